@@ -55,6 +55,7 @@ mod place;
 mod proofs;
 mod protocol;
 mod python_client;
+mod rates;
 mod readers;
 mod readme;
 mod recheck;

@@ -53,3 +53,37 @@ fn simulation_faults_break_single_runs_and_the_campaign_continues() {
         assert_eq!(history.run(&row.run).unwrap().reason.is_some(), row.status == RunStatus::Broken);
     }
 }
+
+/// Every run of a campaign ended with the same fault, thousands of times.
+#[test]
+fn a_campaign_whose_first_runs_all_break_for_the_same_reason_stops() {
+    let folder = tempfile::tempdir().unwrap();
+    let overrides = Overrides { runs: Some(9), history: Some(folder.path().join("h")), ..Overrides::default() };
+    let env = Env::prepare(&root().join("configs/lone_glass.toml"), &overrides).unwrap();
+    let history = History::open(&env.campaign.history).unwrap();
+    let clock = Clock { now: || "2026-01-01T00:00:00Z".to_owned(), secs: || 0.0 };
+    for (id, disturb, runs) in [("all", all as fn(u64, &mut World), 5), ("others", all_but_the_third, 9)] {
+        history.begin_campaign(&env.record(id.into(), "pick".into(), (clock.now)())).unwrap();
+        let options = CampaignOptions { jobs: 2, context: RunContext { clock, disturb: Some(disturb) } };
+        let end = run_all(&env, &history, id, &options, &AtomicBool::new(false), |_| ());
+        assert_eq!(end.committed, runs, "{id}: {:?}", end.ending);
+        match end.ending {
+            Ending::Stopped(faults) => {
+                let fault = faults.iter().next().unwrap();
+                assert_eq!((id, fault.code), ("all", "S034"));
+                assert!(fault.message.starts_with("the first 5 runs were all broken for the same reason: "), "{fault}");
+            }
+            ending => assert_eq!(id, "others", "{ending:?}"),
+        }
+    }
+}
+
+fn all(_: u64, world: &mut World) {
+    assert!(world.poison("glass_1", Poison::NotFinite));
+}
+
+fn all_but_the_third(index: u64, world: &mut World) {
+    if index != 2 {
+        all(index, world);
+    }
+}

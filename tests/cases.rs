@@ -4,8 +4,10 @@ use std::path::Path;
 
 use serde_json::Value;
 
+use actcheck::history::History;
+
 use crate::support::look::blurred;
-use crate::support::{actcheck, copy, edit, project, root, stderr, stdout};
+use crate::support::{actcheck, copy, edit, project, root, script, stderr, stdout};
 
 /// A project in which the second run of a campaign of two fails. Returns the campaign's id.
 fn failing(folder: &Path) -> String {
@@ -288,4 +290,54 @@ fn only_the_first_shard_runs_the_regressions() {
     assert_eq!(merged.status.code(), Some(0), "{}", stderr(&merged));
     let list = stdout(&actcheck(project.path(), &["list", "--history", "whole", "--format", "csv"]));
     assert_eq!(list.lines().count(), 4, "two runs and the case: {list}");
+}
+
+/// A case pinned the skills with which it was recorded: a program that can't start was reported as "1 fails again".
+#[test]
+fn regressions_test_the_skills_of_the_campaign() {
+    let project = project();
+    let folder = project.path();
+    let run = failing(folder);
+    actcheck(folder, &["export", &run, "--regression", "--history", "h"]);
+    script(&folder.join("configs/no_skill.sh"), "#!/bin/sh\necho no robot here\nexit 3\n");
+    let pick = std::fs::read_to_string(folder.join("configs/lone_glass.toml")).unwrap();
+    let text = pick.replace("test_launcher = \"reference\"", "test_launcher = \"./no_skill.sh\"");
+    assert_ne!(text, pick);
+    std::fs::write(folder.join("configs/mine.toml"), text).unwrap();
+    let output = actcheck(folder, &["run", "configs/mine.toml", "--runs", "1", "--history", "h4", "--jobs", "1"]);
+    let told = stdout(&output);
+    assert_eq!(output.status.code(), Some(2), "{told}{}", stderr(&output));
+    assert!(
+        told.starts_with(&format!("regressions: 1 ran, 1 could not be decided: {run}.toml (the program")),
+        "{told}"
+    );
+
+    // The run of the case is stored with the program that performed it.
+    let list = stdout(&actcheck(folder, &["list", "--history", "h4", "--format", "csv"]));
+    let case = list.lines().nth(1).unwrap().split(',').next().unwrap();
+    let shown = stdout(&actcheck(folder, &["show", case, "--history", "h4"]));
+    assert!(shown.contains("the program printed last:\n  no robot here"), "{shown}");
+    let again = actcheck(folder, &["export", case, "-o", "-", "--history", "h4"]);
+    assert!(stdout(&again).contains("no_skill.sh"), "{}{}", stdout(&again), stderr(&again));
+}
+
+/// The cases of a campaign ran again whenever it was resumed.
+#[test]
+fn a_resumed_campaign_keeps_the_results_of_its_regressions() {
+    let project = project();
+    let folder = project.path();
+    let run = failing(folder);
+    actcheck(folder, &["export", &run, "--regression", "--history", "h"]);
+    let arguments = ["run", "configs/lone_glass.toml", "--runs", "2", "--history", "h5", "--format", "json"];
+    let whole: Value = serde_json::from_str(&stdout(&actcheck(folder, &arguments))).unwrap();
+    let id = whole["campaign"].as_str().unwrap();
+    let history = History::open(&folder.join("h5")).unwrap();
+    history.reopen_campaign(id).unwrap();
+    drop(history);
+    let resumed = actcheck(folder, &["run", "--resume", "--history", "h5", "--format", "json"]);
+    let resumed: Value = serde_json::from_str(&stdout(&resumed)).unwrap_or_else(|_| panic!("{}", stderr(&resumed)));
+    assert_eq!(resumed["regressions"], whole["regressions"], "{resumed:#}");
+    assert_eq!(resumed["exit_code"], whole["exit_code"]);
+    let list = stdout(&actcheck(folder, &["list", "--history", "h5", "--format", "csv"]));
+    assert_eq!(list.lines().count(), 4, "two runs and one case: {list}");
 }

@@ -2,7 +2,7 @@
 
 use serde_json::Value;
 
-use crate::support::{actcheck, project, stderr, stdout};
+use crate::support::{actcheck, edit, project, stderr, stdout};
 
 #[test]
 fn a_new_property_is_judged_as_soon_as_it_is_written() {
@@ -96,4 +96,63 @@ fn old_names_of_options_are_hidden_aliases() {
         let run = actcheck(folder.path(), &["datalog", "one.rls", &format!("--max-time={wrong}")]);
         assert_eq!(run.status.code(), Some(2), "{wrong}");
     }
+}
+
+#[test]
+fn the_last_runs_have_names_and_help_and_init_are_commands() {
+    let project = project();
+    let folder = project.path();
+    let list =
+        |more: &[&str]| stdout(&actcheck(folder, &[&["list", "--history", "h", "--format", "csv"], more].concat()));
+    let shown = |name: &str| actcheck(folder, &["show", name, "--history", "h"]);
+    let run = actcheck(folder, &["run", "configs/pick.toml", "--runs", "6", "--history", "h"]);
+    assert_eq!(run.status.code(), Some(1), "{}", stderr(&run));
+    for (name, rows) in [("@last", list(&[])), ("@last-failed", list(&["--failed"]))] {
+        let id = rows.lines().last().unwrap().split(',').next().unwrap();
+        let output = shown(name);
+        assert!(stdout(&output).starts_with(&format!("run {id} ")), "{name}: {}{}", stdout(&output), stderr(&output));
+    }
+    let run = actcheck(folder, &["run", "configs/lone_glass.toml", "--runs", "1", "--history", "whole"]);
+    assert_eq!(run.status.code(), Some(0), "{}", stderr(&run));
+    let none = actcheck(folder, &["show", "@last-failed", "--history", "whole"]);
+    assert!(stderr(&none).contains("has no run in which a property failed"), "{}", stderr(&none));
+
+    let help = stdout(&actcheck(folder, &["help", "run"]));
+    assert_eq!(help, stdout(&actcheck(folder, &["run", "--help"])));
+    let empty = tempfile::tempdir().unwrap();
+    let init = actcheck(empty.path(), &["init"]);
+    assert!(init.status.success(), "{}", stderr(&init));
+    let new = actcheck(tempfile::tempdir().unwrap().path(), &["new", "campaign"]);
+    assert_eq!(stdout(&init), stdout(&new));
+}
+
+/// An empty table is also the answer to a misspelt query.
+#[test]
+fn an_empty_answer_names_the_terms_that_do_not_exist() {
+    let project = project();
+    actcheck(project.path(), &["run", "configs/lone_glass.toml", "--runs", "1", "--history", "h"]);
+    let told = |query: &str| {
+        let output = actcheck(project.path(), &["query", "--history", "h", query]);
+        assert!(output.status.success(), "{}", stderr(&output));
+        stderr(&output)
+    };
+    let misspelt = told("SELECT ?run { ?o act:ofRun ?run ; act:rol \"target\" }");
+    assert!(misspelt.contains("no term `act:rol`") && misspelt.contains("did you mean `act:role`?"), "{misspelt}");
+    assert_eq!(told("SELECT ?run { ?o act:ofRun ?run ; act:role \"act:rol\" }"), "");
+    assert_eq!(told("SELECT ?a { GRAPH act:rechecked { ?a earl:test act:MovedObject } FILTER(act:counts(?a)) }"), "");
+}
+
+/// A broken file that no scene can contain stopped every campaign of the folder.
+#[test]
+fn a_broken_model_stops_only_the_campaigns_that_name_it() {
+    let project = project();
+    let folder = project.path();
+    std::fs::write(folder.join("models/objects/broken.toml"), "category = \"act:Glass\"\n[").unwrap();
+    let check = actcheck(folder, &["check", "configs/pick.toml"]);
+    assert!(check.status.success(), "{}", stderr(&check));
+    assert!(stderr(&check).contains("C002") && stderr(&check).contains("broken.toml"), "{}", stderr(&check));
+    edit(&folder.join("configs/pick.toml"), "model_list = [\"glass\"]", "model_list = [\"glass\", \"broken\"]");
+    let check = actcheck(folder, &["check", "configs/pick.toml"]);
+    assert_eq!(check.status.code(), Some(2), "{}", stdout(&check));
+    assert!(stderr(&check).contains("C002"), "{}", stderr(&check));
 }

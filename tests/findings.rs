@@ -229,6 +229,7 @@ fn summary_of(table: &OutcomeTable, report: PropertyReport) -> FindingsSummary {
         options: String::new(),
         campaigns: vec!["k".to_owned()],
         runs: table.text("run").texts.len() as u64,
+        twins: 0,
         counts: report.findings.counts,
         modes: Vec::new(),
         cascades: Vec::new(),

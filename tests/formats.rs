@@ -202,6 +202,13 @@ fn junit_is_valid_and_has_the_true_counts() {
         let elements = |name: &str| suite.descendants().filter(|node| node.has_tag_name(name)).count();
         assert_eq!(counts(idx), [elements("testcase"), elements("failure"), elements("error"), elements("skipped")]);
     }
+    // Times are those of the clock, not of the simulation: a server adds them up.
+    for (suite, runs) in suites.iter().zip([fifteen(), six()]) {
+        let secs = |node: roxmltree::Node<'_, '_>| node.attribute("time").unwrap().parse::<f64>().unwrap();
+        let cases: f64 = suite.children().filter(|node| node.has_tag_name("testcase")).map(secs).sum();
+        let wall: f64 = runs.iter().map(|run| run.wall_secs).sum();
+        assert!(wall > 0.0 && (secs(*suite) - wall).abs() < 1e-3 && (cases - wall).abs() < 1e-3, "{cases} {wall}");
+    }
     let kinds: BTreeSet<&str> = document
         .descendants()
         .filter(|node| node.has_tag_name("error"))

@@ -47,9 +47,17 @@ fn runs_are_listed_by_outcome_and_property() {
     assert!(column(&dropped, "ObjectInGripper").iter().all(|word| *word == "failed"));
     assert_eq!(dropped.len(), column(&judged, "ObjectInGripper").iter().filter(|word| **word == "failed").count());
 
+    let light = rows(folder, &["--where", "target_mass_kg < 0.3"]);
+    let heavy = rows(folder, &["--where", "target_mass_kg >= 0.3", "--where", "target_category = Glass"]);
+    assert!(!light.is_empty() && !heavy.is_empty() && light.len() + heavy.len() == all.len(), "{light:?} {heavy:?}");
+    let far = rows(folder, &["--failed", "--property", "ObjectInGripper", "--where", "score <= 1"]);
+    assert_eq!(far, dropped);
+    assert!(rows(folder, &["--failed", "--property", "ObjectInGripper", "--where", "outcome = passed"]).is_empty());
+
     let list = |options: &[&str], text: &str| refused(folder, &[&["list", "--history", "h"], options].concat(), text);
     list(&["--property", "ObjectInGriper"], "did you mean `ObjectInGripper`?");
     list(&["--outcome", "fail"], "failed");
+    list(&["--where", "target_mass < 0.3"], "did you mean `target_mass_kg`?");
     list(&["--failed", "--outcome", "passed"], "cannot be used with");
     list(&["--campaign", "zzzz"], "H014");
 }

@@ -98,3 +98,29 @@ fn the_other_examples_perform_their_actions() {
         assert!(kept.contains(words) || kept.contains("the hand is empty"), "{example}: {kept}");
     }
 }
+
+/// A typing error in a skill was a failure of the robot, in every run.
+#[test]
+fn an_exception_in_a_skill_breaks_the_run_and_soon_ends_the_campaign() {
+    let folder = project();
+    let skill = "import actcheck\n\n\n@actcheck.skill(\"Pick\")\ndef pick(robot, pickObject):\n    \
+                 robot.look_fro(pickObject)\n\n\nactcheck.serve()\n";
+    std::fs::write(folder.path().join("configs/mistyped.py"), skill).unwrap();
+    let pick = std::fs::read_to_string(folder.path().join("configs/pick.toml")).unwrap();
+    let named = pick.replace("test_launcher = \"reference\"", "test_launcher = \"mistyped.py\"");
+    std::fs::write(folder.path().join("configs/mistyped.toml"), named).unwrap();
+    let output = Command::new(env!("CARGO_BIN_EXE_actcheck"))
+        .args(["run", "configs/mistyped.toml", "--runs", "50", "--format", "json", "--history", "h"])
+        .current_dir(folder.path())
+        .env("PATH", path())
+        .output()
+        .unwrap();
+    let (json, said): (Value, String) = (serde_json::from_slice(&output.stdout).unwrap(), stderr(&output));
+    assert_eq!((output.status.code(), json["finished_runs"].as_u64()), (Some(2), Some(5)), "{said}");
+    assert!(said.contains("S033") && said.contains("the first 5 runs were all broken"), "{said}");
+    assert_eq!([&json["counts"]["failed"], &json["counts"]["broken"]], [0, 25], "{json:#}");
+    let reason = json["runs"][0]["reason"].as_str().unwrap();
+    assert!(reason.contains("no attribute 'look_fro'") && reason.contains("mistyped.py, line 6"), "{reason}");
+    let shown = stdout(&actcheck(folder.path(), &["show", json["runs"][0]["run"].as_str().unwrap(), "--history", "h"]));
+    assert!(shown.contains("Traceback (most recent call last)"), "{shown}");
+}

@@ -129,6 +129,57 @@ fn a_recheck_uses_current_or_older_rules_and_writes_no_duplicates() {
     assert_eq!(ask(folder, "h", RECHECKED), "n\n12\n");
 }
 
+/// Only `compare` and queries knew the results of `recheck`.
+#[test]
+fn every_command_knows_a_property_and_an_outcome_after_a_recheck() {
+    let project = project();
+    let folder = project.path();
+    let said = |arguments: &[&str]| {
+        let output = actcheck(folder, &[arguments, &["--history", "h"]].concat());
+        assert!(output.status.success(), "{arguments:?}: {}", stderr(&output));
+        stdout(&output)
+    };
+    let output = actcheck(folder, &["run", "configs/lone_glass.toml", "--runs", "2", "--history", "h"]);
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    // The tables beside the history are made before it is judged again.
+    said(&["analyse"]);
+    add_property(folder);
+    change_rule(folder);
+    recheck_json(folder, &[]);
+    let ontology = ["--ontology", "ontology/actions.ttl"];
+    let rules: Value = serde_json::from_str(&said(&[&["rules", "--format", "json"], &ontology[..]].concat())).unwrap();
+    let counts = |name: &str| {
+        let row = rules.as_array().unwrap().iter().find(|row| row["property"] == name).unwrap();
+        [&row["passed"], &row["failed"]].map(|count| count.as_u64().unwrap())
+    };
+    let (upright, moved) = (counts("StaysUpright"), counts("MovedObject"));
+    assert_eq!((upright[0] + upright[1], moved[0] + moved[1]), (2, 2), "{rules:#}");
+    assert!(moved[1] > 0, "every pick moves its object so far: {rules:#}");
+
+    let list = said(&["list", "--property", "MovedObject", "--failed", "--format", "csv"]);
+    assert_eq!(list.lines().count() as u64, moved[1] + 1, "{list}");
+    let run = list.lines().nth(1).unwrap().split(',').next().unwrap();
+    let shown = said(&["show", run]);
+    assert!(shown.contains("StaysUpright") && shown.contains("MovedObject"), "{shown}");
+    assert!(
+        shown.contains("judged again by `actcheck recheck`: MovedObject was passed, StaysUpright is new"),
+        "{shown}"
+    );
+    assert!(said(&["why", run, "StaysUpright"]).contains("StaysUpright"));
+    let markdown = said(&["report", "--markdown"]);
+    assert!(
+        markdown.contains("| StaysUpright |") && markdown.contains(&format!(" ({} of 2) |", moved[0])),
+        "{markdown}"
+    );
+    for name in ["StaysUpright", "MovedObject"] {
+        let [passed, failed] = counts(name);
+        let found: Value = serde_json::from_str(&said(&["analyse", "--property", name, "--format", "json"])).unwrap();
+        let outcomes = &found["properties"][0]["outcomes"];
+        assert_eq!([&outcomes["passed"], &outcomes["failed"]], [passed, failed], "{found:#}");
+    }
+    assert!(said(&["health", "--integrity"]).contains("intact"));
+}
+
 #[test]
 fn impossible_rechecks_are_refused_without_writes() {
     let project = project();

@@ -113,54 +113,31 @@ fn with_marker() -> tempfile::TempDir {
 
 /// A pull request with a file below `regressions/` ran its program on the machine that tests the request.
 #[test]
-fn a_case_starts_another_program_only_with_consent() {
+fn a_case_starts_the_program_that_it_names_only_alone_and_with_consent() {
     let folder = with_marker();
     let (here, mark) = (folder.path(), folder.path().join("mark"));
     campaign(here, "../mark.sh", "[case]\nchoices = {}\n");
     std::fs::rename(here.join("c.toml"), here.join("regressions/theirs.toml")).unwrap();
-    campaign(here, "", "");
-    let run = ["run", "c.toml", "--history", "h"];
-    let said = refused(here, &run);
+    let alone = ["run", "regressions/theirs.toml", "--history", "h"];
+    let said = refused(here, &alone);
     let place = "regressions/theirs.toml:3:1";
     assert!(
         said.contains("X059") && said.contains(place) && said.contains("mark.sh") && said.contains("--trust"),
         "{said}"
     );
-    let said = refused(here, &["run", "regressions/theirs.toml", "--history", "h"]);
-    assert!(said.contains("X059") && said.contains("--trust"), "{said}");
-    let checked = actcheck(here, &["check", "c.toml"]);
-    assert_eq!(checked.status.code(), Some(0), "{}", stderr(&checked));
-    // Another program of the campaign's own does not help.
-    script(&here.join("other.sh"), "#!/bin/sh\nexit 0\n");
-    campaign(here, "./other.sh", "");
-    assert!(refused(here, &run).contains("X059"));
-    assert!(!mark.exists());
-    let output = actcheck(here, &[&run[..], &["--trust"]].concat());
-    assert!(mark.exists() && !stderr(&output).contains("X059"), "{}", stderr(&output));
-}
-
-/// The same program in another environment or folder is another program: both can change the code that it loads.
-#[test]
-fn a_case_with_the_campaigns_own_program_needs_no_consent() {
-    let folder = with_marker();
-    let (here, mark) = (folder.path(), folder.path().join("mark"));
-    let case = |more: &str| {
-        campaign(here, "../mark.sh", &format!("{more}[case]\nchoices = {{}}\n"));
-        std::fs::rename(here.join("c.toml"), here.join("regressions/ours.toml")).unwrap();
-        campaign(here, "./mark.sh", "");
-    };
-    let run = ["run", "c.toml", "--history", "h"];
-    for more in [
-        "",
-        "[skill]\ndir = \"..\"\nenv = { LD_PRELOAD = \"theirs.so\" }\n",
-        "[skill]\ndir = \"..\"\nargs = [\"-c\"]\n",
-    ] {
-        case(more);
-        assert!(refused(here, &run).contains("X059"), "{more}");
-        assert!(!mark.exists(), "{more}");
+    // As a regression it is performed by the campaign's own skills, whatever it names.
+    script(&here.join("other.sh"), "#!/bin/sh\ntouch \"$(dirname \"$0\")/other\"\n");
+    for own in ["", "./other.sh"] {
+        campaign(here, own, "");
+        let checked = actcheck(here, &["check", "c.toml"]);
+        assert_eq!(checked.status.code(), Some(0), "{}", stderr(&checked));
+        for more in [&[][..], &["--trust"]] {
+            let output = actcheck(here, &[&["run", "c.toml", "--history", "h"], more].concat());
+            assert!(stdout(&output).contains("regressions: 1 ran"), "{}{}", stdout(&output), stderr(&output));
+        }
     }
-    case("[skill]\ndir = \"..\"\n");
-    let output = actcheck(here, &run);
+    assert!(here.join("other").exists() && !mark.exists());
+    let output = actcheck(here, &[&alone[..], &["--trust"]].concat());
     assert!(mark.exists() && !stderr(&output).contains("X059"), "{}", stderr(&output));
 }
 

@@ -1,12 +1,36 @@
-//! Checks that the scene of a case, a configuration with one fixed scene, can be built as written.
+//! Prepares cases, configurations with one fixed scene, and checks that the scene can be built as written.
 
 use std::collections::BTreeMap;
+use std::path::Path;
 
+use crate::Env;
+use crate::export::skill_seen_from;
 use actcheck_base::{Diagnostic, Diagnostics, nearest};
-use actcheck_config::{Campaign, Case};
+use actcheck_config as config;
+use actcheck_config::{Campaign, Case, Overrides};
 use actcheck_data::{Choice, ChoiceKind, ChoiceName, ChoiceValue, Choices, ObjectAxis, Scene, SightingAxis};
+use actcheck_rules::Budget;
 use actcheck_scenario as scenario;
 use actcheck_scenario::Space;
+
+impl Env {
+    /// Prepares a case that tests the skills of a campaign: it has a scene and the expected failures, and the campaign's
+    /// own skills perform its actions, whichever program the file names. Its history is the campaign's.
+    ///
+    /// # Errors
+    /// As [`Env::prepare`].
+    pub fn prepare_case(file: &Path, campaign: &Campaign, rule_budget: Budget) -> Result<Self, Diagnostics> {
+        let overrides = Overrides {
+            history: Some(campaign.history.clone()),
+            launcher: Some(campaign.launcher.clone()),
+            ..Overrides::default()
+        };
+        let mut env = Self::prepare_within(file, &overrides, rule_budget)?;
+        let skill = skill_seen_from(file.parent().unwrap_or(Path::new("")), &campaign.launcher);
+        env.text = config::with_skills(&env.campaign.source, campaign, skill)?;
+        Ok(env)
+    }
+}
 
 /// Finds the choices of a case that can't have their written values: S061 the scene has no such choice, S062 the value
 /// is out of bounds, S063 another object is in the way, S060 the scene can't be built at all. Warns of an index that

@@ -33,6 +33,8 @@ pub struct Env {
     pub rules: RuleBook,
     /// Budget for judging one property.
     pub rule_budget: Budget,
+    /// The configuration's text for the record: with the skills that perform the actions.
+    pub(super) text: String,
     /// The requirement on scenes, if the configuration has one.
     pub(super) requirement: Option<Requirement>,
     /// The program that performs actions instead of the reference skills, if the configuration names one.
@@ -151,7 +153,8 @@ impl Env {
                     campaign.warnings.extend(of_case);
                 }
                 let programs = programs(&campaign);
-                faults.or(Self { campaign, ontology, space, rules, rule_budget, requirement, programs })
+                let text = campaign.source.text.to_string();
+                faults.or(Self { campaign, ontology, space, rules, rule_budget, text, requirement, programs })
             }
             _ => Err(faults),
         }
@@ -181,8 +184,8 @@ impl Env {
         CampaignRecord {
             id,
             name,
-            config_text: self.campaign.source.text.to_string(),
-            config_digest: actcheck_base::digest_of(&self.campaign.source.text),
+            config_text: self.text.clone(),
+            config_digest: actcheck_base::digest_of(&self.text),
             config_path: path_from(&self.campaign.history, Path::new(&*self.campaign.source.name)),
             ontology_digest: self.ontology.digest.clone(),
             rules,
@@ -259,6 +262,7 @@ pub(super) fn recorded_overrides(history: &History, record: &CampaignRecord) -> 
         until_width: record.until_width,
         max_failures: record.max_failures,
         history: Some(history.dir().to_path_buf()),
+        launcher: None,
     }
 }
 

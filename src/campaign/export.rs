@@ -46,7 +46,7 @@ pub fn export(
         trace: &trace.hash,
         choices: &choices,
         paths: [None, None, None],
-        skill: skill_seen_from(&folder, env),
+        skill: skill_seen_from(&folder, &env.campaign.launcher),
     };
     let source = &env.campaign.source;
     let (home, written) = (home(source), config::written_paths(source)?);
@@ -79,9 +79,10 @@ fn with_candidates(env: &Env, index: u64, mut choices: Vec<Choice>) -> Vec<Choic
 }
 
 /// The program that performs actions and its working folder, as a configuration in `folder` names them.
-fn skill_seen_from(folder: &Path, env: &Env) -> Option<(Option<String>, String)> {
-    let Launcher::Program(skill) = &env.campaign.launcher else { return None };
-    let seen = |path: &Path| seen_from(folder, &absolute(path));
+pub(crate) fn skill_seen_from(folder: &Path, launcher: &Launcher) -> Option<(Option<String>, String)> {
+    let Launcher::Program(skill) = launcher else { return None };
+    let folder = absolute(folder);
+    let seen = |path: &Path| seen_from(&folder, &absolute(path));
     Some((skill.launcher(seen), seen(&skill.dir)))
 }
 

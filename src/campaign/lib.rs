@@ -3,6 +3,7 @@
 //! Never: prints, reads the command line or a system clock, or depends on the internals of a stage.
 
 mod attempt;
+mod broken_runs;
 mod budget;
 mod case;
 mod changes;

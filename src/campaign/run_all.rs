@@ -6,6 +6,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::sync::{Mutex, PoisonError};
 
+use crate::broken_runs::BrokenRuns;
 use crate::make_run::{Making, make_run};
 use crate::tally::Tally;
 use crate::workers::workers;
@@ -13,8 +14,7 @@ use crate::{
     CampaignResult, Clock, Ending, Env, ExhaustedBudget, Planned, RunContext, RunResult, Schedule, StoredRuns,
     schedule_of,
 };
-use actcheck_base::{Diagnostic, Diagnostics};
-use actcheck_config::Launcher;
+use actcheck_base::Diagnostics;
 use actcheck_history::{History, RunRecord};
 
 /// Maximum number of runs per worker that are made but not stored yet, because an earlier run is missing.
@@ -187,10 +187,7 @@ struct RunWriter<'a> {
     on_run: &'a mut dyn FnMut(&RunRecord),
     end: CampaignResult,
     tally: Tally,
-    /// Number of latest runs in a row that the program broke by a fault of its own.
-    broken_in_a_row: u64,
-    /// Limit on `broken_in_a_row`.
-    most_broken: Option<u64>,
+    broken: BrokenRuns,
     /// Summaries of the batch's runs for the schedule.
     results: Vec<RunResult>,
 }
@@ -205,10 +202,6 @@ impl<'a> RunWriter<'a> {
         on_run: &'a mut dyn FnMut(&RunRecord),
     ) -> Self {
         let end = CampaignResult { ending: Ending::Finished, committed: 0, discards: Vec::new(), rates: Vec::new() };
-        let most_broken = match &env.campaign.launcher {
-            Launcher::Reference => None,
-            Launcher::Program(skill) => Some(skill.max_broken),
-        };
         let tally = Tally::new(env);
         Self {
             history,
@@ -218,8 +211,7 @@ impl<'a> RunWriter<'a> {
             on_run,
             end,
             tally,
-            broken_in_a_row: 0,
-            most_broken,
+            broken: BrokenRuns::new(&env.campaign.launcher),
             results: Vec::new(),
         }
     }
@@ -236,9 +228,18 @@ impl<'a> RunWriter<'a> {
                 self.end.discards.extend(record.discards.iter().map(|reason| (record.index, reason.clone())));
                 (self.on_run)(&record);
                 self.count(RunResult::of(&record))?;
-                self.check_broken_in_a_row(&record)
+                match self.broken.count(&record) {
+                    Some(fault) => {
+                        self.stop(fault.into());
+                        ControlFlow::Break(())
+                    }
+                    None => ControlFlow::Continue(()),
+                }
             }
-            Making::Stored(result) => self.count(result),
+            Making::Stored(result) => {
+                self.broken.resume();
+                self.count(result)
+            }
             Making::Interrupted => {
                 self.end.ending = Ending::Interrupted;
                 ControlFlow::Break(())
@@ -247,20 +248,6 @@ impl<'a> RunWriter<'a> {
                 self.stop(faults);
                 ControlFlow::Break(())
             }
-        }
-    }
-
-    /// Stops the campaign if the program has broken too many runs in a row. Runs are counted in the order of the
-    /// schedule, so that the last one is the same whatever the number of workers. A resumed campaign starts counting
-    /// from 0.
-    fn check_broken_in_a_row(&mut self, record: &RunRecord) -> ControlFlow<()> {
-        self.broken_in_a_row = if record.program_output.is_some() { self.broken_in_a_row + 1 } else { 0 };
-        match self.most_broken {
-            Some(most) if self.broken_in_a_row >= most => {
-                self.stop(too_many_broken(most, record).into());
-                ControlFlow::Break(())
-            }
-            _ => ControlFlow::Continue(()),
         }
     }
 
@@ -295,15 +282,4 @@ impl<'a> RunWriter<'a> {
         self.end.discards.sort();
         self.end
     }
-}
-
-/// The error of a campaign whose program broke `most` runs in a row.
-fn too_many_broken(most: u64, last: &RunRecord) -> Diagnostic {
-    let reason = last.reason.as_deref().unwrap_or_default();
-    let runs = if most == 1 { "a run was".to_owned() } else { format!("{most} runs in a row were") };
-    let message = format!("{runs} broken by the program that performs actions; the last one, {}: {reason}", last.id);
-    Diagnostic::error("S033", message).help(format!(
-        "`actcheck show {}` shows its output; `[skill] max_broken` is the allowed number of such runs in a row",
-        last.id
-    ))
 }

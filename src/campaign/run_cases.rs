@@ -73,7 +73,7 @@ fn store(
     run: FinishedRun,
     context: &RunContext,
 ) -> Result<CaseRun, Diagnostics> {
-    let id = history.next_campaign_id(&actcheck_base::digest_of(&env.campaign.source.text), env.campaign.seed)?;
+    let id = history.next_campaign_id(&actcheck_base::digest_of(&env.text), env.campaign.seed)?;
     let record = run.into_record(RunPlace::alone(&id));
     let mut campaign = env.record(id.clone(), name.to_owned(), record.started.clone());
     campaign.planned_runs = 1;

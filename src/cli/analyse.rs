@@ -159,6 +159,7 @@ pub(super) fn analysed(
         options: asked.typed(),
         campaigns: table.text("campaign").texts.clone(),
         runs: table.text("run").texts.len() as u64,
+        twins: table.counted_runs().iter().filter(|counts| !**counts).count() as u64,
         counts: judged(&table).iter().fold(Counts::default(), |mut sum, of| {
             sum.add_all(of.counts);
             sum

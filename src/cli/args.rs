@@ -31,6 +31,9 @@ pub enum Command {
     /// Write a configuration or a property, ready to edit
     #[command(after_help = "Examples:\n  actcheck new campaign\n  actcheck new property StaysUpright --for Pick")]
     New(crate::new::NewArgs),
+    /// Write a ready-to-run configuration: the same as `actcheck new campaign`
+    #[command(hide = true, after_help = "Example:\n  actcheck init")]
+    Init(crate::new_campaign::NewCampaignArgs),
     /// Check configuration, ontology, rules and models without simulating; reports all mistakes at once
     #[command(after_help = "Example:\n  actcheck check configs/pick.toml")]
     Check(crate::check::CheckArgs),
@@ -54,10 +57,14 @@ pub enum Command {
     )]
     Shrink(crate::shrink::ShrinkArgs),
     /// List the runs of a history
-    #[command(after_help = "Example:\n  actcheck list --format csv")]
+    #[command(
+        after_help = "Examples:\n  actcheck list --format csv\n  actcheck list --failed --property ObjectInGripper --where 'target_mass_kg > 0.3'"
+    )]
     List(crate::list::ListArgs),
     /// Show one run: its scene, and every property's outcome with margin and witness
-    #[command(after_help = "Example:\n  actcheck show k7f3-3    (a run id from `actcheck list`; a prefix is enough)")]
+    #[command(
+        after_help = "Examples:\n  actcheck show k7f3-3    (a run id from `actcheck list`; a prefix is enough)\n  actcheck show @last    (the last run; @last-failed: the last one in which a property failed)"
+    )]
     Show(crate::show::ShowArgs),
     /// Write a report: one HTML page that works offline, or results for Allure, JUnit readers, EARL, …
     ///
@@ -153,9 +160,9 @@ pub enum Command {
     /// Judge stored runs by the current rules, without simulating
     ///
     /// Properties that are newer than the runs are judged too. New and changed outcomes are stored beside the old ones,
-    /// with the digest of the rules and the time; `list`, `show` and the other commands still use the campaign's own
-    /// outcomes. The newest outcomes are those in the graph act:rechecked that no other supersedes (see
-    /// ontology/history.ttl).
+    /// with the digest of the rules and the time. From then on, `rules`, `list`, `show`, `why`, `analyse`, `report` and
+    /// `export` use the newest outcomes; `compare` and `replay` use the campaign's own. In queries, the newest outcomes are
+    /// those in the graph act:rechecked that no other supersedes (see ontology/history.ttl).
     ///
     /// Exit code: 0 no property fails now, 1 a property fails now, 2 the recheck failed or nothing could be decided,
     /// 130 interrupted by Ctrl-C (judgements so far are kept).
@@ -185,7 +192,8 @@ pub enum Command {
     /// elsewhere omits those that are the same as the shipped ones, so that it runs anywhere.
     ///
     /// Tables come from the mirror beside the history (its folder `tables`), which is updated first. They contain no
-    /// shrunk runs, and none of `run --last-failed`.
+    /// shrunk runs, no cases, and no runs of `run --last-failed`. Their column `counts` is false for runs that are
+    /// bit-identical to a later one.
     #[command(
         after_help = "Examples:\n  actcheck export k7f3-3 -o case.toml    (a run id from `actcheck list`; a prefix is enough)\n  actcheck export --parquet tables    (after `actcheck run configs/pick.toml`)\n  actcheck export --nquads history.nq --turtle history.ttl"
     )]

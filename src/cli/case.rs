@@ -10,8 +10,9 @@ use crate::work::quietly;
 use crate::{clock, output, show};
 use actcheck_base::{Diagnostic, Diagnostics, printable_in_colour};
 use actcheck_campaign::{CaseRun, Env, RunContext, run_cases};
-use actcheck_history::History;
+use actcheck_history::{History, RunDetail};
 use actcheck_report::{CaseSummary, case_json, case_text, run_json, run_text};
+use actcheck_verdict::Recurrence;
 
 /// Runs a case and prints whether it still fails in the same way. Returns the exit code.
 pub fn run(args: &RunArgs, env: Env) -> Result<u8, Diagnostics> {
@@ -54,6 +55,20 @@ pub(super) fn summarise(file: &str, env: &Env, made: CaseRun) -> CaseSummary {
         recurrence: made.recurrence,
         same_trace: made.same_trace,
         reason: made.record.reason,
+    }
+}
+
+/// Summarises the stored run of a case.
+pub(super) fn summarise_stored(file: &str, env: &Env, run: &RunDetail) -> CaseSummary {
+    let case = env.campaign.case.clone().unwrap_or_default();
+    let judgements = run.actions.iter().flat_map(|action| &action.judgements);
+    CaseSummary {
+        file: file.to_owned(),
+        run: run.row.run.clone(),
+        recurrence: Recurrence::of(&case.expect.iter().cloned().collect(), judgements),
+        expected: case.expect,
+        same_trace: case.trace.map(|trace| trace == run.row.trace_hash),
+        reason: run.reason.clone(),
     }
 }
 

@@ -29,8 +29,7 @@ pub fn check(args: &CheckArgs, stop: &Arc<AtomicBool>) -> Result<(), Diagnostics
     };
     let budget = Budget { stop: Arc::clone(stop), ..Budget::default() };
     let env = Env::prepare_within(config, &Overrides::default(), budget.clone())?;
-    // Nothing is started here.
-    let cases = if env.campaign.case.is_some() { Vec::new() } else { regressions::prepare(&env, &budget, true)? };
+    let cases = if env.campaign.case.is_some() { Vec::new() } else { regressions::prepare(&env, &budget)? };
     output::print_diagnostics(&env.warnings());
     output::print(&format!(
         "{}: {} tests, {} runs, {} regressions; {} actions and {} properties in {}; {} models; robot {}\n",

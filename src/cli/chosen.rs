@@ -17,8 +17,8 @@ use actcheck_ontology::Ontology;
 /// Runs of a history, and the ontology that explains them.
 #[derive(Debug, Args)]
 pub struct ChosenRuns {
-    /// Only runs of this campaign (may be given several times) [default: all but shrunk and repeated failed
-    /// runs]
+    /// Only runs of this campaign (may be given several times) [default: all but shrunk runs, repeated failed
+    /// runs and cases]
     #[arg(long, value_name = "ID")]
     pub campaign: Vec<String>,
     /// Only runs since this time, such as 2026-11-21, 2026-11-21T18:00:00Z, or 12h for 12 hours ago

@@ -158,7 +158,7 @@ impl Side {
     }
 }
 
-/// Returns the newest campaign of a history, except those that hold a shrunk run or ran failed runs again.
+/// Returns the newest campaign of a history, except those that hold a shrunk run, ran failed runs again, or ran a case.
 ///
 /// # Errors
 /// `X070` there is no such campaign.

@@ -42,6 +42,7 @@ pub fn run(sources_digest: &'static str) -> ExitCode {
         Command::Recheck(args) => recheck::recheck(&args),
         Command::Why(args) => stop::interruptible(|stop| why::why(&args, stop).map(|()| 0)),
         Command::New(args) => new::new(&args).map(|()| 0),
+        Command::Init(args) => crate::new_campaign::campaign(&args).map(|()| 0),
         Command::Datalog(args) => stop::interruptible(|stop| datalog::datalog(&args, stop)),
         Command::Schema(args) => {
             crate::schema::schema(&args);

@@ -30,7 +30,7 @@ pub(super) fn program() -> Command {
         "{{about-with-newline}}\n{{usage-heading}} {{usage}}\n\n{}{heading}Options:{heading:#}\n{{options}}{{after-help}}",
         listed(heading)
     );
-    Arguments::command().help_template(help)
+    Arguments::command().disable_help_subcommand(false).help_template(help)
 }
 
 /// The program with all commands except the hidden ones, for completions and the manual.

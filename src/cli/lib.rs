@@ -58,6 +58,7 @@ mod shrink;
 mod stop;
 mod trust;
 mod when;
+mod where_rows;
 mod why;
 mod work;
 

@@ -7,6 +7,7 @@ use serde_json::Value;
 
 use crate::chosen::{self, is_meant};
 use crate::options::{Format, HistoryArgs};
+use crate::where_rows::{Condition, matching_runs};
 use crate::{history_dir, output};
 use actcheck_base::{Diagnostics, Outcome, did_you_mean, names};
 use actcheck_history::{History, OutcomeRow, RunFilter, RunRow};
@@ -31,9 +32,22 @@ pub struct ListArgs {
     /// Only runs in which a property has this outcome: passed, failed, inapplicable, broken, timeout or untested
     #[arg(long, value_name = "OUTCOME", value_parser = outcome, conflicts_with = "failed")]
     pub outcome: Option<Outcome>,
+    /// Only runs with an outcome that satisfies this condition on a column of the table of outcomes, such as
+    /// `target_mass_kg > 0.3` or `target_category = Glass` (may be given several times; `actcheck export --csv` writes
+    /// the table and describes its columns). With `--property`, `--failed` or `--outcome`, one of these outcomes must
+    /// satisfy it. Shrunk runs, cases and failed runs that ran again are not in the table
+    #[arg(long = "where", value_name = "COLUMN<VALUE", value_parser = Condition::parse)]
+    pub conditions: Vec<Condition>,
     /// How the table is printed
     #[arg(long, value_name = "FORMAT", value_enum, default_value_t)]
     pub format: Format,
+}
+
+impl ListArgs {
+    /// The outcome that a run must have.
+    fn wanted(&self) -> Option<Outcome> {
+        if self.failed { Some(Outcome::Failed) } else { self.outcome }
+    }
 }
 
 /// Returns a run's value in a column.
@@ -49,6 +63,11 @@ pub fn list(args: &ListArgs) -> Result<(), Diagnostics> {
     let mut runs = history.runs(&filter)?;
     let judged = Judged::read(args, &history, &filter)?;
     runs.retain(|row| judged.as_ref().is_none_or(|judged| judged.has(&row.run)));
+    if !args.conditions.is_empty() {
+        let campaign = args.campaign.as_ref();
+        let found = matching_runs(&history, campaign, &args.property, args.wanted(), &args.conditions)?;
+        runs.retain(|row| found.contains(&row.run));
+    }
     // Most campaigns have neither, so empty columns are hidden.
     let repeated = runs.iter().any(|row| row.repetition.is_some());
     let weighted = runs.iter().any(|row| row.weight.is_some());
@@ -91,11 +110,11 @@ struct Judged {
 impl Judged {
     /// Reads the outcomes that the options name. Returns `None` if no option chooses runs by outcome.
     fn read(args: &ListArgs, history: &History, filter: &RunFilter) -> Result<Option<Self>, Diagnostics> {
-        let wanted = if args.failed { Some(Outcome::Failed) } else { args.outcome };
+        let wanted = args.wanted();
         if wanted.is_none() && args.property.is_empty() {
             return Ok(None);
         }
-        let rows = history.outcomes(filter)?;
+        let rows = history.newest_outcomes(filter)?.rows;
         chosen::all_judged(&args.property, rows.iter().map(|row| row.property.as_str()))?;
         let is_named = |row: &OutcomeRow| args.property.iter().any(|name| is_meant(&row.property, name));
         let mut outcomes: BTreeMap<String, Vec<OutcomeRow>> = BTreeMap::new();

@@ -6,10 +6,13 @@ use std::path::PathBuf;
 use clap::Args;
 
 use crate::options::{HistoryArgs, QueryFormat};
+use crate::why::ontology_file;
 use crate::{history_dir, named_queries, output, stop};
 use actcheck_base::{Diagnostic, Diagnostics, Files, Source, Term, names};
 use actcheck_history::{Cancel, QueryAnswer};
+use actcheck_ontology::{Vocabulary, load_vocabulary};
 use actcheck_report::{Table, TableFormat, answer_table};
+use actcheck_rules::unknown_terms;
 
 /// `actcheck query`
 #[derive(Debug, Args)]
@@ -61,7 +64,30 @@ pub fn query(args: &QueryArgs) -> Result<(), Diagnostics> {
         (QueryFormat::Json, _) => TableFormat::Json,
     };
     output::print(&answer_table(&answer, format == TableFormat::Table).render(format));
+    if is_empty(&answer) {
+        output::print_diagnostics(&unknown_terms(&text, &vocabulary()));
+    }
     Ok(())
+}
+
+fn is_empty(answer: &QueryAnswer) -> bool {
+    match answer {
+        QueryAnswer::Boolean(is) => !is,
+        QueryAnswer::Table { rows, .. } => rows.is_empty(),
+        QueryAnswer::Graph(triples) => triples.is_empty(),
+    }
+}
+
+/// The terms of histories, of the world, and of the ontology in this folder. Files that can't be read are left out: the
+/// query has been answered without them.
+fn vocabulary() -> Vocabulary {
+    let shipped = ["ontology/history.ttl", "ontology/world.ttl", "ontology/actions.ttl"];
+    let mut files: Vec<(Files, PathBuf)> = shipped.map(|file| (Files::Shipped, PathBuf::from(file))).into();
+    files.push(ontology_file(None));
+    let read = files.iter().filter_map(|(files, path)| load_vocabulary(files, path).ok());
+    let mut all = Vocabulary::default();
+    all.terms.extend(read.flat_map(|vocabulary| vocabulary.terms));
+    all
 }
 
 /// Prints the named queries. Needs no history.

@@ -3,34 +3,27 @@
 use std::path::{Path, PathBuf};
 
 use crate::work::quietly;
-use crate::{case, clock, trust};
+use crate::{case, clock};
 use actcheck_base::{Diagnostic, Diagnostics};
 use actcheck_campaign as campaign;
 use actcheck_campaign::{Env, RunContext, run_cases};
-use actcheck_config::Overrides;
-use actcheck_history::History;
+use actcheck_history::{CampaignRecord, CampaignRow, History, RunDetail, RunFilter};
 use actcheck_report::CaseSummary;
 use actcheck_rules::Budget;
 
-/// Prepares the cases of a campaign, sorted by file name. Of a campaign in parts, only the first part gets them.
-/// Their runs go into the campaign's history. Unless `trusted`, they must not start a program of their own.
+/// Prepares the cases of a campaign, sorted by file name. The campaign's own skills perform them, so no program that a
+/// case names is started. Of a campaign in parts, only the first part gets them. Their runs go into the campaign's
+/// history.
 ///
 /// # Errors
-/// All faults of all cases at once: those of any configuration, `S065` if a file is not a case, or `X059` if it starts a
-/// program other than the campaign's.
-pub fn prepare(env: &Env, budget: &Budget, trusted: bool) -> Result<Vec<(String, Env)>, Diagnostics> {
+/// All faults of all cases at once: those of any configuration, or `S065` if a file is not a case.
+pub fn prepare(env: &Env, budget: &Budget) -> Result<Vec<(String, Env)>, Diagnostics> {
     let folder = campaign::regressions_folder(&env.campaign.source)?;
-    let overrides = Overrides { history: Some(env.campaign.history.clone()), ..Overrides::default() };
     let mut faults = Diagnostics::new();
     let mut cases = Vec::new();
     for file in files(&folder)? {
-        match Env::prepare_within(&file, &overrides, budget.clone()) {
-            Ok(case) if case.campaign.case.is_some() => {
-                if !trusted && let Err(fault) = trust::check_case(&case, Some(&env.campaign.launcher)) {
-                    faults.extend(fault);
-                }
-                cases.push((name_of(&file), case));
-            }
+        match Env::prepare_case(&file, &env.campaign, budget.clone()) {
+            Ok(case) if case.campaign.case.is_some() => cases.push((name_of(&file), case)),
             Ok(other) => faults.push(
                 Diagnostic::error("S065", "this file is not a case: it has no `[case]`")
                     .in_source(&other.campaign.source)
@@ -63,18 +56,47 @@ fn name_of(file: &Path) -> String {
     file.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned())
 }
 
-/// Runs each case as its own campaign.
+/// Runs each case as its own campaign. Before a campaign that is resumed, only those that did not run before it began.
 ///
 /// # Errors
 /// A scene can no longer be generated, or writing failed.
-pub fn run(cases: &[(String, Env)], history: &History, jobs: usize) -> Result<Vec<CaseSummary>, Diagnostics> {
-    let context = RunContext { clock: clock::system(), disturb: None };
+pub fn run(
+    cases: Vec<(String, Env)>,
+    history: &History,
+    resumed: Option<&CampaignRecord>,
+    jobs: usize,
+) -> Result<Vec<CaseSummary>, Diagnostics> {
     let mut done = Vec::new();
+    let mut new = Vec::new();
+    for (file, env) in cases {
+        match resumed.map(|campaign| made_before(&file, &env, history, campaign)).transpose()?.flatten() {
+            Some(run) => done.push(case::summarise_stored(&file, &env, &run)),
+            None => new.push((file, env)),
+        }
+    }
+    let context = RunContext { clock: clock::system(), disturb: None };
     quietly(|| {
-        run_cases(cases, history, jobs, &context, &mut |at, made| {
-            let (file, env) = &cases[at];
+        run_cases(&new, history, jobs, &context, &mut |at, made| {
+            let (file, env) = &new[at];
             done.push(case::summarise(file, env, made));
         })
     })?;
+    done.sort_by(|a, b| a.file.cmp(&b.file));
     Ok(done)
+}
+
+/// The newest run of an unchanged case that began before a campaign did.
+fn made_before(
+    file: &str,
+    env: &Env,
+    history: &History,
+    campaign: &CampaignRecord,
+) -> Result<Option<RunDetail>, Diagnostics> {
+    let digest = env.record(String::new(), file.to_owned(), String::new()).config_digest;
+    let is_of_case = |row: &CampaignRow| {
+        row.name == file && row.config_digest == digest && row.started <= campaign.started && row.ended.is_some()
+    };
+    let Some(found) = history.campaigns()?.into_iter().rfind(is_of_case) else { return Ok(None) };
+    let rows = history.runs(&RunFilter { campaign: Some(found.id), ..RunFilter::default() })?;
+    rows.first().map(|row| history.run(&row.run)).transpose()
 }

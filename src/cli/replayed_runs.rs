@@ -31,7 +31,7 @@ pub(super) fn for_each(
     // If the current rules can't be read, there are no explanations; the outcomes come from the history.
     let rules = RuleBook::prepare_within(ontology, &budget).ok();
     let read = |id: &String| -> Result<ReplayedRun, Diagnostics> {
-        let run = history.run(id)?;
+        let run = history.newest_run(id)?;
         // A run that broke before its first state has no trace; everything else about it is reported.
         let trace = history.trace(id).ok();
         let explained = rules.as_ref().map(|rules| explained(history, rules, &run, &budget)).unwrap_or_default();

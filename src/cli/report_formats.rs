@@ -9,7 +9,7 @@ use clap::Args;
 use crate::report::ReportArgs;
 use crate::{chosen, output, output_file, replayed_runs, show};
 use actcheck_base::{Diagnostics, Outcome};
-use actcheck_history::{CampaignRow, History, RunDetail, RunFilter, RunRow};
+use actcheck_history::{CampaignRow, History, RunDetail, RunFilter, RunRow, newest_of_alike};
 use actcheck_report::{
     Attachment, Caption, EarlReport, JunitReport, MarkdownReport, Repetitions, allure_common, allure_results, markdown,
     observation, run_picture,
@@ -56,26 +56,27 @@ pub(super) fn write(args: &ReportArgs, history: &History) -> Result<Vec<String>,
     }
     let (campaigns, rows) = asked_for(args, history)?;
     let mut sinks = Sinks::open(args, history, &campaigns)?;
+    let counted = newest_of_alike(&rows);
     let mut judged = BTreeSet::new();
     for row in &rows {
-        let mut run = history.run(&row.run)?;
+        let mut run = history.newest_run(&row.run)?;
         let judgements = run.actions.iter().flat_map(|action| &action.judgements);
         judged.extend(judgements.map(|judgement| judgement.property.clone()));
         args.keep_wanted(&mut run);
-        sinks.take(&run)?;
+        sinks.take(&run, counted.contains(&row.run))?;
     }
     chosen::all_judged(&args.property, judged.iter().map(String::as_str))?;
     sinks.finish(&args.formats, &campaigns)
 }
 
-/// The requested campaigns and runs, in order; shrunk runs, and failed runs that ran again, only if their campaign is
-/// named.
+/// The requested campaigns and runs, in order; shrunk runs, failed runs that ran again, and cases only if their
+/// campaign is named.
 fn asked_for(args: &ReportArgs, history: &History) -> Result<(Vec<CampaignRow>, Vec<RunRow>), Diagnostics> {
     let filter = args.chosen.filter(history)?;
-    let shrunk = history.selected_campaigns()?;
+    let selected = history.selected_campaigns()?;
     let wanted = |id: &String| match &filter.campaigns {
         Some(named) => named.contains(id),
-        None => !shrunk.contains(id),
+        None => !selected.contains(id),
     };
     let since = filter.since.as_deref().unwrap_or_default();
     let mut rows = history.runs(&RunFilter::default())?;
@@ -117,15 +118,18 @@ impl<'a> Sinks<'a> {
         })
     }
 
-    fn take(&mut self, run: &RunDetail) -> Result<(), Diagnostics> {
+    /// Adds a run. Formats with rates leave it out if it does not count; the others list every run.
+    fn take(&mut self, run: &RunDetail, counts: bool) -> Result<(), Diagnostics> {
         if let Some(report) = &mut self.junit {
             report.add(run);
         }
         if let Some(report) = &mut self.earl {
             report.add(run);
         }
-        if let Some(report) = &mut self.markdown {
-            report.add(run);
+        match &mut self.markdown {
+            Some(report) if counts => report.add(run),
+            Some(report) => report.add_twin(run),
+            None => {}
         }
         if let Some(lines) = &mut self.jsonl {
             let campaign = self.campaigns.iter().find(|row| row.id == run.row.campaign);

@@ -36,7 +36,9 @@ pub fn rules(args: &RulesArgs) -> Result<(), Diagnostics> {
     let ontology = ontology::load(&files, &path)?;
     let mut judged: BTreeMap<String, Counts> = BTreeMap::new();
     if let Some(history) = history_dir::open_if_any(&args.history)? {
-        for row in history.outcomes(&RunFilter::default())? {
+        let counted = history.counted_runs()?;
+        let outcomes = history.newest_outcomes(&RunFilter::default())?.rows;
+        for row in outcomes.into_iter().filter(|row| counted.contains(&row.run)) {
             judged.entry(row.property).or_default().add(row.outcome);
         }
     }

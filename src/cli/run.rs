@@ -1,5 +1,6 @@
 //! `actcheck run`
 
+use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, OnceLock};
 
@@ -18,7 +19,7 @@ use actcheck_campaign::{
     CampaignOptions, CampaignResult, Ending, Env, ExhaustedBudget, RunContext, StoredRuns, WeightedRate, resume_all,
 };
 use actcheck_history as history;
-use actcheck_history::{History, RunFilter, RunRecord};
+use actcheck_history::{History, RunFilter, RunRecord, RunRow, newest_of_alike};
 use actcheck_report::{
     CampaignSummary, EndedBy, GuidedSearch, HealthSummary, RunSummary, WeightedLine, campaign_json, campaign_table,
     campaign_text, health_json, health_lines, shrunk_json, shrunk_text, with_shrunk,
@@ -240,8 +241,24 @@ fn failure_modes(history: &History, id: String) -> Result<Vec<analysis::FailureM
     let filter = RunFilter { campaign: Some(id), ..RunFilter::default() };
     let rows = history.outcomes(&filter)?;
     let runs = history.runs(&filter)?;
-    let scenes = runs.into_iter().filter_map(|run| Some((run.run, run.repetition?.scene))).collect();
-    Ok(analysis::failure_modes(&rows, &scenes))
+    Ok(analysis::failure_modes(&rows, &scenes(runs)))
+}
+
+/// The scene of each run: its number if scenes are repeated, or the position of the first run with the same trace. Empty if
+/// all scenes were run once.
+fn scenes(runs: Vec<RunRow>) -> BTreeMap<String, u64> {
+    if runs.iter().any(|run| run.repetition.is_some()) {
+        return runs.into_iter().filter_map(|run| Some((run.run, run.repetition?.scene))).collect();
+    }
+    let alike = newest_of_alike(&runs).len() < runs.len();
+    let mut first: BTreeMap<String, u64> = BTreeMap::new();
+    let mut scenes = BTreeMap::new();
+    for run in runs.into_iter().filter(|_| alike) {
+        let scene =
+            if run.trace_hash.is_empty() { run.index } else { *first.entry(run.trace_hash).or_insert(run.index) };
+        scenes.insert(run.run, scene);
+    }
+    scenes
 }
 
 fn summarise(env: &Env, campaign: String, runs: Vec<RunSummary>, end: &CampaignResult) -> CampaignSummary {

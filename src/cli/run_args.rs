@@ -59,8 +59,8 @@ pub struct RunArgs {
     /// Shrink one run of each failure mode afterwards, as `actcheck shrink` does
     #[arg(long)]
     pub shrink: bool,
-    /// Start the programs that cases name: CONFIG itself, if it is a case, and those of the folder `regressions`. Without
-    /// it, they run only with the reference skills or with the campaign's own program
+    /// Start the program that CONFIG names if it is a case; without it, a case runs only with the reference skills. Files
+    /// of the folder `regressions` need no consent: the campaign's own skills perform them
     #[arg(long)]
     pub trust: bool,
     /// Folder of the history [default: `.actcheck` beside the configuration]

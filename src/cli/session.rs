@@ -41,8 +41,8 @@ pub struct Session {
     pub regressions: Vec<CaseSummary>,
 }
 
-/// Prepares the campaign or case of the arguments, and runs the project's cases. They also run when a campaign is
-/// resumed, because its results include them.
+/// Prepares the campaign or case of the arguments, and runs the project's cases. The results of a resumed campaign include
+/// those of the cases that ran before it.
 pub fn open(args: &RunArgs, budget: &Budget, jobs: usize) -> Result<Opened, Diagnostics> {
     if args.last_failed {
         return open_failed(args, budget);
@@ -57,19 +57,19 @@ pub fn open(args: &RunArgs, budget: &Budget, jobs: usize) -> Result<Opened, Diag
     };
     if env.campaign.case.is_some() {
         if !args.trust {
-            trust::check_case(&env, None)?;
+            trust::check_case(&env)?;
         }
         return Ok(Opened::Case(Box::new(env)));
     }
-    let cases = regressions::prepare(&env, budget, args.trust)?;
-    let (history, goes_on) = match going_on {
-        Some((history, record)) => (history, Some(record.id)),
+    let cases = regressions::prepare(&env, budget)?;
+    let (history, resumed) = match going_on {
+        Some((history, record)) => (history, Some(record)),
         None => (History::open(&env.campaign.history)?, None),
     };
-    let regressions = regressions::run(&cases, &history, jobs)?;
-    let kept = goes_on.as_deref().map_or_else(|| Ok(Vec::new()), |id| stored(&history, &env, id))?;
-    let (id, goes_on) = match goes_on {
-        Some(id) => (id, true),
+    let regressions = regressions::run(cases, &history, resumed.as_ref(), jobs)?;
+    let kept = resumed.as_ref().map_or_else(|| Ok(Vec::new()), |campaign| stored(&history, &env, &campaign.id))?;
+    let (id, goes_on) = match resumed {
+        Some(campaign) => (campaign.id, true),
         None => (history.next_campaign_id(&digest_of(&env.campaign.source.text), env.campaign.seed)?, false),
     };
     Ok(Opened::Campaign(Box::new(Session { env, history, id, goes_on, failed: None, kept, regressions })))
@@ -160,5 +160,6 @@ fn overrides(args: &RunArgs) -> Overrides {
         until_width: args.until_width,
         max_failures: args.max_failures,
         history: args.history.clone(),
+        launcher: None,
     }
 }

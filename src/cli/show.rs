@@ -9,7 +9,7 @@ use crate::options::{Format, HistoryArgs};
 use crate::picture::Picture;
 use crate::{history_dir, output};
 use actcheck_analysis::perceived_sentences;
-use actcheck_base::Diagnostics;
+use actcheck_base::{Diagnostics, names};
 use actcheck_history::{History, RunDetail};
 use actcheck_report::{Table, run_json, run_text};
 
@@ -33,9 +33,9 @@ pub struct ShowArgs {
 pub fn show(args: &ShowArgs) -> Result<(), Diagnostics> {
     let picture = args.picture.as_deref().map(Picture::new).transpose()?;
     let history = history_dir::open_to_read(&args.history)?;
-    let run = history.run(&args.run)?;
+    let run = history.newest_run(&args.run)?;
     output::print(&match args.format {
-        Format::Text => run_text(&run, &perceived(&history, &run)),
+        Format::Text => run_text(&run, &perceived(&history, &run)) + &judged_again(&history.run(&run.row.run)?, &run),
         Format::Json => format!("{:#}\n", run_json(&run, &perceived(&history, &run))),
         Format::Csv => outcomes(&run).render(Format::Csv.into()),
     });
@@ -49,6 +49,22 @@ pub fn show(args: &ShowArgs) -> Result<(), Diagnostics> {
 /// read.
 pub(super) fn perceived(history: &History, run: &RunDetail) -> BTreeMap<u32, String> {
     history.states(&run.row.run).map(|trace| perceived_sentences(run, &trace)).unwrap_or_default()
+}
+
+/// Names the outcomes that differ from those of the campaign. Empty if all are the same.
+fn judged_again(own: &RunDetail, newest: &RunDetail) -> String {
+    let mut notes = Vec::new();
+    for (own, newest) in own.actions.iter().zip(&newest.actions) {
+        for judgement in &newest.judgements {
+            let name = names::local(&judgement.property);
+            match own.judgements.iter().find(|own| own.property == judgement.property) {
+                None => notes.push(format!("{name} is new")),
+                Some(own) if own.outcome != judgement.outcome => notes.push(format!("{name} was {}", own.outcome)),
+                Some(_) => {}
+            }
+        }
+    }
+    if notes.is_empty() { String::new() } else { format!("judged again by `actcheck recheck`: {}\n", notes.join(", ")) }
 }
 
 /// One row for each property of each action of a run.

@@ -7,16 +7,12 @@ use actcheck_config as config;
 use actcheck_config::{Launcher, Overrides};
 use actcheck_history::{CampaignRecord, History};
 
-/// Checks that a case can be run without consent: its program is that of the campaign `own`, or it names none.
+/// Checks that a case can be run without consent: it names no program.
 ///
 /// # Errors
-/// `X059` if the case names another program.
-pub fn check_case(case: &Env, own: Option<&Launcher>) -> Result<(), Diagnostics> {
-    let help = match own {
-        Some(_) => "it is not the campaign's own program; read it, then run again with `--trust`, or remove the case",
-        None => "read the program, then run the case with `--trust`; `reference` starts none",
-    };
-    check(case, own, "this case", help)
+/// `X059` if the case names a program.
+pub fn check_case(case: &Env) -> Result<(), Diagnostics> {
+    check(case, None, "this case", "read the program, then run the case with `--trust`; `reference` starts none")
 }
 
 /// Checks that a campaign of a history can be run again without consent: its program is that of the configuration at

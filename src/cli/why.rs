@@ -36,7 +36,7 @@ pub struct WhyArgs {
 pub fn why(args: &WhyArgs, stop: &Arc<AtomicBool>) -> Result<(), Diagnostics> {
     let budget = Budget { stop: Arc::clone(stop), ..Budget::default() };
     let history = history_dir::open_to_read(&args.history)?;
-    let run = history.run(&args.run)?;
+    let run = history.newest_run(&args.run)?;
     let facts = history.facts(&run.row.run)?;
     let (files, path) = ontology_file(args.ontology.as_deref());
     let rules = RuleBook::prepare_within(&ontology::load(&files, &path)?, &budget)?;

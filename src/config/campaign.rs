@@ -123,6 +123,8 @@ pub struct Overrides {
     pub search: Option<Strategy>,
     /// Overrides `[history] dir`; relative to the current directory.
     pub history: Option<PathBuf>,
+    /// Replaces `test_launcher` and `[skill]`, which are then not read.
+    pub launcher: Option<Launcher>,
 }
 
 /// Limits on one run and on the whole campaign; `None` means unlimited.

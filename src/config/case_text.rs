@@ -100,6 +100,35 @@ pub fn case_text(campaign: &Campaign, case: &CaseText<'_>) -> Result<String, Dia
     Ok(out)
 }
 
+/// Returns a case's text with the skills of a campaign instead of its own. `skill`: as in [`CaseText`]. The text is
+/// unchanged if it names the same skills.
+///
+/// # Errors
+/// C002 if one of the texts is not TOML.
+pub fn with_skills(
+    case: &Source,
+    campaign: &Campaign,
+    skill: Option<(Option<String>, String)>,
+) -> Result<String, Diagnostics> {
+    let (mut table, own) = (parse(case)?, parse(&campaign.source)?);
+    let was = [table.remove("test_launcher"), table.remove("skill")];
+    let is = match skill {
+        None => [None, None],
+        Some((launcher, dir)) => {
+            let mut options = own.get("skill").and_then(Value::as_table).cloned().unwrap_or_default();
+            options.insert("dir".to_owned(), Value::String(dir));
+            [launcher.map(Value::String).or_else(|| own.get("test_launcher").cloned()), Some(Value::Table(options))]
+        }
+    };
+    let names_none = was[1].is_none() && was[0].as_ref().is_none_or(|name| name.as_str() == Some("reference"));
+    if was == is || (is == [None, None] && names_none) {
+        return Ok(case.text.to_string());
+    }
+    let keys = ["test_launcher", "skill"].map(str::to_owned);
+    table.extend(keys.into_iter().zip(is).filter_map(|(key, value)| Some((key, value?))));
+    Ok(table.to_string())
+}
+
 fn names(names: &[String]) -> Value {
     Value::Array(names.iter().cloned().map(Value::String).collect())
 }

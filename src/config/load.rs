@@ -44,7 +44,13 @@ pub fn load_text(source: Source, folder: &Path, overrides: &Overrides) -> Result
     let test_count = table.integer("test_count", 1..=MOST_RUNS).and_then(|count| u32::try_from(count).ok());
     let repeat = table.integer("repeat", 1..=MOST_REPETITIONS).and_then(|count| u32::try_from(count).ok());
     places.extend(table.key_span("test_launcher").map(|span| ("test_launcher".to_owned(), span)));
-    let launcher = skill::read(&mut table, folder, &mut found);
+    let launcher = match &overrides.launcher {
+        Some(launcher) => {
+            skill::pass_over(&mut table);
+            launcher.clone()
+        }
+        None => skill::read(&mut table, folder, &mut found),
+    };
     let seed = table.integer("seed", 0..=i64::MAX).map_or(0, i64::unsigned_abs);
     let ontology = read_ontology_path(&mut table, folder);
     let scene_rule = read_scene_rule(&mut table, folder, &mut found);

@@ -23,7 +23,7 @@ pub(crate) struct ModelLibrary {
     pub(crate) models: BTreeMap<String, Arc<ObjectModel>>,
     /// Names of object files, including invalid ones, so that an invalid model is not also reported as missing.
     names: Vec<String>,
-    /// Faults of SDF and URDF models, reported in full only if the configuration names the model.
+    /// Faults of models, reported in full only if the configuration names the model.
     diagnostics: BTreeMap<String, Diagnostics>,
     /// Models without a category.
     pub(crate) uncategorised: BTreeSet<String>,
@@ -38,8 +38,8 @@ pub(crate) struct ModelLibrary {
 /// The world with only a floor, which needs no file.
 const FLOOR_ALONE: &str = "empty";
 
-/// Reads all models of `model_dir`, or of the shipped folder. Faults of TOML models are reported at once; those of SDF
-/// and URDF models by [`ModelLibrary::report`].
+/// Reads all models of `model_dir`, or of the shipped folder. Faults of models are reported by
+/// [`ModelLibrary::report`].
 pub(crate) fn read(table: &mut Table, folder: &Path, found: &mut Diagnostics) -> ModelLibrary {
     let written = table.string("model_dir");
     let (files, dir) = match &written {
@@ -62,7 +62,7 @@ pub(crate) fn read(table: &mut Table, folder: &Path, found: &mut Diagnostics) ->
         match library.files.read(&path) {
             Ok(source) => match model::read(&source) {
                 Ok(model) => _ = library.models.insert(model.name.clone(), Arc::new(model)),
-                Err(faults) => found.extend(faults),
+                Err(faults) => library.diagnostics.entry(stem(&path)).or_default().extend(faults),
             },
             Err(reason) => {
                 let message = format!("cannot read the model {}: {reason}", path.display());
@@ -128,7 +128,7 @@ impl ModelLibrary {
         table.finish(found);
     }
 
-    /// Returns the faults of SDF and URDF models: all of them for a model that the configuration names, and only the
+    /// Returns the faults of models: all of them for a model that the configuration names, and only the
     /// errors, as warnings, for the others.
     pub(crate) fn report(&self, named: &BTreeSet<&str>) -> Diagnostics {
         let mut report = self.warnings.clone();

@@ -125,6 +125,12 @@ pub(super) fn read(table: &mut Table, folder: &Path, found: &mut Diagnostics) ->
     }
 }
 
+/// Takes `test_launcher` and `[skill]` without reading them: other skills perform the actions.
+pub(super) fn pass_over(table: &mut Table) {
+    drop(table.string("test_launcher"));
+    drop(table.table("skill"));
+}
+
 fn blank(folder: &Path) -> Skill {
     let dir = if folder.as_os_str().is_empty() { PathBuf::from(".") } else { folder.to_path_buf() };
     Skill {

@@ -3,6 +3,7 @@
 //! Never: judges, simulates, changes stored runs, or reads a clock.
 
 mod answer;
+mod counted;
 mod detail;
 mod dump;
 mod evaluation;
@@ -22,6 +23,7 @@ mod read;
 mod read_campaign;
 mod recheck;
 mod record;
+mod resolve;
 mod rows;
 mod salvage;
 mod scene_digest;
@@ -40,6 +42,7 @@ mod write_run;
 mod write_scene;
 
 pub use answer::{Cancel, QueryAnswer};
+pub use counted::newest_of_alike;
 pub use integrity::{Damage, Integrity};
 pub use lists::FAILED_AGAIN;
 pub use newest::NewestOutcomes;

@@ -52,12 +52,15 @@ SELECT ?run ?campaign ?index ?test ?status ?step ?action ?property ?outcome ?mar
     ?run act:campaign ?campaign ; act:index ?index ; act:test ?test ; act:status ?status .
 }";
 
-/// Campaigns whose scenes were selected because they fail. The prefix is [`FAILED_AGAIN`].
-const SELECTED: &str = "
+/// Campaigns whose scenes were selected because they fail: shrunk runs, failed runs that ran again, and cases, which have
+/// the table `case` in their configuration. The prefix is [`FAILED_AGAIN`].
+const SELECTED: &str = r"
 SELECT DISTINCT ?campaign WHERE {
     { ?run act:shrunkFrom ?original ; act:campaign ?campaign }
     UNION
     { ?campaign a act:Campaign ; rdfs:label ?name FILTER(STRSTARTS(?name, 'failed runs of ')) }
+    UNION
+    { ?campaign a act:Campaign ; act:configText ?text FILTER(REGEX(?text, '^[ \\t]*(\\[[ \\t]*case[ \\t]*(\\]|\\.)|case[ \\t]*(\\.|=))', 'm')) }
 }";
 
 /// Name prefix of campaigns that ran the failed runs of another campaign again.
@@ -128,7 +131,7 @@ fn campaign(id: String, runs: u64, node: &Node) -> CampaignRow {
     }
 }
 
-/// Ids of the campaigns that hold a shrunk run, or that ran failed runs again.
+/// Ids of the campaigns that hold a shrunk run, ran failed runs again, or ran a case.
 pub(super) fn selected_campaigns(store: &Store) -> Result<BTreeSet<String>, QueryEvaluationError> {
     Ok(select(store, SELECTED, Vec::new())?.iter().map(|row| id(row, 0)).collect())
 }

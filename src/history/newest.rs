@@ -40,8 +40,8 @@ impl History {
         Ok(newest)
     }
 
-    /// Returns the ids of the campaigns whose scenes were selected because they fail: those that hold a shrunk run, and
-    /// those that ran the failed runs of another campaign again. Statistics leave them out.
+    /// Returns the ids of the campaigns whose scenes were selected because they fail: those that hold a shrunk run, those
+    /// that ran the failed runs of another campaign again, and cases. Statistics leave them out.
     ///
     /// # Errors
     /// The store can't be read.

@@ -1,12 +1,13 @@
 //! SPARQL queries of users: prefixes are predefined, faults have their place, updates are refused.
 
 use std::path::Path;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Arc, OnceLock};
 
-use oxigraph::model::{NamedNode, Term as StoreTerm};
+use oxigraph::model::{Literal, NamedNode, Term as StoreTerm};
 use oxigraph::sparql::{PreparedSparqlQuery, QueryEvaluationError, QueryResults, SparqlEvaluator, SparqlSyntaxError};
 
+use crate::counted::counted_runs;
 use crate::evaluation::{Unfinished, evaluate};
 use crate::fault;
 use crate::open::OpenStore;
@@ -30,7 +31,7 @@ const LONGEST_TEXT: usize = 32 << 20;
 pub(super) fn answer(dir: &Path, store: OpenStore, text: &Source, cancel: &Cancel) -> Result<QueryAnswer, Diagnostics> {
     refuse_update(text)?;
     refuse_excess(text)?;
-    let query = prepare(text, cancel)?;
+    let query = prepare(text, &store, cancel)?;
     let prepared = query.prepared.clone();
     let evaluated = evaluate(&store, cancel, move |store| prepared.on_store(store).execute().and_then(collect));
     query.check_texts(text)?;
@@ -60,12 +61,12 @@ impl Prepared {
 ///
 /// # Errors
 /// Syntax errors.
-pub(super) fn prepare(text: &Source, cancel: &Cancel) -> Result<Prepared, Diagnostics> {
+pub(super) fn prepare(text: &Source, store: &OpenStore, cancel: &Cancel) -> Result<Prepared, Diagnostics> {
     let syntax = |error: SparqlSyntaxError| syntax_fault(text, &error.to_string());
-    drop(evaluator(cancel).parse_query(&*text.text).map_err(syntax)?);
+    drop(query_evaluator(store, cancel).parse_query(&*text.text).map_err(syntax)?);
     // Places in the text that is evaluated differ from the original's, so errors were reported before.
     let made = Arc::new(AtomicUsize::new(0));
-    let bounded = with_text_functions(evaluator(cancel), cancel, &made);
+    let bounded = with_text_functions(query_evaluator(store, cancel), cancel, &made);
     let prepared = bounded.parse_query(&bounded_texts(&text.text)).map_err(syntax)?;
     Ok(Prepared { prepared, made })
 }
@@ -129,6 +130,11 @@ fn stopped(text: &Source) -> Diagnostic {
     Diagnostic::error("H013", "the query was stopped before it ended").in_source(text)
 }
 
+/// The evaluator of users' queries: [`evaluator`] with the function `act:counts`.
+pub(super) fn query_evaluator(store: &OpenStore, cancel: &Cancel) -> SparqlEvaluator {
+    with_counts(evaluator(cancel), store.clone())
+}
+
 /// An evaluator with the predefined prefixes that can be stopped.
 pub(super) fn evaluator(cancel: &Cancel) -> SparqlEvaluator {
     let mut evaluator = SparqlEvaluator::new().with_cancellation_token(cancel.token());
@@ -140,6 +146,17 @@ pub(super) fn evaluator(cancel: &Cancel) -> SparqlEvaluator {
         };
     }
     evaluator
+}
+
+/// Adds the function `act:counts(?run)`: whether the run counts in rates over all campaigns, see
+/// [`History::counted_runs`](crate::History::counted_runs). The runs are read when a query first calls it.
+fn with_counts(evaluator: SparqlEvaluator, store: OpenStore) -> SparqlEvaluator {
+    let counted = OnceLock::new();
+    evaluator.with_custom_function(NamedNode::new_unchecked(names::act("counts")), move |args: &[StoreTerm]| {
+        let [StoreTerm::NamedNode(run)] = args else { return None };
+        let counted = counted.get_or_init(|| counted_runs(&store).ok());
+        Some(Literal::from(counted.as_ref()?.contains(run.as_str().strip_prefix(names::RUN)?)).into())
+    })
 }
 
 fn collect(results: QueryResults<'_>) -> Result<QueryAnswer, QueryEvaluationError> {

@@ -4,18 +4,19 @@
 //! A later judgement is written only if it differs, and names the one that it supersedes: the newest judgement is the
 //! one that no other supersedes.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use oxigraph::model::{GraphNameRef, NamedNode, NamedOrBlankNode, Quad, Term};
 use oxigraph::store::{StorageError, Store};
 
-use crate::History;
 use crate::detail::judgement;
 use crate::graphs::below;
-use crate::read::{Node, subjects_in};
+use crate::read::{Node, id_of, subjects_in};
 use crate::statements::{Statements, iri, time};
 use crate::write_run::{run_node, unique, write_assertion};
+use crate::{History, RunDetail};
 use actcheck_base::{Diagnostics, Judgement};
+use actcheck_verdict::{action_score, run_score};
 
 /// The graph of judgements made after the run.
 const GRAPH: &str = "act:rechecked";
@@ -61,6 +62,54 @@ impl History {
         newest(&*self.store()?, &execution, properties).map_err(|error| self.fault("reading a run's outcomes", &error))
     }
 
+    /// Returns all details of a run as [`History::run`] does, with its newest judgements: later ones replace those of the
+    /// campaign, and properties that were judged only later are added. Scores follow from these judgements.
+    ///
+    /// # Errors
+    /// As [`History::run`].
+    pub fn newest_run(&self, name: &str) -> Result<RunDetail, Diagnostics> {
+        let mut run = self.run(name)?;
+        let store = self.store()?;
+        let fault = |error| self.fault("reading a run's outcomes", &error);
+        let mut is_judged_again = false;
+        for action in &mut run.actions {
+            let later = later(&store, &execution(&run.row.run, action.step)).map_err(fault)?;
+            if later.is_empty() {
+                continue;
+            }
+            action.judgements.retain(|own| later.iter().all(|later| later.property != own.property));
+            action.judgements.extend(later);
+            action.judgements.sort_by(|a, b| a.property.cmp(&b.property));
+            action.score = action_score(action.judgements.iter().map(|judgement| judgement.outcome));
+            is_judged_again = true;
+        }
+        if is_judged_again {
+            let scores: Vec<f64> = run.actions.iter().map(|action| action.score).collect();
+            run.row.score = run_score(&scores);
+        }
+        Ok(run)
+    }
+
+    /// Returns the number of judgements made after the runs of each campaign, by its id. A campaign without any is left
+    /// out. As judgements are only ever added, an equal number means equal judgements.
+    ///
+    /// # Errors
+    /// The store can't be read.
+    pub fn later_counts(&self) -> Result<BTreeMap<String, u64>, Diagnostics> {
+        let (store, graph) = (self.store()?, iri(GRAPH));
+        let graph = GraphNameRef::NamedNode(graph.as_ref());
+        let mut counts: BTreeMap<String, u64> = BTreeMap::new();
+        for quad in store.quads_for_pattern(None, Some(iri("earl:subject").as_ref()), None, Some(graph)) {
+            let execution = quad.map_err(|error| self.fault("reading outcomes", &error))?.object;
+            // The execution of run `k7f3-2` ends in `k7f3-2/1`.
+            let run = id_of(&execution);
+            if let Some((campaign, _)) = run.rsplit_once('-') {
+                *counts.entry(campaign.to_owned()).or_default() += 1;
+            }
+        }
+        Ok(counts)
+    }
+
     /// Stores the new judgements in one transaction: all of them or none. `at` is RFC 3339.
     ///
     /// # Errors
@@ -99,6 +148,20 @@ fn newest(store: &Store, execution: &NamedNode, properties: &[String]) -> Result
     found.retain(|stored| !superseded.contains(&stored.assertion.to_string()));
     found.sort_by(|a, b| a.judgement.property.cmp(&b.judgement.property));
     Ok(found)
+}
+
+/// The judgements of an action that were made after the run and that no other supersedes, unsorted.
+fn later(store: &Store, execution: &NamedNode) -> Result<Vec<Judgement>, StorageError> {
+    let graph = iri(GRAPH);
+    let graph = GraphNameRef::NamedNode(graph.as_ref());
+    let (mut superseded, mut found) = (BTreeSet::new(), Vec::new());
+    for node in subjects_in(store, "earl:subject", execution.as_ref(), graph)? {
+        let assertion = Node::read_in(store, &node, graph)?;
+        superseded.extend(assertion.all("act:supersedes").iter().map(Term::to_string));
+        found.push((node.to_string(), judgement(store, &assertion, graph)?));
+    }
+    found.retain(|(node, _)| !superseded.contains(node));
+    Ok(found.into_iter().map(|(_, judgement)| judgement).collect())
 }
 
 fn write(recheck: &Recheck, at: &str, statements: &mut Statements) {

@@ -214,34 +214,6 @@ impl History {
         lists::outcomes(&*self.store()?, filter).map_err(|error| self.query_fault(&error))
     }
 
-    /// Returns the id of a run, given its id, its IRI, `run:ID`, or a unique prefix.
-    ///
-    /// # Errors
-    /// `H008` no run matches, or several do.
-    pub fn resolve(&self, name: &str) -> Result<String, Diagnostics> {
-        let name = short_id(name.trim().trim_start_matches('<').trim_end_matches('>'));
-        let name = name.strip_prefix("run:").unwrap_or(name);
-        if names::is_id(name) && self.has_run(name)? {
-            return Ok(name.to_owned());
-        }
-        let known = self.ids("act:Run")?;
-        let beginning: Vec<&String> = known.iter().filter(|id| !name.is_empty() && id.starts_with(name)).collect();
-        let fault = match beginning.as_slice() {
-            [only] => return Ok((*only).clone()),
-            [] => Diagnostic::error("H008", format!("the history `{}` has no run `{name}`", self.dir().display()))
-                .help(match nearest(name, known.iter().map(String::as_str)) {
-                    Some(found) => format!("did you mean `{found}`? `actcheck list` shows all runs"),
-                    None => "`actcheck list` shows all runs".to_owned(),
-                }),
-            several => Diagnostic::error("H008", format!("`{name}` matches {} runs", several.len())).help(format!(
-                "name one of them: {}{}",
-                several.iter().take(5).map(|id| id.as_str()).collect::<Vec<_>>().join(", "),
-                if several.len() > 5 { ", …" } else { "" }
-            )),
-        };
-        Err(fault.into())
-    }
-
     /// Returns all details of a run, named as in [`History::resolve`].
     ///
     /// # Errors
@@ -346,7 +318,7 @@ impl History {
         decode(&bytes).map_err(|why| fault::damaged(self.dir(), &format!("the trace of run {id}: {why}")))
     }
 
-    fn has_run(&self, id: &str) -> Result<bool, Diagnostics> {
+    pub(super) fn has_run(&self, id: &str) -> Result<bool, Diagnostics> {
         let (run, class) = (run_node(id), iri("act:Run"));
         self.store()?
             .contains(QuadRef::new(&run, rdf::TYPE, &class, GraphNameRef::DefaultGraph))

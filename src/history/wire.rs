@@ -97,7 +97,8 @@ impl History {
             let fault = Diagnostic::error("H017", "`SERVICE` queries another endpoint, which is not supported");
             return Err(WireFault::Refused(fault.at(text, span).into()));
         }
-        let query = prepare(text, &Cancel::new()).map_err(WireFault::Malformed)?;
+        let store = self.store().map_err(WireFault::Failed)?;
+        let query = prepare(text, &store, &Cancel::new()).map_err(WireFault::Malformed)?;
         let answer = self.evaluate(query.prepared.clone(), text, choose, limits);
         query.check_texts(text).map_err(WireFault::Refused)?;
         answer
@@ -127,8 +128,8 @@ impl History {
         choose: impl Fn(&[WireSyntax]) -> Option<WireSyntax>,
         limits: WireLimits,
     ) -> Result<WireAnswer, WireFault> {
-        let failed = |error: QueryEvaluationError| WireFault::Failed(evaluation_fault(text, &error).into());
         let store = self.store().map_err(WireFault::Failed)?;
+        let failed = |error: QueryEvaluationError| WireFault::Failed(evaluation_fault(text, &error).into());
         let written = match prepared.on_store(&store).execute().map_err(failed)? {
             QueryResults::Boolean(value) => {
                 let syntax = choose(&WireSyntax::TABLES).ok_or(WireFault::NotAcceptable)?;

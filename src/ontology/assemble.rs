@@ -18,7 +18,8 @@ use actcheck_base::{Diagnostic, Diagnostics, Digest, Files, Source, Term, names}
 /// # Errors
 /// Reports all faults at once: a file can't be read or parsed (O001 to O003), a success property is not a property
 /// (O004), a property has no rule or several (O005, O006), a parameter is missing or unknown (O007, O008), a rule file
-/// is missing, has an unknown extension or an absolute path (O009 to O011), or the ontology has no action (O012).
+/// is missing, has an unknown extension or an absolute path (O009 to O011), the ontology has no action (O012), or a
+/// predicate is misspelt (O014).
 pub fn load(files: &Files, path: &Path) -> Result<Ontology, Diagnostics> {
     let mut found = Diagnostics::new();
     let graph = Graph::new(read::read(files, path, &mut found));
@@ -38,6 +39,7 @@ pub fn load(files: &Files, path: &Path) -> Result<Ontology, Diagnostics> {
         .map(|iri| (names::local(&iri).to_owned(), action(&graph, iri)))
         .collect();
     check::actions(&graph, &actions, &mut found);
+    check::misspelt_predicates(&graph, &mut found);
     let found = in_order_of_place(found, graph.sources());
     let mut digest = Digest::new();
     graph.sources().iter().for_each(|source| digest.update(source.text.as_bytes()));
@@ -52,6 +54,16 @@ pub fn load(files: &Files, path: &Path) -> Result<Ontology, Diagnostics> {
         vocabulary: vocabulary(&graph),
         digest: digest.finish(),
     })
+}
+
+/// Reads the terms of a vocabulary with its imports, such as `ontology/history.ttl`, which need have no actions.
+///
+/// # Errors
+/// A file can't be read or parsed (O001 to O003).
+pub fn load_vocabulary(files: &Files, path: &Path) -> Result<Vocabulary, Diagnostics> {
+    let mut found = Diagnostics::new();
+    let graph = Graph::new(read::read(files, path, &mut found));
+    found.or(vocabulary(&graph))
 }
 
 /// Sorts faults by source file, then by position.

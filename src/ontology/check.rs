@@ -36,6 +36,36 @@ pub(super) fn inherited<'a>(graph: &'a Graph, iri: &str, predicate: &str) -> Vec
     statements
 }
 
+/// Local names of the predicates in the paper's namespace that have a meaning here.
+const PREDICATES: [&str; 8] = [
+    "successProperty",
+    "precondition",
+    "performedIn",
+    "hasParameter",
+    "needsParameter",
+    "verifiedBy",
+    "ruleLibrary",
+    "unit",
+];
+
+/// Faults: predicates in the paper's namespace that the ontology does not declare and that are nearly the name of a known
+/// one (O014), so that their statements have no effect.
+pub(super) fn misspelt_predicates(graph: &Graph, found: &mut Diagnostics) {
+    let declared: BTreeSet<&str> = graph.subjects().filter_map(|iri| iri.strip_prefix(names::ACT)).collect();
+    for statement in graph.statements() {
+        let Some(local) = statement.predicate.strip_prefix(names::ACT) else { continue };
+        if PREDICATES.contains(&local) || declared.contains(local) {
+            continue;
+        }
+        if let Some(known) = nearest(local, PREDICATES) {
+            let (source, span) = graph.place(statement, &statement.predicate);
+            let message = format!("there is no predicate `act:{local}`, so that this statement has no effect");
+            found
+                .push(Diagnostic::error("O014", message).at(source, span).help(format!("did you mean `act:{known}`?")));
+        }
+    }
+}
+
 /// Fault: no rule verifies the property (O005).
 pub(super) fn unverified(graph: &Graph, iri: &str) -> Diagnostic {
     let name = names::local(iri);

@@ -13,7 +13,7 @@ mod read;
 mod rule_files;
 mod template;
 
-pub use assemble::load;
+pub use assemble::{load, load_vocabulary};
 pub use model::{Action, Ontology, Property, RuleFile, RuleLanguage, Vocabulary, VocabularyTerm};
 pub use read::triples_of;
 pub use template::{Template, property_template};

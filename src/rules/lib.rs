@@ -83,6 +83,8 @@ pub use book::{RuleBook, owl_closure};
 pub use engine::budget::Budget;
 pub use facts::{Facts, When};
 pub use rules::{Decision, Rules, RulesBuilder};
+#[cfg(feature = "sparql")]
+pub use sparql::query::unknown_terms;
 pub use syntax::parse;
 
 /// Compiles and runs the example of the README.

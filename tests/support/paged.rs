@@ -37,6 +37,7 @@ pub fn findings(table: &OutcomeTable, history: &str) -> FindingsSummary {
         options: String::new(),
         campaigns: table.text("campaign").texts.clone(),
         runs: table.text("run").texts.len() as u64,
+        twins: 0,
         counts: all.iter().fold(Counts::default(), |mut sum, of| {
             sum.add_all(of.counts);
             sum

@@ -90,12 +90,11 @@ class Serving(unittest.TestCase):
         def pick(robot: Robot) -> None:
             robot.step({"tentacle_joint": 1.0})
 
-        (end,) = self.ends(pick)
-        self.assertFalse(end["succeeded"])
-        self.assertRegex(end["message"], r"ValueError: .*'tentacle_joint'.*\(test_skill.py, line \d+: robot.step")
+        with self.assertRaisesRegex(SystemExit, r"ValueError: .*'tentacle_joint'.*\(test_skill.py, line \d+: robot.step"):
+            self.ends(pick)
         self.assertIn("Traceback", self.errors.getvalue())
-        (end,) = self.ends(lambda robot: 7)
-        self.assertRegex(end["message"], "returns a Report, a bool or None, not int")
+        with self.assertRaisesRegex(SystemExit, "returns a Report, a bool or None, not int"):
+            self.ends(lambda robot: 7)
 
     def test_an_aborted_action_is_over_even_for_a_skill_that_catches_everything(self) -> None:
         tries: list[str] = []

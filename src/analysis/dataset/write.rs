@@ -98,7 +98,7 @@ fn export(
     let mut sheets = Sheets::begin(tables, folder)?;
     for (campaign, ids) in runs.history.run_ids()? {
         for run in ids.iter().filter(|_| runs.filter.takes_campaign(&campaign)) {
-            let detail = runs.history.run(run)?;
+            let detail = runs.history.newest_run(run)?;
             if runs.filter.since.as_ref().is_some_and(|since| detail.row.started < *since) {
                 continue;
             }

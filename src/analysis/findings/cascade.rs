@@ -34,11 +34,12 @@ pub struct Cascade {
 
 /// Finds pairs of failures at different steps of a run that are significantly associated, most significant first.
 ///
-/// A later action that was not reached or could not be judged is not counted. Of the runs of one scene only the first
-/// is counted.
+/// A later action that was not reached or could not be judged is not counted. Of bit-identical runs only the newest is
+/// counted, of the runs of one scene only the first.
 pub fn cascades(table: &OutcomeTable, level: f64) -> Vec<Cascade> {
     let runs = table.text("run");
-    let further = Scenes::of(table).further_runs();
+    let counted = table.counted_runs();
+    let further = Scenes::of(table).further_runs(&counted);
     let mut slots: BTreeMap<(u32, u32, u32), usize> = BTreeMap::new();
     let mut counts: BTreeMap<(usize, usize), TwoByTwo> = BTreeMap::new();
     let mut run: Vec<(u32, usize, bool)> = Vec::new();
@@ -47,7 +48,7 @@ pub fn cascades(table: &OutcomeTable, level: f64) -> Vec<Cascade> {
             count(&run, &mut counts);
             run.clear();
         }
-        if runs.of_row[row].is_some_and(|run| further.contains(&run)) {
+        if runs.of_row[row].is_some_and(|run| !counted[run as usize] || further.contains(&run)) {
             continue;
         }
         if let (Some(key), Some(failed)) = (key(table, row), failed(outcome)) {

@@ -2,8 +2,8 @@
 
 use std::collections::BTreeMap;
 
+use crate::findings::judged::newest_of_alike;
 use crate::findings::margins::{Quantiles, quantiles};
-use crate::findings::property::newest_of_alike;
 use crate::findings::scenes::Scenes;
 use crate::{Interval, OutcomeTable, Surrounding, wilson};
 use actcheck_data::Role;

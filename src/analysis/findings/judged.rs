@@ -1,6 +1,6 @@
 //! The properties in a table, and the rows that judge them.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use crate::OutcomeTable;
 use actcheck_base::Outcome;
@@ -13,32 +13,36 @@ pub struct JudgedProperty {
     pub action: String,
     /// IRI of the property.
     pub property: String,
-    /// How often each outcome occurred.
+    /// How often each outcome occurred, in the rows that count.
     pub counts: Counts,
-    /// Indices of its rows, in order.
+    /// Indices of the rows that count, in order: of bit-identical runs only the newest.
     pub rows: Vec<u32>,
+    /// Indices of all its rows, in order.
+    pub every_row: Vec<u32>,
 }
 
 /// Returns every property of every action, sorted by action, then property.
 pub fn judged(table: &OutcomeTable) -> Vec<JudgedProperty> {
     let (actions, properties) = (table.text("action"), table.text("property"));
     let outcomes = outcomes(table);
-    let mut found: BTreeMap<(u32, u32), (Counts, Vec<u32>)> = BTreeMap::new();
-    for (row, outcome) in outcomes.into_iter().enumerate() {
+    let mut found: BTreeMap<(u32, u32), Vec<u32>> = BTreeMap::new();
+    for row in 0..outcomes.len() {
         if let (Some(action), Some(property)) = (actions.of_row[row], properties.of_row[row]) {
-            let (counts, rows) = found.entry((action, property)).or_default();
-            counts.add(outcome);
             // A table has far fewer rows than 2^32.
-            rows.push(row as u32);
+            found.entry((action, property)).or_default().push(row as u32);
         }
     }
     let mut judged: Vec<JudgedProperty> = found
         .into_iter()
-        .map(|((action, property), (counts, rows))| JudgedProperty {
-            action: actions.texts[action as usize].clone(),
-            property: properties.texts[property as usize].clone(),
-            counts,
-            rows,
+        .map(|((action, property), every_row)| {
+            let rows = newest_of_alike(table, &every_row);
+            JudgedProperty {
+                action: actions.texts[action as usize].clone(),
+                property: properties.texts[property as usize].clone(),
+                counts: Counts::of(rows.iter().map(|row| outcomes[*row as usize])),
+                rows,
+                every_row,
+            }
         })
         .collect();
     judged.sort_by(|a, b| (&a.action, &a.property).cmp(&(&b.action, &b.property)));
@@ -51,6 +55,27 @@ pub(super) fn outcomes(table: &OutcomeTable) -> Vec<Outcome> {
     let known: Vec<Outcome> =
         column.texts.iter().map(|word| Outcome::from_word(word).unwrap_or(Outcome::Broken)).collect();
     column.of_row.iter().map(|of| of.map_or(Outcome::Broken, |of| known[of as usize])).collect()
+}
+
+/// Drops rows for which a later row has the same step and a bit-identical run.
+pub(super) fn newest_of_alike(table: &OutcomeTable, rows: &[u32]) -> Vec<u32> {
+    let (hash, step) = (table.text("trace_hash"), table.number("step"));
+    let mut seen = BTreeSet::new();
+    let mut kept: Vec<u32> = rows
+        .iter()
+        .rev()
+        .copied()
+        .filter(|row| {
+            let at = *row as usize;
+            // A run without a hash (broken before its first state) is never a duplicate.
+            match (hash.of_row.get(at).copied().flatten(), step.get(at)) {
+                (Some(of), Some(step)) if !hash.texts[of as usize].is_empty() => seen.insert((of, step.to_bits())),
+                _ => true,
+            }
+        })
+        .collect();
+    kept.reverse();
+    kept
 }
 
 /// Returns whether an outcome is a failure, or `None` if it is undecided.

@@ -8,12 +8,16 @@ use crate::{FailureMode, OutcomeTable, wilson};
 
 /// Returns the failure modes of the runs of a table, most frequent first, then sorted by their properties.
 ///
-/// Runs in which no property passed or failed tested nothing and are left out.
+/// Runs in which no property passed or failed tested nothing and are left out. Of bit-identical runs only the newest
+/// counts.
 pub fn table_failure_modes(table: &OutcomeTable) -> Vec<FailureMode> {
     let (runs, properties) = (table.text("run"), table.text("property"));
+    let counted = table.counted_runs();
     let mut failed_in: BTreeMap<u32, (usize, BTreeSet<u32>)> = BTreeMap::new();
     for (row, outcome) in outcomes(table).into_iter().enumerate() {
-        if let (Some(run), Some(property), Some(failed)) = (runs.of_row[row], properties.of_row[row], failed(outcome)) {
+        if let (Some(run), Some(property), Some(failed)) = (runs.of_row[row], properties.of_row[row], failed(outcome))
+            && counted[run as usize]
+        {
             let (_, signature) = failed_in.entry(run).or_insert((row, BTreeSet::new()));
             if failed {
                 signature.insert(property);

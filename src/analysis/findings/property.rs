@@ -1,7 +1,5 @@
 //! Findings about one property of one action.
 
-use std::collections::BTreeSet;
-
 use crate::findings::judged::{JudgedProperty, failed, outcomes};
 use crate::findings::margins::{Quantiles, quantiles};
 use crate::findings::parameters::{conditions, effects};
@@ -23,7 +21,7 @@ pub struct PropertyFindings {
     pub action: String,
     /// IRI of the property.
     pub property: String,
-    /// How often each outcome occurred.
+    /// How often each outcome occurred; of bit-identical runs only the newest counts.
     pub counts: Counts,
     /// Share of failed among passed and failed. The interval accounts for runs of the same scene.
     pub failing: Option<Interval>,
@@ -33,7 +31,7 @@ pub struct PropertyFindings {
     pub input: PatternInput,
     /// IDs and rows of these runs.
     pub examples: Vec<Example>,
-    /// Number of decided runs that were left out because a later run is bit-identical.
+    /// Number of decided runs that don't count because a later run is bit-identical.
     pub twins: u64,
     /// Number of decided runs that were left out because another run of the same scene is used.
     pub repeated: u64,
@@ -83,10 +81,10 @@ pub fn property_findings(
     options: &PatternOptions,
 ) -> PropertyFindings {
     let outcomes = outcomes(table);
-    let decided: Vec<u32> = of.rows.iter().copied().filter(|row| failed(outcomes[*row as usize]).is_some()).collect();
-    let newest = newest_of_alike(table, &decided);
+    let is_decided = |row: &u32| failed(outcomes[*row as usize]).is_some();
+    let decided: Vec<u32> = of.rows.iter().copied().filter(is_decided).collect();
     let scenes = Scenes::of(table);
-    let rows = scenes.first_rows(&newest);
+    let rows = scenes.first_rows(&decided);
     let weight = table.number("weight");
     let input = PatternInput {
         failed: rows.iter().map(|row| failed(outcomes[*row as usize]) == Some(true)).collect(),
@@ -113,8 +111,8 @@ pub fn property_findings(
             .iter()
             .map(|row| Example { run: run.get(*row as usize).unwrap_or_default().to_owned(), row: *row })
             .collect(),
-        twins: (decided.len() - newest.len()) as u64,
-        repeated: (newest.len() - rows.len()) as u64,
+        twins: (of.every_row.iter().filter(|row| is_decided(row)).count() - decided.len()) as u64,
+        repeated: (decided.len() - rows.len()) as u64,
         weighted_runs: rows
             .iter()
             .filter(|row| weight.get(**row as usize).is_some_and(|weight| !weight.is_nan()))
@@ -123,27 +121,6 @@ pub fn property_findings(
         effects: Mined { patterns: mine(&happened, &simple), input: happened },
         input,
     }
-}
-
-/// Drops rows for which a later row has the same step and a bit-identical run.
-pub(super) fn newest_of_alike(table: &OutcomeTable, rows: &[u32]) -> Vec<u32> {
-    let (hash, step) = (table.text("trace_hash"), table.number("step"));
-    let mut seen = BTreeSet::new();
-    let mut kept: Vec<u32> = rows
-        .iter()
-        .rev()
-        .copied()
-        .filter(|row| {
-            let at = *row as usize;
-            // A run without a hash (broken before its first state) is never a duplicate.
-            match (hash.of_row.get(at).copied().flatten(), step.get(at)) {
-                (Some(hash), Some(step)) => seen.insert((hash, step.to_bits())),
-                _ => true,
-            }
-        })
-        .collect();
-    kept.reverse();
-    kept
 }
 
 fn is_held_out(table: &OutcomeTable, row: usize) -> bool {

@@ -46,12 +46,13 @@ impl<'a> Scenes<'a> {
         rows.iter().copied().filter(is_first).collect()
     }
 
-    /// Returns the runs whose scene an earlier run has had.
-    pub fn further_runs(&self) -> BTreeSet<u32> {
+    /// Returns the runs whose scene an earlier run has had, among those that count.
+    pub fn further_runs(&self, counted: &[bool]) -> BTreeSet<u32> {
         let mut first = BTreeMap::new();
         let mut further = BTreeSet::new();
         for (row, run) in self.run.iter().enumerate() {
             if let (Some(run), key @ Key::Repeated(..)) = (run, self.key(row))
+                && counted[*run as usize]
                 && first.entry(key).or_insert(*run) != run
             {
                 further.insert(*run);

@@ -1,5 +1,7 @@
 //! Failure rate of a property over campaigns, with change points.
 
+use std::collections::BTreeMap;
+
 use crate::findings::judged::{JudgedProperty, failed, outcomes};
 use crate::findings::scenes::Scenes;
 use crate::{Interval, OutcomeTable, TwoByTwo, wilson};
@@ -11,7 +13,7 @@ pub struct TrendPoint {
     pub campaign: String,
     /// Start of its first run in the table (RFC 3339).
     pub started: String,
-    /// Number of decided runs, one for each scene.
+    /// Number of decided runs, one for each scene and trace.
     pub runs: u64,
     /// Number of failed runs among them.
     pub failed: u64,
@@ -41,32 +43,62 @@ pub struct Trend {
     pub changes: Vec<ChangePoint>,
 }
 
+/// Failed and passed runs.
+type Runs = (u64, u64);
+
+/// A decided run: its trace, by which bit-identical runs are recognised, and whether it failed.
+type Decided = (Trace, bool);
+
+/// Identifies the trace of a row.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum Trace {
+    Hash(u32),
+    /// A trace without a hash equals no other.
+    Row(u32),
+}
+
+/// The order of campaigns.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Order {
+    OldestFirst,
+    NewestFirst,
+}
+
 /// Computes the trend of a property. Change points are found by recursive splitting at the position with the lowest
-/// p-value, if it is significant at `level`.
+/// p-value, if it is significant at `level`. Each campaign shows all of its runs; between two changes, bit-identical runs
+/// of several campaigns count once.
 pub fn trend(table: &OutcomeTable, of: &JudgedProperty, level: f64) -> Trend {
     let outcomes = outcomes(table);
-    let (campaign, started) = (table.text("campaign"), table.text("started"));
+    let (campaign, started, hash) = (table.text("campaign"), table.text("started"), table.text("trace_hash"));
     let mut points: Vec<TrendPoint> = Vec::new();
-    let decided: Vec<u32> = of.rows.iter().copied().filter(|row| failed(outcomes[*row as usize]).is_some()).collect();
-    for row in Scenes::of(table).first_rows(&decided).into_iter().map(|row| row as usize) {
+    let mut runs: Vec<Vec<Decided>> = Vec::new();
+    let decided: Vec<u32> =
+        of.every_row.iter().copied().filter(|row| failed(outcomes[*row as usize]).is_some()).collect();
+    for number in Scenes::of(table).first_rows(&decided) {
+        let row = number as usize;
         let (Some(id), Some(failed)) = (campaign.get(row), failed(outcomes[row])) else { continue };
         if points.last().is_none_or(|point| point.campaign != id) {
             let started = started.get(row).unwrap_or_default().to_owned();
             points.push(TrendPoint { campaign: id.to_owned(), started, runs: 0, failed: 0, failing: None });
+            runs.push(Vec::new());
         }
-        if let Some(point) = points.last_mut() {
-            point.runs += 1;
-            point.failed += u64::from(failed);
+        if let Some(runs) = runs.last_mut() {
+            let known = hash.of_row.get(row).copied().flatten().filter(|of| !hash.texts[*of as usize].is_empty());
+            runs.push((known.map_or(Trace::Row(number), Trace::Hash), failed));
         }
     }
-    points.iter_mut().for_each(|point| point.failing = wilson(point.failed, point.runs));
+    for (point, runs) in points.iter_mut().zip(&runs) {
+        let (failed, passed) = distinct([runs], Order::OldestFirst).last().copied().unwrap_or_default();
+        (point.runs, point.failed) = (failed + passed, failed);
+        point.failing = wilson(point.failed, point.runs);
+    }
     let mut places = Vec::new();
-    part(&points, 0, level, &mut places);
+    part(&runs, 0, level, &mut places);
     places.sort_by_key(|(at, _)| *at);
     let bounds: Vec<usize> = std::iter::once(0).chain(places.iter().map(|(at, _)| *at)).chain([points.len()]).collect();
     let share = |from: usize, to: usize| {
-        let part = &points[from..to];
-        wilson(part.iter().map(|point| point.failed).sum(), part.iter().map(|point| point.runs).sum())
+        let (failed, passed) = distinct(&runs[from..to], Order::OldestFirst).last().copied().unwrap_or_default();
+        wilson(failed, failed + passed)
     };
     let changes = places
         .iter()
@@ -79,22 +111,57 @@ pub fn trend(table: &OutcomeTable, of: &JudgedProperty, level: f64) -> Trend {
     Trend { points, changes }
 }
 
-fn part(points: &[TrendPoint], offset: usize, level: f64, found: &mut Vec<(usize, f64)>) {
-    let sum = |points: &[TrendPoint]| {
-        let failed: u64 = points.iter().map(|point| point.failed).sum();
-        (failed, points.iter().map(|point| point.runs).sum::<u64>() - failed)
-    };
+/// Counts the runs with different traces in the first campaigns, for each number of campaigns from 1. The newest of
+/// bit-identical runs decides: their outcomes differ if the rule has changed.
+fn distinct<'a>(campaigns: impl IntoIterator<Item = &'a Vec<Decided>>, order: Order) -> Vec<Runs> {
+    let mut newest: BTreeMap<Trace, bool> = BTreeMap::new();
+    let (mut failures, mut counts) = (0, Vec::new());
+    for runs in campaigns {
+        for (trace, failed) in runs {
+            if order == Order::NewestFirst && newest.contains_key(trace) {
+                continue;
+            }
+            let before = newest.insert(*trace, *failed);
+            failures += u64::from(*failed);
+            failures -= u64::from(before == Some(true));
+        }
+        counts.push((failures, newest.len() as u64 - failures));
+    }
+    counts
+}
+
+fn part(runs: &[Vec<Decided>], offset: usize, level: f64, found: &mut Vec<(usize, f64)>) {
+    let (before, mut behind) = (distinct(runs, Order::OldestFirst), distinct(runs.iter().rev(), Order::NewestFirst));
+    behind.reverse();
     let p = |at: usize| {
-        let ((failed_in, passed_in), (failed_out, passed_out)) = (sum(&points[..at]), sum(&points[at..]));
+        let ((failed_in, passed_in), (failed_out, passed_out)) = (before[at - 1], behind[at]);
         TwoByTwo { failed_in, passed_in, failed_out, passed_out }.fisher().two_sided
     };
-    let surest = (1..points.len()).map(|at| (at, p(at))).min_by(|a, b| a.1.total_cmp(&b.1));
+    let surest = (1..runs.len()).map(|at| (at, p(at))).min_by(|a, b| a.1.total_cmp(&b.1));
     if let Some((at, p)) = surest {
-        let adjusted = (p * (points.len() - 1) as f64).min(1.0);
+        let adjusted = (p * (runs.len() - 1) as f64).min(1.0);
         if adjusted <= level {
             found.push((offset + at, adjusted));
-            part(&points[..at], offset, level, found);
-            part(&points[at..], offset + at, level, found);
+            part(&runs[..at], offset, level, found);
+            part(&runs[at..], offset + at, level, found);
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Ten campaigns of the same three scenes are no more evidence than one.
+    #[test]
+    fn bit_identical_runs_of_several_campaigns_count_once() {
+        let same: Vec<Decided> = vec![(Trace::Hash(0), true), (Trace::Hash(1), false), (Trace::Hash(2), false)];
+        let counts = distinct(&vec![same.clone(); 10], Order::OldestFirst);
+        assert_eq!(counts, [(1, 2); 10]);
+        // The rule changed: in the newest campaign, the first run passes.
+        let changed = vec![(Trace::Hash(0), false), (Trace::Row(9), true), (Trace::Row(10), true)];
+        let both = [same, changed];
+        assert_eq!(distinct(&both, Order::OldestFirst), [(1, 2), (2, 3)]);
+        assert_eq!(distinct(both.iter().rev(), Order::NewestFirst), [(2, 1), (2, 3)]);
     }
 }

@@ -19,6 +19,8 @@ const RUNS_IN_A_FILE: usize = 2_000;
 const MOST_PARTS: usize = 16;
 /// File with the digest of the columns.
 const SCHEMA: &str = "SCHEMA";
+/// File with the number of judgements that `recheck` had added to each campaign when its files were written.
+const RECHECKED: &str = "RECHECKED";
 
 /// An up-to-date mirror of a history's store.
 #[derive(Debug)]
@@ -71,8 +73,8 @@ pub struct MirrorChange {
 }
 
 impl Mirror {
-    /// Updates the mirror of a history: writes missing runs, and rewrites files that are damaged or hold runs that
-    /// the store lacks. If the folder of the history is read-only, missing runs are written into a temporary folder,
+    /// Updates the mirror of a history: writes missing runs, and rewrites files that are damaged, hold runs that the
+    /// store lacks, or are older than a recheck. If the folder of the history is read-only, missing runs are written into a temporary folder,
     /// which is removed with the returned value.
     ///
     /// The campaigns of [`History::selected_campaigns`] are left out, because their scenes were selected to fail.
@@ -92,15 +94,18 @@ impl Mirror {
     }
 
     /// Returns the files of a history's mirror that are damaged or differ from the store and the traces, sorted by name.
-    /// Files of earlier versions and of runs that the store no longer has are not compared: an update replaces them.
+    /// Files of earlier versions, of runs that the store no longer has, and from before a recheck are not compared: an
+    /// update replaces them.
     ///
     /// # Errors
     /// The history can't be read.
     pub fn damage(history: &History) -> Result<Vec<PathBuf>, Diagnostics> {
         let known: BTreeSet<String> = history.run_ids()?.into_iter().flat_map(|(_, runs)| runs).collect();
+        let (before, later) = (rechecked(&tables_of(history)), history.later_counts()?);
+        let is_newest = |campaign: &String| before.get(campaign) == later.get(campaign);
         let mut damaged = Vec::new();
         for file in entries(&tables_of(history)).into_iter().filter(|file| is_table(file)) {
-            let is_of_today = named(&file).is_none_or(|name| name.digest.is_some());
+            let is_of_today = named(&file).is_none_or(|name| name.digest.is_some() && is_newest(&name.campaign));
             if is_of_today && !(is_whole(&file) && is_as_stored(history, &file, &known)?) {
                 damaged.push(file);
             }
@@ -127,11 +132,20 @@ impl Mirror {
         let mut mirror = Self { folder, files: Vec::new(), _place: place };
         let mut change = MirrorChange::default();
         let mut present = if anew || !is_current { BTreeMap::new() } else { present(tables, is_beside) };
+        let (known, later) = (rechecked(tables), history.later_counts()?);
         for (campaign, runs) in history.run_ids()? {
-            let files = present.remove(&campaign).unwrap_or_default();
+            let mut files = present.remove(&campaign).unwrap_or_default();
+            if known.get(&campaign) != later.get(&campaign) {
+                files.drain(..).try_for_each(|file| mirror.remove(&file))?;
+            }
             mirror.update_campaign(history, &campaign, &runs, files, &mut change)?;
         }
         present.into_values().flatten().try_for_each(|file| mirror.remove(&file))?;
+        if is_beside && known != later {
+            let lines: String = later.iter().map(|(campaign, count)| format!("{campaign} {count}\n")).collect();
+            let file = tables.join(RECHECKED);
+            write_atomic(&file, lines.as_bytes()).map_err(|error| unwritten(&file, &error))?;
+        }
         Ok((mirror, change))
     }
 
@@ -272,7 +286,7 @@ fn is_as_stored(history: &History, file: &Path, known: &BTreeSet<String>) -> Res
     for run in &runs {
         // Without its trace, a run's noise and effects can't be compared.
         let Ok((choices, trace)) = history.recorded(run) else { return Ok(true) };
-        rows.add(&TableRun::new(history.run(run)?, &choices, &trace));
+        rows.add(&TableRun::new(history.newest_run(run)?, &choices, &trace));
     }
     Ok(rows.frame().is_ok_and(|frame| read(file, None).is_ok_and(|there| there.equals_missing(&frame))))
 }
@@ -280,6 +294,13 @@ fn is_as_stored(history: &History, file: &Path, known: &BTreeSet<String>) -> Res
 /// The folder of a history's mirror.
 fn tables_of(history: &History) -> PathBuf {
     history.dir().join("tables")
+}
+
+/// Reads the number of later judgements of each campaign from the time when the files were written.
+fn rechecked(tables: &Path) -> BTreeMap<String, u64> {
+    let text = fs::read_to_string(tables.join(RECHECKED)).unwrap_or_default();
+    let line = |line: &str| line.split_once(' ').and_then(|(id, count)| Some((id.to_owned(), count.parse().ok()?)));
+    text.lines().filter_map(line).collect()
 }
 
 fn entries(folder: &Path) -> Vec<PathBuf> {
@@ -311,7 +332,7 @@ fn present(tables: &Path, may_change: bool) -> BTreeMap<String, Vec<PathBuf>> {
 
 /// Reads a run. Noise and effects are unknown if its trace is missing, damaged, or of an unknown version.
 fn table_run(history: &History, run: &str) -> Result<TableRun, Diagnostics> {
-    let detail = history.run(run)?;
+    let detail = history.newest_run(run)?;
     Ok(match history.recorded(run) {
         Ok((choices, trace)) => TableRun::new(detail, &choices, &trace),
         Err(_) => detail.into(),

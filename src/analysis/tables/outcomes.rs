@@ -106,6 +106,27 @@ impl OutcomeTable {
         self.numbers.get(name).map_or(&[], Vec::as_slice)
     }
 
+    /// Returns, for each run (an index into the texts of the column `run`), whether it counts in rates: of runs with
+    /// bit-identical traces only the newest does, because the others add no evidence. Needs the columns `run` and
+    /// `trace_hash`.
+    pub fn counted_runs(&self) -> Vec<bool> {
+        let (runs, hashes) = (self.text("run"), self.text("trace_hash"));
+        let mut newest = BTreeMap::new();
+        for (run, hash) in runs.of_row.iter().zip(&hashes.of_row) {
+            if let (Some(run), Some(hash)) = (run, hash) {
+                newest.insert(*hash, *run);
+            }
+        }
+        let mut counted = vec![true; runs.texts.len()];
+        for (run, hash) in runs.of_row.iter().zip(&hashes.of_row) {
+            if let (Some(run), Some(hash)) = (run, hash) {
+                // A run without a hash (broken before its first state) is never a duplicate.
+                counted[*run as usize] = hashes.texts[*hash as usize].is_empty() || newest.get(hash) == Some(run);
+            }
+        }
+        counted
+    }
+
     fn append(
         &mut self,
         frame: &DataFrame,

@@ -1,17 +1,23 @@
 //! Export of the table: one file in Parquet or CSV, and a description of its columns.
 
+use std::collections::BTreeSet;
 use std::fs::{self, File};
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
-use polars::prelude::{CsvWriter, DataFrame, ParquetWriter, PolarsError, SerWriter as _};
+use polars::prelude::{
+    CsvWriter, DataFrame, NamedFrom as _, ParquetWriter, PolarsError, SerWriter as _, Series as Values,
+};
 use serde_json::{Value, json};
 
-use crate::tables::columns::{ColumnKind, columns};
+use crate::tables::columns::{ColumnKind, ColumnRole, columns};
 use crate::tables::frames::{Rows, kinds_columns, with_kinds};
 use crate::tables::mirror::{Mirror, read, unread, unwritten};
-use crate::tables::{Hierarchy, TableFilter};
+use crate::tables::{Hierarchy, OutcomeTable, TableFilter};
 use actcheck_base::{Diagnostics, NewFile};
+
+/// Column that says whether a run counts in rates over the exported rows.
+const COUNTS: &str = "counts";
 
 /// Writes `outcomes.parquet` and `schema.json` into a folder, creating it if needed. Returns the files and the number
 /// of rows.
@@ -126,6 +132,10 @@ pub(crate) fn schema() -> Value {
             "description": description,
         })
     }));
+    described.push(json!({
+        "name": COUNTS, "type": ColumnKind::Bool, "unit": "", "parameter": false, "role": ColumnRole::Record,
+        "description": "whether the run counts in rates over all rows: false if a later run is bit-identical",
+    }));
     json!({ "rows": "one for each run, action and property", "columns": described })
 }
 
@@ -133,7 +143,23 @@ pub(crate) fn schema() -> Value {
 fn empty(hierarchy: &Hierarchy) -> Result<DataFrame, PolarsError> {
     let mut frame = Rows::default().frame()?;
     with_kinds(&mut frame, hierarchy)?;
+    with_counts(&mut frame, &BTreeSet::new())?;
     Ok(frame)
+}
+
+/// The ids of the selected runs that count in rates.
+fn counted_runs(mirror: &Mirror, filter: &TableFilter) -> Result<BTreeSet<String>, Diagnostics> {
+    let table = OutcomeTable::read(mirror, filter, &["run", "trace_hash"])?;
+    let runs = table.text("run").texts.iter().zip(table.counted_runs());
+    Ok(runs.filter(|(_, counts)| *counts).map(|(run, _)| run.clone()).collect())
+}
+
+/// Adds the column [`COUNTS`].
+fn with_counts(frame: &mut DataFrame, counted: &BTreeSet<String>) -> Result<(), PolarsError> {
+    let runs = frame.column("run")?.str()?;
+    let counts: Vec<Option<bool>> = runs.iter().map(|run| run.map(|run| counted.contains(run))).collect();
+    frame.with_column(Values::new(COUNTS.into(), counts).into())?;
+    Ok(())
 }
 
 /// Passes the selected rows to `take`, file by file. Returns their number.
@@ -144,10 +170,12 @@ fn each(
     mut take: impl FnMut(&DataFrame) -> Result<(), Diagnostics>,
 ) -> Result<usize, Diagnostics> {
     let mut rows = 0;
+    let counted = counted_runs(mirror, filter)?;
     for (_, file) in mirror.files().filter(|(campaign, _)| filter.takes_campaign(campaign)) {
         let read = || -> Result<DataFrame, PolarsError> {
             let mut frame = filter.rows_of(read(file, None)?)?;
             with_kinds(&mut frame, hierarchy)?;
+            with_counts(&mut frame, &counted)?;
             frame.rechunk_mut();
             Ok(frame)
         };

@@ -226,7 +226,7 @@ const CODES_X: &[Code] = &[
     code(
         "X070",
         "the history has no campaign",
-        "it is empty, or holds only shrunk runs and failed runs that ran again",
+        "it is empty, or holds only shrunk runs, failed runs that ran again, and cases",
         "`actcheck run CONFIG` creates one",
     ),
     code(

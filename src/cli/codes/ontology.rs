@@ -79,4 +79,10 @@ const CODES_O: &[Code] = &[
         "a damaged or malicious file: entities that grow, hundreds of attributes or namespaces, thousands of levels",
         "don't use the file, or convert it to Turtle",
     ),
+    code(
+        "O014",
+        "a predicate of our namespaces does not exist",
+        "its name is misspelt, so that the statement has no effect: a property that is never judged, for example",
+        "take the suggested name",
+    ),
 ];

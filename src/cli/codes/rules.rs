@@ -182,6 +182,18 @@ const CODES_R: &[Code] = &[
         "correct the value as the help says",
     ),
     code(
+        "R044",
+        "the comparisons of a rule contradict each other",
+        "no number is in all of their ranges, so the rule never holds",
+        "correct a bound, or write one rule for each range",
+    ),
+    code(
+        "R045",
+        "an angle is compared with more than a full turn",
+        "the number is in degrees, but angles are in radians",
+        "write the number in radians, as in the help",
+    ),
+    code(
         "R050",
         "a predicate depends on its own negation",
         "the rules form a cycle through `~` or an aggregate",

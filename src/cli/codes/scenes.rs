@@ -87,6 +87,12 @@ const CODES_S: &[Code] = &[
         "`actcheck show RUN` shows its output; `[skill] max_broken` is the limit",
     ),
     code(
+        "S034",
+        "all of the first runs of a campaign were broken for the same reason",
+        "a model, a rule or the simulation fails in every scene, so that further runs would end in the same way",
+        "`actcheck show RUN` shows one of them; correct the cause and run again",
+    ),
+    code(
         "S040",
         "the configuration has no test with the actions of a stored run",
         "`tests` changed since the run was made",

@@ -10,7 +10,7 @@ use actcheck_verdict::Counts;
 /// One suite for each campaign and test, one case for each property of each action of each run.
 ///
 /// JUnit has four results: passed, failure, error and skipped. Broken and timeout become errors with the outcome as
-/// their type; inapplicable and untested become skipped with the outcome in their text.
+/// their type; inapplicable and untested become skipped with the outcome in their text. Times are wall times.
 #[derive(Debug, Clone, Default)]
 pub struct JunitReport {
     suites: Vec<Suite>,
@@ -22,7 +22,10 @@ struct Suite {
     test: String,
     started: String,
     counts: Counts,
+    /// Wall time of its runs.
     secs: f64,
+    /// Simulated time of their actions.
+    simulated_secs: f64,
     runs: u64,
     cases: String,
 }
@@ -57,22 +60,28 @@ impl JunitReport {
 impl Suite {
     fn add(&mut self, run: &RunDetail) {
         self.runs += 1;
-        for action in &run.actions {
-            self.secs += if action.judgements.is_empty() { 0.0 } else { action.duration_secs };
+        let judged = || run.actions.iter().filter(|action| !action.judgements.is_empty());
+        self.secs += if judged().next().is_some() { run.wall_secs } else { 0.0 };
+        let simulated: f64 = judged().map(|action| action.duration_secs).sum();
+        self.simulated_secs += simulated;
+        let actions = judged().count() as f64;
+        for action in judged() {
+            let share = if simulated > 0.0 { action.duration_secs / simulated } else { 1.0 / actions };
             for judgement in &action.judgements {
                 self.counts.add(judgement.outcome);
-                self.case(run, action, judgement);
+                // Sums over cases are correct: actions share the wall time of the run by their simulated durations, the
+                // properties of an action equally.
+                let secs = run.wall_secs * share / action.judgements.len() as f64;
+                self.case(run, (action, secs), judgement);
             }
         }
     }
 
-    fn case(&mut self, run: &RunDetail, action: &ActionDetail, judgement: &Judgement) {
-        // The properties of an action share its duration equally, so that sums over cases are correct.
-        let secs = action.duration_secs / action.judgements.len().max(1) as f64;
+    fn case(&mut self, run: &RunDetail, (action, secs): (&ActionDetail, f64), judgement: &Judgement) {
         let class = format!("{}.{}", run.row.test.replace(' ', "-"), names::local(&action.action));
         let name = format!("{} ({})", names::local(&judgement.property), run.row.run);
         let (class, name) = (attribute(&class), attribute(&name));
-        let _ = write!(self.cases, "    <testcase classname=\"{class}\" name=\"{name}\" time=\"{secs:.3}\"");
+        let _ = write!(self.cases, "    <testcase classname=\"{class}\" name=\"{name}\" time=\"{secs:.6}\"");
         let _ = match element(judgement.outcome) {
             None => writeln!(self.cases, "/>"),
             Some("skipped") => {
@@ -94,7 +103,7 @@ impl Suite {
         let count = |outcome| self.counts.get(outcome);
         let _ = writeln!(
             out,
-            "  <testsuite id=\"{idx}\" name=\"{}\" package=\"{}\" hostname=\"localhost\" timestamp=\"{}\" tests=\"{}\" failures=\"{}\" errors=\"{}\" skipped=\"{}\" time=\"{:.3}\">",
+            "  <testsuite id=\"{idx}\" name=\"{}\" package=\"{}\" hostname=\"localhost\" timestamp=\"{}\" tests=\"{}\" failures=\"{}\" errors=\"{}\" skipped=\"{}\" time=\"{:.6}\">",
             attribute(&format!("{} {}", self.campaign, self.test)),
             attribute(&self.campaign),
             // The schema does not allow a time zone here; times are in UTC.
@@ -111,6 +120,7 @@ impl Suite {
         };
         property("campaign", self.campaign.clone());
         property("runs", self.runs.to_string());
+        property("simulated seconds", format!("{:.3}", self.simulated_secs));
         for outcome in Outcome::ALL {
             property(outcome.word(), count(outcome).to_string());
         }

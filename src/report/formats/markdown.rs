@@ -24,6 +24,7 @@ pub struct MarkdownReport {
     passed_runs: u64,
     failures: Vec<String>,
     failed_runs: u64,
+    twins: u64,
     privileged: Vec<String>,
 }
 
@@ -39,11 +40,21 @@ impl MarkdownReport {
         self.privileged = privileged.map(|row| row.id.clone()).collect();
     }
 
-    /// Adds a run.
-    pub fn add(&mut self, run: &RunDetail) {
+    /// Counts a run that a later run repeats bit for bit: it does not count otherwise.
+    pub fn add_twin(&mut self, run: &RunDetail) {
+        self.add_campaign(run);
+        self.twins += 1;
+    }
+
+    fn add_campaign(&mut self, run: &RunDetail) {
         if !self.campaigns.contains(&run.row.campaign) {
             self.campaigns.push(run.row.campaign.clone());
         }
+    }
+
+    /// Adds a run.
+    pub fn add(&mut self, run: &RunDetail) {
+        self.add_campaign(run);
         *self.statuses.entry(run.row.status).or_default() += 1;
         self.scores.push(run.row.score);
         let mut of_run = Counts::default();
@@ -86,6 +97,14 @@ pub fn markdown(report: &MarkdownReport) -> String {
         listed(report.statuses.iter().map(|(status, count)| (status.word(), *count))),
         listed(Outcome::ALL.map(|outcome| (outcome.word(), report.counts.get(outcome)))),
     );
+    if report.twins > 0 {
+        let (more, are) = (plural(report.twins, "more run is a", "more runs are"), plural(report.twins, "", "s"));
+        let _ = writeln!(
+            out,
+            "\n{} {more} bit-for-bit duplicate{are} of a later one: each trace counts once.",
+            report.twins
+        );
+    }
     if runs > 0 {
         let mean = report.scores.iter().sum::<f64>() / runs as f64;
         let _ = writeln!(out, "\nT = {mean:.4}; runs in which everything passed: {}.", rate(report.passed_runs, runs));

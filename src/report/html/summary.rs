@@ -80,13 +80,17 @@ fn sentences(findings: &mut Value, report: &HtmlReport<'_>) {
     }
 }
 
-/// Computes T over all runs and over those that are not broken, and the number of runs in which everything passed.
+/// Computes T over all runs and over those that are not broken, and the number of runs in which everything passed. Of
+/// bit-identical runs only the newest counts.
 fn scores(report: &HtmlReport<'_>) -> Value {
     let table = report.table;
     let (runs, status, score) = (table.text("run"), table.text("status"), table.number("score"));
     let mut first: BTreeMap<u32, usize> = BTreeMap::new();
+    let counted = table.counted_runs();
     for (row, run) in runs.of_row.iter().enumerate() {
-        if let Some(run) = run {
+        if let Some(run) = run
+            && counted[*run as usize]
+        {
             first.entry(*run).or_insert(row);
         }
     }
@@ -101,7 +105,7 @@ fn scores(report: &HtmlReport<'_>) -> Value {
         "T": mean(first.values().filter_map(of)), "T_interval": score_interval(first.values().filter_map(of)),
         "without_broken": mean(whole.clone().filter_map(of)), "without_broken_interval": score_interval(whole.filter_map(of)),
         "runs": first.len(), "all_passed": wilson(passed, tested), "passed": passed, "tested": tested,
-        "statuses": statuses,
+        "statuses": statuses, "twins": report.findings.twins,
     })
 }
 

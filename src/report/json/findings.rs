@@ -17,7 +17,7 @@ pub fn findings_json(summary: &FindingsSummary) -> Value {
         .collect();
     json!({
         "campaigns": summary.campaigns,
-        "runs": summary.runs,
+        "runs": summary.runs, "twins": summary.twins,
         "outcomes": summary.counts,
         "level": summary.level,
         "failure_modes": modes,

@@ -67,6 +67,8 @@ pub struct RunSummary {
     pub reason: Option<String>,
     /// The paper's S.
     pub score: f64,
+    /// Digest over all states; empty if it broke before its first state.
+    pub trace_hash: String,
     /// Its actions, in order.
     pub actions: Vec<ActionSummary>,
 }
@@ -153,6 +155,7 @@ impl RunSummary {
             status: record.status,
             reason: record.reason.clone(),
             score: record.score,
+            trace_hash: record.trace.hash.clone(),
             actions,
         }
     }
@@ -173,6 +176,7 @@ impl RunSummary {
             status: run.row.status,
             reason: run.reason.clone(),
             score: run.row.score,
+            trace_hash: run.row.trace_hash.clone(),
             actions: actions.collect(),
         }
     }
@@ -216,7 +220,7 @@ impl CampaignSummary {
     pub fn pass_rate(&self) -> Option<Proportion> {
         let judged = self.runs.iter().filter(|run| run.status != RunStatus::Broken).count() as u64;
         let passed = self.runs.iter().filter(|run| run.passed()).count() as u64;
-        Proportion::new(passed, judged).map(|rate| rate.with_interval(self.interval_of_repeated(None)))
+        Proportion::new(passed, judged).map(|rate| rate.with_interval(self.interval_of_alike(None)))
     }
 
     /// Outcome counts over all properties.
@@ -253,7 +257,7 @@ impl CampaignSummary {
             let own: Vec<&Judgement> = judgements.filter(|judgement| judgement.property == *iri).collect();
             let counts = Counts::of(own.iter().map(|judgement| judgement.outcome));
             let rate = Proportion::new(counts.passed, counts.decided());
-            let rate = rate.map(|rate| rate.with_interval(self.interval_of_repeated(Some(iri))));
+            let rate = rate.map(|rate| rate.with_interval(self.interval_of_alike(Some(iri))));
             let held_before = own.iter().filter(|judgement| judgement.held_before == Some(true)).count() as u64;
             PropertyLine { property: iri.clone(), label: label.clone(), counts, rate, held_before }
         };
@@ -304,6 +308,7 @@ pub(crate) mod tests {
             status,
             reason: (status != RunStatus::Completed).then(|| "body left the world".into()),
             score,
+            trace_hash: index.to_string(),
             actions: vec![ActionSummary { name: "Pick".into(), score, judgements }],
         }
     }
@@ -327,6 +332,20 @@ pub(crate) mod tests {
             ended_by: None,
             interrupted: false,
         }
+    }
+
+    /// Five runs with the same trace are no more evidence than one.
+    #[test]
+    fn runs_with_the_same_trace_have_the_interval_of_one() {
+        let mut summary = campaign((0..6).map(|index| run(index, RunStatus::Completed, &[Outcome::Passed])).collect());
+        let low = |summary: &CampaignSummary| summary.property_lines()[0].rate.expect("decided").interval.low;
+        let independent = low(&summary);
+        summary.runs.iter_mut().for_each(|run| run.trace_hash = (run.index % 3).to_string());
+        let rate = summary.property_lines()[0].rate.expect("decided");
+        assert_eq!((rate.count, rate.of), (6, 6));
+        assert_eq!(Some(rate.interval), wilson(3, 3));
+        assert_eq!(summary.pass_rate().expect("decided").interval, rate.interval);
+        assert!(low(&summary) < independent);
     }
 
     #[test]

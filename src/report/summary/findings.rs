@@ -20,7 +20,9 @@ pub struct FindingsSummary {
     pub campaigns: Vec<String>,
     /// Number of runs in the table.
     pub runs: u64,
-    /// Outcome counts of the table.
+    /// Number of those that don't count because a later run is bit-identical.
+    pub twins: u64,
+    /// Outcome counts of the runs that count.
     pub counts: Counts,
     /// Failure modes: runs that share the same set of failed properties.
     pub modes: Vec<FailureMode>,

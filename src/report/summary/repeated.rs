@@ -1,5 +1,7 @@
 //! Consistency of repeated scenes, for each property and for whole runs.
 
+use std::collections::BTreeMap;
+
 use crate::{CampaignSummary, RunSummary};
 use actcheck_analysis::{Consistency, Interval, Repeated, consistency};
 use actcheck_base::{Judgement, Outcome};
@@ -38,9 +40,25 @@ impl CampaignSummary {
         self.runs.iter().filter(move |run| run.repetition.is_some_and(|repetition| repetition.scene == scene))
     }
 
-    /// Interval of a pass rate that accounts for repeated scenes. Returns `None` if every scene was run once.
-    pub(super) fn interval_of_repeated(&self, property: Option<&str>) -> Option<Interval> {
-        if self.is_repeated() { consistency(&self.decided(property)).rate } else { None }
+    /// Interval of a pass rate that accounts for repeated scenes and bit-identical runs. Returns `None` if every scene was
+    /// run once.
+    pub(super) fn interval_of_alike(&self, property: Option<&str>) -> Option<Interval> {
+        let is_alike = self.is_repeated() || self.scenes().iter().zip(0..).any(|(scene, place)| *scene != place);
+        if is_alike { consistency(&self.decided(property)).rate } else { None }
+    }
+
+    /// The scene of each run: its number if scenes are repeated, else the position of the first run with the same trace.
+    fn scenes(&self) -> Vec<u64> {
+        let mut first = BTreeMap::new();
+        let mut scenes = Vec::new();
+        for (run, place) in self.runs.iter().zip(0..) {
+            scenes.push(match run.repetition {
+                Some(repetition) => repetition.scene,
+                None if run.trace_hash.is_empty() => place,
+                None => *first.entry(&run.trace_hash).or_insert(place),
+            });
+        }
+        scenes
     }
 
     fn is_repeated(&self) -> bool {
@@ -49,8 +67,7 @@ impl CampaignSummary {
 
     /// The runs in which a property was decided. Without a property, all runs that are not broken.
     fn decided(&self, property: Option<&str>) -> Vec<Repeated> {
-        let of = |run: &RunSummary| {
-            let scene = run.repetition?.scene;
+        let of = |(run, scene): (&RunSummary, u64)| {
             let Some(property) = property else {
                 let judged = run.status != actcheck_history::RunStatus::Broken;
                 return judged.then(|| Repeated { scene, passed: run.passed(), margin: None });
@@ -63,7 +80,7 @@ impl CampaignSummary {
             let margin = margins.and_then(|margins| margins.into_iter().reduce(f64::min));
             (counts.decided() > 0).then_some(Repeated { scene, passed: counts.failed == 0, margin })
         };
-        self.runs.iter().filter_map(of).collect()
+        self.runs.iter().zip(self.scenes()).filter_map(of).collect()
     }
 }
 

@@ -47,7 +47,7 @@ pub fn regressions_text(cases: &[CaseSummary]) -> String {
         _ => None,
     });
     list_group(["could not be decided", "could not be decided"], &|case| match &case.recurrence {
-        Recurrence::Undecided(what) => with(case, &listed(what)),
+        Recurrence::Undecided(what) => with(case, case.reason.as_deref().unwrap_or(&listed(what))),
         _ => None,
     });
     list_group(["no longer fails", "no longer fail"], &|case| match case.recurrence {
@@ -96,6 +96,12 @@ mod tests {
             regressions_text(&cases),
             "regressions: 5 ran, 1 fails again: a.toml (A); 1 fails differently: c.toml (B + C); \
              1 could not be decided: d.toml (A); 1 no longer fails: b.toml (A)\n"
+        );
+        let reason = Some("the program `mine` exited with code 3".to_owned());
+        let undecided = CaseSummary { reason, ..case("d.toml", &["A"], Recurrence::Undecided(set(&["A"]))) };
+        assert_eq!(
+            regressions_text(&[undecided]),
+            "regressions: 1 ran, 1 could not be decided: d.toml (the program `mine` exited with code 3)\n"
         );
         assert_eq!(regressions_text(&[]), "");
         assert_eq!(cases.each_ref().map(CaseSummary::exit_code), [1, 0, 1, 2, 0]);

@@ -21,6 +21,9 @@ pub fn findings_text(summary: &FindingsSummary) -> String {
     let campaigns = list(summary.campaigns.iter().map(String::as_str));
     let plural = if summary.campaigns.len() == 1 { "" } else { "s" };
     let _ = writeln!(out, "{} runs of {} campaign{plural} ({campaigns})", summary.runs, summary.campaigns.len());
+    if summary.twins > 0 {
+        let _ = writeln!(out, "{}", twins_line(summary.twins));
+    }
     let _ = writeln!(out, "{} outcomes: {}", summary.counts.total(), counts(summary.counts));
     modes(&mut out, summary);
     cascades(&mut out, summary);
@@ -29,6 +32,13 @@ pub fn findings_text(summary: &FindingsSummary) -> String {
         property(&mut out, report, summary);
     }
     out
+}
+
+fn twins_line(twins: u64) -> String {
+    match twins {
+        1 => "1 run is bit-for-bit a duplicate of a later one: both count once".to_owned(),
+        _ => format!("{twins} runs are bit-for-bit duplicates of a later one: each trace counts once"),
+    }
 }
 
 fn counts(counts: Counts) -> String {

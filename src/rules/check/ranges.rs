@@ -1,4 +1,5 @@
-//! Reports conditions that no fact can satisfy, because the ontology declares another type for the property's values.
+//! Reports conditions that no fact can satisfy, because the ontology declares another type for the property's values, or
+//! because they contradict each other.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -51,17 +52,24 @@ impl Ranges {
                     _ => {}
                 }
             }
+            contradictions(rule, diagnostics);
             for literal in &rule.body {
-                let Literal::Compare { op: Comparison::Equal, left, right, span } = literal else { continue };
+                let Literal::Compare { op, left, right, span } = literal else { continue };
                 let ((Expr::Variable(variable), Expr::Constant(term))
                 | (Expr::Constant(term), Expr::Variable(variable))) = (left, right)
                 else {
                     continue;
                 };
-                if let Some((property, datatype)) = typed.get(variable)
-                    && crate::model::values::datatype(term) != *datatype
-                    && !same_integer(term, datatype)
-                {
+                let Some((property, datatype)) = typed.get(variable) else { continue };
+                let is_other = match op {
+                    Comparison::Equal => {
+                        crate::model::values::datatype(term) != *datatype && !same_integer(term, datatype)
+                    }
+                    Comparison::Unequal => false,
+                    // Numbers of all types can be compared, but nothing else.
+                    _ => term.number().is_some() != is_numeric(datatype),
+                };
+                if is_other {
                     let fault = never(property, datatype, term);
                     diagnostics.push(fault.at(&rule.origin.source, span.clone()));
                 }
@@ -100,6 +108,61 @@ impl Ranges {
     }
 }
 
+/// The numbers that the comparisons of a rule leave for a variable.
+struct Left {
+    low: f64,
+    high: f64,
+    /// Whether the bounds themselves are left.
+    closed: [bool; 2],
+}
+
+/// Reports `R044` for comparisons with numbers that no value of their variable satisfies together.
+fn contradictions(rule: &Rule, diagnostics: &mut Diagnostics) {
+    let mut left: BTreeMap<Variable, Left> = BTreeMap::new();
+    for literal in &rule.body {
+        let Literal::Compare { op, left: a, right: b, span } = literal else { continue };
+        let (variable, number, op) = match (a, b) {
+            (Expr::Variable(variable), Expr::Constant(term)) => (variable, term.number(), *op),
+            (Expr::Constant(term), Expr::Variable(variable)) => (variable, term.number(), turned(*op)),
+            _ => continue,
+        };
+        let Some(number) = number else { continue };
+        let known =
+            left.entry(*variable).or_insert(Left { low: f64::NEG_INFINITY, high: f64::INFINITY, closed: [true; 2] });
+        let closes = matches!(op, Comparison::Equal | Comparison::LessEqual | Comparison::GreaterEqual);
+        if matches!(op, Comparison::Equal | Comparison::Greater | Comparison::GreaterEqual) && number >= known.low {
+            known.closed[0] = closes && (number > known.low || known.closed[0]);
+            known.low = number;
+        }
+        if matches!(op, Comparison::Equal | Comparison::Less | Comparison::LessEqual) && number <= known.high {
+            known.closed[1] = closes && (number < known.high || known.closed[1]);
+            known.high = number;
+        }
+        if known.low > known.high || (known.low == known.high && known.closed != [true; 2]) {
+            let name = &rule.variables[*variable];
+            let message = format!("this can never hold: no number satisfies all comparisons of `?{name}` in this rule");
+            let help = "`,` means and: for or, write one rule for each case";
+            diagnostics.push(Diagnostic::error("R044", message).at(&rule.origin.source, span.clone()).help(help));
+            return;
+        }
+    }
+}
+
+/// The comparison with its sides exchanged.
+fn turned(op: Comparison) -> Comparison {
+    match op {
+        Comparison::Less => Comparison::Greater,
+        Comparison::LessEqual => Comparison::GreaterEqual,
+        Comparison::Greater => Comparison::Less,
+        Comparison::GreaterEqual => Comparison::LessEqual,
+        same => same,
+    }
+}
+
+fn is_numeric(datatype: &str) -> bool {
+    matches!(datatype.rsplit('#').next(), Some("double" | "integer"))
+}
+
 /// Returns whether an integer term matches `xsd:integer`: small integers have narrower datatypes.
 fn same_integer(term: &Term, datatype: &str) -> bool {
     matches!(term, Term::Integer(_)) && datatype.ends_with("#integer")
@@ -112,6 +175,9 @@ fn never(property: &str, datatype: &str, term: &Term) -> Diagnostic {
     let help = match (datatype.rsplit('#').next(), term) {
         (Some("double"), Term::Integer(value)) => {
             format!("`=` compares terms: write `{value}.0`, or compare with `<=` and `>=`")
+        }
+        (Some("double" | "integer"), Term::String(text)) if text.parse::<f64>().is_ok() => {
+            format!("write the number without quotes: `{text}`")
         }
         (Some("boolean"), _) => "write `true` or `false`, without quotes".to_owned(),
         (Some("string"), _) => "write it in double quotes".to_owned(),

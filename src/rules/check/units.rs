@@ -17,6 +17,9 @@ type Unit = Option<Dimension>;
 const NONE: Dimension = [0; 4];
 const RADIAN: Dimension = [0, 0, 0, 1];
 
+/// Largest angle in the vocabulary. Unit: radians.
+const FULL_TURN_RAD: f64 = std::f64::consts::TAU;
+
 /// Passes over the rules: units propagate through at least this many predicates in a row.
 const PASSES: usize = 4;
 
@@ -153,6 +156,12 @@ impl<'a> Units<'a> {
                 _ => {}
             }
         }
+        for literal in &rule.body {
+            if let Literal::Compare { left, right, span, .. } = literal {
+                seen.degrees(left, right, span);
+                seen.degrees(right, left, span);
+            }
+        }
         for aggregate in rule.aggregation.iter().flat_map(|aggregation| &aggregation.aggregates) {
             use crate::model::program::AggregateKind::Count;
             seen.units[aggregate.output] = if aggregate.kind == Count { None } else { seen.units[aggregate.input] };
@@ -177,6 +186,21 @@ impl Seen<'_> {
         let help = "units of properties are declared in ontology/world.ttl; a number in the rule text fits every unit";
         let fault = Diagnostic::error("R042", message).at(&self.rule.origin.source, span.clone()).help(help);
         self.diagnostics.push(fault);
+    }
+
+    /// Warns (R045) of an angle that is compared with a number beyond a full turn, which is probably in degrees.
+    fn degrees(&mut self, angle: &Expr, number: &Expr, span: &Span) {
+        let mut ignored = Diagnostics::new();
+        let unit =
+            Seen { rule: self.rule, units: self.units.clone(), diagnostics: &mut ignored }.expression(angle, span);
+        let Expr::Constant(term) = number else { return };
+        let Some(number) = term.number().filter(|number| unit == Some(RADIAN) && number.abs() > FULL_TURN_RAD) else {
+            return;
+        };
+        let message = format!("an angle in rad is compared with {number}, which is more than a full turn");
+        let help = format!("{number} degrees are {:.4} rad", number.to_radians());
+        self.diagnostics
+            .push(Diagnostic::warning("R045", message).at(&self.rule.origin.source, span.clone()).help(help));
     }
 
     /// Records the unit of a variable and reports a conflict with its known unit.

@@ -17,8 +17,8 @@ use crate::sparql::ledger::Ledger;
 use crate::sparql::query_text::{first_group, groups, scan, variables};
 use crate::watch::Watch;
 use actcheck_base::{
-    COUNTED_TEXT, Diagnostic, Diagnostics, Findings, MOST_NESTED_CALLS, RuleFault, Source, Span, TEXT_FUNCTIONS, Term,
-    WitnessRow, bounded_texts, check_calls, names, sparql_excess,
+    COUNTED_TEXT, Diagnostic, Diagnostics, Findings, MOST_NESTED_CALLS, RuleFault, Severity, Source, Span,
+    TEXT_FUNCTIONS, Term, WitnessRow, bounded_texts, check_calls, names, sparql_excess,
 };
 use actcheck_ontology::{Ontology, Vocabulary};
 
@@ -260,6 +260,13 @@ fn expected(message: &str) -> String {
         .take(12)
         .collect();
     if words.is_empty() { "something else".to_owned() } else { words.join(" or ") }
+}
+
+/// Returns warnings about terms of our namespaces in a query that the vocabulary lacks.
+pub fn unknown_terms(source: &Source, vocabulary: &Vocabulary) -> Diagnostics {
+    let mut found = Diagnostics::new();
+    check_vocabulary(source, vocabulary, &BTreeSet::new(), &mut found);
+    found.into_iter().map(|fault| Diagnostic { severity: Severity::Warning, ..fault }).collect()
 }
 
 /// Checks that terms of our namespaces are in the vocabulary, as in Datalog.

@@ -29,7 +29,8 @@ def skill(action: str) -> Callable[[_Skill], _Skill]:
     """Registers a function as the skill for an action: `@skill("Pick")`.
 
     It is called with the robot and, as keyword arguments, the designators of the action that it has parameters for. It
-    returns a `Report`, `True` or `None` for success, `False` for failure; any exception, such as `Failed`, is a failure too.
+    returns a `Report`, `True` or `None` for success, `False` for failure; `Failed` is a failure too. Any other exception is a
+    fault of the program, not of the robot: the run is `broken`, with the traceback in its record.
     """
 
     def register(function: _Skill) -> _Skill:
@@ -42,7 +43,8 @@ def skill(action: str) -> Callable[[_Skill], _Skill]:
 def serve(name: str | None = None, wire: Wire | None = None) -> None:
     """Performs actions until the campaign is over. Call it at the end of a program that defines skills.
 
-    Actions without a skill in this program are performed by actcheck's reference skills.
+    Actions without a skill in this program are performed by actcheck's reference skills. An exception of a skill ends the
+    program, and actcheck starts it anew for the next run.
     """
     name = name or Path(sys.argv[0]).stem or "python"
     try:
@@ -53,25 +55,25 @@ def serve(name: str | None = None, wire: Wire | None = None) -> None:
                     report = perform(skills[call.action], Robot(session, call, urdf))
                 except Aborted:
                     continue
+                except ProtocolFault:
+                    raise
+                except Exception as fault:
+                    # The last line is the reason of the broken run, for readers of its record.
+                    traceback.print_exception(fault)
+                    sys.exit(told(fault))
                 session.end(report)
     except ProtocolFault as fault:
         sys.exit(f"actcheck: {fault}")
 
 
 def perform(function: Skill, robot: Robot) -> Report:
-    """Performs one action and returns its report. Raises only faults of the connection."""
+    """Performs one action and returns its report."""
     try:
         return report_of(function(robot, **wanted(function, robot.call)))
     except Ended as ended:
         return ended.report
     except Failed as failed:
         return Report(False, str(failed))
-    except (Aborted, ProtocolFault):
-        raise
-    except Exception as fault:
-        # The report names the line, for readers of the run's record; the full traceback goes to stderr.
-        traceback.print_exception(fault)
-        return Report(False, told(fault))
 
 
 def wanted(function: Skill, call: Call) -> dict[str, Any]:

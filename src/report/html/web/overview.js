@@ -15,7 +15,7 @@ function overview({ runs, summary, filter, open }) {
   return [
     make("section", {},
       make("h1", {}, `${counted(scores.runs, "run")}, ${findings.properties.length === 1 ? "one property" : `${count(findings.properties.length)} properties`}`),
-      make("p", { class: "lead" }, `Every property of every action of every run has one of six outcomes. Runs: ${statuses}.`),
+      make("p", { class: "lead" }, `Every property of every action of every run has one of six outcomes. Runs: ${statuses}.${scores.twins ? ` ${counted(scores.twins, "more run")} ${scores.twins === 1 ? "is" : "are"} bit-identical to a later one: each counts once.` : ""}`),
       make("div", { class: "tiles" }, OUTCOMES.map(tile)),
       shares(counts, "Outcomes"),
       summary.campaigns.filter((row) => row.privileged).map((row) => make("p", {}, `In ${row.id} ${summary.privileged}.`))),
