@@ -120,8 +120,11 @@ fn absurd_masses_and_sizes_are_refused_with_their_place() {
     std::fs::create_dir_all(&objects).unwrap();
     let glass = std::fs::read_to_string(root().join("models/objects/glass.toml")).unwrap();
     let mass = glass.lines().find(|line| line.starts_with("mass_kg")).unwrap();
-    std::fs::write(folder.path().join("c.toml"), "tests = [[\"Pick\"]]\ntest_count = 1\nmodel_dir = \"models\"\n")
-        .unwrap();
+    std::fs::write(
+        folder.path().join("c.toml"),
+        "tests = [[\"Pick\"]]\ntest_count = 1\nmodel_dir = \"models\"\n[pickObject]\nmodel_list = [\"heavy\"]\n",
+    )
+    .unwrap();
     for written in ["mass_kg = 1e30", "mass_kg = 1e7", "mass_kg = inf"] {
         std::fs::write(objects.join("heavy.toml"), glass.replace(mass, written)).unwrap();
         let output = actcheck(folder.path(), &["check", "c.toml"]);

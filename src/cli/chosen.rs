@@ -86,8 +86,15 @@ pub(super) fn hierarchy(ontology: &Ontology) -> Hierarchy {
 
 /// X044: the chosen campaigns and times have no runs.
 pub(super) fn none_of(history: &History) -> Diagnostic {
-    Diagnostic::error("X044", format!("the history `{}` has no matching runs", history.dir().display()))
-        .help("`actcheck list` shows its runs; `actcheck run CONFIG` creates some")
+    let selected = history.selected_campaigns().unwrap_or_default();
+    let help = match selected.last() {
+        Some(id) => format!(
+            "its runs of cases, shrunk runs and repeated failed runs are used only if their campaign is named: \
+             `--campaign {id}`"
+        ),
+        None => "`actcheck list` shows its runs; `actcheck run CONFIG` creates some".to_owned(),
+    };
+    Diagnostic::error("X044", format!("the history `{}` has no matching runs", history.dir().display())).help(help)
 }
 
 /// Whether a name or IRI denotes the property with an IRI.

@@ -83,7 +83,8 @@ pub fn list(args: &ListArgs) -> Result<(), Diagnostics> {
         ("trace_hash", true, |row| row.trace_hash.as_str().into()),
     ];
     let shown: Vec<_> = columns.into_iter().filter(|(_, shown, _)| *shown).collect();
-    let mut table = Table::new(shown.iter().map(|(name, ..)| *name));
+    let mut table =
+        Table::new(shown.iter().map(|(name, ..)| *name)).with_expendable(["trace_hash", "index", "weight", "test"]);
     table.columns.extend(args.property.iter().map(|name| names::local(name).to_owned()));
     let row = |row: &RunRow| {
         let outcomes =

@@ -45,7 +45,8 @@ pub fn rules(args: &RulesArgs) -> Result<(), Diagnostics> {
     let counts = |property: &Property| judged.get(&property.iri).copied().unwrap_or_default();
     let properties = ontology.properties.values();
     let mut table = match args.format {
-        Format::Text => Table::new(["property", "label", "language", "file", "actions", "unit", "passed"]),
+        Format::Text => Table::new(["property", "label", "language", "file", "actions", "unit", "passed"])
+            .with_expendable(["language", "file", "unit", "actions", "label"]),
         Format::Csv | Format::Json => Table::new(
             ["property", "label", "language", "file", "actions", "precondition_of", "unit"]
                 .into_iter()

@@ -12,21 +12,19 @@ use actcheck_history::QueryAnswer;
 /// (for programs).
 pub fn answer_table(answer: &QueryAnswer, short: bool) -> Table {
     match answer {
-        QueryAnswer::Boolean(value) => {
-            Table { columns: vec!["answer".to_owned()], rows: vec![vec![Value::Bool(*value)]] }
-        }
+        QueryAnswer::Boolean(value) => Table { rows: vec![vec![Value::Bool(*value)]], ..Table::new(["answer"]) },
         QueryAnswer::Table { columns, rows } => Table {
-            columns: columns.clone(),
             rows: rows
                 .iter()
                 .map(|row| {
                     row.iter().map(|cell| cell.as_ref().map_or(Value::Null, |term| value(term, short))).collect()
                 })
                 .collect(),
+            ..Table::new(columns)
         },
         QueryAnswer::Graph(triples) => Table {
-            columns: ["subject", "predicate", "object"].map(str::to_owned).to_vec(),
             rows: triples.iter().map(|triple| triple.iter().map(|term| value(term, short)).collect()).collect(),
+            ..Table::new(["subject", "predicate", "object"])
         },
     }
 }

@@ -2,7 +2,7 @@
 
 use serde_json::{Map, Value};
 
-use crate::text::ruled;
+use crate::text::{fit, hidden_columns, ruled, terminal_width};
 
 /// Output format of a table.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -23,30 +23,56 @@ pub struct Table {
     pub columns: Vec<String>,
     /// Rows, each with one value per column.
     pub rows: Vec<Vec<Value>>,
+    /// Columns that a narrow terminal leaves out, the least important one first.
+    pub expendable: Vec<&'static str>,
 }
 
 impl Table {
     /// Creates a table without rows.
     pub fn new<S: Into<String>>(columns: impl IntoIterator<Item = S>) -> Self {
-        Self { columns: columns.into_iter().map(Into::into).collect(), rows: Vec::new() }
+        Self { columns: columns.into_iter().map(Into::into).collect(), ..Self::default() }
+    }
+
+    /// Sets the columns that a narrow terminal leaves out, the least important one first.
+    #[must_use]
+    pub fn with_expendable(self, expendable: impl IntoIterator<Item = &'static str>) -> Self {
+        Self { expendable: expendable.into_iter().collect(), ..self }
     }
 
     /// Renders the table, with a trailing newline.
     pub fn render(&self, format: TableFormat) -> String {
         match format {
-            TableFormat::Table => self.text(),
+            TableFormat::Table => self.text(terminal_width()),
             TableFormat::Csv => self.csv(),
             TableFormat::Json => self.json(),
         }
     }
 
-    fn text(&self) -> String {
+    /// Aligned columns, or one line for each value if they are too wide for the terminal.
+    fn text(&self, width: Option<usize>) -> String {
         let mut table = ruled();
         table.set_header(&self.columns);
         for row in &self.rows {
             table.add_row(row.iter().map(plain));
         }
-        format!("{table}\n")
+        let hidden = match width {
+            Some(width) => fit(&mut table, width, &self.expendable),
+            None => Some(Vec::new()),
+        };
+        match hidden {
+            Some(hidden) => format!("{table}\n{}", hidden_columns(&hidden)),
+            None => self.stacked(),
+        }
+    }
+
+    /// One line for each value; rows are separated by an empty line.
+    fn stacked(&self) -> String {
+        let longest = self.columns.iter().map(|name| name.chars().count()).max().unwrap_or(0);
+        let row = |row: &Vec<Value>| -> String {
+            let pairs = self.columns.iter().zip(row);
+            pairs.map(|(name, value)| format!(" {name:longest$}   {}\n", plain(value))).collect()
+        };
+        self.rows.iter().map(row).collect::<Vec<_>>().join("\n")
     }
 
     fn csv(&self) -> String {
@@ -95,5 +121,16 @@ mod tests {
         assert_eq!(table.render(TableFormat::Csv), "run,score,note\nk-1,0.8,\nk-2,1.0,\"a, \"\"b\"\"\"\n");
         assert!(table.render(TableFormat::Json).contains("\"note\": null"));
         assert!(table.render(TableFormat::Table).contains("k-1"));
+    }
+
+    #[test]
+    fn a_table_that_is_too_wide_is_stacked() {
+        let mut table = Table::new(["iri", "count"]).with_expendable(["count"]);
+        table.rows.push(vec!["https://example.org/a/long/name".into(), 1.into()]);
+        table.rows.push(vec!["b".into(), 2.into()]);
+        let wide = " iri     https://example.org/a/long/name\n count   1\n\n iri     b\n count   2\n";
+        assert_eq!(table.text(Some(20)), wide);
+        assert!(table.text(Some(35)).contains("not shown at this width: count;"), "{}", table.text(Some(35)));
+        assert!(!table.text(None).contains("not shown"));
     }
 }

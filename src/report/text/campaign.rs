@@ -6,7 +6,7 @@ use comfy_table::{Attribute, Cell, Color};
 
 use crate::text::repeated::repeated_text;
 use crate::text::weighted::weighted_text;
-use crate::text::{by_action, regressions_text, ruled};
+use crate::text::{by_action, fit, regressions_text, ruled, terminal_width};
 use crate::{CampaignSummary, PropertyLine, Proportion, RunSummary};
 use actcheck_base::{Outcome, names};
 use actcheck_history::SkillRecord;
@@ -113,7 +113,15 @@ fn properties_table(out: &mut String, summary: &CampaignSummary) {
         let counts = Outcome::ALL.map(|outcome| line.counts.get(outcome).to_string());
         table.add_row([line.label, rate].into_iter().chain(counts));
     }
+    let lines = summary.property_lines();
+    // In a narrow terminal, counts that are all zero are left out.
+    let zero = Outcome::ALL.into_iter().rev().filter(|outcome| lines.iter().all(|line| line.counts.get(*outcome) == 0));
+    let zero: Vec<&str> = zero.map(Outcome::word).collect();
+    let hidden = terminal_width().and_then(|width| fit(&mut table, width, &zero)).unwrap_or_default();
     let _ = writeln!(out, "{table}");
+    if !hidden.is_empty() {
+        let _ = writeln!(out, " (all zero: {})", hidden.join(", "));
+    }
 }
 
 fn pass_rate(line: &PropertyLine) -> String {

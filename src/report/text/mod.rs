@@ -26,7 +26,7 @@ pub use findings::findings_text;
 pub use health::{health_lines, health_text};
 pub use oracles::oracles_text;
 pub use recheck::recheck_text;
-pub(crate) use ruled::ruled;
+pub(crate) use ruled::{fit, hidden_columns, ruled, terminal_width};
 pub use run::run_text;
 pub use scene_rule::scene_rule;
 pub use shrunk::shrunk_text;
