@@ -154,3 +154,31 @@ fn recorded_efforts_and_targets_are_those_of_the_motors() {
     }
     assert!(most > 0.99, "the blocked base pushes with all its force: {most}");
 }
+
+/// Drives against furniture, and returns when it was first touched, with the largest force, and where it stopped.
+fn hit(mut world: World) -> (bool, Contact, [f64; 3]) {
+    world.begin_record();
+    let mut moved_freely = false;
+    for _ in 0..4 {
+        drive(&mut world, 0.15, 0.2);
+        moved_freely |= world.moved_freely();
+    }
+    let place = place_of(&world);
+    let contacts = world.end_record().contacts;
+    let first = contacts.into_iter().find(|contact| contact.pair[0] == "block_1" && contact.pair[1] != "floor");
+    (moved_freely, first.expect("they touched"), place)
+}
+
+#[test]
+fn motion_without_the_engine_ends_before_the_first_contact() {
+    let fresh = || before_furniture(14.0, 0.5);
+    let mut left = fresh();
+    left.leave_to_engine();
+    let (freely, contact, place) = hit(fresh());
+    let (never, expected, engine_place) = hit(left);
+    assert!(freely && !never);
+    assert_eq!(contact.pair, expected.pair);
+    assert!((contact.start_secs - expected.start_secs).abs() < 1.5 / 60.0, "{contact:?} instead of {expected:?}");
+    assert!((contact.max_force_n / expected.max_force_n - 1.0).abs() < 0.1, "{contact:?} instead of {expected:?}");
+    assert!((place[0] - engine_place[0]).abs() < 2e-3, "{place:?} instead of {engine_place:?}");
+}

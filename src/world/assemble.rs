@@ -26,11 +26,11 @@ const FINGER_DAMPING_SECS: f64 = 0.1;
 /// Friction of the robot's links other than the fingers: painted metal and plastic.
 const LINK_FRICTION: f64 = 0.4;
 /// Natural frequency of the joint limits. Unit: hertz. The engine's default limits make a loaded joint bounce back.
-const STOP_FREQUENCY_HZ: f32 = 60.0;
+pub(super) const STOP_FREQUENCY_HZ: f32 = 60.0;
 /// Damping ratio of the joint limits.
-const STOP_DAMPING: f32 = 5.0;
+pub(super) const STOP_DAMPING: f32 = 5.0;
 /// Joint ranges wider than this get no limits in the engine, which saves solver time. Unit: metres or radians.
-const WIDEST_RANGE: f64 = 20.0;
+pub(super) const WIDEST_RANGE: f64 = 20.0;
 
 /// Returns the home posture, with the base at its start pose and the fingers half open.
 pub(super) fn home(profile: &RobotProfile, model: &RobotModel, named: &Named, base: [f64; 3]) -> Vec<f64> {
@@ -88,7 +88,7 @@ pub(super) fn insert_links(
 
 /// Marks the links below a planar base, such as wheels, which do not collide with the floor. The planar joints support
 /// and move the base; wheels in contact with the floor would disturb it.
-fn links_on_floor(model: &RobotModel, named: &Named, profile: &RobotProfile) -> Vec<bool> {
+pub(super) fn links_on_floor(model: &RobotModel, named: &Named, profile: &RobotProfile) -> Vec<bool> {
     let Layout { arm, head, fingers, .. } = &named.layout;
     let mut on_floor = vec![profile.planar_base];
     for (idx, joint) in model.joints.iter().enumerate() {

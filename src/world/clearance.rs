@@ -84,7 +84,7 @@ impl World {
 }
 
 /// Returns the distance between two boxes; 0 if they overlap. Unit: metres.
-fn gap(a: &Aabb, b: &Aabb) -> f64 {
+pub(super) fn gap(a: &Aabb, b: &Aabb) -> f64 {
     let apart = (a.mins - b.maxs).max(b.mins - a.maxs).max(Vector::ZERO);
     f64::from(apart.length())
 }

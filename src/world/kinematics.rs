@@ -155,7 +155,7 @@ fn motion(joint: &Joint, position: f64) -> Isometry3<f64> {
 }
 
 /// Returns the direction of a joint's axis and a point on it. Frame: world.
-fn axis_in_world(joint: &Joint, poses: &[Isometry3<f64>]) -> (Vector3<f64>, Vector3<f64>) {
+pub(super) fn axis_in_world(joint: &Joint, poses: &[Isometry3<f64>]) -> (Vector3<f64>, Vector3<f64>) {
     let frame = poses[joint.parent] * joint.origin;
     (frame.rotation * joint.axis.into_inner(), frame.translation.vector)
 }

@@ -3,12 +3,13 @@
 use std::sync::Arc;
 
 use nalgebra::Isometry3;
-use rapier3d::prelude::{JointAxis, MultibodyDofCoupling, MultibodyJointHandle, PhysicsWorld, RigidBodyHandle};
+use rapier3d::prelude::{GenericJoint, JointAxis, MultibodyDofCoupling, MultibodyJointHandle, PhysicsWorld, RigidBodyHandle};
 
-use crate::assemble::{home, insert_joints, insert_links};
+use crate::assemble::{WIDEST_RANGE, home, insert_joints, insert_links, links_on_floor};
 use crate::convert::to_real;
 use crate::description::{Joint, RobotModel};
 use crate::layout::{Layout, Named};
+use crate::room::Ball;
 use crate::{Kinematics, WorldError};
 use actcheck_data::{JointState, Pose, RobotProfile, RobotStart};
 
@@ -37,6 +38,8 @@ pub(super) struct Motor {
 
 /// Share of the largest speed over which an effort-controlled motor reduces its effort, to limit its speed.
 const SLACK: f64 = 0.02;
+/// Distance to a joint limit below which the engine knows of the limit, for joints at rest. Units: metres or radians.
+const STOP_RANGE: f64 = 0.02;
 
 impl Motor {
     /// Returns its mean effort in a step that ended at this position, without gravity compensation (`held`).
@@ -84,6 +87,16 @@ impl Motor {
     }
 }
 
+/// Gives a joint its stops only where it can reach them in a step of `largest` way: far from them they do nothing, but
+/// the engine would solve them.
+fn limit_if_near(data: &mut GenericJoint, axis: JointAxis, joint: &Joint, position: f64, largest: f64) {
+    if joint.upper - joint.lower >= WIDEST_RANGE {
+        return;
+    }
+    let room = (position - joint.lower).min(joint.upper - position);
+    data.limit_axes.set(axis.into(), room < STOP_RANGE + 2.0 * largest);
+}
+
 /// The robot, its bodies in the engine, and its joint controllers.
 pub struct Robot {
     /// Its profile.
@@ -98,7 +111,11 @@ pub struct Robot {
     pub layout: Layout,
     /// Links of the fingers, left and right.
     pub finger_links: [usize; 2],
-    motors: Vec<Motor>,
+    pub(super) motors: Vec<Motor>,
+    /// Links that do not collide with the floor.
+    pub(super) off_floor: Vec<bool>,
+    /// The bounding ball of each link's shapes, in its frame; `None` for links without shapes.
+    pub(super) balls: Vec<Option<Ball>>,
 }
 
 /// Returns a robot's geometry, layout and home posture, without a simulation.
@@ -137,8 +154,19 @@ impl Robot {
         let kinematics = Kinematics::new(model.clone(), root, named.grasp, named.camera);
         let bodies = insert_links(engine, &model, &kinematics.links(&positions), &named, &profile);
         let motors = insert_joints(engine, &model, &bodies, &named, &profile)?;
-        let mut robot =
-            Self { profile, model, kinematics, bodies, layout: named.layout, finger_links: named.finger_links, motors };
+        let off_floor = links_on_floor(&model, &named, &profile);
+        let balls = model.links.iter().map(|link| Ball::around(&link.solids)).collect();
+        let mut robot = Self {
+            profile,
+            model,
+            kinematics,
+            bodies,
+            layout: named.layout,
+            finger_links: named.finger_links,
+            motors,
+            off_floor,
+            balls,
+        };
         robot.couple_mimics(engine);
         robot.move_to(engine, &positions);
         Ok(robot)
@@ -258,6 +286,10 @@ impl Robot {
         for (idx, motor) in self.motors.iter_mut().enumerate() {
             let held = holding.get(idx).copied().unwrap_or(0.0);
             let largest = self.model.joints[idx].velocity * dt;
+            let Some((multibody, link)) = engine.multibody_joints.get_mut(motor.joint) else { continue };
+            let Some(link) = multibody.link_mut(link) else { continue };
+            let position = f64::from(link.joint.coords()[motor.axis as usize]);
+            limit_if_near(&mut link.joint.data, motor.axis, &self.model.joints[idx], position, largest);
             if let Some(effort) = motor.push {
                 motor.give(engine, effort + held, self.model.joints[idx].velocity);
                 continue;
@@ -265,10 +297,8 @@ impl Robot {
             let change = ((motor.target - motor.setpoint) / f64::from(steps_left)).clamp(-largest, largest);
             motor.setpoint += change;
             motor.setpoint_velocity = change / dt;
-            let Some((multibody, link)) = engine.multibody_joints.get_mut(motor.joint) else { continue };
-            let Some(link) = multibody.link_mut(link) else { continue };
-            motor.began = f64::from(link.joint.coords()[motor.axis as usize]);
-            motor.keep_near(motor.began, self.model.joints[idx].velocity, substep_secs);
+            motor.began = position;
+            motor.keep_near(position, self.model.joints[idx].velocity, substep_secs);
             let position = motor.setpoint + held / motor.stiffness;
             let data = &mut link.joint.data;
             data.set_motor(
@@ -280,6 +310,36 @@ impl Robot {
             );
             data.set_motor_max_force(motor.axis, to_real(motor.max_effort));
         }
+    }
+
+    /// Returns how far each joint can move in a control tick: at its speed now or at that of its setpoint, and to its
+    /// setpoint. Units: metres or radians.
+    pub(super) fn spans(&self, positions: &[f64], velocities: &[f64], tick_secs: f64, overshoot: f64) -> Vec<f64> {
+        let state = positions.iter().zip(velocities);
+        let motors = self.motors.iter().zip(&self.model.joints).zip(state);
+        motors
+            .map(|((motor, joint), (position, velocity))| {
+                let (told, lag) = match motor.push {
+                    Some(_) => (joint.velocity, 0.0),
+                    None => {
+                        let told = (motor.target - motor.setpoint).abs() / tick_secs;
+                        (told.min(joint.velocity), (motor.setpoint - position).abs())
+                    }
+                };
+                overshoot * velocity.abs().max(told) * tick_secs + lag
+            })
+            .collect()
+    }
+
+    /// Returns the joints between the root and a link.
+    pub(super) fn joints_to(&self, link: usize) -> impl Iterator<Item = usize> {
+        let parent = |joint: &usize| self.model.joints[*joint].parent.checked_sub(1);
+        std::iter::successors(link.checked_sub(1), parent)
+    }
+
+    /// Returns whether a joint moves a link.
+    pub(super) fn moves(&self, joint: usize, link: usize) -> bool {
+        self.joints_to(link).any(|moving| moving == joint)
     }
 
     /// Moves all joints to the positions at once, and holds them there.
@@ -325,10 +385,8 @@ impl Robot {
         }
         if let Some((multibody, _)) = engine.multibody_joints.get_mut(self.motors[base[0]].joint) {
             multibody.apply_displacements(&displacements);
-            multibody.forward_kinematics(&engine.bodies, true);
-            multibody.update_rigid_bodies(&mut engine.bodies, true);
         }
-        engine.bodies.propagate_modified_body_positions_to_colliders(&mut engine.colliders);
+        self.place_links(engine);
     }
 
     /// Couples mimic joints to their leaders, as a mechanism does.

@@ -128,6 +128,10 @@ impl World {
     }
 
     fn record_self_contacts(&mut self) {
+        if self.room.free && !self.link_pairs.pass {
+            // They are known to be apart.
+            return;
+        }
         let now = self.recorder.n_ticks();
         for (first, second) in self.link_pairs.iter() {
             let depth = self.depth_of(first, second);

@@ -8,6 +8,7 @@ use rapier3d::prelude::SharedShape;
 use crate::Kinematics;
 use crate::convert::to_pose;
 use crate::engine::{Owner, collider};
+use crate::room::Ball;
 
 /// Distance that links keep from each other. Unit: metres. The tracking error of a moving arm.
 const CLEAR_M: f64 = 0.01;
@@ -85,8 +86,9 @@ fn gap(links: &[Form], Pair { links: (first, second), clear_m }: Pair, poses: &[
     nearest
 }
 
-impl Form {
-    fn new(solids: &[actcheck_data::Part]) -> Self {
+impl Ball {
+    /// Returns a ball around solids: that around their bounding box. Returns `None` if there are none.
+    pub(super) fn around(solids: &[actcheck_data::Part]) -> Option<Self> {
         let mut low = [f64::INFINITY; 3];
         let mut high = [f64::NEG_INFINITY; 3];
         for solid in solids {
@@ -97,11 +99,19 @@ impl Form {
             }
         }
         let (low, high) = (Point3::from(low), Point3::from(high));
+        let ball = Self { middle: nalgebra::center(&low, &high), radius: (high - low).norm() / 2.0 };
+        (!solids.is_empty()).then_some(ball)
+    }
+}
+
+impl Form {
+    fn new(solids: &[actcheck_data::Part]) -> Self {
+        let around = Ball::around(solids).unwrap_or(Ball { middle: Point3::origin(), radius: 0.0 });
         let forms = solids.iter().filter_map(|solid| collider(solid, Owner::Floor, 0.0, 0.0));
         Self {
             solids: forms.map(|form| (form.position, form.shape)).collect(),
-            middle: nalgebra::center(&low, &high),
-            radius: (high - low).norm() / 2.0,
+            middle: around.middle,
+            radius: around.radius,
         }
     }
 }

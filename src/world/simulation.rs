@@ -14,6 +14,7 @@ use crate::link_pairs::LinkPairs;
 use crate::odometry::Tracker;
 use crate::recorder::Recorder;
 use crate::robot::Robot;
+use crate::room::Room;
 use crate::{Fault, Kinematics, Layout, Poison, WorldError, fault};
 use actcheck_data::{
     CONTROL_HZ, Camera, Inertia, KnownKind, ObjectModel, Pose, RobotProfile, Role, Scene, SceneObject, Sensing,
@@ -85,6 +86,7 @@ pub struct World {
     pub(super) believed_from_true: Isometry3<f64>,
     pub(super) tracker: Tracker,
     pub(super) recorder: Recorder,
+    pub(super) room: Room,
     pub(super) fault: Option<Fault>,
     /// The furniture that slides at the moment, by its index.
     pub(super) sliding: BTreeMap<usize, Sliding>,
@@ -132,6 +134,7 @@ pub fn build(scene: &Scene) -> Result<World, WorldError> {
         sensing: scene.sensing.clone(),
         believed_from_true: Isometry3::identity(),
         tracker: Tracker::default(),
+        room: Room::default(),
         fault: None,
         sliding: BTreeMap::new(),
         link_pairs: LinkPairs::default(),
@@ -267,11 +270,19 @@ impl World {
         let holding = self.robot.kinematics.holding_efforts(&self.robot.state(&self.engine).0);
         let dt = 1.0 / f64::from(self.steps_per_second);
         self.robot.begin_tick();
+        let free = self.find_room();
         for step in 0..self.steps_per_tick {
             self.robot.control(&mut self.engine, &holding, dt, self.steps_per_tick - step);
-            self.step_engine();
+            if free {
+                self.robot.move_freely(&mut self.engine);
+            } else {
+                self.step_engine();
+            }
             self.robot.measure(&self.engine, &holding, 1.0 / f64::from(self.steps_per_tick));
             self.n_steps += 1;
+            if free && step + 1 == self.steps_per_tick {
+                self.robot.place_links(&mut self.engine);
+            }
             self.fault = self.find_fault();
             if self.fault.is_some() {
                 return;
