@@ -283,8 +283,7 @@ mod tests {
         wander(&mut world, &mut choices);
         let robot = &world.robot;
         let (mut positions, _) = dynamics(&world);
-        let mut velocities: Vec<f64> =
-            positions.iter().map(|_| choices.real("v".into(), -0.5, 0.5, 0.0)).collect();
+        let mut velocities: Vec<f64> = positions.iter().map(|_| choices.real("v".into(), -0.5, 0.5, 0.0)).collect();
         let energies = |positions: &[f64], velocities: &[f64]| {
             let poses = robot.kinematics.links(positions);
             let now = inertias(&robot.model, &poses, velocities);

@@ -3,7 +3,9 @@
 use std::sync::Arc;
 
 use nalgebra::Isometry3;
-use rapier3d::prelude::{GenericJoint, JointAxis, MultibodyDofCoupling, MultibodyJointHandle, PhysicsWorld, RigidBodyHandle};
+use rapier3d::prelude::{
+    GenericJoint, JointAxis, MultibodyDofCoupling, MultibodyJointHandle, PhysicsWorld, RigidBodyHandle,
+};
 
 use crate::assemble::{WIDEST_RANGE, home, insert_joints, insert_links, links_on_floor};
 use crate::convert::to_real;
