@@ -2,6 +2,7 @@
 //!
 //! Never: judges, changes a history (its tables are stored beside it), or exposes a type of the table library.
 
+mod answer;
 mod compare;
 mod consistency;
 mod coverage;
@@ -20,6 +21,7 @@ mod runs_needed;
 mod score_interval;
 mod tables;
 
+pub use answer::Answer;
 pub use compare::{Compared, ComparedLine, ComparedRun, Comparison, compare, compared_runs};
 pub use consistency::{Consistency, PassPower, Repeated, SceneCounts, SceneRuns, Variance, consistency};
 pub use coverage::{Coverage, PairCoverage, ParameterCoverage};

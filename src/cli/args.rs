@@ -111,8 +111,11 @@ pub enum Command {
     /// untested is excluded from that line and counted. `--fail-if-worse` therefore does not detect a robot that hangs;
     /// the table shows the counts.
     ///
+    /// Each line has one of four answers: B is worse, better, not different (the interval of the difference lies within
+    /// the margin), or the comparison is underpowered, with the number of scenes that would decide.
+    ///
     /// Exit code: 0 done (B is not shown to be worse), 1 B is worse (only with --fail-if-worse), 2 the comparison
-    /// failed.
+    /// failed. With --decide it is the answer.
     #[command(
         after_help = "Examples:\n  actcheck run configs/pick.toml --history /tmp/before\n  actcheck run configs/pick.toml --history /tmp/after    (with another skill, robot or physics)\n  actcheck compare /tmp/before /tmp/after --fail-if-worse 0.05\n  actcheck compare k7f3 k7f3@rechecked    (one campaign, before and after `actcheck recheck`)"
     )]

@@ -31,6 +31,13 @@ pub struct CompareArgs {
     /// lines together
     #[arg(long, value_name = "LEVEL", value_parser = level)]
     pub fail_if_worse: Option<f64>,
+    /// Rates that differ by less count as equal, as a share
+    #[arg(long, value_name = "SHARE", value_parser = level, default_value = "0.05")]
+    pub margin: f64,
+    /// Exit with the answer: 0 no difference, 1 worse, 3 better, 4 underpowered (too few scenes to tell); at the level of
+    /// --fail-if-worse, or 0.05
+    #[arg(long)]
+    pub decide: bool,
     /// The folder of the history for an ID without DIR.
     #[command(flatten)]
     pub history: HistoryArgs,
@@ -58,7 +65,14 @@ pub fn compare(args: &CompareArgs) -> Result<u8, Diagnostics> {
         })
         .collect();
     let sides = [first.summary(), second.summary()];
-    let summary = CompareSummary { sides, comparison, changes, level: args.fail_if_worse };
+    let summary = CompareSummary {
+        sides,
+        comparison,
+        changes,
+        level: args.fail_if_worse,
+        margin: args.margin,
+        decide: args.decide,
+    };
     output::print(&match args.format {
         Format::Text => compare_text(&summary),
         Format::Csv => compare_table(&summary).render(args.format.into()),

@@ -1,9 +1,9 @@
 //! Decides whether the robot can touch anything in the next control tick.
 //!
-//! A free tick needs no contacts. So each of the robot's links keeps its distance from everything else as it was when it
-//! was last measured, and where the link was then. What it has moved since, and what it can move in the next tick, is
-//! subtracted; only when that leaves too little is the distance measured again. All of this follows from the state of
-//! the simulation alone.
+//! A free tick needs no contacts. For each link of the robot, the last measured distance from everything else is kept,
+//! with the pose of the link at that time. The way that it has moved since, and the longest way in the next tick, are
+//! subtracted; the distance is measured again only when too little is left. All of this depends on the state of the
+//! simulation alone.
 
 use nalgebra::{Isometry3, Point3, Vector3};
 use parry3d::bounding_volume::Aabb;
@@ -22,13 +22,13 @@ const RANGE_M: f64 = 0.25;
 const LEFT_M: f64 = 4e-3;
 /// As [`LEFT_M`], between two links of the robot. Unit: metres.
 const LEFT_OF_LINKS_M: f64 = 1e-3;
-/// Factor on the speeds that joints have or are told to have: how far they overshoot.
+/// Factor on the present and the commanded speeds of joints, because joints overshoot.
 const OVERSHOOT: f64 = 1.25;
 
 /// The distances of the robot's links from everything.
 #[derive(Default)]
 pub(super) struct Room {
-    /// Distances of links from what is not the robot, by the link's index.
+    /// Distances of links from the floor and all objects, by the link's index.
     links: Vec<Option<Measured>>,
     /// Distances between the pairs of links that can collide, in their order.
     pairs: Vec<Option<Measured>>,
@@ -46,7 +46,7 @@ struct Measured {
 }
 
 impl Measured {
-    /// Returns what is left of the distance with the link at another pose. Unit: metres.
+    /// Returns a lower bound of the distance with the link at another pose. Unit: metres.
     fn left(&self, pose: &Isometry3<f64>, ball: &Ball) -> f64 {
         let shift = (pose * ball.middle - self.pose * ball.middle).norm();
         // At least the angle, for all angles up to half a turn.

@@ -4,7 +4,7 @@ use serde_json::{Value, json};
 
 use crate::CompareSummary;
 use crate::summary::compared_parts;
-use actcheck_analysis::{Compared, ComparedLine};
+use actcheck_analysis::{Answer, Compared, ComparedLine};
 
 /// Returns the whole comparison as JSON.
 pub fn compare_json(summary: &CompareSummary) -> Value {
@@ -35,14 +35,18 @@ pub fn compare_json(summary: &CompareSummary) -> Value {
         "changes": changes,
         "config_only_in_a": only_a,
         "config_only_in_b": only_b,
-        "lines": found.lines.iter().map(line).collect::<Vec<Value>>(),
+        "lines": found.lines.iter().map(|found| line(found, summary)).collect::<Vec<Value>>(),
         "level": summary.level,
+        "margin": summary.margin,
+        "answer": summary.answer().word(),
         "worse": worse,
     })
 }
 
-fn line(line: &ComparedLine) -> Value {
+fn line(line: &ComparedLine, summary: &CompareSummary) -> Value {
     let (action, property) = compared_parts(&line.of);
+    let answer = line.answer(summary.answer_level(), summary.margin);
+    let scenes = if let Answer::Underpowered { scenes } = answer { scenes } else { None };
     json!({
         "action": action,
         "property": property,
@@ -54,6 +58,8 @@ fn line(line: &ComparedLine) -> Value {
         "p_b_worse": line.test.second_worse,
         "p_b_worse_holm": line.second_worse_adjusted,
         "left_out": { "scenes": line.left_out[0].total(), "a": line.left_out[0], "b": line.left_out[1] },
+        "answer": answer.word(),
+        "scenes_to_decide": scenes,
         "worse": line.worse,
         "better": line.better,
     })

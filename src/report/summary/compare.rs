@@ -1,6 +1,6 @@
 //! A comparison of two campaigns, with a description of each side.
 
-use actcheck_analysis::{Compared, Comparison};
+use actcheck_analysis::{Answer, Compared, Comparison};
 use actcheck_base::names;
 
 /// One side of a comparison.
@@ -46,11 +46,37 @@ pub struct CompareSummary {
     pub changes: Vec<SideChange>,
     /// Significance level at which the second side must not be worse, if one was given.
     pub level: Option<f64>,
+    /// Rates that differ by less count as equal.
+    pub margin: f64,
+    /// Whether the exit code is the answer.
+    pub decide: bool,
 }
 
+/// Significance level of the answer if none was given.
+const USUAL_LEVEL: f64 = 0.05;
+
 impl CompareSummary {
-    /// 1 if the second side is significantly worse at the given level, otherwise 0.
+    /// Significance level of the answers.
+    pub fn answer_level(&self) -> f64 {
+        self.level.unwrap_or(USUAL_LEVEL)
+    }
+
+    /// The answer over all lines.
+    pub fn answer(&self) -> Answer {
+        self.comparison.answer(self.answer_level(), self.margin)
+    }
+
+    /// The code of the answer, if it was asked for: 0 no difference, 1 worse, 3 better, 4 underpowered. Otherwise 1 if the
+    /// second side is significantly worse at the given level, and 0 if not.
     pub fn exit_code(&self) -> u8 {
+        if self.decide {
+            return match self.answer() {
+                Answer::NoDifference => 0,
+                Answer::Worse => 1,
+                Answer::Better => 3,
+                Answer::Underpowered { .. } => 4,
+            };
+        }
         u8::from(self.level.is_some_and(|level| !self.comparison.worse_at(level).is_empty()))
     }
 

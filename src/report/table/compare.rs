@@ -24,6 +24,7 @@ pub fn compare_table(summary: &CompareSummary) -> Table {
         "left_out",
         "worse",
         "better",
+        "answer",
     ]);
     for line in &summary.comparison.lines {
         let (action, property) = compared_parts(&line.of);
@@ -48,6 +49,7 @@ pub fn compare_table(summary: &CompareSummary) -> Table {
             line.left_out[0].total().into(),
             ids(&line.worse).into(),
             ids(&line.better).into(),
+            line.answer(summary.answer_level(), summary.margin).word().into(),
         ]);
     }
     table

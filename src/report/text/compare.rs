@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use crate::summary::compared_name;
 use crate::text::ruled;
 use crate::{CompareSummary, ComparedSide};
-use actcheck_analysis::{ComparedLine, PairedTable};
+use actcheck_analysis::{Answer, ComparedLine, PairedTable};
 use actcheck_base::Outcome;
 use actcheck_verdict::Counts;
 
@@ -24,6 +24,7 @@ pub fn compare_text(summary: &CompareSummary) -> String {
     flips(&mut out, summary);
     left_out(&mut out, summary);
     alone(&mut out, summary);
+    answers(&mut out, summary);
     verdict(&mut out, summary);
     out
 }
@@ -172,6 +173,23 @@ fn alone(out: &mut String, summary: &CompareSummary) {
             let _ = writeln!(out, "judged only in {name}, not compared: {}", names.join(", "));
         }
     }
+}
+
+/// Names the lines by their answers, and how many scenes would decide.
+fn answers(out: &mut String, summary: &CompareSummary) {
+    let (level, margin) = (summary.answer_level(), summary.margin);
+    let _ =
+        writeln!(out, "\nB is … than A (at the level {level}; rates within {} points count as equal)", 100.0 * margin);
+    for line in &summary.comparison.lines {
+        let answer = line.answer(level, margin);
+        let needed = match answer {
+            Answer::Underpowered { scenes: Some(scenes) } => format!(": about {scenes} scenes would decide"),
+            Answer::Underpowered { scenes: None } => ": over a million scenes would decide".to_owned(),
+            _ => String::new(),
+        };
+        let _ = writeln!(out, "  {}: {}{needed}", compared_name(&line.of), answer.word());
+    }
+    let _ = writeln!(out, "answer: {}", summary.answer().word());
 }
 
 fn verdict(out: &mut String, summary: &CompareSummary) {
