@@ -1,4 +1,4 @@
-//! What a comparison of two campaigns shows: worse, better, no difference, or too few scenes to tell.
+//! The answer of a comparison of two campaigns: worse, better, no difference, or too few scenes to decide.
 
 use crate::{ComparedLine, Comparison, PairedTable};
 
@@ -11,7 +11,7 @@ pub enum Answer {
     Better,
     /// The rates differ by less than the margin.
     NoDifference,
-    /// Too few scenes to tell.
+    /// Too few scenes to decide.
     Underpowered {
         /// About how many scenes would decide, if their outcomes are distributed like those so far. `None` if more than
         /// a million, or if no scene was decided on both sides.

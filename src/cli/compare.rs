@@ -34,7 +34,7 @@ pub struct CompareArgs {
     /// Rates that differ by less count as equal, as a share
     #[arg(long, value_name = "SHARE", value_parser = level, default_value = "0.05")]
     pub margin: f64,
-    /// Exit with the answer: 0 no difference, 1 worse, 3 better, 4 underpowered (too few scenes to tell); at the level of
+    /// Exit with the answer: 0 no difference, 1 worse, 3 better, 4 underpowered (too few scenes to decide); at the level of
     /// --fail-if-worse, or 0.05
     #[arg(long)]
     pub decide: bool,
