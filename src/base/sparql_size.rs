@@ -22,7 +22,7 @@ const LINKS: [&str; 8] = ["union", "optional", "minus", "bind", "filter", "graph
 /// assert_eq!(sparql_excess("ASK { ?s ?p ?o FILTER((?o + 1) * 2 > 3) }"), None);
 /// let deep = format!("ASK {{ FILTER({}true{}) }}", "(".repeat(5_000), ")".repeat(5_000));
 /// let (place, message) = sparql_excess(&deep).expect("it is nested too deeply");
-/// assert_eq!((place, message.as_str()), (109..110, "the query is nested more than 100 levels deep"));
+/// assert_eq!((place, message.as_str()), (111..112, "the query is nested more than 100 levels deep"));
 /// ```
 pub fn sparql_excess(text: &str) -> Option<(Span, String)> {
     let mut open: Vec<Bracket> = Vec::new();
