@@ -71,6 +71,8 @@ struct Ours {
 impl Ours {
     fn new(scene: &Scene) -> Self {
         let mut world = world::build(scene).expect("a sound scene");
+        // Both do the same work: free motion of the robot would take fewer steps of the engine.
+        world.leave_to_engine();
         world.watch(now_secs);
         let command = world.hold();
         let steps_per_tick = (world.tick_secs() * f64::from(scene.physics.steps_per_second)).round();
