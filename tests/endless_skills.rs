@@ -1,12 +1,11 @@
 //! Skills that never end: budgets, limits and interrupts end their runs.
 
 use std::path::Path;
-use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
 use serde_json::Value;
 
-use crate::support::{actcheck, root, signal, stderr, stdout};
+use crate::support::{actcheck, processes_in, root, signal, started, stderr, stdout};
 
 /// A folder with a configuration `c.toml` whose program is one of `tests/protocol/`.
 fn project(program: &str, skill: &str, budget: &str) -> tempfile::TempDir {
@@ -69,21 +68,14 @@ fn one_interrupt_ends_a_skill_that_polls_or_is_silent() {
     ];
     for (program, skill) in programs {
         let folder = project(program, &skill, "action_secs = 3600");
-        let mut simulator = Command::new(env!("CARGO_BIN_EXE_actcheck"))
-            .args(["run", "c.toml"])
-            .current_dir(folder.path())
-            .stdout(Stdio::null())
-            .stderr(Stdio::null())
-            .spawn()
-            .unwrap();
+        let mut simulator = started(folder.path(), &["run", "c.toml"]);
         // The program has begun its action, or at least runs.
         let here = std::fs::canonicalize(folder.path()).unwrap();
         let begun = || match program {
             "polls.py" => here.join("starts").exists(),
-            _ => std::fs::read_dir("/proc").unwrap().flatten().any(|entry| {
-                let is_python = std::fs::read(entry.path().join("cmdline"))
-                    .is_ok_and(|line| line.windows(6).any(|part| part == b"python"));
-                is_python && std::fs::read_link(entry.path().join("cwd")).is_ok_and(|cwd| cwd == here)
+            _ => processes_in(&here).iter().any(|process| {
+                let line = std::fs::read(process.join("cmdline"));
+                line.is_ok_and(|line| line.windows(6).any(|part| part == b"python"))
             }),
         };
         let patience = Instant::now() + Duration::from_secs(60);

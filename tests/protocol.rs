@@ -2,13 +2,13 @@
 
 use std::fmt::Write as _;
 use std::path::Path;
-use std::process::{Command, Stdio};
+use std::process::Command;
 use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
 use serde_json::Value;
 
-use crate::support::{actcheck, root, signal, stderr, stdout};
+use crate::support::{actcheck, processes_in, root, signal, started, stderr, stdout};
 
 /// A glass alone on a table.
 const SCENE: &str = "
@@ -333,19 +333,9 @@ fn an_action_over_its_budget_also_ends_for_the_program() {
 fn no_process_is_left_after_the_simulator_ends() {
     for name in ["INT", "KILL"] {
         let folder = project("faulty.py", "[[\"Pick\"]]", 50, "timeout_s = 60.0\nenv = { FAULT = \"silent\" }");
-        let mut simulator = Command::new(env!("CARGO_BIN_EXE_actcheck"))
-            .args(["run", "c.toml", "--jobs", "2"])
-            .current_dir(folder.path())
-            .stdout(Stdio::null())
-            .stderr(Stdio::null())
-            .spawn()
-            .unwrap();
+        let mut simulator = started(folder.path(), &["run", "c.toml", "--jobs", "2"]);
         let here = std::fs::canonicalize(folder.path()).unwrap();
-        let has_program = || {
-            let processes = std::fs::read_dir("/proc").unwrap().flatten();
-            processes.filter(|entry| std::fs::read_link(entry.path().join("cwd")).is_ok_and(|cwd| cwd == here)).count()
-                > 1
-        };
+        let has_program = || processes_in(&here).len() > 1;
         let patience = Instant::now() + Duration::from_secs(30);
         while !has_program() && Instant::now() < patience {
             std::thread::sleep(Duration::from_millis(20));

@@ -59,7 +59,7 @@ pub(super) fn misspelt_predicates(graph: &Graph, found: &mut Diagnostics) {
         }
         if let Some(known) = nearest(local, PREDICATES) {
             let (source, span) = graph.place(statement, &statement.predicate);
-            let message = format!("there is no predicate `act:{local}`, so that this statement has no effect");
+            let message = format!("there is no predicate `act:{local}`: this statement has no effect");
             found
                 .push(Diagnostic::error("O014", message).at(source, span).help(format!("did you mean `act:{known}`?")));
         }

@@ -107,8 +107,8 @@ mod tests {
         counts.record(503, Duration::from_secs(7));
         counts.record(404, Duration::ZERO);
         for (share, ms) in [(0.5, 2.0), (0.97, 2.0), (1.0, 7000.0)] {
-            let told = counts.quantile_ms(share).unwrap();
-            assert!(told >= ms && told <= ms * 1.2, "{share}: {told}");
+            let found = counts.quantile_ms(share).unwrap();
+            assert!(found >= ms && found <= ms * 1.2, "{share}: {found}");
         }
         assert!(counts.to_string().starts_with("99 requests served, 1 refused, 1 failed; 99 % of them within 2."));
         assert!(counts.json().starts_with("{\"served\":99,\"refused\":1,\"failed\":1,\"moved\":0,\"p50_ms\":2."));

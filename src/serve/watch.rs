@@ -24,7 +24,7 @@ struct Limits {
 }
 
 impl Watch {
-    /// Starts the thread. There is no task yet.
+    /// Starts the thread, which waits for its first task.
     pub fn start() -> Self {
         let watch = Self::default();
         let task = Arc::clone(&watch.task);

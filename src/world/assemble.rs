@@ -11,7 +11,7 @@ use crate::convert::{to_pose, to_real, to_vector};
 use crate::description::{Joint, JointKind, RobotModel};
 use crate::engine::{Owner, collider, off_floor};
 use crate::layout::{Layout, Named};
-use crate::robot::Motor;
+use crate::motor::Motor;
 use actcheck_data::RobotProfile;
 
 /// Position error at which a motor reaches its effort limit. Unit: metres. Stiffness is the effort limit divided by

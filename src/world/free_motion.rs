@@ -193,7 +193,7 @@ impl Robot {
     /// Moves the engine's joints from their positions to others, with new velocities.
     fn set_state(&self, engine: &mut PhysicsWorld, began: &[f64], positions: &[f64], velocities: &[f64]) {
         let Some(first) = self.motors.first().map(|motor| motor.joint) else { return };
-        let of = |motor: &crate::robot::Motor| {
+        let of = |motor: &crate::motor::Motor| {
             let (multibody, link) = engine.multibody_joints.get(motor.joint)?;
             Some(multibody.link(link)?.assembly_id())
         };

@@ -25,6 +25,7 @@ mod layout;
 mod link_depth;
 mod link_pairs;
 mod motion;
+mod motor;
 mod observe;
 mod odometry;
 mod perturbation;

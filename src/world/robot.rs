@@ -3,101 +3,16 @@
 use std::sync::Arc;
 
 use nalgebra::Isometry3;
-use rapier3d::prelude::{
-    GenericJoint, JointAxis, MultibodyDofCoupling, MultibodyJointHandle, PhysicsWorld, RigidBodyHandle,
-};
+use rapier3d::prelude::{MultibodyDofCoupling, MultibodyJointHandle, PhysicsWorld, RigidBodyHandle};
 
-use crate::assemble::{WIDEST_RANGE, home, insert_joints, insert_links, links_on_floor};
+use crate::assemble::{home, insert_joints, insert_links, links_on_floor};
 use crate::convert::to_real;
 use crate::description::{Joint, RobotModel};
 use crate::layout::{Layout, Named};
+use crate::motor::{Motor, limit_if_near};
 use crate::room::Ball;
 use crate::{Kinematics, WorldError};
 use actcheck_data::{JointState, Pose, RobotProfile, RobotStart};
-
-/// The motor of one joint.
-#[derive(Debug, Clone)]
-pub(super) struct Motor {
-    pub(super) joint: MultibodyJointHandle,
-    pub(super) axis: JointAxis,
-    pub(super) stiffness: f64,
-    pub(super) damping: f64,
-    pub(super) max_effort: f64,
-    /// Final target position.
-    pub(super) target: f64,
-    /// Current target position: approaches `target` within the joint's velocity limit.
-    pub(super) setpoint: f64,
-    pub(super) setpoint_velocity: f64,
-    /// Commanded effort, instead of a position.
-    pub(super) push: Option<f64>,
-    /// Position at the start of the step.
-    pub(super) began: f64,
-    /// Mean effort in the last control tick, without gravity compensation.
-    pub(super) effort: f64,
-    /// Largest commanded effort as a multiple of the joint's limit: 1 unless the motor is overdriven.
-    pub(super) strength: f64,
-}
-
-/// Share of the largest speed over which an effort-controlled motor reduces its effort, to limit its speed.
-const SLACK: f64 = 0.02;
-/// Distance to a joint limit below which the engine knows of the limit, for joints at rest. Units: metres or radians.
-const STOP_RANGE: f64 = 0.02;
-
-impl Motor {
-    /// Returns its mean effort in a step that ended at this position, without gravity compensation (`held`).
-    ///
-    /// The engine applies the control law in each of `n_substeps`, with the target position ahead by the way of one
-    /// substep at the target velocity, and does not report the motor's impulse. The mean over the substeps follows from
-    /// the positions at both ends of the step.
-    fn effort_of_step(&self, position: f64, held: f64, dt: f64, n_substeps: f64) -> f64 {
-        if let Some(effort) = self.push {
-            return effort;
-        }
-        let ahead = self.setpoint_velocity * dt / n_substeps * (n_substeps + 1.0) / 2.0;
-        let velocity = (position - self.began) / dt;
-        let law =
-            self.stiffness * (self.setpoint + ahead - position) + self.damping * (self.setpoint_velocity - velocity);
-        let given = (law + held).clamp(-self.max_effort, self.max_effort) - held;
-        given.clamp(-self.max_effort, self.max_effort)
-    }
-
-    /// Keeps the setpoint near the joint's position: a setpoint that ran ahead of a blocked joint would make it shoot
-    /// off, once it is free. The joint catches up at a speed at which damping balances stiffness, in the engine's
-    /// implicit steps of `substep_secs`; together with the setpoint's velocity this must not exceed its largest speed.
-    fn keep_near(&mut self, position: f64, fastest: f64, substep_secs: f64) {
-        let damping = self.damping + self.stiffness * substep_secs;
-        let most = (damping * fastest).max(self.max_effort) / self.stiffness;
-        self.setpoint = self.setpoint.clamp(position - most, position + most);
-        let catching_up = self.stiffness * (self.setpoint - position) / damping;
-        self.setpoint_velocity = self.setpoint_velocity.clamp(-fastest - catching_up, fastest - catching_up);
-    }
-
-    /// Applies an effort for a step: a velocity motor with the target speed `top` and `effort` as its limit gives this
-    /// effort until it reaches that speed. Also resets the setpoint, so that position control later resumes at the
-    /// current position.
-    fn give(&mut self, engine: &mut PhysicsWorld, effort: f64, top: f64) {
-        let Some((multibody, link)) = engine.multibody_joints.get_mut(self.joint) else { return };
-        let Some(is) = multibody.link(link) else { return };
-        self.setpoint = f64::from(is.joint.coords()[self.axis as usize]);
-        self.setpoint_velocity = f64::from(multibody.joint_velocity(is)[0]);
-        self.target = self.setpoint;
-        let Some(link) = multibody.link_mut(link) else { return };
-        let damping = effort.abs() / (SLACK * top).max(1e-6);
-        let data = &mut link.joint.data;
-        data.set_motor(self.axis, 0.0, to_real(top.copysign(effort)), 0.0, to_real(damping));
-        data.set_motor_max_force(self.axis, to_real(effort.abs()));
-    }
-}
-
-/// Gives a joint its stops only where it can reach them in a step of `largest` way: far from them they do nothing, but
-/// the engine would solve them.
-fn limit_if_near(data: &mut GenericJoint, axis: JointAxis, joint: &Joint, position: f64, largest: f64) {
-    if joint.upper - joint.lower >= WIDEST_RANGE {
-        return;
-    }
-    let room = (position - joint.lower).min(joint.upper - position);
-    data.limit_axes.set(axis.into(), room < STOP_RANGE + 2.0 * largest);
-}
 
 /// The robot, its bodies in the engine, and its joint controllers.
 pub struct Robot {

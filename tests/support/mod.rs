@@ -15,7 +15,7 @@ pub mod server;
 use std::collections::BTreeMap;
 use std::os::unix::fs::PermissionsExt as _;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::process::{Child, Command, Output, Stdio};
 use std::sync::{Mutex, OnceLock};
 
 /// The checkout's root.
@@ -31,6 +31,18 @@ pub fn actcheck(folder: &Path, arguments: &[&str]) -> Output {
         .env("NO_COLOR", "1")
         .output()
         .unwrap()
+}
+
+/// Starts actcheck in a folder, without waiting for its end and without its output.
+pub fn started(folder: &Path, args: &[&str]) -> Child {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_actcheck"));
+    command.args(args).current_dir(folder).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap()
+}
+
+/// Folders in `/proc` of the processes whose working directory is a folder, which must be canonical.
+pub fn processes_in(folder: &Path) -> Vec<PathBuf> {
+    let processes = std::fs::read_dir("/proc").unwrap().flatten().map(|entry| entry.path());
+    processes.filter(|process| std::fs::read_link(process.join("cwd")).is_ok_and(|at| at == folder)).collect()
 }
 
 /// Sends a signal, such as `INT`, to a process, with the shell's builtin `kill`: minimal systems have no other.

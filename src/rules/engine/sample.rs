@@ -195,8 +195,9 @@ impl Sampler<'_, '_, '_> {
         new.iter().any(|v| self.outputs.get(*v).copied().unwrap_or(false) || read.contains(v))
     }
 
-    /// Looks up an atom for each binding of a sample. `known`: the variables bound before. Returns the number of rows read and the extended bindings, or
-    /// `None` if there is no index for it.
+    /// Looks up an atom for each binding of a sample. Returns the number of rows read and the extended bindings; `None`
+    /// without an index for the lookup. `known`: the variables bound before. `count_rows` gets the rows read for each
+    /// binding.
     #[expect(clippy::too_many_arguments, reason = "the parts of one look-up")]
     fn matches(
         &mut self,
