@@ -2,11 +2,12 @@
 # make test        builds and runs all tests
 # make bench       runs the benchmarks, which print ratios
 # make wheel       builds a wheel of the program and its Python package, and a source distribution, in dist
-# make notebooks   runs the notebooks on new campaigns and saves their outputs (RUNS=200)
+# make notebooks   runs the notebooks on new campaigns, saves their outputs and draws the pictures (RUNS=300)
+# make gallery     writes docs/gallery.md: failures of the shipped campaigns, each with its smallest scene and proof
 #
 # RocksDB and polars are compiled once, in one profile, into a folder outside this checkout (`.ci/env`).
 
-.PHONY: build test bench wheel notebooks
+.PHONY: build test bench wheel notebooks gallery
 
 build:
 	@sh .ci/system
@@ -25,9 +26,12 @@ wheel:
 	@sh .ci/system wheel
 	@sh clients/wheel/build
 
-RUNS ?= 200
+RUNS ?= 300
 
 notebooks: build
 	@. .ci/env && python="$$CARGO_TARGET_DIR/tmp/notebooks" && python3 -m venv "$$python" && \
 		"$$python/bin/python" -m pip install --quiet --disable-pip-version-check -r tests/foreign/requirements.txt && \
-		"$$python/bin/python" notebooks/regenerate.py --runs $(RUNS)
+		"$$python/bin/python" notebooks/regenerate.py --runs $(RUNS) --pictures
+
+gallery: build
+	@python3 docs/gallery/make.py

@@ -1,12 +1,14 @@
 """How much does a campaign cost with readers of its history beside it, and how soon do they answer?
 
-Runs the same campaign in pairs, alone and beside a process that asks the growing history without a pause, in turns of
-order. Prints the ratio of the campaign's CPU times in each pair with their median, and the wall times of the answers.
+Runs the same campaign in pairs, alone and beside a process that asks the growing history once a second, in turns of
+order. Prints the ratio of the campaign's CPU times in each pair with their median, and the CPU and wall times of the
+answers. With HISTORY, each campaign is added to a copy of that history, so that the answers are about many runs.
 
-    python3 benches/readers.py [PROGRAM [PAIRS [RUNS]]]
+    python3 benches/readers.py [PROGRAM [PAIRS [RUNS [HISTORY]]]]
 """
 
 import os
+import shutil
 import statistics
 import subprocess
 import sys
@@ -17,31 +19,42 @@ import time
 PROGRAM = os.path.abspath(sys.argv[1]) if len(sys.argv) > 1 else "actcheck"
 PAIRS = int(sys.argv[2]) if len(sys.argv) > 2 else 5
 RUNS = sys.argv[3] if len(sys.argv) > 3 else "100"
+STORED = os.path.abspath(sys.argv[4]) if len(sys.argv) > 4 else None
 ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
-QUESTIONS = [
-    ["list"],
-    ["query", "--named", "failure-rates"],
-    ["query", "SELECT (COUNT(*) AS ?n) WHERE { ?s a act:Run }"],
-    ["analyse"],
-]
+# Some answers depend on all runs, some on one.
+QUESTIONS = {
+    "list": ["list"],
+    "list --failed": ["list", "--failed"],
+    "show": ["show", "@last"],
+    "query, one run": ["query", "SELECT ?p ?v WHERE { ?run act:index 0 ; ?p ?v } LIMIT 20"],
+    "query, all outcomes": ["query", "--named", "failure-rates"],
+}
+PAUSE_SECS = 1.0
 
 
 def asked(history, done, times, faults):
     """Asks all questions again and again, one at a time."""
     while not done.is_set():
-        for question in QUESTIONS:
+        for name, question in QUESTIONS.items():
             started = time.monotonic()
             command = [PROGRAM, *question, "--history", history]
-            answer = subprocess.run(command, capture_output=True, text=True)
-            times.setdefault(question[0], []).append(time.monotonic() - started)
-            # Before the first run, there is nothing to analyse.
-            if answer.returncode > 1 and "X044" not in answer.stderr and "H003" not in answer.stderr:
-                faults.append(answer.stderr)
+            process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+            errors = process.stderr.read()
+            _, status, usage = os.wait4(process.pid, 0)
+            wall = time.monotonic() - started
+            times.setdefault(name, []).append((wall, usage.ru_utime + usage.ru_stime, usage.ru_maxrss / 1024))
+            # Before the first run, there is nothing to show.
+            if os.waitstatus_to_exitcode(status) > 1 and "H003" not in errors and "H008" not in errors:
+                faults.append(errors)
+            if done.wait(PAUSE_SECS):
+                break
 
 
 def campaign(folder, with_reader, times, faults):
     """CPU time of one campaign, without that of its readers. Unit: seconds."""
     history = os.path.join(folder, "h")
+    if STORED:
+        shutil.copytree(STORED, history)
     command = [PROGRAM, "run", "configs/pick.toml", "--runs", RUNS, "--jobs", "1", "--history", history]
     process = subprocess.Popen(command, cwd=ROOT, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
     done = threading.Event()
@@ -68,8 +81,12 @@ def main():
         ratios.append(secs[True] / secs[False])
         print(f"pair {pair + 1}: {secs[False]:.2f} s alone, {secs[True]:.2f} s beside readers: {ratios[-1]:.3f}", flush=True)
     print(f"median ratio of CPU times: {statistics.median(ratios):.3f}")
-    for name, walls in times.items():
-        print(f"{name}: {len(walls)} answers, median {statistics.median(walls):.2f} s, longest {max(walls):.2f} s")
+    for name, answers in times.items():
+        walls, cpus, sizes = zip(*answers)
+        print(
+            f"{name}: {len(walls)} answers, wall median {statistics.median(walls):.2f} s, longest {max(walls):.2f} s, "
+            f"CPU median {statistics.median(cpus):.2f} s, longest {max(cpus):.2f} s, memory {max(sizes):.0f} MB"
+        )
     print(f"{len(faults)} refused")
     for fault in faults[:3]:
         print(fault)

@@ -7,7 +7,9 @@
 //! random scenes with a bootstrap confidence interval.
 //!
 //! The defaults are `configs/pick.toml`, 2,000 random scenes, 200 searches of at most 60 runs, and all guided
-//! strategies. To change them: `cargo bench --bench search_pick -- --config benches/quiet_pick.toml --random 500
+//! strategies. With `--only FILE.rls`, the rules in this file are the only property, and its violation the only mode:
+//! `--only benches/rare_tilt.rls` plants a violation of a formula about time that one random scene in a hundred has.
+//! To change them: `cargo bench --bench search_pick -- --config benches/quiet_pick.toml --random 500
 //! --seeds 40 --runs 120 --strategies bandit,boundary --first-seed 7001`.
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -137,9 +139,47 @@ fn ratio(guided: &[usize], random: &[usize]) -> [f64; 3] {
     [median(guided) / median(random), ratios[RESAMPLED / 40], ratios[RESAMPLED - 1 - RESAMPLED / 40]]
 }
 
+/// Copies the files of a campaign into a folder, where the rules of a file become the only property of a pick. Returns the
+/// configuration there.
+fn with_only(folder: &Path, config: &Path, rules: &str) -> PathBuf {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    for name in ["ontology", "rules", "models", "configs"] {
+        copy(&root.join(name), &folder.join(name));
+    }
+    let text = std::fs::read_to_string(root.join(rules)).expect("the file of rules is readable");
+    std::fs::write(folder.join("rules/only.rls"), text).expect("room on the disk");
+    let ontology = folder.join("ontology/actions.ttl");
+    let text = std::fs::read_to_string(&ontology).expect("it was just copied");
+    let (before, rest) = text.split_once("act:Pick a act:Action").expect("the shipped ontology has a pick");
+    let (pick, after) = rest.split_once("act:successProperty").expect("a pick has success properties");
+    let (_, after) = after.split_once(" .\n").expect("the statement ends");
+    let only = "act:Only a act:Property ; rdfs:label \"the only property\" ; act:verifiedBy <../rules/only.rls> .\n";
+    let text = format!("{before}act:Pick a act:Action{pick}act:successProperty act:Only .\n{only}{after}");
+    std::fs::write(&ontology, text).expect("room on the disk");
+    let copied = folder.join("configs/only.toml");
+    std::fs::copy(config, &copied).expect("room on the disk");
+    copied
+}
+
+fn copy(from: &Path, to: &Path) {
+    std::fs::create_dir_all(to).expect("room on the disk");
+    for entry in std::fs::read_dir(from).expect("the folder is readable").flatten() {
+        let (path, target) = (entry.path(), to.join(entry.file_name()));
+        if path.is_dir() {
+            copy(&path, &target);
+        } else {
+            std::fs::copy(&path, &target).expect("room on the disk");
+        }
+    }
+}
+
 fn main() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let config = root.join(argument("--config").unwrap_or_else(|| "configs/pick.toml".to_owned()));
+    let mut config = root.join(argument("--config").unwrap_or_else(|| "configs/pick.toml".to_owned()));
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    if let Some(rules) = argument("--only") {
+        config = with_only(folder.path(), &config, &rules);
+    }
     let (seeds, runs, scenes) = (u64::from(number("--seeds", 200)), number("--runs", 60), number("--random", 2_000));
     let named = argument("--strategies").unwrap_or_else(|| "cross-entropy,bandit,boundary".to_owned());
     let guided: Vec<Strategy> =

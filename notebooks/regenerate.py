@@ -1,6 +1,7 @@
 """Runs campaigns, exports their results, and executes every notebook on them from top to bottom.
 
     python notebooks/regenerate.py                             regenerates the notebooks in place
+    python notebooks/regenerate.py --pictures                  and the pictures of README and of the page about failures
     python notebooks/regenerate.py --runs 8 --into /tmp/try    a quick test, which writes to another folder
 
 Requires the packages of tests/foreign/requirements.txt, and actcheck; `make notebooks` provides both. The exported data
@@ -8,6 +9,7 @@ stay in the folder `data` next to the written notebooks.
 """
 
 import argparse
+import json
 import os
 import shutil
 import subprocess
@@ -26,14 +28,17 @@ ROOT = HERE.parent
 CAMPAIGNS = {"first": "configs/pick.toml", "second": "benches/quiet_pick.toml"}
 # Whole tasks take longer: a quarter of the runs.
 TASKS = "configs/pick_and_place.toml"
+# Width of a picture beside another. Unit: pixels.
+WIDTH = 800
 
 
 def main():
     arguments = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     arguments.add_argument("--actcheck", default=str(ROOT / "actcheck"), help="path of the program [default: ./actcheck of the checkout]")
-    arguments.add_argument("--runs", default="200", help="runs of each campaign [default: 200]")
+    arguments.add_argument("--runs", default="300", help="runs of each campaign [default: 300]")
     arguments.add_argument("--jobs", default="2", help="number of parallel runs [default: 2]")
     arguments.add_argument("--into", type=Path, default=HERE, help="output folder [default: the notebooks folder]")
+    arguments.add_argument("--pictures", action="store_true", help="also draw the pictures of documents")
     asked = arguments.parse_args()
     asked.into.mkdir(parents=True, exist_ok=True)
     data = asked.into.resolve() / "data"
@@ -42,6 +47,8 @@ def main():
     faults = [fault for book in sorted(HERE.glob("*.ipynb")) if (fault := execute(book, asked.into / book.name, data))]
     if faults:
         sys.exit("\n".join(faults))
+    if asked.pictures:
+        draw(asked, asked.into / "pictures")
 
 
 def actcheck(asked, *words, good=(0,)):
@@ -84,6 +91,47 @@ def execute(source, target, data):
     book.metadata["language_info"] = {"name": "python"}
     nbformat.write(book, target)
     return fault
+
+
+def draw(asked, pictures):
+    """Draws README's failed pick, and one run of each failure mode on a cluttered table beside its smallest scene."""
+    pictures.mkdir(exist_ok=True)
+    with tempfile.TemporaryDirectory() as scratch:
+        scratch = Path(scratch)
+        history = ["--history", scratch / "pick"]
+        actcheck(asked, "run", "configs/pick.toml", "--jobs", asked.jobs, *history, good=(0, 1))
+        # README describes this run.
+        ninth = failing(asked, history)[0].rsplit("-", 1)[0] + "-9"
+        actcheck(asked, "show", ninth, "--picture", pictures / "failed_pick.svg", *history)
+        history = ["--history", scratch / "clutter"]
+        actcheck(asked, "run", "configs/clutter.toml", "--runs", "60", "--jobs", asked.jobs, *history, good=(0, 1))
+        rows = []
+        for run in failing(asked, history)[:4]:
+            pair = [scratch / f"{run}-{kind}.png" for kind in ("run", "smallest")]
+            actcheck(asked, "show", run, "--picture", pair[0], *history)
+            actcheck(asked, "shrink", run, "--jobs", asked.jobs, "--picture", pair[1], *history)
+            rows.append(pair)
+        beside(rows, pictures / "shrunk.png")
+
+
+def failing(asked, history):
+    """The first run of each failure mode, the most frequent mode first."""
+    modes = json.loads(actcheck(asked, "analyse", "--format", "json", *history))["failure_modes"]
+    return [min(mode["runs"], key=lambda run: int(run.rsplit("-", 1)[1])) for mode in modes if mode["failed"]]
+
+
+def beside(rows, target):
+    """Arranges pairs of pictures in rows, in a third of their size."""
+    from PIL import Image
+
+    shown = [[Image.open(picture).convert("RGB") for picture in pair] for pair in rows]
+    shown = [[picture.resize((WIDTH, picture.height * WIDTH // picture.width)) for picture in pair] for pair in shown]
+    heights = [max(picture.height for picture in pair) for pair in shown]
+    sheet = Image.new("RGB", (2 * WIDTH, sum(heights)), "white")
+    for number, pair in enumerate(shown):
+        for column, picture in enumerate(pair):
+            sheet.paste(picture, (column * WIDTH, sum(heights[:number])))
+    sheet.quantize(255).save(target, optimize=True)
 
 
 if __name__ == "__main__":

@@ -212,13 +212,21 @@ fn hostile(folder: &Path) -> PathBuf {
             }
             if index < 3 {
                 let property = run.actions[0].judgements[1].property.clone();
-                replays.add(&run, None, &[Explained { step: 1, property, text: HOSTILE.to_owned() }]);
+                replays.add(
+                    &run,
+                    None,
+                    &[Explained { step: 1, property, text: HOSTILE.to_owned(), deciding: Vec::new() }],
+                );
             }
             run
         })
         .collect();
-    let words =
-        PropertyWords { label: HOSTILE.to_owned(), comment: Some(HOSTILE.to_owned()), rule: HOSTILE.to_owned() };
+    let words = PropertyWords {
+        label: HOSTILE.to_owned(),
+        comment: Some(HOSTILE.to_owned()),
+        rule: HOSTILE.to_owned(),
+        bounds: Vec::new(),
+    };
     let words = BTreeMap::from([("http://actions#CloseObject".to_owned(), words)]);
     let mirror = paged::mirror(&folder.join("tables"), "k", runs);
     let file = folder.join("hostile.html");

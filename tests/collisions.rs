@@ -51,6 +51,11 @@ fn pushed_furniture_slides_and_resists_with_its_friction() {
     drive(&mut world, -0.4, 0.15);
     let left = place_of(&world);
     assert!((left[0] - x).abs() < 5e-3, "it stays where it was left");
+    let samples = world.end_record().robot.samples;
+    let series =
+        samples.series.iter().find(|series| (series.thing.as_str(), series.quantity.as_str()) == ("block_1", "x"));
+    let course: Vec<f64> = series.expect("furniture that can slide has a course").values().collect();
+    assert!((course[0] - 1.0).abs() < 1e-3 && (course[course.len() - 1] - left[0]).abs() < 1e-3, "{course:?}");
     assert_eq!(world.fault(), None);
 }
 

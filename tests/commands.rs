@@ -79,6 +79,16 @@ fn a_standalone_datalog_program_exports_and_explains() {
     let endless = actcheck(folder.path(), &["datalog", "endless.rls", "--max-tuples", "10000", "--max-time", "1m"]);
     assert_eq!(endless.status.code(), Some(2));
     assert!(stderr(&endless).contains("endless.rls"), "{}", stderr(&endless));
+    std::fs::write(folder.path().join("things.rls"), "n(0) .\nm(?x, !y), n(!y) :- n(?x) .\n").unwrap();
+    let endless = actcheck(folder.path(), &["datalog", "things.rls", "--max-new", "100"]);
+    assert_eq!(endless.status.code(), Some(2));
+    let text = stderr(&endless);
+    assert!(
+        ["R063", "R090", "`n` (argument 1)", "more than 100 new things", "--max-new"]
+            .iter()
+            .all(|word| text.contains(word)),
+        "{text}"
+    );
 }
 
 /// Old spellings work for one more version.
@@ -129,6 +139,7 @@ fn the_last_runs_have_names_and_help_and_init_are_commands() {
 /// An empty table is also the answer to a misspelt query.
 #[test]
 fn an_empty_answer_names_the_terms_that_do_not_exist() {
+    const NONE: &str = "the query has no answers\n";
     let project = project();
     actcheck(project.path(), &["run", "configs/lone_glass.toml", "--runs", "1", "--history", "h"]);
     let told = |query: &str| {
@@ -138,8 +149,8 @@ fn an_empty_answer_names_the_terms_that_do_not_exist() {
     };
     let misspelt = told("SELECT ?run { ?o act:ofRun ?run ; act:rol \"target\" }");
     assert!(misspelt.contains("no term `act:rol`") && misspelt.contains("did you mean `act:role`?"), "{misspelt}");
-    assert_eq!(told("SELECT ?run { ?o act:ofRun ?run ; act:role \"act:rol\" }"), "");
-    assert_eq!(told("SELECT ?a { GRAPH act:rechecked { ?a earl:test act:MovedObject } FILTER(act:counts(?a)) }"), "");
+    assert_eq!(told("SELECT ?run { ?o act:ofRun ?run ; act:role \"act:rol\" }"), NONE);
+    assert_eq!(told("SELECT ?a { GRAPH act:rechecked { ?a earl:test act:MovedObject } FILTER(act:counts(?a)) }"), NONE);
 }
 
 /// A broken file that no scene can contain stopped every campaign of the folder.

@@ -10,8 +10,17 @@ use crate::support::expected::assert_expected;
 use crate::support::{actcheck, edit, root, script, stderr, stdout};
 
 /// Pages with commands. Each has a test, so that they run side by side.
-const WITH_COMMANDS: [&str; 7] =
-    ["cookbook.md", "failures.md", "history.md", "own-skill.md", "properties.md", "verdicts.md", "whole-task.md"];
+const WITH_COMMANDS: [&str; 9] = [
+    "bisect.md",
+    "cookbook.md",
+    "failures.md",
+    "history.md",
+    "own-skill.md",
+    "properties.md",
+    "time.md",
+    "verdicts.md",
+    "whole-task.md",
+];
 
 fn read(path: &Path) -> String {
     std::fs::read_to_string(path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
@@ -19,12 +28,27 @@ fn read(path: &Path) -> String {
 
 /// Runs all commands of a page in the order of the page, after README's first command.
 fn commands_work(page: &str) {
-    let checkout = Checkout::after_first_run();
+    commands_work_in(&Checkout::after_first_run(), page, &[]);
+}
+
+fn commands_work_in(checkout: &Checkout, page: &str, environment: &[(&str, &str)]) {
     let blocks = blocks(&read(&root().join("docs").join(page)), "sh");
     assert!(!blocks.is_empty(), "docs/{page} has no commands");
     for block in &blocks {
-        checkout.run(block, &[]);
+        checkout.run(block, environment);
     }
+}
+
+#[test]
+fn commands_of_the_page_about_bisection_work() {
+    let checkout = Checkout::after_first_run();
+    let [author, committer] =
+        ["GIT_AUTHOR", "GIT_COMMITTER"].map(|who| [format!("{who}_NAME"), format!("{who}_EMAIL")]);
+    let identity: Vec<(&str, &str)> =
+        author.iter().chain(&committer).map(|name| (name.as_str(), "ada@example.org")).collect();
+    let files = "configs/*.toml ontology rules models";
+    checkout.run(&format!("git init --quiet && git add {files} && git commit --quiet --message project"), &identity);
+    commands_work_in(&checkout, "bisect.md", &identity);
 }
 
 #[test]
@@ -50,6 +74,11 @@ fn commands_of_the_page_about_own_skills_work() {
 #[test]
 fn commands_of_the_page_about_properties_work() {
     commands_work("properties.md");
+}
+
+#[test]
+fn commands_of_the_page_about_time_work() {
+    commands_work("time.md");
 }
 
 #[test]

@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use actcheck::base::{RunFacts, Term, TermId, names};
 use actcheck::data::{
     ActionEnd, ActionReport, ActionTrace, BodyState, Choices, ContactEpisode, Extremes, Frames, JointState, LinkState,
-    Look, Percept, Phase, Pose, RobotState, SceneMap, Snapshot, Trace,
+    Look, Percept, Phase, Pose, RobotState, Snapshot, Trace,
 };
 use actcheck::facts::{extract, extract_complete};
 
@@ -175,9 +175,7 @@ pub fn sample_trace(seed: u64) -> Trace {
         actions: vec![action],
         frames: frames(&mut choices, 25.0),
         hash,
-        map: SceneMap::default(),
-        forms: vec![],
-        robot_courses: vec![],
+        ..Trace::default()
     }
 }
 

@@ -9,7 +9,7 @@ use actcheck::analysis::{
 };
 use actcheck::base::Outcome::{self, Failed, Inapplicable, Passed, Untested};
 use actcheck::history::{Repetition, RunDetail};
-use actcheck::report::{FindingsSummary, PropertyReport, collisions_picture, findings_text, patterns_picture};
+use actcheck::report::{FindingsSummary, Page, PropertyReport, collisions_picture, findings_text, patterns_picture};
 
 use crate::support::made_up;
 use crate::support::planted::Dice;
@@ -128,7 +128,7 @@ fn a_condition_and_an_effect_are_listed_apart() {
     let is_arc = |words: &str| words.starts_with("target yaw beyond ±2.") || words.contains(" or < -2.");
     assert!(matches!(when.as_slice(), [only] if is_arc(only)), "{when:?}");
     assert!(matches!(how.as_slice(), [only] if only.starts_with("target perceived off ≥ 0.0")), "{how:?}");
-    let text = findings_text(&summary_of(&table, report));
+    let text = findings_text(&summary_of(&table, report), Page::default());
     let [condition, effect] = ["when (", "how ("].map(|title| text.find(title).unwrap());
     let place = |words: &str| text.find(words).unwrap_or_else(|| panic!("{words}: {text}"));
     assert!(condition < place(&when[0]) && place(&when[0]) < effect, "{text}");
@@ -147,7 +147,7 @@ fn without_a_significant_condition_the_strongest_are_shown_as_unsure() {
         assert!(strongest.p <= strongest.p_corrected && strongest.runs_needed.unwrap() > 40.0, "{strongest:?}");
     }
     assert!(patterns.strongest.windows(2).all(|pair| pair[0].condition.parameter() != pair[1].condition.parameter()));
-    let text = findings_text(&summary_of(&table, report(&table, found)));
+    let text = findings_text(&summary_of(&table, report(&table, found)), Page::default());
     assert!(text.contains("none is confirmed beyond chance; the strongest (perhaps by chance):"), "{text}");
     assert!(text.contains("if it is real, about "), "{text}");
 }
@@ -196,7 +196,7 @@ fn collisions_are_counted_by_type_and_place() {
         "furniture is not movable"
     );
     let summary = summary(&table, 0);
-    let text = findings_text(&summary);
+    let text = findings_text(&summary, Page::default());
     assert!(text.contains("Pick: in 50 % [35–65] of 40 runs") && text.contains("Table (furniture)"), "{text}");
     let svg = collisions_picture(&summary).unwrap().to_svg();
     assert!(svg.contains("Mug: hit in 20 of 40") && svg.contains("approach"), "{svg}");

@@ -16,6 +16,7 @@ const LINES: &str = "<http://x#a> <http://x#p> \"t\\u00e9\\n\"@en .\n# c\n_:b <h
 const QUADS: &str = "<http://x#a> <http://x#p> \"t\" <http://x#g> .\n_:b <http://x#p> _:b _:g .\n<http://x#a> <http://x#p> <http://x#b> .\n";
 const TURTLE: &str = "@prefix x: <http://x#> .\n@base <http://y/> .\nx:a a x:B ; x:p 1, -2.5, 1e3, true, \"\"\"long\n\"t\" \"\"\", 't'@en-GB ; <q> [ x:p ( x:a [] _:b ) ] .\nPREFIX z: <z#>\nz:a z:b z:c .\n";
 const TRIG: &str = "@prefix x: <http://x#> .\nx:g { x:a x:p x:b ; x:q [ x:p 1 ] . _:b x:p ( 1 2 ) }\nGRAPH _:g { x:a x:p \"t\" }\nx:a x:p x:c .\n{ x:d x:p x:e }\n";
+const JSON: &str = "{\"a\": [1, -2.5e3, true, null, {\"é\": \"t\\u00e9\\ud83e\\udd80\\n\\\"\"}],\n \"b\": {\"c\": [[], {}, \"\"], \"d\": 99999999999999999999}}\n";
 const XML: &str = "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<!DOCTYPE rdf:RDF [\n <!ENTITY x \"http://x#\">\n <!ENTITY y \"&x;y\">\n]>\n<!-- c -->\n<rdf:RDF xmlns:rdf=\"http://www.w3.org/1999/02/22-rdf-syntax-ns#\" xmlns:x=\"&x;\" xml:base=\"http://z/\">\n <x:A rdf:about=\"&y;\" x:p='v'>\n  <x:q rdf:datatype=\"&x;d\">t &lt; &#233; &y;</x:q>\n  <x:r xml:lang=\"en\"><![CDATA[<b>]]></x:r>\n  <x:s rdf:parseType=\"Literal\"><i>é</i></x:s>\n  <x:t rdf:parseType=\"Collection\"><x:B rdf:nodeID=\"n\"/><x:B/></x:t>\n  <x:u rdf:resource=\"#f\"/>\n </x:A>\n</rdf:RDF>\n";
 
 /// Parts of the formats' syntax, which damage inserts.
@@ -70,6 +71,7 @@ fn valid(format: usize) -> Vec<u8> {
         "nquads" => QUADS.to_owned(),
         "turtle" => TURTLE.to_owned(),
         "trig" => TRIG.to_owned(),
+        "json" => JSON.to_owned(),
         _ => XML.to_owned(),
     };
     if ending.ends_with("gz") { packed(text.as_bytes()) } else { text.into_bytes() }

@@ -24,7 +24,7 @@ fn commands_are_listed_in_groups_and_run_comes_first() {
             .filter(|line| line.ends_with(':') && !line.starts_with(' '))
             .map(|line| line.trim_end_matches(':'))
             .collect();
-        assert_eq!(headings, ["Run", "Look", "Judge", "Exchange", "Options", "Example"], "{help}");
+        assert_eq!(headings, ["Run", "Look", "Judge", "Exchange", "Options", "Example", "Environment"], "{help}");
         assert!(help.lines().all(|line| line.chars().count() <= 100), "{help}");
     }
     assert_eq!(commands()[0], "run");

@@ -2,6 +2,7 @@
 
 use std::process::Command;
 
+use regex::Regex;
 use serde_json::Value;
 
 use crate::support::{foreign, root, stderr};
@@ -45,6 +46,39 @@ fn committed_notebooks_were_run_in_order() {
     }
     let pictures = |book: &Value| book.to_string().matches("image/png").count();
     assert!(found.iter().map(|(_, book)| pictures(book)).sum::<usize>() >= 5);
+}
+
+/// The palette of Okabe and Ito.
+const OKABE_ITO: [&str; 8] = ["#000000", "#e69f00", "#56b4e9", "#009e73", "#f0e442", "#0072b2", "#d55e00", "#cc79a7"];
+
+#[test]
+fn plots_use_colours_that_colour_blind_people_can_distinguish() {
+    let colour = Regex::new("#[0-9a-fA-F]{6}").unwrap();
+    let is_grey = |text: &str| {
+        let [red, green, blue] = [1, 3, 5].map(|at| i32::from_str_radix(&text[at..at + 2], 16).unwrap());
+        [green, blue].iter().all(|part| (part - red).abs() <= 16)
+    };
+    for (name, book) in notebooks() {
+        for cell in code(&book) {
+            let source = cell["source"].to_string();
+            for found in colour.find_iter(&source).map(|found| found.as_str()) {
+                assert!(OKABE_ITO.contains(&found) || is_grey(found), "{name}: {found}");
+            }
+        }
+    }
+}
+
+/// Fails if the notebooks were saved after a campaign with too few runs.
+#[test]
+fn committed_notebooks_confirm_a_pattern_and_a_difference() {
+    let texts = |wanted: &str| {
+        let (_, book) = notebooks().into_iter().find(|(name, _)| name == wanted).unwrap();
+        code(&book).iter().map(|cell| cell["outputs"].to_string()).collect::<String>()
+    };
+    let patterns = Regex::new(r"when \(\d+ tried, [1-9]\d* confirmed\)").unwrap();
+    assert!(patterns.is_match(&texts("failure_patterns.ipynb")), "no confirmed pattern");
+    let better = Regex::new(r"everything in a run\s*┆\s*[1-9]\d+\s*┆").unwrap();
+    assert!(better.is_match(&texts("comparing.ipynb")), "no difference");
 }
 
 #[test]

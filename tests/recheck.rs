@@ -99,6 +99,49 @@ fn a_recheck_equals_a_new_simulation() {
     assert_eq!(stdout(&actcheck(folder, &["list", "--history", "h"])), listed);
 }
 
+/// Rules about time read the samples that the campaign judged, bit for bit.
+#[test]
+fn a_recheck_by_formulas_equals_a_campaign_that_judges_them() {
+    let project = project();
+    let folder = project.path();
+    actcheck(folder, &["run", "configs/pick.toml", "--runs", "4", "--history", "h"]);
+    let judged = actcheck(folder, &["recheck", "--history", "h", "--ontology", "ontology/time.ttl"]);
+    assert!(judged.status.code() < Some(2), "{}", stderr(&judged));
+    edit(&folder.join("configs/pick.toml"), "../ontology/actions.ttl", "../ontology/time.ttl");
+    actcheck(folder, &["run", "configs/pick.toml", "--runs", "4", "--history", "again"]);
+    let newest = ask(folder, "h", NEWEST);
+    assert!(newest.lines().count() > 4 * 15, "{newest}");
+    assert_eq!(newest, ask(folder, "again", OWN));
+}
+
+/// Holds, motions and phases come from the same samples, although a recheck by them reads no samples.
+#[test]
+fn a_recheck_by_intervals_equals_a_campaign_that_judges_them() {
+    let project = project();
+    let folder = project.path();
+    actcheck(folder, &["run", "configs/pick.toml", "--runs", "3", "--history", "h"]);
+    let rules =
+        "success(?h, ?from, ?to) :- parameter(act:pickObject, ?o), hold_interval(?h, ?o), interval(?h, ?from, ?to),
+        phase_interval(?lift, \"lift\"), interval_within(?lift, ?h) .";
+    std::fs::write(folder.join("rules/held_in_lift.rls"), rules).unwrap();
+    let query = "SELECT ?i ?object ?start ?end WHERE { ?i w:movedObject ?object ; w:start ?start ; w:end ?end }";
+    let prefix = "PREFIX w: <https://w3id.org/actcheck/world#>\n";
+    std::fs::write(folder.join("rules/moves.rq"), format!("{prefix}{query}")).unwrap();
+    let property = |name: &str, file: &str| {
+        format!("act:{name} a act:Property ; rdfs:label \"{name}\" ; act:verifiedBy <../rules/{file}> .\n")
+    };
+    let entries = property("HeldInLift", "held_in_lift.rls") + &property("Moves", "moves.rq");
+    let ontology = folder.join("ontology/actions.ttl");
+    let text = std::fs::read_to_string(&ontology).unwrap() + &entries;
+    std::fs::write(&ontology, text + "act:Pick act:successProperty act:HeldInLift, act:Moves .\n").unwrap();
+    let judged = actcheck(folder, &["recheck", "--history", "h"]);
+    assert!(judged.status.code() < Some(2), "{}", stderr(&judged));
+    actcheck(folder, &["run", "configs/pick.toml", "--runs", "3", "--history", "again"]);
+    let newest = ask(folder, "h", NEWEST);
+    assert!(newest.contains("Moves") && newest.contains("start ="), "{newest}");
+    assert_eq!(newest, ask(folder, "again", OWN));
+}
+
 #[test]
 fn a_recheck_uses_current_or_older_rules_and_writes_no_duplicates() {
     let project = project();

@@ -230,7 +230,7 @@ mod with_recordings {
         judgement.outcome = Outcome::Failed;
         judgement.witness = "it came [nearer](http://example.org) <b>twice</b>".to_owned();
         let property = judgement.property.clone();
-        let why = Explained { step, property, text: "success(?o)\n  was missing".to_owned() };
+        let why = Explained { step, property, text: "success(?o)\n  was missing".to_owned(), deciding: Vec::new() };
         let recorded = |trace: Option<&Trace>| {
             let mut recordings = Recordings::new().unwrap();
             recordings.add(&run, trace, std::slice::from_ref(&why)).unwrap();

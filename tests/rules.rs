@@ -394,6 +394,15 @@ fn every_example_of_the_readme_runs() {
                 assert_eq!(closure.tuples("told"), [[Term::string("set has 3 parts")]]);
                 assert!(program.warnings.is_empty(), "{}", program.warnings);
             }
+            "prolog program with new things" => {
+                let program = Program::load(&Source::new("example", text.clone()), Path::new("")).unwrap();
+                let closure = program.close(actcheck::rules::standalone::Engine::Fast, &Budget::default()).unwrap();
+                let shown = |tuple: Vec<Term>| tuple.iter().map(Term::to_string).collect::<Vec<_>>().join(", ");
+                let parts: Vec<String> = closure.tuples("part").into_iter().map(shown).collect();
+                assert_eq!(parts, ["_:0, \"cup\"", "_:0, \"plate\"", "_:1, \"plate\"", "_:1, \"spoon\""]);
+                assert_eq!(closure.tuples("contacts"), [[Term::Integer(2)]]);
+                assert!(program.warnings.is_empty(), "{}", program.warnings);
+            }
             "turtle" => assert_eq!(statements(text.replace("<..", "<file:").trim_end().trim_end_matches('.')).len(), 6),
             "text" => {}
             other => panic!("what is {other}?"),

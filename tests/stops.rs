@@ -29,7 +29,13 @@ const ENDLESS: [(&str, &str); 2] = [
 ];
 
 fn asked() -> Budget {
-    Budget { tuples: usize::MAX, bytes: usize::MAX, secs: f64::MAX, stop: Arc::new(AtomicBool::new(true)) }
+    Budget {
+        tuples: usize::MAX,
+        bytes: usize::MAX,
+        secs: f64::MAX,
+        new_things: usize::MAX,
+        stop: Arc::new(AtomicBool::new(true)),
+    }
 }
 
 #[test]

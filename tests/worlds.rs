@@ -217,12 +217,8 @@ fn the_map_is_part_of_the_facts() {
     let scene = scenes(&env, 1).remove(0);
     let trace = actcheck::data::Trace {
         snapshots: vec![actcheck::world::build(&scene).unwrap().snapshot()],
-        actions: Vec::new(),
-        frames: actcheck::data::Frames::default(),
-        hash: String::new(),
         map: scene.map.clone(),
-        forms: vec![],
-        robot_courses: vec![],
+        ..actcheck::data::Trace::default()
     };
     let facts = actcheck::facts::extract(&trace);
     let holds = |subject: &str, property: &str, object: Term| {

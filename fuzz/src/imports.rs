@@ -8,7 +8,7 @@ use actcheck::rules::Budget;
 use actcheck::rules::standalone::{Engine, Loading, Program};
 
 /// The formats: a name, the ending of the file, and the options of the import.
-pub const FORMATS: [(&str, &str, &str); 11] = [
+pub const FORMATS: [(&str, &str, &str); 12] = [
     ("csv", "csv", ", format = (any, any)"),
     ("csv", "csv", ", format = (int, string, double), ignore_headers = true"),
     ("dsv", "txt", ", delimiter = \";\", quoting = false, format = (skip, any)"),
@@ -20,6 +20,7 @@ pub const FORMATS: [(&str, &str, &str); 11] = [
     ("trig", "trig", ""),
     ("rdfxml", "rdf", ""),
     ("rdfxml", "rdf.gz", ", base = \"http://x/\""),
+    ("json", "json", ""),
 ];
 
 /// Small enough for many inputs per second; every import returns within it.

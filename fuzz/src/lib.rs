@@ -145,6 +145,7 @@ fn facts() -> &'static RunFacts {
         };
         let snapshots = vec![state(0.06), state(0.16)];
         let designator = terms.intern(Term::iri(format!("{}pickObject", names::ACT)));
-        RunFacts { terms, snapshots, during: vec![Vec::new()], parameters: vec![vec![[designator, glass]]] }
+        let (during, parameters) = (vec![Vec::new()], vec![vec![[designator, glass]]]);
+        RunFacts { terms, snapshots, during, parameters, courses: vec![None] }
     })
 }

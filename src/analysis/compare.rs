@@ -34,6 +34,13 @@ pub struct ComparedRun {
     outcomes: BTreeMap<Compared, Outcome>,
 }
 
+impl ComparedRun {
+    /// The outcomes by subject, over all executions of an action in the run.
+    pub fn outcomes(&self) -> &BTreeMap<Compared, Outcome> {
+        &self.outcomes
+    }
+}
+
 /// One line of a comparison.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ComparedLine {
@@ -237,32 +244,12 @@ impl Comparison {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::sample_rows::{outcome_row, run_row};
 
     fn run(index: u64, arrangement: &str, outcomes: &[(&str, Outcome)]) -> ComparedRun {
         let scene = SceneDigest { arrangement: arrangement.to_owned(), physics: String::new() };
-        let row = RunRow {
-            run: format!("k-{}", index + 1),
-            repetition: None,
-            weight: None,
-            campaign: "k".to_owned(),
-            index,
-            test: "Pick".to_owned(),
-            status: RunStatus::Completed,
-            score: 1.0,
-            trace_hash: String::new(),
-            started: String::new(),
-        };
-        let outcome = |(property, outcome): &(&str, Outcome)| OutcomeRow {
-            run: row.run.clone(),
-            campaign: "k".to_owned(),
-            index,
-            test: "Pick".to_owned(),
-            step: 1,
-            action: "Pick".to_owned(),
-            property: (*property).to_owned(),
-            outcome: *outcome,
-            margin: None,
-        };
+        let row = run_row(index);
+        let outcome = |(property, outcome): &(&str, Outcome)| outcome_row(index, property, *outcome);
         let outcomes: Vec<OutcomeRow> = outcomes.iter().map(outcome).collect();
         let scenes = BTreeMap::from([(row.run.clone(), scene)]);
         compared_runs(&[row], &scenes, &outcomes).remove(0)

@@ -1,6 +1,7 @@
 //! Health checks of a campaign: discarded scenes, duplicate runs, coverage gaps, slow runs and simulation artefacts.
 
 use std::collections::BTreeMap;
+use std::collections::btree_map::Entry;
 
 use crate::{Coverage, PairCoverage, ParameterCoverage};
 use actcheck_base::{Digest, Outcome};
@@ -98,10 +99,10 @@ impl HealthMeter {
         if run.repetition == 0 {
             self.coverage.add(&run.choices);
         }
-        match self.seen.get(&digest(run)) {
-            Some(first) => self.duplicates.push((run.run.clone(), first.clone())),
-            None => {
-                self.seen.insert(digest(run), run.run.clone());
+        match self.seen.entry(digest(run)) {
+            Entry::Occupied(first) => self.duplicates.push((run.run.clone(), first.get().clone())),
+            Entry::Vacant(place) => {
+                place.insert(run.run.clone());
             }
         }
         self.wall.push((run.wall_secs, run.run.clone()));
@@ -220,6 +221,7 @@ fn badly_simulated(health: &Health) -> Vec<HealthProblem> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::sample_rows::outcome_row;
     use actcheck_data::Choices;
 
     fn run(index: u64) -> RunVitals {
@@ -272,17 +274,7 @@ mod tests {
 
     #[test]
     fn a_property_that_rarely_applies_is_reported() {
-        let row = |index: u64, outcome| OutcomeRow {
-            run: format!("k-{}", index + 1),
-            campaign: "k".to_owned(),
-            index,
-            test: "Pick".to_owned(),
-            step: 1,
-            action: "Pick".to_owned(),
-            property: "p".to_owned(),
-            outcome,
-            margin: None,
-        };
+        let row = |index: u64, outcome| outcome_row(index, "p", outcome);
         let rows = |applies: u64, all: u64| -> Vec<OutcomeRow> {
             (0..all).map(|i| row(i, if i < applies { Outcome::Passed } else { Outcome::Inapplicable })).collect()
         };

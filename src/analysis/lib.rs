@@ -3,6 +3,7 @@
 //! Never: judges, changes a history (its tables are stored beside it), or exposes a type of the table library.
 
 mod answer;
+mod bisect;
 mod compare;
 mod consistency;
 mod coverage;
@@ -18,10 +19,13 @@ mod oracles;
 mod paired;
 mod patterns;
 mod runs_needed;
+#[cfg(test)]
+mod sample_rows;
 mod score_interval;
 mod tables;
 
 pub use answer::Answer;
+pub use bisect::{Likeness, OutcomeFlip, like_by_outcomes, like_by_rates, outcome_flips};
 pub use compare::{Compared, ComparedLine, ComparedRun, Comparison, compare, compared_runs};
 pub use consistency::{Consistency, PassPower, Repeated, SceneCounts, SceneRuns, Variance, consistency};
 pub use coverage::{Coverage, PairCoverage, ParameterCoverage};

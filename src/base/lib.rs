@@ -2,11 +2,14 @@
 //!
 //! Never: reads a configuration, depends on actions, rules or robots, or prints.
 
+mod course;
+mod deciding;
 mod diagnostic;
 mod digest;
 mod files;
 mod findings;
 mod judgement;
+mod meaning;
 pub mod names;
 mod printable;
 mod query_texts;
@@ -23,6 +26,8 @@ mod write_atomic;
 mod xml_guard;
 mod xml_limits;
 
+pub use course::{Course, Signal, SignalKey};
+pub use deciding::DecidingSignal;
 pub use diagnostic::{Diagnostic, Diagnostics, Severity};
 pub use digest::{Digest, digest_of, program_digest, set_program_digest};
 pub use files::Files;
@@ -34,13 +39,13 @@ pub use query_texts::{
     check_calls_within, string_end,
 };
 pub use rotation::{tilt_of, yaw_of};
-pub use run_facts::{ActionFacts, RunFacts, Triple};
+pub use run_facts::{ActionFacts, CONSTANT_PROPERTIES, RunFacts, Triple};
 pub use scratch::ScratchFolder;
 pub use shard::{ParseShardError, Shard};
 pub use source::{Source, Span};
-pub use sparql_size::sparql_excess;
-pub use suggest::{did_you_mean, nearest};
+pub use sparql_size::{sparql_excess, unclosed_braces};
+pub use suggest::{did_you_mean, misspelt, nearest};
 pub use term::{Term, TermId, Terms};
-pub use write_atomic::{NewFile, write_atomic};
+pub use write_atomic::{NewFile, write_atomic, write_quickly};
 pub use xml_guard::{XmlGuard, XmlProgress};
 pub use xml_limits::check_xml;

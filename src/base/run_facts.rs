@@ -1,6 +1,6 @@
 //! The facts of one run, by snapshot and action.
 
-use crate::{TermId, Terms};
+use crate::{Course, TermId, Terms};
 
 /// Subject, predicate and object, as IDs in the run's [`Terms`].
 pub type Triple = [TermId; 3];
@@ -16,6 +16,8 @@ pub struct RunFacts {
     pub during: Vec<Vec<Triple>>,
     /// One list for each action: pairs of designator and value, sorted.
     pub parameters: Vec<Vec<[TermId; 2]>>,
+    /// One course for each action; `None` if it was not recorded or not read.
+    pub courses: Vec<Option<Course>>,
 }
 
 /// The facts of one action, as the input of rules.
@@ -31,6 +33,8 @@ pub struct ActionFacts<'a> {
     pub during: &'a [Triple],
     /// Pairs of designator and value.
     pub parameters: &'a [[TermId; 2]],
+    /// Quantities over time; `None` if they were not recorded or not read.
+    pub course: Option<&'a Course>,
 }
 
 impl RunFacts {
@@ -42,6 +46,33 @@ impl RunFacts {
             after: self.snapshots.get(step + 1)?,
             during: self.during.get(step)?,
             parameters: self.parameters.get(step)?,
+            course: self.courses.get(step).and_then(Option::as_ref),
         })
     }
 }
+
+/// Properties whose values in the states before and after an action are the same, by their local names in the world
+/// vocabulary.
+pub const CONSTANT_PROPERTIES: [&str; 21] = [
+    "friction",
+    "fixed",
+    "highX",
+    "highY",
+    "inRoom",
+    "lower",
+    "lowX",
+    "lowY",
+    "mass",
+    "maxEffort",
+    "maxVelocity",
+    "name",
+    "ofSurface",
+    "restitution",
+    "sizeX",
+    "sizeY",
+    "sizeZ",
+    "surfaceHeight",
+    "surfaceLength",
+    "surfaceWidth",
+    "upper",
+];

@@ -91,6 +91,24 @@ fn continues_name(c: char) -> bool {
     c.is_alphanumeric() || matches!(c, '?' | '$' | '_' | ':')
 }
 
+/// Returns a help text about the braces of a query that are not closed, or `None` if all are.
+pub fn unclosed_braces(text: &str) -> Option<String> {
+    let (mut open, mut closed, mut at) = (0usize, 0usize, 0);
+    while let Some(c) = text[at..].chars().next() {
+        match c {
+            '"' | '\'' => {
+                at = string_end(text, at, c);
+                continue;
+            }
+            '{' => open += 1,
+            '}' => closed += 1,
+            _ => {}
+        }
+        at += c.len_utf8();
+    }
+    (open > closed).then(|| format!("a brace is not closed ({open} are opened, {closed} closed): add `}}`"))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

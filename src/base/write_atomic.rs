@@ -19,6 +19,17 @@ pub fn write_atomic(path: &Path, bytes: &[u8]) -> io::Result<()> {
     file.finish()
 }
 
+/// Writes a file that can be made again, such as one of a report: other processes see all of it or nothing, but after a
+/// power cut it may be missing or empty. This takes a hundredth of the time of [`write_atomic`].
+///
+/// # Errors
+/// Returns an error if the file can't be written. An existing file is then unchanged.
+pub fn write_quickly(path: &Path, bytes: &[u8]) -> io::Result<()> {
+    let file = NewFile::beside(path.to_path_buf())?;
+    (&file.file).write_all(bytes)?;
+    file.publish()
+}
+
 /// A file that appears under its name when [`NewFile::finish`] is called. If it is dropped before, nothing remains of
 /// it, and an existing file is unchanged.
 #[derive(Debug)]
@@ -81,13 +92,24 @@ impl NewFile {
     ///
     /// # Errors
     /// The disk is full or can't be written. An existing file is then unchanged.
-    pub fn finish(mut self) -> io::Result<()> {
-        let Some(temporary) = &self.temporary else { return Ok(()) };
+    pub fn finish(self) -> io::Result<()> {
+        if self.temporary.is_none() {
+            return Ok(());
+        }
         self.file.sync_all()?;
-        fs::rename(temporary, &self.target)?;
-        self.temporary = None;
         let folder = self.target.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        let folder = folder.to_path_buf();
+        self.publish()?;
         File::open(folder)?.sync_all()
+    }
+
+    /// Gives the file its name, without flushing it to the disk.
+    fn publish(mut self) -> io::Result<()> {
+        if let Some(temporary) = &self.temporary {
+            fs::rename(temporary, &self.target)?;
+            self.temporary = None;
+        }
+        Ok(())
     }
 }
 
@@ -165,7 +187,7 @@ mod tests {
         // A killed process leaves its file without a lock.
         fs::write(folder.join("out.1-7.tmp"), "half").expect("it can be written");
         fs::write(folder.join("out.mine.tmp"), "another program's").expect("it can be written");
-        write_atomic(&folder.join("other"), b"x").expect("it can be written");
+        write_quickly(&folder.join("other"), b"x").expect("it can be written");
         let alive = NewFile::create(&target).expect("it can be created");
         let beside = NewFile::create(&target).expect("it can be created");
         beside.finish().expect("it can be completed");

@@ -22,6 +22,8 @@ pub struct InputChange {
 pub enum ChangeKind {
     /// This program, by its version and the digest of its sources.
     Program,
+    /// The version of its physics.
+    Physics,
     /// The configuration's text.
     Config,
     /// The program that performs actions: its command, or one of its files.
@@ -39,6 +41,7 @@ impl ChangeKind {
     pub fn word(self) -> &'static str {
         match self {
             Self::Program => "program",
+            Self::Physics => "physics",
             Self::Config => "configuration",
             Self::Skill => "skill",
             Self::Model => "model",
@@ -60,6 +63,12 @@ pub fn changes(was: &CampaignRecord, is: &CampaignRecord) -> Vec<InputChange> {
     let [program_was, program_is] = programs(was, is);
     let mut all = vec![
         single(ChangeKind::Program, "actcheck", &program_was, &program_is),
+        InputChange {
+            kind: ChangeKind::Physics,
+            name: "version".to_owned(),
+            was: was.physics.map(|version| version.to_string()),
+            is: is.physics.map(|version| version.to_string()),
+        },
         single(ChangeKind::Config, &was.name, &was.config_digest, &is.config_digest),
         single(ChangeKind::Ontology, "all files", &was.ontology_digest, &is.ontology_digest),
     ];
@@ -76,6 +85,25 @@ pub fn changes(was: &CampaignRecord, is: &CampaignRecord) -> Vec<InputChange> {
     all.retain(|change| change.was != change.is);
     all.sort_by(|a, b| (a.kind, &a.name).cmp(&(b.kind, &b.name)));
     all
+}
+
+/// Says that the physics has changed since. Returns `None` if it has not: then the same scene gives the same states.
+pub fn other_physics(changes: &[InputChange]) -> Option<String> {
+    let change = changes.iter().find(|change| change.kind == ChangeKind::Physics)?;
+    let number = |version: &Option<String>| version.as_ref().and_then(|version| version.parse::<u32>().ok());
+    let age = if number(&change.was) < number(&change.is) { "older" } else { "newer" };
+    let version = |version: &Option<String>, word: &str| match version {
+        Some(version) => format!("{word}{version}"),
+        None => "without a version".to_owned(),
+    };
+    let (was, is) = (version(&change.was, "version "), version(&change.is, ""));
+    Some(format!("made by {age} physics ({was}; this program has {is})"))
+}
+
+/// Says that a campaign was made by other physics than this program's. Returns `None` if it was not.
+pub fn made_by_other_physics(record: &CampaignRecord) -> Option<String> {
+    let is = CampaignRecord { physics: Some(actcheck_world::PHYSICS_VERSION), ..record.clone() };
+    other_physics(&changes(record, &is))
 }
 
 /// Version and digest of both programs; only the versions if one of the records has no digest.
@@ -125,6 +153,7 @@ mod tests {
             started: String::new(),
             program_version: "0.1.0".to_owned(),
             program_digest: digest.to_owned(),
+            physics: Some(2),
         }
     }
 
@@ -140,6 +169,17 @@ mod tests {
         let found = changes(&record("aa"), &with("2"));
         let [change] = found.as_slice() else { panic!("{found:?}") };
         assert_eq!((change.kind, change.was.as_deref(), change.is.as_deref()), (ChangeKind::Skill, None, Some("2")));
+    }
+
+    #[test]
+    fn physics_without_a_version_is_older() {
+        let (old, two) = (CampaignRecord { physics: None, ..record("aa") }, record("aa"));
+        let three = CampaignRecord { physics: Some(3), ..record("aa") };
+        assert_eq!(other_physics(&changes(&two, &two)), None);
+        let told = |was, is| other_physics(&changes(was, is)).expect("it changed");
+        assert_eq!(told(&old, &two), "made by older physics (without a version; this program has 2)");
+        assert_eq!(told(&two, &three), "made by older physics (version 2; this program has 3)");
+        assert_eq!(told(&three, &two), "made by newer physics (version 3; this program has 2)");
     }
 
     #[test]

@@ -317,9 +317,7 @@ mod tests {
             actions: vec![],
             frames,
             hash: "a".into(),
-            map: Default::default(),
-            forms: vec![],
-            robot_courses: vec![],
+            ..Trace::default()
         }
     }
 

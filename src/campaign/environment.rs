@@ -164,6 +164,7 @@ impl Env {
     pub fn warnings(&self) -> Diagnostics {
         let mut warnings = self.campaign.warnings.clone();
         warnings.extend(self.rules.warnings().iter().cloned().collect());
+        warnings.extend(self.rules.beyond(self.campaign.budget.action_secs));
         warnings
     }
 
@@ -202,6 +203,7 @@ impl Env {
             started,
             program_version: env!("CARGO_PKG_VERSION").to_owned(),
             program_digest: program_digest().to_owned(),
+            physics: Some(world::PHYSICS_VERSION),
         }
     }
 

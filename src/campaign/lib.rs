@@ -35,7 +35,7 @@ mod tally;
 mod workers;
 
 pub use budget::ExhaustedBudget;
-pub use changes::{ChangeKind, InputChange, changes};
+pub use changes::{ChangeKind, InputChange, changes, made_by_other_physics, other_physics};
 pub use difference::TraceDifference;
 pub use environment::Env;
 pub use export::{export, regressions_folder};
@@ -43,7 +43,7 @@ pub use failure::Failure;
 pub use last_failed::LastFailed;
 pub use line::{Clock, Disturbance, RunContext, RunInput, run_line, run_sabotaged};
 pub use outcome::{CampaignResult, Ending, WeightedRate};
-pub use recheck::{RecheckEnd, RecheckOptions, recheck};
+pub use recheck::{RecheckEnd, RecheckOptions, judge_stored, recheck};
 pub use replay::{Fit, Misfit, MisfitKind, OutcomeChange, Replay, ReplayOptions, StoredCampaign, replay_all};
 pub use resume::{StoredRuns, unfinished};
 pub use rule_set::RuleSet;

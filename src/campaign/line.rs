@@ -246,19 +246,11 @@ fn never_performed(test: &[String], scene: &Scene, reason: &str) -> Trace {
             ..actcheck_data::ActionTrace::not_reached(&call.action, &call.parameters)
         })
         .collect();
-    Trace {
-        snapshots: Vec::new(),
-        actions,
-        frames: actcheck_data::Frames::default(),
-        hash: String::new(),
-        map: scene.map.clone(),
-        forms: Vec::new(),
-        robot_courses: Vec::new(),
-    }
+    Trace { actions, map: scene.map.clone(), ..Trace::default() }
 }
 
 /// Judges every action of a trace; one list for each.
-fn judge_all(env: &Env, trace: &Trace, facts: &RunFacts) -> Result<Vec<Vec<Judgement>>, Failure> {
+pub(super) fn judge_all(env: &Env, trace: &Trace, facts: &RunFacts) -> Result<Vec<Vec<Judgement>>, Failure> {
     trace
         .actions
         .iter()

@@ -103,6 +103,24 @@ pub fn recheck<'a>(
     end
 }
 
+/// Judges runs by other rules, and stores nothing. Returns the judgements in the order of the runs, and the faults of the
+/// runs that can't be judged. When `stop` is set, the remaining runs are left out.
+///
+/// # Errors
+/// `X010` if the workers can't be started.
+pub fn judge_stored(
+    history: &History,
+    runs: &[RunRow],
+    rules: &RuleSet,
+    jobs: usize,
+    stop: &AtomicBool,
+) -> Result<(Vec<Recheck>, Diagnostics), Diagnostics> {
+    let judge = |run: &RunRow| (!stop.load(Ordering::Relaxed)).then(|| judge_run(history, run, rules));
+    let judged: Judged = workers(jobs)?.install(|| runs.par_iter().filter_map(judge).collect());
+    let (rechecks, faults) = split_results(judged);
+    Ok((rechecks.into_iter().flatten().collect(), faults))
+}
+
 fn split_results(batch: Judged) -> (Vec<Vec<Recheck>>, Diagnostics) {
     let mut faults = Diagnostics::new();
     let mut rechecks = Vec::with_capacity(batch.len());
@@ -117,7 +135,8 @@ fn split_results(batch: Judged) -> (Vec<Vec<Recheck>>, Diagnostics) {
 
 /// Judges all actions of a run. A run that can't be judged has exactly one fault.
 fn judge_run(history: &History, run: &RunRow, rules: &RuleSet) -> Result<Vec<Recheck>, Diagnostics> {
-    let trace = history.states(&run.run)?;
+    let course = rules.rules.reads_course();
+    let trace = if course { history.trace(&run.run)? } else { history.states(&run.run)? };
     let facts = facts::extract(&trace);
     let mut rechecks = Vec::new();
     for (step, performed) in trace.actions.iter().enumerate() {

@@ -3,7 +3,7 @@
 use crate::{Failure, scene_facts};
 use actcheck_base::{ActionFacts, Diagnostics, RuleFault, names};
 use actcheck_config::Campaign;
-use actcheck_data::{ActionTrace, Frames, Scene, Trace};
+use actcheck_data::{ActionTrace, Scene, Trace};
 use actcheck_facts as facts;
 use actcheck_ontology::{Ontology, Property, RuleFile};
 use actcheck_rules::{Budget, RuleBook};
@@ -52,11 +52,8 @@ impl Requirement {
             snapshots: vec![world.snapshot()],
             // Not performed: it only holds the values of the designators.
             actions: vec![ActionTrace::not_reached("", &scene.designators)],
-            frames: Frames::default(),
-            hash: String::new(),
             map: scene.map.clone(),
-            forms: Vec::new(),
-            robot_courses: Vec::new(),
+            ..Trace::default()
         };
         let mut facts = facts::extract(&trace);
         scene_facts::add(scene, &mut facts);
@@ -67,6 +64,7 @@ impl Requirement {
             after: state,
             during: &[],
             parameters: &facts.parameters[0],
+            course: None,
         };
         match self.rules.judge(&asked, std::slice::from_ref(&self.iri), budget).remove(&self.iri) {
             Some(Ok(found)) if found.holds => Ok(()),

@@ -104,9 +104,9 @@ pub fn analyse(args: &AnalyseArgs) -> Result<(), Diagnostics> {
         return Ok(());
     }
     output::print(&match args.format {
-        Format::Text => findings_text(&summary),
-        Format::Csv if !args.by.is_empty() => maps_table(&summary).render(args.format.into()),
-        Format::Csv => findings_table(&summary).render(args.format.into()),
+        Format::Text => findings_text(&summary, output::page()),
+        Format::Csv if !args.by.is_empty() => maps_table(&summary).render(args.format.into(), output::page()),
+        Format::Csv => findings_table(&summary).render(args.format.into(), output::page()),
         Format::Json => format!("{:#}\n", findings_json(&summary)),
     });
     Ok(())

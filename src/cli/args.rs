@@ -5,7 +5,9 @@ use clap::{Parser, Subcommand};
 /// QuickCheck for robot actions: generated scenes, physics simulation, verdicts by rules that you edit.
 #[derive(Debug, Parser)]
 #[command(name = "actcheck", version, max_term_width = 100, disable_help_subcommand = true)]
-#[command(after_help = "Example:\n  actcheck run configs/pick.toml")]
+#[command(
+    after_help = "Example:\n  actcheck run configs/pick.toml\n\nEnvironment:\n  NO_COLOR, CLICOLOR=0  no colours\n  CLICOLOR_FORCE=1      colours also in pipes and files\n  COLUMNS               width of the output, instead of the terminal's"
+)]
 pub struct Arguments {
     /// The command to run.
     #[command(subcommand)]
@@ -120,6 +122,23 @@ pub enum Command {
         after_help = "Examples:\n  actcheck run configs/pick.toml --history /tmp/before\n  actcheck run configs/pick.toml --history /tmp/after    (with another skill, robot or physics)\n  actcheck compare /tmp/before /tmp/after --fail-if-worse 0.05\n  actcheck compare k7f3 k7f3@rechecked    (one campaign, before and after `actcheck recheck`)"
     )]
     Compare(crate::compare::CompareArgs),
+    /// Find the first revision whose rules, skill or program changed the outcomes
+    ///
+    /// Without CONFIG, judges the runs of a history anew by the ontology and rules of each revision, without simulating;
+    /// nothing is stored. With CONFIG, runs its scenes at each revision: with the revision's own configuration, rules, models
+    /// and skills, and with this program or the one that `--build` and `--program` make. A case is the same scene at each
+    /// revision. `--programs` searches a list of programs instead.
+    ///
+    /// Revisions are halved as by `git bisect`. One that does not parse, build or run is skipped, and so is one for which
+    /// `--most-scenes` are too few. `--good` may also be the newer end: then the first good revision is found. The checkout and
+    /// git's folder are only read: files of revisions are in a temporary folder, which is removed at the end.
+    ///
+    /// Exit code: 0 found, 1 one of several because the others were skipped, 2 the bisection failed or the ends don't differ,
+    /// 130 interrupted by Ctrl-C.
+    #[command(
+        after_help = "Examples:\n  actcheck bisect --good v1.0    (stored runs by the rules of each revision since v1.0)\n  actcheck bisect --good v1.0 --property MovedObject --run k7f3-3\n  actcheck bisect configs/my_skill.toml --good v1.0 --bad main    (the skill of each revision)\n  actcheck bisect configs/pick.toml --good v1.0 --build make --program ./actcheck\n  actcheck bisect case.toml --programs old/actcheck newer/actcheck ./actcheck"
+    )]
+    Bisect(crate::bisect::BisectArgs),
     /// Report a campaign's health: discarded and repeated scenes, values never tried, slow runs, inaccurate simulation
     ///
     /// Prints how much of each parameter's range the scenes cover, compared with the same number of random draws, and

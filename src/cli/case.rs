@@ -33,13 +33,16 @@ pub fn run(args: &RunArgs, env: Env) -> Result<u8, Diagnostics> {
     let run = history.run(&summary.run)?;
     let perceived = show::perceived(&history, &run);
     match args.format {
-        Format::Text => output::print(&format!("{}\n{}", run_text(&run, &perceived), case_text(&summary))),
+        Format::Text => {
+            output::print(&run_text(&run, &perceived, output::page()));
+            output::print_prose(&format!("\n{}", case_text(&summary)));
+        }
         Format::Json => {
             let both = json!({"case": case_json(&summary), "run": run_json(&run, &perceived)});
             output::print(&format!("{both:#}\n"));
         }
         Format::Csv => {
-            output::print(&show::outcomes(&run).render(Format::Csv.into()));
+            output::print(&show::outcomes(&run).render(Format::Csv.into(), output::page()));
             eprint!("{}", printable_in_colour(&case_text(&summary)));
         }
     }

@@ -31,17 +31,24 @@ pub fn check(args: &CheckArgs, stop: &Arc<AtomicBool>) -> Result<(), Diagnostics
     let env = Env::prepare_within(config, &Overrides::default(), budget.clone())?;
     let cases = if env.campaign.case.is_some() { Vec::new() } else { regressions::prepare(&env, &budget)? };
     output::print_diagnostics(&env.warnings());
-    output::print(&format!(
-        "{}: {} tests, {} runs, {} regressions; {} actions and {} properties in {}; {} models; robot {}\n",
+    output::print_prose(&format!(
+        "{}: {}, {}, {}; {} and {} in {}; {}; robot {}\n",
         config.display(),
-        env.campaign.tests.len(),
-        env.planned_runs(),
-        cases.len(),
-        env.ontology.actions.len(),
-        env.ontology.properties.len(),
+        counted(env.campaign.tests.len() as u64, "test"),
+        counted(env.planned_runs(), "run"),
+        counted(cases.len() as u64, "regression"),
+        counted(env.ontology.actions.len() as u64, "action"),
+        match env.ontology.properties.len() {
+            1 => "1 property".to_owned(),
+            count => format!("{count} properties"),
+        },
         env.ontology.sources.first().map_or("", |source| &source.name),
-        env.campaign.models.len(),
+        counted(env.campaign.models.len() as u64, "model"),
         env.campaign.robot.name,
     ));
     Ok(())
+}
+
+fn counted(count: u64, noun: &str) -> String {
+    if count == 1 { format!("1 {noun}") } else { format!("{count} {noun}s") }
 }

@@ -12,7 +12,7 @@ use crate::work::{all_cores, quietly};
 use crate::{clock, output, stop};
 use actcheck_analysis::{OracleTrial, oracle_matrix};
 use actcheck_base::{Diagnostic, Diagnostics};
-use actcheck_campaign::oracles::{FAULTS, Fault, Trial, TrialOptions, try_faults};
+use actcheck_campaign::oracles::{COURSE_FAULTS, FAULTS, Fault, Trial, TrialOptions, try_faults};
 use actcheck_campaign::{Env, RunContext};
 use actcheck_config::Overrides;
 use actcheck_report::{OracleSummary, oracles_json, oracles_table, oracles_text};
@@ -63,8 +63,8 @@ pub fn check_oracles(args: &CheckOraclesArgs) -> Result<u8, Diagnostics> {
     }
     let summary = summarise(args, &env, &faults, &trials);
     output::print(&match args.format {
-        Format::Text => oracles_text(&summary),
-        Format::Csv => oracles_table(&summary).render(Format::Csv.into()),
+        Format::Text => oracles_text(&summary, output::page()),
+        Format::Csv => oracles_table(&summary).render(Format::Csv.into(), output::page()),
         Format::Json => format!("{:#}\n", oracles_json(&summary)),
     });
     output::print_diagnostics(&summary.warnings());
@@ -81,14 +81,21 @@ fn summarise(args: &CheckOraclesArgs, env: &Env, faults: &[Fault], trials: &[Tri
         }
     }
     let plain: Vec<OracleTrial> = trials.iter().map(plain).collect();
-    let names: Vec<&str> = faults.iter().map(|fault| fault.name).collect();
+    let tests = &env.campaign.tests;
+    let of_course = COURSE_FAULTS.iter().filter(|fault| tests.iter().any(|test| fault.concerns(test, env)));
+    let tried: Vec<(&str, &str)> = faults
+        .iter()
+        .map(|fault| (fault.name, fault.what))
+        .chain(of_course.map(|fault| (fault.name, fault.what)))
+        .collect();
+    let names: Vec<&str> = tried.iter().map(|(name, _)| *name).collect();
     let matrix = oracle_matrix(&names, &properties, &plain);
     let name = |iri: &String| env.ontology.properties.get(iri).map_or_else(|| iri.clone(), |p| p.name.clone());
     OracleSummary {
         config: args.config.display().to_string(),
         seed: env.campaign.seed,
         planned: env.planned_runs(),
-        faults: faults.iter().map(|fault| (fault.name.to_owned(), fault.what.to_owned())).collect(),
+        faults: tried.iter().map(|(name, what)| ((*name).to_owned(), (*what).to_owned())).collect(),
         names: properties.iter().map(name).collect(),
         // The first fault is a robot that does nothing.
         gaps: matrix.gaps(FAULTS[0].name),

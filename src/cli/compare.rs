@@ -74,8 +74,8 @@ pub fn compare(args: &CompareArgs) -> Result<u8, Diagnostics> {
         decide: args.decide,
     };
     output::print(&match args.format {
-        Format::Text => compare_text(&summary),
-        Format::Csv => compare_table(&summary).render(args.format.into()),
+        Format::Text => compare_text(&summary, output::page()),
+        Format::Csv => compare_table(&summary).render(args.format.into(), output::page()),
         Format::Json => format!("{:#}\n", compare_json(&summary)),
     });
     Ok(summary.exit_code())

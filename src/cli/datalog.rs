@@ -32,6 +32,9 @@ pub struct DatalogArgs {
     /// Stop after this many derived tuples
     #[arg(long, value_name = "N", default_value_t = 100_000_000)]
     pub max_tuples: usize,
+    /// Stop after this many new things of rules that may make them without end
+    #[arg(long, value_name = "N", default_value_t = 1_000_000)]
+    pub max_new: usize,
     /// Stop at this memory of tuples and texts, approximately, such as 512MiB or 4GiB
     #[arg(long, value_name = "SIZE", default_value = "4GiB", value_parser = memory)]
     pub max_memory: usize,
@@ -47,7 +50,7 @@ pub struct DatalogArgs {
 /// to explain does not hold.
 pub fn datalog(args: &DatalogArgs, stop: &Arc<AtomicBool>) -> Result<u8, Diagnostics> {
     let (tuples, bytes, secs) = (args.max_tuples, args.max_memory, args.max_time);
-    let budget = Budget { tuples, bytes, secs, stop: Arc::clone(stop) };
+    let budget = Budget { tuples, bytes, secs, new_things: args.max_new, stop: Arc::clone(stop) };
     let loading = Loading { budget: budget.clone(), lenient: args.lenient };
     if let Some(statement) = &args.trace {
         let source = Files::Disk.read_program(&args.file).map_err(|why| {
@@ -61,11 +64,11 @@ pub fn datalog(args: &DatalogArgs, stop: &Arc<AtomicBool>) -> Result<u8, Diagnos
         let explained = explained.map_err(|fault| Diagnostic::error("X008", fault.to_string()).in_source(&source))?;
         output::print_diagnostics(&unknown_terms(statement, &explained));
         output::print(&match args.format {
-            ProofFormat::Text => explained.to_text(),
+            ProofFormat::Text => output::page().set(&explained.to_text()),
             ProofFormat::Csv => {
                 let mut table = Table::new(["fact", "holds", "margin", "explanation"]);
                 table.rows.push(explanations::row(&[statement], &explained));
-                table.render(TableFormat::Csv)
+                table.render(TableFormat::Csv, output::page())
             }
             ProofFormat::Json => format!("{:#}\n", explained.to_json()),
             ProofFormat::Dot => explained.to_dot(),
@@ -88,7 +91,7 @@ pub fn datalog(args: &DatalogArgs, stop: &Arc<AtomicBool>) -> Result<u8, Diagnos
     for (predicate, tuples) in summary.tuples {
         table.rows.push(vec![predicate.into(), tuples.into()]);
     }
-    output::print(&table.render(format));
+    output::print(&table.render(format, output::page()));
     let written: Vec<String> =
         summary.written.iter().map(|(file, lines)| format!("{}: {lines} lines", file.display())).collect();
     // CSV and JSON are one document.

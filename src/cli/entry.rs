@@ -18,7 +18,7 @@ use actcheck_base::set_program_digest;
 pub fn run(sources_digest: &'static str) -> ExitCode {
     set_program_digest(sources_digest);
     // clap prints help, version and usage errors itself; after a usage error it exits with 2.
-    let matches = groups::program().get_matches();
+    let matches = groups::program().try_get_matches().unwrap_or_else(|error| groups::with_suggestion(error).exit());
     let arguments = Arguments::from_arg_matches(&matches).unwrap_or_else(|error| error.exit());
     let done = match arguments.command {
         Command::Analyse(args) => crate::analyse::analyse(&args).map(|()| 0),
@@ -27,6 +27,7 @@ pub fn run(sources_digest: &'static str) -> ExitCode {
         Command::Replay(args) => crate::replay::replay(&args),
         Command::Check(args) => stop::interruptible(|stop| check::check(&args, stop).map(|()| 0)),
         Command::Compare(args) => crate::compare::compare(&args),
+        Command::Bisect(args) => crate::bisect::bisect(&args),
         Command::CheckOracles(args) => check_oracles::check_oracles(&args),
         Command::Explain(args) => explain::explain(&args).map(|()| 0),
         Command::Export(args) => export::export(&args).map(|()| 0),

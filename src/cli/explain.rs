@@ -40,11 +40,11 @@ pub fn explain(args: &ExplainArgs) -> Result<(), Diagnostics> {
     };
     output::print(&match args.format {
         CodeFormat::Text => match chosen.as_slice() {
-            [(_, code)] => explanation(code),
-            _ => list(),
+            [(_, code)] => output::page().set(&explanation(code)),
+            _ => output::page().set(&list()),
         },
-        CodeFormat::Csv => table(&chosen).render(TableFormat::Csv),
-        CodeFormat::Json => table(&chosen).render(TableFormat::Json),
+        CodeFormat::Csv => table(&chosen).render(TableFormat::Csv, output::page()),
+        CodeFormat::Json => table(&chosen).render(TableFormat::Json, output::page()),
         CodeFormat::Markdown => page(&chosen),
     });
     Ok(())

@@ -74,11 +74,11 @@ pub fn export(args: &ExportArgs) -> Result<(), Diagnostics> {
             history.write_nquads(file)?;
             "the whole history"
         };
-        output::print(&format!("{} holds {contents}\n", file.display()));
+        output::print_prose(&format!("{} holds {contents}\n", file.display()));
     }
     if let Some(file) = &args.turtle {
         history.write_turtle(file)?;
-        output::print(&format!("{} holds campaigns, runs, scenes and outcomes\n", file.display()));
+        output::print_prose(&format!("{} holds campaigns, runs, scenes and outcomes\n", file.display()));
     }
     if args.parquet.is_some() || args.csv.is_some() || args.dataset.is_some() || args.rebuild_mirror {
         export_tables(args, &history)?;
@@ -92,7 +92,7 @@ fn export_tables(args: &ExportArgs, history: &History) -> Result<(), Diagnostics
     let (mirror, change) = if args.rebuild_mirror { Mirror::rebuild(history) } else { Mirror::update(history) }?;
     if args.rebuild_mirror {
         let runs = change.added;
-        output::print(&format!("{} holds the outcomes of {runs} runs\n", mirror.folder().display()));
+        output::print_prose(&format!("{} holds the outcomes of {runs} runs\n", mirror.folder().display()));
     }
     let runs = DatasetRuns { history, mirror: &mirror, filter: &filter, hierarchy: &hierarchy };
     if let (Some(folder), true) = (&args.parquet, args.complete) {
@@ -117,10 +117,13 @@ fn export_tables(args: &ExportArgs, history: &History) -> Result<(), Diagnostics
 
 fn print_dataset(dataset: &Dataset) {
     for (table, rows) in &dataset.tables {
-        output::print(&format!("{} holds {rows} rows\n", table.display()));
+        output::print_prose(&format!("{} holds {rows} rows\n", table.display()));
     }
     let runs = dataset.runs;
-    output::print(&format!("{} describes the columns of these tables of {runs} runs\n", dataset.schema.display()));
+    output::print_prose(&format!(
+        "{} describes the columns of these tables of {runs} runs\n",
+        dataset.schema.display()
+    ));
     if dataset.without_course > 0 {
         let note = Diagnostic::warning(
             "X054",
@@ -151,7 +154,7 @@ fn export_run(args: &ExportArgs, history: &History, run: &str) -> Result<(), Dia
     }
     output_file::write(&file, text)?;
     let shown = file.display();
-    output::print(&format!("{shown} holds run {}: actcheck run {shown}\n", run.row.run));
+    output::print_prose(&format!("{shown} holds run {}: actcheck run {shown}\n", run.row.run));
     Ok(())
 }
 

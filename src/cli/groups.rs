@@ -1,9 +1,12 @@
 //! The commands in groups, as the program's help lists them, and the command tree for completions and the manual.
 
 use clap::builder::styling::{Effects, Style};
+use clap::error::{ContextKind, ContextValue};
 use clap::{Command, CommandFactory as _};
 
 use crate::args::Arguments;
+use crate::terminal;
+use actcheck_base::nearest;
 
 /// A group of commands in the program's help.
 struct Group {
@@ -17,7 +20,7 @@ const GROUPS: [Group; 4] = [
     Group { title: "Run", commands: &["run", "new", "check", "replay", "shrink"] },
     Group {
         title: "Look",
-        commands: &["list", "show", "report", "analyse", "compare", "health", "query", "serve", "explain"],
+        commands: &["list", "show", "report", "analyse", "compare", "bisect", "health", "query", "serve", "explain"],
     },
     Group { title: "Judge", commands: &["why", "recheck", "rules", "check-oracles", "datalog"] },
     Group { title: "Exchange", commands: &["export", "merge", "schema", "completions", "man"] },
@@ -30,7 +33,11 @@ pub(super) fn program() -> Command {
         "{{about-with-newline}}\n{{usage-heading}} {{usage}}\n\n{}{heading}Options:{heading:#}\n{{options}}{{after-help}}",
         listed(heading)
     );
-    Arguments::command().disable_help_subcommand(false).help_template(help)
+    let program = Arguments::command().disable_help_subcommand(false).help_template(help);
+    match terminal::demanded_width() {
+        Some(width) => program.term_width(width),
+        None => program,
+    }
 }
 
 /// The program with all commands except the hidden ones, for completions and the manual.
@@ -43,6 +50,18 @@ pub(super) fn command_tree() -> Command {
         .disable_help_subcommand(true)
         .subcommand_required(true)
         .subcommands(shown(&all).cloned())
+}
+
+/// Adds a similar command to the error about an unknown one, if clap found none.
+pub(super) fn with_suggestion(mut error: clap::Error) -> clap::Error {
+    let unknown = match error.get(ContextKind::InvalidSubcommand) {
+        Some(ContextValue::String(name)) if error.get(ContextKind::SuggestedSubcommand).is_none() => name.clone(),
+        _ => return error,
+    };
+    if let Some(known) = nearest(&unknown, GROUPS.iter().flat_map(|group| group.commands).copied()) {
+        error.insert(ContextKind::SuggestedSubcommand, ContextValue::Strings(vec![known.to_owned()]));
+    }
+    error
 }
 
 fn shown(all: &Command) -> impl Iterator<Item = &Command> {

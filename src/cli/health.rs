@@ -43,8 +43,8 @@ pub fn health(args: &HealthArgs) -> Result<u8, Diagnostics> {
             .into());
     }
     output::print(&match args.format {
-        Format::Text => health_text(&summary),
-        Format::Csv => health_table(&summary).render(Format::Csv.into()),
+        Format::Text => health_text(&summary, output::page()),
+        Format::Csv => health_table(&summary).render(Format::Csv.into(), output::page()),
         Format::Json => format!("{:#}\n", health_json(&summary)),
     });
     output::print_diagnostics(&summary.warnings());

@@ -23,8 +23,8 @@ pub(super) fn examine(args: &HistoryArgs, format: Format) -> Result<u8, Diagnost
         reason: reason.to_owned(),
     }));
     output::print(&match format {
-        Format::Text => text(&found, &dir),
-        Format::Csv => table(&found).render(format.into()),
+        Format::Text => output::page().set(&text(&found, &dir)),
+        Format::Csv => table(&found).render(format.into(), output::page()),
         Format::Json => format!("{:#}\n", summary(&found, &dir)),
     });
     // A mirror is not written from a damaged store.

@@ -92,7 +92,10 @@ pub fn list(args: &ListArgs) -> Result<(), Diagnostics> {
         shown.iter().map(|(.., cell)| cell(row)).chain(outcomes).collect()
     };
     table.rows = runs.iter().map(row).collect();
-    output::print(&table.render(args.format.into()));
+    output::print(&table.render(args.format.into(), output::page()));
+    if runs.is_empty() {
+        output::print_none("no run matches; `actcheck list` without options lists all");
+    }
     Ok(())
 }
 

@@ -75,7 +75,7 @@ fn write_pages(root: &Command, folder: &Path) -> Result<(), Diagnostics> {
         output_file::write(&folder.join(man.get_filename()), with_examples(&page))?;
     }
     let first = folder.join("actcheck.1");
-    output::print(&format!("wrote {} pages: man -l {}\n", commands.len(), first.display()));
+    output::print_prose(&format!("wrote {} pages: man -l {}\n", commands.len(), first.display()));
     Ok(())
 }
 

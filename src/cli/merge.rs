@@ -134,7 +134,7 @@ fn printed(plan: &MergePlan, format: Format) -> String {
             campaign.missing.len().into(),
         ]);
     }
-    table.render(format.into())
+    table.render(format.into(), output::page())
 }
 
 fn campaign_json(campaign: &PlannedMerge) -> Value {

@@ -40,9 +40,15 @@ pub fn named(name: &str) -> Result<Source, Diagnostics> {
         None => {
             let fault = Diagnostic::error("X048", format!("there is no query `{name}`"));
             let help = did_you_mean(name, known.keys().map(String::as_str));
-            Err(fault.help(format!("{help}; `actcheck query --list-named` describes all of them")).into())
+            let help = if help.ends_with('?') { help } else { help + ";" };
+            Err(fault.help(format!("{help} `actcheck query --list-named` describes all of them")).into())
         }
     }
+}
+
+/// Whether a query has this name.
+pub fn is_named(name: &str) -> bool {
+    sources().is_ok_and(|known| known.contains_key(name))
 }
 
 fn sources() -> Result<BTreeMap<String, Source>, Diagnostics> {

@@ -76,7 +76,7 @@ pub fn campaign(args: &NewCampaignArgs) -> Result<(), Diagnostics> {
         text.push_str(&format!("{SKILL_FILE} needs Python with the package `actcheck` (in actcheck's wheel, and in its sources in clients/python)\n"));
     }
     text.push_str(&format!("next: actcheck run {config}\n"));
-    output::print(&text);
+    output::print_prose(&text);
     Ok(())
 }
 

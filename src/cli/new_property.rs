@@ -39,7 +39,7 @@ pub fn property(args: &NewPropertyArgs) -> Result<(), Diagnostics> {
     if args.ontology.is_none() {
         link_configurations(&path)?;
     }
-    output::print(&format!(
+    output::print_prose(&format!(
         "edit {} and the entry in {}, then `actcheck check CONFIG`\n",
         rule.display(),
         path.display()
@@ -94,7 +94,7 @@ fn write_property(path: &Path, rule: &Path, template: &Template) -> Result<(), D
     })?;
     output_file::write(rule, &template.rule_text)?;
     output_file::write(path, with_entry(&text.text, template))?;
-    output::print(&format!("wrote {} and an entry in {}\n", rule.display(), path.display()));
+    output::print_prose(&format!("wrote {} and an entry in {}\n", rule.display(), path.display()));
     Ok(())
 }
 
@@ -113,7 +113,7 @@ fn write_project(path: &Path, rule: &Path, template: &Template) -> Result<(), Di
         "this folder has no ontology/actions.ttl, so the shipped ontology and rules would be written: \
         move that file away, or name your ontology with `--ontology FILE`",
     )?;
-    output::print(&format!(
+    output::print_prose(&format!(
         "wrote {}: the shipped ontology and rules, with {} and its entry in {} added\n",
         files.in_words(),
         rule.display(),
@@ -132,12 +132,12 @@ fn link_configurations(ontology: &Path) -> Result<(), Diagnostics> {
             (LinksOntology::Already, _) => {}
             (LinksOntology::Now(text), None) => {
                 output_file::write(&file, text)?;
-                output::print(&format!("{} uses {} from now on\n", file.display(), ontology.display()));
+                output::print_prose(&format!("{} uses {} from now on\n", file.display(), ontology.display()));
             }
             (_, folder) => {
                 let seen = folder.map_or(ontology.to_owned(), |_| Path::new("..").join(ontology));
                 let line = format!("ontology = \"{}\"", seen.display());
-                output::print(&format!(
+                output::print_prose(&format!(
                     "{} uses the shipped ontology: add `{line}` to judge the property\n",
                     file.display()
                 ));

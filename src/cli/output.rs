@@ -2,9 +2,11 @@
 
 use std::io::{IsTerminal, Write};
 
-use miette::{GraphicalReportHandler, GraphicalTheme};
+use miette::{GraphicalReportHandler, GraphicalTheme, ThemeCharacters, ThemeStyles};
 
+use crate::terminal;
 use actcheck_base::{Diagnostic, Diagnostics, Severity, printable_in_colour};
+use actcheck_report::Page;
 
 /// Writes results. A reader that has gone away (`| head`) ends the process quietly.
 ///
@@ -15,6 +17,16 @@ pub fn print(text: &str) {
     } else {
         print_bytes(text.as_bytes());
     }
+}
+
+/// Writes results in sentences, broken between words into lines that fit the terminal.
+pub fn print_prose(text: &str) {
+    print(&page().set(text));
+}
+
+/// The width and colours of results.
+pub fn page() -> Page {
+    terminal::of_results()
 }
 
 /// Writes binary results, as [`print`] does.
@@ -33,16 +45,21 @@ pub fn print_bytes(results: &[u8]) {
 pub fn tell(lines: &[String], printed: bool) {
     let text: String = lines.iter().map(|line| format!("{line}\n")).collect();
     if printed {
-        // If the error stream itself fails, there is nowhere left to report it.
-        let _ = std::io::stderr().lock().write_all(printable_in_colour(&text).as_bytes());
+        print_error_text(&terminal::of_errors().set(&text));
     } else {
-        print(&text);
+        print_prose(&text);
     }
 }
 
-/// Whether results may be coloured.
-pub fn colour() -> bool {
-    std::io::stdout().is_terminal() && std::env::var_os("NO_COLOR").is_none()
+/// Prints to the error stream that there are no results: an empty table looks like a fault.
+pub fn print_none(sentence: &str) {
+    print_error_text(&terminal::of_errors().set(&format!("{sentence}\n")));
+}
+
+/// Writes a text to the error stream.
+pub fn print_error_text(text: &str) {
+    // If the error stream itself fails, there is nowhere left to report it.
+    let _ = std::io::stderr().lock().write_all(printable_in_colour(text).as_bytes());
 }
 
 /// Most diagnostics that are printed at once: the excerpt of each takes time in proportion to its file.
@@ -51,9 +68,10 @@ const MOST_PRINTED: usize = 200;
 /// Writes faults with their places, the first 200 if there are more, and the number of errors.
 pub fn print_diagnostics(faults: &Diagnostics) {
     let mut text = String::new();
-    let handler = handler();
+    let page = terminal::of_errors();
+    let handler = handler(page);
     for fault in faults.iter().take(MOST_PRINTED) {
-        let fault = with_file_in_message(fault);
+        let fault = broken_into_lines(with_file_in_message(fault), page);
         if handler.render_report(&mut text, &fault).is_err() {
             text.push_str(&fault.to_string());
         }
@@ -68,10 +86,17 @@ pub fn print_diagnostics(faults: &Diagnostics) {
     }
     // For people only; programs read the codes.
     if let (true, Some(first)) = (std::io::stderr().is_terminal(), faults.iter().next()) {
-        text.push_str(&format!("`actcheck explain {}` prints usual causes and the way out\n", first.code));
+        text.push_str(&page.set(&format!("`actcheck explain {}` prints usual causes and the way out\n", first.code)));
     }
-    // If the error stream itself fails, there is nowhere left to report it.
-    let _ = std::io::stderr().lock().write_all(printable_in_colour(&text).as_bytes());
+    print_error_text(&text);
+}
+
+/// Breaks message and help between words, but not within code.
+fn broken_into_lines(fault: Diagnostic, page: Page) -> Diagnostic {
+    let width = page.width.map_or(WIDEST, |width| width.min(WIDEST));
+    let fill = |text: &str, before: usize| Page { width: width.checked_sub(before), ..page }.fill(text);
+    // In front of a message are four columns, such as `  × `, and in front of a help `  help: `.
+    Diagnostic { message: fill(&fault.message, 4), help: fault.help.as_deref().map(|help| fill(help, 8)), ..fault }
 }
 
 /// A fault of a whole file has no excerpt with the file's name, so the message names the file.
@@ -82,11 +107,12 @@ fn with_file_in_message(fault: &Diagnostic) -> Diagnostic {
     }
 }
 
-fn handler() -> GraphicalReportHandler {
-    let terminal = std::io::stderr().is_terminal();
-    let theme = match (terminal, std::env::var_os("NO_COLOR").is_some()) {
-        (true, false) => GraphicalTheme::unicode(),
-        _ => GraphicalTheme::unicode_nocolor(),
-    };
-    GraphicalReportHandler::new_themed(theme).with_width(100).with_links(false)
+/// Widest message of a diagnostic: longer lines are hard to read. Unit: columns.
+const WIDEST: usize = 100;
+
+/// Colours are those of the terminal's own palette, which fit a light and a dark background.
+fn handler(page: Page) -> GraphicalReportHandler {
+    let styles = if page.colour { ThemeStyles::ansi() } else { ThemeStyles::none() };
+    let theme = GraphicalTheme { characters: ThemeCharacters::unicode(), styles };
+    GraphicalReportHandler::new_themed(theme).with_width(WIDEST).with_wrap_lines(false).with_links(false)
 }

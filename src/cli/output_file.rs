@@ -17,6 +17,14 @@ pub(super) fn write(file: &Path, bytes: impl AsRef<[u8]>) -> Result<(), Diagnost
     written.map_err(|error| cannot_write(file, &error).into())
 }
 
+/// Writes one of many files that can be made again, without waiting for the disk.
+///
+/// # Errors
+/// X007: it can't be written.
+pub(super) fn write_quickly(file: &Path, bytes: &[u8]) -> Result<(), Diagnostics> {
+    actcheck_base::write_quickly(file, bytes).map_err(|error| cannot_write(file, &error).into())
+}
+
 /// X007: a file or folder that can't be written.
 pub(super) fn cannot_write(file: &Path, why: impl std::fmt::Display) -> Diagnostic {
     Diagnostic::error("X007", format!("{} can't be written: {why}", file.display()))

@@ -3,9 +3,14 @@
 use std::path::Path;
 
 use crate::output_file;
+use crate::replayed_runs::explained;
+use crate::why::ontology_file;
 use actcheck_base::{Diagnostic, Diagnostics};
+use actcheck_data::Trace;
 use actcheck_history::{History, RunDetail};
-use actcheck_report::{Caption, Drawing, run_picture};
+use actcheck_ontology as ontology;
+use actcheck_report::{Caption, Chart, Drawing, run_picture};
+use actcheck_rules::{Budget, RuleBook};
 
 /// A picture file in a supported format.
 pub(super) struct Picture<'a> {
@@ -31,16 +36,18 @@ impl<'a> Picture<'a> {
         }
     }
 
-    /// Draws a run.
+    /// Draws a run, with the signals that decided its failed properties about time by the rules of an ontology, or of the
+    /// usual one.
     ///
     /// # Errors
     /// X006: the run has no state to draw; X007: the file can't be written.
-    pub(super) fn draw(&self, history: &History, run: &RunDetail) -> Result<(), Diagnostics> {
+    pub(super) fn draw(&self, history: &History, run: &RunDetail, ontology: Option<&Path>) -> Result<(), Diagnostics> {
         let trace = history.trace(&run.row.run)?;
-        let drawing = run_picture(&Caption::of(run), &trace).ok_or_else(|| {
-            Diagnostic::error("X006", format!("run {} has no state to draw", run.row.run))
-                .help("it broke before its first action; `actcheck show` shows the reason")
-        })?;
+        let drawing = run_picture(&Caption { charts: charts(&trace, run, ontology), ..Caption::of(run) }, &trace)
+            .ok_or_else(|| {
+                Diagnostic::error("X006", format!("run {} has no state to draw", run.row.run))
+                    .help("it broke before its first action; `actcheck show` shows the reason")
+            })?;
         self.write(&drawing)
     }
 
@@ -52,4 +59,12 @@ impl<'a> Picture<'a> {
         let bytes = (self.render)(drawing).map_err(|error| output_file::cannot_write(self.file, error))?;
         output_file::write(self.file, bytes)
     }
+}
+
+/// The charts of a run; none if the rules can't be read.
+fn charts(trace: &Trace, run: &RunDetail, ontology: Option<&Path>) -> Vec<Chart> {
+    let budget = Budget::default();
+    let (files, path) = ontology_file(ontology);
+    let rules = ontology::load(&files, &path).and_then(|ontology| RuleBook::prepare_within(&ontology, &budget));
+    rules.map_or_else(|_| Vec::new(), |rules| Chart::all_of(&explained(trace, &rules, run, &budget)))
 }

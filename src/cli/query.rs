@@ -63,9 +63,10 @@ pub fn query(args: &QueryArgs) -> Result<(), Diagnostics> {
         (QueryFormat::Csv, _) => TableFormat::Csv,
         (QueryFormat::Json, _) => TableFormat::Json,
     };
-    output::print(&answer_table(&answer, format == TableFormat::Table).render(format));
+    output::print(&answer_table(&answer, format == TableFormat::Table).render(format, output::page()));
     if is_empty(&answer) {
         output::print_diagnostics(&unknown_terms(&text, &vocabulary()));
+        output::print_none("the query has no answers");
     }
     Ok(())
 }
@@ -106,7 +107,7 @@ fn list_named(format: QueryFormat) -> Result<(), Diagnostics> {
     for query in named_queries::all()? {
         table.rows.push(vec![query.name.into(), query.title.into(), query.description.into()]);
     }
-    output::print(&table.render(format));
+    output::print(&table.render(format, output::page()));
     Ok(())
 }
 
@@ -116,6 +117,10 @@ fn text(args: &QueryArgs) -> Result<Source, Diagnostics> {
         return named_queries::named(name);
     }
     match (&args.text, &args.file) {
+        (Some(text), _) if named_queries::is_named(text) => {
+            let help = format!("write `actcheck query --named {text}`");
+            Err(Diagnostic::error("X005", format!("`{text}` is the name of a query, not its text")).help(help).into())
+        }
         (Some(text), _) => Ok(Source::new("query", text.as_str())),
         (None, Some(file)) if file.as_os_str() == "-" => {
             let mut text = String::new();

@@ -73,8 +73,8 @@ pub fn recheck(args: &RecheckArgs) -> Result<u8, Diagnostics> {
     );
     progress.finish();
     output::print(&match args.format {
-        Format::Text => recheck_text(&summary),
-        Format::Csv => recheck_table(&summary).render(args.format.into()),
+        Format::Text => recheck_text(&summary, output::page()),
+        Format::Csv => recheck_table(&summary).render(args.format.into(), output::page()),
         Format::Json => format!("{:#}\n", recheck_json(&summary)),
     });
     match end.ending {

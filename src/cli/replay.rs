@@ -72,9 +72,9 @@ pub fn replay(args: &ReplayArgs) -> Result<u8, Diagnostics> {
         }
     }
     output::print(&match args.format {
-        Format::Text => replay_text(&done, faults.len()),
+        Format::Text => output::page().set(&replay_text(&done, faults.len())),
         Format::Json => format!("{:#}\n", replay_json(&done)),
-        Format::Csv => replay_table(&done).render(Format::Csv.into()),
+        Format::Csv => replay_table(&done).render(Format::Csv.into(), output::page()),
     });
     if faults.has_errors() { Err(faults) } else { Ok(u8::from(done.iter().any(|replay: &Replay| !replay.same))) }
 }

@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use serde_json::{Value, json};
 
 use actcheck_base::names;
-use actcheck_campaign::{Replay, TraceDifference};
+use actcheck_campaign::{Replay, TraceDifference, other_physics};
 use actcheck_report::Table;
 
 /// Maximum number of lines of one kind below a run; the rest are counted.
@@ -19,20 +19,28 @@ pub fn replay_text(replays: &[Replay], refused: usize) -> String {
     }
     let same = replays.iter().filter(|replay| replay.same).count();
     if replays.len() + refused > 1 {
-        let differ = replays.len() - same;
-        let _ = writeln!(out, "{same} of {} runs are the same, {differ} differ", replays.len() + refused);
+        let expected = |replay: &&Replay| !replay.same && other_physics(&replay.changes).is_some();
+        let other = replays.iter().filter(expected).count();
+        let differ = replays.len() - same - other;
+        let _ = write!(out, "{same} of {} runs are the same, {differ} differ", replays.len() + refused);
+        let _ = match other {
+            0 => writeln!(out),
+            _ => writeln!(out, ", {other} were made by other physics"),
+        };
     }
     out
 }
 
 fn one_text(out: &mut String, replay: &Replay) {
     let [was, is] = &replay.hashes;
-    let told = match replay.same {
-        true => format!("the same, every bit of every state (trace {was})"),
-        false => format!("differs (trace {was}, now {is})"),
+    let made = other_physics(&replay.changes).filter(|_| !replay.same);
+    let told = match (replay.same, &made) {
+        (true, _) => format!("the same, every bit of every state (trace {was})"),
+        (false, Some(made)) => format!("{made}; its states differ"),
+        (false, None) => format!("differs (trace {was}, now {is})"),
     };
     let _ = writeln!(out, "{} ({}): {told}", replay.run, replay.test);
-    if !replay.same {
+    if !replay.same && made.is_none() {
         let _ = writeln!(out, "  {}", difference_text(replay));
     }
     if let Some(secs) = replay.cut_secs {

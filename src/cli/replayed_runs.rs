@@ -1,5 +1,5 @@
-//! Runs to be replayed in a report, read in order. Reading and explaining them takes most of a report's time, so all
-//! cores share the work.
+//! Runs to be replayed in a report, read in order, a batch at a time. Reading and explaining them takes most of a report's
+//! time, so all cores share the work.
 
 use std::ops::ControlFlow;
 
@@ -8,24 +8,22 @@ use actcheck_base::{Diagnostics, Outcome};
 use actcheck_data::Trace;
 use actcheck_history::{History, RunDetail};
 use actcheck_ontology::Ontology;
-use actcheck_report::Explained;
+use actcheck_report::{Explained, ReplayedRun};
 use actcheck_rules::{Budget, RuleBook};
 
 /// Number of runs that a worker reads ahead.
 const RUNS_OF_A_WORKER: usize = 8;
 
-/// A run with its trace and the explanations of its failures.
-pub(super) type ReplayedRun = (RunDetail, Option<Trace>, Vec<Explained>);
-
-/// Reads runs in the given order and passes each to `take`, until `take` returns [`ControlFlow::Break`].
+/// Reads runs in the given order and passes those that were read at once to `take`, until `take` returns
+/// [`ControlFlow::Break`].
 ///
 /// # Errors
 /// A run can't be read, or `take` fails.
-pub(super) fn for_each(
+pub(super) fn for_each_batch(
     history: &History,
     ontology: &Ontology,
     order: &[String],
-    mut take: impl FnMut(ReplayedRun) -> Result<ControlFlow<()>, Diagnostics>,
+    mut take: impl FnMut(Vec<ReplayedRun>) -> Result<ControlFlow<()>, Diagnostics>,
 ) -> Result<(), Diagnostics> {
     let budget = Budget::default();
     // If the current rules can't be read, there are no explanations; the outcomes come from the history.
@@ -34,8 +32,8 @@ pub(super) fn for_each(
         let run = history.newest_run(id)?;
         // A run that broke before its first state has no trace; everything else about it is reported.
         let trace = history.trace(id).ok();
-        let explained = rules.as_ref().map(|rules| explained(history, rules, &run, &budget)).unwrap_or_default();
-        Ok((run, trace, explained))
+        let explained = rules.as_ref().zip(trace.as_ref()).map(|(rules, trace)| explained(trace, rules, &run, &budget));
+        Ok((run, trace, explained.unwrap_or_default()))
     };
     for runs in order.chunks(all_cores() * RUNS_OF_A_WORKER) {
         let shares: Vec<Vec<Result<ReplayedRun, Diagnostics>>> = std::thread::scope(|scope| {
@@ -46,25 +44,27 @@ pub(super) fn for_each(
                 .map(|share| share.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)))
                 .collect()
         });
-        for run in shares.into_iter().flatten() {
-            if take(run?)?.is_break() {
-                return Ok(());
-            }
+        if take(shares.into_iter().flatten().collect::<Result<_, _>>()?)?.is_break() {
+            return Ok(());
         }
     }
     Ok(())
 }
 
-/// Explains the failed properties of a run. Omits those that the current rules can't explain.
-pub(super) fn explained(history: &History, rules: &RuleBook, run: &RunDetail, budget: &Budget) -> Vec<Explained> {
-    let Ok(facts) = history.facts(&run.row.run) else { return Vec::new() };
+/// Explains the failed properties of a run, given its trace. Omits those that the current rules can't explain.
+pub(super) fn explained(trace: &Trace, rules: &RuleBook, run: &RunDetail, budget: &Budget) -> Vec<Explained> {
+    if run.actions.iter().flat_map(|action| &action.judgements).all(|judgement| judgement.outcome != Outcome::Failed) {
+        return Vec::new();
+    }
+    let facts = History::facts_of(trace);
     let mut found = Vec::new();
     for (idx, action) in run.actions.iter().enumerate() {
         let Some(seen) = facts.action(idx) else { continue };
         for judgement in action.judgements.iter().filter(|judgement| judgement.outcome == Outcome::Failed) {
             if let Ok(explanation) = rules.explain(&seen, &judgement.property, budget) {
                 let (step, property) = (action.step, judgement.property.clone());
-                found.push(Explained { step, property, text: explanation.to_text() });
+                let text = explanation.to_text();
+                found.push(Explained { step, property, text, deciding: explanation.deciding });
             }
         }
     }

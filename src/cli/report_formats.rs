@@ -11,8 +11,8 @@ use crate::{chosen, output, output_file, replayed_runs, show};
 use actcheck_base::{Diagnostics, Outcome};
 use actcheck_history::{CampaignRow, History, RunDetail, RunFilter, RunRow, newest_of_alike};
 use actcheck_report::{
-    Attachment, Caption, EarlReport, JunitReport, MarkdownReport, Repetitions, allure_common, allure_results, markdown,
-    observation, run_picture,
+    Attachment, Caption, Chart, EarlReport, JunitReport, MarkdownReport, Repetitions, allure_common, allure_results,
+    markdown, observation, run_picture,
 };
 use actcheck_rules::{Budget, RuleBook};
 
@@ -210,9 +210,10 @@ impl<'a> AllureFolder<'a> {
             return Vec::new();
         };
         let rules = self.rules.as_ref();
-        let explained = rules.map(|rules| replayed_runs::explained(self.history, rules, run, &self.budget));
+        let explained = rules.map(|rules| replayed_runs::explained(&trace, rules, run, &self.budget));
+        let explained = explained.unwrap_or_default();
+        let charts = Chart::all_of(&explained);
         let mut attachments: Vec<Attachment> = explained
-            .unwrap_or_default()
             .into_iter()
             .map(|explained| Attachment {
                 about: Some((explained.step, explained.property)),
@@ -223,7 +224,7 @@ impl<'a> AllureFolder<'a> {
             })
             .collect();
         // A run that broke before its first state has nothing to draw.
-        let picture = run_picture(&Caption::of(run), &trace);
+        let picture = run_picture(&Caption { charts, ..Caption::of(run) }, &trace);
         attachments.extend(picture.map(|drawing| Attachment {
             about: None,
             name: "before and after".to_owned(),
@@ -236,7 +237,7 @@ impl<'a> AllureFolder<'a> {
 
     fn write(&self, files: &[(String, Vec<u8>)]) -> Result<(), Diagnostics> {
         for (name, bytes) in files {
-            output_file::write(&self.folder.join(name), bytes)?;
+            output_file::write_quickly(&self.folder.join(name), bytes)?;
         }
         Ok(())
     }

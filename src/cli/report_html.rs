@@ -4,10 +4,11 @@ use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 
 use crate::analyse::Analysed;
+use crate::margin_bounds::margin_bounds;
 use crate::{clock, replayed_runs};
 use actcheck_base::Diagnostics;
 use actcheck_history::History;
-use actcheck_ontology::Ontology;
+use actcheck_ontology::{Ontology, RuleLanguage};
 use actcheck_report::{HtmlReport, PropertyWords, Replays, html, replay_order};
 
 /// Renders the whole page, with as many replays as fit into `room` bytes.
@@ -33,6 +34,10 @@ fn words(ontology: &Ontology) -> BTreeMap<String, PropertyWords> {
         label: property.label.clone(),
         comment: property.comment.clone(),
         rule: property.rule.path.clone(),
+        bounds: match property.rule.language {
+            RuleLanguage::Datalog => margin_bounds(&property.rule.source),
+            _ => Vec::new(),
+        },
     };
     ontology.properties.iter().map(|(iri, property)| (iri.clone(), told(property))).collect()
 }
@@ -43,12 +48,9 @@ fn replays(history: &History, ontology: &Ontology, order: &[String], room: f64) 
     if room <= 0.0 {
         return Ok(replays);
     }
-    replayed_runs::for_each(history, ontology, order, |(run, trace, explained)| {
-        if replays.bytes() as f64 >= room {
-            return Ok(ControlFlow::Break(()));
-        }
-        replays.add(&run, trace.as_ref(), &explained);
-        Ok(ControlFlow::Continue(()))
+    replayed_runs::for_each_batch(history, ontology, order, |batch| {
+        replays.add_all(&batch, room);
+        Ok(if replays.bytes() as f64 >= room { ControlFlow::Break(()) } else { ControlFlow::Continue(()) })
     })?;
     Ok(replays)
 }

@@ -60,7 +60,7 @@ pub fn rules(args: &RulesArgs) -> Result<(), Diagnostics> {
             properties.map(|property| for_programs(property, &ontology, counts(property))).collect()
         }
     };
-    output::print(&table.render(args.format.into()));
+    output::print(&table.render(args.format.into(), output::page()));
     Ok(())
 }
 

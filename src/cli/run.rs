@@ -6,9 +6,10 @@ use std::sync::{Arc, OnceLock};
 
 use indicatif::ProgressBar;
 
+use crate::live_failures::LiveFailures;
 use crate::options::Format;
 use crate::progress::Progress;
-use crate::run_args::RunArgs;
+use crate::run_args::{RunArgs, Verbosity};
 use crate::session::{self, Opened, Session};
 use crate::work::{all_cores, quietly};
 use crate::{case, clock, health, output, shrink, stop};
@@ -21,8 +22,9 @@ use actcheck_campaign::{
 use actcheck_history as history;
 use actcheck_history::{History, RunFilter, RunRecord, RunRow, newest_of_alike};
 use actcheck_report::{
-    CampaignSummary, EndedBy, GuidedSearch, HealthSummary, RunSummary, WeightedLine, campaign_json, campaign_table,
-    campaign_text, health_json, health_lines, shrunk_json, shrunk_text, with_shrunk,
+    CampaignSummary, EndedBy, GuidedSearch, HealthSummary, RunSummary, WeightedLine, campaign_json,
+    campaign_result_text, campaign_table, campaign_text, health_json, health_lines, shrunk_json, shrunk_text,
+    with_shrunk,
 };
 use actcheck_rules::Budget;
 use actcheck_verdict::{Counts, mean};
@@ -46,15 +48,23 @@ pub fn run(args: &RunArgs) -> Result<u8, Diagnostics> {
     };
     output::print_diagnostics(&session.env.campaign.warnings);
     let planned = session.runs_to_make();
-    let mut progress = Progress::new(planned, session.env.campaign.limits.time_secs);
+    let verbosity = args.verbosity();
+    let mut progress = match verbosity {
+        Verbosity::Quiet => Progress::hidden(),
+        _ => Progress::new(planned, session.env.campaign.limits.time_secs),
+    };
     // From here on, an interrupt must end the campaign properly.
     shown.get_or_init(|| progress.bar());
     session.begin((clock.now)())?;
     let options = CampaignOptions { jobs, context: RunContext { clock, disturb: None } };
     let mut runs: Vec<RunSummary> = session.kept.iter().map(RunSummary::from_history).collect();
     runs.iter().for_each(|run| progress.run(run));
+    let mut failures = LiveFailures::new(&session.env, &session.id, verbosity);
     let (end, faults) = make_runs(&session, &options, &stop, |record| {
         let summary = RunSummary::of(record);
+        if let Some(text) = failures.text(&summary) {
+            progress.tell(&text);
+        }
         progress.run(&summary);
         runs.push(summary);
         if runs.len().is_multiple_of(MIRROR_EVERY) {
@@ -62,6 +72,9 @@ pub fn run(args: &RunArgs) -> Result<u8, Diagnostics> {
         }
     });
     progress.finish();
+    if failures.any() && args.format == Format::Text {
+        output::print_error_text("\n");
+    }
     let Session { env, history, id, failed, regressions, .. } = session;
     // Sums are taken in the order of indices, so that a campaign merged from parts gets bit-identical results.
     runs.sort_by_key(|run| run.index);
@@ -75,7 +88,7 @@ pub fn run(args: &RunArgs) -> Result<u8, Diagnostics> {
     // If the history failed, only that fault is reported. Failed runs are a biased sample, so their health means little.
     let health =
         if finished.is_ok() && failed.is_none() { Some(health::examine(&history, &summary.campaign)?) } else { None };
-    let results = Results { summary: &summary, health: health.as_ref(), format: args.format };
+    let results = Results { summary: &summary, health: health.as_ref(), format: args.format, verbosity };
     let shrinks = args.shrink && finished.is_ok() && is_whole(&end);
     if shrinks {
         results.print_with(|| shrink::shrink_modes(&env, &history, &examples(&summary), options.jobs, &stop))?;
@@ -145,15 +158,19 @@ struct Results<'a> {
     /// The campaign's health: part of text and JSON, printed to the error stream beside CSV.
     health: Option<&'a HealthSummary>,
     format: Format,
+    verbosity: Verbosity,
 }
 
 impl Results<'_> {
     fn print(&self) {
         output::print(&match self.format {
             Format::Text => {
-                campaign_text(self.summary, output::colour()) + &self.health.map(health_lines).unwrap_or_default()
+                let page = output::page();
+                let quiet = self.verbosity == Verbosity::Quiet;
+                let text = if quiet { campaign_result_text } else { campaign_text }(self.summary, page);
+                text + &self.health.map(|health| health_lines(health, page)).unwrap_or_default()
             }
-            Format::Csv => campaign_table(self.summary).render(self.format.into()),
+            Format::Csv => campaign_table(self.summary).render(self.format.into(), output::page()),
             Format::Json => format!("{:#}\n", self.json()),
         });
         self.warn();
@@ -179,8 +196,10 @@ impl Results<'_> {
         }
         let shrunk = shrink();
         output::print(&match self.format {
-            Format::Text => shrunk.done.iter().map(|one| format!("\n{}", shrunk_text(one))).collect(),
-            Format::Csv => with_shrunk(campaign_table(self.summary), &shrunk.done).render(self.format.into()),
+            Format::Text => shrunk.done.iter().map(|one| format!("\n{}", shrunk_text(one, output::page()))).collect(),
+            Format::Csv => {
+                with_shrunk(campaign_table(self.summary), &shrunk.done).render(self.format.into(), output::page())
+            }
             Format::Json => {
                 let mut json = self.json();
                 json["shrunk"] = shrunk.done.iter().map(shrunk_json).collect();
@@ -200,6 +219,11 @@ fn examples(summary: &CampaignSummary) -> Vec<(String, u64)> {
         .filter_map(|id| summary.runs.iter().find(|run| run.id == *id))
         .map(|run| (run.id.clone(), run.index))
         .collect()
+}
+
+/// How the user invoked this program.
+pub(super) fn program() -> String {
+    std::env::args().next().unwrap_or_else(|| "actcheck".to_owned())
 }
 
 /// The budget that ended a campaign.
@@ -277,7 +301,7 @@ fn summarise(env: &Env, campaign: String, runs: Vec<RunSummary>, end: &CampaignR
         search: None,
         config: env.campaign.source.name.to_string(),
         history: env.campaign.history.display().to_string(),
-        program: std::env::args().next().unwrap_or_else(|| "actcheck".to_owned()),
+        program: program(),
         properties,
         failure_modes: Vec::new(),
         regressions: Vec::new(),

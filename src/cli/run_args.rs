@@ -26,7 +26,7 @@ pub struct RunArgs {
     #[arg(conflicts_with_all = ["resume", "runs", "time", "until_width", "max_failures", "seed", "repeat", "strategy", "shard", "shrink"])]
     pub last_failed: bool,
     /// Scenes for each test, instead of the configuration's `test_count`; an upper limit if a budget ends the campaign
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..), allow_negative_numbers = true)]
     pub runs: Option<u32>,
     /// End after this time, such as 90s, 10m or 2h; runs in flight are completed and kept. Without `--runs`, as many
     /// runs as fit
@@ -69,6 +69,34 @@ pub struct RunArgs {
     /// How results are printed
     #[arg(long, value_name = "FORMAT", value_enum, default_value_t)]
     pub format: Format,
+    /// Print only the result: scores and failures, without progress, tables and notes
+    #[arg(long, short, conflicts_with = "verbose")]
+    pub quiet: bool,
+    /// Print every failure when it happens, each with all its failed properties; otherwise the first ten, each with one
+    #[arg(long, short)]
+    pub verbose: bool,
+}
+
+/// The amount of text that a campaign prints.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Verbosity {
+    /// Only the result.
+    Quiet,
+    /// Also progress, the first failures when they happen, and tables.
+    Usual,
+    /// Also all other failures.
+    Verbose,
+}
+
+impl RunArgs {
+    /// The requested amount of text.
+    pub fn verbosity(&self) -> Verbosity {
+        match (self.quiet, self.verbose) {
+            (true, _) => Verbosity::Quiet,
+            (_, true) => Verbosity::Verbose,
+            _ => Verbosity::Usual,
+        }
+    }
 }
 
 /// Parses the name of a search strategy.

@@ -74,13 +74,13 @@ pub fn serve(args: &ServeArgs) -> Result<(), Diagnostics> {
     });
     let serving = serve::serve(options(args, &folder)?).map_err(|error| unheard(args, &error))?;
     let address = serving.address;
-    output::print(&format!(
+    output::print_prose(&format!(
         "http://{address}/ serves {}, with a report at http://{address}/report and SPARQL at http://{address}/sparql; Ctrl-C stops it\n",
         folder.display()
     ));
     // Only Ctrl-C sends; if its handler is dropped, the wait ends too.
     let _ = waiting.recv();
-    output::print(&format!("{}\n", serving.counts));
+    output::print_prose(&format!("{}\n", serving.counts));
     Ok(())
 }
 

@@ -66,6 +66,9 @@ pub fn open(args: &RunArgs, budget: &Budget, jobs: usize) -> Result<Opened, Diag
         Some((history, record)) => (history, Some(record)),
         None => (History::open(&env.campaign.history)?, None),
     };
+    if env.campaign.sync_each_run {
+        history.sync_each_run();
+    }
     let regressions = regressions::run(cases, &history, resumed.as_ref(), jobs)?;
     let kept = resumed.as_ref().map_or_else(|| Ok(Vec::new()), |campaign| stored(&history, &env, &campaign.id))?;
     let (id, goes_on) = match resumed {
@@ -84,6 +87,9 @@ fn open_failed(args: &RunArgs, budget: &Budget) -> Result<Opened, Diagnostics> {
         return Ok(Opened::Case(Box::new(Env::prepare_within(config, &overrides(args), budget.clone())?)));
     }
     let history = History::open_existing(&loaded.history)?;
+    if loaded.sync_each_run {
+        history.sync_each_run();
+    }
     let (env, failed) = LastFailed::find(&history, config, budget.clone())?;
     if failed.is_empty() {
         return Ok(Opened::NoneFailed(failed.campaign));

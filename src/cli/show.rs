@@ -10,6 +10,7 @@ use crate::picture::Picture;
 use crate::{history_dir, output};
 use actcheck_analysis::perceived_sentences;
 use actcheck_base::{Diagnostics, names};
+use actcheck_campaign::made_by_other_physics;
 use actcheck_history::{History, RunDetail};
 use actcheck_report::{Table, run_json, run_text};
 
@@ -24,6 +25,9 @@ pub struct ShowArgs {
     /// Draw the scene before and after the run into this file, as a raster (.png) or vector image (.svg)
     #[arg(long, value_name = "FILE.png")]
     pub picture: Option<PathBuf>,
+    /// The ontology whose rules explain failures in the picture [default: ontology/actions.ttl here, or the shipped one]
+    #[arg(long, value_name = "FILE")]
+    pub ontology: Option<PathBuf>,
     /// How it is printed
     #[arg(long, value_name = "FORMAT", value_enum, default_value_t)]
     pub format: Format,
@@ -35,14 +39,24 @@ pub fn show(args: &ShowArgs) -> Result<(), Diagnostics> {
     let history = history_dir::open_to_read(&args.history)?;
     let run = history.newest_run(&args.run)?;
     output::print(&match args.format {
-        Format::Text => run_text(&run, &perceived(&history, &run)) + &judged_again(&history.run(&run.row.run)?, &run),
+        Format::Text => {
+            let page = output::page();
+            let again = judged_again(&history.run(&run.row.run)?, &run);
+            run_text(&run, &perceived(&history, &run), page) + &page.set(&again) + &page.set(&made_by(&history, &run)?)
+        }
         Format::Json => format!("{:#}\n", run_json(&run, &perceived(&history, &run))),
-        Format::Csv => outcomes(&run).render(Format::Csv.into()),
+        Format::Csv => outcomes(&run).render(Format::Csv.into(), output::page()),
     });
     match picture {
-        Some(picture) => picture.draw(&history, &run),
+        Some(picture) => picture.draw(&history, &run, args.ontology.as_deref()),
         None => Ok(()),
     }
+}
+
+/// Says that the run was made by other physics than this program's. Empty if it was not.
+fn made_by(history: &History, run: &RunDetail) -> Result<String, Diagnostics> {
+    let told = made_by_other_physics(&history.campaign(&run.row.campaign)?);
+    Ok(told.map(|made| format!("{made}: a replay has other states\n")).unwrap_or_default())
 }
 
 /// Sentences about the perceived targets of a run's actions that failed, by their positions. Empty if its trace can't be

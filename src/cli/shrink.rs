@@ -82,12 +82,12 @@ pub fn shrink(args: &ShrinkArgs) -> Result<u8, Diagnostics> {
     let index = env.index_of(&run.row.test, &recorded)?;
     let shrunk = shrink_one(&env, &history, (&run.row.run, index), &options)?;
     output::print(&match args.format {
-        Format::Text => shrunk_text(&shrunk),
-        Format::Csv => choices_table(&shrunk).render(args.format.into()),
+        Format::Text => shrunk_text(&shrunk, output::page()),
+        Format::Csv => choices_table(&shrunk).render(args.format.into(), output::page()),
         Format::Json => format!("{:#}\n", shrunk_json(&shrunk)),
     });
     if let Some(picture) = picture {
-        picture.draw(&history, &shrunk.run)?;
+        picture.draw(&history, &shrunk.run, None)?;
     }
     Ok(if asked.load(Ordering::Relaxed) { stop::INTERRUPTED } else { 0 })
 }

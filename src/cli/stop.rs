@@ -51,7 +51,8 @@ pub fn interruptible(work: impl FnOnce(&Arc<AtomicBool>) -> Result<u8, Diagnosti
     }
 }
 
-fn tell() {
+/// Reports the interrupt.
+pub fn tell() {
     let help = "written files and runs are complete; work in progress is lost";
     output::print_diagnostics(&Diagnostic::error("X030", "interrupted").help(help).into());
 }

@@ -68,6 +68,9 @@ impl Condition {
 
 fn value_of(column: &Column, operator: &str, text: &str) -> Result<Value, String> {
     let text = text.trim_matches(['"', '\'']);
+    if text.is_empty() {
+        return Err(format!("`{} {operator}` needs a value, such as `{} {operator} 0.3`", column.name, column.name));
+    }
     match (column.kind, text.parse::<f64>()) {
         (ColumnKind::Text, _) if matches!(operator, "=" | "!=") => Ok(Value::Text(text.to_owned())),
         (ColumnKind::Text, _) => Err(format!("`{}` is a text: compare it with = or !=", column.name)),
@@ -119,6 +122,7 @@ mod tests {
             ("score", "must be a column"),
             ("scor < 1", "did you mean `score`"),
             ("score < many", "is a number"),
+            ("score <", "needs a value"),
             ("target_category < Glass", "is a text"),
             ("reported = 2", "true or false"),
         ] {

@@ -37,9 +37,9 @@ pub fn why(args: &WhyArgs, stop: &Arc<AtomicBool>) -> Result<(), Diagnostics> {
     let budget = Budget { stop: Arc::clone(stop), ..Budget::default() };
     let history = history_dir::open_to_read(&args.history)?;
     let run = history.newest_run(&args.run)?;
-    let facts = history.facts(&run.row.run)?;
     let (files, path) = ontology_file(args.ontology.as_deref());
     let rules = RuleBook::prepare_within(&ontology::load(&files, &path)?, &budget)?;
+    let facts = history.facts(&run.row.run, rules.reads_course())?;
     let perceived = show::perceived(&history, &run);
     let mut told = 0;
     let mut table = Table::new(["run", "step", "action", "property", "holds", "margin", "explanation"]);
@@ -53,7 +53,7 @@ pub fn why(args: &WhyArgs, stop: &Arc<AtomicBool>) -> Result<(), Diagnostics> {
             let columns = [run.row.run.as_str(), &(step + 1).to_string(), &action.action, &property];
             match args.format {
                 ProofFormat::Csv => table.rows.push(explanations::row(&columns, &explained)),
-                ProofFormat::Text => output::print(&format!("{title}\n{}\n", explained.to_text())),
+                ProofFormat::Text => output::print_prose(&format!("{title}\n{}\n", explained.to_text())),
                 ProofFormat::Json => output::print(&format!("{:#}\n\n", explained.to_json())),
                 ProofFormat::Dot => output::print(&format!("{}\n", explained.to_dot())),
             }
@@ -64,11 +64,11 @@ pub fn why(args: &WhyArgs, stop: &Arc<AtomicBool>) -> Result<(), Diagnostics> {
             && args.format == ProofFormat::Text
             && action.judgements.iter().any(failed)
         {
-            output::print(&format!("{} {}: {sentence}\n", run.row.run, names::local(&action.action)));
+            output::print_prose(&format!("{} {}: {sentence}\n", run.row.run, names::local(&action.action)));
         }
     }
     if args.format == ProofFormat::Csv && told > 0 {
-        output::print(&table.render(TableFormat::Csv));
+        output::print(&table.render(TableFormat::Csv, output::page()));
     }
     if told == 0 { Err(nothing_to_tell(&run, args.property.as_deref()).into()) } else { Ok(()) }
 }

@@ -69,6 +69,8 @@ pub struct Campaign {
     pub case: Option<Case>,
     /// History folder (`[history] dir`), `.actcheck` next to the configuration by default.
     pub history: PathBuf,
+    /// Whether each run is written to the disk at once (`[history] sync`; default `false`).
+    pub sync_each_run: bool,
     /// Spans of keys and values, for faults that only a later stage can find: `tests.0.1` is the second action of
     /// the first test, `pickObject` the table's header, `pickObject.2` its third candidate.
     pub places: BTreeMap<String, Span>,

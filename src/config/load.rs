@@ -60,7 +60,7 @@ pub fn load_text(source: Source, folder: &Path, overrides: &Overrides) -> Result
     let sensing = ranges::read_sensing(&mut table, &mut found);
     let (budget, limits) = ranges::read_budget(&mut table, &mut found);
     let search = read_search(&mut table, &mut found);
-    let history = read_history(&mut table, folder, &mut found);
+    let (history, sync_each_run) = read_history(&mut table, folder, &mut found);
     // Taken before the tables of designators, which may have any name.
     let case = table.table("case");
     let designators = designators::read(&mut table, &mut library, &mut places, &mut found);
@@ -104,6 +104,7 @@ pub fn load_text(source: Source, folder: &Path, overrides: &Overrides) -> Result
         limits: limits.overridden(overrides),
         case,
         history: overrides.history.clone().unwrap_or(history),
+        sync_each_run,
         places,
         warnings,
     })
@@ -185,13 +186,15 @@ fn read_scene_rule(table: &mut Table, folder: &Path, found: &mut Diagnostics) ->
     read
 }
 
-fn read_history(table: &mut Table, folder: &Path, found: &mut Diagnostics) -> PathBuf {
-    let mut dir = folder.join(HISTORY_DIR);
+/// Reads the history's folder, and whether each run is written to the disk at once.
+fn read_history(table: &mut Table, folder: &Path, found: &mut Diagnostics) -> (PathBuf, bool) {
+    let (mut dir, mut sync) = (folder.join(HISTORY_DIR), false);
     if let Some(mut history) = table.table("history") {
         if let Some(written) = history.string("dir") {
             dir = resolve_path(folder, &written.value);
         }
+        sync = history.boolean("sync").unwrap_or(false);
         history.finish(found);
     }
-    dir
+    (dir, sync)
 }

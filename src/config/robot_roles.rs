@@ -60,7 +60,14 @@ impl Roles {
                 let Some(limits) = tree.joints.get(&joint.value) else { continue };
                 if *position < limits.lower - SLACK || *position > limits.upper + SLACK {
                     let message = format!("{position} is beyond the limits of `{}`", joint.value);
-                    let help = format!("its limits are {} and {}", limits.lower, limits.upper);
+                    let radians = position.to_radians();
+                    let is_large = limits.motion == Motion::Turns && position.abs() > std::f64::consts::TAU;
+                    let meant = is_large && (limits.lower..=limits.upper).contains(&radians);
+                    let degrees = match meant {
+                        true => format!(" rad; {position} degrees are {radians:.4} rad"),
+                        false => String::new(),
+                    };
+                    let help = format!("its limits are {} and {}{degrees}", limits.lower, limits.upper);
                     table.fault("W054", span.clone(), message, help);
                 }
             }

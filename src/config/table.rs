@@ -6,7 +6,7 @@ use std::ops::{RangeBounds, RangeInclusive};
 
 use crate::value::{self, Entry, Located, Value};
 use crate::words::{example, in_words};
-use actcheck_base::{Diagnostic, Diagnostics, Source, Span, did_you_mean};
+use actcheck_base::{Diagnostic, Diagnostics, Source, Span, did_you_mean, nearest};
 
 /// A table that is being read.
 ///
@@ -22,6 +22,8 @@ pub struct Table {
     entries: BTreeMap<String, Entry>,
     /// Keys that were requested, whether present or not.
     known: BTreeSet<String>,
+    /// Required keys that are missing, each with its fault.
+    missing: Vec<(String, Diagnostic)>,
     found: Diagnostics,
 }
 
@@ -35,7 +37,15 @@ impl Table {
     }
 
     fn new(source: &Source, path: String, span: Span, entries: BTreeMap<String, Entry>) -> Self {
-        Self { source: source.clone(), path, span, entries, known: BTreeSet::new(), found: Diagnostics::new() }
+        Self {
+            source: source.clone(),
+            path,
+            span,
+            entries,
+            known: BTreeSet::new(),
+            missing: Vec::new(),
+            found: Diagnostics::new(),
+        }
     }
 
     /// The text that the table is part of.
@@ -102,14 +112,16 @@ impl Table {
             self.known.insert((*key).to_owned());
             if !self.entries.contains_key(*key) {
                 let message = format!("{} is missing", self.name(key));
-                let near = self.entries.keys().map(String::as_str).filter(|name| !keys.contains(name));
-                let help = match actcheck_base::nearest(key, near) {
-                    Some(found) => format!("is `{found}` meant to be `{key}`?"),
-                    None => format!("add `{key} = …`{}", self.place_in_words()),
-                };
-                self.fault("C005", self.span.clone(), message, help);
+                let help = format!("add `{key} = …`{}", self.place_in_words());
+                let fault = Diagnostic::error("C005", message).at(&self.source, self.span.clone()).help(help);
+                self.missing.push(((*key).to_owned(), fault));
             }
         }
+    }
+
+    /// Takes keys without reading them, because another fault decides about them.
+    pub(crate) fn ignore(&mut self, keys: &[&str]) {
+        keys.iter().for_each(|key| drop(self.take(key)));
     }
 
     /// Records a fault of this table's text.
@@ -122,14 +134,24 @@ impl Table {
         self.found.extend(faults);
     }
 
-    /// Moves the faults to `diagnostics`, with a C003 for each unknown key.
+    /// Moves the faults to `diagnostics`, with a C003 for each unknown key. A required key that is missing because it is
+    /// misspelt is one fault.
     pub fn finish(mut self, diagnostics: &mut Diagnostics) {
         for (key, entry) in std::mem::take(&mut self.entries) {
             let kind = if matches!(entry.value.value, Value::Table(_)) { "table" } else { "key" };
-            let message = format!("unknown {kind} {}", self.name(&key));
-            let help = did_you_mean(&key, self.known.iter().map(String::as_str));
+            let mut message = format!("unknown {kind} {}", self.name(&key));
+            let missing = nearest(&key, self.missing.iter().map(|(key, _)| key.as_str())).map(str::to_owned);
+            let help = match missing {
+                Some(missing) => {
+                    message.push_str(&format!(", and {} is missing", self.name(&missing)));
+                    self.missing.retain(|(key, _)| *key != missing);
+                    format!("did you mean `{missing}`?")
+                }
+                None => did_you_mean(&key, self.known.iter().map(String::as_str)),
+            };
             self.fault("C003", entry.key_span, message, help);
         }
+        self.missing.into_iter().for_each(|(_, fault)| diagnostics.push(fault));
         diagnostics.extend(self.found);
     }
 
@@ -430,13 +452,12 @@ mod tests {
         assert_eq!(
             found,
             [
-                "C005 t.toml:1:1: `friction` is missing",
                 "C006 t.toml:1:9: `count` is -1",
                 "C004 t.toml:2:8: `mass` must be a number above 0, but this is a string",
                 "C009 t.toml:3:9: the range `range` begins above its end",
                 "C006 t.toml:5:7: `big` is too large",
                 "C007 t.toml:6:8: `list` is an empty list",
-                "C003 t.toml:4:1: unknown key `frction`",
+                "C003 t.toml:4:1: unknown key `frction`, and `friction` is missing",
             ]
         );
     }

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::Motion;
+use crate::{Interval, Motion, Samples};
 
 /// The robot's course during one action.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
@@ -19,6 +19,13 @@ pub struct RobotCourse {
     /// Its measurements and commands. Stored with the bodies' tracks, which not every reader needs.
     #[serde(skip)]
     pub motion: Motion,
+    /// Quantities of all bodies at the control rate, for rules about time. Stored with the bodies' tracks. Empty in
+    /// traces of earlier versions.
+    #[serde(skip)]
+    pub samples: Samples,
+    /// When objects were held and when they moved, by [`Samples::intervals`]. `None` in traces of earlier versions.
+    #[serde(skip)]
+    pub intervals: Option<Vec<Interval>>,
 }
 
 /// Extremes of one joint. Units: metres or radians, by kind.

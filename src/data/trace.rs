@@ -10,7 +10,7 @@ use crate::{Part, Pose, RobotCourse, SceneMap, Snapshot};
 ///
 /// `snapshots` has one more element than there are performed actions: the state after one action is the state before
 /// the next and is stored once.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Trace {
     /// States before, between and after the actions.
     pub snapshots: Vec<Snapshot>,

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use crate::writer::Writer;
-use crate::{during, places, robot_course, snapshot};
+use crate::{course, during, intervals, places, robot_course, snapshot};
 use actcheck_base::{RunFacts, Term, TermId, names};
 use actcheck_data::{ActionEnd, SceneMap, Trace};
 
@@ -57,9 +57,12 @@ fn extract_to(trace: &Trace, extent: Extent) -> RunFacts {
             }
             if let Some(course) = trace.robot_courses.get(idx) {
                 robot_course::write(course, &mut writer);
+                intervals::write(course, &mut writer);
             }
+            intervals::write_phases(action, &mut writer);
         }
         facts.during.push(writer.take());
+        facts.courses.push(course::of_action(trace, idx));
         facts.parameters.push(parameters(&action.parameters, &bodies, &trace.map, &mut writer));
     }
     facts.terms = writer.terms;

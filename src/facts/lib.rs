@@ -2,8 +2,10 @@
 //!
 //! Never: steps the simulation, holds a threshold, depends on a rule, or decides a verdict.
 
+mod course;
 mod during;
 mod extract;
+mod intervals;
 mod places;
 mod robot_course;
 mod snapshot;

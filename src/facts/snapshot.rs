@@ -4,8 +4,8 @@ use crate::writer::Writer;
 use actcheck_base::{TermId, names};
 use actcheck_data::{BodyState, JointState, Pose, RobotState, Snapshot};
 
-const POSITION: [&str; 3] = ["x", "y", "z"];
-const ROTATION: [&str; 4] = ["qx", "qy", "qz", "qw"];
+pub(super) const POSITION: [&str; 3] = ["x", "y", "z"];
+pub(super) const ROTATION: [&str; 4] = ["qx", "qy", "qz", "qw"];
 
 /// Writes the state of all bodies and of the robot.
 pub(super) fn write(snapshot: &Snapshot, writer: &mut Writer) {

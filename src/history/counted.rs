@@ -5,6 +5,7 @@ use std::collections::BTreeSet;
 use oxigraph::sparql::QueryEvaluationError;
 use oxigraph::store::Store;
 
+use crate::wanted::Wanted;
 use crate::{History, RunFilter, RunRow, lists};
 use actcheck_base::Diagnostics;
 
@@ -32,6 +33,6 @@ impl History {
     /// # Errors
     /// The store can't be read.
     pub fn counted_runs(&self) -> Result<BTreeSet<String>, Diagnostics> {
-        counted_runs(&*self.store()?).map_err(|error| self.query_fault(&error))
+        counted_runs(&*self.store_with(|| Wanted::queries(&lists::COUNTED))?).map_err(|error| self.query_fault(&error))
     }
 }

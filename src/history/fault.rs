@@ -86,6 +86,16 @@ pub(super) fn temporary(dir: &Path, error: &std::io::Error) -> Diagnostics {
     Diagnostic::error("H001", message).help("free some space there, or name another folder with `TMPDIR`").into()
 }
 
+/// A reader can't open its copy of the store, or add to it.
+pub(super) fn unread(dir: &Path, error: &StorageError) -> Diagnostics {
+    match error {
+        StorageError::Io(error) if matches!(error.kind(), ErrorKind::StorageFull | ErrorKind::QuotaExceeded) => {
+            temporary(dir, error)
+        }
+        other => damaged(dir, &other.to_string()),
+    }
+}
+
 /// H007: a file of the store differs from its checksum.
 pub(super) fn damaged_file(dir: &Path, name: &str) -> Diagnostics {
     damaged(dir, &format!("`store/{name}` has changed since it was written"))

@@ -1,8 +1,8 @@
 //! The folder of a history: its layout, its version, and its lock.
 //!
 //! `VERSION` names the format; `lock` is held while a process writes; `store/` is the RDF store, and `seal/` has the
-//! checksums of its files; `traces/` has one file for each run; `hulls/` caches the convex solids of meshes, which can be
-//! recomputed at any time.
+//! checksums of its files; `journal` has the statements that are not in its tables yet; `traces/` has one file for each
+//! run; `hulls/` caches the convex solids of meshes, which can be recomputed at any time.
 
 use std::fs::{self, File, OpenOptions, TryLockError};
 use std::io::ErrorKind;
@@ -13,8 +13,11 @@ use std::time::Duration;
 use crate::fault;
 use actcheck_base::{Diagnostics, write_atomic};
 
-/// Format of the folder that this program writes, and the newest that it reads.
-pub(super) const FORMAT: u64 = 1;
+/// Format of a folder without a journal.
+const FORMAT: u64 = 1;
+/// Format of a folder with a journal, which earlier versions do not read: they would miss its runs. The newest that this
+/// program reads.
+const FORMAT_WITH_JOURNAL: u64 = 2;
 const TITLE: &str = "actcheck history";
 /// Longest version file. Unit: bytes.
 const LONGEST_VERSION: u64 = 1_000;
@@ -49,8 +52,7 @@ impl Folder {
         }
         let folder = Self { dir: dir.to_path_buf(), _lock: Some(lock(dir)?) };
         if !known {
-            write_atomic(&dir.join("VERSION"), format!("{TITLE} {FORMAT}\n").as_bytes())
-                .map_err(|error| fault::io(dir, "writing its version", &error))?;
+            folder.write_version(FORMAT)?;
         }
         fs::create_dir_all(folder.traces()).map_err(|error| fault::io(dir, "creating the folder of traces", &error))?;
         Ok(folder)
@@ -70,6 +72,18 @@ impl Folder {
     pub(super) fn is_locked(&self) -> bool {
         let lock = File::open(self.dir.join("lock"));
         lock.is_ok_and(|lock| matches!(lock.try_lock_shared(), Err(TryLockError::WouldBlock)))
+    }
+
+    /// Marks the folder before its journal is created, or after it was removed, so that programs which know no journals
+    /// read only complete histories.
+    pub(super) fn mark_journal(&self, exists: bool) -> Result<(), Diagnostics> {
+        let format = if exists { FORMAT_WITH_JOURNAL } else { FORMAT };
+        if version(&self.dir)? == Some(format) { Ok(()) } else { self.write_version(format) }
+    }
+
+    fn write_version(&self, format: u64) -> Result<(), Diagnostics> {
+        write_atomic(&self.dir.join("VERSION"), format!("{TITLE} {format}\n").as_bytes())
+            .map_err(|error| fault::io(&self.dir, "writing its version", &error))
     }
 
     /// The folder as the user gave it.
@@ -109,6 +123,14 @@ impl Folder {
 
 /// Whether the folder has a history that this program can read.
 fn has_version(dir: &Path) -> Result<bool, Diagnostics> {
+    match version(dir)? {
+        Some(version) if version > FORMAT_WITH_JOURNAL => Err(fault::newer(dir, version, FORMAT_WITH_JOURNAL)),
+        version => Ok(version.is_some()),
+    }
+}
+
+/// The format of the history in a folder. Returns `None` if it has none.
+fn version(dir: &Path) -> Result<Option<u64>, Diagnostics> {
     let file = dir.join("VERSION");
     // A pipe or a device of a foreign folder may have no end.
     if fs::metadata(&file).is_ok_and(|data| !data.is_file() || data.len() > LONGEST_VERSION) {
@@ -116,14 +138,14 @@ fn has_version(dir: &Path) -> Result<bool, Diagnostics> {
     }
     let text = match fs::read_to_string(&file) {
         Ok(text) => text,
-        Err(error) if error.kind() == ErrorKind::NotFound => return Ok(false),
+        Err(error) if error.kind() == ErrorKind::NotFound => return Ok(None),
         Err(error) if error.kind() == ErrorKind::InvalidData => return Err(fault::foreign(dir)),
         Err(error) => return Err(fault::io(dir, "reading its version", &error)),
     };
-    let Some(version) = text.trim().strip_prefix(TITLE).and_then(|number| number.trim().parse::<u64>().ok()) else {
-        return Err(fault::foreign(dir));
-    };
-    if version > FORMAT { Err(fault::newer(dir, version, FORMAT)) } else { Ok(true) }
+    match text.trim().strip_prefix(TITLE).and_then(|number| number.trim().parse::<u64>().ok()) {
+        Some(version) => Ok(Some(version)),
+        None => Err(fault::foreign(dir)),
+    }
 }
 
 /// Whether a folder without a version holds any files other than those left by `actcheck check` or by an interrupted

@@ -39,6 +39,45 @@ pub(super) fn encode(rows: &[Vec<f32>]) -> Vec<u8> {
     out
 }
 
+/// Encodes a column of integers, each as its difference from a prediction.
+pub(super) fn encode_steps(values: &[i32], out: &mut Vec<u8>) {
+    if let [first, rest @ ..] = values
+        && rest.iter().all(|value| value == first)
+    {
+        out.push(CONSTANT);
+        put_u64(out, zigzag(i64::from(*first)));
+        return;
+    }
+    out.push(BITS);
+    let (mut last, mut step) = (0i64, 0i64);
+    for value in values.iter().copied().map(i64::from) {
+        // Bodies move smoothly: the prediction repeats the last step.
+        put_u64(out, zigzag(value - (last + step)));
+        (last, step) = (value, value - last);
+    }
+}
+
+/// Decodes the integers that [`encode_steps`] encoded at the start of `bytes`, and returns them with the remaining bytes.
+/// Returns `None` if the bytes are corrupt.
+pub(super) fn decode_steps(count: usize, bytes: &[u8]) -> Option<(Vec<i32>, &[u8])> {
+    if count > MOST_VALUES {
+        return None;
+    }
+    let mut rest = Reader { bytes };
+    if rest.byte()? == CONSTANT {
+        let value = i32::try_from(unzigzag(rest.u64()?)).ok()?;
+        return Some((vec![value; count], rest.bytes));
+    }
+    let (mut last, mut step) = (0i64, 0i64);
+    let values = (0..count).map(|_| {
+        let value = last.checked_add(step)?.checked_add(unzigzag(rest.u64()?))?;
+        (last, step) = (value, value.checked_sub(last)?);
+        i32::try_from(value).ok()
+    });
+    let values = values.collect::<Option<Vec<i32>>>()?;
+    Some((values, rest.bytes))
+}
+
 /// Decodes the rows that [`encode`] encoded. Returns `None` if the bytes are corrupt.
 #[cfg(test)]
 fn decode(bytes: &[u8]) -> Option<Vec<Vec<f32>>> {
@@ -248,6 +287,20 @@ mod tests {
         for rows in tables {
             assert_eq!(bits(&decode(&encode(&rows)).expect("it was just encoded")), bits(&rows));
         }
+    }
+
+    #[test]
+    fn integers_come_back_and_corrupt_ones_are_rejected() {
+        for values in [vec![], vec![5], vec![-7; 100], vec![i32::MIN, i32::MAX, 0, 3], (0..500).collect()] {
+            let mut bytes = Vec::new();
+            encode_steps(&values, &mut bytes);
+            let (decoded, rest) = decode_steps(values.len(), &bytes).expect("they were just encoded");
+            assert_eq!((decoded, rest.len()), (values.clone(), 0));
+            for end in 0..bytes.len() {
+                assert!(values.is_empty() || decode_steps(values.len(), &bytes[..end]).is_none(), "{values:?} {end}");
+            }
+        }
+        assert!(decode_steps(usize::MAX, &[CONSTANT, 0]).is_none());
     }
 
     #[test]

@@ -32,7 +32,8 @@ pub(super) const LEFT_OUT: [&str; 13] = [
 ];
 
 /// Classes whose members are recognisable by their properties.
-pub(super) const UNTYPED: [&str; 5] = ["Joint", "Contact", "Percept", "PerceivedPlane", "PerceivedObject"];
+pub(super) const UNTYPED: [&str; 8] =
+    ["Joint", "Contact", "Hold", "Motion", "ActionPhase", "Percept", "PerceivedPlane", "PerceivedObject"];
 
 /// The node of a part, whose IRI is below that of `node`.
 pub(super) fn below(node: &NamedNode, part: &str) -> NamedNode {

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use crate::folder::Folder;
 use crate::salvage::scan;
 use crate::seal::{Found, Seal};
-use crate::{History, RunFilter, fault, trace_file};
+use crate::{History, RunFilter, fault, journal, pending, trace_file};
 use actcheck_base::Diagnostics;
 
 /// A damaged or missing part of a history.
@@ -64,6 +64,10 @@ impl History {
                     .to_owned(),
             }),
         }
+        if journal::read(dir).is_ok_and(|bytes| !journal::statements(&bytes).1) {
+            let reason = pending::DAMAGED.to_owned();
+            found.damage.push(Damage { file: PathBuf::from(journal::NAME), run: None, reason });
+        }
         let history = match Self::open_to_read(dir) {
             Ok(history) => match scan(&*history.store()?) {
                 Ok(()) => history,
@@ -105,7 +109,8 @@ impl History {
 
 /// Opens the readable part of a history, and adds its faults.
 fn salvaged(dir: &Path, why: &str, found: &mut Integrity) -> Result<History, Diagnostics> {
-    if found.damage.iter().all(|damage| !damage.file.starts_with("store")) {
+    let is_named = |damage: &Damage| damage.file.starts_with("store") || damage.file.starts_with(journal::NAME);
+    if !found.damage.iter().any(is_named) {
         found.damage.push(Damage { file: PathBuf::from("store"), run: None, reason: why.trim().to_owned() });
     }
     let (history, lost) = History::open_to_salvage(dir).map_err(|_| fault::damaged(dir, why.trim()))?;

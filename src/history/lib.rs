@@ -3,6 +3,8 @@
 //! Never: judges, simulates, changes stored runs, or reads a clock.
 
 mod answer;
+mod chosen;
+mod columns;
 mod counted;
 mod detail;
 mod dump;
@@ -12,11 +14,13 @@ mod folder;
 mod frames;
 mod graphs;
 mod integrity;
+mod journal;
 mod light;
 mod lists;
 pub mod merge;
 mod newest;
 mod open;
+mod pending;
 mod query;
 mod rdf_text;
 mod read;
@@ -36,6 +40,7 @@ mod terms;
 mod trace_details;
 mod trace_file;
 mod vitals;
+mod wanted;
 mod wire;
 mod write_campaign;
 mod write_run;

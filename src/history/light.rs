@@ -39,7 +39,7 @@ pub(super) fn light(text: &str) -> Option<Query> {
 }
 
 /// A parser that knows the predefined prefixes.
-fn parser() -> SparqlParser {
+pub(super) fn parser() -> SparqlParser {
     static PARSER: OnceLock<SparqlParser> = OnceLock::new();
     let made = || {
         names::PREFIXES.iter().fold(SparqlParser::new(), |parser, (prefix, namespace)| {

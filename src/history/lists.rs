@@ -2,13 +2,15 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use oxigraph::model::{Literal, Term};
+use oxigraph::model::{GraphNameRef, Literal, Term};
 use oxigraph::sparql::QueryEvaluationError;
-use oxigraph::store::Store;
+use oxigraph::store::{StorageError, Store};
 
 use crate::detail::{outcome, status, version};
-use crate::read::{Node, id_of, select, text_of};
+use crate::read::{Node, id_of, select, select_columns, text_of};
 use crate::read_campaign::skill;
+use crate::statements::iri;
+use crate::wanted::Wanted;
 use crate::write_campaign::campaign_node;
 use crate::{CampaignRow, OutcomeRow, Repetition, RunFilter, RunRow};
 use actcheck_base::Outcome;
@@ -24,17 +26,17 @@ SELECT ?campaign WHERE { ?campaign a act:Campaign ; prov:startedAtTime ?started 
 
 const RUNS: &str = "
 SELECT ?run ?campaign ?index ?test ?status ?score ?hash ?started ?scene ?repetition ?weight WHERE {
-    ?run act:campaign ?campaign ; act:index ?index ; act:test ?test ; act:status ?status ; act:score ?score ;
-        act:traceHash ?hash ; prov:startedAtTime ?started .
+    ?run act:campaign ?campaign . ?run act:index ?index . ?run act:test ?test . ?run act:status ?status .
+    ?run act:score ?score . ?run act:traceHash ?hash . ?run prov:startedAtTime ?started .
     OPTIONAL { ?run act:sceneNumber ?scene ; act:repetition ?repetition }
     OPTIONAL { ?run act:weight ?weight }
 }";
 
 const OUTCOMES: &str = "
 SELECT ?run ?campaign ?index ?test ?status ?step ?action ?property ?outcome ?margin WHERE {
-    ?run act:campaign ?campaign ; act:index ?index ; act:test ?test ; act:status ?status .
-    ?execution act:ofRun ?run ; act:step ?step ; act:action ?action .
-    ?assertion earl:subject ?execution ; earl:test ?property ; earl:result ?result .
+    ?run act:campaign ?campaign . ?run act:index ?index . ?run act:test ?test . ?run act:status ?status .
+    ?execution act:ofRun ?run . ?execution act:step ?step . ?execution act:action ?action .
+    ?assertion earl:subject ?execution . ?assertion earl:test ?property . ?assertion earl:result ?result .
     ?result act:outcome ?outcome .
     OPTIONAL { ?result act:margin ?margin }
 }";
@@ -75,6 +77,44 @@ SELECT ?run ?step ?property ?at ?outcome ?rule WHERE {
     }
     ?execution act:ofRun ?run ; act:step ?step .
 }";
+
+/// Time in which a look-up reads one run, divided by the time in which columns read one.
+const LOOK_UP_COST: usize = 6;
+
+/// Queries of the runs that count in rates.
+pub(super) const COUNTED: [&str; 3] = [SELECTED, STARTS, RUNS];
+
+/// The statements that [`campaigns`] reads.
+pub(super) fn of_campaigns() -> Wanted {
+    let mut wanted = Wanted::queries(&[CAMPAIGNS]);
+    wanted.add(Wanted::campaigns());
+    wanted
+}
+
+/// The statements that [`runs`] reads.
+pub(super) fn of_runs() -> Wanted {
+    Wanted::queries(&[STARTS, RUNS])
+}
+
+/// The statements that [`outcomes`] reads.
+pub(super) fn of_outcomes() -> Wanted {
+    Wanted::queries(&[STARTS, OUTCOMES])
+}
+
+/// The statements that [`rechecked`] reads.
+pub(super) fn of_rechecked() -> Wanted {
+    Wanted::queries(&[RECHECKED])
+}
+
+/// The statements that [`later_judgements`] reads.
+pub(super) fn of_later_judgements() -> Wanted {
+    Wanted::queries(&[LATER])
+}
+
+/// The statements that [`selected_campaigns`] and [`campaign_ids`] read.
+pub(super) fn of_selected_campaigns() -> Wanted {
+    Wanted::queries(&[SELECTED, STARTS])
+}
 
 type Row = Vec<Option<Term>>;
 
@@ -155,10 +195,29 @@ fn given(filter: &RunFilter) -> Vec<(&'static str, Term)> {
     [campaign, test, status].into_iter().flatten().collect()
 }
 
+/// The rows of a query about runs that match a filter.
+fn of_filtered(store: &Store, query: &str, filter: &RunFilter) -> Result<Vec<Row>, QueryEvaluationError> {
+    let is_most = match &filter.campaign {
+        None => true,
+        Some(id) => has_most_runs(store, id).map_err(|error| QueryEvaluationError::Dataset(Box::new(error)))?,
+    };
+    let read = if is_most { select_columns } else { select };
+    read(store, query, given(filter))
+}
+
+/// Whether a campaign has so many of a store's runs that reading all runs takes less time than looking up its own.
+fn has_most_runs(store: &Store, campaign: &str) -> Result<bool, StorageError> {
+    let (of, node) = (iri("act:campaign"), campaign_node(campaign));
+    let runs = |value| store.quads_for_pattern(None, Some(of.as_ref()), value, Some(GraphNameRef::DefaultGraph));
+    let own = runs(Some(node.as_ref().into())).count();
+    let all = runs(None).take(own * LOOK_UP_COST + 1);
+    Ok(all.map(|quad| quad.map(drop)).collect::<Result<Vec<()>, _>>()?.len() <= own * LOOK_UP_COST)
+}
+
 /// The runs that match a filter, sorted by the start of their campaign, then by index.
 pub(super) fn runs(store: &Store, filter: &RunFilter) -> Result<Vec<RunRow>, QueryEvaluationError> {
     let ranks = ranks(store)?;
-    let mut rows: Vec<RunRow> = select(store, RUNS, given(filter))?
+    let mut rows: Vec<RunRow> = of_filtered(store, RUNS, filter)?
         .iter()
         .map(|row| RunRow {
             run: id(row, 0),
@@ -180,7 +239,7 @@ pub(super) fn runs(store: &Store, filter: &RunFilter) -> Result<Vec<RunRow>, Que
 /// Outcomes of the runs that match a filter, in the same order, then by step and property.
 pub(super) fn outcomes(store: &Store, filter: &RunFilter) -> Result<Vec<OutcomeRow>, QueryEvaluationError> {
     let ranks = ranks(store)?;
-    let mut rows: Vec<OutcomeRow> = select(store, OUTCOMES, given(filter))?.iter().map(outcome_row).collect();
+    let mut rows: Vec<OutcomeRow> = of_filtered(store, OUTCOMES, filter)?.iter().map(outcome_row).collect();
     rows.sort_by(|a, b| {
         (ranks.get(&a.campaign), a.index, &a.run, a.step, &a.property).cmp(&(
             ranks.get(&b.campaign),

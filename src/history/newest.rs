@@ -23,7 +23,9 @@ impl History {
         let mut newest = NewestOutcomes { rows: self.outcomes(filter)?, rules: BTreeMap::new() };
         let key = |row: &OutcomeRow| (row.index, row.run.clone(), row.step, row.property.clone());
         let mut known: BTreeMap<_, usize> = newest.rows.iter().enumerate().map(|(at, row)| (key(row), at)).collect();
-        for (row, rule) in lists::rechecked(&*self.store()?, filter).map_err(|error| self.query_fault(&error))? {
+        for (row, rule) in lists::rechecked(&*self.store_with(lists::of_rechecked)?, filter)
+            .map_err(|error| self.query_fault(&error))?
+        {
             newest.rules.entry(row.property.clone()).or_default().insert(rule);
             match known.get(&key(&row)) {
                 Some(at) => newest.rows[*at] = row,
@@ -46,6 +48,7 @@ impl History {
     /// # Errors
     /// The store can't be read.
     pub fn selected_campaigns(&self) -> Result<BTreeSet<String>, Diagnostics> {
-        lists::selected_campaigns(&*self.store()?).map_err(|error| self.query_fault(&error))
+        lists::selected_campaigns(&*self.store_with(lists::of_selected_campaigns)?)
+            .map_err(|error| self.query_fault(&error))
     }
 }

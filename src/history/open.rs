@@ -2,17 +2,19 @@
 
 use std::ops::Deref;
 use std::path::Path;
-use std::sync::atomic::AtomicUsize;
-use std::sync::{Arc, PoisonError, RwLock};
+use std::sync::{Arc, Mutex, PoisonError, RwLock};
 use std::thread::sleep;
 use std::time::Duration;
 
-use oxigraph::store::Store;
+use oxigraph::store::{StorageError, Store};
 
 use crate::folder::Folder;
+use crate::journal::{self, Journal};
+use crate::pending;
 use crate::salvage::salvage;
 use crate::seal::{Found, Seal};
 use crate::snapshot::{MOST_COMPARED, Snapshot};
+use crate::wanted::Wanted;
 use crate::{History, fault};
 use actcheck_base::Diagnostics;
 
@@ -26,7 +28,14 @@ const TRIES: usize = 300;
 pub(super) struct OpenStore {
     store: Store,
     /// The files of a reader's store, which must outlive it.
-    _snapshot: Option<Arc<Snapshot>>,
+    snapshot: Option<Arc<Snapshot>>,
+}
+
+impl OpenStore {
+    /// Total size of the tables of a reader's store. Unit: bytes. `None` for the owner's.
+    pub(super) fn size(&self) -> Option<u64> {
+        Some(self.snapshot.as_ref()?.size)
+    }
 }
 
 impl Deref for OpenStore {
@@ -42,6 +51,29 @@ pub(super) struct Opened {
     store: OpenStore,
     /// `None` for the owner, who sees each change.
     snapshot: Option<Arc<Snapshot>>,
+    /// The statements of the snapshot's journal that are in the store.
+    loaded: Mutex<Wanted>,
+}
+
+impl Opened {
+    /// Adds statements of the snapshot's journal to a reader's store, if they are not in it.
+    fn load(&self, dir: &Path, wanted: impl FnOnce() -> Wanted) -> Result<(), Diagnostics> {
+        let Some(snapshot) = self.snapshot.as_ref().filter(|snapshot| !snapshot.journal.is_empty()) else {
+            return Ok(());
+        };
+        let mut loaded = self.loaded.lock().unwrap_or_else(PoisonError::into_inner);
+        let missing = wanted().beyond(&loaded);
+        if missing.is_empty() {
+            return Ok(());
+        }
+        let (part, is_whole) = journal::part(&snapshot.journal, &missing);
+        if !is_whole {
+            return Err(fault::damaged(dir, pending::DAMAGED));
+        }
+        pending::add(&self.store, part).map_err(|error| fault::unread(dir, &error))?;
+        loaded.add(missing);
+        Ok(())
+    }
 }
 
 impl History {
@@ -70,7 +102,7 @@ impl History {
     pub fn open_to_read(dir: &Path) -> Result<Self, Diagnostics> {
         let folder = Folder::to_read(dir)?;
         let opened = read_present(&folder, TRIES)?;
-        Ok(Self { opened: RwLock::new(Some(opened)), folder, logged: AtomicUsize::new(0) })
+        Ok(Self::with(opened, folder))
     }
 
     /// Like [`History::open_to_read`], for a damaged history: reads everything that can be read into memory. Returns it
@@ -80,12 +112,14 @@ impl History {
     /// As [`History::open_to_read`], if nothing can be read.
     pub fn open_to_salvage(dir: &Path) -> Result<(Self, Vec<String>), Diagnostics> {
         let folder = Folder::to_read(dir)?;
-        let opened = read(&folder, Snapshot::salvage(&folder)?)?;
-        let salvaged =
-            salvage(&opened.store, &folder.traced()).map_err(|error| fault::store(dir, "reading it", &error))?;
-        let store = OpenStore { store: salvaged.store, _snapshot: opened.snapshot.clone() };
-        let opened = Opened { store, snapshot: opened.snapshot };
-        Ok((Self { opened: RwLock::new(Some(opened)), folder, logged: AtomicUsize::new(0) }, salvaged.lost))
+        let snapshot = Snapshot::salvage(&folder)?;
+        let (journal, is_whole) = journal::statements(&snapshot.journal);
+        let opened = read_tables(&folder, snapshot)?;
+        let salvaged = salvage(&opened.store, journal, is_whole, &folder.traced())
+            .map_err(|error| fault::store(dir, "reading it", &error))?;
+        let store = OpenStore { store: salvaged.store, snapshot: opened.snapshot.clone() };
+        let opened = Opened { store, snapshot: opened.snapshot, loaded: Mutex::new(Wanted::all()) };
+        Ok((Self::with(opened, folder), salvaged.lost))
     }
 
     /// Takes a new snapshot if the history has changed since the last one. Returns whether it has. Answers that are
@@ -117,11 +151,35 @@ impl History {
             return Err(fault::damaged_file(folder.dir(), name));
         }
         let opened = own(&folder)?;
-        Ok(Self { opened: RwLock::new(Some(opened)), folder, logged: AtomicUsize::new(0) })
+        let history = Self::with(opened, folder);
+        history.take_over_journal()?;
+        Ok(history)
     }
 
-    /// Returns a handle of the store. (All clones use the same store.)
+    fn with(opened: Opened, folder: Folder) -> Self {
+        let journal = Mutex::new(Journal::new(folder.dir()));
+        Self { opened: RwLock::new(Some(opened)), folder, journal }
+    }
+
+    /// Returns a handle of the store with every statement. (All clones use the same store.)
     pub(super) fn store(&self) -> Result<OpenStore, Diagnostics> {
+        self.store_with(Wanted::all)
+    }
+
+    /// Returns a handle of the store with the wanted statements at least: a reader's store lacks others that are in the
+    /// journal.
+    pub(super) fn store_with(&self, wanted: impl FnOnce() -> Wanted) -> Result<OpenStore, Diagnostics> {
+        self.complete_store()?;
+        let opened = self.opened.read().unwrap_or_else(PoisonError::into_inner);
+        if let Some(opened) = opened.as_ref() {
+            opened.load(self.dir(), wanted)?;
+        }
+        drop(opened);
+        self.bare_store()
+    }
+
+    /// Returns a handle of the store, which lacks the statements in the journal.
+    pub(super) fn bare_store(&self) -> Result<OpenStore, Diagnostics> {
         let opened = self.opened.read().unwrap_or_else(PoisonError::into_inner);
         let opened = opened.as_ref().ok_or_else(|| fault::damaged(self.dir(), "it could not be opened again"))?;
         Ok(opened.store.clone())
@@ -140,10 +198,16 @@ impl History {
 impl Drop for History {
     /// Seals the store of an owner after closing it.
     fn drop(&mut self) {
+        // The rest of the journal is taken over by the next owner.
+        let _ = self.load_journal();
         let opened = self.opened.get_mut().unwrap_or_else(PoisonError::into_inner).take();
         if opened.is_some_and(|opened| opened.snapshot.is_none()) {
             // Without a new seal, the earlier one still covers its files.
             let _ = Seal::write(&self.folder);
+            if !self.dir().join(journal::NAME).exists() {
+                // If it remains marked, only earlier versions refuse it.
+                let _ = self.folder.mark_journal(false);
+            }
         }
     }
 }
@@ -178,24 +242,43 @@ fn read_present(folder: &Folder, tries: usize) -> Result<Opened, Diagnostics> {
     }
 }
 
+/// Opens a snapshot. The statements of its journal are added when they are asked for.
 fn read(folder: &Folder, snapshot: Snapshot) -> Result<Opened, Diagnostics> {
+    if !journal::is_whole(&snapshot.journal) {
+        return Err(fault::damaged(folder.dir(), pending::DAMAGED));
+    }
+    if snapshot.journal.is_empty() {
+        return read_tables(folder, snapshot);
+    }
+    let store = pending::open(&snapshot);
+    opened(folder, store, snapshot)
+}
+
+fn read_tables(folder: &Folder, snapshot: Snapshot) -> Result<Opened, Diagnostics> {
     let store = Store::open_read_only(snapshot.store());
-    let store = store.map_err(|error| fault::damaged(folder.dir(), &error.to_string()))?;
+    opened(folder, store, snapshot)
+}
+
+fn opened(folder: &Folder, store: Result<Store, StorageError>, snapshot: Snapshot) -> Result<Opened, Diagnostics> {
+    let store = store.map_err(|error| fault::unread(folder.dir(), &error))?;
     let snapshot = Some(Arc::new(snapshot));
-    Ok(Opened { store: OpenStore { store, _snapshot: snapshot.clone() }, snapshot })
+    let store = OpenStore { store, snapshot: snapshot.clone() };
+    Ok(Opened { store, snapshot, loaded: Mutex::default() })
 }
 
 fn own(folder: &Folder) -> Result<Opened, Diagnostics> {
     let path = folder.store();
     let store = Store::open(&path).map_err(|error| fault::store(folder.dir(), "opening its store", &error))?;
-    // Each opening leaves a log of over 100 kB, which is only useful to the store's developers.
+    // Each opening leaves a log of over 100 kB, which is only useful to the store's developers; a process that was killed
+    // while it wrote tables leaves them under names that the store does not know.
     for entry in std::fs::read_dir(&path).into_iter().flatten().filter_map(Result::ok) {
-        if entry.file_name().to_string_lossy().starts_with("LOG.old.") {
+        let name = entry.file_name().to_string_lossy().into_owned();
+        if name.starts_with("LOG.old.") || name.starts_with("bulk-") {
             // Harmless if it remains.
             let _ = std::fs::remove_file(entry.path());
         }
     }
-    Ok(Opened { store: OpenStore { store, _snapshot: None }, snapshot: None })
+    Ok(Opened { store: OpenStore { store, snapshot: None }, snapshot: None, loaded: Mutex::default() })
 }
 
 #[cfg(test)]

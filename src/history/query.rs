@@ -1,19 +1,22 @@
 //! SPARQL queries of users: prefixes are predefined, faults have their place, updates are refused.
 
-use std::path::Path;
+use std::ops::Range;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, OnceLock};
 
 use oxigraph::model::{Literal, NamedNode, Term as StoreTerm};
 use oxigraph::sparql::{PreparedSparqlQuery, QueryEvaluationError, QueryResults, SparqlEvaluator, SparqlSyntaxError};
 
+use crate::columns::by_columns;
 use crate::counted::counted_runs;
 use crate::evaluation::{Unfinished, evaluate};
 use crate::fault;
+use crate::light::parser;
 use crate::open::OpenStore;
 use crate::syntax_fault::syntax_fault;
 use crate::terms::{from_store, to_store};
-use crate::{Cancel, QueryAnswer};
+use crate::wanted::Wanted;
+use crate::{Cancel, History, QueryAnswer};
 use actcheck_base::{
     COUNTED_TEXT, Diagnostic, Diagnostics, MOST_NESTED_CALLS, Source, Span, TEXT_FUNCTIONS, Term, bounded_texts,
     check_calls, names, sparql_excess,
@@ -27,10 +30,15 @@ const MOST_TEXT: usize = 512 << 20;
 /// Maximum length of one of these texts. Unit: bytes.
 const LONGEST_TEXT: usize = 32 << 20;
 
+/// Sizes of stores whose columns are joined. In smaller ones it does not matter; in larger ones the columns may not fit
+/// in memory. Unit: bytes.
+const COLUMNS: Range<u64> = 16 << 20..1 << 30;
+
 /// Answers a query.
-pub(super) fn answer(dir: &Path, store: OpenStore, text: &Source, cancel: &Cancel) -> Result<QueryAnswer, Diagnostics> {
+pub(super) fn answer(history: &History, text: &Source, cancel: &Cancel) -> Result<QueryAnswer, Diagnostics> {
     refuse_update(text)?;
     refuse_excess(text)?;
+    let store = history.store_with(|| Wanted::query(&text.text))?;
     let query = prepare(text, &store, cancel)?;
     let prepared = query.prepared.clone();
     let evaluated = evaluate(&store, cancel, move |store| prepared.on_store(store).execute().and_then(collect));
@@ -39,7 +47,7 @@ pub(super) fn answer(dir: &Path, store: OpenStore, text: &Source, cancel: &Cance
         Unfinished::Stopped => stopped(text).into(),
         Unfinished::Failed(error) => evaluation_fault(text, &error).into(),
         Unfinished::Crashed => Diagnostic::error("H012", "the query made the evaluator crash").in_source(text).into(),
-        Unfinished::Damaged(error) => fault::damaged(dir, &error.to_string()),
+        Unfinished::Damaged(error) => fault::damaged(history.dir(), &error.to_string()),
     })
 }
 
@@ -67,7 +75,14 @@ pub(super) fn prepare(text: &Source, store: &OpenStore, cancel: &Cancel) -> Resu
     // Places in the text that is evaluated differ from the original's, so errors were reported before.
     let made = Arc::new(AtomicUsize::new(0));
     let bounded = with_text_functions(query_evaluator(store, cancel), cancel, &made);
-    let prepared = bounded.parse_query(&bounded_texts(&text.text)).map_err(syntax)?;
+    let bounded_text = bounded_texts(&text.text);
+    let prepared = match store.size() {
+        Some(size) if COLUMNS.contains(&size) => {
+            let query = parser().parse_query(&bounded_text).map_err(syntax)?;
+            bounded.for_query(by_columns(query))
+        }
+        _ => bounded.parse_query(&bounded_text).map_err(syntax)?,
+    };
     Ok(Prepared { prepared, made })
 }
 

@@ -3,11 +3,13 @@
 use std::collections::BTreeMap;
 
 use oxigraph::model::{GraphNameRef, NamedNodeRef, NamedOrBlankNode, NamedOrBlankNodeRef, Term, TermRef, Variable};
-use oxigraph::sparql::{QueryEvaluationError, QueryResults};
+use oxigraph::sparql::{PreparedSparqlQuery, QueryEvaluationError, QueryResults};
 use oxigraph::store::{StorageError, Store};
 
 use crate::Cancel;
+use crate::columns::by_columns;
 use crate::evaluation::{Unfinished, evaluate};
+use crate::light::parser;
 use crate::query::evaluator;
 use crate::statements::iri;
 use actcheck_base::names;
@@ -126,7 +128,24 @@ pub(super) fn select(
     query: &str,
     given: Vec<(&str, Term)>,
 ) -> Result<Vec<Vec<Option<Term>>>, QueryEvaluationError> {
-    let mut prepared = evaluator(&Cancel::new()).parse_query(query)?;
+    answered(store, evaluator(&Cancel::new()).parse_query(query)?, given)
+}
+
+/// Like [`select`], for a query that reads most values of its properties.
+pub(super) fn select_columns(
+    store: &Store,
+    query: &str,
+    given: Vec<(&str, Term)>,
+) -> Result<Vec<Vec<Option<Term>>>, QueryEvaluationError> {
+    let query = parser().parse_query(query)?;
+    answered(store, evaluator(&Cancel::new()).for_query(by_columns(query)), given)
+}
+
+fn answered(
+    store: &Store,
+    mut prepared: PreparedSparqlQuery,
+    given: Vec<(&str, Term)>,
+) -> Result<Vec<Vec<Option<Term>>>, QueryEvaluationError> {
     for (variable, value) in given {
         prepared = prepared.substitute_variable(Variable::new_unchecked(variable), value);
     }

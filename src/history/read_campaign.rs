@@ -48,6 +48,7 @@ pub(super) fn beginning(store: &Store, id: &str) -> Result<Option<CampaignRecord
         started: text(&node, "prov:startedAtTime"),
         program_version: version(&node),
         program_digest: text(&node, "act:programDigest"),
+        physics: node.count("act:physics").and_then(|version| u32::try_from(version).ok()),
     }))
 }
 

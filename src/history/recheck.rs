@@ -6,13 +6,14 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use oxigraph::model::{GraphNameRef, NamedNode, NamedOrBlankNode, Quad, Term};
+use oxigraph::model::{GraphNameRef, NamedNode, NamedNodeRef, NamedOrBlankNode, Quad, QuadRef, Term};
 use oxigraph::store::{StorageError, Store};
 
 use crate::detail::judgement;
 use crate::graphs::below;
 use crate::read::{Node, id_of, subjects_in};
 use crate::statements::{Statements, iri, time};
+use crate::wanted::Wanted;
 use crate::write_run::{run_node, unique, write_assertion};
 use crate::{History, RunDetail};
 use actcheck_base::{Diagnostics, Judgement};
@@ -59,7 +60,8 @@ impl History {
     /// The store can't be read.
     pub fn newest(&self, run: &str, step: u32, properties: &[String]) -> Result<Vec<StoredJudgement>, Diagnostics> {
         let execution = execution(run, step);
-        newest(&*self.store()?, &execution, properties).map_err(|error| self.fault("reading a run's outcomes", &error))
+        let store = self.store_with(|| Wanted::run(run_node(run).as_str()))?;
+        newest(&store, &execution, properties).map_err(|error| self.fault("reading a run's outcomes", &error))
     }
 
     /// Returns all details of a run as [`History::run`] does, with its newest judgements: later ones replace those of the
@@ -69,7 +71,7 @@ impl History {
     /// As [`History::run`].
     pub fn newest_run(&self, name: &str) -> Result<RunDetail, Diagnostics> {
         let mut run = self.run(name)?;
-        let store = self.store()?;
+        let store = self.store_with(|| Wanted::run(run_node(&run.row.run).as_str()))?;
         let fault = |error| self.fault("reading a run's outcomes", &error);
         let mut is_judged_again = false;
         for action in &mut run.actions {
@@ -96,7 +98,8 @@ impl History {
     /// # Errors
     /// The store can't be read.
     pub fn later_counts(&self) -> Result<BTreeMap<String, u64>, Diagnostics> {
-        let (store, graph) = (self.store()?, iri(GRAPH));
+        let graph = iri(GRAPH);
+        let store = self.store_with(|| Wanted::in_graph("earl:subject", GRAPH))?;
         let graph = GraphNameRef::NamedNode(graph.as_ref());
         let mut counts: BTreeMap<String, u64> = BTreeMap::new();
         for quad in store.quads_for_pattern(None, Some(iri("earl:subject").as_ref()), None, Some(graph)) {
@@ -133,11 +136,17 @@ fn execution(run: &str, step: u32) -> NamedNode {
 }
 
 fn newest(store: &Store, execution: &NamedNode, properties: &[String]) -> Result<Vec<StoredJudgement>, StorageError> {
-    let graph = iri(GRAPH);
+    let (graph, test) = (iri(GRAPH), iri("earl:test"));
     let mut superseded = BTreeSet::new();
     let mut found = Vec::new();
     for graph in [GraphNameRef::DefaultGraph, GraphNameRef::NamedNode(graph.as_ref())] {
         for node in subjects_in(store, "earl:subject", execution.as_ref(), graph)? {
+            // Those of the campaign supersede nothing. A look-up takes a tenth of the time of reading a node.
+            if let ([property], GraphNameRef::DefaultGraph) = (properties, graph)
+                && !store.contains(QuadRef::new(&node, &test, NamedNodeRef::new_unchecked(property), graph))?
+            {
+                continue;
+            }
             let assertion = Node::read_in(store, &node, graph)?;
             superseded.extend(assertion.all("act:supersedes").iter().map(Term::to_string));
             if assertion.text("earl:test").is_some_and(|property| properties.contains(&property)) {

@@ -48,6 +48,8 @@ pub struct CampaignRecord {
     pub program_version: String,
     /// Digest of the program's sources; empty if an earlier version wrote the campaign.
     pub program_digest: String,
+    /// Version of the program's physics; `None` if an earlier version wrote the campaign.
+    pub physics: Option<u32>,
 }
 
 /// A program that performs actions, as recorded with a campaign.

@@ -50,16 +50,23 @@ pub(super) fn scan(store: &Store) -> Result<(), StorageError> {
 }
 
 /// Collects the readable statements of a store. Runs that may lack some are left out completely, and their campaigns lose
-/// their end, so that they can be resumed. `traces` are the ids of the runs that have a trace.
+/// their end, so that they can be resumed. The statements of the journal are added; `is_whole` says whether it could be
+/// read completely. `traces` are the ids of the runs that have a trace.
 ///
 /// # Errors
 /// There is not enough memory.
-pub(super) fn salvage(store: &Store, traces: &[String]) -> Result<Salvaged, StorageError> {
+pub(super) fn salvage(
+    store: &Store,
+    journal: Vec<Quad>,
+    is_whole: bool,
+    traces: &[String],
+) -> Result<Salvaged, StorageError> {
     let mut found = Collected::default();
-    let is_whole = found.add(store.iter(), MOST_ERRORS);
-    let is_complete = is_whole || found.add_other_indexes(store);
+    let is_readable = found.add(store.iter(), MOST_ERRORS);
+    let is_complete = (is_readable || found.add_other_indexes(store)) && is_whole;
     let memory = Store::new()?;
     memory.extend(found.quads)?;
+    memory.extend(journal)?;
     let mut lost = Vec::new();
     if !is_complete {
         let known = runs(&memory);

@@ -7,6 +7,7 @@ use oxigraph::store::{StorageError, Store};
 
 use crate::detail::{designators, objects};
 use crate::read::Node;
+use crate::wanted::Wanted;
 use crate::write_run::run_node;
 use crate::{History, ObjectDetail, RunRow};
 use actcheck_base::{Diagnostics, Digest};
@@ -26,7 +27,7 @@ impl History {
     /// # Errors
     /// The store can't be read.
     pub fn scenes(&self, runs: &[RunRow]) -> Result<BTreeMap<String, SceneDigest>, Diagnostics> {
-        let store = self.store()?;
+        let store = self.store_with(Wanted::details)?;
         runs.iter()
             .map(|row| Ok((row.run.clone(), read(&store, &run_node(&row.run))?)))
             .collect::<Result<_, StorageError>>()

@@ -12,6 +12,7 @@ use std::thread::yield_now;
 
 use crate::fault;
 use crate::folder::Folder;
+use crate::journal;
 use crate::seal::{CURRENT, Found, Seal, manifest_of};
 use actcheck_base::{Diagnostics, ScratchFolder};
 
@@ -29,14 +30,19 @@ pub(super) struct Snapshot {
     stamp: Stamp,
     /// The tables, open.
     _tables: Vec<File>,
+    /// Total size of the tables. Unit: bytes.
+    pub(super) size: u64,
+    /// The journal, whose statements the store may lack.
+    pub(super) journal: Vec<u8>,
 }
 
-/// Identifies the state of a store: current manifest, its size, and the logs with their sizes.
+/// Identifies the state of a store: current manifest, its size, and the logs and the journal with their sizes.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Stamp {
     manifest: Vec<u8>,
     size: u64,
     logs: Vec<(String, u64)>,
+    journal: u64,
 }
 
 impl Snapshot {
@@ -86,20 +92,22 @@ impl Snapshot {
 
     /// Whether a folder's store has changed since the snapshot was taken.
     pub(super) fn is_stale(&self, folder: &Folder) -> bool {
-        stamp(&folder.store()).is_none_or(|stamp| stamp != self.stamp)
+        stamp(folder, &folder.store()).is_none_or(|stamp| stamp != self.stamp)
     }
 }
 
 /// Takes a snapshot whose manifest is in the folder `small`. Returns `None` if the manifest changed meanwhile.
 fn attempt(folder: &Folder, small: &Path, seal: Option<&Seal>) -> Result<Option<Snapshot>, Diagnostics> {
     let dir = folder.dir();
-    let Some(before) = stamp(small) else { return Ok(None) };
+    let Some(before) = stamp(folder, small) else { return Ok(None) };
     if seal.is_some_and(|seal| seal.is_wrong_current(&before.manifest)) {
         return Err(fault::damaged_file(dir, CURRENT));
     }
     let scratch = ScratchFolder::create().map_err(|error| fault::temporary(dir, &error))?;
     let compared = seal.filter(|seal| seal.size() <= MOST_COMPARED);
-    let mut tables = Vec::new();
+    // Read before the store's files: the owner puts statements into the store before it removes them from here.
+    let journal = journal::read(dir).map_err(|error| fault::io(dir, "reading its journal", &error))?;
+    let (mut tables, mut size) = (Vec::new(), 0);
     let manifest = manifest_of(&before.manifest).unwrap_or_default();
     let entries = fs::read_dir(folder.store()).map_err(|error| fault::io(dir, "reading its store", &error))?;
     let names: Vec<String> = entries.filter_map(|entry| entry.ok()?.file_name().into_string().ok()).collect();
@@ -121,6 +129,7 @@ fn attempt(folder: &Folder, small: &Path, seal: Option<&Seal>) -> Result<Option<
         let linked = if name.ends_with(".sst") { link(&file, &from, &to) } else { copy(&mut file, &to) };
         linked.map_err(|error| fault::temporary(dir, &error))?;
         if name.ends_with(".sst") {
+            size += file.metadata().map_or(0, |found| found.len());
             tables.push(file);
         }
     }
@@ -135,9 +144,10 @@ fn attempt(folder: &Folder, small: &Path, seal: Option<&Seal>) -> Result<Option<
     }
     fs::write(scratch.path().join(CURRENT), &before.manifest).map_err(|error| fault::temporary(dir, &error))?;
     let copied = fs::metadata(scratch.path().join(manifest)).map_or(0, |found| found.len());
-    let is_same = stamp(small).is_some_and(|after| after.manifest == before.manifest && after.size == before.size);
+    let is_same =
+        stamp(folder, small).is_some_and(|after| after.manifest == before.manifest && after.size == before.size);
     let whole = is_same && copied == before.size;
-    Ok(whole.then_some(Snapshot { scratch, stamp: before, _tables: tables }))
+    Ok(whole.then_some(Snapshot { scratch, stamp: before, _tables: tables, size, journal }))
 }
 
 /// The fault of a store without a readable manifest: another process is creating it, or it is damaged.
@@ -146,7 +156,7 @@ fn missing(folder: &Folder) -> Diagnostics {
 }
 
 /// Reads the stamp of a store. Returns `None` if it has no readable manifest.
-fn stamp(store: &Path) -> Option<Stamp> {
+fn stamp(folder: &Folder, store: &Path) -> Option<Stamp> {
     let current = fs::read(store.join(CURRENT)).ok()?;
     let size = fs::metadata(store.join(manifest_of(&current)?)).ok()?.len();
     let mut logs: Vec<(String, u64)> = fs::read_dir(store)
@@ -158,7 +168,8 @@ fn stamp(store: &Path) -> Option<Stamp> {
         })
         .collect();
     logs.sort();
-    Some(Stamp { manifest: current, size, logs })
+    let journal = fs::metadata(folder.dir().join(journal::NAME)).map_or(0, |found| found.len());
+    Some(Stamp { manifest: current, size, logs, journal })
 }
 
 fn copy(file: &mut File, to: &Path) -> io::Result<()> {

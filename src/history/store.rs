@@ -2,8 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
-use std::sync::RwLock;
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Mutex, RwLock};
 
 use oxigraph::model::vocab::rdf;
 use oxigraph::model::{GraphNameRef, NamedNode, QuadRef};
@@ -11,9 +10,11 @@ use oxigraph::sparql::QueryEvaluationError;
 use oxigraph::store::StorageError;
 
 use crate::folder::Folder;
+use crate::journal::Journal;
 use crate::open::Opened;
 use crate::read::{short_id, subjects, text_of};
 use crate::statements::iri;
+use crate::wanted::Wanted;
 use crate::write_campaign::{self, campaign_node};
 use crate::write_run::{self, run_node};
 use crate::{
@@ -28,19 +29,16 @@ use actcheck_facts::extract;
 /// A history that only this process may write, or that it only reads (after [`History::open_to_read`]).
 ///
 /// A run that [`History::commit`] stored survives a kill of the process. Before a power cut, the operating system may not
-/// have written the last seconds to the disk; runs stored before [`History::flush`] survive that, too.
+/// have written the last seconds to the disk; runs stored before [`History::flush`] survive that, too, and all runs after
+/// [`History::sync_each_run`].
 /// Its trace file is written first, so that every run in the store has one.
 pub struct History {
     // Dropped before the folder, which releases the lock. `None` only if reopening failed.
     pub(super) opened: RwLock<Option<Opened>>,
     pub(super) folder: Folder,
-    /// Number of quads that are only in the store's log.
-    pub(super) logged: AtomicUsize,
+    /// The statements that are not in the store yet.
+    pub(super) journal: Mutex<Journal>,
 }
-
-/// Number of quads in the log at which they are written to the store's tables: about 100 runs. Smaller tables would be
-/// merged and written again several times, and readers take longer to open a long log.
-const MOST_LOGGED: usize = 50_000;
 
 impl History {
     /// The folder as the caller gave it.
@@ -68,9 +66,7 @@ impl History {
     pub fn begin_campaign(&self, record: &CampaignRecord) -> Result<(), Diagnostics> {
         self.check_ids("campaign", [&record.id])?;
         self.remove_orphans()?;
-        self.store()?
-            .extend(write_campaign::beginning(record))
-            .map_err(|error| self.fault("writing the campaign", &error))?;
+        self.enter(&write_campaign::beginning(record), "writing the campaign")?;
         self.flush()
     }
 
@@ -108,15 +104,11 @@ impl History {
             .map_err(|error| Diagnostic::error("H006", format!("{doing} failed: {error}")))?;
         let file = self.folder.trace(&record.id);
         write_atomic(&file, &bytes).map_err(|error| fault::io(self.dir(), &doing, &error))?;
-        let quads = write_run::quads(record);
-        let count = quads.len();
-        self.store()?.extend(quads).map_err(|error| {
+        self.enter(&write_run::quads(record), &doing).inspect_err(|_| {
             // A trace without a run is harmless; if it can't be removed now, the next campaign removes it.
             let _ = std::fs::remove_file(&file);
-            self.fault(&doing, &error)
         })?;
-        let logged = self.logged.fetch_add(count, Ordering::Relaxed) + count;
-        if logged >= MOST_LOGGED { self.flush() } else { Ok(()) }
+        self.load_long_journal()
     }
 
     /// Flushes all committed data to the disk.
@@ -124,8 +116,8 @@ impl History {
     /// # Errors
     /// Writing failed: `H005`, `H006`.
     pub fn flush(&self) -> Result<(), Diagnostics> {
-        self.logged.store(0, Ordering::Relaxed);
-        self.store()?.flush().map_err(|error| self.fault("writing to the disk", &error))
+        self.sync_journal()?;
+        self.bare_store()?.flush().map_err(|error| self.fault("writing to the disk", &error))
     }
 
     /// Writes the end of a campaign, and flushes everything to the disk.
@@ -133,9 +125,8 @@ impl History {
     /// # Errors
     /// Writing failed: `H005`, `H006`.
     pub fn finish_campaign(&self, id: &str, end: &CampaignEnd) -> Result<(), Diagnostics> {
-        self.store()?
-            .extend(write_campaign::end(id, end))
-            .map_err(|error| self.fault("writing the end of the campaign", &error))?;
+        self.enter(&write_campaign::end(id, end), "writing the end of the campaign")?;
+        self.load_journal()?;
         self.flush()?;
         self.reopen()
     }
@@ -145,7 +136,8 @@ impl History {
     /// # Errors
     /// The store can't be read; `H026` an id is not an id.
     pub fn campaigns(&self) -> Result<Vec<CampaignRow>, Diagnostics> {
-        let campaigns = lists::campaigns(&*self.store()?).map_err(|error| self.query_fault(&error))?;
+        let campaigns =
+            lists::campaigns(&*self.store_with(lists::of_campaigns)?).map_err(|error| self.query_fault(&error))?;
         self.check_ids("campaign", campaigns.iter().map(|campaign| &campaign.id))?;
         Ok(campaigns)
     }
@@ -155,8 +147,8 @@ impl History {
     /// # Errors
     /// `H014` there is no such campaign.
     pub fn campaign(&self, id: &str) -> Result<CampaignRecord, Diagnostics> {
-        let record =
-            read_campaign::beginning(&*self.store()?, id).map_err(|error| self.fault("reading a campaign", &error))?;
+        let record = read_campaign::beginning(&*self.store_with(Wanted::campaigns)?, id)
+            .map_err(|error| self.fault("reading a campaign", &error))?;
         match record {
             Some(record) => Ok(record),
             None => {
@@ -177,7 +169,7 @@ impl History {
     /// # Errors
     /// The store can't be read; `H026` an id is not an id.
     pub fn runs(&self, filter: &RunFilter) -> Result<Vec<RunRow>, Diagnostics> {
-        let runs = lists::runs(&*self.store()?, filter).map_err(|error| self.query_fault(&error))?;
+        let runs = lists::runs(&*self.store_with(lists::of_runs)?, filter).map_err(|error| self.query_fault(&error))?;
         self.check_ids("run", runs.iter().flat_map(|run| [&run.run, &run.campaign]))?;
         Ok(runs)
     }
@@ -188,8 +180,8 @@ impl History {
     /// # Errors
     /// The store can't be read.
     pub fn run_ids(&self) -> Result<Vec<(String, Vec<String>)>, Diagnostics> {
-        let store = self.store()?;
         let shrunk = self.selected_campaigns()?;
+        let store = self.store_with(|| Wanted::values(&["act:campaign"]))?;
         let campaigns = lists::campaign_ids(&store).map_err(|error| self.query_fault(&error))?;
         let mut found = Vec::new();
         for id in campaigns.into_iter().filter(|id| !shrunk.contains(id)) {
@@ -211,7 +203,7 @@ impl History {
     /// # Errors
     /// The store can't be read.
     pub fn outcomes(&self, filter: &RunFilter) -> Result<Vec<OutcomeRow>, Diagnostics> {
-        lists::outcomes(&*self.store()?, filter).map_err(|error| self.query_fault(&error))
+        lists::outcomes(&*self.store_with(lists::of_outcomes)?, filter).map_err(|error| self.query_fault(&error))
     }
 
     /// Returns all details of a run, named as in [`History::resolve`].
@@ -220,7 +212,9 @@ impl History {
     /// `H008` there is no such run.
     pub fn run(&self, name: &str) -> Result<RunDetail, Diagnostics> {
         let id = self.resolve(name)?;
-        detail::read(&*self.store()?, &run_node(&id)).map_err(|error| self.fault("reading a run", &error))
+        let node = run_node(&id);
+        let store = self.store_with(|| Wanted::run(node.as_str()))?;
+        detail::read(&store, &node).map_err(|error| self.fault("reading a run", &error))
     }
 
     /// Returns the trace of a run, named as in [`History::resolve`].
@@ -248,7 +242,7 @@ impl History {
     /// As [`History::trace`].
     pub fn choices(&self, name: &str) -> Result<Vec<Choice>, Diagnostics> {
         let id = self.resolve(name)?;
-        Ok(self.decoded(&id, trace_file::decode_states)?.0)
+        self.decoded(&id, trace_file::decode_choices)
     }
 
     /// Returns every choice of a run, named as in [`History::resolve`], and its trace as in [`History::states`].
@@ -266,10 +260,13 @@ impl History {
     /// `H014` there is no such campaign; otherwise as [`History::trace`].
     pub fn each_vitals(&self, campaign: &str, mut each: impl FnMut(&RunVitals)) -> Result<(), Diagnostics> {
         self.campaign(campaign)?;
-        for row in self.runs(&RunFilter { campaign: Some(campaign.to_owned()), ..RunFilter::default() })? {
-            let choices = self.decoded(&row.run, trace_file::decode_states)?.0;
-            let read = vitals::read(&*self.store()?, &row.run, choices);
-            each(&read.map_err(|error| self.fault("reading a run", &error))?);
+        let rows = self.runs(&RunFilter { campaign: Some(campaign.to_owned()), ..RunFilter::default() })?;
+        let store = self.store_with(vitals::wanted)?;
+        let fault = |error| self.fault("reading a run", &error);
+        let columns = vitals::Columns::read(&store).map_err(fault)?;
+        for row in rows {
+            let choices = self.decoded(&row.run, trace_file::decode_choices)?;
+            each(&columns.of(&store, &row, choices).map_err(fault)?);
         }
         Ok(())
     }
@@ -277,12 +274,18 @@ impl History {
     /// Returns the facts of a run, named as in [`History::resolve`]: extracted from its trace, the same as during the
     /// run.
     ///
-    /// The store holds facts only for queries; reading them from there would take many times as long.
+    /// The store holds facts only for queries; reading them from there would take many times as long. `course`: whether
+    /// to read the quantities over time too, which takes ten times as long.
     ///
     /// # Errors
     /// As [`History::trace`].
-    pub fn facts(&self, name: &str) -> Result<RunFacts, Diagnostics> {
-        Ok(extract(&self.states(name)?))
+    pub fn facts(&self, name: &str, course: bool) -> Result<RunFacts, Diagnostics> {
+        Ok(Self::facts_of(&if course { self.trace(name)? } else { self.states(name)? }))
+    }
+
+    /// Returns the facts of a trace: the same as during the run.
+    pub fn facts_of(trace: &Trace) -> RunFacts {
+        extract(trace)
     }
 
     /// Answers a SPARQL query. The prefixes of [`actcheck_base::names::PREFIXES`] need no declaration.
@@ -301,7 +304,7 @@ impl History {
     /// # Errors
     /// As [`History::query`]; `H013` the query was stopped.
     pub fn query_from(&self, text: &Source, cancel: &Cancel) -> Result<QueryAnswer, Diagnostics> {
-        query::answer(self.dir(), self.store()?, text, cancel)
+        query::answer(self, text, cancel)
     }
 
     /// Path of a run's trace file, which need not exist.
@@ -320,16 +323,17 @@ impl History {
 
     pub(super) fn has_run(&self, id: &str) -> Result<bool, Diagnostics> {
         let (run, class) = (run_node(id), iri("act:Run"));
-        self.store()?
+        // A question about one run is often followed by questions about others.
+        self.store_with(|| Wanted::individuals("act:Run"))?
             .contains(QuadRef::new(&run, rdf::TYPE, &class, GraphNameRef::DefaultGraph))
             .map_err(|error| self.fault("reading", &error))
     }
 
     /// Returns the ids of all individuals of a class, sorted as strings.
     pub(super) fn ids(&self, class: &str) -> Result<Vec<String>, Diagnostics> {
+        let store = self.store_with(|| Wanted::individuals(class))?;
         let class = iri(class);
-        let found =
-            subjects(&*self.store()?, "rdf:type", class.as_ref()).map_err(|error| self.fault("reading", &error))?;
+        let found = subjects(&store, "rdf:type", class.as_ref()).map_err(|error| self.fault("reading", &error))?;
         let mut ids: Vec<String> = found.into_iter().map(|node| short_id(&text_of(&node.into())).to_owned()).collect();
         ids.sort();
         self.check_ids(if class.as_str().ends_with("Run") { "run" } else { "campaign" }, &ids)?;

@@ -4,7 +4,7 @@
 //! The reported place of a failed keyword is off by the keyword's length; this module corrects it, so that the place is
 //! the one that users expect.
 
-use actcheck_base::{Diagnostic, Source, names};
+use actcheck_base::{Diagnostic, Source, names, unclosed_braces};
 
 /// Expected words that a message lists; a syntax error can have a hundred.
 const EXPECTED_SHOWN: usize = 8;
@@ -71,6 +71,12 @@ fn unexpected(text: &Source, end: usize, expected: &[&str]) -> Diagnostic {
         found => format!("this is not a SPARQL query: unexpected `{found}`"),
     };
     let fault = Diagnostic::error("H010", message).at(text, start..stop);
+    if let Some(help) = unclosed_braces(&text.text).filter(|_| found.is_empty()) {
+        return fault.help(help);
+    }
+    if !text.text.contains('{') {
+        return fault.help("a query is a pattern of triples in braces, such as `SELECT ?run WHERE { ?run a act:Run }`");
+    }
     match listed(expected) {
         Some(list) => fault.help(format!("expected {list}")),
         None => fault.help("a query is `SELECT … WHERE { … }`, `ASK { … }`, `CONSTRUCT` or `DESCRIBE`"),

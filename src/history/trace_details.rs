@@ -3,7 +3,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use actcheck_data::{ActionTrace, Clearance, LinkState, Look, RobotCourse, Snapshot, Trace};
+use actcheck_data::{ActionTrace, Clearance, Interval, LinkState, Look, RobotCourse, Snapshot, Trace};
 
 /// The later fields of a whole trace, in the order of its parts.
 #[derive(Default, Serialize, Deserialize)]
@@ -11,6 +11,23 @@ pub(super) struct Details {
     snapshots: Vec<SnapshotDetails>,
     actions: Vec<ActionDetails>,
     clearances: Vec<Vec<Clearance>>,
+}
+
+/// The holds and motions of each action, which follow [`Details`] in the file.
+#[derive(Default, Serialize, Deserialize)]
+pub(super) struct Intervals(Vec<Option<Vec<Interval>>>);
+
+impl Intervals {
+    pub(super) fn of(trace: &Trace) -> Self {
+        Self(trace.robot_courses.iter().map(|course| course.intervals.clone()).collect())
+    }
+
+    /// Sets the intervals of each action. Does nothing for traces of earlier versions, which have none.
+    pub(super) fn fill(self, trace: &mut Trace) {
+        for (course, intervals) in trace.robot_courses.iter_mut().zip(self.0) {
+            course.intervals = intervals;
+        }
+    }
 }
 
 /// The later fields of a snapshot.

@@ -10,8 +10,8 @@ use flate2::read::GzDecoder;
 use flate2::write::GzEncoder;
 
 use crate::frames;
-use crate::trace_details::Details;
-use actcheck_data::{ActionTrace, Choice, Form, Frames, RobotCourse, SceneMap, Snapshot, Trace};
+use crate::trace_details::{Details, Intervals};
+use actcheck_data::{ActionTrace, Choice, Form, Frames, RobotCourse, Samples, SceneMap, Series, Snapshot, Trace};
 
 /// Magic bytes at the start of each file. The last one is the format version; it increases whenever a type of the trace
 /// changes.
@@ -20,7 +20,7 @@ const MAGIC: &[u8; 8] = b"actrace4";
 const WITHOUT_CANDIDATES: &[u8; 8] = b"actrace3";
 
 /// First part: choices, states, actions, time between frames, names of tracks, hash. The map, the forms of bodies, the
-/// courses of the robot and [`Details`] follow it. (Traces of earlier versions end before any of these.)
+/// courses of the robot, [`Details`] and [`Intervals`] follow it. (Traces of earlier versions end before any of these.)
 type Head = (Vec<Choice>, Vec<Snapshot>, Vec<ActionTrace>, f64, Vec<String>, String);
 
 /// Encodes a run's file.
@@ -31,7 +31,7 @@ pub(super) fn encode(choices: &[Choice], trace: &Trace) -> Result<Vec<u8>, Strin
     let frames = &trace.frames;
     let head = (choices, &trace.snapshots, &trace.actions, frames.period_secs, &frames.names, &trace.hash);
     let mut head = postcard::to_stdvec(&head).map_err(|error| error.to_string())?;
-    let later = (&trace.map, &trace.forms, &trace.robot_courses, Details::of(trace));
+    let later = (&trace.map, &trace.forms, &trace.robot_courses, Details::of(trace), Intervals::of(trace));
     head.extend(postcard::to_stdvec(&later).map_err(|error| error.to_string())?);
     let head = compressed(&head)?;
     let course = compressed(&[frames::encode(&frames.rows), encode_motions(trace)?].concat())?;
@@ -54,17 +54,48 @@ pub(super) fn decode(bytes: &[u8]) -> Result<(Vec<Choice>, Trace), String> {
 }
 
 /// Encodes the robot's measurements and commands, which follow the motion of the bodies: joints and rows for each
-/// action.
+/// action, then the samples of each.
 fn encode_motions(trace: &Trace) -> Result<Vec<u8>, String> {
     let mut out = Vec::new();
     for course in &trace.robot_courses {
         out.extend(postcard::to_stdvec(&course.motion.joints).map_err(|error| error.to_string())?);
         out.extend(frames::encode(&course.motion.rows));
     }
+    for course in &trace.robot_courses {
+        encode_samples(&course.samples, &mut out)?;
+    }
     Ok(out)
 }
 
-/// Decodes the robot's motion. Traces of earlier versions end before it and have none.
+/// The stored description of a series, before its steps: thing, second thing, quantity, steps per unit.
+type SeriesHead = (String, String, String, u32);
+
+fn encode_samples(samples: &Samples, out: &mut Vec<u8>) -> Result<(), String> {
+    let heads: Vec<SeriesHead> = samples
+        .series
+        .iter()
+        .map(|series| (series.thing.clone(), series.other.clone(), series.quantity.clone(), series.steps_per_unit))
+        .collect();
+    let head = (samples.period_secs, samples.count as u64, heads);
+    out.extend(postcard::to_stdvec(&head).map_err(|error| error.to_string())?);
+    samples.series.iter().for_each(|series| frames::encode_steps(&series.steps, out));
+    Ok(())
+}
+
+fn decode_samples(rest: &[u8]) -> Option<(Samples, &[u8])> {
+    let ((period_secs, count, heads), mut rest): ((f64, u64, Vec<SeriesHead>), &[u8]) =
+        postcard::take_from_bytes(rest).ok()?;
+    let count = usize::try_from(count).ok()?;
+    let mut series = Vec::with_capacity(heads.len());
+    for (thing, other, quantity, steps_per_unit) in heads {
+        let steps;
+        (steps, rest) = frames::decode_steps(count, rest)?;
+        series.push(Series { thing, other, quantity, steps_per_unit, steps });
+    }
+    Some((Samples { period_secs, count, series }, rest))
+}
+
+/// Decodes the robot's motion and the samples. Traces of earlier versions end before either and have none.
 fn decode_motions(mut rest: &[u8], trace: &mut Trace) -> Option<()> {
     if rest.is_empty() {
         return Some(());
@@ -72,6 +103,12 @@ fn decode_motions(mut rest: &[u8], trace: &mut Trace) -> Option<()> {
     for course in &mut trace.robot_courses {
         (course.motion.joints, rest) = postcard::take_from_bytes(rest).ok()?;
         (course.motion.rows, rest) = frames::decode_next(rest)?;
+    }
+    if rest.is_empty() {
+        return Some(());
+    }
+    for course in &mut trace.robot_courses {
+        (course.samples, rest) = decode_samples(rest)?;
     }
     Some(())
 }
@@ -84,6 +121,16 @@ pub(super) fn decode_states(bytes: &[u8]) -> Result<(Vec<Choice>, Trace), String
     decode_head(parts(bytes)?.0)
 }
 
+/// Decodes the choices alone: they come first.
+///
+/// # Errors
+/// A message that names the damaged part.
+pub(super) fn decode_choices(bytes: &[u8]) -> Result<Vec<Choice>, String> {
+    let head = expanded(parts(bytes)?.0)?;
+    let (choices, _) = postcard::take_from_bytes(&head).map_err(|error| error.to_string().to_lowercase())?;
+    Ok(choices)
+}
+
 fn decode_head(head: &[u8]) -> Result<(Vec<Choice>, Trace), String> {
     let head = expanded(head)?;
     let read = |error: postcard::Error| error.to_string().to_lowercase();
@@ -91,11 +138,13 @@ fn decode_head(head: &[u8]) -> Result<(Vec<Choice>, Trace), String> {
     let (map, rest): (SceneMap, &[u8]) = part_of(rest).map_err(read)?;
     let (forms, rest): (Vec<Form>, &[u8]) = part_of(rest).map_err(read)?;
     let (robot_courses, rest): (Vec<RobotCourse>, &[u8]) = part_of(rest).map_err(read)?;
-    let (details, _): (Details, &[u8]) = part_of(rest).map_err(read)?;
+    let (details, rest): (Details, &[u8]) = part_of(rest).map_err(read)?;
+    let (intervals, _): (Intervals, &[u8]) = part_of(rest).map_err(read)?;
     let (choices, snapshots, actions, period_secs, names, hash) = head;
     let frames = Frames { period_secs, names, rows: Vec::new() };
     let mut trace = Trace { snapshots, actions, frames, hash, map, forms, robot_courses };
     details.fill(&mut trace);
+    intervals.fill(&mut trace);
     Ok((choices, trace))
 }
 

@@ -8,8 +8,10 @@ use oxigraph::sparql::{
 };
 
 use crate::light::light;
+use crate::open::OpenStore;
 use crate::query::{evaluation_fault, prepare, refuse_excess, refuse_update};
 use crate::rdf_text::serializer;
+use crate::wanted::Wanted;
 use crate::{Cancel, History, RdfSyntax};
 use actcheck_base::{Diagnostic, Diagnostics, Source, Span};
 
@@ -97,9 +99,9 @@ impl History {
             let fault = Diagnostic::error("H017", "`SERVICE` queries another endpoint, which is not supported");
             return Err(WireFault::Refused(fault.at(text, span).into()));
         }
-        let store = self.store().map_err(WireFault::Failed)?;
+        let store = self.store_with(|| Wanted::query(&text.text)).map_err(WireFault::Failed)?;
         let query = prepare(text, &store, &Cancel::new()).map_err(WireFault::Malformed)?;
-        let answer = self.evaluate(query.prepared.clone(), text, choose, limits);
+        let answer = evaluated(&store, query.prepared.clone(), text, choose, limits);
         query.check_texts(text).map_err(WireFault::Refused)?;
         answer
     }
@@ -117,46 +119,47 @@ impl History {
         cancel: &Cancel,
     ) -> Option<Result<WireAnswer, WireFault>> {
         let query = light(&text.text)?;
+        let store = self.store_with(|| Wanted::parsed(&query)).map_err(WireFault::Failed);
         let prepared = SparqlEvaluator::new().with_cancellation_token(cancel.token()).for_query(query);
-        Some(self.evaluate(prepared, text, choose, limits))
+        Some(store.and_then(|store| evaluated(&store, prepared, text, choose, limits)))
     }
+}
 
-    fn evaluate(
-        &self,
-        prepared: PreparedSparqlQuery,
-        text: &Source,
-        choose: impl Fn(&[WireSyntax]) -> Option<WireSyntax>,
-        limits: WireLimits,
-    ) -> Result<WireAnswer, WireFault> {
-        let store = self.store().map_err(WireFault::Failed)?;
-        let failed = |error: QueryEvaluationError| WireFault::Failed(evaluation_fault(text, &error).into());
-        let written = match prepared.on_store(&store).execute().map_err(failed)? {
-            QueryResults::Boolean(value) => {
-                let syntax = choose(&WireSyntax::TABLES).ok_or(WireFault::NotAcceptable)?;
-                let serializer = QueryResultsSerializer::from_format(table_format(syntax));
-                serializer.serialize_boolean_to_writer(Vec::new(), value).map(|body| (syntax, body)).map_err(Into::into)
-            }
-            QueryResults::Solutions(solutions) => {
-                let syntax = choose(&WireSyntax::TABLES).ok_or(WireFault::NotAcceptable)?;
-                table(solutions, syntax, limits).map(|body| (syntax, body))
-            }
-            QueryResults::Graph(triples) => {
-                let syntax = choose(&WireSyntax::GRAPHS).ok_or(WireFault::NotAcceptable)?;
-                graph(triples, syntax, limits).map(|body| (syntax, body))
-            }
-        };
-        written.map_err(|stop| match stop {
-            Stop::TooMany => {
-                let message = format!("the answer has more than {} rows", limits.rows);
-                let fault = Diagnostic::error("H018", message)
-                    .help("request less, or fetch it in parts with `LIMIT` and `OFFSET`");
-                WireFault::Refused(fault.into())
-            }
-            Stop::TooLarge => WireFault::TooLarge,
-            Stop::Evaluation(error) => failed(error),
-            Stop::Writing(error) => WireFault::Failed(Diagnostic::error("H012", error.to_string()).into()),
-        })
-    }
+/// Evaluates a query, and writes its answer.
+fn evaluated(
+    store: &OpenStore,
+    prepared: PreparedSparqlQuery,
+    text: &Source,
+    choose: impl Fn(&[WireSyntax]) -> Option<WireSyntax>,
+    limits: WireLimits,
+) -> Result<WireAnswer, WireFault> {
+    let failed = |error: QueryEvaluationError| WireFault::Failed(evaluation_fault(text, &error).into());
+    let written = match prepared.on_store(store).execute().map_err(failed)? {
+        QueryResults::Boolean(value) => {
+            let syntax = choose(&WireSyntax::TABLES).ok_or(WireFault::NotAcceptable)?;
+            let serializer = QueryResultsSerializer::from_format(table_format(syntax));
+            serializer.serialize_boolean_to_writer(Vec::new(), value).map(|body| (syntax, body)).map_err(Into::into)
+        }
+        QueryResults::Solutions(solutions) => {
+            let syntax = choose(&WireSyntax::TABLES).ok_or(WireFault::NotAcceptable)?;
+            table(solutions, syntax, limits).map(|body| (syntax, body))
+        }
+        QueryResults::Graph(triples) => {
+            let syntax = choose(&WireSyntax::GRAPHS).ok_or(WireFault::NotAcceptable)?;
+            graph(triples, syntax, limits).map(|body| (syntax, body))
+        }
+    };
+    written.map_err(|stop| match stop {
+        Stop::TooMany => {
+            let message = format!("the answer has more than {} rows", limits.rows);
+            let fault =
+                Diagnostic::error("H018", message).help("request less, or fetch it in parts with `LIMIT` and `OFFSET`");
+            WireFault::Refused(fault.into())
+        }
+        Stop::TooLarge => WireFault::TooLarge,
+        Stop::Evaluation(error) => failed(error),
+        Stop::Writing(error) => WireFault::Failed(Diagnostic::error("H012", error.to_string()).into()),
+    })
 }
 
 /// The reason why an answer was not written completely.

@@ -33,7 +33,8 @@ pub(super) fn beginning(record: &CampaignRecord) -> Vec<Quad> {
         .text("act:strategy", &record.strategy)
         .has("prov:startedAtTime", time(&record.started))
         .text("act:program", &program(&record.program_version))
-        .text("act:programDigest", &record.program_digest);
+        .text("act:programDigest", &record.program_digest)
+        .optional("act:physics", record.physics.map(|version| count(u64::from(version))));
     if let Some(skill) = &record.skill {
         statements
             .about(campaign.clone())

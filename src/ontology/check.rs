@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use crate::Action;
 use crate::graph::Graph;
 use crate::read::Statement;
-use actcheck_base::{Diagnostic, Diagnostics, Source, Span, did_you_mean, names, nearest};
+use actcheck_base::{Diagnostic, Diagnostics, Source, Span, did_you_mean, misspelt, names, nearest};
 
 /// Individuals of `act:Action` or of its subclasses, and individuals of those (a special kind of Pick is a Pick).
 pub(super) fn action_iris(graph: &Graph) -> BTreeSet<String> {
@@ -51,15 +51,20 @@ const PREDICATES: [&str; 8] = [
 /// Faults: predicates in the paper's namespace that the ontology does not declare and that are nearly the name of a known
 /// one (O014), so that their statements have no effect.
 pub(super) fn misspelt_predicates(graph: &Graph, found: &mut Diagnostics) {
+    let mut reported = BTreeSet::new();
     let declared: BTreeSet<&str> = graph.subjects().filter_map(|iri| iri.strip_prefix(names::ACT)).collect();
     for statement in graph.statements() {
         let Some(local) = statement.predicate.strip_prefix(names::ACT) else { continue };
         if PREDICATES.contains(&local) || declared.contains(local) {
             continue;
         }
-        if let Some(known) = nearest(local, PREDICATES) {
+        if let Some(known) = misspelt(local, PREDICATES) {
             let (source, span) = graph.place(statement, &statement.predicate);
-            let message = format!("there is no predicate `act:{local}`: this statement has no effect");
+            // A statement with several objects is one for each.
+            if !reported.insert((source.name.to_string(), span.start)) {
+                continue;
+            }
+            let message = format!("unknown predicate `act:{local}`; the statement has no effect");
             found
                 .push(Diagnostic::error("O014", message).at(source, span).help(format!("did you mean `act:{known}`?")));
         }

@@ -20,12 +20,14 @@ pub use formats::{
     Attachment, EarlReport, JunitReport, MarkdownReport, Repetitions, allure_common, allure_results, markdown,
     observation,
 };
-pub use html::{Explained, HTML_COLUMNS, HtmlReport, PropertyWords, Replays, html, replay_order};
+pub use html::{
+    Explained, HTML_COLUMNS, HtmlReport, MarginBound, PropertyWords, ReplayedRun, Replays, html, replay_order,
+};
 pub use json::{
     campaign_json, case_json, compare_json, findings_json, health_json, oracles_json, recheck_json, run_json,
     shrunk_json,
 };
-pub use picture::{Caption, Drawing, collisions_picture, patterns_picture, run_picture};
+pub use picture::{Caption, Chart, Drawing, collisions_picture, patterns_picture, run_picture};
 #[cfg(feature = "rerun")]
 pub use recording::{RecordingFault, Recordings};
 pub use summary::{
@@ -39,6 +41,6 @@ pub use table::{
     oracles_table, recheck_table, with_shrunk,
 };
 pub use text::{
-    campaign_text, case_text, compare_text, findings_text, health_lines, health_text, oracles_text, recheck_text,
-    run_text, scene_rule, shrunk_text,
+    FailureLines, Page, campaign_result_text, campaign_text, case_text, compare_text, findings_text, health_lines,
+    health_text, oracles_text, recheck_text, run_text, scene_rule, shrunk_text,
 };

@@ -1,4 +1,5 @@
-//! Finds the moment of a run at which a failed property was decided, as the starting point for playback.
+//! Finds the moments of a run that a failed property is about: the one at which it was decided, as the starting point for
+//! playback, and the one that its witness describes.
 
 use actcheck_data::{BodyState, Trace};
 
@@ -9,6 +10,36 @@ const LOST_SECS: f64 = 0.2;
 /// Lead time: playback starts this long before the deciding event. Unit: seconds.
 const BEFORE_SECS: f64 = 0.3;
 
+/// How a failed outcome came about, as far as the trace shows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Event {
+    /// The robot first touched something that it is not to touch.
+    Touched,
+    /// Something that it is not to touch moved.
+    Moved,
+    /// The robot lost contact with the object.
+    Lost,
+    /// A link was nearest to the object, which was never touched.
+    Nearest,
+}
+
+impl Event {
+    /// The event in words.
+    pub(super) fn words(self) -> &'static str {
+        match self {
+            Self::Touched => "first contact",
+            Self::Moved => "first movement",
+            Self::Lost => "last contact",
+            Self::Nearest => "nearest approach",
+        }
+    }
+
+    /// Whether a witness describes the event itself. Otherwise it describes the state after the action.
+    fn is_stated(self) -> bool {
+        matches!(self, Self::Touched | Self::Moved)
+    }
+}
+
 /// Returns the moment that decided an outcome, from the objects that its witness names. Unit: seconds since the run
 /// began.
 ///
@@ -17,37 +48,86 @@ const BEFORE_SECS: f64 = 0.3;
 /// the robot lost contact with the named objects; if it never touched them, a link was nearest to them. If none
 /// applies, returns the end of the action. All but the last are shifted earlier by [`BEFORE_SECS`].
 pub(super) fn deciding_moment(trace: &Trace, action_idx: usize, witness: &str) -> f64 {
-    let begin = |idx: usize| trace.snapshots.get(idx).or(trace.snapshots.last()).map_or(0.0, |state| state.time_secs);
-    let (run_begin, start, end) = (begin(0), begin(action_idx), begin(action_idx + 1));
-    let Some(action) = trace.actions.get(action_idx) else { return end - run_begin };
-    let handled = |id: &str| action.parameters.values().flatten().any(|value| value == id);
-    let bodies = trace.snapshots.first().into_iter().flat_map(|state| &state.bodies);
-    let (furniture, things): (Vec<&BodyState>, Vec<&BodyState>) =
-        bodies.filter(|body| names(witness, &body.id)).partition(|body| body.fixed);
-    let named: Vec<&str> = things.iter().map(|body| body.id.as_str()).collect();
-    let others: Vec<&str> = named.iter().copied().filter(|id| !handled(id)).collect();
-    let touchable: Vec<&str> = furniture.iter().map(|body| body.id.as_str()).chain(others.iter().copied()).collect();
-    let by_robot = |ids: &[&str]| -> Vec<(f64, f64)> {
+    let (start, end) = span(trace, action_idx);
+    let event = deciding_event(trace, action_idx, &Named::of(trace, action_idx, witness));
+    event.map_or(end, |(secs, _)| (start + secs - BEFORE_SECS).clamp(start, end))
+}
+
+/// Returns the moment that the witness of a failure describes, and the event that decided the outcome if that was
+/// earlier. Unit: seconds since the run began.
+///
+/// If the witness names something that the robot touched or moved although it must not, the moment is that event. Any
+/// other witness describes the state after the action.
+pub(super) fn stated_moment(trace: &Trace, action_idx: usize, witness: &str) -> (f64, Option<Event>) {
+    let (start, end) = span(trace, action_idx);
+    let mut named = Named::of(trace, action_idx, witness);
+    named.furniture.retain(|id| !carries(trace, action_idx + 1, id, &named.things));
+    match deciding_event(trace, action_idx, &named) {
+        Some((secs, event)) if event.is_stated() => ((start + secs).clamp(start, end), None),
+        Some((_, event)) => (end, Some(event)),
+        None => (end, None),
+    }
+}
+
+/// Start and end of an action. Unit: seconds since the run began.
+fn span(trace: &Trace, action_idx: usize) -> (f64, f64) {
+    let at = |idx: usize| trace.snapshots.get(idx).or(trace.snapshots.last()).map_or(0.0, |state| state.time_secs);
+    let (start, end) = (at(action_idx) - at(0), at(action_idx + 1) - at(0));
+    (start, end.max(start))
+}
+
+/// Whether an object carried one of some others in a snapshot: then a witness names it as the place of the other.
+fn carries(trace: &Trace, snapshot_idx: usize, id: &str, others: &[String]) -> bool {
+    let bodies = trace.snapshots.get(snapshot_idx).into_iter().flat_map(|state| &state.bodies);
+    bodies.filter(|body| others.contains(&body.id)).any(|body| body.rests_on.iter().any(|under| under == id))
+}
+
+/// The ids that a witness names.
+struct Named {
+    furniture: Vec<String>,
+    /// Movable objects.
+    things: Vec<String>,
+    /// Those of them that are not parameters of the action.
+    others: Vec<String>,
+}
+
+impl Named {
+    fn of(trace: &Trace, action_idx: usize, witness: &str) -> Self {
+        let parameters = || trace.actions.get(action_idx).into_iter().flat_map(|action| action.parameters.values());
+        let bodies = trace.snapshots.first().into_iter().flat_map(|state| &state.bodies);
+        let (furniture, things): (Vec<&BodyState>, Vec<&BodyState>) =
+            bodies.filter(|body| names(witness, &body.id)).partition(|body| body.fixed);
+        let ids = |bodies: Vec<&BodyState>| bodies.into_iter().map(|body| body.id.clone()).collect::<Vec<_>>();
+        let things = ids(things);
+        let others = things.iter().filter(|id| !parameters().flatten().any(|value| value == *id)).cloned().collect();
+        Self { furniture: ids(furniture), things, others }
+    }
+}
+
+/// The event that decided an outcome, with its time since the action began. Unit: seconds.
+fn deciding_event(trace: &Trace, action_idx: usize, named: &Named) -> Option<(f64, Event)> {
+    let action = trace.actions.get(action_idx)?;
+    let (start, end) = span(trace, action_idx);
+    let by_robot = |ids: &[&String]| -> Vec<(f64, f64)> {
         let touches = action.contacts.iter().filter(|contact| {
             let [a, b] = &contact.pair;
-            [(a, b), (b, a)].iter().any(|(robot, thing)| robot.starts_with("robot/") && ids.contains(&thing.as_str()))
+            [(a, b), (b, a)].iter().any(|(robot, thing)| robot.starts_with("robot/") && ids.contains(thing))
         });
         touches.map(|contact| (contact.start_secs, contact.end_secs)).collect()
     };
-    let touched = by_robot(&touchable).into_iter().map(|(start, _)| start).min_by(f64::total_cmp);
-    let moved = || {
-        others
-            .iter()
-            .filter_map(|id| first_movement(trace, id, start - run_begin, end - run_begin))
-            .min_by(f64::total_cmp)
-    };
-    let lost = || match by_robot(&named).into_iter().map(|(_, end)| end).max_by(f64::total_cmp) {
-        Some(last) => (start + last < end - LOST_SECS).then_some(last),
-        None => nearest(trace, &named, start - run_begin, end - run_begin),
-    };
-    let since_start = touched.or_else(moved).or_else(lost);
-    let at = since_start.map_or(end, |secs| start + secs - BEFORE_SECS);
-    at.clamp(start, end.max(start)) - run_begin
+    let touchable: Vec<&String> = named.furniture.iter().chain(&named.others).collect();
+    if let Some(first) = by_robot(&touchable).into_iter().map(|(start, _)| start).min_by(f64::total_cmp) {
+        return Some((first, Event::Touched));
+    }
+    let moved = named.others.iter().filter_map(|id| first_movement(trace, id, start, end));
+    if let Some(first) = moved.min_by(f64::total_cmp) {
+        return Some((first, Event::Moved));
+    }
+    let things: Vec<&String> = named.things.iter().collect();
+    match by_robot(&things).into_iter().map(|(_, end)| end).max_by(f64::total_cmp) {
+        Some(last) => (start + last < end - LOST_SECS).then_some((last, Event::Lost)),
+        None => nearest(trace, &things, start, end).map(|secs| (secs, Event::Nearest)),
+    }
 }
 
 /// Whether a text contains a whole word.
@@ -88,11 +168,11 @@ fn first_movement(trace: &Trace, id: &str, start: f64, end: f64) -> Option<f64> 
 
 /// When a link of the robot was nearest to any of the objects, since the action began. Unit: seconds; `start` and `end`
 /// since the run began.
-fn nearest(trace: &Trace, ids: &[&str], start: f64, end: f64) -> Option<f64> {
+fn nearest(trace: &Trace, ids: &[&String], start: f64, end: f64) -> Option<f64> {
     let slots = |wanted: &dyn Fn(&str) -> bool| -> Vec<usize> {
         trace.frames.names.iter().enumerate().filter(|(_, name)| wanted(name)).map(|(slot, _)| slot).collect()
     };
-    let (links, things) = (slots(&|name| name.starts_with("robot/")), slots(&|name| ids.contains(&name)));
+    let (links, things) = (slots(&|name| name.starts_with("robot/")), slots(&|name| ids.iter().any(|id| *id == name)));
     let pairs = things.iter().flat_map(|thing| links.iter().map(move |link| (*thing, *link)));
     let apart = pairs.flat_map(|(thing, link)| {
         let both = positions(trace, thing, start, end).zip(positions(trace, link, start, end));
@@ -104,6 +184,87 @@ fn nearest(trace: &Trace, ids: &[&str], start: f64, end: f64) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    use std::collections::BTreeMap;
+
+    use actcheck_data::{ActionTrace, ContactEpisode, Pose, RobotState, Snapshot};
+
+    fn body(id: &str, fixed: bool, rests_on: &str) -> BodyState {
+        BodyState {
+            id: id.to_owned(),
+            model: String::new(),
+            category: String::new(),
+            fixed,
+            pose: Pose::IDENTITY,
+            linear_velocity: [0.0; 3],
+            angular_velocity: [0.0; 3],
+            aabb_min: [0.0; 3],
+            aabb_max: [0.0; 3],
+            mass_kg: 1.0,
+            friction: 0.5,
+            restitution: 0.0,
+            touches: Vec::new(),
+            rests_on: vec![rests_on.to_owned()],
+            asleep: false,
+            size_m: None,
+            grasp_distance_m: None,
+        }
+    }
+
+    fn snapshot(time_secs: f64) -> Snapshot {
+        let robot = RobotState {
+            base_true: [0.0; 3],
+            base_believed: [0.0; 3],
+            joints: Vec::new(),
+            gripper: Pose::IDENTITY,
+            gripper_opening_m: 0.0,
+            left_touches: Vec::new(),
+            right_touches: Vec::new(),
+            links: Vec::new(),
+        };
+        Snapshot { time_secs, bodies: vec![body("table_1", true, "floor"), body("glass_1", false, "table_1")], robot }
+    }
+
+    /// A pick of `glass_1` on `table_1` from 2 s to 12 s, in which the robot touched things for a second each.
+    fn picked(touched: &[(&str, f64)]) -> Trace {
+        let parameters = BTreeMap::from([("pickObject".to_owned(), vec!["glass_1".to_owned()])]);
+        let contacts = touched.iter().map(|(thing, start)| ContactEpisode {
+            pair: [(*thing).to_owned(), "robot/hand".to_owned()],
+            start_secs: *start,
+            end_secs: start + 1.0,
+            max_force_n: 5.0,
+            point_m: None,
+        });
+        let action = ActionTrace { contacts: contacts.collect(), ..ActionTrace::not_reached("Pick", &parameters) };
+        Trace { snapshots: vec![snapshot(2.0), snapshot(12.0)], actions: vec![action], ..Trace::default() }
+    }
+
+    /// The sentence "48.8 cm from the gripper" was shown with the hand at the glass, where the robot lost it.
+    #[test]
+    fn a_sentence_about_the_state_after_an_action_is_shown_at_its_end() {
+        let trace = picked(&[("glass_1", 5.0)]);
+        let witness = "glass_1 is 48.8 cm from the gripper, needs less than 5 cm";
+        assert_eq!(stated_moment(&trace, 0, witness), (10.0, Some(Event::Lost)));
+        assert!((deciding_moment(&trace, 0, witness) - 5.7).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_sentence_about_a_contact_is_shown_when_it_begins() {
+        let trace = picked(&[("glass_1", 5.0), ("table_1", 3.0)]);
+        assert_eq!(stated_moment(&trace, 0, "the robot pressed table_1 with 90 N"), (3.0, None));
+    }
+
+    #[test]
+    fn furniture_under_the_named_object_is_its_place_and_was_not_hit() {
+        let trace = picked(&[("glass_1", 5.0), ("table_1", 3.0)]);
+        let witness = "glass_1 still rests on table_1; the fingers do not both touch glass_1";
+        assert_eq!(stated_moment(&trace, 0, witness), (10.0, Some(Event::Lost)));
+    }
+
+    #[test]
+    fn a_sentence_that_names_nothing_is_shown_at_the_end() {
+        assert_eq!(stated_moment(&picked(&[]), 0, "the action reported failed"), (10.0, None));
+    }
 
     #[test]
     fn names_match_whole_words_only() {

@@ -111,7 +111,6 @@ mod tests {
     use std::collections::BTreeMap;
 
     use super::*;
-    use actcheck_data::{Frames, SceneMap};
 
     fn contact(pair: [&str; 2], start_secs: f64, max_force_n: f64) -> ContactEpisode {
         let point_m = Some([1.0, 0.25, 0.5]);
@@ -121,15 +120,7 @@ mod tests {
     fn trace(contacts: Vec<ContactEpisode>) -> Trace {
         let parameters = BTreeMap::from([(TARGET.to_owned(), vec!["glass_1".to_owned()])]);
         let action = ActionTrace { contacts, ..ActionTrace::not_reached("Pick", &parameters) };
-        Trace {
-            snapshots: Vec::new(),
-            actions: vec![action],
-            frames: Frames::default(),
-            hash: String::new(),
-            map: SceneMap::default(),
-            forms: Vec::new(),
-            robot_courses: Vec::new(),
-        }
+        Trace { actions: vec![action], ..Trace::default() }
     }
 
     fn label(trace: &Trace, failures: &[(usize, &str)]) -> Option<String> {

@@ -1,6 +1,6 @@
 //! Facts of an action for users of the library.
 
-use actcheck_base::{ActionFacts, Diagnostics, Source, Term, TermId, Terms, Triple};
+use actcheck_base::{ActionFacts, Course, Diagnostics, Source, Term, TermId, Terms, Triple};
 use actcheck_ontology::triples_of;
 
 /// The snapshot of an action that a fact belongs to.
@@ -40,6 +40,7 @@ pub struct Facts {
     parameters: Vec<[TermId; 2]>,
     /// Number of Turtle texts, which distinguishes their blank nodes.
     documents: usize,
+    course: Option<Course>,
 }
 
 impl Facts {
@@ -94,6 +95,12 @@ impl Facts {
         self
     }
 
+    /// Sets the quantities over time, which temporal operators and `course` read.
+    pub fn set_course(&mut self, course: Course) -> &mut Self {
+        self.course = Some(course);
+        self
+    }
+
     /// Returns the number of triples, including duplicates.
     pub fn len(&self) -> usize {
         self.before.len() + self.during.len() + self.after.len()
@@ -112,6 +119,7 @@ impl Facts {
             after: &self.after,
             during: &self.during,
             parameters: &self.parameters,
+            course: self.course.as_ref(),
         }
     }
 }

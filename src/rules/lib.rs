@@ -77,6 +77,7 @@ mod rules;
 mod sparql;
 pub mod standalone;
 pub mod syntax;
+mod temporal;
 mod watch;
 
 pub use book::{RuleBook, owl_closure};

@@ -1,6 +1,6 @@
 //! The time and memory that an evaluation may still use, shared by joins, built-ins and explanations.
 
-use std::cell::Cell;
+use std::cell::{Cell, OnceCell};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -14,10 +14,14 @@ pub(crate) enum Stop {
     Tuples,
     /// Too much memory.
     Bytes,
+    /// Too many new things.
+    NewThings,
     /// The time limit was exceeded.
     Time,
     /// The caller requested a stop.
     Requested,
+    /// A quantity over time that a rule reads was not recorded; the watch has the text.
+    Unrecorded,
 }
 
 /// Minimum running time before a requested stop takes effect. The properties of a pick take about a millisecond, so
@@ -77,6 +81,7 @@ pub(crate) struct Watch {
     /// Text processed since the last check of the clock. Unit: bytes.
     work: Cell<usize>,
     stop: Cell<Option<Stop>>,
+    unrecorded: OnceCell<String>,
 }
 
 impl Watch {
@@ -89,6 +94,7 @@ impl Watch {
             made: Cell::new(0),
             work: Cell::new(0),
             stop: Cell::new(None),
+            unrecorded: OnceCell::new(),
         }
     }
 
@@ -101,6 +107,7 @@ impl Watch {
             made: Cell::new(0),
             work: Cell::new(0),
             stop: Cell::new(None),
+            unrecorded: OnceCell::new(),
         }
     }
 
@@ -112,6 +119,17 @@ impl Watch {
     /// Returns the reason if a built-in or an allocation was refused.
     pub(crate) fn stopped(&self) -> Result<(), Stop> {
         self.stop.get().map_or(Ok(()), Err)
+    }
+
+    /// Stops the evaluation because a quantity was not recorded.
+    pub(crate) fn unrecorded(&self, text: String) {
+        self.unrecorded.get_or_init(|| text);
+        self.stop.set(Some(Stop::Unrecorded));
+    }
+
+    /// Returns which quantity was not recorded.
+    pub(crate) fn unrecorded_text(&self) -> &str {
+        self.unrecorded.get().map_or("a quantity over time was not recorded", String::as_str)
     }
 
     /// Accounts for memory until it is released.

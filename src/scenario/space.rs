@@ -219,7 +219,11 @@ fn check_tests(campaign: &Campaign, ontology: &Ontology, found: &mut Diagnostics
             let needs = action.success_properties.iter().chain(&action.preconditions);
             let needs: BTreeSet<&String> =
                 needs.filter_map(|iri| ontology.properties.get(iri)).flat_map(|property| &property.needs).collect();
-            for designator in needs.into_iter().filter(|name| !campaign.candidates.contains_key(*name)) {
+            let unknown = unknown_tables(campaign, ontology);
+            // A table with a name that probably means the designator is reported itself (S004).
+            let is_meant = |designator: &str| unknown.iter().any(|table| nearest(table, [designator]).is_some());
+            let has = |designator: &str| campaign.candidates.contains_key(designator) || is_meant(designator);
+            for designator in needs.into_iter().filter(|name| !has(name)) {
                 let message = format!("`{name}` needs a value for `{designator}`, which has no candidates");
                 let help = format!("add a table with candidates: {}", example(designator));
                 found.push(campaign.fault("S003", &key, message).help(help));
@@ -240,11 +244,22 @@ fn example(designator: &str) -> String {
     format!("`[{designator}]` with `{key} = [\"…\"]`")
 }
 
+/// The tables that are named after designators.
+fn known_tables(ontology: &Ontology) -> BTreeSet<&str> {
+    ontology.designators.iter().map(String::as_str).chain(SPECIAL).collect()
+}
+
+/// The tables of candidates that no designator has.
+fn unknown_tables<'a>(campaign: &'a Campaign, ontology: &Ontology) -> Vec<&'a String> {
+    let known = known_tables(ontology);
+    campaign.candidates.keys().filter(|name| !known.contains(name.as_str())).collect()
+}
+
 /// Checks that tables are named after designators.
 fn check_tables(campaign: &Campaign, ontology: &Ontology, found: &mut Diagnostics) {
-    let known: BTreeSet<&str> = ontology.designators.iter().map(String::as_str).chain(SPECIAL).collect();
+    let known = known_tables(ontology);
     let tables = ["physics", "sensing", "camera", "robot", "budget", "history", "categories", "scene", "nav"];
-    for name in campaign.candidates.keys().filter(|name| !known.contains(name.as_str())) {
+    for name in unknown_tables(campaign, ontology) {
         let message = format!("unknown table `{name}`: the ontology has no designator of this name");
         let help = match nearest(name, known.iter().copied().chain(tables)) {
             Some(near) => format!("did you mean `{near}`?"),
@@ -267,7 +282,7 @@ fn check_categories(campaign: &Campaign, ontology: &Ontology, found: &mut Diagno
                 format!("the model `{}` has the category `{short}`, which the ontology does not have", model.name);
             let classes: BTreeSet<&str> = ontology.superclasses.keys().map(|class| names::local(class)).collect();
             let help = match nearest(names::local(&model.category), classes) {
-                Some(near) => format!("did you mean `{near}`? the category is set in the model's file"),
+                Some(near) => format!("did you mean `act:{near}`? the category is set in the model's file"),
                 None => format!("state it in the ontology: `{short} a owl:Class ; rdfs:subClassOf act:Graspable`"),
             };
             found.push(campaign.fault("S005", &key, message).help(help));

@@ -53,14 +53,14 @@ pub(super) fn page(history: &str, examples: &[ExampleQuery]) -> String {
         "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\
          <title>Query {history}</title><link rel=\"stylesheet\" href=\"/style.css\"><script src=\"/query.js\" defer></script></head><body>\
          <header><h1>Query the history <code>{history}</code></h1><a href=\"/report\">Report</a></header>\
-         <p>Read-only SPARQL 1.1; endpoint: <code>/sparql</code>. The prefixes below are predefined.</p>\
+         <main><p>Read-only SPARQL 1.1; endpoint: <code>/sparql</code>. The prefixes below are predefined.</p>\
          <form id=\"form\" action=\"/sparql\" method=\"post\">\
          <label for=\"example\">Examples</label><select id=\"example\"><option value=\"\">choose an example …</option>{options}</select>\
          <p id=\"about\" aria-live=\"polite\"></p>\
          <label for=\"query\">Query</label><textarea id=\"query\" name=\"query\" spellcheck=\"false\" required>{first}</textarea>\
          <div class=\"row\"><button type=\"submit\">Run</button><span class=\"faint\">or Ctrl+Enter</span></div></form>\
-         <div id=\"said\" role=\"status\"></div><div class=\"row\" id=\"downloads\"></div><div class=\"wide\" id=\"answer\"></div>\
-         <details><summary>Prefixes</summary><ul id=\"prefixes\">{prefixes}</ul></details></body></html>\n"
+         <div id=\"said\" role=\"status\"></div><div class=\"row\" id=\"downloads\"></div><div class=\"wide\" id=\"answer\" tabindex=\"0\" role=\"group\" aria-label=\"Answer\"></div>\
+         <details><summary>Prefixes</summary><ul id=\"prefixes\">{prefixes}</ul></details></main></body></html>\n"
     )
 }
 

@@ -35,6 +35,7 @@ mod recorder;
 mod robot;
 mod robot_course;
 mod room;
+mod samples;
 mod self_contact;
 mod sense;
 mod settle;
@@ -55,3 +56,7 @@ pub use self_contact::SelfContact;
 pub use sense::Sighting;
 pub use settle::Settling;
 pub use simulation::{Command, Observation, World, build};
+
+/// Version of the physics: the same scene and commands give the same bits only with the same version. It rises with each
+/// change of these bits.
+pub const PHYSICS_VERSION: u32 = 2;

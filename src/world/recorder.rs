@@ -13,6 +13,7 @@ use crate::engine::Owner;
 use crate::motion::MotionMeter;
 use crate::quality::QualityMeter;
 use crate::robot_course::RobotMeter;
+use crate::samples::SampleMeter;
 use actcheck_base::Digest;
 use actcheck_data::{Pose, RobotCourse};
 
@@ -112,6 +113,7 @@ pub struct Recorder {
     pub(super) robot: RobotMeter,
     pub(super) motion: MotionMeter,
     pub(super) clearance: ClearanceMeter,
+    pub(super) samples: SampleMeter,
 }
 
 impl Recorder {
@@ -136,6 +138,7 @@ impl Recorder {
             robot: RobotMeter::default(),
             motion: MotionMeter::default(),
             clearance: ClearanceMeter::default(),
+            samples: SampleMeter::default(),
         }
     }
 
@@ -167,6 +170,7 @@ impl World {
         self.begin_robot_course();
         self.begin_clearance();
         self.begin_motion();
+        self.begin_samples();
     }
 
     /// Ends the record and returns it.
@@ -196,11 +200,18 @@ impl World {
                 max_displacement_m: *max_displacement_m,
             })
             .collect();
+        let samples = self.end_samples();
         Record {
             contacts,
             courses,
             base: self.recorder.base,
-            robot: RobotCourse { clearances: self.clearances(), motion: self.end_motion(), ..self.end_robot_course() },
+            robot: RobotCourse {
+                clearances: self.clearances(),
+                motion: self.end_motion(),
+                intervals: Some(samples.intervals()),
+                samples,
+                ..self.end_robot_course()
+            },
         }
     }
 
@@ -247,6 +258,7 @@ impl World {
             let touches = touches(&self.engine);
             self.record_contacts(&touches);
             self.record_robot(&touches);
+            self.record_samples(&touches);
             self.record_touched(&touches);
             self.move_furniture(&touches);
             if (self.recorder.n_ticks - self.recorder.began).is_multiple_of(self.recorder.ticks_per_frame) {

@@ -3,7 +3,7 @@
 //! Self-collisions are measured from the links' shapes and poses: contact forces don't show how deep a motor presses
 //! one link into another.
 
-use actcheck_data::{HeldCourse, JointCourse, Motion, Pose, RobotCourse, SelfCollision};
+use actcheck_data::{HeldCourse, JointCourse, Pose, RobotCourse, SelfCollision};
 use std::collections::BTreeMap;
 
 use nalgebra::{Isometry3, Point3};
@@ -87,13 +87,7 @@ impl World {
             held_secs: *ticks as f64 * tick_secs,
             max_tilt_rad: *tilt,
         });
-        RobotCourse {
-            joints: joints.collect(),
-            self_contacts,
-            held: held.collect(),
-            clearances: Vec::new(),
-            motion: Motion::default(),
-        }
+        RobotCourse { joints: joints.collect(), self_contacts, held: held.collect(), ..RobotCourse::default() }
     }
 
     fn record_joints(&mut self) {

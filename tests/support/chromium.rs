@@ -154,10 +154,15 @@ impl Chromium {
         }
     }
 
+    /// Opens an address.
+    pub fn visit(&mut self, url: &str) {
+        self.call("Page.navigate", json!({ "url": "about:blank" }));
+        self.call("Page.navigate", json!({ "url": url }));
+    }
+
     /// Opens a report at a view, such as `/runs`.
     pub fn open(&mut self, file: &Path, view: &str) {
-        self.call("Page.navigate", json!({ "url": "about:blank" }));
-        self.call("Page.navigate", json!({ "url": format!("file://{}#{view}", file.display()) }));
+        self.visit(&format!("file://{}#{view}", file.display()));
         self.until("document.documentElement.dataset.ready");
     }
 

@@ -73,19 +73,40 @@ pub fn allure() -> Option<&'static Path> {
     static ALLURE: OnceLock<Option<PathBuf>> = OnceLock::new();
     ALLURE
         .get_or_init(|| {
-            let wanted = root().join("tests/foreign/package.json");
-            let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("allure");
-            kept(&folder, &wanted, |folder| {
-                std::fs::create_dir_all(folder).map_err(|error| error.to_string())?;
-                std::fs::copy(&wanted, folder.join("package.json")).map_err(|error| error.to_string())?;
-                let mut npm = Command::new("npm");
-                run(npm.args(["install", "--no-audit", "--no-fund", "--loglevel=error"]).current_dir(folder))
-            })
-            .map_err(|why| left_out("tests of Allure's generator from npm", &why))
-            .ok()?;
+            let made = from_npm("allure", "package.json");
+            let folder = made.map_err(|why| left_out("tests of Allure's generator from npm", &why)).ok()?;
             Some(folder.join("node_modules/.bin/allure"))
         })
         .as_deref()
+}
+
+/// The script of axe-core from npm, as `tests/foreign/axe/package.json` pins it, cached beside the build output. Returns
+/// `None` if it can't be installed. It is fetched and never copied into this project (MPL-2.0).
+pub fn axe() -> Option<&'static str> {
+    static AXE: OnceLock<Option<String>> = OnceLock::new();
+    AXE.get_or_init(|| {
+        from_npm("axe", "axe/package.json")
+            .and_then(|folder| {
+                let script = folder.join("node_modules/axe-core/axe.min.js");
+                std::fs::read_to_string(&script).map_err(|error| format!("{}: {error}", script.display()))
+            })
+            .map_err(|why| left_out("axe-core's checks of the report and the query page", &why))
+            .ok()
+    })
+    .as_deref()
+}
+
+/// A folder with the packages of a `package.json` in `tests/foreign`, cached beside the build output.
+fn from_npm(name: &str, packages: &str) -> Result<PathBuf, String> {
+    let wanted = root().join("tests/foreign").join(packages);
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
+    kept(&folder, &wanted, |folder| {
+        std::fs::create_dir_all(folder).map_err(|error| error.to_string())?;
+        std::fs::copy(&wanted, folder.join("package.json")).map_err(|error| error.to_string())?;
+        let mut npm = Command::new("npm");
+        run(npm.args(["install", "--no-audit", "--no-fund", "--loglevel=error"]).current_dir(folder))
+    })?;
+    Ok(folder)
 }
 
 /// Returns `true` if a program of the system is installed.

@@ -8,11 +8,13 @@ pub mod line;
 pub mod look;
 pub mod made_up;
 pub mod mutations;
+pub mod nulls;
 pub mod paged;
 pub mod planted;
 pub mod server;
 
 use std::collections::BTreeMap;
+use std::io::ErrorKind;
 use std::os::unix::fs::PermissionsExt as _;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
@@ -88,19 +90,33 @@ pub fn shipped_project() -> tempfile::TempDir {
 
 /// Copies a folder without histories.
 pub fn copy(from: &Path, to: &Path) {
-    std::fs::create_dir_all(to).unwrap();
-    for entry in std::fs::read_dir(from).unwrap() {
-        let entry = entry.unwrap();
+    try_copy(from, to).unwrap();
+}
+
+/// Copies the folder of a history that is open. Its owner may still remove files that it no longer needs: then it is
+/// copied once more.
+pub fn copy_open(from: &Path, to: &Path) {
+    while let Err(error) = try_copy(from, to) {
+        assert_eq!(error.kind(), ErrorKind::NotFound, "{error}");
+        std::fs::remove_dir_all(to).unwrap();
+    }
+}
+
+fn try_copy(from: &Path, to: &Path) -> std::io::Result<()> {
+    std::fs::create_dir_all(to)?;
+    for entry in std::fs::read_dir(from)? {
+        let entry = entry?;
         let target: PathBuf = to.join(entry.file_name());
         if entry.file_name() == ".actcheck" {
             continue;
         }
         if entry.path().is_dir() {
-            copy(&entry.path(), &target);
+            try_copy(&entry.path(), &target)?;
         } else {
-            std::fs::copy(entry.path(), target).unwrap();
+            std::fs::copy(entry.path(), target)?;
         }
     }
+    Ok(())
 }
 
 /// Writes an executable file.

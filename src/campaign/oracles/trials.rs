@@ -6,8 +6,9 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use rayon::prelude::*;
 
+use crate::line::judge_all;
 use crate::make_run::SCENES_PER_RUN;
-use crate::oracles::Fault;
+use crate::oracles::{COURSE_FAULTS, CourseFault, Fault};
 use crate::workers::workers;
 use crate::{Env, Planned, RunContext, RunInput, run_line, run_sabotaged};
 use actcheck_actions::Saboteur;
@@ -48,7 +49,8 @@ struct Scene {
 }
 
 /// Runs every planned scene without a fault, and then with each fault that concerns its test, on several workers. Calls
-/// `on_done` after each.
+/// `on_done` after each. If rules read the course of actions, every run without a fault is judged with each fault of the
+/// course, too.
 ///
 /// The results are sorted by index, the run without a fault first. They depend neither on the number of workers nor on
 /// the clock. Runs that have not begun when `stop` is set are left out.
@@ -80,28 +82,45 @@ pub fn try_faults(
         made
     };
     Ok(pool.install(|| {
-        let sound: Vec<(Scene, Trial)> = (0..env.planned_runs()).into_par_iter().filter_map(sound).collect();
+        let sound: Vec<(Scene, Vec<Trial>)> = (0..env.planned_runs()).into_par_iter().filter_map(sound).collect();
         let pairs: Vec<(&Scene, &Fault)> =
             sound.iter().flat_map(|(scene, _)| faults.iter().map(move |fault| (scene, fault))).collect();
         let spoilt: Vec<Trial> = pairs.par_iter().filter_map(with_fault).collect();
-        let mut trials: Vec<Trial> = sound.iter().map(|(_, trial)| trial.clone()).chain(spoilt).collect();
+        let mut trials: Vec<Trial> = sound.iter().flat_map(|(_, trials)| trials.clone()).chain(spoilt).collect();
         trials.sort_by_key(|trial| trial.index);
         trials
     }))
 }
 
-/// Runs the scene of an index as a campaign would. Returns `None` if no scene can be built.
-fn without_fault(env: &Env, index: u64, context: &RunContext) -> Option<(Scene, Trial)> {
+/// Runs the scene of an index as a campaign would, and judges it without a fault and with each fault of its course.
+/// Returns `None` if no scene can be built.
+fn without_fault(env: &Env, index: u64, context: &RunContext) -> Option<(Scene, Vec<Trial>)> {
     let repeat = u64::from(env.campaign.repeat);
     let repetition = (repeat > 1).then_some(index % repeat);
     let planned = Planned { index, scene: index / repeat, repetition, steering: None };
     (0..SCENES_PER_RUN).find_map(|attempt| {
         let choices = planned.choices(env.campaign.seed, attempt);
         let record = run(env, index, choices, context, None)?;
-        let outcomes = outcomes(&record);
-        let trial = Trial { index, fault: None, came_about: true, outcomes };
-        Some((Scene { index, choices: record.choices }, trial))
+        let sound = Trial { index, fault: None, came_about: true, outcomes: outcomes(&record) };
+        let trials = std::iter::once(sound).chain(with_course_faults(env, &record)).collect();
+        Some((Scene { index, choices: record.choices }, trials))
     })
+}
+
+/// Judges a run without a fault again with each fault of its course.
+fn with_course_faults(env: &Env, record: &RunRecord) -> Vec<Trial> {
+    let Some(test) = env.campaign.tests.get(env.test_of(record.index)) else { return Vec::new() };
+    let judged = |fault: &CourseFault| {
+        let mut trace = record.trace.clone();
+        let came_about = fault.put_into(&mut trace);
+        let facts = actcheck_facts::extract(&trace);
+        let judgements = judge_all(env, &trace, &facts).ok()?;
+        let outcomes = if came_about { worst(&judgements) } else { BTreeMap::new() };
+        Some(Trial { index: record.index, fault: Some(fault.name), came_about, outcomes })
+    };
+    let is_complete = record.status == RunStatus::Completed;
+    let concerned = COURSE_FAULTS.iter().filter(|fault| is_complete && fault.concerns(test, env));
+    concerned.filter_map(judged).collect()
 }
 
 /// Runs the same scene with a fault. Choices that only arise because of the fault are drawn anew.
@@ -131,11 +150,12 @@ fn run(
 
 /// The worst outcome of each property over all actions; empty if the run did not complete.
 fn outcomes(record: &RunRecord) -> BTreeMap<String, Outcome> {
+    if record.status == RunStatus::Completed { worst(&record.judgements) } else { BTreeMap::new() }
+}
+
+fn worst(judgements: &[Vec<Judgement>]) -> BTreeMap<String, Outcome> {
     let mut worst: BTreeMap<String, Outcome> = BTreeMap::new();
-    if record.status != RunStatus::Completed {
-        return worst;
-    }
-    for Judgement { property, outcome, .. } in record.judgements.iter().flatten() {
+    for Judgement { property, outcome, .. } in judgements.iter().flatten() {
         let known = worst.entry(property.clone()).or_insert(*outcome);
         if severity(*outcome) > severity(*known) {
             *known = *outcome;

@@ -223,6 +223,43 @@ const CODES_X: &[Code] = &[
         "it comes from someone else, or the campaign's own program has changed since",
         "read the program, then run again with `--trust`; or remove the case",
     ),
+    code("X060", "git can't be started, or failed", "git is not installed", "install git, or use `bisect --programs`"),
+    code(
+        "X061",
+        "`actcheck bisect` needs a git repository",
+        "this folder is not in a checkout",
+        "start it in a checkout, or name versions of the program with `--programs`",
+    ),
+    code(
+        "X062",
+        "the repository has no such revision or file",
+        "the name is misspelt, or was not fetched",
+        "name a commit, a tag or a branch; `git log --oneline` lists commits",
+    ),
+    code(
+        "X063",
+        "no way leads from the good to the bad version",
+        "they are the same, or on different branches",
+        "name two versions of which one contains the other, as the help says",
+    ),
+    code(
+        "X064",
+        "the ends of a bisection don't differ, or the bad one is better",
+        "`--good` and `--bad` are swapped, or too few scenes were run",
+        "swap them, raise `--most-scenes`, or name other properties or runs",
+    ),
+    code(
+        "X065",
+        "an end of a bisection can't be judged",
+        "its rules don't parse, or it can't be built or run",
+        "name another end; only revisions between the ends are skipped",
+    ),
+    code(
+        "X066",
+        "a temporary file of a bisection can't be written",
+        "the folder for temporary files is full or not writable",
+        "free space, or name another folder with the environment variable TMPDIR",
+    ),
     code(
         "X070",
         "the history has no campaign",

@@ -161,7 +161,12 @@ const CODES_R: &[Code] = &[
         "it belongs to a built-in function or to a library",
         "choose another name, or use the library's",
     ),
-    code("R039", "rules can't create new terms", "an existential variable `!x` is used", "use a variable of the body"),
+    code(
+        "R039",
+        "a new thing `!x` is in a wrong place",
+        "it is in a body, a fact, a computation, a `margin`, beside an aggregate, or beside a variable `?x` of its name",
+        "write `!x` as an argument of a head, and `?x` for everything that the body knows",
+    ),
     code(
         "R040",
         "a predicate is never used",
@@ -194,10 +199,52 @@ const CODES_R: &[Code] = &[
         "write the number in radians, as in the help",
     ),
     code(
+        "R046",
+        "no action can change a success property",
+        "its rules read only the state before the action, constants such as `w:mass`, designators and the ontology, so it has the same outcome whatever the robot does",
+        "read `after` or `during`, or state the property as `act:precondition`",
+    ),
+    code(
+        "R047",
+        "a name without a prefix is a constant that no fact has",
+        "a variable is written as in Prolog, or the prefix of a term is missing",
+        "write `?name` for a variable, or `act:Name` for a term",
+    ),
+    code(
         "R050",
         "a predicate depends on its own negation",
         "the rules form a cycle through `~` or an aggregate",
         "break the cycle that the help shows",
+    ),
+    code(
+        "R051",
+        "a formula over time is written wrongly",
+        "an operator has the wrong number of parts, an interval is empty, or a part is a number instead of a comparison",
+        "correct the marked place as the help says; see docs/time.md",
+    ),
+    code(
+        "R052",
+        "a quantity is not recorded over time",
+        "its name is misspelt, or it has another number of things",
+        "write one of the quantities in docs/time.md",
+    ),
+    code(
+        "R053",
+        "the course of an action can't be read here",
+        "a program on its own has no course, and a library must not derive facts of the snapshots from it",
+        "write the formula in a property, or derive another predicate in the library",
+    ),
+    code(
+        "R054",
+        "a condition of a formula always or never holds",
+        "it compares a quantity that is never negative with 0, or its parts cover all values or exclude each other",
+        "compare with another number, or leave the condition out",
+    ),
+    code(
+        "R055",
+        "an interval of a formula contains no moment of an action, or ends after it",
+        "it lies between two samples, or beyond the time limit of actions (`action_secs`)",
+        "correct the interval, or leave it out: without one, an operator reaches to the end",
     ),
     code(
         "R060",
@@ -216,6 +263,12 @@ const CODES_R: &[Code] = &[
         "a property is a SPARQL query, which this build can't evaluate",
         "a program uses the crate `actcheck-rules` without its feature `sparql`",
         "build the crate with the feature `sparql`, or write the property in Datalog (`.rls`)",
+    ),
+    code(
+        "R063",
+        "a rule may make new things without end",
+        "its new things satisfy its own conditions, directly or by way of other rules",
+        "add a condition that new things don't satisfy; an evaluation ends with an error after a number of them, which `actcheck datalog --max-new` sets",
     ),
     code(
         "R070",
@@ -244,7 +297,7 @@ const CODES_R: &[Code] = &[
     code(
         "R074",
         "rows or statements of an import can't be read",
-        "rows lack fields, fields don't fit the column's format, a quote has no end, statements have wrong syntax, or an XML document is cut or demands too much",
+        "rows lack fields, fields don't fit the column's format, a quote has no end, statements have wrong syntax, a JSON document is not valid, or an XML document is cut or demands too much",
         "correct the file at the places of the message; `--lenient` leaves out the rest",
     ),
     code(
@@ -256,8 +309,8 @@ const CODES_R: &[Code] = &[
     code(
         "R090",
         "a budget of rule evaluation is spent",
-        "a recursive rule computes new values without end, there are very many facts, or an import has no end",
-        "add a limit such as `?x < 100`; `actcheck datalog` has `--max-tuples`, `--max-memory` and `--max-time`",
+        "a recursive rule computes new values or makes new things without end, there are very many facts, or an import has no end",
+        "add a limit such as `?x < 100`; `actcheck datalog` has `--max-tuples`, `--max-new`, `--max-memory` and `--max-time`",
     ),
     code("R091", "an evaluation of rules was interrupted", "Ctrl-C", "start the command again"),
     code(

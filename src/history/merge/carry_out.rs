@@ -65,6 +65,7 @@ pub fn carry_out(
         }
         writer.end(campaign)?;
     }
+    into.load_journal()?;
     into.flush()?;
     into.reopen()?;
     Ok(writer.merged)
@@ -154,8 +155,9 @@ impl Writer<'_> {
         Ok(self.renames[source].apply(quads))
     }
 
+    /// The end of a campaign that an earlier process wrote, so that it is not in the journal of this one.
     fn ends(&self, node: &NamedNode) -> Result<Vec<Quad>, Diagnostics> {
-        let store = self.into.store()?;
+        let store = self.into.bare_store()?;
         let quads = store.quads_for_pattern(Some(node.into()), None, None, Some(GraphNameRef::DefaultGraph));
         let ends: Result<Vec<Quad>, StorageError> = quads.filter(|quad| quad.as_ref().map_or(true, is_end)).collect();
         ends.map_err(|error| self.into.fault("reading a campaign", &error))
@@ -165,6 +167,10 @@ impl Writer<'_> {
     fn write(&self, new: &[Quad], old: &[Quad]) -> Result<(), Diagnostics> {
         if new.is_empty() && old.is_empty() {
             return Ok(());
+        }
+        if old.is_empty() {
+            self.into.enter(new, "writing merged data")?;
+            return self.into.load_long_journal();
         }
         replace(&*self.into.store()?, new, old).map_err(|error| self.into.fault("writing merged data", &error))
     }

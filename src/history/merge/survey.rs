@@ -77,7 +77,7 @@ impl Found {
 /// It can't be read.
 pub(super) fn survey(history: &History, source: Option<usize>) -> Result<Vec<Found>, Diagnostics> {
     let shrunk = history.selected_campaigns()?;
-    let store = history.store()?;
+    let store = history.store_with(lists::of_later_judgements)?;
     let mut later: BTreeMap<String, BTreeSet<String>> = BTreeMap::new();
     for (run, judgement) in lists::later_judgements(&store).map_err(|error| history.query_fault(&error))? {
         later.entry(run).or_default().insert(judgement);

@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 use serde_json::{Value, json};
 
 use crate::formats::identity::{case_name, scene};
-use crate::run_text;
+use crate::{Page, run_text};
 use actcheck_base::{Judgement, Outcome, digest_of, names};
 use actcheck_data::Role;
 use actcheck_history::{ActionDetail, RunDetail};
@@ -59,7 +59,7 @@ pub fn allure_results(
         name: "the whole run".to_owned(),
         media_type: "text/plain",
         ending: "txt",
-        bytes: run_text(run, perceived).into_bytes(),
+        bytes: run_text(run, perceived, Page::default()).into_bytes(),
     };
     let attachments: Vec<&Attachment> = attachments.iter().chain([&whole]).collect();
     let mut files = Vec::new();

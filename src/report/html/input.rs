@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use crate::FindingsSummary;
 use crate::html::Replays;
 use actcheck_analysis::OutcomeTable;
+use actcheck_base::DecidingSignal;
 use actcheck_history::CampaignRow;
 
 /// The content of a page.
@@ -27,7 +28,7 @@ pub struct HtmlReport<'a> {
 }
 
 /// Names and descriptions of a property.
-#[derive(Debug, Clone, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct PropertyWords {
     /// `rdfs:label`.
     pub label: String,
@@ -35,10 +36,21 @@ pub struct PropertyWords {
     pub comment: Option<String>,
     /// Path of its rule file, as written in the ontology.
     pub rule: String,
+    /// The values that its margins are measured from.
+    pub bounds: Vec<MarginBound>,
+}
+
+/// A threshold of a margin: the margin is the difference between it and a measured value.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MarginBound {
+    /// The threshold, in the property's unit.
+    pub at: f64,
+    /// Whether the value is to be below it; otherwise above.
+    pub below: bool,
 }
 
 /// Explanation of an outcome: the proof, or the missing facts.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Explained {
     /// Position of the action in the test, from 1.
     pub step: u32,
@@ -46,4 +58,6 @@ pub struct Explained {
     pub property: String,
     /// The explanation, indented.
     pub text: String,
+    /// The signals that decided formulas over the course of the action.
+    pub deciding: Vec<DecidingSignal>,
 }

@@ -15,10 +15,11 @@ mod page;
 mod replay;
 mod scripts;
 mod shapes;
+mod signals;
 mod summary;
 
 pub use columns::HTML_COLUMNS;
-pub use input::{Explained, HtmlReport, PropertyWords};
+pub use input::{Explained, HtmlReport, MarginBound, PropertyWords};
 pub use order::replay_order;
 pub use page::html;
-pub use replay::Replays;
+pub use replay::{ReplayedRun, Replays};

@@ -1,6 +1,8 @@
 //! Packs runs for playback: their details and the trajectories of all bodies.
 
 use std::collections::BTreeMap;
+use std::num::NonZero;
+use std::thread::available_parallelism;
 
 use serde_json::{Value, json};
 
@@ -19,6 +21,9 @@ const GRAIN_M: f64 = 1e-4;
 /// Quantisation step of quaternion components, as in traces.
 const GRAIN_TURN: f64 = 2e-4;
 
+/// A run with its trace, unless it has none, and the explanations of its failures.
+pub type ReplayedRun = (RunDetail, Option<Trace>, Vec<Explained>);
+
 /// Packed runs for playback.
 #[derive(Debug, Default)]
 pub struct Replays {
@@ -30,16 +35,35 @@ pub struct Replays {
 impl Replays {
     /// Adds a run. A run without a trace can't be played back, but its details are included.
     pub fn add(&mut self, run: &RunDetail, trace: Option<&Trace>, explained: &[Explained]) {
-        let mut pack = Pack::default();
-        details(&mut pack, run);
-        let actions: Vec<Value> =
-            run.actions.iter().enumerate().map(|(idx, _)| action(run, trace, idx, explained)).collect();
-        pack.set("actions", actions);
-        if let Some(trace) = trace.filter(|trace| !trace.snapshots.is_empty()) {
-            self.trajectories(&mut pack, run, trace);
-            pack.set("pressed", pressed(run, trace));
+        let packed = self.bodies(run, trace).packed(run, trace, explained);
+        self.insert(run, packed);
+    }
+
+    /// Adds runs as [`Replays::add`] does, until `room` is full. All cores share the work. Unit of `room`: bytes.
+    pub fn add_all(&mut self, runs: &[ReplayedRun], room: f64) {
+        // Shapes are numbered in the order of the runs, so that the page does not depend on the number of cores.
+        let (mut numbered, mut shapes) = (Vec::with_capacity(runs.len()), Vec::with_capacity(runs.len()));
+        for run in runs {
+            numbered.push((run, self.bodies(&run.0, run.1.as_ref())));
+            shapes.push(self.shapes.all().len());
         }
-        let packed = pack.finish();
+        let of_a_worker = runs.len().div_ceil(available_parallelism().map_or(1, NonZero::get)).max(1);
+        let shares: Vec<Vec<String>> = std::thread::scope(|scope| {
+            let started: Vec<_> =
+                numbered.chunks(of_a_worker).map(|share| scope.spawn(move || packed_runs(share))).collect();
+            let ended = started.into_iter().map(|share| share.join());
+            ended.map(|share| share.unwrap_or_else(|panic| std::panic::resume_unwind(panic))).collect()
+        });
+        for (((run, ..), packed), shapes) in runs.iter().zip(shares.into_iter().flatten()).zip(shapes) {
+            self.insert(run, packed);
+            if self.bytes as f64 >= room {
+                self.shapes.truncate(shapes);
+                return;
+            }
+        }
+    }
+
+    fn insert(&mut self, run: &RunDetail, packed: String) {
         self.bytes += packed.len();
         self.runs.insert(run.row.run.clone(), packed);
     }
@@ -59,8 +83,9 @@ impl Replays {
         packed(json!(self.shapes.all()).to_string().as_bytes())
     }
 
-    /// Packs the trajectories of moving bodies, and the fixed bodies.
-    fn trajectories(&mut self, pack: &mut Pack, run: &RunDetail, trace: &Trace) {
+    /// The bodies of a run, with the numbers of their shapes.
+    fn bodies(&mut self, run: &RunDetail, trace: Option<&Trace>) -> Bodies {
+        let Some(trace) = trace.filter(|trace| !trace.snapshots.is_empty()) else { return Bodies::default() };
         let forms: BTreeMap<&str, &Form> = trace.forms.iter().map(|form| (form.name.as_str(), form)).collect();
         let first = trace.snapshots.iter().take(1).flat_map(|state| &state.bodies);
         let bodies: BTreeMap<&str, &BodyState> = first.map(|body| (body.id.as_str(), body)).collect();
@@ -85,9 +110,39 @@ impl Replays {
             let (kind, role) = (names::local(&body.category), roles.get(body.id.as_str()));
             Some(json!({ "name": body.id, "form": form(&body.id)?, "at": at, "kind": kind, "role": role }))
         });
-        pack.set("still", still.collect::<Vec<Value>>());
-        pack.set("tracks", tracks);
-        set_trajectories(pack, trace, &slots);
+        Bodies { still: still.collect(), tracks, slots }
+    }
+}
+
+/// The bodies of a run: fixed ones and tracks, as the page gets them.
+#[derive(Debug, Default)]
+struct Bodies {
+    still: Vec<Value>,
+    tracks: Vec<Value>,
+    /// Place of each track in the frames.
+    slots: Vec<usize>,
+}
+
+fn packed_runs(runs: &[(&ReplayedRun, Bodies)]) -> Vec<String> {
+    let packed =
+        |((run, trace, explained), bodies): &(&ReplayedRun, Bodies)| bodies.packed(run, trace.as_ref(), explained);
+    runs.iter().map(packed).collect()
+}
+
+impl Bodies {
+    fn packed(&self, run: &RunDetail, trace: Option<&Trace>, explained: &[Explained]) -> String {
+        let mut pack = Pack::default();
+        details(&mut pack, run);
+        let actions: Vec<Value> =
+            run.actions.iter().enumerate().map(|(idx, _)| action(run, trace, idx, explained)).collect();
+        pack.set("actions", actions);
+        if let Some(trace) = trace.filter(|trace| !trace.snapshots.is_empty()) {
+            pack.set("still", self.still.clone());
+            pack.set("tracks", self.tracks.clone());
+            set_trajectories(&mut pack, trace, &self.slots);
+            pack.set("pressed", pressed(run, trace));
+        }
+        pack.finish()
     }
 }
 
@@ -177,6 +232,23 @@ fn columns(rows: &[Vec<f32>], slots: &[usize]) -> (Vec<Vec<i16>>, [f64; 3], f64)
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// The page may depend neither on the number of cores nor on how many runs are read at once.
+    #[test]
+    fn shapes_of_runs_beyond_the_room_are_forgotten() {
+        let form = |size: f64| {
+            let part = actcheck_data::Part {
+                pose: actcheck_data::Pose::IDENTITY,
+                shape: actcheck_data::Shape::Sphere { radius: size },
+            };
+            Form { name: "a".to_owned(), parts: vec![part] }
+        };
+        let mut shapes = Shapes::default();
+        assert_eq!([0.1, 0.2, 0.3].map(|size| shapes.of(&form(size))), [0, 1, 2]);
+        shapes.truncate(1);
+        assert_eq!([0.1, 0.3].map(|size| shapes.of(&form(size))), [0, 1]);
+        assert_eq!(shapes.all().len(), 2);
+    }
 
     #[test]
     fn trajectories_are_exact_to_a_tenth_of_a_millimetre() {

@@ -9,16 +9,18 @@ pub(super) const STYLE: [&str; 4] = [
 ];
 
 /// Scripts. All share one scope; the last one starts the program.
-pub(super) const SCRIPT: [&str; 26] = [
+pub(super) const SCRIPT: [&str; 31] = [
     include_str!("web/dom.js"),
     include_str!("web/unpack.js"),
     include_str!("web/words.js"),
     include_str!("web/outcomes.js"),
     include_str!("web/runs.js"),
+    include_str!("web/address.js"),
     include_str!("web/filter.js"),
     include_str!("web/list.js"),
     include_str!("web/plots.js"),
     include_str!("web/scatter.js"),
+    include_str!("web/outline.js"),
     include_str!("web/overview.js"),
     include_str!("web/properties.js"),
     include_str!("web/modes.js"),
@@ -30,8 +32,11 @@ pub(super) const SCRIPT: [&str; 26] = [
     include_str!("web/three.js"),
     include_str!("web/solids.js"),
     include_str!("web/course.js"),
+    include_str!("web/closest.js"),
+    include_str!("web/labels.js"),
     include_str!("web/orbit.js"),
     include_str!("web/stage.js"),
+    include_str!("web/signals.js"),
     include_str!("web/timeline.js"),
     include_str!("web/player.js"),
     include_str!("web/run.js"),

@@ -38,6 +38,12 @@ impl Shapes {
         number
     }
 
+    /// Removes all shapes but the first `count`.
+    pub fn truncate(&mut self, count: usize) {
+        self.forms.truncate(count);
+        self.known.retain(|_, number| *number < count);
+    }
+
     /// All shapes, by index.
     pub fn all(&self) -> &[Value] {
         &self.forms

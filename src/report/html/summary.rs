@@ -131,6 +131,7 @@ fn property_slot(slot: &Slot, report: &HtmlReport<'_>) -> Value {
         "step": slot.step, "action": names::local(&slot.action), "property": names::local(&slot.property),
         "iri": slot.property, "label": words.map(|words| &words.label),
         "comment": words.and_then(|words| words.comment.as_ref()), "rule": words.map(|words| &words.rule),
+        "bounds": words.map(|words| words.bounds.iter().map(|bound| json!({ "at": bound.at, "below": bound.below })).collect::<Vec<_>>()),
         "of": of,
     })
 }

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use crate::picture::charts::Chart;
 use crate::picture::drawing::{Drawing, Paint, Rect, Style, Words};
 use crate::picture::{font, paint};
 use crate::pressed::Pressed;
@@ -31,6 +32,8 @@ pub struct Caption {
     pub failures: Vec<String>,
     /// Index of the action and witness of each failed property.
     pub witnesses: Vec<(usize, String)>,
+    /// The signals that decided failed properties about time.
+    pub charts: Vec<Chart>,
     /// Role of each object, by id.
     pub roles: BTreeMap<String, Role>,
 }
@@ -56,6 +59,7 @@ impl Caption {
             actions: run.actions.iter().map(what_was_done).collect(),
             failures: reason.chain(failed).collect(),
             witnesses: witnesses.collect(),
+            charts: Vec::new(),
             roles: run.objects.iter().map(|object| (object.id.clone(), object.role)).collect(),
         }
     }

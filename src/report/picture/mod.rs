@@ -3,10 +3,12 @@
 //! From a run to pixels: [`run`] lays out the panels, [`window`] selects the region that each shows, [`outline`] and
 //! [`paths`] compute the outlines of bodies and the paths of motions, and [`labels`] places names. The result is a
 //! [`drawing`] of plain shapes, which [`svg`] writes and [`png`] rasterises, with glyphs from [`font`]. [`patterns`]
-//! draws the runs of patterns in the same way, and [`collisions`] the things that were hit.
+//! draws the runs of patterns in the same way, [`collisions`] the things that were hit, and [`charts`] the signals that
+//! decided properties about time.
 //!
 //! Never: reads or writes a file, or uses a shape that is not in the trace.
 
+mod charts;
 mod collisions;
 mod drawing;
 mod font;
@@ -23,6 +25,7 @@ mod run;
 mod svg;
 mod window;
 
+pub use charts::Chart;
 pub use collisions::collisions_picture;
 pub use drawing::Drawing;
 pub use header::Caption;

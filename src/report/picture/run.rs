@@ -7,7 +7,7 @@ use crate::picture::drawing::{Drawing, Paint, Rect, Words};
 use crate::picture::panel::{Moment, PanelData};
 use crate::picture::paths::{Mover, paths};
 use crate::picture::window::{Bounds, View, Window, close_ups, overview};
-use crate::picture::{header, legend, paint, panel};
+use crate::picture::{charts, header, legend, paint, panel};
 use crate::pressed::hardest_of_run;
 use actcheck_data::{Role, Trace};
 
@@ -25,7 +25,8 @@ const HIGHEST_PX: [f64; 3] = [330.0, 430.0, 340.0];
 /// On the left is the state before the first action with percepts; on the right is the state after the last action with
 /// the paths of base, hand and target, in the colour of the action, and a mark at the hardest contact of the robot with
 /// something that it is not to touch. The top row is a map, if the world is larger than
-/// the close-ups; below it are close-ups from above and from the side.
+/// the close-ups; below it are close-ups from above and from the side, and charts of the signals that decided failed
+/// properties about time.
 pub fn run_picture(caption: &Caption, trace: &Trace) -> Option<Drawing> {
     let of_role =
         |role: Role| caption.roles.iter().filter(move |(_, other)| **other == role).map(|(id, _)| id.as_str());
@@ -54,6 +55,8 @@ pub fn run_picture(caption: &Caption, trace: &Trace) -> Option<Drawing> {
     for (view, bounds, kind) in whole.into_iter().chain([(View::TOP, close_ups, 1), (side, close_ups, 2)]) {
         y = row(&mut drawing, &data, view, &bounds, kind, y);
     }
+    let below = Rect { left: GAP_PX, top: y, width: inner, height: 0.0 };
+    y = charts::draw(&mut drawing, &caption.charts, below, GAP_PX);
     drawing.height = legend::draw(&mut drawing, &data, GAP_PX, y, inner) + GAP_PX / 2.0;
     Some(drawing)
 }

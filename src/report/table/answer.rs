@@ -47,7 +47,7 @@ fn value(term: &Term, short: bool) -> Value {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::TableFormat;
+    use crate::{Page, TableFormat};
 
     #[test]
     fn people_get_short_iris_and_programs_full_ones() {
@@ -55,9 +55,9 @@ mod tests {
             columns: vec!["run".into(), "n".into()],
             rows: vec![vec![Some(Term::iri("https://w3id.org/actcheck/run/k7f3-1")), None]],
         };
-        assert_eq!(answer_table(&answer, true).render(TableFormat::Csv), "run,n\nrun:k7f3-1,\n");
+        assert_eq!(answer_table(&answer, true).render(TableFormat::Csv, Page::default()), "run,n\nrun:k7f3-1,\n");
         assert_eq!(
-            answer_table(&answer, false).render(TableFormat::Csv),
+            answer_table(&answer, false).render(TableFormat::Csv, Page::default()),
             "run,n\nhttps://w3id.org/actcheck/run/k7f3-1,\n"
         );
     }

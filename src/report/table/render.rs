@@ -2,7 +2,7 @@
 
 use serde_json::{Map, Value};
 
-use crate::text::{fit, hidden_columns, ruled, terminal_width};
+use crate::text::{Page, fit, ruled, stacked};
 
 /// Output format of a table.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -39,40 +39,38 @@ impl Table {
         Self { expendable: expendable.into_iter().collect(), ..self }
     }
 
-    /// Renders the table, with a trailing newline.
-    pub fn render(&self, format: TableFormat) -> String {
+    /// Renders the table, with a trailing newline. Only text depends on the page.
+    pub fn render(&self, format: TableFormat, page: Page) -> String {
         match format {
-            TableFormat::Table => self.text(terminal_width()),
+            TableFormat::Table => self.text(page),
             TableFormat::Csv => self.csv(),
             TableFormat::Json => self.json(),
         }
     }
 
     /// Aligned columns, or one line for each value if they are too wide for the terminal.
-    fn text(&self, width: Option<usize>) -> String {
+    fn text(&self, page: Page) -> String {
         let mut table = ruled();
         table.set_header(&self.columns);
         for row in &self.rows {
             table.add_row(row.iter().map(plain));
         }
-        let hidden = match width {
-            Some(width) => fit(&mut table, width, &self.expendable),
-            None => Some(Vec::new()),
-        };
-        match hidden {
-            Some(hidden) => format!("{table}\n{}", hidden_columns(&hidden)),
-            None => self.stacked(),
-        }
+        page.set(&match fit(&mut table, page, &self.expendable) {
+            Some(hidden) if hidden.is_empty() => format!("{table}\n"),
+            Some(hidden) => {
+                let hidden = hidden.join(", ");
+                format!("{table}\n (not shown at this width: {hidden}; `--format csv` has all columns)\n")
+            }
+            None => stacked(&self.texts()),
+        })
     }
 
-    /// One line for each value; rows are separated by an empty line.
-    fn stacked(&self) -> String {
-        let longest = self.columns.iter().map(|name| name.chars().count()).max().unwrap_or(0);
-        let row = |row: &Vec<Value>| -> String {
-            let pairs = self.columns.iter().zip(row);
-            pairs.map(|(name, value)| format!(" {name:longest$}   {}\n", plain(value))).collect()
+    /// The texts of each column, the header first.
+    fn texts(&self) -> Vec<Vec<String>> {
+        let column = |(idx, name): (usize, &String)| {
+            std::iter::once(name.clone()).chain(self.rows.iter().map(|row| plain(&row[idx]))).collect()
         };
-        self.rows.iter().map(row).collect::<Vec<_>>().join("\n")
+        self.columns.iter().enumerate().map(column).collect()
     }
 
     fn csv(&self) -> String {
@@ -118,9 +116,12 @@ mod tests {
         let mut table = Table::new(["run", "score", "note"]);
         table.rows.push(vec!["k-1".into(), 0.8.into(), Value::Null]);
         table.rows.push(vec!["k-2".into(), 1.0.into(), "a, \"b\"".into()]);
-        assert_eq!(table.render(TableFormat::Csv), "run,score,note\nk-1,0.8,\nk-2,1.0,\"a, \"\"b\"\"\"\n");
-        assert!(table.render(TableFormat::Json).contains("\"note\": null"));
-        assert!(table.render(TableFormat::Table).contains("k-1"));
+        assert_eq!(
+            table.render(TableFormat::Csv, Page::default()),
+            "run,score,note\nk-1,0.8,\nk-2,1.0,\"a, \"\"b\"\"\"\n"
+        );
+        assert!(table.render(TableFormat::Json, Page::default()).contains("\"note\": null"));
+        assert!(table.render(TableFormat::Table, Page::default()).contains("k-1"));
     }
 
     #[test]
@@ -129,8 +130,9 @@ mod tests {
         table.rows.push(vec!["https://example.org/a/long/name".into(), 1.into()]);
         table.rows.push(vec!["b".into(), 2.into()]);
         let wide = " iri     https://example.org/a/long/name\n count   1\n\n iri     b\n count   2\n";
-        assert_eq!(table.text(Some(20)), wide);
-        assert!(table.text(Some(35)).contains("not shown at this width: count;"), "{}", table.text(Some(35)));
-        assert!(!table.text(None).contains("not shown"));
+        let text = |width: usize| table.text(Page { width: Some(width), colour: false });
+        assert_eq!(text(22), wide);
+        assert!(text(35).contains("not shown at this width: count;"), "{}", text(35));
+        assert!(!table.text(Page::default()).contains("not shown"));
     }
 }

@@ -3,7 +3,7 @@
 
 use comfy_table::{Attribute, Cell, Color};
 
-use crate::text::ruled;
+use crate::text::{Page, fit, fitted, ruled};
 use crate::{ActionSummary, CampaignSummary, PropertyLine, RunSummary};
 use actcheck_base::Outcome;
 use actcheck_verdict::{Counts, mean};
@@ -15,14 +15,20 @@ pub(super) fn has_several_actions(summary: &CampaignSummary) -> bool {
 
 /// Scores of the shown runs: the paper's A of each action, and S. The last line has the means over all runs (T in
 /// column S).
-pub(super) fn scores_table(summary: &CampaignSummary, shown: &[&RunSummary], colour: bool) -> comfy_table::Table {
-    let mut table = ruled();
-    if colour {
-        table.enforce_styling();
-    } else {
-        table.force_no_tty();
+pub(super) fn scores_table(summary: &CampaignSummary, shown: &[&RunSummary], page: Page) -> String {
+    let names = steps(summary);
+    let mut table = table_of_scores(summary, shown, &names);
+    if fit(&mut table, page, &[]).is_some() {
+        return format!("{table}\n");
     }
-    let steps = steps(summary);
+    // Names of actions are wider than their scores.
+    let short: Vec<String> = (1..=names.len()).map(|step| format!("A{step}")).collect();
+    let legend = format!(" ({})\n", names.join(", "));
+    fitted(table_of_scores(summary, shown, &short), page, &["test"]) + &legend
+}
+
+fn table_of_scores(summary: &CampaignSummary, shown: &[&RunSummary], steps: &[String]) -> comfy_table::Table {
+    let mut table = ruled();
     let is_one_test = summary.runs.windows(2).all(|pair| pair[0].test == pair[1].test);
     let mut header = vec!["run".to_owned()];
     if !is_one_test {
@@ -88,7 +94,6 @@ pub(super) fn properties_table(
     rate: impl Fn(&PropertyLine) -> String,
 ) -> comfy_table::Table {
     let mut table = ruled();
-    table.force_no_tty();
     let counted = Outcome::ALL.map(|outcome| outcome.word().to_owned());
     let header = ["action", "property", "pass rate [95 % interval]"].map(str::to_owned);
     table.set_header(header.into_iter().chain(counted));
@@ -126,7 +131,7 @@ mod tests {
         let summary = campaign(runs);
         assert!(has_several_actions(&summary));
         let shown: Vec<&RunSummary> = summary.runs.iter().collect();
-        let text = scores_table(&summary, &shown, false).to_string();
+        let text = scores_table(&summary, &shown, Page::default());
         let rows: Vec<Vec<&str>> = text.lines().map(|line| line.split_whitespace().collect()).collect();
         assert_eq!(rows[0], ["run", "A1", "Pick", "A2", "Place", "S"], "{text}");
         assert_eq!(rows[2], ["k7f3-1", "1.00", "0.50", "0.75"]);

@@ -2,11 +2,11 @@
 
 use std::fmt::Write as _;
 
-use comfy_table::{Attribute, Cell, Color};
+use comfy_table::{Attribute, Cell, Color, Table};
 
 use crate::text::repeated::repeated_text;
 use crate::text::weighted::weighted_text;
-use crate::text::{by_action, fit, regressions_text, ruled, terminal_width};
+use crate::text::{Page, by_action, command, fit, fitted, regressions_text, ruled};
 use crate::{CampaignSummary, PropertyLine, Proportion, RunSummary};
 use actcheck_base::{Outcome, names};
 use actcheck_history::SkillRecord;
@@ -17,25 +17,34 @@ const RUNS_SHOWN: usize = 40;
 const FAILURES_SHOWN: usize = 20;
 
 /// Formats the table of runs × properties, the scores, and the witness of each failed property.
-pub fn campaign_text(summary: &CampaignSummary, colour: bool) -> String {
+pub fn campaign_text(summary: &CampaignSummary, page: Page) -> String {
     let mut out = regressions_text(&summary.regressions);
     if !out.is_empty() {
         out.push('\n');
     }
-    runs_table(&mut out, summary, colour);
+    runs_table(&mut out, summary, page);
     out.push('\n');
-    properties_table(&mut out, summary);
+    out.push_str(&properties_text(summary, page));
     out.push('\n');
-    repeated_text(&mut out, summary);
-    weighted_text(&mut out, summary);
+    repeated_text(&mut out, summary, page);
+    weighted_text(&mut out, summary, page);
     scores(&mut out, summary);
     failure_modes(&mut out, summary);
     remarks(&mut out, summary);
     failures(&mut out, summary);
-    out
+    page.set(&out)
 }
 
-fn runs_table(out: &mut String, summary: &CampaignSummary, colour: bool) {
+/// Formats only the result: scores, which properties fail together, and the witness of each failed property.
+pub fn campaign_result_text(summary: &CampaignSummary, page: Page) -> String {
+    let mut out = regressions_text(&summary.regressions);
+    scores(&mut out, summary);
+    failure_modes(&mut out, summary);
+    failures(&mut out, summary);
+    page.set(&out)
+}
+
+fn runs_table(out: &mut String, summary: &CampaignSummary, page: Page) {
     if summary.runs.is_empty() {
         return;
     }
@@ -43,27 +52,18 @@ fn runs_table(out: &mut String, summary: &CampaignSummary, colour: bool) {
     let fit = summary.runs.len() <= RUNS_SHOWN;
     let shown: Vec<&RunSummary> = summary.runs.iter().filter(|run| fit || !run.passed()).take(RUNS_SHOWN).collect();
     let several = by_action::has_several_actions(summary);
-    let table = if several { by_action::scores_table } else { outcomes_table }(summary, &shown, colour);
-    let _ = writeln!(out, "{table}");
+    out.push_str(&if several { by_action::scores_table } else { outcomes_table }(summary, &shown, page));
     let left_out = summary.runs.len() - shown.len();
     if left_out > 0 {
         let passed = summary.runs.iter().filter(|run| run.passed()).count();
-        let _ = writeln!(
-            out,
-            "{left_out} more runs ({passed} of all passed): {} list --history {}",
-            summary.program, summary.history
-        );
+        let more = command(format!("{} list --history {}", summary.program, summary.history));
+        let _ = writeln!(out, "{left_out} more runs ({passed} of all passed): {more}");
     }
 }
 
 /// Outcomes of the shown runs, for tests with a single action.
-fn outcomes_table(summary: &CampaignSummary, shown: &[&RunSummary], colour: bool) -> comfy_table::Table {
+fn outcomes_table(summary: &CampaignSummary, shown: &[&RunSummary], page: Page) -> String {
     let mut table = ruled();
-    if colour {
-        table.enforce_styling();
-    } else {
-        table.force_no_tty();
-    }
     let labels = summary.properties.iter().map(|(_, label, _)| label.clone());
     table.set_header(["run".to_owned(), "test".to_owned()].into_iter().chain(labels).chain(["S".to_owned()]));
     for run in shown {
@@ -71,6 +71,37 @@ fn outcomes_table(summary: &CampaignSummary, shown: &[&RunSummary], colour: bool
         row.extend(summary.properties.iter().map(|(iri, ..)| outcomes_cell(run, iri)));
         row.push(Cell::new(format!("{:.2}", run.score)));
         table.add_row(row);
+    }
+    match fit(&mut table, page, &["test"]) {
+        Some(_) => format!("{table}\n"),
+        None => fitted(narrow_outcomes(summary, shown), page, &["test", "S"]),
+    }
+}
+
+/// As [`outcomes_table`], but names the properties of each outcome instead of a column for each property.
+fn narrow_outcomes(summary: &CampaignSummary, shown: &[&RunSummary]) -> Table {
+    let mut table = ruled();
+    table.set_header(["run", "test", "outcomes", "S"]);
+    for run in shown {
+        let judged = || run.actions.iter().flat_map(|action| &action.judgements);
+        let label = |iri: &str| summary.properties.iter().find(|(known, ..)| known == iri).map(|(_, label, _)| label);
+        let of = |outcome: Outcome| {
+            let of = judged().filter(|judgement| judgement.outcome == outcome);
+            let names: Vec<&str> = of.filter_map(|judgement| label(&judgement.property)).map(String::as_str).collect();
+            (!names.is_empty()).then(|| format!("{outcome}: {}", names.join(", ")))
+        };
+        let others: Vec<String> =
+            Outcome::ALL.into_iter().filter(|one| *one != Outcome::Passed).filter_map(of).collect();
+        let outcomes = if others.is_empty() { "all passed".to_owned() } else { others.join("; ") };
+        let colour = if run.passed() {
+            Color::Green
+        } else if run.failed() {
+            Color::Red
+        } else {
+            Color::Yellow
+        };
+        let score = Cell::new(format!("{:.2}", run.score));
+        table.add_row([Cell::new(&run.id), Cell::new(&run.test), Cell::new(outcomes).fg(colour), score]);
     }
     table
 }
@@ -99,13 +130,30 @@ fn outcomes_cell(run: &RunSummary, property: &str) -> Cell {
     }
 }
 
-fn properties_table(out: &mut String, summary: &CampaignSummary) {
-    if by_action::has_several_actions(summary) {
-        let _ = writeln!(out, "{}", by_action::properties_table(summary, pass_rate));
-        return;
+/// Formats the pass rate of each property. A narrow page leaves out counts: first those that are all zero, then those
+/// that the rate has too.
+fn properties_text(summary: &CampaignSummary, page: Page) -> String {
+    let lines = summary.property_lines();
+    let is_zero = |outcome: &Outcome| lines.iter().all(|line| line.counts.get(*outcome) == 0);
+    let (zero, other): (Vec<Outcome>, Vec<Outcome>) = Outcome::ALL.into_iter().rev().partition(is_zero);
+    let (zero, other) = (zero.into_iter().map(Outcome::word), other.into_iter().rev().map(Outcome::word));
+    let expendable: Vec<&str> = zero.clone().chain(other).collect();
+    let by_action = by_action::has_several_actions(summary);
+    let mut table = if by_action { by_action::properties_table(summary, pass_rate) } else { properties_table(summary) };
+    let Some(hidden) = fit(&mut table, page, &expendable) else { return fitted(table, page, &[]) };
+    let mut out = format!("{table}\n");
+    let (empty, left_out): (Vec<&str>, Vec<&str>) =
+        hidden.iter().map(String::as_str).partition(|name| zero.clone().any(|word| word == *name));
+    for (title, names) in [("all zero", empty), ("not shown at this width", left_out)] {
+        if !names.is_empty() {
+            let _ = writeln!(out, " ({title}: {})", names.join(", "));
+        }
     }
+    out
+}
+
+fn properties_table(summary: &CampaignSummary) -> Table {
     let mut table = ruled();
-    table.force_no_tty();
     let counted = Outcome::ALL.map(|outcome| outcome.word().to_owned());
     table.set_header(["property".to_owned(), "pass rate [95 % interval]".to_owned()].into_iter().chain(counted));
     for line in summary.property_lines() {
@@ -113,15 +161,7 @@ fn properties_table(out: &mut String, summary: &CampaignSummary) {
         let counts = Outcome::ALL.map(|outcome| line.counts.get(outcome).to_string());
         table.add_row([line.label, rate].into_iter().chain(counts));
     }
-    let lines = summary.property_lines();
-    // In a narrow terminal, counts that are all zero are left out.
-    let zero = Outcome::ALL.into_iter().rev().filter(|outcome| lines.iter().all(|line| line.counts.get(*outcome) == 0));
-    let zero: Vec<&str> = zero.map(Outcome::word).collect();
-    let hidden = terminal_width().and_then(|width| fit(&mut table, width, &zero)).unwrap_or_default();
-    let _ = writeln!(out, "{table}");
-    if !hidden.is_empty() {
-        let _ = writeln!(out, " (all zero: {})", hidden.join(", "));
-    }
+    table
 }
 
 fn pass_rate(line: &PropertyLine) -> String {
@@ -133,9 +173,12 @@ fn scores(out: &mut String, summary: &CampaignSummary) {
     let broken = summary.runs.len() - summary.runs.iter().filter(|run| run.reason.is_none()).count();
     let _ = writeln!(
         out,
-        "T = {} over {} runs (without broken runs {}); {} did not complete; {} scenes discarded",
+        "T = {} over {} (without broken runs {}); {} did not complete; {} scenes discarded",
         score(summary.total_score()),
-        summary.runs.len(),
+        match summary.runs.len() {
+            1 => "1 run".to_owned(),
+            count => format!("{count} runs"),
+        },
         score(summary.total_score_without_broken()),
         broken,
         summary.discards,
@@ -204,16 +247,12 @@ fn failures(out: &mut String, summary: &CampaignSummary) {
                 let _ = writeln!(out, "  {} failed: {label}: {}", action.name, judgement.witness);
             }
         }
-        let _ = writeln!(out, "  more: {} show {} --history {}", summary.program, run.id, summary.history);
+        let more = command(format!("{} show {} --history {}", summary.program, run.id, summary.history));
+        let _ = writeln!(out, "  more: {more}");
     }
     if shown.len() > FAILURES_SHOWN {
-        let _ = writeln!(
-            out,
-            "\n{} more runs did not pass: {} list --history {}",
-            shown.len() - FAILURES_SHOWN,
-            summary.program,
-            summary.history
-        );
+        let more = command(format!("{} list --history {}", summary.program, summary.history));
+        let _ = writeln!(out, "\n{} more runs did not pass: {more}", shown.len() - FAILURES_SHOWN);
     }
 }
 
@@ -229,7 +268,7 @@ mod tests {
             run(0, RunStatus::Completed, &[Outcome::Passed, Outcome::Failed]),
             run(1, RunStatus::Broken, &[Outcome::Broken, Outcome::Broken]),
         ]);
-        let text = campaign_text(&summary, false);
+        let text = campaign_text(&summary, Page::default());
         assert!(text.contains("Pick failed: property 1: glass_1 moved 0.4 cm, needs more than 2 cm"), "{text}");
         assert!(text.contains("actcheck show k7f3-1 --history configs/.actcheck"), "{text}");
         assert!(text.contains("T = 0.2500 over 2 runs (without broken runs 0.5000); 1 did not complete"), "{text}");

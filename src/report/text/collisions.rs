@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use crate::summary::percent;
-use crate::text::ruled;
+use crate::text::{Page, fitted, ruled};
 use actcheck_analysis::{Collisions, HitKind, Interval, Sector};
 use actcheck_base::names;
 
@@ -18,7 +18,7 @@ pub(super) fn shade(rate: f64) -> char {
 }
 
 /// Writes the collisions of each action: the things that were hit, how often, how hard, and where they were.
-pub(super) fn collisions(out: &mut String, all: &[Collisions]) {
+pub(super) fn collisions(out: &mut String, all: &[Collisions], page: Page) {
     let hit = || all.iter().filter(|of| of.hit > 0);
     if hit().next().is_none() {
         return;
@@ -26,8 +26,8 @@ pub(super) fn collisions(out: &mut String, all: &[Collisions]) {
     out.push_str("\ncollisions (with things that the action is not to touch, with more than 1 N)\n");
     for of in hit() {
         let _ = writeln!(out, "{}: in {} of {} runs", names::local(&of.action), interval(of.rate), of.executions);
-        kinds(out, of);
-        places(out, of);
+        kinds(out, of, page);
+        places(out, of, page);
     }
 }
 
@@ -35,7 +35,7 @@ fn interval(rate: Interval) -> String {
     format!("{} [{:.0}–{:.0}]", percent(rate.rate), rate.low * 100.0, rate.high * 100.0)
 }
 
-fn kinds(out: &mut String, of: &Collisions) {
+fn kinds(out: &mut String, of: &Collisions, page: Page) {
     let mut table = ruled();
     table.set_header(["hit", "share", "runs", "median N", "max N", "mostly by", "mostly in", "mostly", "such as"]);
     for kind in &of.kinds {
@@ -53,7 +53,8 @@ fn kinds(out: &mut String, of: &Collisions) {
             kind.runs.first().cloned().unwrap_or_default(),
         ]);
     }
-    let _ = writeln!(out, "{table}");
+    let expendable = ["mostly in", "mostly", "median N", "such as", "mostly by", "runs", "max N"];
+    out.push_str(&fitted(table, page, &expendable));
 }
 
 /// Formats the most frequent names; with their counts, unless there is only one name.
@@ -70,7 +71,7 @@ fn names_of(counts: &[(String, u64)], most: usize, kind: &HitKind) -> String {
 }
 
 /// Writes how often movable things were hit, by their place around the goal.
-fn places(out: &mut String, of: &Collisions) {
+fn places(out: &mut String, of: &Collisions, page: Page) {
     if of.sectors.iter().flatten().all(|sector| sector.present == 0) {
         return;
     }
@@ -82,7 +83,7 @@ fn places(out: &mut String, of: &Collisions) {
         let direction = row.first().map_or("", |sector| sector.direction);
         table.add_row(std::iter::once(direction.to_owned()).chain(row.iter().map(cell)));
     }
-    let _ = writeln!(out, "{table}");
+    out.push_str(&fitted(table, page, &[]));
 }
 
 fn band(sector: &Sector) -> String {

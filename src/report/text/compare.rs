@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use crate::summary::compared_name;
-use crate::text::ruled;
+use crate::text::{Page, fitted, ruled};
 use crate::{CompareSummary, ComparedSide};
 use actcheck_analysis::{Answer, ComparedLine, PairedTable};
 use actcheck_base::Outcome;
@@ -13,20 +13,20 @@ use actcheck_verdict::Counts;
 const MAX_LISTED: usize = 10;
 
 /// Formats both sides, their differences, rates and tests of each property, the scenes that flipped, and the verdict.
-pub fn compare_text(summary: &CompareSummary) -> String {
+pub fn compare_text(summary: &CompareSummary, page: Page) -> String {
     let mut out = String::new();
     let [first, second] = &summary.sides;
     let _ = writeln!(out, "A  {}\nB  {}", side(first), side(second));
     scenes(&mut out, summary);
     changes(&mut out, summary);
     out.push('\n');
-    lines(&mut out, summary);
+    lines(&mut out, summary, page);
     flips(&mut out, summary);
     left_out(&mut out, summary);
     alone(&mut out, summary);
     answers(&mut out, summary);
     verdict(&mut out, summary);
-    out
+    page.set(&out)
 }
 
 fn side(side: &ComparedSide) -> String {
@@ -89,18 +89,9 @@ fn shortened(text: &str) -> String {
     pieces.map(short).collect()
 }
 
-fn lines(out: &mut String, summary: &CompareSummary) {
+fn lines(out: &mut String, summary: &CompareSummary, page: Page) {
     let mut table = ruled();
-    table.force_no_tty().set_header([
-        "passed in",
-        "A",
-        "B",
-        "B − A, percent [95 %]",
-        "only A",
-        "only B",
-        "p",
-        "p, corrected",
-    ]);
+    table.set_header(["passed in", "A", "B", "B − A, percent [95 %]", "only A", "only B", "p", "p corrected"]);
     for line in &summary.comparison.lines {
         let [a, b] = line.table.passed().map(|passed| format!("{passed}/{}", line.table.pairs()));
         let PairedTable { only_first, only_second, .. } = line.table;
@@ -117,7 +108,8 @@ fn lines(out: &mut String, summary: &CompareSummary) {
     }
     let _ = writeln!(
         out,
-        "{table}\n\np: McNemar's exact test, two-sided; corrected: for {} lines, by Holm. [95 %]: Tango's score interval",
+        "{}\np: McNemar's exact test, two-sided; corrected: for {} lines, by Holm. [95 %]: Tango's score interval",
+        fitted(table, page, &["p", "only A", "only B", "p corrected"]),
         summary.comparison.lines.len()
     );
 }

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use crate::summary::percent;
 use crate::text::collisions::{collisions, shade};
-use crate::text::{ruled, scene_rule};
+use crate::text::{Page, command, fitted, ruled, scene_rule};
 use crate::{Causes, FindingsSummary, PropertyReport, Proportion};
 use actcheck_analysis::{Judged, Pattern, TwoWay, TwoWayCell};
 use actcheck_base::{Outcome, names};
@@ -16,7 +16,7 @@ const MAX_LISTED: usize = 8;
 const MAX_LINES: usize = 10;
 /// Formats counts, failure modes, cascades and collisions, then each property with its patterns, margins, trend, flaky scenes and
 /// heat maps.
-pub fn findings_text(summary: &FindingsSummary) -> String {
+pub fn findings_text(summary: &FindingsSummary, page: Page) -> String {
     let mut out = String::new();
     let campaigns = list(summary.campaigns.iter().map(String::as_str));
     let plural = if summary.campaigns.len() == 1 { "" } else { "s" };
@@ -25,13 +25,13 @@ pub fn findings_text(summary: &FindingsSummary) -> String {
         let _ = writeln!(out, "{}", twins_line(summary.twins));
     }
     let _ = writeln!(out, "{} outcomes: {}", summary.counts.total(), counts(summary.counts));
-    modes(&mut out, summary);
+    modes(&mut out, summary, page);
     cascades(&mut out, summary);
-    collisions(&mut out, &summary.collisions);
+    collisions(&mut out, &summary.collisions, page);
     for report in &summary.properties {
-        property(&mut out, report, summary);
+        property(&mut out, report, summary, page);
     }
-    out
+    page.set(&out)
 }
 
 fn twins_line(twins: u64) -> String {
@@ -52,7 +52,7 @@ fn list<'a>(ids: impl ExactSizeIterator<Item = &'a str>) -> String {
     format!("{}{rest}", shown.join(", "))
 }
 
-fn modes(out: &mut String, summary: &FindingsSummary) {
+fn modes(out: &mut String, summary: &FindingsSummary, page: Page) {
     if summary.modes.is_empty() {
         return;
     }
@@ -66,7 +66,7 @@ fn modes(out: &mut String, summary: &FindingsSummary) {
             format!("{} [{:.0}–{:.0}]", percent(mode.share.rate), mode.share.low * 100.0, mode.share.high * 100.0);
         table.add_row([share, mode.runs.len().to_string(), failed, mode.runs.first().cloned().unwrap_or_default()]);
     }
-    let _ = writeln!(out, "{table}");
+    out.push_str(&fitted(table, page, &["example"]));
     rest(out, summary.modes.len());
 }
 
@@ -100,7 +100,7 @@ fn cascades(out: &mut String, summary: &FindingsSummary) {
     rest(out, summary.cascades.len());
 }
 
-fn property(out: &mut String, report: &PropertyReport, summary: &FindingsSummary) {
+fn property(out: &mut String, report: &PropertyReport, summary: &FindingsSummary, page: Page) {
     let found = &report.findings;
     let _ = write!(out, "\n{} ({}): ", report.name(), names::local(&found.action));
     match Proportion::new(found.counts.failed, found.counts.decided()) {
@@ -127,7 +127,7 @@ fn property(out: &mut String, report: &PropertyReport, summary: &FindingsSummary
         let (flaky, all) = (scenes.len(), report.repeated_scenes);
         let _ = writeln!(out, "  flaky in {flaky} of {all} scenes: {}", list(scenes.iter().map(String::as_str)));
     }
-    report.maps.iter().for_each(|shown| map(out, shown));
+    report.maps.iter().for_each(|shown| map(out, shown, page));
 }
 
 fn patterns(out: &mut String, report: &PropertyReport, summary: &FindingsSummary) {
@@ -238,13 +238,16 @@ fn evidence(out: &mut String, causes: &Causes<'_>, pattern: &Pattern) {
 fn more_scenes(out: &mut String, report: &PropertyReport, pattern: &Pattern, summary: &FindingsSummary, number: usize) {
     let parameters = &report.findings.input.parameters;
     if scene_rule(&pattern.conditions, parameters, "").is_ok() {
-        let _ = writeln!(
-            out,
-            "     more such scenes: {} analyse --property {} --scene-rule {number}{} > more.rls, and `require = \"more.rls\"` under \
-             `[scene]` of a configuration in the same folder",
+        let more = command(format!(
+            "{} analyse --property {} --scene-rule {number}{} > more.rls",
             summary.program,
             report.name(),
             summary.options
+        ));
+        let _ = writeln!(
+            out,
+            "     more such scenes: {more}, and `require = \"more.rls\"` under `[scene]` of a configuration in the same \
+             folder"
         );
     }
 }
@@ -292,7 +295,7 @@ fn trend(out: &mut String, report: &PropertyReport) {
     }
 }
 
-fn map(out: &mut String, map: &TwoWay) {
+fn map(out: &mut String, map: &TwoWay, page: Page) {
     let (down, across) = (map.by.first().map_or("", String::as_str), map.by.get(1).map_or("", String::as_str));
     let title = if across.is_empty() { down.to_owned() } else { format!("{down} (down) and {across} (across)") };
     let _ = writeln!(out, "\n  failures by {title}");
@@ -301,7 +304,7 @@ fn map(out: &mut String, map: &TwoWay) {
     for (label, cells) in map.down.iter().zip(&map.cells) {
         table.add_row(std::iter::once(label.clone()).chain(cells.iter().map(shaded)));
     }
-    let _ = writeln!(out, "{table}");
+    out.push_str(&fitted(table, page, &[]));
 }
 
 /// Formats a heat map cell, such as `▒ 45 % of 40`.

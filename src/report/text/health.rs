@@ -3,10 +3,10 @@
 use std::fmt::Write as _;
 
 use crate::HealthSummary;
-use crate::text::ruled;
+use crate::text::{Page, command, fitted, ruled};
 
 /// One line for each warning, for the end of a campaign's summary. Empty if the campaign is healthy.
-pub fn health_lines(summary: &HealthSummary) -> String {
+pub fn health_lines(summary: &HealthSummary, page: Page) -> String {
     let mut out = String::new();
     for warning in summary.warnings().iter() {
         let help = warning.help.as_deref().unwrap_or_default();
@@ -14,18 +14,18 @@ pub fn health_lines(summary: &HealthSummary) -> String {
     }
     if !out.is_empty() {
         out.insert(0, '\n');
-        let _ = writeln!(out, "  more: {} health {} --history {}", summary.program, summary.campaign, summary.history);
+        let more = format!("{} health {} --history {}", summary.program, summary.campaign, summary.history);
+        let _ = writeln!(out, "  more: {}", command(more));
     }
-    out
+    page.set(&out)
 }
 
 /// Formats coverage, then the other measurements.
-pub fn health_text(summary: &HealthSummary) -> String {
+pub fn health_text(summary: &HealthSummary, page: Page) -> String {
     let health = &summary.health;
     let mut out = String::new();
     if !health.parameters.is_empty() {
         let mut table = ruled();
-        table.force_no_tty();
         table.set_header(["parameter", "draws", "bins hit (expected)", "draws in each bin"]);
         for parameter in &health.parameters {
             let counts: Vec<String> = parameter.counts.iter().map(u64::to_string).collect();
@@ -36,7 +36,7 @@ pub fn health_text(summary: &HealthSummary) -> String {
                 counts.join(" "),
             ]);
         }
-        let _ = writeln!(out, "{table}\n");
+        let _ = writeln!(out, "{}", fitted(table, page, &["draws in each bin", "draws"]));
     }
     let (hits, expected, cells) = summary.pairs();
     if cells > 0 {
@@ -58,5 +58,5 @@ pub fn health_text(summary: &HealthSummary) -> String {
         1 => writeln!(out, "campaign {} in {}: 1 warning", summary.campaign, summary.history),
         many => writeln!(out, "campaign {} in {}: {many} warnings", summary.campaign, summary.history),
     };
-    out
+    page.set(&out)
 }

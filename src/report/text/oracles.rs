@@ -3,13 +3,12 @@
 use std::fmt::Write as _;
 
 use crate::OracleSummary;
-use crate::text::ruled;
+use crate::text::{Page, fitted, ruled};
 use actcheck_analysis::{LEVEL, Notice};
 
 /// Formats the matrix: how often each property failed with each fault, and a legend.
-pub fn oracles_text(summary: &OracleSummary) -> String {
+pub fn oracles_text(summary: &OracleSummary, page: Page) -> String {
     let mut table = ruled();
-    table.force_no_tty();
     let names = summary.names.iter().cloned();
     table.set_header(["fault".to_owned(), "took effect".to_owned()].into_iter().chain(names));
     let matrix = &summary.matrix;
@@ -24,11 +23,11 @@ pub fn oracles_text(summary: &OracleSummary) -> String {
         let came_about = format!("{} of {}", row.came_about, row.scenes);
         table.add_row([row.fault.clone(), came_about].into_iter().chain(cells));
     }
-    let mut out = format!("{table}\n\n");
+    let mut out = fitted(table, page, &[]) + "\n";
     let _ = writeln!(
         out,
-        "failed/decided in the scenes in which the fault took effect; * noticed: fails significantly more often than in the\n\
-         same scenes without the fault (McNemar's exact test, one-sided, p ≤ {LEVEL})\n"
+        "failed/decided in the scenes in which the fault took effect; * noticed: fails significantly more often than in \
+         the same scenes without the fault (McNemar's exact test, one-sided, p ≤ {LEVEL})\n"
     );
     for (fault, what) in &summary.faults {
         let _ = writeln!(out, "  {fault}: {what}");
@@ -38,5 +37,5 @@ pub fn oracles_text(summary: &OracleSummary) -> String {
         1 => writeln!(out, "\n1 gap"),
         gaps => writeln!(out, "\n{gaps} gaps"),
     };
-    out
+    page.set(&out)
 }

@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use crate::summary::reason_text;
-use crate::text::ruled;
+use crate::text::{Page, fitted, ruled};
 use crate::{RecheckChange, RecheckSummary};
 use actcheck_base::{Outcome, names};
 use actcheck_verdict::Counts;
@@ -12,10 +12,10 @@ use actcheck_verdict::Counts;
 const MAX_LISTED: usize = 20;
 
 /// Formats the counts of each property before and now, and the outcomes that changed.
-pub fn recheck_text(summary: &RecheckSummary) -> String {
+pub fn recheck_text(summary: &RecheckSummary, page: Page) -> String {
     let mut out = String::new();
     let mut table = ruled();
-    table.force_no_tty().set_header(["property", "before", "now", "changed", "new"]);
+    table.set_header(["property", "before", "now", "changed", "new"]);
     for (iri, line) in &summary.properties {
         table.add_row([
             names::local(iri).to_owned(),
@@ -26,9 +26,9 @@ pub fn recheck_text(summary: &RecheckSummary) -> String {
         ]);
     }
     let restated: u64 = summary.properties.values().map(|line| line.restated).sum();
-    let _ = writeln!(out, "{table}\n\n{}", totals(summary, restated));
+    let _ = writeln!(out, "{}\n{}", fitted(table, page, &["new"]), totals(summary, restated));
     changes(&mut out, summary);
-    out
+    page.set(&out)
 }
 
 fn totals(summary: &RecheckSummary, restated: u64) -> String {

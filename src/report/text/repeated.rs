@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use crate::text::ruled;
+use crate::text::{Page, fitted, ruled};
 use crate::{CampaignSummary, RepeatedProperty};
 use actcheck_analysis::{PassPower, SceneCounts, Variance};
 
@@ -13,7 +13,7 @@ const POWERS_SHOWN: usize = 5;
 const SCENES_NAMED: usize = 6;
 
 /// Writes the consistency of repeated scenes. Writes nothing if every scene was run once.
-pub(super) fn repeated_text(out: &mut String, summary: &CampaignSummary) {
+pub(super) fn repeated_text(out: &mut String, summary: &CampaignSummary, page: Page) {
     let repeated = summary.repeated();
     let most = repeated.iter().map(|property| property.found.pass_powers.len()).max().unwrap_or(0);
     if most == 0 {
@@ -21,10 +21,10 @@ pub(super) fn repeated_text(out: &mut String, summary: &CampaignSummary) {
     }
     let powers = shown_powers(most);
     let mut table = ruled();
-    table.force_no_tty();
     let header = ["property", "always passed", "always failed", "flaky"].map(str::to_owned);
-    let of_powers = powers.iter().map(|k| format!("pass^{k} [95 % interval]"));
-    table.set_header(header.into_iter().chain(of_powers).chain(["variance from noise".to_owned()]));
+    let of_powers: Vec<String> = powers.iter().map(|k| format!("pass^{k} [95 % interval]")).collect();
+    let noise = "variance from noise";
+    table.set_header(header.into_iter().chain(of_powers.clone()).chain([noise.to_owned()]));
     for RepeatedProperty { label, found, .. } in &repeated {
         let scenes = found.always_passed + found.always_failed + found.flaky.len() as u64;
         let of = |count: u64| format!("{count} of {scenes}");
@@ -32,7 +32,10 @@ pub(super) fn repeated_text(out: &mut String, summary: &CampaignSummary) {
         let power = |k: &u64| found.pass_powers.iter().find(|power| power.k == *k).map_or_else(String::new, power_text);
         table.add_row(head.into_iter().chain(powers.iter().map(power)).chain([noise_share(found.outcome)]));
     }
-    let _ = writeln!(out, "{table}");
+    // Powers between the first and the last one say least.
+    let between = of_powers.iter().skip(1).rev().skip(1).map(String::as_str);
+    let expendable: Vec<&str> = between.chain([noise, "always failed", "always passed"]).collect();
+    out.push_str(&fitted(table, page, &expendable));
     let _ = writeln!(
         out,
         "pass^k: the probability that k runs of a scene, each with different noise, all pass\n\

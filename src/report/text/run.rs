@@ -3,14 +3,14 @@
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
-use crate::text::ruled;
+use crate::text::{Page, fitted, ruled};
 use actcheck_base::names;
 use actcheck_history::{ActionDetail, ObjectDetail, Repetition, RunDetail};
 
 /// Formats a run: its scene, the reports of its actions, and every outcome with margin and witness.
 ///
 /// `perceived` are sentences about the perceived target, by the action's position in the test (from 1).
-pub fn run_text(run: &RunDetail, perceived: &BTreeMap<u32, String>) -> String {
+pub fn run_text(run: &RunDetail, perceived: &BTreeMap<u32, String>, page: Page) -> String {
     let mut out = String::new();
     let row = &run.row;
     let _ = writeln!(out, "run {} ({}), {}, S = {:.2}", row.run, row.test, row.status.word(), row.score);
@@ -42,17 +42,17 @@ pub fn run_text(run: &RunDetail, perceived: &BTreeMap<u32, String>) -> String {
         let _ = writeln!(out, "{designator} = {}", values.join(", "));
     }
     out.push('\n');
-    scene(&mut out, run);
+    scene(&mut out, run, page);
     for action in &run.actions {
-        action_text(&mut out, action);
+        action_text(&mut out, action, page);
         if let Some(sentence) = perceived.get(&action.step) {
             let _ = writeln!(out, "{sentence}");
         }
     }
-    out
+    page.set(&out)
 }
 
-fn scene(out: &mut String, run: &RunDetail) {
+fn scene(out: &mut String, run: &RunDetail, page: Page) {
     let mut table = ruled();
     table.set_header([
         "object",
@@ -69,7 +69,7 @@ fn scene(out: &mut String, run: &RunDetail) {
     for object in &run.objects {
         table.add_row(object_row(object));
     }
-    let _ = writeln!(out, "{table}");
+    out.push_str(&fitted(table, page, &["friction", "mass kg", "max tilt °", "yaw °", "role", "category"]));
     let [x, y, heading] = run.robot_base;
     let _ = writeln!(out, "robot at x {x:.3} m, y {y:.3} m, heading {:.1}°", heading.to_degrees());
 }
@@ -92,7 +92,7 @@ fn object_row(object: &ObjectDetail) -> Vec<String> {
     ]
 }
 
-fn action_text(out: &mut String, action: &ActionDetail) {
+fn action_text(out: &mut String, action: &ActionDetail, page: Page) {
     let reported = match action.reported {
         Some(true) => "reported success",
         Some(false) => "reported failure",
@@ -122,5 +122,5 @@ fn action_text(out: &mut String, action: &ActionDetail) {
             judgement.witness.clone(),
         ]);
     }
-    let _ = writeln!(out, "{table}");
+    out.push_str(&fitted(table, page, &["margin"]));
 }

@@ -3,11 +3,11 @@
 use std::fmt::Write as _;
 
 use crate::ShrunkSummary;
-use crate::text::ruled;
+use crate::text::{Page, fitted, ruled};
 use actcheck_base::names;
 
 /// Formats the shrunk scene, the choices that matter, and why it fails.
-pub fn shrunk_text(shrunk: &ShrunkSummary) -> String {
+pub fn shrunk_text(shrunk: &ShrunkSummary, page: Page) -> String {
     let mut out = String::new();
     let failed: Vec<&str> = shrunk.failed.iter().map(|iri| names::local(iri)).collect();
     let _ = writeln!(out, "{}: the smallest scene found that fails like {}", shrunk.run.row.run, shrunk.original);
@@ -29,11 +29,11 @@ pub fn shrunk_text(shrunk: &ShrunkSummary) -> String {
     if shrunk.noise_kept {
         let _ = writeln!(out, "with fresh noise the run does not fail often enough: its recorded noise is kept");
     }
-    let _ = writeln!(out, "\n{}", scene_table(shrunk));
+    let _ = write!(out, "\n{}", scene_table(shrunk, page));
     if shrunk.choices.is_empty() {
         let _ = writeln!(out, "it fails with every choice at its nominal value");
     } else {
-        let _ = writeln!(out, "\n{}", choice_table(shrunk));
+        let _ = write!(out, "\n{}", choice_table(shrunk, page));
     }
     if let Some((name, value)) = &shrunk.neighbour
         && let Some(choice) = shrunk.choices.iter().find(|choice| choice.name == *name)
@@ -48,10 +48,10 @@ pub fn shrunk_text(shrunk: &ShrunkSummary) -> String {
     for why in &shrunk.why {
         let _ = write!(out, "\n{why}");
     }
-    out
+    page.set(&out)
 }
 
-fn scene_table(shrunk: &ShrunkSummary) -> String {
+fn scene_table(shrunk: &ShrunkSummary, page: Page) -> String {
     let mut table = ruled();
     table.set_header(["object", "role", "x m", "y m", "yaw °", "moved cm"]);
     for object in &shrunk.run.objects {
@@ -64,10 +64,10 @@ fn scene_table(shrunk: &ShrunkSummary) -> String {
             object.displacement_m.map_or_else(String::new, |moved| format!("{:.1}", moved * 100.0)),
         ]);
     }
-    table.to_string()
+    fitted(table, page, &["yaw °", "role"])
 }
 
-fn choice_table(shrunk: &ShrunkSummary) -> String {
+fn choice_table(shrunk: &ShrunkSummary, page: Page) -> String {
     let mut table = ruled();
     table.set_header(["choice", "value", "nominal", "needed", "fails from … to", "passes at"]);
     for choice in &shrunk.choices {
@@ -82,7 +82,7 @@ fn choice_table(shrunk: &ShrunkSummary) -> String {
             passes.join(", "),
         ]);
     }
-    table.to_string()
+    fitted(table, page, &["passes at", "nominal", "needed"])
 }
 
 fn number(value: f64) -> String {

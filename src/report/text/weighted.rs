@@ -2,11 +2,11 @@
 
 use std::fmt::Write as _;
 
-use crate::text::ruled;
+use crate::text::{Page, fitted, ruled};
 use crate::{CampaignSummary, GuidedSearch};
 
 /// Writes the weighted rates next to the raw counts. Writes nothing if scenes were sampled at random.
-pub(super) fn weighted_text(out: &mut String, summary: &CampaignSummary) {
+pub(super) fn weighted_text(out: &mut String, summary: &CampaignSummary, page: Page) {
     let Some(GuidedSearch { strategy, lines }) = &summary.search else { return };
     let _ = writeln!(
         out,
@@ -17,7 +17,6 @@ pub(super) fn weighted_text(out: &mut String, summary: &CampaignSummary) {
         return;
     }
     let mut table = ruled();
-    table.force_no_tty();
     table.set_header([
         "test",
         "property",
@@ -30,5 +29,5 @@ pub(super) fn weighted_text(out: &mut String, summary: &CampaignSummary) {
         let raw = line.raw.map_or_else(String::new, |raw| format!("{} of {}", raw.count, raw.of));
         table.add_row([line.test.clone(), line.label.clone(), failing, raw]);
     }
-    let _ = writeln!(out, "{table}\n");
+    let _ = writeln!(out, "{}", fitted(table, page, &["test"]));
 }

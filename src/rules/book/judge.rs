@@ -2,6 +2,8 @@
 
 use std::collections::BTreeMap;
 
+use crate::check::checking::unique;
+use crate::check::formulas::Bound;
 use crate::engine::budget::Budget;
 use crate::engine::evaluate::{Layers, Planned, Tables, evaluate, fault};
 use crate::engine::load::Given;
@@ -12,6 +14,7 @@ use crate::model::program::{Predicates, Scope};
 use crate::model::universe::Universe;
 #[cfg(feature = "sparql")]
 use crate::sparql::{dataset::Statements, query::Query, snapshot::snapshot};
+use crate::temporal::{NO_INTERVALS, UNRECORDED, lacks_intervals};
 use actcheck_base::{ActionFacts, Diagnostics, Findings, RuleFault, Terms};
 
 /// Every property's rules with the libraries, parsed, checked and planned. Shared between threads.
@@ -61,6 +64,10 @@ pub struct RuleBook {
     #[cfg(feature = "sparql")]
     pub(crate) statements: Statements,
     pub(crate) warnings: Diagnostics,
+    /// Whether a rule reads quantities over time.
+    pub(crate) reads_course: bool,
+    /// The intervals of formulas.
+    pub(crate) bounds: Vec<Bound>,
 }
 
 impl std::fmt::Debug for RuleBook {
@@ -81,6 +88,10 @@ pub(crate) enum JudgeRules {
     Datalog {
         planned: Box<Planned>,
         verdict: Verdict,
+        /// Whether its rules read quantities over time.
+        reads_course: bool,
+        /// Whether its rules read holds or motions.
+        reads_intervals: bool,
         /// Scope of the file's predicates.
         scope: Scope,
         /// Prefixes that the file declares.
@@ -88,6 +99,17 @@ pub(crate) enum JudgeRules {
     },
     #[cfg(feature = "sparql")]
     Sparql(Box<Query>),
+}
+
+impl JudgeRules {
+    /// Returns whether the rules read holds or motions, which runs of earlier versions lack.
+    pub(crate) fn reads_intervals(&self) -> bool {
+        match self {
+            Self::Datalog { reads_intervals, .. } => *reads_intervals,
+            #[cfg(feature = "sparql")]
+            Self::Sparql(query) => query.reads_intervals,
+        }
+    }
 }
 
 impl RuleBook {
@@ -101,19 +123,27 @@ impl RuleBook {
         properties: &[String],
         budget: &Budget,
     ) -> BTreeMap<String, Result<Findings, RuleFault>> {
-        let mut universe = Universe::new(&self.terms, Some(facts.terms));
+        let mut universe = Universe::of_action(&self.terms, facts);
         let derived = match self.enriched(facts, &mut universe, budget) {
             Ok(derived) => derived,
             Err(fault) => return properties.iter().map(|iri| (iri.clone(), Err(fault.clone()))).collect(),
         };
         #[cfg(feature = "sparql")]
         let graphs = std::cell::OnceCell::new();
+        let lacks_intervals = lacks_intervals(facts);
         let mut results = BTreeMap::new();
+        let label = universe.next_label();
         for iri in properties {
-            let result = match self.properties.get(iri) {
+            // A property's new things don't depend on the properties that are judged with it.
+            universe.label_from(label);
+            let judge = self.properties.get(iri);
+            let result = match judge {
+                Some(judge) if lacks_intervals && judge.rules.reads_intervals() => {
+                    Err(RuleFault::Value(NO_INTERVALS.to_owned()))
+                }
                 None => Err(RuleFault::Value(format!("unknown property {iri}"))),
-                Some(Judge { rules: JudgeRules::Datalog { planned, verdict, .. }, .. }) => {
-                    self.datalog(planned, verdict, &derived, &mut universe, budget)
+                Some(Judge { rules: JudgeRules::Datalog { planned, verdict, reads_course, .. }, .. }) => {
+                    self.datalog((planned, verdict, *reads_course), &derived, &mut universe, budget)
                 }
                 #[cfg(feature = "sparql")]
                 Some(Judge { rules: JudgeRules::Sparql(query), .. }) => {
@@ -135,7 +165,7 @@ impl RuleBook {
         properties: &[String],
         budget: &Budget,
     ) -> BTreeMap<String, Result<Findings, RuleFault>> {
-        let unchanged = ActionFacts { after: facts.before, during: &[], ..*facts };
+        let unchanged = ActionFacts { after: facts.before, during: &[], course: None, ..*facts };
         self.judge(&unchanged, properties, budget)
     }
 
@@ -143,9 +173,12 @@ impl RuleBook {
     /// `SELECT`).
     ///
     /// A forbidden event can't have happened before the action, so that such a property held before is not informative.
+    /// Neither is a property of the course of the action.
     pub fn states_success(&self, property: &str) -> bool {
         match self.properties.get(property).map(|judge| &judge.rules) {
-            Some(JudgeRules::Datalog { verdict, .. }) => verdict.decisive.as_ref().is_some_and(|it| it.positive),
+            Some(JudgeRules::Datalog { verdict, reads_course, .. }) => {
+                !reads_course && verdict.decisive.as_ref().is_some_and(|it| it.positive)
+            }
             #[cfg(feature = "sparql")]
             Some(JudgeRules::Sparql(query)) => query.asks,
             None => false,
@@ -157,9 +190,19 @@ impl RuleBook {
         self.properties.get(property).map_or("", |judge| &judge.digest)
     }
 
+    /// Returns whether a rule reads quantities over time, which stored runs keep apart from the other facts.
+    pub fn reads_course(&self) -> bool {
+        self.reads_course
+    }
+
     /// Returns the warnings about the rules.
     pub fn warnings(&self) -> &Diagnostics {
         &self.warnings
+    }
+
+    /// Returns the warnings `R055` about formulas whose intervals reach beyond the time limit of actions. Unit: seconds.
+    pub fn beyond(&self, limit_secs: f64) -> Diagnostics {
+        unique(self.bounds.iter().filter_map(|bound| bound.beyond(limit_secs)).collect())
     }
 
     /// Returns the facts of an action with the tuples that the libraries derive from them.
@@ -179,12 +222,14 @@ impl RuleBook {
 
     fn datalog(
         &self,
-        planned: &Planned,
-        verdict: &Verdict,
+        (planned, verdict, reads_course): (&Planned, &Verdict, bool),
         derived: &Tables,
         universe: &mut Universe<'_>,
         budget: &Budget,
     ) -> Result<Findings, RuleFault> {
+        if reads_course && universe.course().is_none() {
+            return Err(RuleFault::Value(UNRECORDED.to_owned()));
+        }
         let mut layers = Layers { own: Tables::default(), below: vec![derived, &self.fixed] };
         let mut meter = Meter::new(budget);
         evaluate(planned, &self.predicates, &self.indexes, &mut layers, universe, &mut meter)

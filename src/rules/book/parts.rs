@@ -14,6 +14,14 @@ pub(super) fn extend(program: &mut Program, more: Program) {
     }
 }
 
+/// Name of the source of [`gather_state`]'s rules.
+const GATHERED: &str = "(given)";
+
+/// Returns whether a rule is one of [`gather_state`]'s.
+pub(super) fn gathers_state(rule: &Rule) -> bool {
+    &*rule.origin.source.name == GATHERED
+}
+
 /// If a rule reads `state` for a variable property, it also needs the facts derived for single properties:
 ///
 /// ```prolog
@@ -36,7 +44,7 @@ pub(super) fn gather_state(predicates: &mut Predicates) -> Vec<Rule> {
     for (id, property) in single {
         let variables = [Operand::Variable(0), Operand::Variable(1), Operand::Variable(2)];
         let args = vec![variables[0], variables[1], Operand::Constant(property), variables[2]];
-        let source = actcheck_base::Source::new("(given)", "");
+        let source = actcheck_base::Source::new(GATHERED, "");
         rules.push(Rule {
             head: Atom { predicate: general, args, span: 0..0 },
             body: vec![Literal::Positive(Atom { predicate: id, args: variables.to_vec(), span: 0..0 })],
@@ -44,6 +52,7 @@ pub(super) fn gather_state(predicates: &mut Predicates) -> Vec<Rule> {
             variables: vec!["phase".into(), "s".into(), "o".into()],
             head_names: vec!["phase".into(), "s".into(), String::new(), "o".into()],
             origin: Origin { source, span: 0..0, name: None, comment: None },
+            making: None,
         });
     }
     rules
@@ -56,9 +65,7 @@ pub(super) fn needed<'p>(
     snapshots: bool,
     predicates: &Predicates,
 ) -> Program {
-    let bodies = |rules: &[Rule]| -> Vec<usize> {
-        rules.iter().flat_map(|rule| rule.body.iter().filter_map(Literal::atom).map(|atom| atom.predicate)).collect()
-    };
+    let bodies = |rules: &[Rule]| -> Vec<usize> { rules.iter().flat_map(Rule::reads).collect() };
     let mut needed: BTreeSet<usize> = properties.flat_map(|program| bodies(&program.rules)).collect();
     if snapshots {
         needed.extend((0..predicates.len()).filter(|id| predicates.get(*id).name == "state"));
@@ -79,29 +86,50 @@ pub(super) fn needed<'p>(
     library
 }
 
-/// Splits the rules into those that read only the ontology, directly or indirectly, and the rest.
-pub(super) fn split_fixed(program: Program, predicates: &Predicates) -> (Program, Program) {
-    let mut moving: BTreeSet<usize> = (0..predicates.len())
-        .filter(|id| predicates.get(*id).given && predicates.get(*id).name != "ontology")
-        .collect();
+/// Splits the library into the rules that depend on the course of the action, directly or indirectly, and the rest.
+/// `reads` returns whether a rule reads it directly.
+///
+/// The first are evaluated with each property that needs them: a run without a course breaks only these properties.
+pub(super) fn split_timed(library: Program, reads: impl Fn(&Rule) -> bool) -> (Program, Program) {
+    let timed: Vec<usize> = library.rules.iter().filter(|rule| reads(rule)).map(|rule| rule.head.predicate).collect();
+    let timed = with_dependents(&library.rules, timed);
+    partitioned(library, &timed)
+}
+
+/// Returns some predicates with those whose rules read them, directly or indirectly.
+fn with_dependents(rules: &[Rule], mut waiting: Vec<usize>) -> BTreeSet<usize> {
+    let mut found: BTreeSet<usize> = waiting.iter().copied().collect();
     let mut heads_of: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
-    for rule in &program.rules {
-        for atom in rule.body.iter().filter_map(Literal::atom) {
-            heads_of.entry(atom.predicate).or_default().push(rule.head.predicate);
+    for rule in rules {
+        for predicate in rule.reads() {
+            heads_of.entry(predicate).or_default().push(rule.head.predicate);
         }
     }
-    let mut waiting: Vec<usize> = moving.iter().copied().collect();
     while let Some(predicate) = waiting.pop() {
         let heads = heads_of.get(&predicate).into_iter().flatten();
-        waiting.extend(heads.copied().filter(|head| moving.insert(*head)));
+        waiting.extend(heads.copied().filter(|head| found.insert(*head)));
     }
-    let (mut fixed, mut rest) = (Program::default(), Program::default());
+    found
+}
+
+/// Splits a program into the rules and facts of some predicates, and the rest.
+fn partitioned(program: Program, predicates: &BTreeSet<usize>) -> (Program, Program) {
+    let (mut inside, mut outside) = (Program::default(), Program::default());
     for rule in program.rules {
-        if moving.contains(&rule.head.predicate) { rest.rules.push(rule) } else { fixed.rules.push(rule) }
+        let target = if predicates.contains(&rule.head.predicate) { &mut inside } else { &mut outside };
+        target.rules.push(rule);
     }
     for (predicate, rows) in program.facts {
-        let target = if moving.contains(&predicate) { &mut rest } else { &mut fixed };
+        let target = if predicates.contains(&predicate) { &mut inside } else { &mut outside };
         target.facts.insert(predicate, rows);
     }
+    (inside, outside)
+}
+
+/// Splits the rules into those that read only the ontology, directly or indirectly, and the rest.
+pub(super) fn split_fixed(program: Program, predicates: &Predicates) -> (Program, Program) {
+    let given = |id: &usize| predicates.get(*id).given && predicates.get(*id).name != "ontology";
+    let moving = with_dependents(&program.rules, (0..predicates.len()).filter(given).collect());
+    let (rest, fixed) = partitioned(program, &moving);
     (fixed, rest)
 }

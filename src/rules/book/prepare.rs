@@ -6,10 +6,13 @@ use std::collections::BTreeSet;
 
 use crate::book::judge::{Judge, JudgeRules, RuleBook};
 use crate::book::owl::owl_closure_within;
-use crate::book::parts::{extend, gather_state, needed, split_fixed};
+use crate::book::parts::{extend, gather_state, gathers_state, needed, split_fixed, split_timed};
 use crate::check::checking::{Checking, Role, unique, used_names};
+use crate::check::formulas::{self, Bound};
 use crate::check::ranges::Ranges;
 use crate::check::stratify::stratify;
+use crate::check::termination::warnings;
+use crate::check::unchanging::{self, Reads};
 use crate::check::units::Units;
 use crate::engine::budget::Budget;
 use crate::engine::evaluate::{Layers, Planned, Tables, evaluate, fault};
@@ -18,11 +21,12 @@ use crate::engine::meter::Meter;
 use crate::engine::plan::Indexes;
 use crate::engine::reading::Verdict;
 use crate::model::given::Phases;
-use crate::model::program::{Predicates, Program};
+use crate::model::program::{Predicates, Program, Rule};
 use crate::model::universe::Universe;
 #[cfg(feature = "sparql")]
 use crate::sparql::{dataset::Statements, query::Query};
 use crate::syntax::{Syntax, parse};
+use crate::temporal::{IntervalTerms, add_margin, add_moment, define_moment, reads_course};
 use actcheck_base::{Diagnostic, Diagnostics, Digest, TermId, Terms};
 use actcheck_ontology::{Ontology, Property, RuleLanguage};
 
@@ -71,6 +75,7 @@ impl Preparing {
         }
         for (scope, _, syntax) in &properties {
             checking.define(syntax, Role::Property(*scope));
+            define_moment(&mut checking, syntax, *scope);
         }
         let mut library = Program::default();
         for syntax in &libraries {
@@ -78,7 +83,10 @@ impl Preparing {
         }
         let mut programs = BTreeMap::new();
         for (scope, _, syntax) in &properties {
-            programs.insert(*scope, checking.rules(syntax, Role::Property(*scope)));
+            let mut program = checking.rules(syntax, Role::Property(*scope));
+            add_margin(&mut checking, &mut program, syntax, *scope);
+            add_moment(&checking, &mut program, *scope);
+            programs.insert(*scope, program);
             warn_unused(&mut checking, syntax, *scope);
         }
         let (mut predicates, split, found) = (checking.predicates, checking.split, checking.diagnostics);
@@ -88,6 +96,9 @@ impl Preparing {
         }
         self.diagnostics.extend(found);
         self.types_and_units(ontology, &library, &programs, &properties, &predicates);
+        if split {
+            self.unchanging(ontology, &library, &programs, &properties, (&predicates, phases));
+        }
         if split {
             library.rules.extend(gather_state(&mut predicates));
         }
@@ -135,23 +146,49 @@ impl Preparing {
         let mut indexes = Indexes::new(&predicates);
         let has_sparql = ontology.properties.values().any(|p| p.rule.language == RuleLanguage::Sparql);
         let library = self.stratified(library, &predicates);
+        let intervals = IntervalTerms::new(&self.terms);
+        let reads_intervals = |rule: &Rule| intervals.in_rule(rule, &predicates);
+        let library = {
+            let reads =
+                |rule: &Rule| !gathers_state(rule) && (reads_course(rule, &predicates) || reads_intervals(rule));
+            let (timed, rest) = split_timed(library, reads);
+            self.only_own_predicates(&timed, &predicates);
+            for program in programs.values_mut() {
+                let timed = needed(timed.clone(), std::iter::once(&*program), false, &predicates);
+                extend(program, timed);
+            }
+            rest
+        };
         let library = needed(library, programs.values(), has_sparql, &predicates);
+        let mut given = Given::new(&predicates, phases);
+        given.restrict_course(&programs.values().chain([&library]).collect::<Vec<_>>());
         let (fixed, moving) = split_fixed(library, &predicates);
         let fixed = self.plan(fixed, &predicates, &mut indexes);
         let libraries = self.plan(moving, &predicates, &mut indexes);
+        let program_reads_course = |program: &Program| program.rules.iter().any(|rule| reads_course(rule, &predicates));
+        let bounds = programs.values().flat_map(|program| Bound::all_of(&program.rules)).collect();
+        let any_reads_course = programs.values().any(program_reads_course);
         let mut properties = self.queries(ontology);
         for (scope, property, syntax) in syntaxes {
             let program = programs.remove(scope).unwrap_or_default();
             let verdict = Verdict::new(&program, &predicates, *scope);
+            let reads_course = program_reads_course(&program);
+            let reads_intervals = program.rules.iter().any(reads_intervals);
             let planned = Box::new(self.plan(program, &predicates, &mut indexes));
-            let rules = JudgeRules::Datalog { planned, verdict, scope: *scope, prefixes: syntax.prefixes.clone() };
+            let rules = JudgeRules::Datalog {
+                planned,
+                verdict,
+                reads_course,
+                reads_intervals,
+                scope: *scope,
+                prefixes: syntax.prefixes.clone(),
+            };
             properties.insert(property.iri.clone(), judge(ontology, property, rules));
         }
         self.diagnostics = unique(self.diagnostics);
         if self.diagnostics.has_errors() {
             return Err(self.diagnostics);
         }
-        let given = Given::new(&predicates, phases);
         let own = given.load_ontology(&triples, &predicates, &indexes);
         let fixed_facts = given.load_ontology(&triples, &predicates, &indexes);
         #[cfg(feature = "sparql")]
@@ -170,6 +207,8 @@ impl Preparing {
             #[cfg(feature = "sparql")]
             statements,
             warnings: self.diagnostics,
+            reads_course: any_reads_course,
+            bounds,
         })
     }
 
@@ -185,6 +224,7 @@ impl Preparing {
         let ranges = Ranges::new(ontology);
         for program in std::iter::once(library).chain(programs.values()) {
             ranges.check(&program.rules, predicates, &self.terms, &mut self.diagnostics);
+            formulas::check(&program.rules, &mut self.diagnostics);
         }
         let mut units = Units::new(predicates, &ontology.vocabulary, &self.terms);
         units.learn(&library.rules);
@@ -195,6 +235,26 @@ impl Preparing {
             units.check(&program.rules, &mut self.diagnostics);
             if let (Some(margin), Some(unit)) = (predicates.find(*scope, "margin", None), &property.unit) {
                 units.check_margin(&program.rules, margin, unit, &mut self.diagnostics);
+            }
+        }
+    }
+
+    /// Warns of success properties that no action can change.
+    fn unchanging(
+        &mut self,
+        ontology: &Ontology,
+        library: &Program,
+        programs: &BTreeMap<usize, Program>,
+        properties: &[(usize, &Property, Syntax)],
+        (predicates, phases): (&Predicates, Phases),
+    ) {
+        for (scope, property, syntax) in properties {
+            let Some(program) = programs.get(scope).filter(|_| syntax.whole) else { continue };
+            let reads = Reads::new(library, predicates, phases, &self.terms);
+            if let Some(rule) = reads.unchanging(program, *scope) {
+                let (source, span) = (&rule.origin.source, rule.head.span.clone());
+                self.diagnostics
+                    .extend(unchanging::warning(ontology, property, source, span).map(Into::into).unwrap_or_default());
             }
         }
     }
@@ -228,6 +288,19 @@ impl Preparing {
         judges
     }
 
+    /// Reports library rules that derive facts of the snapshots from the course of the action: every property reads the
+    /// snapshots, also in runs without a course.
+    fn only_own_predicates(&mut self, timed: &Program, predicates: &Predicates) {
+        for rule in timed.rules.iter().filter(|rule| predicates.get(rule.head.predicate).given) {
+            let name = &predicates.get(rule.head.predicate).name;
+            let message = format!("`{name}` can't depend on the course of the action");
+            let help = "derive a predicate with a name of its own: every property reads the snapshots, and runs of \
+                        earlier versions have no course";
+            let place = rule.head.span.clone();
+            self.diagnostics.push(Diagnostic::error("R053", message).at(&rule.origin.source, place).help(help));
+        }
+    }
+
     /// Reports the SPARQL properties, which need the feature `sparql`.
     #[cfg(not(feature = "sparql"))]
     fn queries(&mut self, ontology: &Ontology) -> BTreeMap<String, Judge> {
@@ -254,7 +327,10 @@ impl Preparing {
     fn plan(&mut self, program: Program, predicates: &Predicates, indexes: &mut Indexes) -> Planned {
         let universe = Universe::new(&self.terms, None);
         match stratify(&program.rules, predicates, &universe) {
-            Ok(strata) => Planned::new(program, strata, indexes, &|_| None),
+            Ok(strata) => {
+                self.diagnostics.extend(warnings(&program.rules, predicates, &universe));
+                Planned::new(program, strata, indexes, &|_| None)
+            }
             Err(found) => {
                 self.diagnostics.extend(found);
                 Planned::new(Program::default(), Vec::new(), indexes, &|_| None)
@@ -300,6 +376,11 @@ fn judge(ontology: &Ontology, property: &Property, rules: JudgeRules) -> Judge {
 
 /// Warns about predicates of a property's file that no rule reads and that are not part of the verdict.
 fn warn_unused(checking: &mut Checking<'_>, syntax: &Syntax, scope: usize) {
+    let has = |name: &str| checking.defined.contains_key(&(scope, name.to_owned()));
+    if !has("success") && !has("violation") {
+        // Reported with the same remedy (R026).
+        return;
+    }
     let used = used_names(syntax);
     let verdict = crate::model::given::VERDICT.map(|(name, _)| name);
     let mut unused = BTreeMap::new();

@@ -7,7 +7,7 @@ use crate::check::translate::translate;
 use crate::model::given::{GIVEN, VERDICT};
 use crate::model::program::{MAX_ARITY, Predicate, Predicates, Program, Scope};
 use crate::syntax::limits::{FAULT_LIMIT, LITERAL_LIMIT, RULE_LIMIT, WARNING_LIMIT};
-use crate::syntax::{AtomSyntax, LiteralSyntax, Statement, Syntax};
+use crate::syntax::{AtomSyntax, LiteralSyntax, Statement, Syntax, TemporalOperator};
 use actcheck_base::{Diagnostic, Diagnostics, Source, Span, Term, Terms, did_you_mean, names};
 use actcheck_ontology::Vocabulary;
 
@@ -161,6 +161,10 @@ impl<'a> Checking<'a> {
             let message = format!("`{name}` is already defined by a library ({})", definition.place());
             return self.error("R038", source, &head.name_span, message, "choose another name, or use the library's");
         }
+        if role != Role::Standalone && TemporalOperator::named(name).is_some() {
+            let message = format!("`{name}` is a temporal operator");
+            return self.error("R038", source, &head.name_span, message, "choose another name");
+        }
         self.define_predicate(source, name, head.args.len(), &head.span, role);
     }
 
@@ -243,11 +247,11 @@ impl<'a> Checking<'a> {
                 Some(name) => format!("`{name}` is neither of them: {}", did_you_mean(name, ["success", "violation"])),
                 None => "add a rule such as `success(?o) :- parameter(act:pickObject, ?o), … .`".to_owned(),
             };
-            self.diagnostics.push(
-                Diagnostic::error("R026", "the file defines neither `success` nor `violation`")
-                    .in_source(source)
-                    .help(help),
-            );
+            let fault = Diagnostic::error("R026", "the file defines neither `success` nor `violation`").help(help);
+            self.diagnostics.push(match near {
+                Some(name) => fault.at(source, place_of(syntax, name)),
+                None => fault.in_source(source),
+            });
         }
         for (name, columns) in [("margin", 1), ("because", 1)] {
             if let Some(definition) = self.defined.get(&(scope, name.to_owned()))
@@ -298,7 +302,7 @@ impl<'a> Checking<'a> {
         let own = self
             .defined
             .keys()
-            .filter(|(scope, _)| *scope == 0 || *scope == role.scope())
+            .filter(|(scope, name)| (*scope == 0 || *scope == role.scope()) && !name.contains('~'))
             .map(|(_, name)| name.clone());
         let given = GIVEN.iter().filter(|_| role != Role::Standalone).map(|(name, ..)| (*name).to_owned());
         own.chain(given).collect()

@@ -1,12 +1,13 @@
 //! Translates the expressions and aggregates of one rule from syntax to checked expressions.
 
-use crate::builtins;
-use crate::check::checking::counted;
+use crate::builtins::{self, Builtin};
+use crate::check::checking::{Role, counted};
 use crate::check::translate::Translation;
 use crate::model::expression::{Expr, Variable};
 use crate::model::program::{Aggregate, AggregateKind, Aggregation, Literal};
 use crate::syntax::{Expression, ExpressionKind};
-use actcheck_base::{Span, Term, did_you_mean};
+use crate::temporal::known_quantity;
+use actcheck_base::{Span, Term, did_you_mean, names};
 
 impl Translation<'_, '_> {
     /// Translates a head expression that contains aggregates. Variables outside the aggregates are grouping variables.
@@ -89,6 +90,7 @@ impl Translation<'_, '_> {
             ExpressionKind::Constant(term) => {
                 if let Term::Iri(iri) = term {
                     self.checking.vocabulary(self.source, iri, span, false);
+                    self.bare_name(iri, span);
                 }
                 Some(Expr::Constant(term.clone()))
             }
@@ -117,6 +119,21 @@ impl Translation<'_, '_> {
         }
     }
 
+    /// Warns (R047) of a name that begins with a capital: in Prolog it would be a variable.
+    pub(super) fn bare_name(&mut self, name: &str, span: &Span) {
+        let is_bare = name.starts_with(char::is_uppercase) && name.chars().all(|c| c.is_alphanumeric() || c == '_');
+        if is_bare && self.role != Role::Standalone {
+            let help = format!(
+                "a variable is written `?{name}`, and a term of the ontology with a prefix, as in `act:{name}`"
+            );
+            let message = format!("`{name}` is a constant that no fact has");
+            // Once for each name, not for each place.
+            if !self.checking.diagnostics.iter().any(|known| known.code == "R047" && known.message == message) {
+                self.checking.warning("R047", self.source, span, message, help);
+            }
+        }
+    }
+
     fn all(&mut self, expressions: &[Expression]) -> Option<Vec<Expr>> {
         let values: Vec<Option<Expr>> = expressions.iter().map(|arg| self.expression(arg)).collect();
         values.into_iter().collect()
@@ -127,8 +144,8 @@ impl Translation<'_, '_> {
         match &expression.kind {
             ExpressionKind::Anonymous => self.error("R035", span, "`_` has no value to compute with", "use a variable"),
             ExpressionKind::Existential(name) => {
-                let help = "a rule can't create new terms: use a variable of the body";
-                self.error("R039", span, format!("existential variable `!{name}` is not supported"), help);
+                let help = format!("a new thing is an argument of a head, on its own; elsewhere write `?{name}`");
+                self.error("R039", span, format!("new thing `!{name}` in a body or a computation"), help);
             }
             ExpressionKind::Aggregate(name, _) => {
                 let help = "write aggregates in heads: derive the value in a separate rule and use it here";
@@ -143,11 +160,18 @@ impl Translation<'_, '_> {
         None
     }
 
-    pub(crate) fn call(&mut self, name: &str, args: Vec<Expr>, span: &Span) -> Option<Expr> {
+    /// Returns the built-in of a call with this number of arguments. Returns `None` if an error was reported.
+    pub(super) fn builtin(&mut self, name: &str, n_args: usize, span: &Span) -> Option<&'static Builtin> {
         let Some(builtin) = builtins::builtin(name) else {
             if name.starts_with("geo3d:") {
                 // The prefix is unknown, which the parser has reported.
                 self.faulty = true;
+                return None;
+            }
+            if let Some(local) = name.strip_prefix(names::W).filter(|local| known_quantity(local).is_some()) {
+                let message = format!("`w:{local}(…)` has a value at each moment, not one for the whole action");
+                let help = format!("write a formula, such as `always(w:{local}(…) < 1)`; see docs/time.md");
+                self.error("R053", span, message, help);
                 return None;
             }
             let shown = name.strip_prefix(builtins::GEO3D).map_or(name.to_owned(), |local| format!("geo3d:{local}"));
@@ -158,16 +182,21 @@ impl Translation<'_, '_> {
             self.error("R027", span, format!("unknown function `{shown}`"), help);
             return None;
         };
-        if !(builtin.min_args..=builtin.max_args).contains(&args.len()) {
+        if !(builtin.min_args..=builtin.max_args).contains(&n_args) {
             let wanted = match (builtin.min_args, builtin.max_args) {
                 (least, usize::MAX) => format!("at least {least}"),
                 (least, most) if least == most => least.to_string(),
                 (least, most) => format!("{least} to {most}"),
             };
-            let message = format!("`{}` has {}, needs {wanted}", builtin.name, counted(args.len()));
+            let message = format!("`{}` has {}, needs {wanted}", builtin.name, counted(n_args));
             self.error("R027", span, message, "functions and their arguments are listed in rules/README.md");
             return None;
         }
+        Some(builtin)
+    }
+
+    pub(crate) fn call(&mut self, name: &str, args: Vec<Expr>, span: &Span) -> Option<Expr> {
+        let builtin = self.builtin(name, args.len(), span)?;
         if let ("REGEX", [_, Expr::Constant(Term::String(pattern))]) = (builtin.name, args.as_slice()) {
             return match builtins::compile_pattern(pattern) {
                 Ok(pattern) => args.into_iter().next().map(|text| Expr::Matches(Box::new(text), Box::new(pattern))),
@@ -188,7 +217,8 @@ pub(crate) fn push_new(list: &mut Vec<Variable>, variable: Variable) {
     }
 }
 
-fn operator(symbol: char) -> &'static str {
+/// Returns the name of the built-in of an operator.
+pub(super) fn operator(symbol: char) -> &'static str {
     match symbol {
         '+' => "SUM",
         '-' => "MINUS",

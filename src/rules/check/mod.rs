@@ -4,10 +4,15 @@
 
 pub(crate) mod checking;
 mod expressions;
+pub(crate) mod formulas;
+mod making;
 pub(crate) mod options;
 mod predicates;
 pub(crate) mod ranges;
 mod safety;
 pub(crate) mod stratify;
+mod temporal;
+pub(crate) mod termination;
 mod translate;
+pub(crate) mod unchanging;
 pub(crate) mod units;

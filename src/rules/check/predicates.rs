@@ -5,7 +5,8 @@ use crate::check::translate::Translation;
 use crate::model::given::{GIVEN, add_given, phase_of, property_place};
 use crate::model::program::PredicateId;
 use crate::syntax::{AtomSyntax, Expression, ExpressionKind};
-use actcheck_base::{Term, did_you_mean};
+use crate::temporal::{known_quantity, quantity_names};
+use actcheck_base::{Term, did_you_mean, names};
 
 impl Translation<'_, '_> {
     /// Returns the predicate of an atom and the arguments that are columns. Returns `None` if an error was reported.
@@ -23,6 +24,9 @@ impl Translation<'_, '_> {
             if args.len() != *arity {
                 let message = format!("`{name}` has {}, needs {arity}", counted(args.len()));
                 self.error("R022", &atom.span, message, format!("write `{form}`"));
+                return None;
+            }
+            if name == "course" && !self.names_quantity(&args[1]) {
                 return None;
             }
             return Some(self.given(atom, args));
@@ -60,6 +64,34 @@ impl Translation<'_, '_> {
         let known = self.checking.known_names(self.role);
         let help = did_you_mean(name, known.iter().map(String::as_str));
         self.error("R023", &atom.name_span, format!("no rule defines `{name}`"), help);
+    }
+
+    /// Checks that the property of `course` is a quantity of one thing. Reports an error if it is not.
+    fn names_quantity(&mut self, property: &Expression) -> bool {
+        let iri = match &property.kind {
+            ExpressionKind::Constant(Term::Iri(iri)) => iri.to_string(),
+            ExpressionKind::Global(global) => {
+                self.globals.get(global).and_then(Term::as_iri).unwrap_or_default().to_owned()
+            }
+            _ => String::new(),
+        };
+        let (message, help) = match iri.strip_prefix(names::W) {
+            None if !iri.is_empty() => return true,
+            Some(local) => match known_quantity(local) {
+                Some(1) if local != "phase" => return true,
+                Some(_) => (
+                    format!("`w:{local}` is not a quantity of one thing"),
+                    "read it in a formula, such as `always(w:distance(?a, ?b) > 0.1)`".to_owned(),
+                ),
+                None => (format!("unknown quantity `w:{local}`"), did_you_mean(local, quantity_names())),
+            },
+            None => (
+                "`course` needs a constant property".to_owned(),
+                "write a quantity, such as `course(?o, w:z, ?t, ?z)`".to_owned(),
+            ),
+        };
+        self.error("R052", &property.span, message, help);
+        false
     }
 
     /// Resolves a given predicate: shorthands become `state`, a constant property becomes part of the predicate.

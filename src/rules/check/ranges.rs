@@ -3,10 +3,12 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use crate::check::formulas::formulas;
 use crate::model::expression::{Expr, Variable};
 use crate::model::program::{Atom, Literal, Operand, Predicates, Rule};
 use crate::syntax::Comparison;
-use actcheck_base::{Diagnostic, Diagnostics, Term, TermId, Terms, names};
+use crate::temporal::Formula;
+use actcheck_base::{Diagnostic, Diagnostics, Span, Term, TermId, Terms, names};
 use actcheck_ontology::Ontology;
 
 /// The types of property values, as declared by the ontology.
@@ -53,6 +55,8 @@ impl Ranges {
                 }
             }
             contradictions(rule, diagnostics);
+            numbers_of_formulas(rule, &typed, diagnostics);
+            opposites(rule, diagnostics);
             for literal in &rule.body {
                 let Literal::Compare { op, left, right, span } = literal else { continue };
                 let ((Expr::Variable(variable), Expr::Constant(term))
@@ -108,6 +112,27 @@ impl Ranges {
     }
 }
 
+/// Reports `R043` for variables that a formula compares with numbers, although their values are not numbers.
+fn numbers_of_formulas(rule: &Rule, typed: &BTreeMap<Variable, (&str, &str)>, diagnostics: &mut Diagnostics) {
+    for formula in formulas(rule) {
+        formula.visit(&mut |part| {
+            let Formula::Compare { left, right, span, .. } = part else { return };
+            let mut variables = Vec::new();
+            [left, right].into_iter().for_each(|side| side.numbers(&mut variables));
+            for variable in variables {
+                let Some((property, datatype)) = typed.get(&variable).filter(|(_, of)| !is_numeric(of)) else {
+                    continue;
+                };
+                let (property, datatype) = (names::shorten(property), names::shorten(datatype));
+                let message = format!("this can never hold: the values of `{property}` are {datatype}, not numbers");
+                let help = "compare the quantity with a number, or with the value of a property that has numbers";
+                let fault = Diagnostic::error("R043", message).help(help);
+                diagnostics.push(fault.at(&rule.origin.source, span.clone()));
+            }
+        });
+    }
+}
+
 /// The numbers that the comparisons of a rule leave for a variable.
 struct Left {
     low: f64,
@@ -123,7 +148,7 @@ fn contradictions(rule: &Rule, diagnostics: &mut Diagnostics) {
         let Literal::Compare { op, left: a, right: b, span } = literal else { continue };
         let (variable, number, op) = match (a, b) {
             (Expr::Variable(variable), Expr::Constant(term)) => (variable, term.number(), *op),
-            (Expr::Constant(term), Expr::Variable(variable)) => (variable, term.number(), turned(*op)),
+            (Expr::Constant(term), Expr::Variable(variable)) => (variable, term.number(), op.turned()),
             _ => continue,
         };
         let Some(number) = number else { continue };
@@ -148,15 +173,81 @@ fn contradictions(rule: &Rule, diagnostics: &mut Diagnostics) {
     }
 }
 
-/// The comparison with its sides exchanged.
-fn turned(op: Comparison) -> Comparison {
-    match op {
-        Comparison::Less => Comparison::Greater,
-        Comparison::LessEqual => Comparison::GreaterEqual,
-        Comparison::Greater => Comparison::Less,
-        Comparison::GreaterEqual => Comparison::LessEqual,
-        same => same,
+/// Reports `R044` for conditions that exclude each other: comparisons of the same two variables, a variable that equals
+/// two constants, and a pattern that is both required and excluded. One for each rule.
+fn opposites(rule: &Rule, diagnostics: &mut Diagnostics) {
+    let found = compared_variables(rule).or_else(|| two_constants(rule)).or_else(|| required_and_excluded(rule));
+    if let Some((message, span)) = found {
+        let help = match message.ends_with("itself") {
+            true => "compare it with another variable or a number",
+            false => "`,` means and: for or, write one rule for each case",
+        };
+        diagnostics.push(Diagnostic::error("R044", message).at(&rule.origin.source, span).help(help));
     }
+}
+
+fn compared_variables(rule: &Rule) -> Option<(String, Span)> {
+    // Which of less, equal and greater are left for each pair.
+    let mut left: BTreeMap<(Variable, Variable), [bool; 3]> = BTreeMap::new();
+    for literal in &rule.body {
+        let Literal::Compare { op, left: Expr::Variable(a), right: Expr::Variable(b), span } = literal else {
+            continue;
+        };
+        let (pair, op) = if a <= b { ((*a, *b), *op) } else { ((*b, *a), op.turned()) };
+        let allowed = match op {
+            Comparison::Equal => [false, true, false],
+            Comparison::Unequal => [true, false, true],
+            Comparison::Less => [true, false, false],
+            Comparison::LessEqual => [true, true, false],
+            Comparison::Greater => [false, false, true],
+            Comparison::GreaterEqual => [false, true, true],
+        };
+        let left = left.entry(pair).or_insert(if a == b { [false, true, false] } else { [true; 3] });
+        left.iter_mut().zip(allowed).for_each(|(left, allowed)| *left &= allowed);
+        if *left == [false; 3] {
+            let [a, b] = [pair.0, pair.1].map(|variable| &rule.variables[variable]);
+            let message = match a == b {
+                true => format!("this can never hold: `?{a}` is compared with itself"),
+                false => format!("this can never hold: the comparisons of `?{a}` with `?{b}` exclude each other"),
+            };
+            return Some((message, span.clone()));
+        }
+    }
+    None
+}
+
+fn two_constants(rule: &Rule) -> Option<(String, Span)> {
+    let mut equal: BTreeMap<Variable, &Term> = BTreeMap::new();
+    for literal in &rule.body {
+        let Literal::Compare { op: Comparison::Equal, left, right, span } = literal else { continue };
+        let ((Expr::Variable(variable), Expr::Constant(term)) | (Expr::Constant(term), Expr::Variable(variable))) =
+            (left, right)
+        else {
+            continue;
+        };
+        let first = equal.entry(*variable).or_insert(term);
+        if first.number().is_none() && *first != term {
+            let name = &rule.variables[*variable];
+            return Some((format!("this can never hold: `?{name}` is `{first}` and `{term}`"), span.clone()));
+        }
+    }
+    None
+}
+
+fn required_and_excluded(rule: &Rule) -> Option<(String, Span)> {
+    let positive = |atom: &Atom| {
+        rule.body.iter().any(|literal| match literal {
+            Literal::Positive(other) => other.predicate == atom.predicate && other.args == atom.args,
+            _ => false,
+        })
+    };
+    rule.body.iter().find_map(|literal| match literal {
+        Literal::Negative(atom) if !atom.args.contains(&Operand::Any) && positive(atom) => {
+            let message = "this can never hold: the same condition is required and, with `~`, excluded".to_owned();
+            Some((message, atom.span.clone()))
+        }
+        _ => None,
+    })
 }
 
 fn is_numeric(datatype: &str) -> bool {

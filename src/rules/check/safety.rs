@@ -65,7 +65,10 @@ fn head_bound(rule: &mut Translation<'_, '_>, head: &Atom, aggregation: Option<&
     for variable in &missing {
         let (name, span) = rule.variables[*variable].clone();
         if !name.is_empty() {
-            let help = format!("use `?{name}` in a positive atom of the body, or give it a value with `?{name} = …`");
+            let help = format!(
+                "use `?{name}` in a positive atom of the body, or give it a value with `?{name} = …`; if each match \
+                 makes a new thing, write `!{name}`"
+            );
             rule.error("R020", &span, format!("variable `?{name}` of the head is not bound in the body"), help);
         }
     }

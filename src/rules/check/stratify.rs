@@ -81,6 +81,10 @@ fn graph(rules: &[Rule], predicates: usize) -> Vec<Vec<Edge>> {
             let strict = negated || rule.aggregation.is_some();
             graph[rule.head.predicate].push(Edge { to: atom.predicate, strict, rule: idx });
         }
+        // New things depend on all heads, so that these are derived together.
+        for head in rule.makes().into_iter().flat_map(|making| &making.heads) {
+            graph[rule.head.predicate].push(Edge { to: head.predicate, strict: false, rule: idx });
+        }
     }
     graph
 }
@@ -152,6 +156,8 @@ fn cycle_fault(
     let back = way_back(edge.to, from, graph, component);
     let mut way: Vec<String> =
         back.iter().take(CYCLE_SHOWN).map(|predicate| shown(predicates, *predicate, terms)).collect();
+    // Parts of one rule have one name.
+    way.dedup();
     if let Some(left_out) = back.len().checked_sub(CYCLE_SHOWN + 1).filter(|count| *count > 0) {
         way.push(format!("({left_out} more)"));
     }
@@ -197,6 +203,6 @@ pub(crate) fn shown(predicates: &Predicates, id: PredicateId, terms: &Universe<'
     let predicate = predicates.get(id);
     match predicate.property.map(|property| terms.term(property)) {
         Some(term) => format!("{}(… {} …)", predicate.name, term.as_iri().map_or(term.to_string(), names::shorten)),
-        None => predicate.name.clone(),
+        None => predicate.helps().unwrap_or(&predicate.name).to_owned(),
     }
 }

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use crate::builtins;
 use crate::check::checking::{Checking, Role};
 use crate::check::expressions::{contains_aggregate, push_new};
+use crate::check::making::makes_new_things;
 use crate::check::options::globals;
 use crate::check::safety;
 use crate::engine::budget::Budget;
@@ -13,6 +14,7 @@ use crate::model::program::{Aggregation, Atom, Literal, Operand, Origin, Predica
 use crate::model::universe::Universe;
 use crate::syntax::limits::{FAULT_LIMIT, LITERAL_LIMIT, VARIABLE_LIMIT};
 use crate::syntax::{AtomSyntax, Comparison, Expression, ExpressionKind, LiteralSyntax, RuleSyntax, Statement, Syntax};
+use crate::temporal::Timed;
 use crate::watch::Watch;
 use actcheck_base::{Source, Span, Term, TermId, Terms};
 
@@ -36,6 +38,9 @@ pub(crate) fn translate(checking: &mut Checking<'_>, syntax: &Syntax, role: Role
                     }
                 }
             }
+            Statement::Rule(rule) if makes_new_things(rule) => {
+                program.rules.extend(Translation::new(checking, &syntax.source, role, &globals).making(rule));
+            }
             Statement::Rule(rule) => {
                 for head in &rule.heads {
                     let rules = Translation::new(checking, &syntax.source, role, &globals).rule(rule, head);
@@ -58,7 +63,7 @@ pub(crate) struct Translation<'c, 'a> {
     pub(crate) variables: Vec<(String, Span)>,
     pub(crate) body: Vec<Literal>,
     /// Helper rules for negated atoms with repeated variables.
-    extra: Vec<Rule>,
+    pub(super) extra: Vec<Rule>,
     pub(crate) faulty: bool,
     /// Whether too many variables have been reported.
     variable_limit_reported: bool,
@@ -126,12 +131,17 @@ impl<'c, 'a> Translation<'c, 'a> {
         };
         let variables = self.variables.into_iter().map(|(name, _)| name).collect();
         let mut rules = self.extra;
-        rules.push(Rule { head, body: self.body, aggregation, variables, head_names, origin });
+        rules.push(Rule { head, body: self.body, aggregation, variables, head_names, origin, making: None });
         rules
     }
 
     fn fact(mut self, head: &AtomSyntax) -> Option<(PredicateId, Vec<TermId>)> {
         let (predicate, args) = self.predicate(head, true)?;
+        if let Some((name, span)) = head.args.iter().find_map(new_thing) {
+            let help = "a rule makes new things, one for each match of its body: write a body after `:-`";
+            self.error("R039", span, format!("new thing `!{name}` in a fact"), help);
+            return None;
+        }
         let mut row = Vec::new();
         for arg in &args {
             let term = self.ground(arg)?;
@@ -165,7 +175,7 @@ impl<'c, 'a> Translation<'c, 'a> {
     }
 
     /// Adds the constant column of an atom without arguments.
-    fn pad(&mut self, predicate: PredicateId, mut args: Vec<Operand>) -> Vec<Operand> {
+    pub(super) fn pad(&mut self, predicate: PredicateId, mut args: Vec<Operand>) -> Vec<Operand> {
         if args.is_empty() && self.checking.predicates.get(predicate).width == 1 {
             args.push(Operand::Constant(unit(self.checking.terms)));
         }
@@ -198,7 +208,7 @@ impl<'c, 'a> Translation<'c, 'a> {
         self.variables.len() - 1
     }
 
-    fn literal(&mut self, literal: &LiteralSyntax) {
+    pub(super) fn literal(&mut self, literal: &LiteralSyntax) {
         match literal {
             LiteralSyntax::Atom(atom) => {
                 if self.is_test(atom) {
@@ -216,6 +226,12 @@ impl<'c, 'a> Translation<'c, 'a> {
             LiteralSyntax::Negated(syntax) => {
                 if let Some(atom) = self.body_atom(syntax) {
                     self.body.push(Literal::Negative(atom));
+                }
+            }
+            LiteralSyntax::Temporal(formula) => {
+                if let Some(checked) = self.formula(formula) {
+                    let value = Expr::Timed(Box::new(Timed::truth(checked)));
+                    self.body.push(Literal::Test { value, span: formula.span.clone() });
                 }
             }
             LiteralSyntax::Comparison { op, left, right, span } => {
@@ -275,7 +291,7 @@ impl<'c, 'a> Translation<'c, 'a> {
         }
     }
 
-    fn head_argument(&mut self, arg: &Expression, aggregation: Option<&mut Aggregation>) -> Option<Operand> {
+    pub(super) fn head_argument(&mut self, arg: &Expression, aggregation: Option<&mut Aggregation>) -> Option<Operand> {
         match &arg.kind {
             ExpressionKind::Anonymous => {
                 self.error("R035", &arg.span, "`_` in a head", "write a variable or a constant instead of `_`");
@@ -329,6 +345,7 @@ impl<'c, 'a> Translation<'c, 'a> {
             variables: self.variables.iter().map(|(name, _)| name.clone()).collect(),
             head_names: vec![String::new(); kept.len()],
             origin,
+            making: None,
         });
         head
     }
@@ -337,6 +354,13 @@ impl<'c, 'a> Translation<'c, 'a> {
 /// Returns the constant in the only column of predicates without arguments.
 pub(crate) fn unit(terms: &mut Terms) -> TermId {
     terms.intern(Term::Boolean(true))
+}
+
+fn new_thing(expression: &Expression) -> Option<(&str, &Span)> {
+    match &expression.kind {
+        ExpressionKind::Existential(name) => Some((name, &expression.span)),
+        _ => None,
+    }
 }
 
 fn variable_name(expression: &Expression) -> Option<&str> {

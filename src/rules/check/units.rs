@@ -1,11 +1,12 @@
 //! Checks the units of values in rules, based on the vocabulary: a length can't be compared with a mass.
 
-use std::collections::HashMap;
+use std::collections::{BTreeSet, HashMap};
 
 use crate::model::expression::Expr;
 use crate::model::program::{Atom, Literal, Operand, PredicateId, Predicates, Rule};
 use crate::syntax::Comparison;
-use actcheck_base::{Diagnostic, Diagnostics, Span, Terms};
+use crate::temporal::{Formula, Quantity};
+use actcheck_base::{Diagnostic, Diagnostics, Span, Term, Terms};
 use actcheck_ontology::Vocabulary;
 
 /// Exponents of metre, kilogram, second and radian.
@@ -109,7 +110,14 @@ impl<'a> Units<'a> {
         let rule = rules.iter().find(|rule| rule.head.predicate == margin);
         if let Some(rule) = rule.filter(|_| *found != wanted) {
             let message = format!("the margin is in {}, but the property's unit is {}", shown(*found), shown(wanted));
-            let help = "change `act:unit` of the property, or convert the margin";
+            let help = match shown(*found) {
+                unit if found.iter().any(|power| *power != 0) => {
+                    format!(
+                        "write `act:unit \"{unit}\"` in the property's entry of the ontology, or convert the margin"
+                    )
+                }
+                _ => "change `act:unit` in the property's entry of the ontology, or convert the margin".to_owned(),
+            };
             diagnostics
                 .push(Diagnostic::error("R042", message).at(&rule.origin.source, rule.head.span.clone()).help(help));
         }
@@ -129,11 +137,16 @@ impl<'a> Units<'a> {
 
     /// Infers the units of a rule's variables and reports mismatches.
     fn rule(&self, rule: &Rule, diagnostics: &mut Diagnostics) -> Vec<Unit> {
-        let mut seen = Seen { rule, units: vec![None; rule.variables.len()], diagnostics };
+        let units = vec![None; rule.variables.len()];
+        let mut seen = Seen { rule, vocabulary: self.vocabulary, units, of_properties: BTreeSet::new(), diagnostics };
         for literal in &rule.body {
             if let Literal::Positive(atom) = literal {
+                let property = self.predicates.get(atom.predicate).property;
                 for (column, arg) in atom.args.iter().enumerate() {
                     if let Operand::Variable(variable) = arg {
+                        if property.is_some() && column + 1 == atom.args.len() {
+                            seen.of_properties.insert(*variable);
+                        }
                         seen.both(*variable, self.column(atom, column), &atom.span);
                     }
                 }
@@ -157,9 +170,13 @@ impl<'a> Units<'a> {
             }
         }
         for literal in &rule.body {
-            if let Literal::Compare { left, right, span, .. } = literal {
+            if let Literal::Compare { op, left, right, span } = literal {
                 seen.degrees(left, right, span);
                 seen.degrees(right, left, span);
+                if *op != Comparison::Unequal {
+                    seen.text(left, right, span);
+                    seen.text(right, left, span);
+                }
             }
         }
         for aggregate in rule.aggregation.iter().flat_map(|aggregation| &aggregation.aggregates) {
@@ -177,7 +194,10 @@ impl<'a> Units<'a> {
 /// The units inferred so far for one rule.
 struct Seen<'a> {
     rule: &'a Rule,
+    vocabulary: &'a Vocabulary,
     units: Vec<Unit>,
+    /// Variables that are the value of a property of the vocabulary.
+    of_properties: BTreeSet<usize>,
     diagnostics: &'a mut Diagnostics,
 }
 
@@ -188,15 +208,40 @@ impl Seen<'_> {
         self.diagnostics.push(fault);
     }
 
+    /// Reports `R043` for a number with a unit that is compared with a text. `Ranges` reports values of properties.
+    fn text(&mut self, number: &Expr, text: &Expr, span: &Span) {
+        let (Expr::Constant(Term::String(text)), Some(unit)) = (text, self.unit_of(number, span)) else { return };
+        let is_of_property = matches!(number, Expr::Variable(variable) if self.of_properties.contains(variable));
+        if is_of_property {
+            return;
+        }
+        let of = if unit == NONE { String::new() } else { format!(" in {}", shown(unit)) };
+        let message = format!("this can never hold: a number{of} is compared with the text `\"{text}\"`");
+        let help = match text.parse::<f64>() {
+            Ok(_) => format!("write the number without quotes: `{text}`"),
+            Err(_) => "compare it with a number".to_owned(),
+        };
+        self.diagnostics.push(Diagnostic::error("R043", message).at(&self.rule.origin.source, span.clone()).help(help));
+    }
+
+    /// The unit of an expression, whose mismatches are reported elsewhere.
+    fn unit_of(&self, expr: &Expr, span: &Span) -> Unit {
+        let (units, of_properties, mut ignored) = (self.units.clone(), BTreeSet::new(), Diagnostics::new());
+        let vocabulary = self.vocabulary;
+        Seen { rule: self.rule, vocabulary, units, of_properties, diagnostics: &mut ignored }.expression(expr, span)
+    }
+
     /// Warns (R045) of an angle that is compared with a number beyond a full turn, which is probably in degrees.
     fn degrees(&mut self, angle: &Expr, number: &Expr, span: &Span) {
-        let mut ignored = Diagnostics::new();
-        let unit =
-            Seen { rule: self.rule, units: self.units.clone(), diagnostics: &mut ignored }.expression(angle, span);
+        let unit = self.unit_of(angle, span);
         let Expr::Constant(term) = number else { return };
         let Some(number) = term.number().filter(|number| unit == Some(RADIAN) && number.abs() > FULL_TURN_RAD) else {
             return;
         };
+        self.beyond_full_turn(number, span);
+    }
+
+    fn beyond_full_turn(&mut self, number: f64, span: &Span) {
         let message = format!("an angle in rad is compared with {number}, which is more than a full turn");
         let help = format!("{number} degrees are {:.4} rad", number.to_radians());
         self.diagnostics
@@ -238,7 +283,47 @@ impl Seen<'_> {
                 });
                 None
             }
+            Expr::Timed(timed) => {
+                let mut units = Vec::new();
+                timed.formulas().iter().for_each(|formula| self.formula(formula, &mut units));
+                // Robustness has a unit if all comparisons have the same.
+                units.first().copied().flatten().filter(|unit| units.iter().all(|other| *other == Some(*unit)))
+            }
             Expr::Constant(_) | Expr::Matches(..) => None,
+        }
+    }
+
+    /// Checks the comparisons of a formula and appends the unit of each.
+    fn formula(&mut self, formula: &Formula, found: &mut Vec<Unit>) {
+        match formula {
+            Formula::Compare { left, right, span, .. } => {
+                let (a, b) = (self.quantity(left, span), self.quantity(right, span));
+                found.push(self.alike(a, b, "compares", span));
+                for (unit, other) in [(a, right), (b, left)] {
+                    if let (Some(RADIAN), Quantity::Number(number)) = (unit, other)
+                        && number.abs() > FULL_TURN_RAD
+                    {
+                        self.beyond_full_turn(*number, span);
+                    }
+                }
+            }
+            Formula::Truth { .. } => {}
+            Formula::Not(inner) => self.formula(inner, found),
+            Formula::And(parts) | Formula::Or(parts) | Formula::Temporal { parts, .. } => {
+                parts.iter().for_each(|part| self.formula(part, found));
+            }
+        }
+    }
+
+    fn quantity(&mut self, quantity: &Quantity, span: &Span) -> Unit {
+        match quantity {
+            Quantity::Number(_) => None,
+            Quantity::Variable(variable) => self.units[*variable],
+            Quantity::Recorded { iri, .. } => dimension(self.vocabulary.terms.get(iri.as_str())?.unit.as_deref()?),
+            Quantity::Call(builtin, args) => {
+                let units: Vec<Unit> = args.iter().map(|arg| self.quantity(arg, span)).collect();
+                self.call(builtin.name, &units, span)
+            }
         }
     }
 

@@ -17,6 +17,8 @@ pub struct Budget {
     pub tuples: usize,
     /// Maximum memory of tuples, matches and created texts, approximately. Unit: bytes.
     pub bytes: usize,
+    /// Maximum number of new things (`!x`) of rules that may make them without end.
+    pub new_things: usize,
     /// Wall time. Unit: seconds.
     pub secs: f64,
     /// Set by another thread to stop the evaluation, but not before it has run for 0.2 s: short ones are finished.
@@ -26,6 +28,6 @@ pub struct Budget {
 impl Default for Budget {
     fn default() -> Self {
         // A pick run derives some hundred tuples in under a millisecond, so all limits are far above realistic rules.
-        Self { tuples: 5_000_000, bytes: 1 << 30, secs: 10.0, stop: Arc::default() }
+        Self { tuples: 5_000_000, bytes: 1 << 30, new_things: 10_000, secs: 10.0, stop: Arc::default() }
     }
 }

@@ -3,9 +3,11 @@
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 use crate::check::stratify::Stratum;
+use crate::check::termination::{Endless, endless};
 use crate::engine::access::{Access, Own};
 use crate::engine::collect::{Distinct, Sink, bytes_of_row};
 use crate::engine::join::Halt;
+use crate::engine::making::Search;
 use crate::engine::meter::{Meter, Stop};
 use crate::engine::plan::{Indexes, Op, Part, Parts, RulePlan, Scan, Sizes, Variant, plan_rule};
 use crate::engine::relation::{Finished, Growing, finished, growing};
@@ -70,18 +72,28 @@ pub(crate) struct Planned {
     /// Facts of the text, as rows stored one after another.
     pub(crate) facts: BTreeMap<PredicateId, Vec<TermId>>,
     pub(crate) plans: Vec<Option<RulePlan>>,
+    /// For each rule that makes new things, how it looks for known ones.
+    pub(crate) searches: Vec<Option<Search>>,
+    /// The predicates of new things that may be made without end.
+    pub(crate) endless: BTreeSet<PredicateId>,
 }
 
 impl Planned {
     /// Plans every rule of a stratified program.
     pub(crate) fn new(program: Program, strata: Vec<Stratum>, indexes: &mut Indexes, sizes: Sizes<'_>) -> Self {
         let mut plans: Vec<Option<RulePlan>> = vec![None; program.rules.len()];
+        let mut searches: Vec<Option<Search>> = vec![None; program.rules.len()];
         for stratum in &strata {
-            for rule in &stratum.rules {
-                plans[*rule] = Some(plan_rule(&program.rules[*rule], stratum, indexes, sizes));
+            for idx in &stratum.rules {
+                let rule = &program.rules[*idx];
+                match rule.makes() {
+                    Some(making) => searches[*idx] = Some(Search::new(rule, making, indexes)),
+                    None => plans[*idx] = Some(plan_rule(rule, stratum, indexes, sizes)),
+                }
             }
         }
-        Self { rules: program.rules, strata, facts: program.facts, plans }
+        let endless = endless(&program.rules).iter().map(Endless::made).collect();
+        Self { rules: program.rules, strata, facts: program.facts, plans, searches, endless }
     }
 }
 
@@ -182,7 +194,7 @@ impl Run<'_, '_, '_> {
     }
 
     /// Returns the memory of a tuple in all its orders. Unit: bytes.
-    fn row_bytes(&self, predicate: PredicateId) -> usize {
+    pub(crate) fn row_bytes(&self, predicate: PredicateId) -> usize {
         bytes_of_row(self.predicates.get(predicate).width, self.access.indexes.of(predicate).len())
     }
 
@@ -220,6 +232,7 @@ impl Run<'_, '_, '_> {
     fn recursive(&mut self, stratum: &Stratum, layers: &mut Layers<'_>) -> Result<(), Stopped> {
         let mut grown = self.grow(stratum, layers);
         let readers = self.readers(stratum);
+        let mut makers = self.makers(stratum, layers).map_err(|stop| Stopped { stop, rule: None })?;
         // The predicates that have new tuples, or had some in the last round.
         let mut active: BTreeSet<usize> = (0..grown.len()).collect();
         // Number of new tuples of the round.
@@ -234,13 +247,18 @@ impl Run<'_, '_, '_> {
         loop {
             active.retain(|place| grown[*place].changed());
             if active.is_empty() {
-                break;
+                active.extend(self.turn(&mut makers, stratum, layers, &grown, &mut new)?);
+                if active.is_empty() {
+                    break;
+                }
+                continue;
             }
             let mut due: Vec<(usize, usize)> = active.iter().flat_map(|place| &readers[*place]).copied().collect();
             due.sort_unstable();
             let rule = due.first().map(|(rule, _)| *rule).or(stratum.rules.first().copied());
             let stopped = |stop| Stopped { stop, rule };
             self.record_rounds(stratum, &active, &grown).map_err(stopped)?;
+            makers.add_matches(&active, &grown, &self.meter.watch).map_err(stopped)?;
             self.meter.derived(new).map_err(stopped)?;
             self.meter.check().map_err(stopped)?;
             new = 0;
@@ -302,6 +320,13 @@ impl Run<'_, '_, '_> {
                 {
                     wanted[place][*index] = true;
                 }
+            }
+        }
+        for scan in
+            stratum.rules.iter().filter_map(|rule| self.planned.searches[*rule].as_ref()).flat_map(Search::steps)
+        {
+            if let Ok(place) = stratum.predicates.binary_search(&scan.predicate) {
+                wanted[place][scan.index] = true;
             }
         }
         let mut grown = Vec::new();

@@ -1,14 +1,15 @@
 //! Loads the facts of one action directly into rows of the given predicates, without an RDF store.
 
-use std::collections::HashMap;
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 use crate::engine::evaluate::Tables;
 use crate::engine::plan::Indexes;
 use crate::engine::relation::finished;
 use crate::model::given::Phases;
-use crate::model::program::{PredicateId, Predicates};
+use crate::model::program::{Literal, Operand, PredicateId, Predicates, Program};
 use crate::model::universe::Universe;
-use actcheck_base::{ActionFacts, TermId, Triple};
+use crate::temporal::{things_of, values_of};
+use actcheck_base::{ActionFacts, Course, Term, TermId, Triple};
 
 /// The given predicates that the rules read.
 #[derive(Debug, Clone)]
@@ -22,6 +23,16 @@ pub(crate) struct Given {
     /// `ontology` for one property each.
     ontology: HashMap<TermId, PredicateId>,
     any_ontology: Option<PredicateId>,
+    /// `course` for one quantity each. In order: loading creates terms, whose IDs must not depend on the process.
+    course: BTreeMap<TermId, CourseReader>,
+}
+
+/// A predicate with the samples of a quantity.
+#[derive(Debug, Clone)]
+struct CourseReader {
+    predicate: PredicateId,
+    /// The things that rules name, if they name one everywhere: the samples of others are not needed.
+    things: Option<BTreeSet<TermId>>,
 }
 
 impl Given {
@@ -33,6 +44,7 @@ impl Given {
             parameter: None,
             ontology: HashMap::new(),
             any_ontology: None,
+            course: BTreeMap::new(),
         };
         for (id, predicate) in predicates.list.iter().enumerate().filter(|(_, predicate)| predicate.given) {
             match (predicate.name.as_str(), predicate.property) {
@@ -44,10 +56,27 @@ impl Given {
                     given.ontology.insert(property, id);
                 }
                 ("ontology", None) => given.any_ontology = Some(id),
+                ("course", Some(quantity)) => {
+                    given.course.insert(quantity, CourseReader { predicate: id, things: None });
+                }
                 _ => given.parameter = Some(id),
             }
         }
         given
+    }
+
+    /// Restricts the samples that are loaded to those of the things that these rules read.
+    pub(crate) fn restrict_course(&mut self, programs: &[&Program]) {
+        let rules = || programs.iter().flat_map(|program| &program.rules);
+        for reader in self.course.values_mut() {
+            let atoms = rules().flat_map(|rule| &rule.body).filter_map(Literal::atom);
+            let subjects =
+                atoms.filter(|atom| atom.predicate == reader.predicate).map(|atom| match atom.args.first() {
+                    Some(Operand::Constant(thing)) => Some(*thing),
+                    _ => None,
+                });
+            reader.things = subjects.collect();
+        }
     }
 
     /// Loads the ontology's statements.
@@ -92,6 +121,11 @@ impl Given {
                 rows[predicate].extend([universe.of_run(*designator), universe.of_run(*value)]);
             }
         }
+        if let Some(course) = facts.course {
+            for (quantity, reader) in &self.course {
+                load_course(course, *quantity, reader.things.as_ref(), universe, &mut rows[reader.predicate]);
+            }
+        }
         let mut tables = Tables::new(predicates.len());
         for (predicate, rows) in rows.into_iter().enumerate().filter(|(_, rows)| !rows.is_empty()) {
             tables.set(predicate, finished(predicates.get(predicate).width, &rows, indexes.of(predicate).clone()));
@@ -114,6 +148,36 @@ impl Given {
     #[cfg(feature = "sparql")]
     pub(crate) fn any_state(&self) -> Option<PredicateId> {
         self.any_state
+    }
+}
+
+/// Appends the samples of a quantity of each thing, or of the given things: subject, time, value.
+fn load_course(
+    course: &Course,
+    quantity: TermId,
+    only: Option<&BTreeSet<TermId>>,
+    universe: &mut Universe<'_>,
+    rows: &mut Vec<TermId>,
+) {
+    let Some(iri) = universe.term(quantity).as_iri().map(str::to_owned) else { return };
+    let times: Vec<TermId> =
+        (0..course.count).map(|idx| universe.intern(Term::Double(idx as f64 * course.period_secs))).collect();
+    for thing in things_of(course) {
+        let id = universe.intern(Term::iri(thing.as_str()));
+        if only.is_some_and(|things| !things.contains(&id)) {
+            continue;
+        }
+        let Some(values) = values_of(course, &iri, std::slice::from_ref(&thing)) else { continue };
+        // Most things are at rest most of the time: their values are the same for many samples.
+        let mut last: Option<(f64, TermId)> = None;
+        for (time, value) in times.iter().zip(values) {
+            let value_id = match last {
+                Some((same, same_id)) if same.to_bits() == value.to_bits() => same_id,
+                _ => universe.intern(Term::Double(value)),
+            };
+            last = Some((value, value_id));
+            rows.extend([id, *time, value_id]);
+        }
     }
 }
 

@@ -101,7 +101,7 @@ fn lookup(atom: &Atom, bound: &[bool], indexes: &mut Indexes) -> (usize, Vec<Ope
     (index, key)
 }
 
-fn scan(atom: &Atom, part: Part, bound: &mut [bool], indexes: &mut Indexes) -> Op {
+pub(crate) fn scan(atom: &Atom, part: Part, bound: &mut [bool], indexes: &mut Indexes) -> Op {
     let (index, key) = lookup(atom, bound, indexes);
     let order = &indexes.of(atom.predicate)[index];
     let mut columns = Vec::new();

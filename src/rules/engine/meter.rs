@@ -11,6 +11,7 @@ pub(crate) struct Meter {
     budget: Budget,
     pub(crate) watch: Watch,
     tuples: usize,
+    new_things: usize,
     steps: u32,
 }
 
@@ -19,7 +20,7 @@ const STEPS_PER_CHECK: u32 = 16_384;
 
 impl Meter {
     pub(crate) fn new(budget: &Budget) -> Self {
-        Self { budget: budget.clone(), watch: Watch::new(budget), tuples: 0, steps: 0 }
+        Self { budget: budget.clone(), watch: Watch::new(budget), tuples: 0, new_things: 0, steps: 0 }
     }
 
     /// Counts one row read.
@@ -48,6 +49,12 @@ impl Meter {
         if self.tuples.saturating_add(count) > self.budget.tuples { Err(Stop::Tuples) } else { Ok(()) }
     }
 
+    /// Counts a new thing of a rule that may make them without end.
+    pub(crate) fn made(&mut self) -> Result<(), Stop> {
+        self.new_things += 1;
+        if self.new_things > self.budget.new_things { Err(Stop::NewThings) } else { Ok(()) }
+    }
+
     /// Ends the count; the explanation of the result uses the time and memory that are left.
     pub(crate) fn into_watch(self) -> Watch {
         self.watch
@@ -61,14 +68,25 @@ impl Meter {
         });
         match stop {
             Stop::Tuples => RuleFault::BudgetSpent(format!("more than {} derived tuples{place}", self.budget.tuples)),
+            Stop::NewThings => {
+                let most = self.budget.new_things;
+                RuleFault::BudgetSpent(format!(
+                    "more than {most} {NEW_THINGS}{place}, which makes further ones for them; add a condition that they \
+                     don't satisfy"
+                ))
+            }
             Stop::Bytes => {
                 RuleFault::BudgetSpent(format!("more than {} of memory{place}", mebibytes(self.budget.bytes)))
             }
             Stop::Time => RuleFault::BudgetSpent(format!("more than {} s{place}", self.budget.secs)),
             Stop::Requested => RuleFault::Interrupted,
+            Stop::Unrecorded => RuleFault::Value(format!("{}{place}", self.watch.unrecorded_text())),
         }
     }
 }
+
+/// The noun for the things of rules with `!x` in their heads, in messages.
+pub(crate) const NEW_THINGS: &str = "new things (`!x`)";
 
 /// Formats an amount of memory.
 pub(crate) fn mebibytes(bytes: usize) -> String {

@@ -10,6 +10,7 @@ pub(crate) mod evaluate;
 pub(crate) mod join;
 pub(crate) mod load;
 pub(crate) mod lower;
+pub(crate) mod making;
 pub(crate) mod meter;
 pub(crate) mod naive;
 pub(crate) mod plan;

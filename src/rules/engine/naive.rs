@@ -7,6 +7,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use crate::check::stratify::Stratum;
 use crate::engine::aggregate::{aggregate, projection};
 use crate::engine::collect::bytes_of_row;
+use crate::engine::making::sort_by_value;
 use crate::engine::meter::{Meter, Stop};
 use crate::engine::plan::operand_value;
 use crate::engine::relation::sort_rows;
@@ -21,37 +22,101 @@ pub(crate) type Sets = BTreeMap<PredicateId, BTreeSet<Vec<TermId>>>;
 /// Memory of a row in a set without its values. Unit: bytes.
 const ROW_BYTES: usize = 64;
 
-/// Adds all tuples that the rules derive to `sets`.
+/// Adds all tuples that the rules derive to `sets`. `endless`: the predicates of new things whose number is limited.
 pub(crate) fn close(
     rules: &[Rule],
     strata: &[Stratum],
+    endless: &BTreeSet<PredicateId>,
     sets: &mut Sets,
     universe: &mut Universe<'_>,
     meter: &mut Meter,
 ) -> Result<(), Stop> {
     for stratum in strata {
-        loop {
-            let mut new = Vec::new();
-            for rule in stratum.rules.iter().map(|idx| &rules[*idx]) {
-                for row in derive(rule, sets, universe, meter)? {
-                    if !sets.get(&rule.head.predicate).is_some_and(|set| set.contains(&row)) {
-                        new.push((rule.head.predicate, row));
-                    }
-                }
-            }
-            if new.is_empty() {
-                break;
-            }
-            for (predicate, row) in new {
-                let bytes = ROW_BYTES + bytes_of_row(row.len(), 0);
-                if sets.entry(predicate).or_default().insert(row) {
-                    meter.derived(1)?;
-                    meter.watch.hold(bytes)?;
-                }
+        let rules: Vec<&Rule> = stratum.rules.iter().map(|idx| &rules[*idx]).collect();
+        let (makers, others): (Vec<&Rule>, Vec<&Rule>) = rules.into_iter().partition(|rule| rule.makes().is_some());
+        saturate(&others, sets, universe, meter)?;
+        // Until each rule in turn makes nothing.
+        let (mut turn, mut idle) = (0, 0);
+        while idle < makers.len() {
+            let rule = makers[turn % makers.len()];
+            let made = make(rule, endless.contains(&rule.head.predicate), sets, universe, meter)?;
+            (turn, idle) = (turn + 1, if made { 0 } else { idle + 1 });
+            if made {
+                saturate(&others, sets, universe, meter)?;
             }
         }
     }
     Ok(())
+}
+
+/// Applies rules that make no new things until there are no new tuples.
+fn saturate(rules: &[&Rule], sets: &mut Sets, universe: &mut Universe<'_>, meter: &mut Meter) -> Result<(), Stop> {
+    loop {
+        let mut new = Vec::new();
+        for rule in rules {
+            for row in derive(rule, sets, universe, meter)? {
+                if !sets.get(&rule.head.predicate).is_some_and(|set| set.contains(&row)) {
+                    new.push((rule.head.predicate, row));
+                }
+            }
+        }
+        if new.is_empty() {
+            return Ok(());
+        }
+        for (predicate, row) in new {
+            add(predicate, row, sets, meter)?;
+        }
+    }
+}
+
+fn add(predicate: PredicateId, row: Vec<TermId>, sets: &mut Sets, meter: &mut Meter) -> Result<(), Stop> {
+    let bytes = ROW_BYTES + bytes_of_row(row.len(), 0);
+    if sets.entry(predicate).or_default().insert(row) {
+        meter.derived(1)?;
+        meter.watch.hold(bytes)?;
+    }
+    Ok(())
+}
+
+/// Makes new things for each match of a rule whose heads no tuples satisfy. Returns whether it made some.
+fn make(
+    rule: &Rule,
+    limit: bool,
+    sets: &mut Sets,
+    universe: &mut Universe<'_>,
+    meter: &mut Meter,
+) -> Result<bool, Stop> {
+    let (Some(making), Some(matched)) = (rule.makes(), rule.body.iter().find_map(Literal::atom)) else {
+        return Ok(false);
+    };
+    let matched_rows: Vec<Vec<TermId>> = sets.get(&matched.predicate).into_iter().flatten().cloned().collect();
+    let mut rows: Vec<&[TermId]> = matched_rows.iter().map(Vec::as_slice).collect();
+    sort_by_value(&mut rows, universe);
+    let heads: Vec<Literal> = making.heads.iter().cloned().map(Literal::Positive).collect();
+    let mut any = false;
+    for row in rows {
+        let mut binding = vec![None; rule.variables.len()];
+        unify(matched, row, &mut binding);
+        let mut satisfied = Vec::new();
+        matches(&heads, sets, universe, &mut binding, &mut satisfied, meter)?;
+        if !satisfied.is_empty() {
+            continue;
+        }
+        for variable in &making.new {
+            binding[*variable] = Some(universe.new_thing(&meter.watch)?);
+            if limit {
+                meter.made()?;
+            }
+        }
+        let values: Vec<TermId> = binding.iter().map(|id| id.unwrap_or(0)).collect();
+        // The heads too, so that the next match finds them.
+        for atom in making.heads.iter().chain([&rule.head]) {
+            let row = atom.args.iter().map(|arg| operand_value(*arg, &values)).collect();
+            add(atom.predicate, row, sets, meter)?;
+        }
+        any = true;
+    }
+    Ok(any)
 }
 
 /// Returns all head rows of one rule.

@@ -1,6 +1,6 @@
 //! Explanations of properties.
 
-use std::cell::Cell;
+use std::cell::{Cell, RefCell};
 
 use crate::book::judge::{Judge, JudgeRules, RuleBook};
 use crate::engine::budget::Budget;
@@ -12,6 +12,7 @@ use crate::explain::model::Explanation;
 use crate::explain::proof::Prover;
 use crate::explain::search::{ProofContext, stated_facts};
 use crate::model::universe::Universe;
+use crate::temporal::{NO_INTERVALS, lacks_intervals};
 use actcheck_base::{ActionFacts, Findings, RuleFault};
 
 impl RuleBook {
@@ -21,6 +22,9 @@ impl RuleBook {
     /// The property is unknown, a value is invalid, or the budget was exceeded.
     pub fn explain(&self, facts: &ActionFacts<'_>, property: &str, budget: &Budget) -> Result<Explanation, RuleFault> {
         let judge = self.property(property)?;
+        if judge.rules.reads_intervals() && lacks_intervals(facts) {
+            return Err(RuleFault::Value(NO_INTERVALS.to_owned()));
+        }
         match &judge.rules {
             JudgeRules::Datalog { planned, verdict, .. } => {
                 let evaluated = self.evaluate_for_proofs(facts, planned, verdict, budget)?;
@@ -49,7 +53,7 @@ impl RuleBook {
         budget: &Budget,
     ) -> Result<Explanation, RuleFault> {
         match &self.property(property)?.rules {
-            JudgeRules::Datalog { planned, verdict, scope, prefixes } => {
+            JudgeRules::Datalog { planned, verdict, scope, prefixes, .. } => {
                 let goal = Goal::parse(statement, prefixes).and_then(|goal| {
                     let predicate = goal.predicate(&self.predicates, &[*scope, 0])?;
                     Ok((goal, predicate))
@@ -79,7 +83,7 @@ impl RuleBook {
         verdict: &Verdict,
         budget: &Budget,
     ) -> Result<Evaluated<'a>, RuleFault> {
-        let mut universe = Universe::new(&self.terms, Some(facts.terms));
+        let mut universe = Universe::of_action(&self.terms, facts);
         let (mut rounds, mut meter) = (Rounds::default(), Meter::new(budget));
         let given = self.given.load(facts, &mut universe, &self.predicates, &self.indexes);
         let own = self.given.load(facts, &mut universe, &self.predicates, &self.indexes);
@@ -128,6 +132,7 @@ impl Evaluated<'_> {
             universe: &self.universe,
             watch: &self.watch,
             exhausted: Cell::new(false),
+            deciding: RefCell::default(),
         }
     }
 }
@@ -140,6 +145,7 @@ fn explained(label: &str, findings: Findings, verdict: &Verdict, context: &Proof
         miss: None,
         unknown: Vec::new(),
         notes: Vec::new(),
+        deciding: Vec::new(),
     };
     if let Some(decisive) = &verdict.decisive {
         let mut prover = Prover::new(context);
@@ -159,6 +165,7 @@ fn explained(label: &str, findings: Findings, verdict: &Verdict, context: &Proof
         explanation.notes.push("the property is inapplicable here: `applicable` has no tuples".to_owned());
     }
     explanation.findings = Some(findings);
+    explanation.deciding = context.deciding_in(&explanation.to_text());
     explanation
 }
 
@@ -175,5 +182,13 @@ fn of_query(label: &str, findings: Findings) -> Explanation {
         .chain(["a SPARQL property is explained by its rows; only Datalog properties have proofs".to_owned()])
         .collect();
     let (proofs, unknown) = (Vec::new(), Vec::new());
-    Explanation { title: label.to_owned(), findings: Some(findings), proofs, miss: None, unknown, notes }
+    Explanation {
+        title: label.to_owned(),
+        findings: Some(findings),
+        proofs,
+        miss: None,
+        unknown,
+        notes,
+        deciding: Vec::new(),
+    }
 }

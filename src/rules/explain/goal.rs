@@ -181,5 +181,5 @@ pub(super) fn goal_explained(
         }
     }
     let title = statement.trim().to_owned();
-    Explanation { title, findings: None, proofs, miss, unknown: Vec::new(), notes }
+    Explanation { title, findings: None, proofs, miss, unknown: Vec::new(), notes, deciding: Vec::new() }
 }

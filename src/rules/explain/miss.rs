@@ -6,6 +6,7 @@ use crate::engine::naive::unify;
 use crate::explain::model::{Failure, Miss};
 use crate::explain::proof::{Prover, keep_group};
 use crate::explain::search::{Binding, ProofContext, reading_order};
+use crate::model::expression::Expr;
 use crate::model::program::{Atom, Literal, Operand, PredicateId, Rule};
 use crate::model::values::Number;
 use actcheck_base::TermId;
@@ -18,6 +19,8 @@ const NEAREST_SHOWN: usize = 3;
 /// The progress of one rule towards the goal.
 struct Attempt<'a> {
     rule: &'a Rule,
+    /// The head that matches the goal. A rule that makes new things has several heads.
+    head: &'a Atom,
     /// Indices of its conditions in evaluation order.
     order: Vec<usize>,
     /// Number of conditions satisfied.
@@ -55,7 +58,15 @@ impl<'a> ProofContext<'a> {
             if let Some(aggregation) = &rule.aggregation {
                 keep_group(&mut binding, &aggregation.group);
             }
-            if let Some(attempt) = self.attempt(rule, binding, &steps)
+            let head = &rule.head;
+            let rule = match &rule.making {
+                Some(making) => {
+                    making.new.iter().for_each(|variable| binding[*variable] = None);
+                    self.rules_of(making.matches).next().unwrap_or(rule)
+                }
+                None => rule,
+            };
+            if let Some(attempt) = self.attempt(rule, head, binding, &steps)
                 && best.as_ref().is_none_or(|best| attempt.better_than(best))
             {
                 best = Some(attempt);
@@ -66,11 +77,17 @@ impl<'a> ProofContext<'a> {
 
     /// Evaluates a rule and returns the attempt that satisfied the largest fraction of its conditions. Returns `None`
     /// if the search was stopped before the first attempt.
-    fn attempt(&self, rule: &'a Rule, mut binding: Binding, steps: &Cell<usize>) -> Option<Attempt<'a>> {
+    fn attempt(
+        &self,
+        rule: &'a Rule,
+        head: &'a Atom,
+        mut binding: Binding,
+        steps: &Cell<usize>,
+    ) -> Option<Attempt<'a>> {
         let order = reading_order(rule, &binding);
         let mut best: Option<Attempt<'a>> = None;
         self.follow(rule, &order, 0, &mut binding, steps, &mut |depth, binding, distance| {
-            let attempt = Attempt { rule, order: order.clone(), depth, binding: binding.clone(), distance };
+            let attempt = Attempt { rule, head, order: order.clone(), depth, binding: binding.clone(), distance };
             if best.as_ref().is_none_or(|best| attempt.better_than(best)) {
                 best = Some(attempt);
             }
@@ -79,7 +96,8 @@ impl<'a> ProofContext<'a> {
     }
 
     /// Calls `stopped` for every dead end with the number of satisfied conditions, the binding, and the distance of a
-    /// failed comparison. The dead end of an aggregating rule may be that its aggregate has another value.
+    /// failed comparison. The dead end of an aggregating rule may be that its aggregate has another value, and that of a
+    /// rule with new things that it made others, or none because known tuples satisfy its heads.
     fn follow(
         &self,
         rule: &Rule,
@@ -93,7 +111,7 @@ impl<'a> ProofContext<'a> {
             return;
         }
         let Some(idx) = order.get(depth) else {
-            if rule.aggregation.is_some() {
+            if rule.aggregation.is_some() || rule.making.is_some() {
                 stopped(depth, binding, None);
             }
             return;
@@ -132,6 +150,10 @@ impl<'a> ProofContext<'a> {
                 let wanted = Number::of(self.universe.term(binding[*variable]?))?.double();
                 Some((side(value)? - wanted).abs())
             }
+            Literal::Test { value: Expr::Timed(timed), .. } => {
+                let robustness = Expr::Timed(Box::new(timed.robustness()));
+                side(&robustness).map(f64::abs)
+            }
             _ => None,
         }
     }
@@ -139,11 +161,16 @@ impl<'a> ProofContext<'a> {
     fn build_miss(&self, attempt: &Attempt<'a>, known: &[Option<TermId>], depth: usize) -> Miss {
         let rule = attempt.rule;
         let shown = |idx: &usize| self.literal(rule, &rule.body[*idx], &attempt.binding);
-        let open = open_binding(&rule.head, known, rule.variables.len()).unwrap_or_default();
-        let goal = self.pattern(&rule.head, &open, &rule.variables);
+        let open = open_binding(attempt.head, known, rule.variables.len()).unwrap_or_default();
+        let goal = self.pattern(attempt.head, &open, &rule.variables);
         let (failed, failure) = match attempt.order.get(attempt.depth).map(|idx| &rule.body[*idx]) {
             Some(literal) => {
                 (self.unsatisfied(rule, literal, &attempt.binding), self.failure(literal, &attempt.binding, depth))
+            }
+            None if rule.making.is_some() => {
+                let nearest = self.nearest(attempt.head.predicate, known);
+                let failed = "a new thing for this: the rule made others, or known tuples satisfy its heads".to_owned();
+                (failed, Failure::NoMatch { nearest, because: None })
             }
             None => (format!("a group whose aggregate is {goal}"), self.other_aggregates(rule, &open)),
         };
@@ -185,6 +212,9 @@ impl<'a> ProofContext<'a> {
                 (Some(_), Some(_)) => Failure::Comparison { distance: self.distance(literal, binding) },
                 _ => Failure::NoValue,
             },
+            Literal::Test { value: Expr::Timed(_), .. } => {
+                Failure::Comparison { distance: self.distance(literal, binding) }
+            }
             Literal::Test { .. } => Failure::NoValue,
         }
     }

@@ -1,6 +1,6 @@
 //! Data model of an explanation.
 
-use actcheck_base::{Findings, Span};
+use actcheck_base::{DecidingSignal, Findings, Span};
 
 /// Explains why a property or goal holds or does not hold: a tree, which [`Explanation::to_text`] formats.
 ///
@@ -42,6 +42,8 @@ pub struct Explanation {
     pub unknown: Vec<UnknownTerm>,
     /// Remarks, for example that a query has no proof.
     pub notes: Vec<String>,
+    /// The signals that decided formulas over the course of the action.
+    pub deciding: Vec<DecidingSignal>,
 }
 
 impl Explanation {

@@ -1,6 +1,6 @@
 //! Explanations of the tuples of a standalone program.
 
-use std::cell::Cell;
+use std::cell::{Cell, RefCell};
 
 use crate::engine::budget::Budget;
 use crate::engine::evaluate::{Layers, Rounds, Tables, evaluate_recording_rounds, fault};
@@ -46,6 +46,7 @@ impl Program {
             universe: &universe,
             watch: &watch,
             exhausted: Cell::new(false),
+            deciding: RefCell::default(),
         };
         Ok(Explanation { unknown, ..goal_explained(statement, predicate, &known, &context) })
     }

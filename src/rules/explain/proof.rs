@@ -8,7 +8,7 @@ use crate::engine::naive::unify;
 use crate::engine::plan::operand_value;
 use crate::explain::model::{Premise, Proof, Support};
 use crate::explain::search::{Binding, ProofContext, reading_order};
-use crate::model::program::{Literal, PredicateId, Rule};
+use crate::model::program::{Literal, Making, PredicateId, Rule};
 use actcheck_base::TermId;
 
 /// Deeper proofs are cut, so that the tree stays small and readable.
@@ -50,7 +50,10 @@ impl<'g, 'a> Prover<'g, 'a> {
                 Some(_) => self.aggregate(rule, row, depth),
                 None => self.instance(rule, binding, round).map(|binding| Support::Rule {
                     rule: self.context.rule_ref(rule),
-                    premises: self.premises(rule, &binding, round, depth),
+                    premises: match &rule.making {
+                        Some(making) => self.made(making, &binding, depth),
+                        None => self.premises(rule, &binding, round, depth),
+                    },
                 }),
             };
             if let Some(support) = support {
@@ -132,6 +135,27 @@ impl<'g, 'a> Prover<'g, 'a> {
                 Literal::Negative(atom) => Premise::Absent(self.context.negated(rule, atom, binding)),
                 _ => Premise::Computed(self.context.literal(rule, literal, binding)),
             });
+        }
+        premises
+    }
+
+    /// Returns the conditions of a rule under which it made new things, and these things.
+    fn made(&mut self, making: &Making, binding: &Binding, depth: usize) -> Vec<Premise> {
+        let Some(rule) = self.context.rules_of(making.matches).next() else { return Vec::new() };
+        let mut known = binding.clone();
+        making.new.iter().for_each(|variable| known[*variable] = None);
+        let values: Vec<TermId> = known.iter().map(|id| id.unwrap_or(0)).collect();
+        let row: Vec<TermId> = rule.head.args.iter().map(|arg| operand_value(*arg, &values)).collect();
+        let round = self.context.round(making.matches, &row);
+        let mut premises = match self.instance(rule, known, round) {
+            Some(binding) => self.premises(rule, &binding, round, depth),
+            None => Vec::new(),
+        };
+        for variable in &making.new {
+            if let Some(id) = binding[*variable] {
+                let (name, thing) = (&rule.variables[*variable], self.context.term(id));
+                premises.push(Premise::Computed(format!("{name} is {thing}, a new thing, which the rule made")));
+            }
         }
         premises
     }

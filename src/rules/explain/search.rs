@@ -1,6 +1,6 @@
 //! Backward search: evaluates rules from their heads over finished tuples.
 
-use std::cell::Cell;
+use std::cell::{Cell, RefCell};
 
 use crate::engine::evaluate::{Planned, Rounds, Tables};
 use crate::engine::meter::Watch;
@@ -10,6 +10,7 @@ use crate::engine::relation::finished;
 use crate::model::expression::holds;
 use crate::model::program::{Atom, Literal, Operand, PredicateId, Predicates, Rule};
 use crate::model::universe::Universe;
+use crate::temporal::Evidence;
 use actcheck_base::{Term, TermId};
 
 /// Values of a rule's variables; `None` if unbound.
@@ -30,6 +31,8 @@ pub(crate) struct ProofContext<'a> {
     pub(crate) watch: &'a Watch,
     /// Whether a search was stopped at its limit.
     pub(crate) exhausted: Cell<bool>,
+    /// The evidence for the formulas that were shown so far.
+    pub(crate) deciding: RefCell<Vec<Evidence>>,
 }
 
 /// Returns the facts written in the programs or read by their imports, without derived tuples.

@@ -5,7 +5,8 @@ use crate::explain::search::{Binding, ProofContext};
 use crate::model::expression::Expr;
 use crate::model::given::property_place;
 use crate::model::program::{Atom, Literal, Operand, PredicateId, Rule};
-use actcheck_base::{Term, TermId, names};
+use crate::temporal::{Evidence, Timed};
+use actcheck_base::{DecidingSignal, Term, TermId, names};
 
 impl ProofContext<'_> {
     /// Formats a tuple as a statement.
@@ -19,6 +20,7 @@ impl ProofContext<'_> {
     pub(super) fn pattern(&self, atom: &Atom, binding: &Binding, names: &[String]) -> String {
         let is_repeated = |variable| atom.args.iter().filter(|arg| **arg == Operand::Variable(variable)).count() > 1;
         let unbound = |variable: usize| match names.get(variable) {
+            Some(name) if name.starts_with('!') && is_repeated(variable) => name.clone(),
             Some(name) if !name.is_empty() && is_repeated(variable) => format!("?{name}"),
             _ => "_".to_owned(),
         };
@@ -78,6 +80,17 @@ impl ProofContext<'_> {
                 let text = self.source_text(rule, span.clone());
                 format!("{text}, with {} {} {}", values[0], op.symbol(), values[1])
             }
+            Literal::Test { value: Expr::Timed(timed), span } => {
+                let text = self.source_text(rule, span.clone());
+                match self.evidence(timed, rule, binding) {
+                    Some(evidence) => {
+                        let said = format!("{text}: {}", evidence.text);
+                        self.deciding.borrow_mut().push(evidence);
+                        said
+                    }
+                    None => text,
+                }
+            }
             Literal::Test { span, .. } => self.source_text(rule, span.clone()),
         }
     }
@@ -112,7 +125,31 @@ impl ProofContext<'_> {
         expr.value(&values, self.universe, self.watch).map(std::borrow::Cow::into_owned)
     }
 
-    fn source_text(&self, rule: &Rule, span: actcheck_base::Span) -> String {
+    /// Returns the moment that decides a formula, with the values there.
+    fn evidence(&self, timed: &Timed, rule: &Rule, binding: &Binding) -> Option<Evidence> {
+        let mut used = Vec::new();
+        timed.variables(&mut used);
+        if used.iter().any(|variable| binding[*variable].is_none()) {
+            return None;
+        }
+        let values: Vec<TermId> = binding.iter().map(|id| id.unwrap_or(0)).collect();
+        timed.evidence(&values, self.universe, self.watch, &|span| self.source_text(rule, span))
+    }
+
+    /// Takes the signals that decided the formulas of an explanation with this text, each once.
+    pub(super) fn deciding_in(&self, text: &str) -> Vec<DecidingSignal> {
+        let mut signals: Vec<DecidingSignal> = Vec::new();
+        for evidence in self.deciding.take().into_iter().filter(|evidence| text.contains(&evidence.text)) {
+            for signal in evidence.signals {
+                if !signals.contains(&signal) {
+                    signals.push(signal);
+                }
+            }
+        }
+        signals
+    }
+
+    pub(super) fn source_text(&self, rule: &Rule, span: actcheck_base::Span) -> String {
         let text = rule.origin.source.text.get(span).unwrap_or_default();
         text.split_whitespace().collect::<Vec<_>>().join(" ")
     }

@@ -7,6 +7,7 @@ use crate::builtins::{self, Builtin, Value};
 use crate::model::universe::Universe;
 use crate::model::values::{lexical, text_len};
 use crate::syntax::Comparison;
+use crate::temporal::Timed;
 use crate::watch::Watch;
 use actcheck_base::{Term, TermId};
 
@@ -26,6 +27,8 @@ pub(crate) enum Expr {
     Matches(Box<Expr>, Box<regex::Regex>),
     /// The pieces of an f-string: each value's text.
     Format(Vec<Expr>),
+    /// A formula over the course of the action: its truth or its robustness.
+    Timed(Box<Timed>),
 }
 
 impl Expr {
@@ -36,6 +39,17 @@ impl Expr {
             Self::Variable(variable) => found.push(*variable),
             Self::Call(_, args) | Self::Format(args) => args.iter().for_each(|arg| arg.variables(found)),
             Self::Matches(arg, _) => arg.variables(found),
+            Self::Timed(timed) => timed.variables(found),
+        }
+    }
+
+    /// Whether a formula over the course of the action is part of the expression.
+    pub(crate) fn is_timed(&self) -> bool {
+        match self {
+            Self::Constant(_) | Self::Variable(_) => false,
+            Self::Call(_, args) | Self::Format(args) => args.iter().any(Self::is_timed),
+            Self::Matches(arg, _) => arg.is_timed(),
+            Self::Timed(_) => true,
         }
     }
 
@@ -70,6 +84,7 @@ impl Expr {
                 }
                 Some(Cow::Owned(Term::string(text)))
             }
+            Self::Timed(timed) => timed.value(binding, terms, watch).map(Cow::Owned),
         }
     }
 }

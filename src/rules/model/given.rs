@@ -4,13 +4,14 @@ use crate::model::program::{Predicate, PredicateId, Predicates};
 use actcheck_base::{Term, TermId, Terms, names};
 
 /// Name, signature and arity of each given predicate.
-pub(crate) const GIVEN: [(&str, &str, usize); 6] = [
+pub(crate) const GIVEN: [(&str, &str, usize); 7] = [
     ("state", "state(phase, subject, property, object)", 4),
     ("before", "before(subject, property, object)", 3),
     ("after", "after(subject, property, object)", 3),
     ("during", "during(subject, property, object)", 3),
     ("ontology", "ontology(subject, property, object)", 3),
     ("parameter", "parameter(designator, value)", 2),
+    ("course", "course(subject, property, seconds, value)", 4),
 ];
 
 /// The predicates of a property's file that determine the verdict: name and meaning.
@@ -26,7 +27,7 @@ pub(crate) const VERDICT: [(&str, &str); 5] = [
 pub(crate) fn property_place(name: &str) -> Option<usize> {
     match name {
         "state" => Some(2),
-        "ontology" => Some(1),
+        "ontology" | "course" => Some(1),
         _ => None,
     }
 }

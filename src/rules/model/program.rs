@@ -1,6 +1,7 @@
 //! Checked rules: predicates and variables are indices, every variable is bound, every name is resolved.
 
 use std::collections::{BTreeMap, HashMap};
+use std::sync::Arc;
 
 use crate::model::expression::{Expr, Variable};
 use crate::syntax::Comparison;
@@ -30,6 +31,15 @@ pub(crate) struct Predicate {
     pub(crate) width: usize,
     /// Whether its facts are input, not only derived.
     pub(crate) given: bool,
+}
+
+impl Predicate {
+    /// Returns the predicate of the text that a helper predicate, such as `p~12`, was added for. Returns `None` for any
+    /// other predicate.
+    pub(crate) fn helps(&self) -> Option<&str> {
+        let (name, number) = self.name.rsplit_once('~')?;
+        (!number.is_empty() && number.bytes().all(|byte| byte.is_ascii_digit())).then_some(name)
+    }
 }
 
 /// All predicates of a book or program.
@@ -190,6 +200,41 @@ pub(crate) struct Rule {
     /// Names of the head's arguments: the variable's name, or an empty string for any other argument.
     pub(crate) head_names: Vec<String>,
     pub(crate) origin: Origin,
+    /// The rule with new things that this rule is a part of.
+    pub(crate) making: Option<Arc<Making>>,
+}
+
+impl Rule {
+    /// Returns the rule with new things if this is the part that makes them.
+    pub(crate) fn makes(&self) -> Option<&Making> {
+        self.making.as_deref().filter(|making| making.made == self.head.predicate)
+    }
+
+    /// Returns the predicates that the rule reads. A rule that makes new things also reads its own heads.
+    pub(crate) fn reads(&self) -> impl Iterator<Item = PredicateId> {
+        let heads = self.makes().into_iter().flat_map(|making| &making.heads);
+        self.body.iter().filter_map(Literal::atom).chain(heads).map(|atom| atom.predicate)
+    }
+}
+
+/// A rule with new things (`!x`) in its heads. For `h(?x, !v), g(!v) :- b(?x, ?y) .`, it consists of these parts, which
+/// have the same variables:
+///
+/// ```prolog
+/// matches(?x) :- b(?x, ?y) .
+/// made(?x, !v) :- matches(?x) .          % For each tuple that lacks the heads: a new thing for `!v`.
+/// h(?x, ?v) :- made(?x, ?v) .
+/// g(?v) :- made(?x, ?v) .
+/// ```
+#[derive(Debug)]
+pub(crate) struct Making {
+    /// The values of the body that the heads read.
+    pub(crate) matches: PredicateId,
+    /// These values with the new things.
+    pub(crate) made: PredicateId,
+    /// The variables of the new things.
+    pub(crate) new: Vec<Variable>,
+    pub(crate) heads: Vec<Atom>,
 }
 
 /// The checked rules and facts of one file, or of several that belong together.

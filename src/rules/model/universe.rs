@@ -2,18 +2,21 @@
 
 use crate::model::values::text_len;
 use crate::watch::{Stop, Watch};
-use actcheck_base::{Term, TermId, Terms};
+use actcheck_base::{ActionFacts, Course, Term, TermId, Terms};
 
 /// Terms of three origins with common ids. The terms of the rules and of the run are borrowed, not copied.
 #[derive(Debug)]
 pub(crate) struct Universe<'a> {
     book: &'a Terms,
     run: Option<&'a Terms>,
+    course: Option<&'a Course>,
     /// Common id of each term of the run, or [`UNKNOWN`] until first used.
     run_ids: Vec<TermId>,
     created: Terms,
     /// Memory of the created terms. Unit: bytes.
     created_bytes: usize,
+    /// The label of the next new thing, if no fact has it.
+    next_label: u64,
 }
 
 /// Memory of a created term without its text: two copies of the term and its entry in the table. Unit: bytes.
@@ -24,7 +27,18 @@ const UNKNOWN: TermId = TermId::MAX;
 impl<'a> Universe<'a> {
     /// Creates a universe of the rules' terms and, optionally, the terms of a run.
     pub(crate) fn new(book: &'a Terms, run: Option<&'a Terms>) -> Self {
-        Self { book, run, run_ids: vec![UNKNOWN; run.map_or(0, Terms::len)], created: Terms::new(), created_bytes: 0 }
+        let run_ids = vec![UNKNOWN; run.map_or(0, Terms::len)];
+        Self { book, run, course: None, run_ids, created: Terms::new(), created_bytes: 0, next_label: 0 }
+    }
+
+    /// Creates the universe of the rules' terms and the facts of an action.
+    pub(crate) fn of_action(book: &'a Terms, facts: &ActionFacts<'a>) -> Self {
+        Self { course: facts.course, ..Self::new(book, Some(facts.terms)) }
+    }
+
+    /// Returns the quantities of the action over time; `None` if they were not recorded.
+    pub(crate) fn course(&self) -> Option<&'a Course> {
+        self.course
     }
 
     fn run_start(&self) -> usize {
@@ -94,6 +108,27 @@ impl<'a> Universe<'a> {
         let id = self.intern(term);
         watch.hold(self.created_bytes - before)?;
         Ok(id)
+    }
+
+    /// Returns the id of a new thing: a blank node that no fact and no rule names.
+    pub(crate) fn new_thing(&mut self, watch: &Watch) -> Result<TermId, Stop> {
+        loop {
+            let term = Term::Blank(self.next_label.to_string().into());
+            self.next_label += 1;
+            if self.book.id(&term).is_none() && self.run.is_none_or(|run| run.id(&term).is_none()) {
+                return self.create(term, watch);
+            }
+        }
+    }
+
+    /// Returns the label of the next new thing.
+    pub(crate) fn next_label(&self) -> u64 {
+        self.next_label
+    }
+
+    /// Labels new things from a number on, so that they don't depend on evaluations whose tuples are not read.
+    pub(crate) fn label_from(&mut self, label: u64) {
+        self.next_label = label;
     }
 
     /// Returns all terms.

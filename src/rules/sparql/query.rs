@@ -15,10 +15,11 @@ use crate::model::values::lexical;
 use crate::sparql::dataset::{Snapshot, Statements, View, length_of, to_rdf};
 use crate::sparql::ledger::Ledger;
 use crate::sparql::query_text::{first_group, groups, scan, variables};
+use crate::temporal::named_in;
 use crate::watch::Watch;
 use actcheck_base::{
     COUNTED_TEXT, Diagnostic, Diagnostics, Findings, MOST_NESTED_CALLS, RuleFault, Severity, Source, Span,
-    TEXT_FUNCTIONS, Term, WitnessRow, bounded_texts, check_calls, names, sparql_excess,
+    TEXT_FUNCTIONS, Term, WitnessRow, bounded_texts, check_calls, names, sparql_excess, unclosed_braces,
 };
 use actcheck_ontology::{Ontology, Vocabulary};
 
@@ -27,6 +28,8 @@ pub(crate) struct Query {
     prepared: PreparedSparqlQuery,
     /// Whether it is an `ASK` query, which passes if it is true.
     pub(crate) asks: bool,
+    /// Whether it reads holds or motions.
+    pub(crate) reads_intervals: bool,
     /// Name of its file.
     file: String,
 }
@@ -67,7 +70,12 @@ impl Query {
             diagnostics
                 .push(Diagnostic::error("R061", "the query is neither ASK nor SELECT").in_source(source).help(help));
         }
-        diagnostics.or(Self { prepared, asks: form == Some(Form::Ask), file: source.name.to_string() })
+        diagnostics.or(Self {
+            prepared,
+            asks: form == Some(Form::Ask),
+            reads_intervals: named_in(&source.text),
+            file: source.name.to_string(),
+        })
     }
 
     /// Judges an action: `ASK` passes if it is true, `SELECT` if it has no rows.
@@ -137,7 +145,8 @@ impl Query {
                 let how = format!("made a text that is too long for a budget of {most}");
                 RuleFault::BudgetSpent(format!("the query in {} {how}; {advice}", self.file))
             }
-            Stop::Requested => RuleFault::Interrupted,
+            // Queries read no quantities over time.
+            Stop::Requested | Stop::Unrecorded | Stop::NewThings => RuleFault::Interrupted,
         }
     }
 
@@ -241,7 +250,11 @@ fn syntax_fault(source: &Source, message: &str) -> Diagnostic {
             let start: usize = source.text.split_inclusive('\n').take(line.saturating_sub(1)).map(str::len).sum();
             let offset: usize = source.text[start..].chars().take(column.saturating_sub(1)).map(char::len_utf8).sum();
             let at = (start + offset).min(source.text.len());
-            Diagnostic::error("R060", "syntax error in the query").at(source, at..at).help(help)
+            let (message, help) = match source.text[at..].trim().is_empty() {
+                true => ("the query ends too early", unclosed_braces(&source.text).unwrap_or(help)),
+                false => ("syntax error in the query", help),
+            };
+            Diagnostic::error("R060", message).at(source, at..at).help(help)
         }
         None => {
             let help = "see https://www.w3.org/TR/sparql11-query/";

@@ -9,6 +9,7 @@ use crate::engine::budget::Budget;
 use crate::model::program::{Predicates, Program};
 use crate::standalone::faults::Faults;
 use crate::standalone::input::{Compression, Ended, Limits, open};
+use crate::standalone::json::read_json;
 use crate::standalone::records::{Found, Records};
 use crate::standalone::settings::Settings;
 use crate::standalone::sink::Sink;
@@ -18,9 +19,10 @@ use crate::syntax::{LiteralSyntax, Statement, Syntax, Transfer};
 use actcheck_base::{Diagnostic, Diagnostics, RuleFault, Source, Span, TermId, Terms, did_you_mean};
 
 /// Formats of imports.
-const FORMATS: [&str; 9] = ["csv", "dsv", "tsv", "rdf", "ntriples", "nquads", "turtle", "trig", "rdfxml"];
+const FORMATS: [&str; 10] = ["csv", "dsv", "tsv", "json", "rdf", "ntriples", "nquads", "turtle", "trig", "rdfxml"];
 const TABLE_OPTIONS: [&str; 7] =
     ["resource", "format", "delimiter", "quoting", "compression", "ignore_headers", "limit"];
+const JSON_OPTIONS: [&str; 3] = ["resource", "compression", "limit"];
 const RDF_OPTIONS: [&str; 4] = ["resource", "compression", "limit", "base"];
 
 /// A file to import.
@@ -40,6 +42,7 @@ pub(super) struct Import {
 enum Content {
     Table(Layout),
     Rdf { format: RdfFormat, base: Option<String> },
+    Json,
 }
 
 /// First pass: collects the imports. The number of columns comes from an option, a rule, or the file itself.
@@ -62,9 +65,13 @@ pub(super) fn define_imports(checking: &mut Checking<'_>, syntax: &Syntax, folde
 fn define_import(checking: &mut Checking<'_>, syntax: &Syntax, transfer: &Transfer, folder: &Path) -> Option<Import> {
     let source = &syntax.source;
     known_format(checking, source, transfer)?;
-    let is_table = matches!(transfer.format.as_str(), "csv" | "dsv" | "tsv");
-    let mut settings = Settings::new(syntax, transfer, if is_table { &TABLE_OPTIONS } else { &RDF_OPTIONS });
-    let import = import_of(checking, syntax, transfer, folder, &mut settings, is_table);
+    let options: &[&str] = match transfer.format.as_str() {
+        "csv" | "dsv" | "tsv" => &TABLE_OPTIONS,
+        "json" => &JSON_OPTIONS,
+        _ => &RDF_OPTIONS,
+    };
+    let mut settings = Settings::new(syntax, transfer, options);
+    let import = import_of(checking, syntax, transfer, folder, &mut settings);
     let failed = settings.diagnostics.has_errors();
     checking.diagnostics.extend(settings.diagnostics);
     import.filter(|_| !failed)
@@ -77,7 +84,6 @@ fn import_of(
     transfer: &Transfer,
     folder: &Path,
     settings: &mut Settings<'_>,
-    is_table: bool,
 ) -> Option<Import> {
     let source = &syntax.source;
     if !transfer.options.iter().any(|(name, _)| name == "resource") {
@@ -93,9 +99,10 @@ fn import_of(
     }
     let path = folder.join(&resource);
     let compression = compression(settings, &path);
-    let (content, arity) = match is_table {
-        true => table(checking, syntax, transfer, settings, &path, compression)?,
-        false => rdf(checking, source, transfer, settings, &path)?,
+    let (content, arity) = match transfer.format.as_str() {
+        "csv" | "dsv" | "tsv" => table(checking, syntax, transfer, settings, &path, compression)?,
+        "json" => (Content::Json, 3),
+        _ => rdf(checking, source, transfer, settings, &path)?,
     };
     let limit = settings.count("limit").unwrap_or(usize::MAX);
     let (predicate, span) = (transfer.predicate.clone(), transfer.span.clone());
@@ -109,9 +116,7 @@ fn known_format(checking: &mut Checking<'_>, source: &Source, transfer: &Transfe
         return Some(());
     }
     let (message, help) = match format {
-        "json" | "sparql" => {
-            (format!("imports from {format} are not supported"), format!("formats: {}", FORMATS.join(", ")))
-        }
+        "sparql" => (format!("imports from {format} are not supported"), format!("formats: {}", FORMATS.join(", "))),
         _ => (format!("unknown format `{format}`"), did_you_mean(format, FORMATS)),
     };
     checking.error("R070", source, &transfer.span, message, help);
@@ -298,6 +303,7 @@ fn read(import: &Import, sink: &mut Sink<'_>, faults: &mut Faults) -> Result<(),
     let reader = open(&import.path, import.compression, sink.limits)?;
     match &import.content {
         Content::Table(layout) => read_table(reader, layout, import.limit, sink, faults),
+        Content::Json => read_json(reader, import.limit, sink, faults),
         Content::Rdf { format, base } => read_rdf(reader, *format, base.as_deref(), import.limit, sink, faults),
     }
     .and_then(|()| sink.check())

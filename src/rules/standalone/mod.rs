@@ -6,6 +6,7 @@ mod export;
 mod faults;
 mod import;
 mod input;
+mod json;
 mod program;
 mod records;
 mod run;

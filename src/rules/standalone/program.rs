@@ -6,6 +6,7 @@ use std::sync::Arc;
 
 use crate::check::checking::{Checking, Role, unique};
 use crate::check::stratify::stratify;
+use crate::check::termination::warnings;
 use crate::engine::budget::Budget;
 use crate::engine::evaluate::{Layers, Planned, Tables, evaluate, fault};
 use crate::engine::meter::Meter;
@@ -196,6 +197,7 @@ impl Program {
         let sizes: Vec<Option<usize>> = (0..predicates.len())
             .map(|id| program.facts.get(&id).map(|rows| rows.len() / predicates.get(id).width))
             .collect();
+        diagnostics.extend(warnings(&program.rules, &predicates, &Universe::new(&terms, None)));
         let mut indexes = Indexes::new(&predicates);
         let planned = Planned::new(program, strata, &mut indexes, &|id| sizes[id]);
         let terms = Arc::new(terms);
@@ -259,8 +261,8 @@ impl Program {
             let width = self.predicates.get(*predicate).width;
             sets.entry(*predicate).or_default().extend(rows.chunks_exact(width).map(<[TermId]>::to_vec));
         }
-        naive::close(&self.planned.rules, &self.planned.strata, &mut sets, universe, meter)
-            .map_err(|stop| meter.fault(stop, None))?;
+        let Planned { rules, strata, endless, .. } = &self.planned;
+        naive::close(rules, strata, endless, &mut sets, universe, meter).map_err(|stop| meter.fault(stop, None))?;
         let rows = |id| sets.get(&id).map_or(Vec::new(), |set| set.iter().flatten().copied().collect());
         Ok((0..self.predicates.len()).map(|id| (id, rows(id))).collect())
     }

@@ -3,9 +3,10 @@
 use std::path::{Path, PathBuf};
 
 use crate::engine::budget::Budget;
+use crate::engine::meter::NEW_THINGS;
 use crate::standalone::export::{exports, write};
 use crate::standalone::program::{Engine, Loading, Program};
-use actcheck_base::{Diagnostic, Diagnostics, Files, RuleFault};
+use actcheck_base::{Diagnostic, Diagnostics, Files, RuleFault, Source};
 
 /// Results of running a program.
 #[derive(Debug, Clone, Default)]
@@ -43,13 +44,8 @@ pub fn run_as(path: &Path, out_dir: &Path, loading: &Loading) -> Result<Summary,
     if diagnostics.has_errors() {
         return Err(diagnostics);
     }
-    let closure = program.close(Engine::Fast, &loading.budget).map_err(|fault| {
-        if fault == RuleFault::Interrupted {
-            return Diagnostic::error("R091", fault.to_string()).in_source(&source);
-        }
-        let help = "a recursive rule that computes new values may never terminate; add a limit such as `?x < 100`";
-        Diagnostic::error("R090", fault.to_string()).in_source(&source).help(help)
-    })?;
+    let closure =
+        program.close(Engine::Fast, &loading.budget).map_err(|fault| stopped(&fault, &program.warnings, &source))?;
     let mut summary = Summary { warnings: program.warnings, ..Summary::default() };
     summary.tuples = closure.predicates().map(|name| (name.to_owned(), closure.count(name))).collect();
     for export in exports {
@@ -60,4 +56,20 @@ pub fn run_as(path: &Path, out_dir: &Path, loading: &Loading) -> Result<Summary,
         summary.written.push((out_dir.join(&export.path), count));
     }
     Ok(summary)
+}
+
+/// Returns the error of a stopped evaluation; if there were too many new things, after the warnings that say why.
+fn stopped(fault: &RuleFault, warnings: &Diagnostics, source: &Source) -> Diagnostics {
+    if *fault == RuleFault::Interrupted {
+        return Diagnostic::error("R091", fault.to_string()).in_source(source).into();
+    }
+    let mut found = Diagnostics::new();
+    let help = if fault.reason().contains(NEW_THINGS) {
+        warnings.iter().filter(|warning| warning.code == "R063").for_each(|warning| found.push(warning.clone()));
+        "a rule that makes new things for its own things may never terminate; `--max-new` sets the limit"
+    } else {
+        "a recursive rule that computes new values may never terminate; add a limit such as `?x < 100`"
+    };
+    found.push(Diagnostic::error("R090", fault.to_string()).in_source(source).help(help));
+    found
 }

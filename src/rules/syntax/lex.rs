@@ -14,7 +14,7 @@ pub enum Token {
     Iri(String),
     /// `?x`.
     Variable(String),
-    /// `!x`: an existential variable.
+    /// `!x`: a new thing.
     Existential(String),
     /// `$x`: a parameter of the program.
     Global(String),
@@ -265,6 +265,10 @@ impl Lexer<'_> {
                 "unexpected character `#`".into(),
                 "comments begin with `%`, aggregates are `#count`, `#sum`, `#min`, `#max`",
             );
+            if self.peek() == Some(' ') {
+                // Probably meant as a comment.
+                self.take_while(|c| c != '\n');
+            }
             return None;
         }
         Some(Token::Aggregate(name))

@@ -7,9 +7,11 @@ mod lex_text;
 pub(crate) mod limits;
 mod parse;
 mod parse_expression;
+mod parse_formula;
 mod tree;
 
 pub use parse::parse;
 pub use tree::{
-    AtomSyntax, Comparison, Expression, ExpressionKind, LiteralSyntax, RuleSyntax, Statement, Syntax, Transfer,
+    AtomSyntax, Comparison, Expression, ExpressionKind, Formula, FormulaKind, LiteralSyntax, RuleSyntax, Statement,
+    Syntax, TemporalOperator, Transfer,
 };

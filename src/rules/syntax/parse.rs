@@ -3,7 +3,8 @@
 use crate::syntax::lex::{Spanned, Token, lex};
 use crate::syntax::limits::{FAULT_LIMIT, PREFIX_LIMIT, SIZE_LIMIT};
 use crate::syntax::tree::{
-    AtomSyntax, Comparison, ExpressionKind, LiteralSyntax, RuleSyntax, Statement, Syntax, Transfer,
+    AtomSyntax, Comparison, ExpressionKind, Formula, FormulaKind, LiteralSyntax, RuleSyntax, Statement, Syntax,
+    Transfer,
 };
 use actcheck_base::{Diagnostic, Diagnostics, Source, Span, did_you_mean};
 
@@ -109,8 +110,19 @@ impl Parser<'_> {
     }
 
     pub(crate) fn unexpected(&mut self, wanted: &str) -> ErrorReported {
+        if let Some(fault) = self.unfinished(wanted) {
+            return fault;
+        }
         let message = format!("expected {wanted}, found {}", describe(self.token()));
+        let text = &self.source.text[self.span().start..];
+        let before = &self.source.text[..self.end()];
         let help = match self.token() {
+            _ if text.starts_with("<-") || text.starts_with("<=") => "a rule is written `head(…) :- body(…) .`",
+            Token::Symbol("=") if before.ends_with('=') => "equality is written `=`",
+            Token::Name(_) | Token::Prefixed(..) if before.ends_with("not") => "negation is written `~atom(…)`",
+            Token::Name(_) if before.ends_with(|c: char| c.is_ascii_digit()) => {
+                "numbers are written without a unit, in metres, radians, seconds and kilograms"
+            }
             Token::End => "end the statement with `.`",
             Token::Symbol(":-") => "a rule has one `:-`; the statement before it may lack its final `.`",
             Token::Symbol(";") => "write one rule for each alternative",
@@ -118,6 +130,17 @@ impl Parser<'_> {
         };
         let span = self.span();
         self.fault("R010", span, message, help)
+    }
+
+    /// Reports a statement without its full stop at its end, if the next token begins a statement in another line.
+    fn unfinished(&mut self, wanted: &str) -> Option<ErrorReported> {
+        let (end, next) = (self.end(), self.span().start);
+        let begins = matches!(self.token(), Token::Name(_) | Token::Directive(_) | Token::AttributeOpen);
+        let is_next = begins && self.source.text[end..next].contains('\n') && self.source.text[..next].ends_with('\n');
+        (is_next && wanted.starts_with("`.` ")).then(|| {
+            let help = "end every statement with ` .`";
+            self.fault("R010", end.saturating_sub(1)..end, "the statement has no `.` at its end", help)
+        })
     }
 
     /// Skips past the next dot, or to a token that can only begin a statement.
@@ -205,10 +228,35 @@ impl Parser<'_> {
 
     fn literal(&mut self) -> Result<LiteralSyntax, ErrorReported> {
         if self.take("~") {
+            if self.begins_formula() {
+                let start = self.tokens[self.at - 1].span.start;
+                let formula = self.temporal()?;
+                let span = start..formula.span.end;
+                return Ok(LiteralSyntax::Temporal(Formula { kind: FormulaKind::Not(Box::new(formula)), span }));
+            }
             return Ok(LiteralSyntax::Negated(self.atom("an atom after `~`")?));
+        }
+        if self.begins_formula() {
+            return Ok(LiteralSyntax::Temporal(self.temporal()?));
         }
         let start = self.at;
         let left = self.expression()?;
+        let Some(op) = self.comparison() else {
+            let name_span = self.tokens[start].span.clone();
+            return match left.kind {
+                ExpressionKind::Call(predicate, args) => {
+                    Ok(LiteralSyntax::Atom(AtomSyntax { predicate, args, span: left.span, name_span }))
+                }
+                _ => Err(self.unexpected("a comparison")),
+            };
+        };
+        let right = self.expression()?;
+        let span = left.span.start..right.span.end;
+        Ok(LiteralSyntax::Comparison { op, left, right, span })
+    }
+
+    /// Takes a comparison operator, if one is next.
+    pub(super) fn comparison(&mut self) -> Option<Comparison> {
         let op = match self.token() {
             Token::Symbol("=") => Comparison::Equal,
             Token::Symbol("!=") => Comparison::Unequal,
@@ -216,20 +264,10 @@ impl Parser<'_> {
             Token::Symbol("<=") => Comparison::LessEqual,
             Token::Symbol(">") => Comparison::Greater,
             Token::Symbol(">=") => Comparison::GreaterEqual,
-            _ => {
-                let name_span = self.tokens[start].span.clone();
-                return match left.kind {
-                    ExpressionKind::Call(predicate, args) => {
-                        Ok(LiteralSyntax::Atom(AtomSyntax { predicate, args, span: left.span, name_span }))
-                    }
-                    _ => Err(self.unexpected("a comparison")),
-                };
-            }
+            _ => return None,
         };
         self.advance();
-        let right = self.expression()?;
-        let span = left.span.start..right.span.end;
-        Ok(LiteralSyntax::Comparison { op, left, right, span })
+        Some(op)
     }
 
     pub(crate) fn atom(&mut self, wanted: &str) -> Result<AtomSyntax, ErrorReported> {

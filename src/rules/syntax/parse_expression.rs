@@ -9,7 +9,7 @@ use crate::syntax::tree::{Expression, ExpressionKind};
 use actcheck_base::{Span, Term, did_you_mean, names};
 
 /// Maximum nesting depth of expressions, so that recursion over them is safe everywhere.
-const DEPTH_LIMIT: usize = 64;
+pub(super) const DEPTH_LIMIT: usize = 64;
 /// Maximum number of operators in one chain (`a + b + …`), which is the depth of its tree on the left side.
 const CHAIN_LIMIT: usize = 256;
 
@@ -113,7 +113,7 @@ impl Parser<'_> {
             }
             Token::Name(_) | Token::Prefixed(..) => return self.name_or_call(),
             Token::Symbol("{") => {
-                let help = "maps are for JSON imports, which are not supported; import CSV, TSV or RDF";
+                let help = "write one fact for each entry; JSON files are imported as facts with three arguments";
                 return Err(self.fault("R012", span, "maps are not supported", help));
             }
             _ => return Err(self.unexpected("a term")),

@@ -118,6 +118,95 @@ pub enum LiteralSyntax {
         /// The whole comparison.
         span: Span,
     },
+    /// A formula that begins with a temporal operator, such as `always(w:tilt(?o) < 0.5)`.
+    Temporal(Formula),
+}
+
+/// A formula over the course of an action.
+#[derive(Debug, Clone)]
+#[non_exhaustive]
+pub struct Formula {
+    /// Its kind, with its parts.
+    pub kind: FormulaKind,
+    /// Its place in the source.
+    pub span: Span,
+}
+
+/// Kinds of formulas.
+#[derive(Debug, Clone)]
+#[non_exhaustive]
+pub enum FormulaKind {
+    /// The comparison of two quantities.
+    Compare(Comparison, Expression, Expression),
+    /// A quantity that is true or false, such as `w:held(?o)`.
+    Signal(Expression),
+    /// `~a`.
+    Not(Box<Formula>),
+    /// `a and b`.
+    And(Vec<Formula>),
+    /// `a or b`.
+    Or(Vec<Formula>),
+    /// `a implies b`.
+    Implies(Box<Formula>, Box<Formula>),
+    /// A temporal operator with one part, or for `until` and `since` two.
+    Temporal {
+        /// Operator.
+        operator: TemporalOperator,
+        /// `[from, to]` in seconds, if written.
+        bound: Option<[Expression; 2]>,
+        /// Its parts.
+        parts: Vec<Formula>,
+    },
+}
+
+/// Temporal operators.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum TemporalOperator {
+    /// At every later time.
+    Always,
+    /// At some later time.
+    Eventually,
+    /// The second at some later time, and the first at all times before that.
+    Until,
+    /// At every earlier time.
+    Historically,
+    /// At some earlier time.
+    Once,
+    /// The second at some earlier time, and the first at all times after that.
+    Since,
+}
+
+impl TemporalOperator {
+    /// All operators.
+    pub const ALL: [Self; 6] =
+        [Self::Always, Self::Eventually, Self::Until, Self::Historically, Self::Once, Self::Since];
+
+    /// Returns the operator of a name.
+    pub fn named(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|operator| operator.name() == name)
+    }
+
+    /// Returns the name as written.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Always => "always",
+            Self::Eventually => "eventually",
+            Self::Until => "until",
+            Self::Historically => "historically",
+            Self::Once => "once",
+            Self::Since => "since",
+        }
+    }
+
+    /// Returns whether it looks at earlier times.
+    pub fn is_past(self) -> bool {
+        matches!(self, Self::Historically | Self::Once | Self::Since)
+    }
+
+    /// Returns the number of its parts.
+    pub fn parts(self) -> usize {
+        if matches!(self, Self::Until | Self::Since) { 2 } else { 1 }
+    }
 }
 
 /// Comparison operators.
@@ -138,6 +227,17 @@ pub enum Comparison {
 }
 
 impl Comparison {
+    /// Returns the operator of the same comparison with its sides exchanged.
+    pub(crate) fn turned(self) -> Self {
+        match self {
+            Self::Less => Self::Greater,
+            Self::LessEqual => Self::GreaterEqual,
+            Self::Greater => Self::Less,
+            Self::GreaterEqual => Self::LessEqual,
+            same => same,
+        }
+    }
+
     /// Returns the operator as written.
     pub fn symbol(self) -> &'static str {
         match self {
@@ -183,7 +283,7 @@ pub enum ExpressionKind {
     Format(Vec<Expression>),
     /// `#count(v, distinct…)`.
     Aggregate(String, Vec<Expression>),
-    /// `!x`: not supported, but parsed so that a clear error can name it.
+    /// `!x`: a new thing, in a head.
     Existential(String),
     /// A tuple `(a, b)`, only in options of imports.
     Tuple(Vec<Expression>),

@@ -14,12 +14,12 @@ function collisions(report) {
   ];
 }
 
-function collisionCard({ runs, filter, open }, action) {
+function collisionCard({ runs, list, open }, action) {
   const colour = (category) => {
     const place = action.kinds.findIndex((kind) => kind.category === category);
     return HIT_COLOURS[place < 0 ? HIT_COLOURS.length - 1 : Math.min(place, HIT_COLOURS.length - 1)];
   };
-  const show = (kind) => { filter.set({ ...ANY, pattern: { runs: kind.runs, told: `${local(action.action)} hits ${local(kind.category)}` } }); location.hash = "#/runs"; };
+  const to = (kind) => list({ pattern: kind.name });
   return make("section", { class: "card collisions" },
     make("h2", {}, local(action.action), make("small", {}, ` hits something in ${interval(action.rate)} of ${counted(action.executions, "run")}`)),
     action.hit > 0 && [
@@ -27,18 +27,18 @@ function collisionCard({ runs, filter, open }, action) {
         make("figure", {}, topView(runs, action, colour, open),
           make("figcaption", { class: "faint" }, "The target, or the goal of the base, is in the middle; the robot approaches upwards. Crosses were hit, the larger the harder; dots were not. Furniture is at the contact or its nearest point. Click a cross to open its run.")),
         make("div", {}, sectorTable(action))),
-      hitTable(action, colour, show)]);
+      hitTable(action, colour, to)]);
 }
 
 /** One row for each category that was hit. */
-function hitTable(action, colour, show) {
+function hitTable(action, colour, to) {
   const most = (counts, hit) => counts.slice(0, 2).map(({ name, count: times }) => `${name.replace(/^robot\//, "")}${times === hit ? "" : ` ${times}`}`).join(", ");
-  return make("div", { class: "scroll", tabindex: "0" }, make("table", {},
+  return scroller("What was hit", make("table", {},
     make("thead", {}, make("tr", {}, ["hit", "share of runs with one [95 %]", "runs", "median force", "largest", "mostly by", "mostly in", "mostly"].map((head) => make("th", { scope: "col" }, head)))),
     make("tbody", {}, action.kinds.map((kind) => make("tr", {},
       make("th", { scope: "row" }, make("span", { class: "swatch", style: { background: colour(kind.category) } }), " ",
-        make("button", { type: "button", class: "flat", onclick: () => show(kind) }, local(kind.category)), kind.furniture && make("small", {}, " furniture")),
-      make("td", {}, interval(kind.rate)), make("td", {}, `${count(kind.hit)} of ${count(kind.present)}`),
+        make("a", { href: to(kind) }, local(kind.category)), kind.furniture && make("small", {}, " furniture")),
+      make("td", {}, rateCell(kind.rate)), make("td", {}, `${count(kind.hit)} of ${count(kind.present)}`),
       make("td", {}, number(kind.force_n.p50, "N")), make("td", {}, number(kind.force_n.most, "N")),
       make("td", {}, most(kind.by, kind.hit)), make("td", {}, most(kind.phases, kind.hit)), make("td", {}, most(kind.directions, kind.hit)))))));
 }
@@ -52,8 +52,8 @@ function sectorTable(action) {
     : make("td", { class: "none" }, "");
   return make("figure", { class: "heat" },
     make("figcaption", {}, "% of movable things hit, by their direction and distance from the target or goal; small: things"),
-    make("div", { class: "scroll", tabindex: "0" }, make("table", {},
-      make("thead", {}, make("tr", {}, make("th", {}), action.sectors[0].map((sector) => make("th", { scope: "col" }, band(sector))))),
+    scroller("Share hit by direction and distance", make("table", {},
+      make("thead", {}, make("tr", {}, make("td", {}), action.sectors[0].map((sector) => make("th", { scope: "col" }, band(sector))))),
       make("tbody", {}, action.sectors.map((row) => make("tr", {}, make("th", { scope: "row" }, row[0].direction), row.map(cell)))))));
 }
 

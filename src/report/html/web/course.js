@@ -1,5 +1,26 @@
 // Poses of all bodies at a moment of a run. The counterpart of `replay.rs`.
 
+/** A vector turned by a quaternion x, y, z, w. */
+function turned([i, j, k, w], [x, y, z]) {
+  const [a, b, c] = [2 * (j * z - k * y), 2 * (k * x - i * z), 2 * (i * y - j * x)];
+  return [x + w * a + j * c - k * b, y + w * b + k * a - i * c, z + w * c + i * b - j * a];
+}
+
+/** A point of a pose's frame, in the frame of the pose. */
+function placed(pose, point) {
+  return turned(pose.slice(3), point).map((value, axis) => value + pose[axis]);
+}
+
+/** A point, in the frame of a pose. */
+function within(pose, point) {
+  const [i, j, k, w] = pose.slice(3);
+  return turned([-i, -j, -k, w], point.map((value, axis) => value - pose[axis]));
+}
+
+function apart(a, b) {
+  return Math.hypot(...a.map((value, axis) => value - b[axis]));
+}
+
 class Course {
   constructor(replay) {
     this.tracks = replay.tracks;
@@ -11,6 +32,26 @@ class Course {
     this.grain = replay.grain;
     this.turn = replay.turn;
     this.slot = new Map(this.tracks.map((track, slot) => [track.name, slot]));
+    this.grasp = this.graspOf(replay);
+  }
+
+  /** The link that carries the grasp point, and the point in its frame: the one in whose frame it moves least. */
+  graspOf(replay) {
+    const action = replay.actions.find(({ hand }) => hand && hand[0] && hand[1]);
+    if (!action) return null;
+    const end = Math.min(this.seconds, (action.start ?? 0) + action.seconds);
+    const links = this.tracks.map((track, slot) => [track, slot]).filter(([track]) => track.name.startsWith("robot/"));
+    const found = links.map(([, slot]) => {
+      const [before, after] = [within(this.pose(slot, action.start ?? 0), action.hand[0]), within(this.pose(slot, end), action.hand[1])];
+      // Of links that are fixed to each other, the nearest.
+      return { slot, point: before, off: apart(before, after) + 1e-3 * Math.hypot(...before) };
+    });
+    return found.sort((a, b) => a.off - b.off)[0] ?? null;
+  }
+
+  /** Position of the grasp point. */
+  hand(secs) {
+    return this.grasp && placed(this.pose(this.grasp.slot, secs), this.grasp.point);
   }
 
   value(slot, part, frame) {

@@ -33,6 +33,11 @@ function fill(element, ...children) {
   return element;
 }
 
+/** A box that scrolls sideways, also with the keyboard. */
+function scroller(label, ...children) {
+  return make("div", { class: "scroll", tabindex: "0", role: "group", "aria-label": label }, children);
+}
+
 /** Local name of an IRI: the part after the last `#` or `/`. */
 function local(iri) {
   return String(iri ?? "").replace(/^.*[#/]/, "");

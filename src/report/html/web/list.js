@@ -3,7 +3,7 @@
 const ROW = 32;
 const MORE = 12;
 
-function runList(runs, filter) {
+function runList({ runs, filter, to }) {
   const body = make("div", { class: "rows", role: "rowgroup" });
   const head = make("div", { class: "row head", role: "row" },
     ["run", "S"].map((word, i) => make("span", { class: i ? "score" : "id", role: "columnheader" }, word)),
@@ -19,9 +19,9 @@ function runList(runs, filter) {
     const run = filter.shown[at], id = runs.runs[run];
     const told = runs.failures(run).map((slot) => runs.why(run, slot)).find(Boolean)
       ?? runs.steps.map((step) => runs.text(step.message, run)).filter(Boolean).at(-1) ?? "";
-    return make("a", { class: "row", role: "row", href: `#/run/${encodeURIComponent(id)}`, tabindex: "-1", id: `row-${at}`,
-      "aria-rowindex": at + 1, style: { top: `${at * ROW}px` } },
-      make("span", { class: "id", role: "rowheader" }, id, runs.replayed.has(id) && make("span", { class: "can", title: "can be played back" }, "▶")),
+    return make("div", { class: "row", role: "row", id: `row-${at}`, "aria-rowindex": at + 1, style: { top: `${at * ROW}px` },
+      onclick: (event) => event.target.closest("a") || event.ctrlKey || event.metaKey || (location.hash = to(run)) },
+      make("span", { class: "id", role: "rowheader" }, make("a", { href: to(run), tabindex: "-1" }, id), runs.replayed.has(id) && make("span", { class: "can", role: "img", "aria-label": "can be played back", title: "can be played back" }, "▶")),
       make("span", { class: "score", role: "gridcell" }, Number.isNaN(runs.score[run]) ? "–" : runs.score[run].toFixed(2)),
       runs.slots.map((slot, i) => {
         const outcome = runs.outcome(run, i);
@@ -53,6 +53,8 @@ function runList(runs, filter) {
     for (const element of shownRows.values()) element.remove();
     shownRows.clear();
     active = -1;
+    list.removeAttribute("aria-activedescendant");
+    list.hidden = filter.shown.length === 0;
     list.scrollTop = 0;
     draw(0);
     // Rows that are not visible yet are added after the visible ones are drawn.
@@ -71,7 +73,7 @@ function runList(runs, filter) {
       drawMore();
       event.preventDefault();
     } else if (event.key === "Enter" && active >= 0) {
-      location.hash = `#/run/${encodeURIComponent(runs.runs[filter.shown[active]])}`;
+      location.hash = to(filter.shown[active]);
     }
   });
   new ResizeObserver(drawMore).observe(list);

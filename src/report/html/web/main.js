@@ -6,7 +6,7 @@ const VIEWS = [["", "Overview"], ["properties", "Properties"], ["modes", "Failur
 /** Number of runs indexed for search in one idle period: a few milliseconds, so that clicks are not delayed. */
 const AT_A_TIME = 400;
 
-/** The elements of a view, its reaction to the filter, and its clean-up. */
+/** The elements of a view, its reaction to the filter and to another address of the same view, and its clean-up. */
 function view(report, [name, chosen]) {
   switch (name) {
     case "properties": return { parts: properties(report, chosen) };
@@ -15,10 +15,10 @@ function view(report, [name, chosen]) {
     case "collisions": return { parts: collisions(report) };
     case "map": return tableMap(report);
     case "history": return { parts: trends(report) };
-    case "run": return runView(report, decodeURIComponent(chosen ?? ""));
+    case "run": return runView(report, chosen ?? "");
     case "runs": {
-      const [bar, follow] = report.filter.bar(), [list, anew] = runList(report.runs, report.filter);
-      return { parts: [make("h1", {}, "Runs"), bar, list], follow: () => { follow(); anew(); }, wide: true };
+      const [bar, follow] = report.filter.bar(), [list, anew] = runList(report), [none, without] = noMatch(report.filter);
+      return { parts: [make("h1", {}, "Runs"), bar, none, list], follow: () => { follow(); without(); anew(); }, wide: true };
     }
     default: return { parts: overview(report) };
   }
@@ -48,16 +48,32 @@ async function main() {
   try {
     const [summary, columns] = await Promise.all([unpack("summary"), unpack("runs")]);
     const runs = new Runs(columns, summary), filter = new Filter(runs);
-    const report = { runs, summary, filter, open: (run) => { location.hash = `#/run/${encodeURIComponent(runs.runs[run])}`; } };
+    const address = new Address(filter);
+    const report = {
+      runs, summary, filter, address,
+      to: (run) => address.of("run", runs.runs[run]),
+      open: (run) => { location.hash = report.to(run); },
+      list: (change) => addressOf(["runs"], filter.query({ ...ANY, ...change })),
+    };
     const links = frame(summary, element);
+    const lead = () => links.forEach((link) => link.setAttribute("href", address.of(link.dataset.view)));
+    filter.listeners.add(lead);
+    filter.noted = (replace) => address.note({}, replace);
     let shown = {};
     const go = (first) => {
-      const way = location.hash.replace(/^#\/?/, "").split("/");
+      const opened = wayOf(location.hash), { way } = opened;
+      address.opened(opened);
+      if (FILTERED.has(way[0])) filter.set(filter.ofQuery(opened.query));
+      // A step back or forward within a view.
+      if (!first && shown.key === way.join("/")) return shown.arrive?.(opened.query);
       filter.listeners.delete(shown.follow);
       shown.end?.();
-      shown = { ...view(report, way) };
+      shown = { ...view(report, way), key: way.join("/") };
       if (Array.isArray(shown.parts)) fill(element, shown.parts);
-      if (shown.follow) filter.listeners.add(shown.follow);
+      if (shown.follow) {
+        filter.listeners.add(shown.follow);
+        shown.follow();
+      }
       element.className = shown.wide ? `wide ${way[0]}` : way[0];
       for (const link of links) {
         const here = link.dataset.view === (way[0] === "run" ? "runs" : way[0]);
@@ -67,6 +83,7 @@ async function main() {
       }
       if (way[0] !== "properties") scrollTo(0, 0);
       if (!first) element.focus({ preventScroll: true });
+      return undefined;
     };
     addEventListener("hashchange", () => go(false));
     go(true);

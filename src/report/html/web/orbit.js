@@ -2,7 +2,7 @@
 
 class Orbit {
   constructor(camera, element, changed) {
-    Object.assign(this, { camera, element, changed, turn: -0.9, height: 0.5, distance: 2, centre: [0, 0, 0.6], fingers: new Map() });
+    Object.assign(this, { camera, element, changed, turn: -0.9, height: 0.5, distance: 2, scale: 1, centre: [0, 0, 0.6], fingers: new Map() });
     element.addEventListener("pointerdown", (event) => {
       element.setPointerCapture(event.pointerId);
       this.fingers.set(event.pointerId, [event.clientX, event.clientY]);
@@ -41,20 +41,20 @@ class Orbit {
   }
 
   zoom(by) {
-    this.distance = Math.min(20, Math.max(0.15, this.distance * by));
+    this.scale = Math.min(8, Math.max(0.12, this.scale * by));
     this.changed();
   }
 
   pan(x, y) {
-    const scale = this.distance / this.element.clientHeight, [sin, cos] = [Math.sin(this.turn), Math.cos(this.turn)];
+    const scale = this.distance * this.scale / this.element.clientHeight, [sin, cos] = [Math.sin(this.turn), Math.cos(this.turn)];
     this.centre = [this.centre[0] + sin * x * scale, this.centre[1] - cos * x * scale, this.centre[2] + y * scale];
     this.held = true;
     this.changed();
   }
 
   place() {
-    const flat = Math.cos(this.height) * this.distance, [x, y, z] = this.centre;
-    this.camera.position.set(x + flat * Math.cos(this.turn), y + flat * Math.sin(this.turn), z + Math.sin(this.height) * this.distance);
+    const away = this.distance * this.scale, flat = Math.cos(this.height) * away, [x, y, z] = this.centre;
+    this.camera.position.set(x + flat * Math.cos(this.turn), y + flat * Math.sin(this.turn), z + Math.sin(this.height) * away);
     this.camera.lookAt(x, y, z);
   }
 }

@@ -1,17 +1,16 @@
 // The start page: counts, then scores, then the most frequent failures.
 
-function overview({ runs, summary, filter, open }) {
+function overview(report) {
+  const { runs, summary, list } = report;
   const all = Array.from({ length: runs.count }, (_, run) => run);
   const counts = runs.counts(all);
   const { scores, findings } = summary;
   const statuses = Object.entries(scores.statuses).map(([word, times]) => `${count(times)} ${word}`).join(", ");
   const between = (found) => found ? `[${found.low.toFixed(2)}–${found.high.toFixed(2)}] ·` : "";
-  const tile = (word) => make("button", {
-    type: "button", class: `tile ${word}`, title: MEANING[word],
-    onclick: () => { filter.set({ ...ANY, outcome: word }); location.hash = "#/runs"; },
-  }, make("span", { class: "large" }, count(counts[word])), make("span", {}, `${SIGNS[word]} ${word}`));
-  const score = (name, value, told) => make("div", { class: "score" },
-    make("span", { class: "large" }, value), make("b", {}, name), make("span", { class: "faint" }, told));
+  const tile = (word) => make("a", { class: `tile ${word}`, title: MEANING[word], href: list({ outcome: word }) }, make("span", { class: "large" }, count(counts[word])), make("span", {}, `${SIGNS[word]} ${word}`));
+  const score = (name, value, told, found) => make("div", { class: "score" },
+    make("span", { class: "large" }, value), make("b", {}, name), found && rateBar(found, "passed"), make("span", { class: "faint" }, told));
+  const ofScore = (rate, found) => found && { rate, ...found };
   return [
     make("section", {},
       make("h1", {}, `${counted(scores.runs, "run")}, ${findings.properties.length === 1 ? "one property" : `${count(findings.properties.length)} properties`}`),
@@ -20,14 +19,14 @@ function overview({ runs, summary, filter, open }) {
       shares(counts, "Outcomes"),
       summary.campaigns.filter((row) => row.privileged).map((row) => make("p", {}, `In ${row.id} ${summary.privileged}.`))),
     make("section", { class: "scores" },
-      score("T", scores.T === null ? "–" : scores.T.toFixed(4), `${between(scores.T_interval)} mean score of ${counted(scores.runs, "run")}`),
-      score("T without broken runs", scores.without_broken === null ? "–" : scores.without_broken.toFixed(4), `${between(scores.without_broken_interval)} the robot's alone`),
+      score("T", scores.T === null ? "–" : scores.T.toFixed(4), `${between(scores.T_interval)} mean score of ${counted(scores.runs, "run")}`, ofScore(scores.T, scores.T_interval)),
+      score("T without broken runs", scores.without_broken === null ? "–" : scores.without_broken.toFixed(4), `${between(scores.without_broken_interval)} the robot's alone`, ofScore(scores.without_broken, scores.without_broken_interval)),
       score("everything passed", scores.all_passed ? percent(scores.all_passed.rate) : "–",
-        scores.all_passed ? `[${(scores.all_passed.low * 100).toFixed(0)}–${(scores.all_passed.high * 100).toFixed(0)}] · ${count(scores.passed)} of ${counted(scores.tested, "run")} that tested anything` : "no run tested anything")),
+        scores.all_passed ? `[${(scores.all_passed.low * 100).toFixed(0)}–${(scores.all_passed.high * 100).toFixed(0)}] · ${count(scores.passed)} of ${counted(scores.tested, "run")} that tested anything` : "no run tested anything", scores.all_passed)),
     make("section", { class: "card" }, make("h2", {}, "Properties"), propertyTable(summary),
       make("p", { class: "more" }, make("a", { href: "#/properties" }, "margins and heat maps →"))),
     make("div", { class: "columns" },
-      make("section", {}, make("h2", {}, "Failure modes"), modeBars(summary, filter, 6),
+      make("section", {}, make("h2", {}, "Failure modes"), modeBars(report, 6),
         make("p", { class: "more" }, make("a", { href: "#/modes" }, "all failure modes →"))),
       make("section", {}, make("h2", {}, "Patterns"), patternList(summary, 6),
         make("p", { class: "more" }, make("a", { href: "#/patterns" }, "patterns with plots →")))),
@@ -37,14 +36,13 @@ function overview({ runs, summary, filter, open }) {
 /** One row for each property: the pass rate with its interval, and the six counts. */
 function propertyTable(summary) {
   const passing = ({ failing }) => failing && { rate: 1 - failing.rate, low: 1 - failing.high, high: 1 - failing.low };
-  return make("div", { class: "scroll", tabindex: "0" }, make("table", { class: "properties" },
-    make("thead", {}, make("tr", {}, ["property", "pass rate [95 %]", "", ...OUTCOMES.map((word) =>
+  return scroller("Properties", make("table", { class: "properties" },
+    make("thead", {}, make("tr", {}, ["property", "pass rate [95 %]", ...OUTCOMES.map((word) =>
       make("span", { title: `${word}: ${MEANING[word]}` }, sign(word)))].map((head) => make("th", { scope: "col" }, head)))),
     make("tbody", {}, summary.findings.properties.map((property, i) => make("tr", {},
       make("th", { scope: "row" }, make("a", { href: `#/properties/${i}` },
         make("small", {}, `${local(property.action)} `), breakable(local(property.property)))),
-      make("td", { class: "rate" }, interval(passing(property))),
-      make("td", {}, intervalPlot(passing(property))),
+      make("td", {}, rateCell(passing(property), "passed")),
       OUTCOMES.map((word) => make("td", { class: property.outcomes[word] ? "" : "faint" }, count(property.outcomes[word]))))))));
 }
 

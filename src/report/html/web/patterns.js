@@ -11,9 +11,10 @@ function patterns(report) {
 }
 
 /** The confirmed patterns of conditions or effects; for properties that fail without one, the strongest. */
-function causesOf({ runs, summary, filter, open }, kind) {
+function causesOf(report, kind) {
+  const { summary } = report;
   const cards = summary.findings.properties.flatMap((property, of) =>
-    property[kind].found.filter((pattern) => pattern.confirmed).map((pattern) => patternCard(runs, property, of, pattern, filter, open)));
+    property[kind].found.filter((pattern) => pattern.confirmed).map((pattern) => patternCard(report, property, of, pattern)));
   const unsure = summary.findings.properties.filter((property) => property.outcomes.failed > 0 && !property[kind].found.some((pattern) => pattern.confirmed));
   return [cards, unsure.length > 0 && make("section", { class: "card unsure" },
     make("h3", {}, "Not beyond chance"),
@@ -33,22 +34,20 @@ function probability(p) {
   return p < 1e-3 ? p.toExponential(0) : p.toFixed(3);
 }
 
-function patternCard(runs, property, of, pattern, filter, open) {
-  const told = pattern.sentence.replace(/^.* runs with /, "").replace(/; elsewhere.*$/, "");
+function patternCard({ runs, list, open }, property, of, pattern) {
   const facts = [
     ["runs in it", count(pattern.all.failed_in + pattern.all.passed_in)], ["lift", number(pattern.lift)],
     ["confirmed on", `${count(pattern.held_out.failed_in)} of ${count(pattern.held_out.failed_in + pattern.held_out.passed_in)} held out`],
     ["q", pattern.q < 1e-4 ? pattern.q.toExponential(0) : number(pattern.q)],
   ];
-  const show = () => { filter.set({ ...ANY, pattern: { runs: pattern.runs, told } }); location.hash = "#/runs"; };
   return make("section", { class: "card pattern" },
     make("h2", {}, pattern.sentence),
     make("dl", { class: "facts" }, facts.map(([name, value]) => make("div", {}, make("dt", {}, name), make("dd", {}, value)))),
     make("div", { class: "rates" },
-      make("span", {}, "with it"), intervalPlot(pattern.rate, "failed"), make("span", {}, interval(pattern.rate)),
-      pattern.elsewhere && [make("span", {}, "elsewhere"), intervalPlot(pattern.elsewhere, "failed"), make("span", {}, interval(pattern.elsewhere))]),
+      make("span", {}, "with it"), rateBar(pattern.rate, "failed"), make("span", {}, interval(pattern.rate)),
+      pattern.elsewhere && [make("span", {}, "elsewhere"), rateBar(pattern.elsewhere, "failed"), make("span", {}, interval(pattern.elsewhere))]),
     patternPlot(runs, of, pattern, open),
-    make("p", {}, make("button", { type: "button", onclick: show }, `Show its ${count(pattern.runs.length)} runs`)),
+    make("p", {}, make("a", { class: "button", href: list({ pattern: pattern.name }) }, `Show its ${count(pattern.runs.length)} runs`)),
     pattern.more && make("p", { class: "faint" }, "More such scenes: ", make("code", {}, pattern.more), " prints the rule for ", make("code", {}, "[scene] require"), "."));
 }
 

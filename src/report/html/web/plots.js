@@ -1,14 +1,17 @@
 // Plots: intervals, distributions, heat maps, trends.
 
-/** A proportion with its interval on an axis from 0 to 1. */
-function intervalPlot(found, outcome = "passed") {
+/** A proportion as a bar with its 95 % interval as a whisker. `most`: the share that fills the width. */
+function rateBar(found, outcome, most = 1) {
   if (!found) return make("span", { class: "faint" }, "never decided");
-  const x = (share) => 4 + share * 152;
-  return make("svg", { class: `interval ${outcome}`, viewBox: "0 0 160 16", role: "img", "aria-label": interval(found) },
-    make("line", { class: "axis", x1: x(0), x2: x(1), y1: 8, y2: 8 }),
-    [0, 0.5, 1].map((share) => make("line", { class: "axis", x1: x(share), x2: x(share), y1: 5, y2: 11 })),
-    make("line", { class: "span", x1: x(found.low), x2: x(found.high), y1: 8, y2: 8 }),
-    make("circle", { class: "dot", cx: x(found.rate), cy: 8, r: 4 }));
+  const part = (share) => `${(Math.min(1, share / most) * 100).toFixed(2)}%`;
+  return make("span", { class: `rate ${outcome}`, role: "img", "aria-label": interval(found) },
+    make("span", { class: "fill", style: { width: part(found.rate) } }),
+    make("span", { class: "whisker", style: { left: part(found.low), width: part(found.high - found.low) } }));
+}
+
+/** A proportion in a table: its bar, then its numbers. */
+function rateCell(found, outcome = "failed") {
+  return found ? make("span", { class: "ratecell" }, rateBar(found, outcome), make("span", {}, interval(found))) : make("span", { class: "faint" }, "never decided");
 }
 
 /** A histogram of margins: negative values in the colour of failed, positive ones in that of passed. */
@@ -47,8 +50,8 @@ function heatMap(map) {
   const bare = (name) => (name ?? "").replace(/_(m|rad|kg)$/, " ($1)").replaceAll("_", " ");
   return make("figure", { class: "heat" },
     make("figcaption", {}, `% failed by ${bare(map.by[0])}${map.by[1] ? ` (down) and ${bare(map.by[1])} (across)` : ""}; small: runs`),
-    make("div", { class: "scroll", tabindex: "0" }, make("table", {},
-      map.across[0] !== "" && make("thead", {}, make("tr", {}, make("th", {}), map.across.map((name) => make("th", { scope: "col" }, name)))),
+    scroller(`Failures by ${bare(map.by[0])}`, make("table", {},
+      map.across[0] !== "" && make("thead", {}, make("tr", {}, make("td", {}), map.across.map((name) => make("th", { scope: "col" }, name)))),
       make("tbody", {}, map.down.map((name, i) => make("tr", {}, make("th", { scope: "row" }, name), map.cells[i].map(cell)))))));
 }
 

@@ -1,12 +1,12 @@
 // The view of one run: failures with explanations, timeline, scene and 3D replay.
 
-function runView({ runs, summary, filter }, id) {
+function runView({ runs, summary, filter, address, to }, id) {
   const run = runs.place.get(id);
-  if (run === undefined) return { parts: [make("h1", {}, "No such run"), make("p", {}, `This report has no run ${id}.`)] };
+  if (run === undefined) return { parts: [make("h1", {}, "No such run"), make("p", {}, `This report has no run ${id}. `, make("a", { href: address.of("runs") }, "See all runs"))] };
   const at = filter.shown.indexOf(run);
   const step = (by, words) => {
     const other = at >= 0 ? filter.shown[at + by] : undefined;
-    return other !== undefined && make("a", { class: "button", href: `#/run/${encodeURIComponent(runs.runs[other])}` }, words);
+    return other !== undefined && make("a", { class: "button", href: to(other) }, words);
   };
   const place = make("div", { class: "watch" });
   const details = make("div", { class: "details" });
@@ -15,7 +15,7 @@ function runView({ runs, summary, filter }, id) {
   const parts = [
     make("header", { class: "runhead" },
       make("h1", {}, id, " ", badge(worst, worst === "passed" ? "nothing failed" : worst)),
-      make("nav", { "aria-label": "Other runs" }, step(-1, "← previous"), step(1, "next →"), make("a", { class: "button", href: "#/runs" }, "all runs"))),
+      make("nav", { "aria-label": "Other runs" }, step(-1, "← previous"), step(1, "next →"), make("a", { class: "button", href: address.of("runs") }, filter.isAny ? "all runs" : "these runs"))),
     make("p", { class: "lead" }, `${runs.text(runs.test, run)} · S = ${Number.isNaN(runs.score[run]) ? "–" : runs.score[run].toFixed(2)} · campaign ${runs.text(runs.campaign, run)} · ${moment(runs.text(runs.started, run))} · ${runs.text(runs.status, run)}`),
     make("div", { class: "run" }, place, details),
     parameterTable(runs, run),
@@ -28,12 +28,18 @@ function runView({ runs, summary, filter }, id) {
     return { parts, end: () => known.end() };
   }
   put(place, make("p", { class: "waiting" }, "Unpacking the run …"));
-  watch(known, place, details, { runs, run, id }).catch((error) =>
+  watch(known, place, details, { runs, run, id, address }).catch((error) =>
     fill(place, make("p", { class: "note" }, `Can't show this run in 3D: ${error.message}`), notHere(summary, id)));
-  return { parts, end: () => known.end() };
+  return { parts, end: () => known.end(), arrive: (query) => known.arrive?.(secsOf(query)) };
 }
 
-async function watch(known, place, details, { runs, run, id }) {
+/** The moment that an address asks for, in seconds; `null` if it asks for none. */
+function secsOf(query) {
+  const secs = Number.parseFloat(query.get("t") ?? "");
+  return Number.isFinite(secs) ? secs : null;
+}
+
+async function watch(known, place, details, { runs, run, id, address }) {
   const replay = await unpack(`replay-${runs.replayed.get(id)}`);
   let ended = false, shown = null;
   known.end = () => { ended = true; shown?.end(); };
@@ -43,16 +49,24 @@ async function watch(known, place, details, { runs, run, id }) {
   fill(details, replay.actions.map((action) => [action.perceived && action.judged.some(told) && make("p", { class: "perceived" }, `${action.perceived}.`),
     action.judged.filter(told).map((judged) => explained(action, judged, seek))]), actionsOf(replay), allOutcomes(runs, run), objectTable(replay), discards(replay));
   if (!replay.courses || !replay.courses.frames) {
-    fill(place, make("p", { class: "note" }, replay.reason ? `The run was ${runs.text(runs.status, run)}: ${replay.reason}` : "The trace of this run is missing, corrupt, or was written by an earlier version of the program."));
-    return;
+    return fill(place, make("p", { class: "note" }, replay.reason ? `The run was ${runs.text(runs.status, run)}: ${replay.reason}` : "The trace of this run is missing, corrupt, or was written by an earlier version of the program."));
   }
-  const made = await player(replay);
+  // The moment of the first sentence beside the picture; of a run in which nothing failed, its beginning.
+  const first = replay.actions.flatMap((action) => action.judged).filter(told).map((judged) => judged.stated).find((secs) => typeof secs === "number");
+  const usual = () => first ?? 0;
+  const made = await player(replay, unitsOf(runs), (secs) => address.note({ t: secs.toFixed(2) }));
   if (ended) return made.end();
   shown = made;
   fill(place, made.element);
-  const decided = replay.actions.flatMap((action) => action.judged).filter(told).map((judged) => judged.decided).filter((secs) => typeof secs === "number");
-  made.begin(decided.length ? Math.min(...decided) : 0);
+  made.begin(secsOf(wayOf(location.hash).query) ?? usual());
+  known.arrive = (secs) => made.seek(secs ?? usual());
   place.dataset.ready = "true";
+  return undefined;
+}
+
+/** The judged properties with the units of their margins. */
+function unitsOf(runs) {
+  return runs.slots.map((slot) => ({ ...slot, unit: runs.summary.findings.properties[slot.of]?.margin.unit }));
 }
 
 /** A failed property, with the data of the tables. */
@@ -69,8 +83,13 @@ function explained(action, judged, seek) {
     make("p", {}, judged.witness),
     judged.pressed && make("p", { class: "pressed" }, judged.pressed),
     make("p", { class: "faint" }, judged.margin !== null && `margin ${number(judged.margin)} `,
-      typeof judged.decided === "number" && make("button", { type: "button", class: "flat", onclick: () => seek(judged.decided) }, `show the moment (${judged.decided.toFixed(1)} s)`)),
-    judged.why && make("details", {}, make("summary", {}, "Why"), make("div", { class: "proof", tabindex: "0" }, judged.why.split("\n").filter((line) => line.trim()).map(proofLine))));
+      momentButton(judged.stated, "show the moment", seek),
+      judged.event && momentButton(judged.decided, `before it: ${judged.event}`, seek)),
+    judged.why && make("details", {}, make("summary", {}, "Why"), make("div", { class: "proof", tabindex: "0", role: "group", "aria-label": "Proof" }, judged.why.split("\n").filter((line) => line.trim()).map(proofLine))));
+}
+
+function momentButton(secs, words, seek) {
+  return typeof secs === "number" && make("button", { type: "button", class: "flat", onclick: () => seek(secs) }, `${words} (${secs.toFixed(1)} s)`);
 }
 
 /** A line of an explanation: missing facts are highlighted, citations are dimmed. */
@@ -100,7 +119,7 @@ function allOutcomes(runs, run) {
 
 function objectTable(replay) {
   return make("section", {}, make("h2", {}, "Scene"), make("p", { class: "faint" }, `world ${replay.world}, seed ${replay.seed}, program ${replay.program}`),
-    make("div", { class: "scroll", tabindex: "0" }, make("table", {},
+    scroller("Objects of the scene", make("table", {},
       make("thead", {}, make("tr", {}, ["object", "kind", "role", "mass (kg)", "friction", "displacement (m)", "tilt (rad)"].map((word) => make("th", { scope: "col" }, word)))),
       make("tbody", {}, replay.objects.map((object) => make("tr", { class: object.role === "target" ? "strong" : "" },
         make("th", { scope: "row" }, object.id), make("td", {}, object.kind), make("td", {}, object.role),

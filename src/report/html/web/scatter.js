@@ -18,7 +18,8 @@ function varies(parameter) {
 }
 
 /**
- * Dots over two parameters. `dots`: the outcome by which each run is drawn (`null`: hidden); `box`: ranges to mark.
+ * Dots over two parameters. `dots`: the outcome by which each run is drawn (`null`: hidden); `box`: ranges to mark;
+ * `outlines`: of tables, in the plane of the two parameters.
  * Returns the element and a function that draws it anew.
  */
 function scatter(runs, { height = 420, open, box = {}, label }) {
@@ -27,15 +28,15 @@ function scatter(runs, { height = 420, open, box = {}, label }) {
   const element = make("div", { class: "scatterbox" }, canvas, tip);
   let placed = [], shown = null;
 
-  const draw = (x, y, equal, dots) => {
-    shown = [x, y, equal, dots];
+  const draw = (x, y, equal, dots, outlines = []) => {
+    shown = [x, y, equal, dots, outlines];
     const width = canvas.clientWidth, scale = Math.min(2, devicePixelRatio);
     if (!width) return;
     canvas.width = width * scale;
     canvas.height = height * scale;
     const pen = canvas.getContext("2d");
     pen.scale(scale, scale);
-    const frame = axes(pen, runs, x, y, equal, width, height, box);
+    const frame = axes(pen, runs, x, y, equal, width, height, box, outlines);
     placed = [];
     const order = ["inapplicable", "untested", "passed", "broken", "timeout", "failed"];
     const colours = Object.fromEntries(OUTCOMES.map((name) => [name, colourOf(name)]));
@@ -101,10 +102,11 @@ function cross(pen, x, y, radius) {
 }
 
 /** Draws axes, grid and marked ranges, and returns the position of each run. */
-function axes(pen, runs, x, y, equal, width, height, box) {
+function axes(pen, runs, x, y, equal, width, height, box, outlines) {
   const [xs, ys] = [runs.parameter.get(x), runs.parameter.get(y)];
   const inner = { left: 52, top: 12, width: width - 66, height: height - 54 };
-  let [xr, yr] = [rangeOf(xs.values), rangeOf(ys.values)];
+  const corners = outlines.flatMap((outline) => outline.points);
+  let [xr, yr] = [xs, ys].map(({ values }, axis) => corners.length ? rangeOf([...rangeOf(values, 0), ...corners.map((corner) => corner[axis])]) : rangeOf(values));
   if (equal) {
     const scale = Math.max((xr[1] - xr[0]) / inner.width, (yr[1] - yr[0]) / inner.height);
     const grown = ([low, high], size) => [(low + high - scale * size) / 2, (low + high + scale * size) / 2];
@@ -118,6 +120,20 @@ function axes(pen, runs, x, y, equal, width, height, box) {
   pen.beginPath();
   pen.rect(inner.left, inner.top, inner.width, inner.height);
   pen.clip();
+  for (const { points, model } of outlines) {
+    pen.beginPath();
+    for (const [left, up] of points) pen.lineTo(px(left), py(up));
+    pen.closePath();
+    pen.fillStyle = colourOf("table");
+    pen.fill();
+    pen.strokeStyle = colourOf("soft");
+    pen.lineWidth = 1.5;
+    pen.stroke();
+    pen.fillStyle = colourOf("soft");
+    pen.font = "11px system-ui, sans-serif";
+    pen.textAlign = "left";
+    pen.fillText(model.replaceAll("_", " "), px(Math.min(...points.map((point) => point[0]))) + 6, py(Math.max(...points.map((point) => point[1]))) + 14);
+  }
   if (box[x] || box[y]) {
     pen.fillStyle = colourOf("mark");
     pen.strokeStyle = colourOf("failed");
@@ -168,10 +184,10 @@ function bands(condition, [first, last]) {
   return [[condition?.low ?? first, condition?.high ?? last]];
 }
 
-function rangeOf(values) {
+function rangeOf(values, share = 0.04) {
   let [low, high] = [Infinity, -Infinity];
   for (const value of values) if (!Number.isNaN(value)) [low, high] = [Math.min(low, value), Math.max(high, value)];
-  const room = (high - low || 1) * 0.04;
+  const room = (high - low || 1) * share;
   return [low - room, high + room];
 }
 

@@ -14,6 +14,17 @@ function geometryOf(three, part) {
   }
 }
 
+/** Height of a part that stands upright, from its middle up and down. */
+function heightOf(part) {
+  switch (part.kind) {
+    case "box": return part.size[2];
+    case "sphere": return 2 * part.radius;
+    case "capsule": return part.height + 2 * part.radius;
+    case "hull": return 2 * Math.max(...part.points.map((point) => point[2]));
+    default: return part.height ?? 0;
+  }
+}
+
 function tube(three, { low, high, wall, height }) {
   const corner = (radius, y) => new three.Vector2(Math.max(radius, 1e-4), y);
   return new three.LatheGeometry([corner(low, -height / 2), corner(high, height / 2), corner(high - wall, height / 2),

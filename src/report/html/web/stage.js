@@ -1,9 +1,18 @@
-// A run in 3D: fixed bodies, moving bodies, lights and a camera.
+// A run in 3D: fixed bodies, moving bodies, lights and a camera that follows the hand and the target.
+
+/** Margin around the framed points. Unit: metres. */
+const AROUND_M = 0.3;
+/** A contact is framed from so long before it until so long after it. Unit: seconds. */
+const BESIDE_SECS = 0.5;
+/** Things further than this from the centre of the view have no label. Unit: metres. */
+const LABELLED_M = 1.5;
+/** Angle between the camera's direction and the robot's reach. Unit: radians. */
+const ASIDE = 1.95;
 
 class Stage {
-  constructor(three, replay, forms, canvas) {
+  constructor(three, replay, course, forms, canvas) {
     this.three = three;
-    this.course = new Course(replay);
+    this.course = course;
     this.canvas = canvas;
     this.target = replay.objects.find((object) => object.role === "target" && this.course.slot.has(object.id))?.id;
     this.renderer = new three.WebGLRenderer({ canvas, antialias: true, preserveDrawingBuffer: true });
@@ -14,9 +23,11 @@ class Stage {
     this.camera = new three.PerspectiveCamera(38, 1, 0.02, 60);
     this.camera.up.set(0, 0, 1);
     this.lights();
+    this.labels = new Labels();
     this.fill(replay, forms);
+    this.name(replay, forms);
     this.orbit = new Orbit(this.camera, canvas, () => this.draw());
-    this.begin();
+    this.begin(0);
   }
 
   lights() {
@@ -49,17 +60,58 @@ class Stage {
       return group;
     });
     this.seen = new three.Group();
-    for (const thing of replay.actions.flatMap((action) => action.seen ?? [])) {
+    this.boxes = replay.actions.flatMap((action) => action.seen ?? []).map((thing) => {
       const box = new three.LineSegments(new three.EdgesGeometry(new three.BoxGeometry(...thing.size)), new three.LineBasicMaterial({ color: 0xb43cb0 }));
       const [x, y, z] = thing.at;
       box.quaternion.set(...thing.at.slice(3)).normalize();
       box.position.set(x, y, z + thing.size[2] / 2);
       this.seen.add(box);
-    }
-    this.seen.visible = false;
+      return { thing, box };
+    });
+    this.gap = new three.Line(new three.BufferGeometry().setFromPoints([new three.Vector3(), new three.Vector3()]), new three.LineBasicMaterial({ color: LOOKS.target[0], depthTest: false, transparent: true }));
+    this.gap.renderOrder = 1;
+    this.gap.frustumCulled = false;
+    scene.add(this.gap);
     scene.add(this.seen, this.trail());
     this.pressed = replay.pressed && { ...replay.pressed, mark: this.mark(replay.pressed) };
     if (this.pressed) scene.add(this.pressed.mark);
+  }
+
+  /** Labels for the hand and all things, and for the gap between hand and target. */
+  name(replay, forms) {
+    const { course, labels } = this, above = (form) => form.reduce((most, part) => Math.max(most, part.at[2] + heightOf(part) / 2), 0) + 0.02;
+    const near = (point) => point && apart(point, this.centre ?? point) < LABELLED_M ? point : null;
+    const target = this.target && course.slot.get(this.target);
+    this.form = target !== undefined && forms[course.tracks[target].form];
+    this.told = labels.add("gap", "", () => this.middle);
+    const body = (track, slot) => labels.add(track.role === "target" ? "target" : "other", track.name, (secs) => {
+      const [x, y, z] = course.position(track.name, secs);
+      return near([x, y, z + above(forms[course.tracks[slot].form])]);
+    });
+    const things = course.tracks.map((track, slot) => [track, slot]).filter(([track]) => !track.name.startsWith("robot/"));
+    things.filter(([track]) => track.role === "target").forEach(([track, slot]) => body(track, slot));
+    if (course.grasp) labels.add("hand", "gripper", (secs) => { const [x, y, z] = course.hand(secs); return [x, y, z + 0.06]; });
+    things.filter(([track]) => track.role !== "target").forEach(([track, slot]) => body(track, slot));
+    const furniture = new Set(replay.still.map((still) => still.name));
+    for (const { thing, box } of this.boxes.filter((one) => !furniture.has(one.thing.name))) {
+      const [x, y, z] = thing.at;
+      labels.add("seen", `seen: ${thing.name}`, () => this.seen.visible && box.visible ? near([x, y, z + thing.size[2]]) : null);
+    }
+    for (const still of replay.still.filter(({ kind }) => kind !== "Wall")) {
+      const [x, y, z] = still.at;
+      labels.add("other", still.name, () => near([x, y, z + above(forms[still.form])]));
+    }
+  }
+
+  /** The line from the hand to the nearest point of the target, with its length. */
+  measure(secs) {
+    const hand = this.course.hand(secs), slot = this.target && this.course.slot.get(this.target);
+    const closest = hand && this.form && closestOf(this.form, this.course.pose(slot, secs), hand);
+    this.gap.visible = Boolean(closest && closest.distance > 0.01 && this.labels.shown);
+    this.middle = this.gap.visible ? hand.map((value, axis) => (value + closest.on[axis]) / 2) : null;
+    if (!this.gap.visible) return;
+    this.gap.geometry.setFromPoints([hand, closest.on].map((point) => new this.three.Vector3(...point)));
+    this.told.textContent = inUnit(closest.distance, "m");
   }
 
   /** A star with its label at the hardest contact. It is visible through bodies. */
@@ -111,19 +163,33 @@ class Stage {
     return new three.Line(new three.BufferGeometry().setFromPoints(points), new three.LineBasicMaterial({ color: LOOKS.target[0], transparent: true, opacity: 0.7 }));
   }
 
-  /** The camera's focus: the target while the robot is near it, else the robot. */
+  /** A sphere around the hand and the target, and the marked contact around its time. */
   focus(secs) {
-    const robot = this.course.robot(secs), target = this.target && this.course.position(this.target, secs);
-    if (!robot) return target ?? [0, 0, 0.5];
-    if (!target || Math.hypot(target[0] - robot[0], target[1] - robot[1]) > 1.6) return [robot[0], robot[1], 0.55];
-    return target.map((value, i) => value + (robot[i] - value) * (i < 2 ? 0.36 : 0.1));
+    const target = this.target && this.course.position(this.target, secs), hand = this.course.hand(secs) ?? this.course.robot(secs);
+    const points = [hand, target].filter(Boolean);
+    if (this.pressed && secs >= this.pressed.secs[0] - BESIDE_SECS && secs <= this.pressed.secs[1] + BESIDE_SECS) points.push(this.pressed.at);
+    if (!points.length) return { centre: [0, 0, 0.5], radius: 0.9 };
+    const [low, high] = [Math.min, Math.max].map((of) => [0, 1, 2].map((axis) => of(...points.map((point) => point[axis]))));
+    return { centre: low.map((value, axis) => (value + high[axis]) / 2), radius: Math.min(1.6, apart(low, high) / 2 + AROUND_M) };
   }
 
-  /** The initial view: from the side of the line from the robot to the target. */
-  begin() {
-    const robot = this.course.robot(0) ?? [0, 0, 0], target = (this.target && this.course.position(this.target, 0)) ?? [1, 0, 0];
+  /** The distance from which a sphere fills the picture. */
+  away(radius) {
+    const up = this.camera.fov * Math.PI / 360, across = Math.atan(Math.tan(up) * this.camera.aspect);
+    return radius / Math.sin(Math.min(up, across));
+  }
+
+  /** The view of a moment: from the side of the robot's reach, on which fewer things are in the way. */
+  begin(secs) {
+    const robot = this.course.robot(secs) ?? [0, 0, 0], target = (this.target && this.course.position(this.target, secs)) ?? [1, 0, 0];
     const way = Math.atan2(target[1] - robot[1], target[0] - robot[0]);
-    Object.assign(this.orbit, { turn: way - 1.95, height: 0.46, distance: 2.75, centre: this.focus(0) });
+    const others = this.course.tracks.filter((track) => !track.name.startsWith("robot/") && track.name !== this.target).map((track) => this.course.position(track.name, secs));
+    const hidden = (turn) => others.filter(([x, y]) => {
+      const [ahead, aside] = [(x - target[0]) * Math.cos(turn) + (y - target[1]) * Math.sin(turn), (y - target[1]) * Math.cos(turn) - (x - target[0]) * Math.sin(turn)];
+      return ahead > 0 && ahead < 1 && Math.abs(aside) < 0.12;
+    }).length;
+    const turn = hidden(way + ASIDE) < hidden(way - ASIDE) ? way + ASIDE : way - ASIDE, { centre, radius } = this.focus(secs);
+    Object.assign(this.orbit, { turn, height: 0.46, distance: this.away(radius), centre });
   }
 
   theme() {
@@ -146,10 +212,18 @@ class Stage {
       const [from, to] = this.pressed.secs;
       this.pressed.mark.material.opacity = secs >= from && secs <= to ? 1 : 0.35;
     }
-    const focus = this.focus(secs);
-    if (follow && !this.orbit.held) {
-      this.orbit.centre = this.near ? this.orbit.centre.map((value, i) => value + (focus[i] - value) * 0.12) : focus;
+    for (const { thing, box } of this.boxes) {
+      // Of several looks at a thing, the last one so far.
+      const since = thing.secs ?? 0;
+      box.visible = since <= secs && !this.boxes.some((other) => other.thing.name === thing.name && other.thing !== thing && other.thing.secs > since && other.thing.secs <= secs);
     }
+    const { centre, radius } = this.focus(secs), focus = centre, distance = this.away(radius), part = this.near ? 0.12 : 1;
+    this.centre = centre;
+    if (follow && !this.orbit.held) {
+      this.orbit.centre = this.orbit.centre.map((value, i) => value + (focus[i] - value) * part);
+      this.orbit.distance += (distance - this.orbit.distance) * part;
+    }
+    this.measure(secs);
     this.sun.position.set(focus[0] + 1.6, focus[1] - 2.2, focus[2] + 4.2);
     this.sun.target.position.set(...focus);
     this.draw();
@@ -168,14 +242,18 @@ class Stage {
       this.renderer.setSize(width, height, false);
       this.camera.aspect = width / height;
       this.camera.updateProjectionMatrix();
+      if (!this.orbit.held) this.orbit.distance = this.away(this.focus(this.secs ?? 0).radius);
     }
     this.orbit.place();
     this.renderer.render(this.scene, this.camera);
+    this.labels.element.hidden = !this.labels.shown;
+    if (this.labels.shown) this.labels.place(this.three, this.camera, this.secs ?? 0, width, height);
   }
 
   /** Renders a moment as a picture, with its own camera. */
   picture(secs, into) {
-    const before = [this.secs ?? 0, this.orbit.centre, this.near];
+    const { orbit } = this, before = [this.secs ?? 0, this.near], view = { centre: orbit.centre, distance: orbit.distance, scale: orbit.scale, held: orbit.held };
+    Object.assign(orbit, { scale: 1, held: false });
     this.near = false;
     this.show(secs, true);
     this.paint();
@@ -183,7 +261,8 @@ class Stage {
     into.width = 480;
     into.height = Math.round(480 * height / Math.max(1, width));
     pen.drawImage(this.canvas, 0, 0, into.width, into.height);
-    [this.orbit.centre, this.near] = [before[1], before[2]];
+    Object.assign(orbit, view);
+    this.near = before[1];
     this.show(before[0], false);
   }
 

@@ -24,39 +24,72 @@ function lanes(replay, seconds) {
     .sort((a, b) => b.robot - a.robot || b.most - a.most).slice(0, MOST_LANES);
 }
 
-/** Returns the timeline and a function that marks a moment. A click calls `seek` with its time. */
-function timeline(replay, seconds, seek) {
-  const rows = lanes(replay, seconds), left = 150, width = 1000, inner = width - left - 10;
+/** Width below which a timeline scrolls. Unit: pixels. */
+const NARROWEST = 400;
+
+/**
+ * The timeline with the signals below it, drawn anew in every width so that its text stays readable. Returns the element,
+ * and functions that draw it, mark a moment, and end it. A click calls `seek` with its time.
+ */
+function timeline(replay, course, signals, thresholds, seek) {
+  const seconds = course.seconds, element = scroller("Timeline and signals");
+  element.classList.add("tracks");
+  let mark = () => {}, secs = 0, drawn = 0;
+  const draw = () => {
+    const width = Math.max(NARROWEST, Math.round(element.clientWidth));
+    if (!element.clientWidth || width === drawn) return;
+    drawn = width;
+    const [drawing, follow] = timelineOf(replay, course, signals, thresholds, seconds, width, seek);
+    fill(element, drawing);
+    mark = follow;
+    mark(secs);
+  };
+  const resized = new ResizeObserver(() => requestAnimationFrame(draw));
+  resized.observe(element);
+  return { element, draw, mark: (to) => { secs = to; mark(to); }, end: () => resized.disconnect() };
+}
+
+function timelineOf(replay, course, signals, thresholds, seconds, width, seek) {
+  const rows = lanes(replay, seconds), left = width < 600 ? 104 : 150, inner = width - left - 10, letters = width < 600 ? 17 : 26;
   const x = (secs) => left + (seconds ? secs / seconds : 0) * inner;
-  const top = 42, height = top + rows.length * LANE + 8;
-  const marks = replay.actions.flatMap((action) => action.judged.filter((judged) => judged.decided !== null && judged.decided !== undefined));
-  const now = make("line", { class: "now", x1: left, x2: left, y1: 0, y2: height });
-  const drawing = make("svg", { class: "timeline", viewBox: `0 0 ${width} ${height}`, role: "img",
-    "aria-label": "Actions, contacts and failures over time",
+  const top = 42, below = top + rows.length * LANE + 4, height = below + signals.length * SIGNAL + 18;
+  const marks = replay.actions.flatMap((action) => action.judged).filter((judged) => typeof judged.stated === "number");
+  const now = make("line", { class: "now", x1: left, x2: left, y1: 0, y2: height - 16 });
+  const [plots, follow] = signalRows(signals, thresholds, course, { x, left, width, top: below });
+  const drawing = make("svg", { class: "timeline", viewBox: `0 0 ${width} ${height}`, width, height, role: "img",
+    "aria-label": `Actions, contacts and failures over ${number(seconds, "s")}, and ${counted(signals.length, "signal")}: ${signals.map(({ name }) => name).join(", ")}`,
     onclick: (event) => {
       const at = drawing.getBoundingClientRect();
       seek(Math.min(seconds, Math.max(0, ((event.clientX - at.left) / at.width * width - left) / inner * seconds)));
     } },
-    replay.actions.filter((action) => action.start !== undefined && action.seconds > 0).map((action, i) => [
-      make("rect", { class: `action of${i % 6}`, x: x(action.start), y: 2, width: Math.max(2, x(action.start + action.seconds) - x(action.start) - 1), height: 16, rx: 3 },
-        make("title", { svg: true }, `${local(action.action)}: ${number(action.seconds, "s")}`)),
-      make("text", { class: "name", x: x(action.start) + 5, y: 14 }, x(action.start + action.seconds) - x(action.start) > 40 ? local(action.action) : ""),
-      (action.phases ?? []).map(([name, start], j, all) => {
-        const [from, to] = [x(action.start + start), x(action.start + (all[j + 1]?.[1] ?? action.seconds))];
-        return [
-          make("line", { class: "phase", x1: from, x2: from, y1: 20, y2: 34 }, make("title", { svg: true }, name)),
-          to - from > name.length * 5.4 + 6 && make("text", { class: "small", x: from + 3, y: 31 }, name)];
-      })]),
+    replay.actions.filter((action) => action.start !== undefined && action.seconds > 0).map((action, i) => actionBar(action, i, x)),
     rows.map((lane, i) => [
-      make("text", { class: "small", x: left - 8, y: top + i * LANE + 10, "text-anchor": "end" }, lane.pair.length > 26 ? `${lane.pair.slice(0, 25)}…` : lane.pair,
+      make("text", { class: "small", x: left - 8, y: top + i * LANE + 10, "text-anchor": "end" }, lane.pair.length > letters ? `${lane.pair.slice(0, letters - 1)}…` : lane.pair,
         make("title", { svg: true }, lane.pair)),
       make("line", { class: "lane", x1: left, x2: width - 10, y1: top + i * LANE + 7, y2: top + i * LANE + 7 }),
       lane.episodes.map(([from, to, force]) => make("rect", {
         class: lane.robot ? "contact robot" : "contact", x: x(from), width: Math.max(2, x(to) - x(from)), y: top + i * LANE + 2, height: 10, rx: 2,
         "fill-opacity": 0.35 + 0.65 * Math.min(1, force / 20),
       }, make("title", { svg: true }, `${lane.pair}: ${number(from, "s")} to ${number(to, "s")}, up to ${number(force, "N")}`)))]),
-    marks.map((judged) => make("path", { class: "decided", d: `M${x(judged.decided)} 0 V${height} M${x(judged.decided) - 4} 0 h8 l-4 6 z` },
+    plots,
+    ticks([0, seconds], inner / 80).map((secs) => make("text", { class: "small", x: x(secs), y: height - 4, "text-anchor": secs === 0 ? "start" : "middle" }, number(Number(secs.toFixed(2)), "s"))),
+    marks.map((judged) => make("path", { class: "decided", d: `M${x(judged.stated)} 0 V${height - 16} M${x(judged.stated) - 4} 0 h8 l-4 6 z` },
       make("title", { svg: true }, `${local(judged.property)} failed`))),
     now);
-  return [drawing, (secs) => { now.setAttribute("x1", x(secs)); now.setAttribute("x2", x(secs)); }];
+  return [drawing, (secs) => { now.setAttribute("x1", x(secs)); now.setAttribute("x2", x(secs)); follow(secs); }];
+}
+
+/** An action with its phases. */
+function actionBar(action, i, x) {
+  const length = x(action.start + action.seconds) - x(action.start);
+  return [
+    make("rect", { class: `action of${i % 6}`, x: x(action.start), y: 2, width: Math.max(2, length - 1), height: 16, rx: 3 },
+      make("title", { svg: true }, `${local(action.action)}: ${number(action.seconds, "s")}`)),
+    make("text", { class: "name", x: x(action.start) + 5, y: 14 }, length > 40 ? local(action.action) : ""),
+    (action.phases ?? []).map(([name, start], j, all) => {
+      const [from, to] = [x(action.start + start), x(action.start + (all[j + 1]?.[1] ?? action.seconds))];
+      return [
+        make("line", { class: "phase", x1: from, x2: from, y1: 20, y2: 34 }, make("title", { svg: true }, name)),
+        to - from > name.length * 5.8 + 6 && make("text", { class: "small", x: from + 3, y: 31 }, name)];
+    })];
 }

@@ -1,0 +1,149 @@
+//! Takes the statements of the journal into the store.
+
+use std::io;
+use std::sync::PoisonError;
+
+use oxigraph::model::{Quad, Term};
+use oxigraph::store::{StorageError, Store};
+
+use crate::journal::{self, Journal, Part};
+use crate::snapshot::Snapshot;
+use crate::{History, fault};
+use actcheck_base::Diagnostics;
+
+/// Number of statements in the journal at which they are written to tables: about 600 runs. From the second part on, the
+/// store merges tables and no longer compresses them; but readers take longer with a long journal, up to some tenths of a
+/// second.
+const MOST: usize = 400_000;
+/// Number of statements from which they are written to tables directly. A few are cheaper as a transaction, because
+/// tables are a dozen files.
+const FEWEST_LOADED: usize = 4_000;
+/// Number of statements in a transaction.
+const TRANSACTION: usize = 20_000;
+/// Largest store that may have no statements. Unit: bytes.
+const MOST_EMPTY: u64 = 1 << 20;
+/// The reason why a journal can't be read.
+pub(super) const DAMAGED: &str = "its journal has changed since it was written";
+
+impl History {
+    /// Makes each stored run survive a power cut, which costs a sync of the disk for each.
+    pub fn sync_each_run(&self) {
+        self.journal().synced = true;
+    }
+
+    fn journal(&self) -> std::sync::MutexGuard<'_, Journal> {
+        self.journal.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Stores statements: all of them or, on an error, none.
+    pub(super) fn enter(&self, quads: &[Quad], doing: &str) -> Result<(), Diagnostics> {
+        let mut journal = self.journal();
+        if journal.is_new() {
+            self.folder.mark_journal(true)?;
+        }
+        journal.append(quads).map_err(|error| fault::io(self.dir(), doing, &error))
+    }
+
+    pub(super) fn sync_journal(&self) -> Result<(), Diagnostics> {
+        self.journal().sync().map_err(|error| self.unwritten(&error))
+    }
+
+    /// Writes the statements of the journal into the store's tables, if there are many.
+    pub(super) fn load_long_journal(&self) -> Result<(), Diagnostics> {
+        if self.journal().statements >= MOST { self.load_journal() } else { Ok(()) }
+    }
+
+    /// Writes the statements of the journal into the store's tables.
+    pub(super) fn load_journal(&self) -> Result<(), Diagnostics> {
+        let mut journal = self.journal();
+        if journal.statements == 0 {
+            return Ok(());
+        }
+        self.take_over(&mut journal, |store, quads| {
+            if quads.len() >= FEWEST_LOADED {
+                return load(store, quads);
+            }
+            store.extend(quads)?;
+            store.flush()
+        })
+    }
+
+    /// Adds the statements of the journal to the store by transactions, which also survive a kill, so that the owner can
+    /// read them.
+    pub(super) fn complete_store(&self) -> Result<(), Diagnostics> {
+        let mut journal = self.journal();
+        if journal.statements == 0 {
+            return Ok(());
+        }
+        let synced = journal.synced;
+        self.take_over(&mut journal, |store, quads| {
+            extend(store, quads)?;
+            if synced { store.flush() } else { Ok(()) }
+        })
+    }
+
+    /// Writes the journal of a killed process into the store.
+    pub(super) fn take_over_journal(&self) -> Result<(), Diagnostics> {
+        let mut journal = self.journal();
+        self.take_over(&mut journal, |store, quads| match quads.len() {
+            0 => Ok(()),
+            1..FEWEST_LOADED => extend(store, quads).and_then(|()| store.flush()),
+            _ => load(store, quads),
+        })
+    }
+
+    fn take_over(
+        &self,
+        journal: &mut Journal,
+        take: impl FnOnce(&Store, Vec<Quad>) -> Result<(), StorageError>,
+    ) -> Result<(), Diagnostics> {
+        let bytes = journal::read(self.dir()).map_err(|error| fault::io(self.dir(), "reading its journal", &error))?;
+        let (quads, is_whole) = journal::statements(&bytes);
+        if !is_whole {
+            return Err(fault::damaged(self.dir(), DAMAGED));
+        }
+        take(&*self.bare_store()?, quads).map_err(|error| self.fault("writing its tables", &error))?;
+        // Only then: a killed process leaves the statements in both.
+        journal.remove().map_err(|error| self.unwritten(&error))
+    }
+
+    fn unwritten(&self, error: &io::Error) -> Diagnostics {
+        fault::io(self.dir(), "writing its journal", error)
+    }
+}
+
+/// Writes statements directly into tables.
+fn load(store: &Store, quads: Vec<Quad>) -> Result<(), StorageError> {
+    // One batch, so that there is one table for each index. The library counts a thousand statements as a megabyte.
+    let megabytes = quads.len() / 1000 + 1;
+    let mut loader = store.bulk_loader().with_num_threads(1).with_max_memory_size_in_megabytes(megabytes);
+    loader.load_quads(quads)?;
+    loader.commit()
+}
+
+fn extend(store: &Store, quads: Vec<Quad>) -> Result<(), StorageError> {
+    quads.chunks(TRANSACTION).try_for_each(|quads| store.extend(quads.iter().cloned()))
+}
+
+/// Opens a snapshot, so that statements of its journal can be added: it is the reader's own. As long as its tables are
+/// empty, statements take a third of the time in memory.
+pub(super) fn open(snapshot: &Snapshot) -> Result<Store, StorageError> {
+    if snapshot.size <= MOST_EMPTY && Store::open_read_only(snapshot.store())?.is_empty()? {
+        return Store::new();
+    }
+    Store::open(snapshot.store())
+}
+
+/// Adds statements of a journal.
+pub(super) fn add(store: &Store, part: Part) -> Result<(), StorageError> {
+    extend(store, part.quads)?;
+    let mut transaction = store.start_transaction()?;
+    for graph in part.graphs {
+        match graph {
+            Term::NamedNode(node) => transaction.insert_named_graph(&node),
+            Term::BlankNode(node) => transaction.insert_named_graph(&node),
+            _ => {}
+        }
+    }
+    transaction.commit()
+}

@@ -1,0 +1,218 @@
+//! The truth and the robustness of a formula over the samples of an action.
+//!
+//! Source: Donzé and Maler, "Robust satisfaction of temporal logic over real-valued signals", 2010. On samples, windows
+//! contain the samples between their ends, and end with the action.
+
+use crate::builtins::Builtin;
+use crate::model::universe::Universe;
+use crate::syntax::{Comparison, TemporalOperator};
+use crate::temporal::formula::{Formula, Quantity, Thing};
+use crate::temporal::quantities::values_of;
+use crate::temporal::windows::{Window, largest_after, negated, reversed, smallest_after, until};
+use crate::watch::Watch;
+use actcheck_base::{Course, Term, TermId, names};
+use std::borrow::Cow;
+
+/// Why a run can't be judged by a rule about time.
+pub(crate) const UNRECORDED: &str =
+    "the course of the action was not recorded: the run is of an earlier version; run the campaign again";
+
+/// Reads formulas under one binding of a rule's variables.
+pub(super) struct Reader<'a> {
+    pub(super) course: &'a Course,
+    binding: &'a [TermId],
+    terms: &'a Universe<'a>,
+    watch: &'a Watch,
+}
+
+/// The contribution of a comparison: its distance from flipping, or only whether it holds (1 or −1).
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Scale {
+    Robustness,
+    Truth,
+}
+
+impl<'a> Reader<'a> {
+    /// Returns `None`, and stops the evaluation, if the course of the action was not recorded.
+    pub(super) fn new(binding: &'a [TermId], terms: &'a Universe<'a>, watch: &'a Watch) -> Option<Self> {
+        let Some(course) = terms.course().filter(|course| course.count > 0) else {
+            watch.unrecorded(UNRECORDED.to_owned());
+            return None;
+        };
+        Some(Self { course, binding, terms, watch })
+    }
+
+    /// Returns whether a formula holds in the action.
+    pub(super) fn holds(&self, formula: &Formula) -> Option<bool> {
+        let robustness = self.robustness(formula)?;
+        if robustness != 0.0 {
+            return Some(robustness > 0.0);
+        }
+        // On the border, `<` and `<=` differ.
+        let truth = self.samples(formula, Scale::Truth)?;
+        Some(truth.get(self.moment(formula)).is_some_and(|value| *value > 0.0))
+    }
+
+    /// Returns how far a formula is from flipping in the action; infinite if no number can flip it.
+    pub(super) fn robustness(&self, formula: &Formula) -> Option<f64> {
+        self.over_time(formula)?.get(self.moment(formula)).copied()
+    }
+
+    /// Returns the sample at which a formula is read: the first, or the last if it looks back.
+    pub(super) fn moment(&self, formula: &Formula) -> usize {
+        if formula.looks_back() { self.course.count.saturating_sub(1) } else { 0 }
+    }
+
+    /// Returns the time of a sample since the action began. Unit: seconds.
+    pub(super) fn secs(&self, at: usize) -> f64 {
+        at as f64 * self.course.period_secs
+    }
+
+    /// Returns the robustness at each sample.
+    pub(super) fn over_time(&self, formula: &Formula) -> Option<Vec<f64>> {
+        self.samples(formula, Scale::Robustness)
+    }
+
+    /// Returns the window of an operator.
+    pub(super) fn window(&self, from: f64, to: f64) -> Window {
+        Window::of(from, to, self.course.period_secs)
+    }
+
+    fn samples(&self, formula: &Formula, scale: Scale) -> Option<Vec<f64>> {
+        self.watch.work(size_of::<f64>() * self.course.count)?;
+        match formula {
+            Formula::Compare { op, left, right, .. } => {
+                let (left, right) = (self.quantity(left)?, self.quantity(right)?);
+                let values = left.iter().zip(right.iter()).map(|(a, b)| match scale {
+                    Scale::Robustness => distance(*op, *a, *b),
+                    Scale::Truth => sign(compares(*op, *a, *b)),
+                });
+                Some(values.collect())
+            }
+            Formula::Truth { quantity, .. } => {
+                let factor = if scale == Scale::Truth { 1.0 } else { f64::INFINITY };
+                Some(self.quantity(quantity)?.iter().map(|value| factor * sign(*value != 0.0)).collect())
+            }
+            Formula::Not(inner) => self.samples(inner, scale).map(negated),
+            Formula::And(parts) => self.joined(parts, scale, f64::min),
+            Formula::Or(parts) => self.joined(parts, scale, f64::max),
+            Formula::Temporal { operator, from, to, parts, .. } => {
+                let parts: Option<Vec<Vec<f64>>> = parts.iter().map(|part| self.samples(part, scale)).collect();
+                Some(temporal(*operator, self.window(*from, *to), parts?))
+            }
+        }
+    }
+
+    fn joined(&self, parts: &[Formula], scale: Scale, join: fn(f64, f64) -> f64) -> Option<Vec<f64>> {
+        let mut parts = parts.iter();
+        let mut joined = self.samples(parts.next()?, scale)?;
+        for part in parts {
+            let more = self.samples(part, scale)?;
+            joined.iter_mut().zip(more).for_each(|(slot, value)| *slot = join(*slot, value));
+        }
+        Some(joined)
+    }
+
+    /// Returns a quantity at each sample.
+    pub(super) fn quantity(&self, quantity: &Quantity) -> Option<Vec<f64>> {
+        let count = self.course.count;
+        match quantity {
+            Quantity::Number(value) => Some(vec![*value; count]),
+            Quantity::Variable(variable) => {
+                let term = self.terms.term(self.binding[*variable]);
+                let Some(value) = term.number() else {
+                    self.watch.unrecorded(format!("{term} is not a number"));
+                    return None;
+                };
+                Some(vec![value; count])
+            }
+            Quantity::Recorded { iri, things, .. } => {
+                let things: Vec<String> = things.iter().map(|thing| self.thing(thing)).collect();
+                let values = values_of(self.course, iri, &things);
+                if values.is_none() {
+                    let things: Vec<String> = things.iter().map(|thing| names::shorten(thing)).collect();
+                    let of = things.join(" and ");
+                    self.watch.unrecorded(format!("`{}` of {of} was not recorded", names::shorten(iri)));
+                }
+                values
+            }
+            Quantity::Call(builtin, args) => {
+                let args: Option<Vec<Vec<f64>>> = args.iter().map(|arg| self.quantity(arg)).collect();
+                Some(self.called(builtin, &args?))
+            }
+        }
+    }
+
+    fn thing(&self, thing: &Thing) -> String {
+        match thing {
+            Thing::Constant(text) => text.clone(),
+            Thing::Variable(variable) => match self.terms.term(self.binding[*variable]) {
+                Term::Iri(iri) => iri.to_string(),
+                Term::String(text) => text.to_string(),
+                term => term.to_string(),
+            },
+        }
+    }
+
+    /// Applies a built-in at each sample. Its value is NaN where it has none.
+    fn called(&self, builtin: &Builtin, args: &[Vec<f64>]) -> Vec<f64> {
+        let at = |idx: usize| args.iter().map(move |values| values[idx]);
+        let each = |value: &dyn Fn(usize) -> f64| (0..self.course.count).map(value).collect();
+        match (builtin.name, args) {
+            ("SUM", _) => each(&|idx| at(idx).sum()),
+            ("PRODUCT", _) => each(&|idx| at(idx).product()),
+            ("MIN", _) => each(&|idx| at(idx).fold(f64::INFINITY, f64::min)),
+            ("MAX", _) => each(&|idx| at(idx).fold(f64::NEG_INFINITY, f64::max)),
+            ("MINUS", [a, b]) => each(&|idx| a[idx] - b[idx]),
+            ("DIVISION", [a, b]) => each(&|idx| a[idx] / b[idx]),
+            ("INVERSE" | "NEGATIVE", [a]) => each(&|idx| -a[idx]),
+            ("ABS", [a]) => each(&|idx| a[idx].abs()),
+            ("SQRT", [a]) => each(&|idx| a[idx].sqrt()),
+            _ => each(&|idx| {
+                let values: Vec<Cow<'_, Term>> = at(idx).map(|value| Cow::Owned(Term::Double(value))).collect();
+                builtin.call(&values, self.watch).and_then(|term| term.number()).unwrap_or(f64::NAN)
+            }),
+        }
+    }
+}
+
+fn temporal(operator: TemporalOperator, window: Window, parts: Vec<Vec<f64>>) -> Vec<f64> {
+    let mut parts = parts.into_iter().map(|values| if operator.is_past() { reversed(values) } else { values });
+    let first = parts.next().unwrap_or_default();
+    let values = match operator {
+        TemporalOperator::Always | TemporalOperator::Historically => smallest_after(&first, window),
+        TemporalOperator::Eventually | TemporalOperator::Once => largest_after(&first, window),
+        TemporalOperator::Until | TemporalOperator::Since => {
+            let second = parts.next().unwrap_or_default();
+            until(&first, &second, window)
+        }
+    };
+    if operator.is_past() { reversed(values) } else { values }
+}
+
+/// Returns how far a comparison is from flipping; negative if it does not hold. A value that is not a number can't hold.
+fn distance(op: Comparison, left: f64, right: f64) -> f64 {
+    let value = match op {
+        Comparison::Less | Comparison::LessEqual => right - left,
+        Comparison::Greater | Comparison::GreaterEqual => left - right,
+        Comparison::Equal => -(left - right).abs(),
+        Comparison::Unequal => (left - right).abs(),
+    };
+    if value.is_nan() { f64::NEG_INFINITY } else { value }
+}
+
+/// Returns whether a comparison of two numbers holds.
+pub(super) fn compares(op: Comparison, left: f64, right: f64) -> bool {
+    match op {
+        Comparison::Less => left < right,
+        Comparison::LessEqual => left <= right,
+        Comparison::Greater => left > right,
+        Comparison::GreaterEqual => left >= right,
+        Comparison::Equal => left == right,
+        Comparison::Unequal => left != right,
+    }
+}
+
+fn sign(holds: bool) -> f64 {
+    if holds { 1.0 } else { -1.0 }
+}
