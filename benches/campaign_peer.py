@@ -20,12 +20,12 @@ import subprocess
 import sys
 import tempfile
 import tomllib
-import venv
 from pathlib import Path
+
+from environment import enter
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent
-ENVIRONMENT = ROOT / "target" / "campaign_peer"
 PACKAGES = ["mujoco==4.0.0", "hypothesis", "pyoxigraph", "numpy"]
 PROPERTIES = ["CloseObject", "ObjectGrasped", "NoGraspCollisions", "MovedObject", "ObjectInGripper"]
 
@@ -44,13 +44,12 @@ TABLE_M, HALF_M = 0.705, 0.31
 
 def main():
     parser = argparse.ArgumentParser()
-    parser.add_argument("--program", default=str(ROOT / "target" / "release" / "actcheck"))
+    parser.add_argument("--program", default=str(ROOT / "actcheck"))
     parser.add_argument("--runs", type=int, default=16)
     parser.add_argument("--rounds", type=int, default=5)
     parser.add_argument("--peer", metavar="SEED", type=int, help="run only the peer's campaign, with this seed")
     chosen = parser.parse_args()
-    if Path(sys.prefix).resolve() != ENVIRONMENT.resolve():
-        enter()
+    enter(__file__, PACKAGES)
     if chosen.peer is not None:
         return peer(chosen.runs, chosen.peer)
     ratios = []
@@ -65,15 +64,6 @@ def main():
         ratios.append(own / theirs)
         print(f"{idx + 1:<8}{own:>12.3f}{theirs:>12.3f}{own / theirs:>8.2f}   the peer: {report.strip()}", flush=True)
     print(f"median ratio: {sorted(ratios)[len(ratios) // 2]:.2f}")
-
-
-def enter():
-    """Restarts this script in a virtual environment with the packages."""
-    if not (ENVIRONMENT / "bin" / "python").exists():
-        venv.create(ENVIRONMENT, with_pip=True)
-    python = ENVIRONMENT / "bin" / "python"
-    subprocess.run([python, "-m", "pip", "install", "--quiet", *PACKAGES], check=True)
-    raise SystemExit(subprocess.run([python, __file__, *sys.argv[1:]]).returncode)
 
 
 def cpu_secs(command, runs):

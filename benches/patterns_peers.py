@@ -15,12 +15,12 @@ import resource
 import subprocess
 import sys
 import time
-import venv
 import warnings
 from pathlib import Path
 
+from environment import enter, folder_of
+
 HERE = Path(__file__).resolve().parent
-ENVIRONMENT = HERE.parent / "target" / "patterns_peers"
 PACKAGES = ["pysubgroup==0.8.0", "sliceline==0.3.0", "pandas", "numpy"]
 DEPTH = 3
 CELLS = 8
@@ -33,7 +33,7 @@ def main():
     if sys.argv[1:2] == ["--tables"]:
         folder, times = Path(sys.argv[2]), Path(sys.argv[3]).read_text()
     else:
-        folder = ENVIRONMENT / "tables"
+        folder = folder_of(__file__) / "tables"
         command = ["cargo", "bench", "--bench", "patterns", "--", "tables", str(folder)]
         times = subprocess.run(command, check=True, capture_output=True, text=True, cwd=HERE.parent).stdout
     # Set after the benchmark, which needs more memory.
@@ -95,10 +95,6 @@ def sliceline_finds(table):
 
 
 if __name__ == "__main__":
-    python = ENVIRONMENT / "bin" / "python"
-    if Path(sys.prefix).resolve() != ENVIRONMENT.resolve() and "--tables" not in sys.argv:
-        if not python.exists():
-            venv.create(ENVIRONMENT, with_pip=True)
-            subprocess.run([python, "-m", "pip", "install", "--quiet", *PACKAGES], check=True)
-        sys.exit(subprocess.run([python, __file__, *sys.argv[1:]]).returncode)
+    if "--tables" not in sys.argv:
+        enter(__file__, PACKAGES)
     main()

@@ -14,11 +14,11 @@ import subprocess
 import sys
 import tempfile
 import time
-import venv
 from pathlib import Path
 
+from environment import enter
+
 HERE = Path(__file__).resolve().parent
-ENVIRONMENT = HERE.parent / "target" / "physics_peers"
 PACKAGES = ["mujoco==4.0.0", "pybullet==3.2.7"]
 # As in `physics.rs`.
 STEPS = 480
@@ -27,8 +27,7 @@ SETTLING = 480
 
 
 def main():
-    if Path(sys.prefix).resolve() != ENVIRONMENT.resolve():
-        enter()
+    enter(__file__, PACKAGES)
     arguments = sys.argv[1:]
     if arguments[:1] == ["--scene"]:
         scene = json.loads(Path(arguments[1]).read_text())
@@ -46,15 +45,6 @@ def main():
     print(f"{'engine':<36}{'steps/s':>10}{'actcheck is':>14}")
     for name, value in rates.items():
         print(f"{name:<36}{value:>10.0f}{ours / value:>11.2f} x")
-
-
-def enter():
-    """Restarts this script in a virtual environment with the engines."""
-    if not (ENVIRONMENT / "bin" / "python").exists():
-        venv.create(ENVIRONMENT, with_pip=True)
-    python = ENVIRONMENT / "bin" / "python"
-    subprocess.run([python, "-m", "pip", "install", "--quiet", *PACKAGES], check=True)
-    raise SystemExit(subprocess.run([python, __file__, *sys.argv[1:]]).returncode)
 
 
 def rate(step):

@@ -8,15 +8,14 @@ two do not estimate. `--points FILE` reads the points from a file instead of run
 """
 
 import math
-import os
 import statistics
 import subprocess
 import sys
-import venv
 from pathlib import Path
 
+from environment import enter
+
 HERE = Path(__file__).resolve().parent
-ENVIRONMENT = HERE.parent / "target" / "search_peers"
 PACKAGES = ["verifai==2.2.0", "hypothesis==6.170.15", "setuptools<81"]
 
 WIDTH = 8
@@ -179,20 +178,8 @@ def compare(seeds):
                 print(f"{shape:<10} {100 * volume:>5.2f} %  {name:<16} {median:>6} {median / random:>6.2f}", flush=True)
 
 
-def inside_environment():
-    """Restarts this script in a virtual environment with both packages, which it creates if necessary."""
-    python = ENVIRONMENT / "bin" / "python"
-    if Path(sys.prefix) == ENVIRONMENT:
-        return
-    if not (ENVIRONMENT / "ready").exists():
-        venv.create(ENVIRONMENT, with_pip=True)
-        subprocess.run([python, "-m", "pip", "install", "--quiet", *PACKAGES], check=True)
-        (ENVIRONMENT / "ready").touch()
-    os.execv(python, [str(python), str(Path(__file__).resolve()), *sys.argv[1:]])
-
-
 def main():
-    inside_environment()
+    enter(__file__, PACKAGES)
     arguments = sys.argv[1:]
     if "--points" in arguments:
         at = arguments.index("--points")

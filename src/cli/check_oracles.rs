@@ -85,8 +85,8 @@ fn summarise(args: &CheckOraclesArgs, env: &Env, faults: &[Fault], trials: &[Tri
     let of_course = COURSE_FAULTS.iter().filter(|fault| tests.iter().any(|test| fault.concerns(test, env)));
     let tried: Vec<(&str, &str)> = faults
         .iter()
-        .map(|fault| (fault.name, fault.what))
-        .chain(of_course.map(|fault| (fault.name, fault.what)))
+        .map(|fault| (fault.name, fault.description))
+        .chain(of_course.map(|fault| (fault.name, fault.description)))
         .collect();
     let names: Vec<&str> = tried.iter().map(|(name, _)| *name).collect();
     let matrix = oracle_matrix(&names, &properties, &plain);

@@ -164,8 +164,19 @@ fn is_small(aggregate: &AggregateExpression) -> bool {
 /// Whether the value of an expression is at most as long as a term of the store or of the query.
 fn is_bounded(expression: &Expression) -> bool {
     use Expression as E;
+    let itself = match expression {
+        E::FunctionCall(function, _) => keeps_length(function),
+        E::Exists(_) => false,
+        _ => true,
+    };
+    itself && parts(expression).into_iter().all(is_bounded)
+}
+
+/// The expressions directly inside an expression; patterns are left out.
+pub(super) fn parts(expression: &Expression) -> Vec<&Expression> {
+    use Expression as E;
     match expression {
-        E::NamedNode(_) | E::Literal(_) | E::Variable(_) | E::Bound(_) => true,
+        E::NamedNode(_) | E::Literal(_) | E::Variable(_) | E::Bound(_) | E::Exists(_) => Vec::new(),
         E::Or(a, b)
         | E::And(a, b)
         | E::Equal(a, b)
@@ -177,13 +188,11 @@ fn is_bounded(expression: &Expression) -> bool {
         | E::Add(a, b)
         | E::Subtract(a, b)
         | E::Multiply(a, b)
-        | E::Divide(a, b) => is_bounded(a) && is_bounded(b),
-        E::UnaryPlus(a) | E::UnaryMinus(a) | E::Not(a) => is_bounded(a),
-        E::In(a, list) => is_bounded(a) && list.iter().all(is_bounded),
-        E::If(a, b, c) => is_bounded(a) && is_bounded(b) && is_bounded(c),
-        E::Coalesce(list) => list.iter().all(is_bounded),
-        E::FunctionCall(function, arguments) => keeps_length(function) && arguments.iter().all(is_bounded),
-        E::Exists(_) => false,
+        | E::Divide(a, b) => vec![a, b],
+        E::UnaryPlus(a) | E::UnaryMinus(a) | E::Not(a) => vec![a],
+        E::If(a, b, c) => vec![a, b, c],
+        E::In(a, list) => [&**a].into_iter().chain(list).collect(),
+        E::Coalesce(list) | E::FunctionCall(_, list) => list.iter().collect(),
     }
 }
 

@@ -1,7 +1,7 @@
 //! The statements of a journal that an answer can depend on.
 //!
-//! A journal has up to some hundred thousand statements, most of them facts that few questions ask for. An answer depends
-//! only on the statements that match a pattern of the question, so a reader takes only these from the journal.
+//! A journal has up to some hundred thousand statements, most of them facts that few questions ask for. An answer
+//! depends only on the statements that match a pattern of the question, so a reader takes only these from the journal.
 
 use std::collections::BTreeSet;
 
@@ -12,7 +12,7 @@ use spargebra::algebra::{
 };
 use spargebra::term::{NamedNodePattern, TermPattern, TriplePattern};
 
-use crate::light::parser;
+use crate::light::{parser, parts};
 use crate::lists;
 use crate::statements::iri;
 use actcheck_base::names;
@@ -137,7 +137,8 @@ impl Wanted {
         self.patterns.is_empty() && self.runs.is_empty() && !self.graphs
     }
 
-    /// The wanted statements that another does not have. A reader that asks for several runs gets the statements about all runs.
+    /// The wanted statements that another does not have. A reader that asks for several runs gets the statements about
+    /// all runs.
     pub(super) fn beyond(mut self, other: &Self) -> Self {
         if self.runs.difference(&other.runs).count() + other.runs.len() > MOST_RUNS {
             self.runs.clear();
@@ -222,31 +223,13 @@ impl Wanted {
 
     fn add_expression(&mut self, expression: &Expression, graph: &InGraph) {
         use Expression as E;
+        parts(expression).into_iter().for_each(|part| self.add_expression(part, graph));
         match expression {
-            E::NamedNode(_) | E::Literal(_) | E::Variable(_) | E::Bound(_) => {}
-            E::Or(a, b)
-            | E::And(a, b)
-            | E::Equal(a, b)
-            | E::SameTerm(a, b)
-            | E::Greater(a, b)
-            | E::GreaterOrEqual(a, b)
-            | E::Less(a, b)
-            | E::LessOrEqual(a, b)
-            | E::Add(a, b)
-            | E::Subtract(a, b)
-            | E::Multiply(a, b)
-            | E::Divide(a, b) => [a, b].into_iter().for_each(|part| self.add_expression(part, graph)),
-            E::UnaryPlus(a) | E::UnaryMinus(a) | E::Not(a) => self.add_expression(a, graph),
-            E::If(a, b, c) => [a, b, c].into_iter().for_each(|part| self.add_expression(part, graph)),
-            E::In(a, list) => [&**a].into_iter().chain(list).for_each(|part| self.add_expression(part, graph)),
-            E::Coalesce(list) => list.iter().for_each(|part| self.add_expression(part, graph)),
             E::Exists(pattern) => self.add_pattern(pattern, graph),
-            E::FunctionCall(function, list) => {
-                list.iter().for_each(|part| self.add_expression(part, graph));
-                if matches!(function, Function::Custom(function) if function.as_str() == names::act("counts")) {
-                    self.add(Self::queries(&lists::COUNTED));
-                }
+            E::FunctionCall(Function::Custom(function), _) if function.as_str() == names::act("counts") => {
+                self.add(Self::queries(&lists::COUNTED));
             }
+            _ => {}
         }
     }
 }

@@ -93,13 +93,31 @@ pub fn copy(from: &Path, to: &Path) {
     try_copy(from, to).unwrap();
 }
 
-/// Copies the folder of a history that is open. Its owner may still remove files that it no longer needs: then it is
-/// copied once more.
+/// Copies the folder of a history that is open. Its owner may still write and remove files in the background: then the
+/// copy may be of two times, so the folder is copied once more.
 pub fn copy_open(from: &Path, to: &Path) {
-    while let Err(error) = try_copy(from, to) {
-        assert_eq!(error.kind(), ErrorKind::NotFound, "{error}");
+    loop {
+        let before = sizes(from);
+        let copied = try_copy(from, to);
+        if let Err(error) = &copied {
+            assert_eq!(error.kind(), ErrorKind::NotFound, "{error}");
+        }
+        if copied.is_ok() && sizes(from) == before {
+            return;
+        }
         std::fs::remove_dir_all(to).unwrap();
     }
+}
+
+/// All files in a folder with their sizes, in bytes; files removed meanwhile have none.
+fn sizes(folder: &Path) -> BTreeMap<PathBuf, Option<u64>> {
+    let entries = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
+    entries
+        .flat_map(|path| match path.metadata() {
+            Ok(metadata) if metadata.is_dir() => sizes(&path),
+            size => BTreeMap::from([(path, size.ok().map(|metadata| metadata.len()))]),
+        })
+        .collect()
 }
 
 fn try_copy(from: &Path, to: &Path) -> std::io::Result<()> {

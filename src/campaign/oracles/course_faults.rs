@@ -1,5 +1,5 @@
-//! The table of faults of the course: they change only the recorded way, not the states before and after,
-//! except for a person who is added to both.
+//! The table of faults of the course: they change only the recorded course, not the states before and after.
+//! One fault also adds a person to both states.
 
 use crate::Env;
 use crate::oracles::retouch::{Retouch, distance};
@@ -12,8 +12,8 @@ use actcheck_data::Trace;
 pub struct CourseFault {
     /// Its name in results.
     pub name: &'static str,
-    /// Description.
-    pub what: &'static str,
+    /// The fault in one sentence.
+    pub description: &'static str,
     /// The action whose course is changed.
     pub action: &'static str,
     /// The change.
@@ -72,8 +72,13 @@ pub enum CourseChange {
 const HIGH_M: f64 = 0.25;
 
 /// A fault of the course of one action.
-const fn fault(name: &'static str, action: &'static str, change: CourseChange, what: &'static str) -> CourseFault {
-    CourseFault { name, what, action, change }
+const fn fault(
+    name: &'static str,
+    action: &'static str,
+    change: CourseChange,
+    description: &'static str,
+) -> CourseFault {
+    CourseFault { name, description, action, change }
 }
 
 /// All faults of courses, in the order of the table of results. To add one, add a row and its change.

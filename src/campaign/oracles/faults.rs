@@ -9,7 +9,7 @@ pub struct Fault {
     /// Its name in results.
     pub name: &'static str,
     /// Description.
-    pub what: &'static str,
+    pub description: &'static str,
     /// The change to robot, world or report.
     pub sabotage: Sabotage,
 }
@@ -37,37 +37,37 @@ const PLACE: &[&str] = &["Place"];
 pub const FAULTS: [Fault; 21] = [
     Fault {
         name: "no-op",
-        what: "the robot does nothing and reports success",
+        description: "the robot does nothing and reports success",
         sabotage: Sabotage { robot: Some(Defect::Idle), report: Some(true), ..NONE },
     },
     Fault {
         name: "release",
-        what: "the hand opens while it carries the object",
+        description: "the hand opens while it carries the object",
         sabotage: Sabotage { actions: PICK, world: Some((Moment::Carrying, Accident::HandOpens)), ..NONE },
     },
     Fault {
         name: "slip",
-        what: "the object loses all friction while it is carried",
+        description: "the object loses all friction while it is carried",
         sabotage: Sabotage { actions: PICK, world: Some((Moment::Carrying, Accident::Slippery)), ..NONE },
     },
     Fault {
         name: "wrong-object",
-        what: "the robot mistakes the nearest other object for the requested one",
+        description: "the robot mistakes the nearest other object for the requested one",
         sabotage: Sabotage { actions: PICK, robot: Some(Defect::WrongObject), ..NONE },
     },
     Fault {
         name: "teleport",
-        what: "the object jumps half a metre away while it is carried",
+        description: "the object jumps half a metre away while it is carried",
         sabotage: Sabotage { actions: PICK, world: Some((Moment::Carrying, Accident::Teleport)), ..NONE },
     },
     Fault {
         name: "neighbour-falls",
-        what: "the object's nearest neighbour is knocked over while the hand reaches for the object",
+        description: "the object's nearest neighbour is knocked over while the hand reaches for the object",
         sabotage: Sabotage { actions: PICK, world: Some((Moment::Reaching, Accident::NeighbourFalls)), ..NONE },
     },
     Fault {
         name: "false-success",
-        what: "the hand drops the object, and the action reports success",
+        description: "the hand drops the object, and the action reports success",
         sabotage: Sabotage {
             actions: PICK,
             world: Some((Moment::Carrying, Accident::HandOpens)),
@@ -77,27 +77,27 @@ pub const FAULTS: [Fault; 21] = [
     },
     Fault {
         name: "false-failure",
-        what: "the action succeeds and reports failure",
+        description: "the action succeeds and reports failure",
         sabotage: Sabotage { report: Some(false), ..NONE },
     },
     Fault {
         name: "frozen-sensors",
-        what: "all sensor readings stay as they were when the action began",
+        description: "all sensor readings stay as they were when the action began",
         sabotage: Sabotage { robot: Some(Defect::FrozenSensors), ..NONE },
     },
     Fault {
         name: "obstacle",
-        what: "an obstacle appears right in front of the base while it drives",
+        description: "an obstacle appears right in front of the base while it drives",
         sabotage: Sabotage { actions: MOVE_TO, world: Some((Moment::Driving, Accident::InTheWay)), ..NONE },
     },
     Fault {
         name: "carried-off",
-        what: "the robot is moved out of its rooms while it drives; odometry and landmarks don't show it at once",
+        description: "the robot is moved out of its rooms while it drives; odometry and landmarks don't show it at once",
         sabotage: Sabotage { actions: MOVE_TO, world: Some((Moment::Driving, Accident::CarriedOff)), ..NONE },
     },
     Fault {
         name: "dropped-on-the-way",
-        what: "the hand opens while the robot drives to the place, and the action reports success",
+        description: "the hand opens while the robot drives to the place, and the action reports success",
         sabotage: Sabotage {
             actions: PLACE,
             world: Some((Moment::Driving, Accident::HandOpens)),
@@ -107,47 +107,47 @@ pub const FAULTS: [Fault; 21] = [
     },
     Fault {
         name: "placed-and-gone",
-        what: "the object jumps half a metre away once it is released",
+        description: "the object jumps half a metre away once it is released",
         sabotage: Sabotage { actions: PLACE, world: Some((Moment::LetGo, Accident::Teleport)), ..NONE },
     },
     Fault {
         name: "placed-and-fallen",
-        what: "the object falls over once it is released",
+        description: "the object falls over once it is released",
         sabotage: Sabotage { actions: PLACE, world: Some((Moment::LetGo, Accident::Falls)), ..NONE },
     },
     Fault {
         name: "hand-jams",
-        what: "the hand no longer opens when it should release the object",
+        description: "the hand no longer opens when it should release the object",
         sabotage: Sabotage { actions: PLACE, world: Some((Moment::Lowering, Accident::HandJams)), ..NONE },
     },
     Fault {
         name: "place-neighbour-falls",
-        what: "the nearest neighbour of the place is knocked over while the object is lowered to it",
+        description: "the nearest neighbour of the place is knocked over while the object is lowered to it",
         sabotage: Sabotage { actions: PLACE, world: Some((Moment::Lowering, Accident::NeighbourFalls)), ..NONE },
     },
     Fault {
         name: "base-pushed",
-        what: "the base is pushed against the nearest furniture and back before the robot picks",
+        description: "the base is pushed against the nearest furniture and back before the robot picks",
         sabotage: Sabotage { actions: PICK, world: Some((Moment::Starting, Accident::PushedIntoFurniture)), ..NONE },
     },
     Fault {
         name: "arm-through-head",
-        what: "the arm moves through the robot's head and back before the robot picks",
+        description: "the arm moves through the robot's head and back before the robot picks",
         sabotage: Sabotage { actions: PICK, world: Some((Moment::Starting, Accident::ArmThroughHead)), ..NONE },
     },
     Fault {
         name: "percepts-swapped",
-        what: "the robot's percepts of the object and of another one are exchanged",
+        description: "the robot's percepts of the object and of another one are exchanged",
         sabotage: Sabotage { actions: PERCEIVE_OR_PICK, robot: Some(Defect::SwappedPercepts), ..NONE },
     },
     Fault {
         name: "other-kind",
-        what: "the camera perceives the object as one of another kind and size",
+        description: "the camera perceives the object as one of another kind and size",
         sabotage: Sabotage { actions: PERCEIVE, robot: Some(Defect::MistakenKind), ..NONE },
     },
     Fault {
         name: "runaway-motor",
-        what: "the motor of the hand's joint runs away with three times its largest effort while the hand reaches",
+        description: "the motor of the hand's joint runs away with three times its largest effort while the hand reaches",
         sabotage: Sabotage { actions: PICK, world: Some((Moment::Reaching, Accident::RunawayMotor)), ..NONE },
     },
 ];

@@ -4,6 +4,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use crate::check::formulas::formulas;
+use crate::check::left::Left;
 use crate::model::expression::{Expr, Variable};
 use crate::model::program::{Atom, Literal, Operand, Predicates, Rule};
 use crate::syntax::Comparison;
@@ -133,14 +134,6 @@ fn numbers_of_formulas(rule: &Rule, typed: &BTreeMap<Variable, (&str, &str)>, di
     }
 }
 
-/// The numbers that the comparisons of a rule leave for a variable.
-struct Left {
-    low: f64,
-    high: f64,
-    /// Whether the bounds themselves are left.
-    closed: [bool; 2],
-}
-
 /// Reports `R044` for comparisons with numbers that no value of their variable satisfies together.
 fn contradictions(rule: &Rule, diagnostics: &mut Diagnostics) {
     let mut left: BTreeMap<Variable, Left> = BTreeMap::new();
@@ -152,18 +145,9 @@ fn contradictions(rule: &Rule, diagnostics: &mut Diagnostics) {
             _ => continue,
         };
         let Some(number) = number else { continue };
-        let known =
-            left.entry(*variable).or_insert(Left { low: f64::NEG_INFINITY, high: f64::INFINITY, closed: [true; 2] });
-        let closes = matches!(op, Comparison::Equal | Comparison::LessEqual | Comparison::GreaterEqual);
-        if matches!(op, Comparison::Equal | Comparison::Greater | Comparison::GreaterEqual) && number >= known.low {
-            known.closed[0] = closes && (number > known.low || known.closed[0]);
-            known.low = number;
-        }
-        if matches!(op, Comparison::Equal | Comparison::Less | Comparison::LessEqual) && number <= known.high {
-            known.closed[1] = closes && (number < known.high || known.closed[1]);
-            known.high = number;
-        }
-        if known.low > known.high || (known.low == known.high && known.closed != [true; 2]) {
+        let known = left.entry(*variable).or_default();
+        known.keep(op, number);
+        if known.is_empty() {
             let name = &rule.variables[*variable];
             let message = format!("this can never hold: no number satisfies all comparisons of `?{name}` in this rule");
             let help = "`,` means and: for or, write one rule for each case";
