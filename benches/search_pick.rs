@@ -8,7 +8,7 @@
 //!
 //! The defaults are `configs/pick.toml`, 2,000 random scenes, 200 searches of at most 60 runs, and all guided
 //! strategies. With `--only FILE.rls`, the rules in this file are the only property, and its violation the only mode:
-//! `--only benches/rare_tilt.rls` plants a rare violation of a formula about time.
+//! `--only benches/near_another.rls` plants a rare violation of a formula about time.
 //! To change them: `cargo bench --bench search_pick -- --config benches/quiet_pick.toml --random 500
 //! --seeds 40 --runs 120 --strategies bandit,boundary --first-seed 7001`.
 

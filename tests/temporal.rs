@@ -3,12 +3,20 @@
 //! `tests/temporal/cases.toml` has the cases. `tests/temporal/rtamt.jsonl` has random formulas with their robustness,
 //! made by `benches/stl.py`; `ACTCHECK_RTAMT=FILE` names another file of such cases.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
-use actcheck::base::{Course, Outcome, Signal, Term, names};
-use actcheck::rules::{Facts, Rules, When};
+use actcheck::base::{Course, Files, Outcome, Signal, Term, names};
+use actcheck::ontology;
+use actcheck::rules::{Budget, Facts, RuleBook, Rules, When};
 
 use crate::support::planted::Dice;
+use crate::support::root;
+
+/// The prefixes of facts in cases.
+fn turtle(text: &str) -> String {
+    let [act, obj] = [names::act(""), names::obj("")];
+    format!("@prefix act: <{act}> . @prefix obj: <{obj}> . @prefix w: <{}> . {text}", names::W)
+}
 
 /// Expands a prefixed name of a case.
 fn iri(name: &str) -> String {
@@ -53,9 +61,8 @@ fn formulas_over_courses_made_by_hand() {
             .unwrap_or_else(|found| panic!("{name}: {found}"));
         let mut facts = Facts::new();
         facts.set_parameter(Term::iri(names::act("pickObject")), Term::iri(names::obj("a")));
-        if let Some(turtle) = case.get("facts").and_then(toml::Value::as_str) {
-            let text = format!("@prefix obj: <{}> . @prefix w: <{}> . {turtle}", names::obj(""), names::W);
-            facts.add_turtle(When::After, &text).expect("the facts are Turtle");
+        if let Some(text) = case.get("facts").and_then(toml::Value::as_str) {
+            facts.add_turtle(When::After, &turtle(text)).expect("the facts are Turtle");
         }
         if let Some(course) = course_of(case) {
             facts.set_course(course);
@@ -67,14 +74,59 @@ fn formulas_over_courses_made_by_hand() {
             Err(fault) => fault.to_string(),
         };
         let margin = case.get("margin").map(|margin| numbers(margin)[0]);
-        let near = match (decision.margin(), margin) {
-            (Some(found), Some(wanted)) => (found - wanted).abs() < 1e-9,
-            (found, wanted) => found == wanted,
-        };
-        assert!(near || (margin.is_none() && name.contains("relation")), "{name}: {:?}\n{why}", decision.margin());
+        assert!(
+            equal(decision.margin(), margin) || (margin.is_none() && name.contains("relation")),
+            "{name}: {:?}\n{why}",
+            decision.margin()
+        );
         let wanted = case.get("why").and_then(toml::Value::as_str).unwrap_or_default();
         assert!(why.contains(wanted), "{name}:\n{why}");
     }
+}
+
+/// Whether two margins are equal; `None`: no number changes the outcome.
+fn equal(found: Option<f64>, wanted: Option<f64>) -> bool {
+    match (found, wanted) {
+        (Some(found), Some(wanted)) => (found - wanted).abs() < 1e-9,
+        (found, wanted) => found == wanted,
+    }
+}
+
+#[test]
+fn shipped_properties_about_time_are_decided_as_their_descriptions_say() {
+    let ontology = ontology::load(&Files::Disk, &root().join("ontology/time.ttl")).expect("the ontology is valid");
+    let book = RuleBook::prepare(&ontology).expect("the rules are valid");
+    let text = std::fs::read_to_string("tests/temporal/shipped.toml").expect("the cases are readable");
+    let properties: toml::Table = text.parse().expect("the cases are TOML");
+    let properties = properties["property"].as_array().expect("properties are a list");
+    for property in properties {
+        let name = property["name"].as_str().expect("a property has a name");
+        let mut outcomes = BTreeSet::new();
+        for (idx, case) in property["case"].as_array().expect("cases are a list").iter().enumerate() {
+            let mut facts = Facts::new();
+            for (parameter, value) in [("pickObject", "a"), ("placeSurface", "table")] {
+                facts.set_parameter(Term::iri(names::act(parameter)), Term::iri(names::obj(value)));
+            }
+            if let Some(text) = property.get("before").and_then(toml::Value::as_str) {
+                facts.add_turtle(When::Before, &turtle(text)).expect("the facts are Turtle");
+            }
+            facts.set_course(course_of(case).expect("a case has signals"));
+            let mut found = book.judge(&facts.as_action(), &[names::act(name)], &Budget::default());
+            let found = found.remove(&names::act(name)).expect("it was judged");
+            let found = found.unwrap_or_else(|fault| panic!("{name}, case {idx}: {fault:?}"));
+            let wanted = case["outcome"].as_str().unwrap_or_default();
+            assert_eq!(found.outcome().to_string(), wanted, "{name}, case {idx}: {found:?}");
+            let margin = case.get("margin").map(|margin| numbers(margin)[0]);
+            assert!(equal(found.margin, margin), "{name}, case {idx}: {:?}, not {margin:?}", found.margin);
+            outcomes.insert(wanted);
+        }
+        assert_eq!(outcomes.len(), 2, "{name} needs cases that pass and cases that fail");
+    }
+    let described = |property: &str| properties.iter().any(|case| case["name"].as_str() == Some(property));
+    let shipped = std::fs::read_to_string(root().join("ontology/time.ttl")).expect("the ontology is readable");
+    let names = shipped.lines().filter_map(|line| line.strip_prefix("act:")?.strip_suffix(" a act:Property ;"));
+    let missing: Vec<&str> = names.filter(|name| !described(name)).collect();
+    assert!(missing.is_empty() && properties.len() == 20, "{missing:?}");
 }
 
 #[test]
