@@ -16,14 +16,25 @@ const CHAIN_LIMIT: usize = 256;
 impl Parser<'_> {
     /// Parses a sum of products.
     pub(crate) fn expression(&mut self) -> Result<Expression, ErrorReported> {
-        self.depth += 1;
-        if self.depth > DEPTH_LIMIT {
+        let help = "name parts of it with assignments such as `?part = …`";
+        self.nested("expression is nested too deeply", help, |parser| {
+            parser.chain(&["+", "-"], |parser| parser.chain(&["*", "/"], Self::factor))
+        })
+    }
+
+    /// Parses a part one level deeper; reports `R005` at the present token if that is too deep.
+    pub(super) fn nested<T>(
+        &mut self,
+        message: &str,
+        help: &str,
+        part: impl FnOnce(&mut Self) -> Result<T, ErrorReported>,
+    ) -> Result<T, ErrorReported> {
+        if self.depth >= DEPTH_LIMIT {
             let span = self.span();
-            self.depth -= 1;
-            let help = format!("at most {DEPTH_LIMIT} levels; name parts of it with assignments such as `?part = …`");
-            return Err(self.fault("R005", span, "expression is nested too deeply", help));
+            return Err(self.fault("R005", span, message, format!("at most {DEPTH_LIMIT} levels; {help}")));
         }
-        let result = self.chain(&["+", "-"], |parser| parser.chain(&["*", "/"], Self::factor));
+        self.depth += 1;
+        let result = part(self);
         self.depth -= 1;
         result
     }
@@ -65,15 +76,7 @@ impl Parser<'_> {
                 self.advance();
                 return Ok(self.number(&text, negative, span));
             }
-            self.depth += 1;
-            if self.depth > DEPTH_LIMIT {
-                self.depth -= 1;
-                let span = self.span();
-                return Err(self.fault("R005", span, "expression is nested too deeply", "remove some of the signs"));
-            }
-            let inner = self.factor();
-            self.depth -= 1;
-            let inner = inner?;
+            let inner = self.nested("expression is nested too deeply", "remove some of the signs", Self::factor)?;
             if !negative {
                 return Ok(inner);
             }

@@ -108,16 +108,7 @@ impl Parser<'_> {
 
     /// Parses a formula: `implies` binds weakest, then `or`, then `and`.
     fn formula(&mut self) -> Result<Formula, ErrorReported> {
-        self.depth += 1;
-        if self.depth > DEPTH_LIMIT {
-            let span = self.span();
-            self.depth -= 1;
-            let help = format!("at most {DEPTH_LIMIT} levels; split the formula over several rules");
-            return Err(self.fault("R005", span, "formula is nested too deeply", help));
-        }
-        let result = self.implication();
-        self.depth -= 1;
-        result
+        self.nested("formula is nested too deeply", "split the formula over several rules", Self::implication)
     }
 
     fn implication(&mut self) -> Result<Formula, ErrorReported> {
@@ -165,15 +156,7 @@ impl Parser<'_> {
     fn simple(&mut self) -> Result<Formula, ErrorReported> {
         let start = self.span().start;
         if self.take("~") {
-            self.depth += 1;
-            if self.depth > DEPTH_LIMIT {
-                self.depth -= 1;
-                let span = self.span();
-                return Err(self.fault("R005", span, "formula is nested too deeply", "remove some of the negations"));
-            }
-            let inner = self.simple();
-            self.depth -= 1;
-            let inner = inner?;
+            let inner = self.nested("formula is nested too deeply", "remove some of the negations", Self::simple)?;
             let span = start..inner.span.end;
             return Ok(Formula { kind: FormulaKind::Not(Box::new(inner)), span });
         }
