@@ -136,7 +136,7 @@ fn split_results(batch: Judged) -> (Vec<Vec<Recheck>>, Diagnostics) {
 /// Judges all actions of a run. A run that can't be judged has exactly one fault.
 fn judge_run(history: &History, run: &RunRow, rules: &RuleSet) -> Result<Vec<Recheck>, Diagnostics> {
     let course = rules.rules.reads_course();
-    let trace = if course { history.trace(&run.run)? } else { history.states(&run.run)? };
+    let trace = if course { history.sampled(&run.run)? } else { history.states(&run.run)? };
     let facts = facts::extract(&trace);
     let mut rechecks = Vec::new();
     for (step, performed) in trace.actions.iter().enumerate() {

@@ -92,6 +92,31 @@ pub(super) fn decode_next(bytes: &[u8]) -> Option<(Vec<Vec<f32>>, &[u8])> {
     Some((rows, rest.bytes))
 }
 
+/// Skips the rows that [`encode`] encoded at the start of `bytes`, and returns the remaining bytes. Returns `None` if the
+/// bytes are corrupt.
+pub(super) fn skip_next(bytes: &[u8]) -> Option<&[u8]> {
+    let mut rest = Reader { bytes };
+    let kind = rest.byte()?;
+    let height = rest.number()?;
+    if kind == RAGGED {
+        for _ in 0..height {
+            let width = rest.number()?;
+            rest.take(width.checked_mul(4)?)?;
+        }
+        return Some(rest.bytes);
+    }
+    let width = if height == 0 { rest.number().map(|_| 0)? } else { rest.number()? };
+    for _ in 0..width {
+        match rest.byte()? {
+            CONSTANT => drop(rest.take(4)?),
+            BITS => drop(rest.take(height.checked_mul(4)?)?),
+            kind if usize::from(kind - IN_GRAINS) < GRAINS.len() => rest.skip_numbers(height)?,
+            _ => return None,
+        }
+    }
+    Some(rest.bytes)
+}
+
 fn read(rest: &mut Reader<'_>) -> Option<Vec<Vec<f32>>> {
     let kind = rest.byte()?;
     let height = rest.number()?;
@@ -250,6 +275,15 @@ impl<'a> Reader<'a> {
         self.take(4)?.try_into().ok().map(u32::from_le_bytes)
     }
 
+    /// Skips variable-length integers: each ends with a byte below 128.
+    fn skip_numbers(&mut self, count: usize) -> Option<()> {
+        for _ in 0..count {
+            let end = self.bytes.iter().position(|byte| *byte < 0x80)?;
+            self.bytes = &self.bytes[end + 1..];
+        }
+        Some(())
+    }
+
     fn u64(&mut self) -> Option<u64> {
         let mut value = 0u64;
         for shift in (0..64).step_by(7) {
@@ -286,6 +320,8 @@ mod tests {
         ];
         for rows in tables {
             assert_eq!(bits(&decode(&encode(&rows)).expect("it was just encoded")), bits(&rows));
+            let followed = [encode(&rows), vec![9]].concat();
+            assert_eq!(skip_next(&followed), Some([9].as_slice()));
         }
     }
 
@@ -308,13 +344,13 @@ mod tests {
         let rows: Vec<Vec<f32>> = (0..50).map(|i| vec![i as f32 * 0.125, (i as f32).sin()]).collect();
         let bytes = encode(&rows);
         for end in 0..bytes.len() {
-            assert!(decode(&bytes[..end]).is_none(), "{end}");
+            assert!(decode(&bytes[..end]).is_none() && skip_next(&bytes[..end]).is_none(), "{end}");
         }
         for at in 0..bytes.len() {
             let mut bytes = bytes.clone();
             bytes[at] ^= 0xff;
             // Decoding must only terminate: it may return another number.
-            let _ = decode(&bytes);
+            let _ = (decode(&bytes), skip_next(&bytes));
         }
     }
 

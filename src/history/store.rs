@@ -226,6 +226,16 @@ impl History {
         Ok(self.decoded(&id, trace_file::decode)?.1)
     }
 
+    /// Returns the trace of a run, named as in [`History::resolve`], with the samples of its actions but without the
+    /// motion of bodies and joints: everything from which facts and quantities over time are extracted.
+    ///
+    /// # Errors
+    /// As [`History::trace`].
+    pub fn sampled(&self, name: &str) -> Result<Trace, Diagnostics> {
+        let id = self.resolve(name)?;
+        Ok(self.decoded(&id, trace_file::decode_sampled)?.1)
+    }
+
     /// Returns the trace of a run, named as in [`History::resolve`], without the motion of its bodies: everything from
     /// which facts are extracted, in a tenth of the time.
     ///
@@ -280,7 +290,7 @@ impl History {
     /// # Errors
     /// As [`History::trace`].
     pub fn facts(&self, name: &str, course: bool) -> Result<RunFacts, Diagnostics> {
-        Ok(Self::facts_of(&if course { self.trace(name)? } else { self.states(name)? }))
+        Ok(Self::facts_of(&if course { self.sampled(name)? } else { self.states(name)? }))
     }
 
     /// Returns the facts of a trace: the same as during the run.

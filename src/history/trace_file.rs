@@ -49,7 +49,7 @@ pub(super) fn decode(bytes: &[u8]) -> Result<(Vec<Choice>, Trace), String> {
     let course = expanded(course)?;
     let (rows, rest) = frames::decode_next(&course).ok_or("the motion of the bodies can't be read")?;
     trace.frames.rows = rows;
-    decode_motions(rest, &mut trace).ok_or("the motion of the robot can't be read")?;
+    read_motions(rest, &mut trace, decode_motion).ok_or("the motion of the robot can't be read")?;
     Ok((choices, trace))
 }
 
@@ -95,14 +95,32 @@ fn decode_samples(rest: &[u8]) -> Option<(Samples, &[u8])> {
     Some((Samples { period_secs, count, series }, rest))
 }
 
-/// Decodes the robot's motion and the samples. Traces of earlier versions end before either and have none.
-fn decode_motions(mut rest: &[u8], trace: &mut Trace) -> Option<()> {
+/// Decodes the robot's measurements and commands of one action, and returns the remaining bytes.
+fn decode_motion<'b>(course: &mut RobotCourse, bytes: &'b [u8]) -> Option<&'b [u8]> {
+    let (joints, rest) = postcard::take_from_bytes(bytes).ok()?;
+    let (rows, rest) = frames::decode_next(rest)?;
+    (course.motion.joints, course.motion.rows) = (joints, rows);
+    Some(rest)
+}
+
+/// Skips the bytes that [`decode_motion`] decodes.
+fn skip_motion<'b>(_: &mut RobotCourse, bytes: &'b [u8]) -> Option<&'b [u8]> {
+    let (_, rest): (Vec<String>, &[u8]) = postcard::take_from_bytes(bytes).ok()?;
+    frames::skip_next(rest)
+}
+
+/// Reads the robot's motion by `motion`, which returns the remaining bytes, and decodes the samples. Traces of earlier
+/// versions end before either and have none.
+fn read_motions<'b>(
+    mut rest: &'b [u8],
+    trace: &mut Trace,
+    motion: impl Fn(&mut RobotCourse, &'b [u8]) -> Option<&'b [u8]>,
+) -> Option<()> {
     if rest.is_empty() {
         return Some(());
     }
     for course in &mut trace.robot_courses {
-        (course.motion.joints, rest) = postcard::take_from_bytes(rest).ok()?;
-        (course.motion.rows, rest) = frames::decode_next(rest)?;
+        rest = motion(course, rest)?;
     }
     if rest.is_empty() {
         return Some(());
@@ -111,6 +129,20 @@ fn decode_motions(mut rest: &[u8], trace: &mut Trace) -> Option<()> {
         (course.samples, rest) = decode_samples(rest)?;
     }
     Some(())
+}
+
+/// Decodes the choices and the trace with the samples of its actions, but without the motion of bodies and joints:
+/// everything from which facts and quantities over time are extracted.
+///
+/// # Errors
+/// A message that names the damaged part.
+pub(super) fn decode_sampled(bytes: &[u8]) -> Result<(Vec<Choice>, Trace), String> {
+    let (head, course) = parts(bytes)?;
+    let (choices, mut trace) = decode_head(head)?;
+    let course = expanded(course)?;
+    let rest = frames::skip_next(&course).ok_or("the motion of the bodies can't be read")?;
+    read_motions(rest, &mut trace, skip_motion).ok_or("the motion of the robot can't be read")?;
+    Ok((choices, trace))
 }
 
 /// Decodes the choices and the trace without the rows of its frames: everything from which facts are extracted.

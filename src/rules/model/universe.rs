@@ -1,5 +1,9 @@
 //! Common term ids for the rules, the facts of a run, and the terms created by an evaluation.
 
+use std::cell::RefCell;
+use std::collections::BTreeMap;
+use std::rc::Rc;
+
 use crate::model::values::text_len;
 use crate::watch::{Stop, Watch};
 use actcheck_base::{ActionFacts, Course, Term, TermId, Terms};
@@ -10,6 +14,9 @@ pub(crate) struct Universe<'a> {
     book: &'a Terms,
     run: Option<&'a Terms>,
     course: Option<&'a Course>,
+    /// Quantities over time that were computed so far, by their IRI and the things they are of; `None` if they are not
+    /// known. Several properties read the same ones.
+    quantities: RefCell<BTreeMap<(String, Vec<String>), Option<Rc<Vec<f64>>>>>,
     /// Common id of each term of the run, or [`UNKNOWN`] until first used.
     run_ids: Vec<TermId>,
     created: Terms,
@@ -28,7 +35,16 @@ impl<'a> Universe<'a> {
     /// Creates a universe of the rules' terms and, optionally, the terms of a run.
     pub(crate) fn new(book: &'a Terms, run: Option<&'a Terms>) -> Self {
         let run_ids = vec![UNKNOWN; run.map_or(0, Terms::len)];
-        Self { book, run, course: None, run_ids, created: Terms::new(), created_bytes: 0, next_label: 0 }
+        Self {
+            book,
+            run,
+            course: None,
+            quantities: RefCell::default(),
+            run_ids,
+            created: Terms::new(),
+            created_bytes: 0,
+            next_label: 0,
+        }
     }
 
     /// Creates the universe of the rules' terms and the facts of an action.
@@ -39,6 +55,22 @@ impl<'a> Universe<'a> {
     /// Returns the quantities of the action over time; `None` if they were not recorded.
     pub(crate) fn course(&self) -> Option<&'a Course> {
         self.course
+    }
+
+    /// Returns a quantity at each sample, which is computed once.
+    pub(crate) fn quantity(
+        &self,
+        iri: &str,
+        things: Vec<String>,
+        compute: impl FnOnce(&[String]) -> Option<Vec<f64>>,
+    ) -> Option<Rc<Vec<f64>>> {
+        let key = (iri.to_owned(), things);
+        if let Some(known) = self.quantities.borrow().get(&key) {
+            return known.clone();
+        }
+        let values = compute(&key.1).map(Rc::new);
+        self.quantities.borrow_mut().insert(key, values.clone());
+        values
     }
 
     fn run_start(&self) -> usize {

@@ -60,15 +60,15 @@ pub(super) fn deciding_signal(
             let op = if swapped { mirrored(*op) } else { *op };
             let (values, limit) = (reader.quantity(signal)?, reader.quantity(limit)?);
             let holds: Vec<bool> =
-                values.iter().zip(&limit).map(|(value, limit)| compares(op, *value, *limit)).collect();
+                values.iter().zip(limit.iter()).map(|(value, limit)| compares(op, *value, *limit)).collect();
             Some(DecidingSignal {
                 quantity: readable(quantity),
                 unit: unit_of(signal),
                 symbol: op.symbol(),
                 period_secs,
                 interval: around(&holds, *at),
-                values,
-                limit,
+                values: values.to_vec(),
+                limit: limit.to_vec(),
                 at: *at,
             })
         }
@@ -81,7 +81,7 @@ pub(super) fn deciding_signal(
                 unit: "",
                 symbol: "",
                 period_secs,
-                values,
+                values: values.to_vec(),
                 limit: Vec::new(),
                 interval,
                 at: *at,

@@ -4,6 +4,7 @@
 //! contain the samples between their ends, and end with the action.
 
 use crate::builtins::Builtin;
+use crate::model::expression::Variable;
 use crate::model::universe::Universe;
 use crate::syntax::{Comparison, TemporalOperator};
 use crate::temporal::formula::{Formula, Quantity, Thing};
@@ -12,6 +13,7 @@ use crate::temporal::windows::{Window, largest_after, negated, reversed, smalles
 use crate::watch::Watch;
 use actcheck_base::{Course, Term, TermId, names};
 use std::borrow::Cow;
+use std::rc::Rc;
 
 /// Why a run can't be judged by a rule about time.
 pub(crate) const UNRECORDED: &str =
@@ -23,6 +25,13 @@ pub(super) struct Reader<'a> {
     binding: &'a [TermId],
     terms: &'a Universe<'a>,
     watch: &'a Watch,
+}
+
+/// One side of a comparison.
+enum Side {
+    /// The same number at each sample.
+    Same(f64),
+    Each(Rc<Vec<f64>>),
 }
 
 /// The contribution of a comparison: its distance from flipping, or only whether it holds (1 or −1).
@@ -82,12 +91,19 @@ impl<'a> Reader<'a> {
         self.watch.work(size_of::<f64>() * self.course.count)?;
         match formula {
             Formula::Compare { op, left, right, .. } => {
-                let (left, right) = (self.quantity(left)?, self.quantity(right)?);
-                let values = left.iter().zip(right.iter()).map(|(a, b)| match scale {
-                    Scale::Robustness => distance(*op, *a, *b),
-                    Scale::Truth => sign(compares(*op, *a, *b)),
-                });
-                Some(values.collect())
+                let sides = (self.side(left)?, self.side(right)?);
+                let count = self.course.count;
+                Some(match (scale, op) {
+                    // The common ones, without a choice for each sample.
+                    (Scale::Robustness, Comparison::Less | Comparison::LessEqual) => {
+                        pairs(sides, count, |a, b| known(b - a))
+                    }
+                    (Scale::Robustness, Comparison::Greater | Comparison::GreaterEqual) => {
+                        pairs(sides, count, |a, b| known(a - b))
+                    }
+                    (Scale::Robustness, _) => pairs(sides, count, |a, b| distance(*op, a, b)),
+                    (Scale::Truth, _) => pairs(sides, count, |a, b| sign(compares(*op, a, b))),
+                })
             }
             Formula::Truth { quantity, .. } => {
                 let factor = if scale == Scale::Truth { 1.0 } else { f64::INFINITY };
@@ -113,32 +129,43 @@ impl<'a> Reader<'a> {
         Some(joined)
     }
 
+    fn side(&self, quantity: &Quantity) -> Option<Side> {
+        Some(match quantity {
+            Quantity::Number(value) => Side::Same(*value),
+            Quantity::Variable(variable) => Side::Same(self.number(*variable)?),
+            _ => Side::Each(self.quantity(quantity)?),
+        })
+    }
+
+    /// Returns the number that a variable is bound to.
+    fn number(&self, variable: Variable) -> Option<f64> {
+        let term = self.terms.term(self.binding[variable]);
+        let value = term.number();
+        if value.is_none() {
+            self.watch.unrecorded(format!("{term} is not a number"));
+        }
+        value
+    }
+
     /// Returns a quantity at each sample.
-    pub(super) fn quantity(&self, quantity: &Quantity) -> Option<Vec<f64>> {
+    pub(super) fn quantity(&self, quantity: &Quantity) -> Option<Rc<Vec<f64>>> {
         let count = self.course.count;
         match quantity {
-            Quantity::Number(value) => Some(vec![*value; count]),
-            Quantity::Variable(variable) => {
-                let term = self.terms.term(self.binding[*variable]);
-                let Some(value) = term.number() else {
-                    self.watch.unrecorded(format!("{term} is not a number"));
-                    return None;
-                };
-                Some(vec![value; count])
-            }
+            Quantity::Number(value) => Some(Rc::new(vec![*value; count])),
+            Quantity::Variable(variable) => Some(Rc::new(vec![self.number(*variable)?; count])),
             Quantity::Recorded { iri, things, .. } => {
-                let things: Vec<String> = things.iter().map(|thing| self.thing(thing)).collect();
-                let values = values_of(self.course, iri, &things);
+                let named: Vec<String> = things.iter().map(|thing| self.thing(thing)).collect();
+                let values = self.terms.quantity(iri, named, |things| values_of(self.course, iri, things));
                 if values.is_none() {
-                    let things: Vec<String> = things.iter().map(|thing| names::shorten(thing)).collect();
-                    let of = things.join(" and ");
+                    let things = things.iter().map(|thing| names::shorten(&self.thing(thing)));
+                    let of = things.collect::<Vec<_>>().join(" and ");
                     self.watch.unrecorded(format!("`{}` of {of} was not recorded", names::shorten(iri)));
                 }
                 values
             }
             Quantity::Call(builtin, args) => {
-                let args: Option<Vec<Vec<f64>>> = args.iter().map(|arg| self.quantity(arg)).collect();
-                Some(self.called(builtin, &args?))
+                let args: Option<Vec<Rc<Vec<f64>>>> = args.iter().map(|arg| self.quantity(arg)).collect();
+                Some(Rc::new(self.called(builtin, &args?)))
             }
         }
     }
@@ -155,7 +182,7 @@ impl<'a> Reader<'a> {
     }
 
     /// Applies a built-in at each sample. Its value is NaN where it has none.
-    fn called(&self, builtin: &Builtin, args: &[Vec<f64>]) -> Vec<f64> {
+    fn called(&self, builtin: &Builtin, args: &[Rc<Vec<f64>>]) -> Vec<f64> {
         let at = |idx: usize| args.iter().map(move |values| values[idx]);
         let each = |value: &dyn Fn(usize) -> f64| (0..self.course.count).map(value).collect();
         match (builtin.name, args) {
@@ -168,6 +195,7 @@ impl<'a> Reader<'a> {
             ("INVERSE" | "NEGATIVE", [a]) => each(&|idx| -a[idx]),
             ("ABS", [a]) => each(&|idx| a[idx].abs()),
             ("SQRT", [a]) => each(&|idx| a[idx].sqrt()),
+            ("ATAN2", [a, b]) => each(&|idx| libm::atan2(a[idx], b[idx])),
             _ => each(&|idx| {
                 let values: Vec<Cow<'_, Term>> = at(idx).map(|value| Cow::Owned(Term::Double(value))).collect();
                 builtin.call(&values, self.watch).and_then(|term| term.number()).unwrap_or(f64::NAN)
@@ -190,6 +218,21 @@ fn temporal(operator: TemporalOperator, window: Window, parts: Vec<Vec<f64>>) ->
     if operator.is_past() { reversed(values) } else { values }
 }
 
+/// Applies a comparison at each sample.
+fn pairs((left, right): (Side, Side), count: usize, compare: impl Fn(f64, f64) -> f64) -> Vec<f64> {
+    match (left, right) {
+        (Side::Each(left), Side::Same(b)) => left.iter().map(|a| compare(*a, b)).collect(),
+        (Side::Same(a), Side::Each(right)) => right.iter().map(|b| compare(a, *b)).collect(),
+        (Side::Each(left), Side::Each(right)) => left.iter().zip(&*right).map(|(a, b)| compare(*a, *b)).collect(),
+        (Side::Same(a), Side::Same(b)) => vec![compare(a, b); count],
+    }
+}
+
+/// A value that is not a number can't hold.
+fn known(value: f64) -> f64 {
+    if value.is_nan() { f64::NEG_INFINITY } else { value }
+}
+
 /// Returns how far a comparison is from flipping; negative if it does not hold. A value that is not a number can't hold.
 fn distance(op: Comparison, left: f64, right: f64) -> f64 {
     let value = match op {
@@ -198,7 +241,7 @@ fn distance(op: Comparison, left: f64, right: f64) -> f64 {
         Comparison::Equal => -(left - right).abs(),
         Comparison::Unequal => (left - right).abs(),
     };
-    if value.is_nan() { f64::NEG_INFINITY } else { value }
+    known(value)
 }
 
 /// Returns whether a comparison of two numbers holds.
