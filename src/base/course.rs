@@ -2,6 +2,8 @@
 
 use std::collections::BTreeMap;
 
+use crate::Steps;
+
 /// A recorded quantity: its IRI, the thing's IRI, and for quantities of two things the IRI of the second, else an empty
 /// string.
 pub type SignalKey = [String; 3];
@@ -18,7 +20,7 @@ pub enum Signal {
         /// Number of steps in one unit.
         per_unit: u32,
         /// The samples.
-        steps: Vec<i32>,
+        steps: Steps,
     },
 }
 
@@ -93,7 +95,7 @@ mod tests {
     fn a_pair_is_found_in_both_orders_and_things_of_a_quantity_are_listed() {
         let mut course = Course::new(0.5, 3);
         let key = |parts: [&str; 3]| parts.map(str::to_owned);
-        course.set(key(["force", "b", "a"]), Signal::Steps { per_unit: 10, steps: vec![1, 2] });
+        course.set(key(["force", "b", "a"]), Signal::Steps { per_unit: 10, steps: vec![1, 2].into() });
         course.set(key(["z", "a", ""]), Signal::Constant(4.0));
         assert_eq!(course.get("force", "a", "b"), course.get("force", "b", "a"));
         assert_eq!(course.get("force", "a", "b").map(|signal| signal.values(3)), Some(vec![0.1, 0.2, 0.2]));

@@ -31,7 +31,7 @@ impl RuleSet {
     /// Restricts it to some properties, given by local name or IRI. An empty list means all.
     ///
     /// # Errors
-    /// `X037` for every name that is not a success property of any action.
+    /// `X037` for every name that is not a success property of any action. (The rules were checked before.)
     pub fn only(mut self, properties: &[String]) -> Result<Self, Diagnostics> {
         if properties.is_empty() {
             return Ok(self);
@@ -51,6 +51,16 @@ impl RuleSet {
         for action in self.actions.values_mut() {
             action.success_properties.retain(|iri| named(iri));
         }
-        faults.or(self)
+        let mut only = faults.or(self)?;
+        // Facts that only other properties read need not be loaded.
+        let mut ontology = only.ontology.clone();
+        let asked: BTreeSet<&String> = only
+            .actions
+            .values()
+            .flat_map(|action| action.success_properties.iter().chain(&action.preconditions))
+            .collect();
+        ontology.properties.retain(|iri, _| asked.contains(iri));
+        only.rules = RuleBook::prepare(&ontology)?;
+        Ok(only)
     }
 }

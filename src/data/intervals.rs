@@ -92,7 +92,7 @@ mod tests {
     use super::*;
 
     fn series(quantity: &str, steps_per_unit: u32, steps: &[i32]) -> Series {
-        Series { steps: steps.to_vec(), ..Series::new("cup", "", quantity, steps_per_unit) }
+        Series { steps: steps.to_vec().into(), ..Series::new("cup", "", quantity, steps_per_unit) }
     }
 
     fn intervals(series: Vec<Series>) -> Vec<(IntervalKind, f64, f64)> {

@@ -1,5 +1,7 @@
 //! Quantities of one action over time, at the control rate.
 
+use actcheck_base::Steps;
+
 /// The recorded quantities of one action. The first sample of each is the initial state.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Samples {
@@ -24,14 +26,14 @@ pub struct Series {
     /// Number of steps in one unit of the quantity.
     pub steps_per_unit: u32,
     /// The samples, as numbers of steps. Shape: count.
-    pub steps: Vec<i32>,
+    pub steps: Steps,
 }
 
 impl Series {
     /// Creates an empty series.
     pub fn new(thing: &str, other: &str, quantity: &str, steps_per_unit: u32) -> Self {
         let (thing, other, quantity) = (thing.to_owned(), other.to_owned(), quantity.to_owned());
-        Self { thing, other, quantity, steps_per_unit, steps: Vec::new() }
+        Self { thing, other, quantity, steps_per_unit, steps: Steps::default() }
     }
 
     /// Returns a value as a number of steps; values beyond the range become its ends, and NaN becomes 0.
@@ -55,7 +57,8 @@ mod tests {
     #[test]
     fn samples_are_the_nearest_decimals() {
         let mut series = Series::new("cup", "", "z", 10_000);
-        series.steps.extend([0.3, -0.12345, f64::INFINITY, f64::NAN].map(|value| Series::steps_of(value, 10_000)));
+        series.steps =
+            [0.3, -0.12345, f64::INFINITY, f64::NAN].map(|value| Series::steps_of(value, 10_000)).into_iter().collect();
         let values: Vec<f64> = series.values().collect();
         assert_eq!(values[..2], [0.3, -0.1235]);
         assert_eq!(values[2], f64::from(i32::MAX) / 1e4);

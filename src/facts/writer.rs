@@ -1,5 +1,6 @@
 //! Writer of a run's terms and triples.
 
+use std::collections::HashMap;
 use std::fmt::Write as _;
 
 use actcheck_base::names::escaped;
@@ -64,6 +65,8 @@ pub(super) struct Writer {
     pub(super) terms: Terms,
     triples: Vec<Triple>,
     iri: String,
+    /// IDs of numbers, by the bits of their f32: most are the same before and after an action.
+    numbers: HashMap<u32, TermId>,
 }
 
 impl Writer {
@@ -101,8 +104,14 @@ impl Writer {
 
     /// Adds a number.
     pub(super) fn number(&mut self, subject: TermId, property: &str, value: f64) {
-        let value = self.terms.intern(Term::Double(shortest(value)));
+        let value = self.shortest(value);
         self.state(subject, property, value);
+    }
+
+    fn shortest(&mut self, value: f64) -> TermId {
+        #[expect(clippy::cast_possible_truncation, reason = "rounding to the precision of physics is intended")]
+        let bits = (value as f32).to_bits();
+        *self.numbers.entry(bits).or_insert_with(|| self.terms.intern(Term::Double(shortest(value))))
     }
 
     /// Adds several numbers, one for each property.

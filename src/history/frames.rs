@@ -4,6 +4,8 @@
 //! the [`GRAINS`], to which a recorder may round, take about one byte per value, constant columns take nothing, and all
 //! others about three bytes.
 
+use actcheck_base::{ByteReader, put_varint, unzigzag, zigzag};
+
 /// Steps of rounded values, coarse ones first. The last is a power of two, which `f32` represents exactly.
 const GRAINS: [f64; 3] = [2e-4, 1e-4, 1.0 / 8192.0];
 /// Maximum number of values of one run: limits the memory that a corrupt file can request. A long run has under a
@@ -39,45 +41,6 @@ pub(super) fn encode(rows: &[Vec<f32>]) -> Vec<u8> {
     out
 }
 
-/// Encodes a column of integers, each as its difference from a prediction.
-pub(super) fn encode_steps(values: &[i32], out: &mut Vec<u8>) {
-    if let [first, rest @ ..] = values
-        && rest.iter().all(|value| value == first)
-    {
-        out.push(CONSTANT);
-        put_u64(out, zigzag(i64::from(*first)));
-        return;
-    }
-    out.push(BITS);
-    let (mut last, mut step) = (0i64, 0i64);
-    for value in values.iter().copied().map(i64::from) {
-        // Bodies move smoothly: the prediction repeats the last step.
-        put_u64(out, zigzag(value - (last + step)));
-        (last, step) = (value, value - last);
-    }
-}
-
-/// Decodes the integers that [`encode_steps`] encoded at the start of `bytes`, and returns them with the remaining bytes.
-/// Returns `None` if the bytes are corrupt.
-pub(super) fn decode_steps(count: usize, bytes: &[u8]) -> Option<(Vec<i32>, &[u8])> {
-    if count > MOST_VALUES {
-        return None;
-    }
-    let mut rest = Reader { bytes };
-    if rest.byte()? == CONSTANT {
-        let value = i32::try_from(unzigzag(rest.u64()?)).ok()?;
-        return Some((vec![value; count], rest.bytes));
-    }
-    let (mut last, mut step) = (0i64, 0i64);
-    let values = (0..count).map(|_| {
-        let value = last.checked_add(step)?.checked_add(unzigzag(rest.u64()?))?;
-        (last, step) = (value, value.checked_sub(last)?);
-        i32::try_from(value).ok()
-    });
-    let values = values.collect::<Option<Vec<i32>>>()?;
-    Some((values, rest.bytes))
-}
-
 /// Decodes the rows that [`encode`] encoded. Returns `None` if the bytes are corrupt.
 #[cfg(test)]
 fn decode(bytes: &[u8]) -> Option<Vec<Vec<f32>>> {
@@ -87,7 +50,7 @@ fn decode(bytes: &[u8]) -> Option<Vec<Vec<f32>>> {
 /// Decodes the rows that [`encode`] encoded at the start of `bytes`, and returns them with the remaining bytes. Returns
 /// `None` if the bytes are corrupt.
 pub(super) fn decode_next(bytes: &[u8]) -> Option<(Vec<Vec<f32>>, &[u8])> {
-    let mut rest = Reader { bytes };
+    let mut rest = ByteReader { bytes };
     let rows = read(&mut rest)?;
     Some((rows, rest.bytes))
 }
@@ -95,40 +58,40 @@ pub(super) fn decode_next(bytes: &[u8]) -> Option<(Vec<Vec<f32>>, &[u8])> {
 /// Skips the rows that [`encode`] encoded at the start of `bytes`, and returns the remaining bytes. Returns `None` if the
 /// bytes are corrupt.
 pub(super) fn skip_next(bytes: &[u8]) -> Option<&[u8]> {
-    let mut rest = Reader { bytes };
+    let mut rest = ByteReader { bytes };
     let kind = rest.byte()?;
-    let height = rest.number()?;
+    let height = rest.size()?;
     if kind == RAGGED {
         for _ in 0..height {
-            let width = rest.number()?;
+            let width = rest.size()?;
             rest.take(width.checked_mul(4)?)?;
         }
         return Some(rest.bytes);
     }
-    let width = if height == 0 { rest.number().map(|_| 0)? } else { rest.number()? };
+    let width = if height == 0 { rest.size().map(|_| 0)? } else { rest.size()? };
     for _ in 0..width {
         match rest.byte()? {
             CONSTANT => drop(rest.take(4)?),
             BITS => drop(rest.take(height.checked_mul(4)?)?),
-            kind if usize::from(kind - IN_GRAINS) < GRAINS.len() => rest.skip_numbers(height)?,
+            kind if usize::from(kind - IN_GRAINS) < GRAINS.len() => rest.skip_varints(height)?,
             _ => return None,
         }
     }
     Some(rest.bytes)
 }
 
-fn read(rest: &mut Reader<'_>) -> Option<Vec<Vec<f32>>> {
+fn read(rest: &mut ByteReader<'_>) -> Option<Vec<Vec<f32>>> {
     let kind = rest.byte()?;
-    let height = rest.number()?;
+    let height = rest.size()?;
     if kind == RAGGED {
         return (0..height)
             .map(|_| {
-                let width = rest.number()?;
+                let width = rest.size()?;
                 (0..width).map(|_| rest.bits().map(f32::from_bits)).collect()
             })
             .collect();
     }
-    let width = rest.number()?;
+    let width = rest.size()?;
     if height.checked_mul(width)? > MOST_VALUES || height > MOST_VALUES {
         return None;
     }
@@ -151,7 +114,7 @@ fn encode_column(values: &[f32], out: &mut Vec<u8>) {
         let (mut last, mut step) = (0i64, 0i64);
         for count in counts.into_iter().map(i64::from) {
             // Bodies move smoothly: the prediction repeats the last step.
-            put_u64(out, zigzag(count - (last + step)));
+            put_varint(out, zigzag(count - (last + step)));
             (last, step) = (count, count - last);
         }
     } else {
@@ -176,7 +139,7 @@ fn encode_bits(values: &[f32], out: &mut Vec<u8>) {
     }
 }
 
-fn decode_column(height: usize, rest: &mut Reader<'_>) -> Option<Vec<f32>> {
+fn decode_column(height: usize, rest: &mut ByteReader<'_>) -> Option<Vec<f32>> {
     if height == 0 {
         return Some(Vec::new());
     }
@@ -187,18 +150,18 @@ fn decode_column(height: usize, rest: &mut Reader<'_>) -> Option<Vec<f32>> {
     }
 }
 
-fn decode_counts(grain: f64, height: usize, rest: &mut Reader<'_>) -> Option<Vec<f32>> {
+fn decode_counts(grain: f64, height: usize, rest: &mut ByteReader<'_>) -> Option<Vec<f32>> {
     let (mut last, mut step) = (0i64, 0i64);
     (0..height)
         .map(|_| {
-            let count = last.checked_add(step)?.checked_add(unzigzag(rest.u64()?))?;
+            let count = last.checked_add(step)?.checked_add(unzigzag(rest.varint()?))?;
             (last, step) = (count, count.checked_sub(last)?);
             i32::try_from(count).ok().map(|count| of_grains(count, grain))
         })
         .collect()
 }
 
-fn decode_bits(height: usize, rest: &mut Reader<'_>) -> Option<Vec<f32>> {
+fn decode_bits(height: usize, rest: &mut ByteReader<'_>) -> Option<Vec<f32>> {
     let planes = [rest.take(height)?, rest.take(height)?, rest.take(height)?, rest.take(height)?];
     let mut last = 0u32;
     Some(
@@ -232,73 +195,8 @@ fn of_grains(count: i32, grain: f64) -> f32 {
     (f64::from(count) * grain) as f32
 }
 
-fn zigzag(value: i64) -> u64 {
-    ((value << 1) ^ (value >> 63)).cast_unsigned()
-}
-
-fn unzigzag(value: u64) -> i64 {
-    (value >> 1).cast_signed() ^ -(value & 1).cast_signed()
-}
-
 fn put(out: &mut Vec<u8>, value: usize) {
-    put_u64(out, value as u64);
-}
-
-/// Writes a variable-length integer: seven bits per byte, low bits first.
-fn put_u64(out: &mut Vec<u8>, mut value: u64) {
-    loop {
-        let low = (value & 0x7f) as u8;
-        value >>= 7;
-        out.push(if value == 0 { low } else { low | 0x80 });
-        if value == 0 {
-            return;
-        }
-    }
-}
-
-struct Reader<'a> {
-    bytes: &'a [u8],
-}
-
-impl<'a> Reader<'a> {
-    fn take(&mut self, count: usize) -> Option<&'a [u8]> {
-        let (taken, rest) = self.bytes.split_at_checked(count)?;
-        self.bytes = rest;
-        Some(taken)
-    }
-
-    fn byte(&mut self) -> Option<u8> {
-        self.take(1).map(|bytes| bytes[0])
-    }
-
-    fn bits(&mut self) -> Option<u32> {
-        self.take(4)?.try_into().ok().map(u32::from_le_bytes)
-    }
-
-    /// Skips variable-length integers: each ends with a byte below 128.
-    fn skip_numbers(&mut self, count: usize) -> Option<()> {
-        for _ in 0..count {
-            let end = self.bytes.iter().position(|byte| *byte < 0x80)?;
-            self.bytes = &self.bytes[end + 1..];
-        }
-        Some(())
-    }
-
-    fn u64(&mut self) -> Option<u64> {
-        let mut value = 0u64;
-        for shift in (0..64).step_by(7) {
-            let byte = self.byte()?;
-            value |= u64::from(byte & 0x7f) << shift;
-            if byte & 0x80 == 0 {
-                return Some(value);
-            }
-        }
-        None
-    }
-
-    fn number(&mut self) -> Option<usize> {
-        usize::try_from(self.u64()?).ok()
-    }
+    put_varint(out, value as u64);
 }
 
 #[cfg(test)]
@@ -323,20 +221,6 @@ mod tests {
             let followed = [encode(&rows), vec![9]].concat();
             assert_eq!(skip_next(&followed), Some([9].as_slice()));
         }
-    }
-
-    #[test]
-    fn integers_come_back_and_corrupt_ones_are_rejected() {
-        for values in [vec![], vec![5], vec![-7; 100], vec![i32::MIN, i32::MAX, 0, 3], (0..500).collect()] {
-            let mut bytes = Vec::new();
-            encode_steps(&values, &mut bytes);
-            let (decoded, rest) = decode_steps(values.len(), &bytes).expect("they were just encoded");
-            assert_eq!((decoded, rest.len()), (values.clone(), 0));
-            for end in 0..bytes.len() {
-                assert!(values.is_empty() || decode_steps(values.len(), &bytes[..end]).is_none(), "{values:?} {end}");
-            }
-        }
-        assert!(decode_steps(usize::MAX, &[CONSTANT, 0]).is_none());
     }
 
     #[test]

@@ -4,6 +4,7 @@
 //! only pictures and replay need.
 
 use std::io::{Read, Write};
+use std::sync::Arc;
 
 use flate2::Compression;
 use flate2::read::GzDecoder;
@@ -11,6 +12,7 @@ use flate2::write::GzEncoder;
 
 use crate::frames;
 use crate::trace_details::{Details, Intervals};
+use actcheck_base::Steps;
 use actcheck_data::{ActionTrace, Choice, Form, Frames, RobotCourse, Samples, SceneMap, Series, Snapshot, Trace};
 
 /// Magic bytes at the start of each file. The last one is the format version; it increases whenever a type of the trace
@@ -46,10 +48,11 @@ pub(super) fn encode(choices: &[Choice], trace: &Trace) -> Result<Vec<u8>, Strin
 pub(super) fn decode(bytes: &[u8]) -> Result<(Vec<Choice>, Trace), String> {
     let (head, course) = parts(bytes)?;
     let (choices, mut trace) = decode_head(head)?;
-    let course = expanded(course)?;
+    let course = Arc::new(expanded(course)?);
     let (rows, rest) = frames::decode_next(&course).ok_or("the motion of the bodies can't be read")?;
     trace.frames.rows = rows;
-    read_motions(rest, &mut trace, decode_motion).ok_or("the motion of the robot can't be read")?;
+    read_motions(&course, course.len() - rest.len(), &mut trace, decode_motion)
+        .ok_or("the motion of the robot can't be read")?;
     Ok((choices, trace))
 }
 
@@ -78,21 +81,23 @@ fn encode_samples(samples: &Samples, out: &mut Vec<u8>) -> Result<(), String> {
         .collect();
     let head = (samples.period_secs, samples.count as u64, heads);
     out.extend(postcard::to_stdvec(&head).map_err(|error| error.to_string())?);
-    samples.series.iter().for_each(|series| frames::encode_steps(&series.steps, out));
+    samples.series.iter().for_each(|series| series.steps.encode(out));
     Ok(())
 }
 
-fn decode_samples(rest: &[u8]) -> Option<(Samples, &[u8])> {
-    let ((period_secs, count, heads), mut rest): ((f64, u64, Vec<SeriesHead>), &[u8]) =
-        postcard::take_from_bytes(rest).ok()?;
+/// Decodes the samples of one action at a position of the expanded bytes, and returns the position after them.
+fn decode_samples(bytes: &Arc<Vec<u8>>, at: usize) -> Option<(Samples, usize)> {
+    let ((period_secs, count, heads), rest): ((f64, u64, Vec<SeriesHead>), &[u8]) =
+        postcard::take_from_bytes(bytes.get(at..)?).ok()?;
     let count = usize::try_from(count).ok()?;
+    let mut at = bytes.len() - rest.len();
     let mut series = Vec::with_capacity(heads.len());
     for (thing, other, quantity, steps_per_unit) in heads {
         let steps;
-        (steps, rest) = frames::decode_steps(count, rest)?;
+        (steps, at) = Steps::encoded(count, bytes, at)?;
         series.push(Series { thing, other, quantity, steps_per_unit, steps });
     }
-    Some((Samples { period_secs, count, series }, rest))
+    Some((Samples { period_secs, count, series }, at))
 }
 
 /// Decodes the robot's measurements and commands of one action, and returns the remaining bytes.
@@ -109,13 +114,15 @@ fn skip_motion<'b>(_: &mut RobotCourse, bytes: &'b [u8]) -> Option<&'b [u8]> {
     frames::skip_next(rest)
 }
 
-/// Reads the robot's motion by `motion`, which returns the remaining bytes, and decodes the samples. Traces of earlier
-/// versions end before either and have none.
-fn read_motions<'b>(
-    mut rest: &'b [u8],
+/// Reads the robot's motion at a position of the expanded bytes by `motion`, which returns the remaining bytes, and
+/// decodes the samples. Traces of earlier versions end before either and have none.
+fn read_motions(
+    bytes: &Arc<Vec<u8>>,
+    at: usize,
     trace: &mut Trace,
-    motion: impl Fn(&mut RobotCourse, &'b [u8]) -> Option<&'b [u8]>,
+    motion: impl for<'b> Fn(&mut RobotCourse, &'b [u8]) -> Option<&'b [u8]>,
 ) -> Option<()> {
+    let mut rest = bytes.get(at..)?;
     if rest.is_empty() {
         return Some(());
     }
@@ -125,8 +132,9 @@ fn read_motions<'b>(
     if rest.is_empty() {
         return Some(());
     }
+    let mut at = bytes.len() - rest.len();
     for course in &mut trace.robot_courses {
-        (course.samples, rest) = decode_samples(rest)?;
+        (course.samples, at) = decode_samples(bytes, at)?;
     }
     Some(())
 }
@@ -139,9 +147,10 @@ fn read_motions<'b>(
 pub(super) fn decode_sampled(bytes: &[u8]) -> Result<(Vec<Choice>, Trace), String> {
     let (head, course) = parts(bytes)?;
     let (choices, mut trace) = decode_head(head)?;
-    let course = expanded(course)?;
+    let course = Arc::new(expanded(course)?);
     let rest = frames::skip_next(&course).ok_or("the motion of the bodies can't be read")?;
-    read_motions(rest, &mut trace, skip_motion).ok_or("the motion of the robot can't be read")?;
+    read_motions(&course, course.len() - rest.len(), &mut trace, skip_motion)
+        .ok_or("the motion of the robot can't be read")?;
     Ok((choices, trace))
 }
 

@@ -94,8 +94,9 @@ impl World {
             let mut pair = [self.name_of(first), self.name_of(second)];
             pair.sort();
             let mut contact = Series::new(&pair[0], &pair[1], "contactForce", FORCE_STEPS);
-            contact.steps = vec![0; count];
-            forces.into_iter().for_each(|(at, force)| contact.steps[at] = force);
+            let mut steps = vec![0; count];
+            forces.into_iter().for_each(|(at, force)| steps[at] = force);
+            contact.steps = steps.into();
             series.push(contact);
         }
         Samples { period_secs: self.tick_secs(), count, series }
