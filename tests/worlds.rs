@@ -7,7 +7,7 @@ use std::path::Path;
 use actcheck::base::{Diagnostics, Source, Term, names};
 use actcheck::campaign::Env;
 use actcheck::config::{self, Campaign, Overrides};
-use actcheck::data::{Choices, Role, Scene};
+use actcheck::data::{Choices, Part, Pose, Role, Scene, bounds};
 use actcheck::rules::Budget;
 use actcheck::scenario::{Solid, draw};
 
@@ -358,14 +358,89 @@ fn a_gazebo_world_gets_its_included_models() {
     let front = map.locations.iter().find(|location| location.name == "far_front").unwrap();
     assert!((front.at[0] - 3.0).abs() < 1e-3 && (front.at[1] - (1.0 - 0.4 - 0.69)).abs() < 1e-3, "{front:?}");
     for (inside, expected) in [
-        ("<include><uri>model://sofa_bed</uri></include>".to_owned(), "W040"),
+        ("<include><uri>model://sofa_bed</uri></include>".to_owned(), "there is no usable model `sofa_bed`"),
+        ("<include><uri>model://broken_lamp</uri></include>".to_owned(), "the model `broken_lamp` can't be used: "),
         (format!("{}{}", include("a", "0 0 0 0 0 0"), include("a", "3 0 0 0 0 0")), "W041"),
-        (include("a", "0 0 0 1 0 0"), "a tilted model"),
-        ("<model name=\"inline\"/>".to_owned(), "W035"),
+        ("<model name=\"a\"><include><uri>model://b</uri></include></model>".to_owned(), "there is no model `b`"),
+        ("<model><link/></model>".to_owned(), "`<model>` has no attribute `name`"),
     ] {
         let said = read(&inside).unwrap_err().to_string();
         assert!(said.contains(expected), "{inside}: {said}");
     }
+}
+
+/// Worlds as people publish them. Each line of `expected` has the name of a solid, with the lowest and the highest
+/// corner of its bounding box.
+#[test]
+fn gazebo_worlds_have_their_solids_in_the_same_places() {
+    const BOX: &str = "<link name=\"l\"><collision name=\"c\"><geometry><box><size>2 1 0.5</size></box></geometry></collision></link>";
+    let model = |inside: &str| format!("<sdf version=\"1.5\"><model name=\"m\">{inside}</model></sdf>");
+    let files = [
+        ("crate", model(BOX)),
+        ("raised", model(&format!("<pose>0 0 3 0 0 0</pose>{BOX}"))),
+        ("door", model(&format!("{BOX}<link name=\"leaf\"/><joint name=\"hinge\" type=\"revolute\"/>"))),
+        (
+            "pair",
+            model(
+                "<include><uri>model://crate</uri></include><include><uri>model://crate</uri><pose>0 4 0 0 0 0</pose></include>",
+            ),
+        ),
+        ("loop", model("<include><uri>model://loop</uri></include>")),
+        ("Traffic_Cone", model(BOX)),
+        ("traffic_light", model(BOX)),
+    ];
+    let folder = tempfile::tempdir().unwrap();
+    for (name, text) in files {
+        let model = folder.path().join("m").join(name);
+        std::fs::create_dir_all(&model).unwrap();
+        std::fs::write(model.join("model.sdf"), text).unwrap();
+    }
+    std::fs::create_dir_all(folder.path().join("m/worlds")).unwrap();
+    let solids = |version: &str, inside: &str| {
+        let text = format!(
+            "<!-- a -- b -->\n<?xml version=\"1.0\"?><sdf version=\"{version}\"><world name=\"w\">{inside}</world></sdf>"
+        );
+        std::fs::write(folder.path().join("m/worlds/w.world"), text).unwrap();
+        let campaign = campaign(folder.path(), "model_dir = \"m\"\n[world]\nworlds = [\"w\"]\n")
+            .map_err(|found| found.to_string())?;
+        let lines = campaign.worlds["w"].furniture.iter().map(|piece| {
+            let place = |part: &Part| Part {
+                pose: Pose::from_isometry(&(piece.pose.to_isometry() * part.pose.to_isometry())),
+                shape: part.shape.clone(),
+            };
+            let parts: Vec<Part> = campaign.models[&piece.model].parts.iter().map(place).collect();
+            let (low, high) = bounds(&parts);
+            let corner = |at: nalgebra::Vector3<f64>| {
+                <[f64; 3]>::from(at).map(|value| format!("{value:.2}").replace("-0.00", "0.00")).join(" ")
+            };
+            format!("{}: {} to {}", piece.name, corner(low), corner(high))
+        });
+        Ok::<Vec<String>, String>(lines.collect())
+    };
+    let include = |name: &str, more: &str| format!("<include><uri>model://{name}</uri>{more}</include>");
+    for (inside, expected) in [
+        (format!("<model name=\"a\"><pose>1 2 0.25 0 0 0</pose>{BOX}</model>"), "a: 0.00 1.50 0.00 to 2.00 2.50 0.50"),
+        (format!("<model name=\"a\"><pose>0 0 1 0 1.5707963 0</pose>{BOX}</model>"), "a: -0.25 -0.50 0.00 to 0.25 0.50 2.00"),
+        (format!("<model name=\"a\"><pose>0 0 1 1.5707963 0 1.5707963</pose>{BOX}</model>"), "a: -0.25 -1.00 0.50 to 0.25 1.00 1.50"),
+        (format!("<model name=\"a\"><pose>0 0 1 0 0 0</pose><model name=\"b\"><pose>5 0 0 0 0 0</pose>{BOX}</model></model>"), "a: 4.00 -0.50 0.75 to 6.00 0.50 1.25"),
+        (format!("<model name=\"a\"><pose>0 0 1 0 0 0</pose>{}</model>", include("crate", "<pose>0 0 2 0 0 0</pose>")), "a: -1.00 -0.50 2.75 to 1.00 0.50 3.25"),
+        (format!("<model name=\"a\">{BOX}<link name=\"k\"><gravity>0</gravity></link><joint name=\"j\" type=\"prismatic\"/></model>"), "a: -1.00 -0.50 -0.25 to 1.00 0.50 0.25"),
+        ("<model name=\"a\"><link name=\"l\"><collision name=\"c\"><geometry><plane/></geometry></collision></link></model><model name=\"b\"><link name=\"l\"><visual name=\"v\"/></link></model>".to_owned(), ""),
+        (include("crate", "<name>x</name><pose>0 0 0.25 0 0 0</pose>"), "x: -1.00 -0.50 0.00 to 1.00 0.50 0.50"),
+        (include("crate", "<pose>0 0 1 0 1.5707963 0</pose>"), "crate: -0.25 -0.50 0.00 to 0.25 0.50 2.00"),
+        (include("raised", ""), "raised: -1.00 -0.50 2.75 to 1.00 0.50 3.25"),
+        (include("raised", "<pose>0 0 0.25 0 0 0</pose>"), "raised: -1.00 -0.50 0.00 to 1.00 0.50 0.50"),
+        (include("door", "<pose>0 0 0.25 0 0 0</pose>"), "door: -1.00 -0.50 0.00 to 1.00 0.50 0.50"),
+        (include("pair", ""), "pair: -1.00 -0.50 -0.25 to 1.00 4.50 0.25"),
+        ("<include><uri>https://fuel.example.org/1.0/someone/models/Traffic Light/2</uri></include><include><uri>https://fuel.example.org/1.0/someone/models/Ground Plane</uri></include>".to_owned(), "Traffic Light: -1.00 -0.50 -0.25 to 1.00 0.50 0.25"),
+        ("<spherical_coordinates gz:a=\"b\"/>".to_owned(), ""),
+    ] {
+        for version in ["1.3", "1.6", "1.12"] {
+            assert_eq!(solids(version, &inside).map(|lines| lines.join("\n")), Ok(expected.to_owned()), "{inside}");
+        }
+    }
+    let endless = solids("1.6", &include("loop", "")).unwrap_err();
+    assert!(endless.contains("the model `loop` can't be used: ") && endless.contains("W040"), "{endless}");
 }
 
 #[test]

@@ -274,9 +274,11 @@ fn categorise(campaign: &mut Campaign, ontology: &Ontology) {
     let used = campaign.used_models();
     for name in &campaign.uncategorised {
         let Some(model) = campaign.models.get_mut(name) else { continue };
-        match ontology.class_called(name) {
+        // Models that only a world has are called WORLD/NAME. Configurations can't name them.
+        let own_name = name.rsplit_once('/').map(|(_, own_name)| own_name);
+        match ontology.class_called(own_name.unwrap_or(name)) {
             Some(class) => Arc::make_mut(model).category = class.to_owned(),
-            None if used.contains(name) => campaign.warnings.push(
+            None if own_name.is_none() && used.contains(name) => campaign.warnings.push(
                 Diagnostic::warning("W039", format!("the model `{name}` has no category: it counts as `act:Object`"))
                     .help(format!("add it to `[categories]`, for example `{name} = \"act:Cup\"`")),
             ),

@@ -25,6 +25,8 @@ pub(crate) struct ModelLibrary {
     names: Vec<String>,
     /// Faults of models, reported in full only if the configuration names the model.
     diagnostics: BTreeMap<String, Diagnostics>,
+    /// Names of models whose files give them a pose.
+    posed: BTreeSet<String>,
     /// Models without a category.
     pub(crate) uncategorised: BTreeSet<String>,
     /// The worlds that the configuration names.
@@ -52,6 +54,7 @@ pub(crate) fn read(table: &mut Table, folder: &Path, found: &mut Diagnostics) ->
         models: BTreeMap::new(),
         names: Vec::new(),
         diagnostics: BTreeMap::new(),
+        posed: BTreeSet::new(),
         uncategorised: BTreeSet::new(),
         worlds: BTreeMap::new(),
         start: None,
@@ -84,9 +87,8 @@ pub(crate) fn read(table: &mut Table, folder: &Path, found: &mut Diagnostics) ->
 impl ModelLibrary {
     /// Reads the SDF and URDF models.
     fn read_foreign(&mut self) {
-        let folders = [self.folder.clone(), self.folder.join("objects")];
-        let lookup = Lookup { files: &self.files, folders: folders.to_vec() };
-        for model in folders.iter().flat_map(|folder| foreign::find(&self.files, folder)) {
+        let lookup = Lookup { files: &self.files, folders: self.folders() };
+        for model in self.folders().iter().flat_map(|folder| foreign::find(&self.files, folder)) {
             if self.names.contains(&model.name) {
                 let message = format!("there are two models `{0}`: {1} is ignored", model.name, model.path.display());
                 let fault = Diagnostic::warning("W036", message).help("give one of them another name");
@@ -94,15 +96,23 @@ impl ModelLibrary {
                 continue;
             }
             match foreign::read(&model, &lookup) {
-                Ok((read, warnings)) => {
-                    self.models.insert(model.name.clone(), Arc::new(read));
+                Ok(read) => {
+                    self.models.insert(model.name.clone(), Arc::new(read.model));
                     self.uncategorised.insert(model.name.clone());
-                    self.diagnostics.insert(model.name.clone(), warnings);
+                    self.diagnostics.insert(model.name.clone(), read.warnings);
+                    if read.has_pose {
+                        self.posed.insert(model.name.clone());
+                    }
                 }
                 Err(faults) => _ = self.diagnostics.insert(model.name.clone(), faults),
             }
             self.names.push(model.name);
         }
+    }
+
+    /// The folders with SDF and URDF models.
+    fn folders(&self) -> Vec<PathBuf> {
+        vec![self.folder.clone(), self.folder.join("objects")]
     }
 
     /// Reads `[categories]`: categories by model name, which override those in the models' files.
@@ -182,15 +192,18 @@ impl ModelLibrary {
                 return;
             }
         };
-        let model = |name: &str| self.models.get(name).map(|model| &**model);
-        let known: Vec<String> = self.models.keys().cloned().collect();
         let (world, diagnostics) = if is_toml(&path) {
+            let model = |name: &str| self.models.get(name).map(|model| &**model);
+            let known: Vec<String> = self.models.keys().cloned().collect();
             match world_map::read(&name.value, &source, model, &known) {
                 Ok(world) => (Some(world), Diagnostics::new()),
                 Err(faults) => (None, faults),
             }
         } else {
-            foreign::world::read(&name.value, &source, model, &known)
+            let lookup = Lookup { files: &files, folders: self.folders() };
+            let included = foreign::world::Included { models: &self.models, posed: &self.posed, lookup: &lookup };
+            let (world, diagnostics) = foreign::world::read(&name.value, &source, &path, &included);
+            (world.map(|world| self.add_models_of(world)), diagnostics)
         };
         let (errors, warnings): (Vec<Diagnostic>, Vec<Diagnostic>) =
             diagnostics.into_iter().partition(|fault| fault.severity == Severity::Error);
@@ -199,6 +212,15 @@ impl ModelLibrary {
         if let Some(world) = world {
             self.worlds.insert(world.name.clone(), Arc::new(world));
         }
+    }
+
+    /// Adds the models that only a world has, and returns its map. Configurations can't name these models.
+    fn add_models_of(&mut self, world: foreign::world::World) -> WorldMap {
+        for model in world.models {
+            self.uncategorised.insert(model.name.clone());
+            self.models.insert(model.name.clone(), Arc::new(model));
+        }
+        world.map
     }
 
     /// The worlds of the model folder, then the shipped ones.

@@ -31,7 +31,7 @@ const UNREAD: [&str; 3] = ["trifans", "tristrips", "polygons"];
 /// # Errors
 /// W031 if it is not XML, W037 if it has no usable geometry.
 pub(crate) fn read(source: &Source, warnings: &mut Diagnostics) -> Result<Mesh, Diagnostics> {
-    let document = xml::parse(source)?;
+    let document = xml::parse(source, &source.text)?;
     let root = document.root_element();
     let fault = |node: Node, reason: String| -> Diagnostics {
         Diagnostic::error("W037", format!("the mesh {} is unusable: {reason}", source.name))

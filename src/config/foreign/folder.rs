@@ -2,7 +2,12 @@
 
 use std::path::{Path, PathBuf};
 
+use nalgebra::Isometry3;
+
+use crate::foreign::lenient::repaired;
 use crate::foreign::lookup::Lookup;
+use crate::foreign::nested::Role;
+use crate::foreign::sdf::SdfModel;
 use crate::foreign::xml::{self, Reader};
 use crate::foreign::{sdf, urdf};
 use actcheck_base::{Diagnostic, Diagnostics, Files};
@@ -21,12 +26,7 @@ pub(crate) struct Found {
 pub(crate) fn find(files: &Files, folder: &Path) -> Vec<Found> {
     let mut found: Vec<Found> = Vec::new();
     for model in files.folders(folder) {
-        let inside = files.list(&model);
-        let first = ["model.config", "model.sdf", "model.urdf"]
-            .iter()
-            .map(|file| model.join(file))
-            .find(|path| inside.contains(path));
-        if let (Some(path), Some(name)) = (first, model.file_name()) {
+        if let (Some(path), Some(name)) = (model_file(files, &model), model.file_name()) {
             found.push(Found { name: name.to_string_lossy().into_owned(), path });
         }
     }
@@ -39,24 +39,74 @@ pub(crate) fn find(files: &Files, folder: &Path) -> Vec<Found> {
     found
 }
 
-/// Reads a model. Also returns warnings about ignored elements.
+/// A model of a file.
+pub(crate) struct Read {
+    pub(crate) model: ObjectModel,
+    /// Whether the file gives the model a pose, which the pose of an `<include>` replaces.
+    pub(crate) has_pose: bool,
+    /// Warnings about ignored elements.
+    pub(crate) warnings: Diagnostics,
+}
+
+/// Reads a model.
 ///
 /// # Errors
 /// All faults of its files: an unreadable file (W030), text that is not XML (W031) or not a model (W032), a missing
-/// element (W033), an invalid value (W034), an element that can't be simulated (W035), an unusable mesh (W037), or no
-/// solid shape (W038).
-pub(crate) fn read(found: &Found, lookup: &Lookup) -> Result<(ObjectModel, Diagnostics), Diagnostics> {
+/// element (W033), an invalid value (W034), an element that can't be simulated (W035), an unusable mesh (W037), no
+/// solid shape (W038), or an included model that is missing or has faults (W040).
+pub(crate) fn read(found: &Found, lookup: &Lookup) -> Result<Read, Diagnostics> {
+    let (sdf, warnings) = read_sdf_model(found, lookup, Role::Object, 0)?;
+    let has_pose = sdf.pose != Isometry3::identity();
+    Ok(Read { model: sdf.body.into_model(&found.name, sdf.digest, &sdf.pose), has_pose, warnings })
+}
+
+/// Reads a model that `depth` others include, as a body. Also returns warnings.
+///
+/// # Errors
+/// As [`read`].
+pub(crate) fn read_sdf_model(
+    found: &Found,
+    lookup: &Lookup,
+    role: Role,
+    depth: usize,
+) -> Result<(SdfModel, Diagnostics), Diagnostics> {
     let path = match found.path.file_name().and_then(|name| name.to_str()) {
         Some("model.config") => sdf_path(&found.path, lookup.files)?,
         _ => found.path.clone(),
     };
     let source = lookup.files.read(&path).map_err(|reason| unreadable(&path, &reason))?;
     let is_urdf = path.extension().is_some_and(|ending| ending == "urdf");
-    let (model, said) = if is_urdf { urdf::read(&source, &path, lookup) } else { sdf::read(&source, &path, lookup) };
-    match model {
-        Some(model) => Ok((model.body.into_model(&found.name, model.digest, &model.pose), said)),
-        None => Err(said),
+    let (model, said) =
+        if is_urdf { urdf::read(&source, &path, lookup) } else { sdf::read(&source, &path, lookup, role, depth) };
+    model.map(|model| (model, said.clone())).ok_or(said)
+}
+
+/// Returns the name of the model that a URI means: the path in a model folder, or the last part of a web address.
+pub(crate) fn name_in(uri: &str) -> String {
+    let path = uri.trim_end_matches('/');
+    match path.split_once("://") {
+        Some(("model" | "package", path)) => path.to_owned(),
+        Some(("http" | "https", address)) => {
+            // Fuel's addresses end in `models/NAME` or `models/NAME/VERSION`.
+            let name = address.split_once("/models/").map_or(address, |(_, name)| name);
+            name.split('/').next().unwrap_or(name).to_owned()
+        }
+        _ => path.to_owned(),
     }
+}
+
+/// Finds a model by its path in the folders. Names of web addresses may differ from folders in case and spaces.
+pub(crate) fn named(name: &str, lookup: &Lookup) -> Option<Found> {
+    let folder_name = name.to_lowercase().replace(' ', "_");
+    let places = lookup.folders.iter().flat_map(|folder| [folder.join(name), folder.join(&folder_name)]);
+    places.filter_map(|place| Some(Found { name: name.to_owned(), path: model_file(lookup.files, &place)? })).next()
+}
+
+/// Returns the file of a model's folder that names or is the model.
+fn model_file(files: &Files, folder: &Path) -> Option<PathBuf> {
+    let inside = files.list(folder);
+    let known = ["model.config", "model.sdf", "model.urdf"].map(|file| folder.join(file));
+    known.into_iter().find(|path| inside.contains(path))
 }
 
 fn unreadable(path: &Path, reason: &str) -> Diagnostic {
@@ -67,7 +117,8 @@ fn unreadable(path: &Path, reason: &str) -> Diagnostic {
 /// Returns the SDF file named by a `model.config`; if there are several, that of the newest version.
 fn sdf_path(config: &Path, files: &Files) -> Result<PathBuf, Diagnostics> {
     let source = files.read(config).map_err(|reason| unreadable(config, &reason))?;
-    let document = xml::parse(&source)?;
+    let text = repaired(&source.text);
+    let document = xml::parse(&source, &text)?;
     let mut reader = Reader::new(&source);
     let root = document.root_element();
     let newest = xml::children(root, "sdf").max_by_key(|sdf| {

@@ -13,14 +13,20 @@ pub(crate) struct Shapes<'a> {
     pub(crate) lookup: &'a Lookup<'a>,
     /// The file that contains the shapes.
     pub(crate) path: &'a Path,
-    /// Digest of the mesh files.
+    /// Digest of the mesh files and of included models.
     pub(crate) digest: Digest,
+    /// Number of models that include this file's model.
+    pub(crate) depth: usize,
 }
 
 /// Help text with the supported kinds of geometry.
 const KINDS: &str = "use a box, cylinder, sphere, capsule or mesh";
 
-impl Shapes<'_> {
+impl<'a> Shapes<'a> {
+    pub(crate) fn new(lookup: &'a Lookup<'a>, path: &'a Path) -> Self {
+        Self { lookup, path, digest: Digest::new(), depth: 0 }
+    }
+
     /// Reads the shape of an SDF `<geometry>`. Reports a fault and returns `None` if it is empty or invalid.
     pub(crate) fn sdf(&mut self, geometry: Node, reader: &mut Reader) -> Option<Shape> {
         let kind = kind_of(geometry, reader)?;

@@ -7,7 +7,7 @@ use crate::foreign::geometry::Shapes;
 use crate::foreign::lookup::Lookup;
 use crate::foreign::robot_tree::{self, Tree};
 use crate::foreign::xml::{self, Node, Reader};
-use actcheck_base::{Diagnostics, Digest, Source};
+use actcheck_base::{Diagnostics, Source};
 use actcheck_data::Shape;
 
 /// The parts of a URDF that a profile needs.
@@ -22,9 +22,9 @@ pub(crate) struct RobotText {
 
 /// Reads the links, joints and collision meshes, and reports every fault with its span.
 pub(crate) fn read(source: &Source, path: &Path, lookup: &Lookup, found: &mut Diagnostics) -> RobotText {
-    let mut shapes = Shapes { lookup, path, digest: Digest::new() };
+    let mut shapes = Shapes::new(lookup, path);
     let mut meshes = BTreeMap::new();
-    let document = match xml::parse_model(source) {
+    let document = match xml::parse_model(source, &source.text) {
         Ok(document) => document,
         Err(faults) => {
             found.extend(faults);

@@ -6,40 +6,52 @@ use nalgebra::{Isometry3, Matrix3};
 
 use crate::foreign::body::{Body, Mass, is_possible};
 use crate::foreign::geometry::{Shapes, check_volume};
+use crate::foreign::lenient::repaired;
 use crate::foreign::lookup::Lookup;
+use crate::foreign::nested::{Links, Role};
 use crate::foreign::xml::{self, Bound, Node, Reader};
-use actcheck_base::{Diagnostics, Digest, Source};
+use actcheck_base::{Diagnostics, Source};
 use actcheck_data::{Part, Pose};
 
 /// Supported minor versions of SDF 1.
-const VERSIONS: std::ops::RangeInclusive<u32> = 4..=11;
+const VERSIONS: std::ops::RangeInclusive<u32> = 3..=12;
 
 /// A model read from SDF or URDF.
 pub(crate) struct SdfModel {
     pub(crate) body: Body,
     /// Pose of the model's origin in the file.
     pub(crate) pose: Isometry3<f64>,
+    /// Whether the file says that it never moves.
+    pub(crate) is_static: bool,
     /// Digest of the file and its meshes.
     pub(crate) digest: String,
 }
 
-/// Reads the model of an SDF file and its faults. The model is `None` if there are errors.
-pub(crate) fn read(source: &Source, path: &Path, lookup: &Lookup) -> (Option<SdfModel>, Diagnostics) {
-    let document = match xml::parse_model(source) {
+/// Reads the model of an SDF file and its faults, included in `depth` others. The model is `None` if there are errors.
+pub(crate) fn read(
+    source: &Source,
+    path: &Path,
+    lookup: &Lookup,
+    role: Role,
+    depth: usize,
+) -> (Option<SdfModel>, Diagnostics) {
+    let text = repaired(&source.text);
+    let document = match xml::parse_model(source, &text) {
         Ok(document) => document,
         Err(faults) => return (None, faults),
     };
     let mut reader = Reader::new(source);
-    let mut shapes = Shapes { lookup, path, digest: Digest::new() };
+    let mut shapes = Shapes { depth, ..Shapes::new(lookup, path) };
     shapes.digest.update(source.text.as_bytes());
     let model = root_model(document.root_element(), &mut reader);
     let read = model.map(|model| {
         let pose = pose(model, &mut reader).unwrap_or_default();
-        (read_model(model, &mut shapes, &mut reader), pose)
+        (read_model(model, role, &mut shapes, &mut reader), pose, is_static(model, &mut reader))
     });
     let found = reader.found;
     let complete = read.filter(|_| !found.has_errors());
-    (complete.map(|(body, pose)| SdfModel { body, pose, digest: shapes.digest.finish() }), found)
+    let digest = shapes.digest.finish();
+    (complete.map(|(body, pose, is_static)| SdfModel { body, pose, is_static, digest }), found)
 }
 
 /// Returns the only model of a document.
@@ -102,62 +114,35 @@ pub(crate) fn pose(node: Node, reader: &mut Reader) -> Option<Isometry3<f64>> {
     Some(xml::placed([x, y, z], [roll * unit, pitch * unit, yaw * unit]))
 }
 
-/// Reads a model's links as one rigid body.
-pub(crate) fn read_model(model: Node, shapes: &mut Shapes, reader: &mut Reader) -> Body {
-    const KNOWN: [&str; 13] = [
-        "link",
-        "joint",
-        "static",
-        "pose",
-        "frame",
-        "self_collide",
-        "allow_auto_disable",
-        "enable_wind",
-        "plugin",
-        "model",
-        "include",
-        "gripper",
-        "name",
-    ];
-    reader.warn_about_unknown_children(model, &KNOWN);
-    let fixed = xml::child(model, "static").is_some_and(|node| reader.boolean(node).unwrap_or(false));
+/// Reads a model's links, with those of nested and included models, as one rigid body.
+pub(crate) fn read_model(model: Node, role: Role, shapes: &mut Shapes, reader: &mut Reader) -> Body {
+    let fixed = role == Role::Furniture || is_static(model, reader);
     let mut body = Body { fixed, ..Body::default() };
-    for nested in model.children().filter(|child| ["model", "include", "gripper"].contains(&child.tag_name().name())) {
-        let message = format!("`<{}>` inside a model is not supported", nested.tag_name().name());
-        reader.error("W035", nested, message, "copy its links into this model, or make it a separate model");
+    let links = Links::of(model, role, reader);
+    links.check_joints(role, body.fixed, reader);
+    for (link, at) in &links.links {
+        read_link(*link, at, role, &mut body, shapes, reader);
     }
-    for plugin in xml::children(model, "plugin") {
-        reader.warning("W036", plugin, "the plugin is not run".to_owned(), "the model works without it");
-    }
-    let links: Vec<Node> = xml::children(model, "link").collect();
-    check_joints(model, &links, body.fixed, reader);
-    for link in links {
-        read_link(link, &mut body, shapes, reader);
-    }
-    if body.parts.is_empty() && !reader.found.has_errors() {
+    links.read_included(role, &mut body, shapes, reader);
+    if body.parts.is_empty() && role == Role::Object && !reader.found.has_errors() {
         let message = "the model has no solid shape: none of its links has a `<collision>`".to_owned();
         reader.error("W038", model, message, "give a link a `<collision>`; a `<visual>` does not collide");
     }
     body
 }
 
-/// Checks that the links form one rigid body: those of a model that is not static need fixed joints (W035).
-fn check_joints(model: Node, links: &[Node], fixed: bool, reader: &mut Reader) {
-    let joints: Vec<Node> = xml::children(model, "joint").collect();
-    for joint in joints.iter().filter(|joint| joint.attribute("type") != Some("fixed")) {
-        let kind = joint.attribute("type").unwrap_or("unknown");
-        let name = joint.attribute("name").unwrap_or("");
-        let message = format!("the joint `{name}` is of the type {kind}, but objects must be rigid");
-        reader.error("W035", *joint, message, "make the joint `fixed`; robots are read from URDF");
-    }
-    if let (Some(loose), false) = (links.get(joints.len() + 1), fixed) {
-        let name = loose.attribute("name").unwrap_or("");
-        let message = format!("no joint connects the link `{name}` to the others");
-        reader.error("W035", *loose, message, "add a `<joint type=\"fixed\">`, or write `<static>true</static>`");
-    }
+fn is_static(model: Node, reader: &mut Reader) -> bool {
+    xml::child(model, "static").is_some_and(|node| reader.boolean(node).unwrap_or(false))
 }
 
-fn read_link(link: Node, body: &mut Body, shapes: &mut Shapes, reader: &mut Reader) {
+fn read_link(
+    link: Node,
+    model: &Isometry3<f64>,
+    role: Role,
+    body: &mut Body,
+    shapes: &mut Shapes,
+    reader: &mut Reader,
+) {
     const KNOWN: [&str; 10] = [
         "pose",
         "inertial",
@@ -171,7 +156,7 @@ fn read_link(link: Node, body: &mut Body, shapes: &mut Shapes, reader: &mut Read
         "must_be_base_link",
     ];
     reader.warn_about_unknown_children(link, &KNOWN);
-    let Some(at) = pose(link, reader) else { return };
+    let Some(at) = pose(link, reader).map(|pose| model * pose) else { return };
     for (name, usual, message) in [
         ("gravity", true, "a link without gravity can't be simulated"),
         ("kinematic", false, "a kinematic link can't be simulated"),
@@ -183,15 +168,16 @@ fn read_link(link: Node, body: &mut Body, shapes: &mut Shapes, reader: &mut Read
             reader.error("W035", node, message.to_owned(), "write `<static>true</static>` if the model never moves");
         }
     }
-    if let Some(decay) = xml::child(link, "velocity_decay") {
+    if let (Some(decay), Role::Object) = (xml::child(link, "velocity_decay"), role) {
         let message = "`<velocity_decay>` is ignored: the simulation has no air drag".to_owned();
         reader.warning("W036", decay, message, "the model works without it");
     }
     let before = body.parts.len();
-    for collision in xml::children(link, "collision") {
+    for collision in xml::children(link, "collision").filter(|collision| role == Role::Object || !is_plane(*collision))
+    {
         read_collision(collision, &at, body, shapes, reader);
     }
-    match xml::child(link, "inertial") {
+    match xml::child(link, "inertial").filter(|_| role == Role::Object) {
         Some(inertial) => {
             if let Some(mass) = read_inertial(inertial, &at, reader) {
                 body.masses.push(mass);
@@ -201,6 +187,11 @@ fn read_link(link: Node, body: &mut Body, shapes: &mut Shapes, reader: &mut Read
         }
         None => body.has_unknown_mass |= body.parts.len() > before,
     }
+}
+
+/// Whether a `<collision>` is a plane: every world has a floor.
+fn is_plane(collision: Node) -> bool {
+    xml::child(collision, "geometry").is_some_and(|geometry| xml::child(geometry, "plane").is_some())
 }
 
 fn read_collision(collision: Node, link: &Isometry3<f64>, body: &mut Body, shapes: &mut Shapes, reader: &mut Reader) {

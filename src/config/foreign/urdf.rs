@@ -6,10 +6,11 @@ use nalgebra::{Isometry3, Matrix3};
 
 use crate::foreign::body::{Body, Mass};
 use crate::foreign::geometry::{Shapes, check_volume};
+use crate::foreign::lenient::repaired;
 use crate::foreign::lookup::Lookup;
 use crate::foreign::sdf::{SdfModel, possible};
 use crate::foreign::xml::{self, Bound, Node, Reader};
-use actcheck_base::{Diagnostics, Digest, Source};
+use actcheck_base::{Diagnostics, Source};
 use actcheck_data::{Part, Pose};
 
 /// Longest chain of links; a longer one is a cycle.
@@ -17,12 +18,13 @@ const LONGEST_CHAIN: usize = 256;
 
 /// Reads the object of a URDF file and its faults. The object is `None` if there are errors.
 pub(crate) fn read(source: &Source, path: &Path, lookup: &Lookup) -> (Option<SdfModel>, Diagnostics) {
-    let document = match xml::parse_model(source) {
+    let text = repaired(&source.text);
+    let document = match xml::parse_model(source, &text) {
         Ok(document) => document,
         Err(faults) => return (None, faults),
     };
     let mut reader = Reader::new(source);
-    let mut shapes = Shapes { lookup, path, digest: Digest::new() };
+    let mut shapes = Shapes::new(lookup, path);
     shapes.digest.update(source.text.as_bytes());
     let root = document.root_element();
     let mut body = Body::default();
@@ -36,7 +38,8 @@ pub(crate) fn read(source: &Source, path: &Path, lookup: &Lookup) -> (Option<Sdf
     if found.has_errors() {
         return (None, found);
     }
-    (Some(SdfModel { body, pose: Isometry3::identity(), digest: shapes.digest.finish() }), found)
+    let digest = shapes.digest.finish();
+    (Some(SdfModel { body, pose: Isometry3::identity(), is_static: false, digest }), found)
 }
 
 fn read_robot(root: Node, body: &mut Body, shapes: &mut Shapes, reader: &mut Reader) {

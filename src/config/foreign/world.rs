@@ -1,11 +1,21 @@
-//! Reads Gazebo worlds: their included models as static furniture, with a location in front of each surface.
+//! Reads Gazebo worlds: their models as static furniture, with a location in front of each surface.
 
-use nalgebra::{Isometry3, Point3, Vector3};
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
+use std::sync::Arc;
 
+use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
+
+use crate::foreign::body::Body;
+use crate::foreign::geometry::Shapes;
+use crate::foreign::lenient::repaired;
+use crate::foreign::lookup::Lookup;
+use crate::foreign::nested::Role;
 use crate::foreign::sdf::{check_version, pose};
 use crate::foreign::xml::{self, Node, Reader};
+use crate::foreign::{folder, sdf};
 use crate::{Furniture, WorldMap};
-use actcheck_base::{Diagnostics, Source, did_you_mean, digest_of};
+use actcheck_base::{Diagnostics, Severity, Source, did_you_mean, digest_of};
 use actcheck_data::{Location, ObjectModel, Pose};
 
 /// Elements of a world that are read, or that do not affect its geometry: light, Gazebo's display and time steps.
@@ -31,98 +41,168 @@ const KNOWN: [&str; 16] = [
 const ALWAYS_THERE: [&str; 2] = ["ground_plane", "sun"];
 /// Distance between the edge of a surface and the middle of the base of a robot working at it. Unit: metres.
 const FRONT_GAP_M: f64 = 0.69;
-/// A model that is tilted by more than this is rejected. Unit: cosine.
+/// A model that is tilted by more than this gets a model of its own. Unit: cosine.
 const UPRIGHT_COSINE: f64 = 0.999;
 
-/// Reads a Gazebo world. `model` looks up the models that configurations can also name. The world is `None` if there
-/// are errors.
+/// A world, and its models that only it has.
+pub(crate) struct World {
+    pub(crate) map: WorldMap,
+    /// Models that are defined inside the world, and included ones that stand otherwise than the model itself. Their names
+    /// begin with that of the world.
+    pub(crate) models: Vec<ObjectModel>,
+}
+
+/// The models that worlds can include.
+pub(crate) struct Included<'a> {
+    /// Usable models by name.
+    pub(crate) models: &'a BTreeMap<String, Arc<ObjectModel>>,
+    /// Names of models whose files give them a pose, which the pose of an `<include>` replaces.
+    pub(crate) posed: &'a BTreeSet<String>,
+    pub(crate) lookup: &'a Lookup<'a>,
+}
+
+/// Reads a Gazebo world. It is `None` if there are errors.
 ///
 /// # Errors
 /// All faults of the text: it is not XML (W031) or not SDF of a supported version (W032), lacks an element (W033), has
-/// an invalid value (W034) or an unsupported element (W035), includes a missing model (W040), or has a duplicate name
-/// (W041).
-pub(crate) fn read<'a>(
-    name: &str,
-    source: &Source,
-    model: impl Fn(&str) -> Option<&'a ObjectModel>,
-    known: &[String],
-) -> (Option<WorldMap>, Diagnostics) {
-    let document = match xml::parse_model(source) {
+/// an invalid value (W034) or an unsupported element (W035), has an unusable mesh (W037), includes a missing or faulty
+/// model (W040), or has a duplicate name (W041).
+pub(crate) fn read(name: &str, source: &Source, path: &Path, included: &Included<'_>) -> (Option<World>, Diagnostics) {
+    let text = repaired(&source.text);
+    let document = match xml::parse_model(source, &text) {
         Ok(document) => document,
         Err(faults) => return (None, faults),
     };
-    let mut reader = Reader::new(source);
-    let mut map = WorldMap { digest: digest_of(&source.text), ..WorldMap::floor_only(name) };
+    let map = WorldMap { digest: digest_of(&source.text), ..WorldMap::floor_only(name) };
+    let mut gathering =
+        Gathering { path, included, world: World { map, models: Vec::new() }, reader: Reader::new(source) };
     let root = document.root_element();
-    if check_version(root, &mut reader).is_some()
-        && let Some(world) = reader.required(root, "world")
+    if check_version(root, &mut gathering.reader).is_some()
+        && let Some(world) = gathering.reader.required(root, "world")
     {
-        reader.warn_about_unknown_children(world, &KNOWN);
-        for inline in xml::children(world, "model").filter(|inline| !is_floor(*inline)) {
-            let message = "a model defined inside a world is not supported".to_owned();
-            reader.error(
-                "W035",
-                inline,
-                message,
-                "move it to its own folder and include it: `<include><uri>model://NAME</uri></include>`",
-            );
-        }
-        for include in xml::children(world, "include") {
-            if let Some(piece) = read_include(include, &model, known, &mut reader) {
-                if map.furniture.iter().any(|other| other.name == piece.name) {
-                    let message = format!("there are two `{}`", piece.name);
-                    reader.error("W041", include, message, "give one of them another `<name>`");
-                }
-                map.locations.extend(front(&piece, model(&piece.model)));
-                map.furniture.push(piece);
+        gathering.reader.warn_about_unknown_children(world, &KNOWN);
+        for child in world.children().filter(Node::is_element) {
+            let piece = match child.tag_name().name() {
+                "model" => gathering.inline(child),
+                "include" => gathering.include(child),
+                _ => None,
+            };
+            if let Some(piece) = piece {
+                gathering.add(piece, child);
             }
         }
     }
-    let found = reader.found;
+    let found = gathering.reader.found;
     let complete = !found.has_errors();
-    (complete.then_some(map), found)
+    (complete.then_some(gathering.world), found)
 }
 
-/// Whether a model of a world is a floor, which contains a plane.
-fn is_floor(model: Node) -> bool {
-    model.descendants().any(|node| node.tag_name().name() == "plane")
+/// A world while it is read.
+struct Gathering<'a> {
+    path: &'a Path,
+    included: &'a Included<'a>,
+    world: World,
+    reader: Reader<'a>,
 }
 
-fn read_include<'a>(
-    include: Node,
-    model: &impl Fn(&str) -> Option<&'a ObjectModel>,
-    known: &[String],
-    reader: &mut Reader,
-) -> Option<Furniture> {
-    reader.warn_about_unknown_children(include, &["uri", "name", "pose", "static"]);
-    let uri = reader.required(include, "uri")?;
-    let named = xml::text(uri).trim_start_matches("model://").trim_end_matches('/');
-    if ALWAYS_THERE.contains(&named) {
-        return None;
+impl Gathering<'_> {
+    fn add(&mut self, piece: Furniture, node: Node) {
+        if self.world.map.furniture.iter().any(|other| other.name == piece.name) {
+            let message = format!("there are two `{}`", piece.name);
+            self.reader.error("W041", node, message, "give one of them another name");
+        }
+        let own = self.world.models.iter().find(|model| model.name == piece.model);
+        let model = own.or_else(|| self.included.models.get(&piece.model).map(|model| &**model));
+        self.world.map.locations.extend(front(&piece, model));
+        self.world.map.furniture.push(piece);
     }
-    let Some(included) = model(named) else {
-        let message = format!("there is no usable model `{named}`");
-        reader.error("W040", uri, message, did_you_mean(named, known.iter().map(String::as_str)));
-        return None;
-    };
-    if !included.fixed && xml::child(include, "static").is_none_or(|fixed| xml::text(fixed) != "true") {
-        let message = format!("`{named}` can move in Gazebo, but is static in a world here");
-        reader.warning("W036", include, message, "put movable objects into `[surfaceObjects]` or `nav_obstacle_list`");
+
+    /// Reads a model that is defined inside the world. A model without solid shapes but planes is left out: every world
+    /// has a floor, and lights and pictures do not collide.
+    fn inline(&mut self, model: Node) -> Option<Furniture> {
+        let name = self.reader.attribute(model, "name")?;
+        let mut shapes = Shapes::new(self.included.lookup, self.path);
+        shapes.digest.update(self.reader.source.text[model.range()].as_bytes());
+        let n_faults = self.reader.found.len();
+        let body = sdf::read_model(model, Role::Furniture, &mut shapes, &mut self.reader);
+        let at = pose(model, &mut self.reader)?;
+        let is_faulty = self.reader.found.iter().skip(n_faults).any(|fault| fault.severity == Severity::Error);
+        if is_faulty || body.parts.is_empty() {
+            return None;
+        }
+        let is_still = xml::child(model, "static").is_some_and(|fixed| is_true(fixed));
+        self.warn_if_movable(is_still, name, model);
+        Some(self.stand(body, shapes.digest.finish(), &at, name))
     }
-    let at = pose(include, reader)?;
-    if (at.rotation * Vector3::z()).z < UPRIGHT_COSINE {
-        reader.error(
-            "W035",
-            include,
-            "a tilted model is not supported in a world".to_owned(),
-            "rotate it about z only",
-        );
-        return None;
+
+    fn include(&mut self, include: Node) -> Option<Furniture> {
+        let known = ["uri", "name", "pose", "static", "plugin", "placement_frame"];
+        self.reader.warn_about_unknown_children(include, &known);
+        let uri = self.reader.required(include, "uri")?;
+        let named = folder::name_in(xml::text(uri));
+        if ALWAYS_THERE.contains(&named.to_lowercase().replace(' ', "_").as_str()) {
+            return None;
+        }
+        let at = pose(include, &mut self.reader)?;
+        let name = xml::child(include, "name").map_or(named.as_str(), xml::text);
+        let is_still = xml::child(include, "static").is_some_and(|fixed| is_true(fixed));
+        let is_upright = (at.rotation * Vector3::z()).z >= UPRIGHT_COSINE;
+        let has_pose = xml::child(include, "pose").is_some();
+        if let Some(model) = self.included.models.get(&named)
+            && is_upright
+            && !(has_pose && self.included.posed.contains(&named))
+        {
+            self.warn_if_movable(is_still || model.fixed, &named, include);
+            // A model's origin is below its middle; the file's origin may differ.
+            let foot = at * Point3::from(model.origin_m.map(|x| -x));
+            return Some(Furniture { name: name.to_owned(), model: named.clone(), pose: upright(&at, foot) });
+        }
+        let Some(found) = folder::named(&named, self.included.lookup) else {
+            let message = format!("there is no usable model `{named}`");
+            let known = self.included.models.keys().map(String::as_str);
+            self.reader.error("W040", uri, message, did_you_mean(&named, known));
+            return None;
+        };
+        match folder::read_sdf_model(&found, self.included.lookup, Role::Furniture, 1) {
+            Ok((model, _)) if model.body.parts.is_empty() => None,
+            Ok((model, _)) => {
+                self.warn_if_movable(is_still || model.is_static, &named, include);
+                let at = if has_pose { at } else { model.pose };
+                Some(self.stand(model.body, model.digest, &at, name))
+            }
+            Err(faults) => {
+                let first = faults.iter().find(|fault| fault.severity == Severity::Error);
+                let reason = first.map_or("", |fault| fault.message.as_str());
+                let message = format!("the model `{named}` can't be used: {reason}");
+                self.reader.error("W040", uri, message, "mend that model, or remove the `<include>`");
+                None
+            }
+        }
     }
-    let name = xml::child(include, "name").map_or(named, xml::text);
-    // A model's origin is below its middle; the file's origin may differ.
-    let foot = at * Point3::from(included.origin_m.map(|x| -x));
-    Some(Furniture { name: name.to_owned(), model: named.to_owned(), pose: upright(&at, foot) })
+
+    /// Adds a body as a model of its own, which stands at a pose.
+    fn stand(&mut self, body: Body, digest: String, at: &Isometry3<f64>, name: &str) -> Furniture {
+        let heading = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), Pose::from_isometry(at).yaw());
+        let tilt = Isometry3::from_parts(Translation3::identity(), heading.inverse() * at.rotation);
+        let model = body.into_model(&format!("{}/{name}", self.world.map.name), digest, &tilt);
+        let at = Isometry3::from_parts(at.translation, heading);
+        let foot = at * Point3::from(model.origin_m.map(|x| -x));
+        let piece = Furniture { name: name.to_owned(), model: model.name.clone(), pose: upright(&at, foot) };
+        self.world.models.push(model);
+        piece
+    }
+
+    fn warn_if_movable(&mut self, is_still: bool, name: &str, node: Node) {
+        if !is_still {
+            let message = format!("`{name}` can move in Gazebo, but is static in a world here");
+            let help = "put movable objects into `[surfaceObjects]` or `nav_obstacle_list`";
+            self.reader.warning("W036", node, message, help);
+        }
+    }
+}
+
+fn is_true(node: Node) -> bool {
+    ["true", "1"].contains(&xml::text(node))
 }
 
 fn upright(at: &Isometry3<f64>, foot: Point3<f64>) -> Pose {

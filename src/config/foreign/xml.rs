@@ -52,13 +52,13 @@ impl Bound {
     }
 }
 
-/// Parses the document of a text.
+/// Parses the document of a text: that of the source, or its [`repaired`](crate::foreign::lenient::repaired) text.
 ///
 /// # Errors
 /// W031 at the first syntax error; W055 if parsing could exhaust time or memory.
-pub(crate) fn parse(source: &Source) -> Result<roxmltree::Document<'_>, Diagnostics> {
+pub(crate) fn parse<'t>(source: &Source, text: &'t str) -> Result<roxmltree::Document<'t>, Diagnostics> {
     check_xml(source, "W055")?;
-    roxmltree::Document::parse(&source.text).map_err(|error| {
+    roxmltree::Document::parse(text).map_err(|error| {
         let place = error.pos();
         let at = offset(&source.text, place.row as usize, place.col as usize);
         // The library's message ends with the position, which our diagnostics print before the message.
@@ -75,7 +75,7 @@ pub(crate) fn parse(source: &Source) -> Result<roxmltree::Document<'_>, Diagnost
 ///
 /// # Errors
 /// As [`parse`]; W055 also if it has more parts than can be simulated.
-pub(crate) fn parse_model(source: &Source) -> Result<roxmltree::Document<'_>, Diagnostics> {
+pub(crate) fn parse_model<'t>(source: &Source, text: &'t str) -> Result<roxmltree::Document<'t>, Diagnostics> {
     let refused = |message: String, at: Span| {
         Diagnostic::error("W055", message)
             .at(source, at)
@@ -84,7 +84,7 @@ pub(crate) fn parse_model(source: &Source) -> Result<roxmltree::Document<'_>, Di
     if source.text.len() > LONGEST_MODEL {
         return Err(refused(format!("this model is longer than {} MiB", LONGEST_MODEL >> 20), 0..0).into());
     }
-    let document = parse(source)?;
+    let document = parse(source, text)?;
     for part in PARTS {
         let mut all = document.descendants().filter(|node| node.is_element() && node.tag_name().name() == part);
         if let Some(next) = all.nth(MOST_PARTS) {
