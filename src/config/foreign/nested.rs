@@ -94,8 +94,9 @@ impl<'a> Links<'a> {
         }
         let all: Vec<Node> = self.links.iter().chain(&self.includes).map(|(node, _)| *node).collect();
         if let (Some(loose), false) = (all.get(self.joints.len() + 1), fixed) {
-            let name = xml::child(*loose, "name").map_or_else(|| loose.attribute("name").unwrap_or(""), xml::text);
-            let message = format!("no joint connects the link `{name}` to the others");
+            let written = ["name", "uri"].iter().find_map(|child| xml::child(*loose, child)).map(xml::text);
+            let name = loose.attribute("name").or(written).unwrap_or_default();
+            let message = format!("no joint connects `{name}` to the other links");
             reader.error("W035", *loose, message, "add a `<joint type=\"fixed\">`, or write `<static>true</static>`");
         }
     }

@@ -47,7 +47,7 @@ const UPRIGHT_COSINE: f64 = 0.999;
 /// A world, and its models that only it has.
 pub(crate) struct World {
     pub(crate) map: WorldMap,
-    /// Models that are defined inside the world, and included ones that stand otherwise than the model itself. Their names
+    /// Models that are defined inside the world, and included ones with another pose than the model itself. Their names
     /// begin with that of the world.
     pub(crate) models: Vec<ObjectModel>,
 }
@@ -56,7 +56,7 @@ pub(crate) struct World {
 pub(crate) struct Included<'a> {
     /// Usable models by name.
     pub(crate) models: &'a BTreeMap<String, Arc<ObjectModel>>,
-    /// Names of models whose files give them a pose, which the pose of an `<include>` replaces.
+    /// Names of models whose files give them a pose, which that of an `<include>` replaces.
     pub(crate) posed: &'a BTreeSet<String>,
     pub(crate) lookup: &'a Lookup<'a>,
 }
@@ -150,7 +150,7 @@ impl Gathering<'_> {
         let has_pose = xml::child(include, "pose").is_some();
         if let Some(model) = self.included.models.get(&named)
             && is_upright
-            && !(has_pose && self.included.posed.contains(&named))
+            && !self.included.posed.contains(&named)
         {
             self.warn_if_movable(is_still || model.fixed, &named, include);
             // A model's origin is below its middle; the file's origin may differ.
