@@ -433,6 +433,7 @@ fn gazebo_worlds_have_their_solids_in_the_same_places() {
         (include("door", "<pose>0 0 0.25 0 0 0</pose>"), "door: -1.00 -0.50 0.00 to 1.00 0.50 0.50"),
         (include("pair", ""), "pair: -1.00 -0.50 -0.25 to 1.00 4.50 0.25"),
         ("<include><uri>https://fuel.example.org/1.0/someone/models/Traffic Light/2</uri></include><include><uri>https://fuel.example.org/1.0/someone/models/Ground Plane</uri></include>".to_owned(), "Traffic Light: -1.00 -0.50 -0.25 to 1.00 0.50 0.25"),
+        (format!("<model name=\"hut\"><pose>0 0 0.25 0 0 0</pose>{BOX}<model name=\"b\"><pose>1 4 0 0 0 1.5707963</pose>{BOX}</model></model>"), "hut_1: -1.00 -0.50 0.00 to 1.00 0.50 0.50\nhut_2: 0.50 3.00 0.00 to 1.50 5.00 0.50"),
         ("<spherical_coordinates gz:a=\"b\"/>".to_owned(), ""),
     ] {
         for version in ["1.3", "1.6", "1.12"] {

@@ -148,9 +148,9 @@ impl<'a> Planner<'a> {
         let (kinematics, layout) = (operator.kinematics(), operator.layout());
         let start = operator.commanded().to_vec();
         let points = kinematics.surface_points(CHECK_M);
-        let furniture: Vec<Block> = others.iter().filter(|seen| seen.furniture).map(Block::new).collect();
-        let things: Vec<Pillar> = others.iter().filter(|seen| !seen.furniture).map(Pillar::new).collect();
         let from = Point2::new(start[base[0]], start[base[1]]);
+        let furniture = Block::around(&Point3::new(from.x, from.y, 0.0), others);
+        let things: Vec<Pillar> = others.iter().filter(|seen| !seen.furniture).map(Pillar::new).collect();
         let ground = Ground::new(&furniture, &things, radius(kinematics, base, &start, &points), &from);
         let mut postures = operator.profile().postures.clone();
         postures.push(operator.profile().home.clone());

@@ -23,6 +23,9 @@ pub struct Block {
     height: f64,
 }
 
+/// Height below a piece of furniture's top from which a robot counts as mounted on it. Unit: metres.
+const ON_TOP_M: f64 = 0.05;
+
 /// The vertical cylinder around an object.
 #[derive(Debug, Clone)]
 pub struct Pillar {
@@ -38,6 +41,13 @@ impl Block {
         let [width, depth, height] = seen.size_m;
         let half = [width / 2.0, depth / 2.0];
         Self { from_world: seen.pose.to_isometry().inverse(), half, height: seen.pose.position[2] + height }
+    }
+
+    /// The boxes of all perceived furniture, except of a piece around the robot: it is a room, whose box says nothing
+    /// about its walls. `base` is the origin of the robot's base.
+    pub fn around(base: &Point3<f64>, others: &[Sighting]) -> Vec<Self> {
+        let furniture = others.iter().filter(|seen| seen.furniture).map(Self::new);
+        furniture.filter(|block| block.beside(base) >= 0.0 || base.z > block.height - ON_TOP_M).collect()
     }
 
     /// Horizontal distance to the outline, negative inside. Unit: metres.
@@ -172,6 +182,20 @@ mod tests {
     fn table() -> Block {
         let pose = Pose::IDENTITY;
         Block::new(&Sighting { id: "t".to_owned(), pose, size_m: [0.6, 0.6, 0.7], furniture: true })
+    }
+
+    #[test]
+    fn a_room_around_the_robot_does_not_block_it_but_a_table_below_it_does() {
+        let seen = |size: f64, height| Sighting {
+            id: "t".to_owned(),
+            pose: Pose::IDENTITY,
+            size_m: [size, size, height],
+            furniture: true,
+        };
+        let others = [seen(8.0, 2.5), seen(0.6, 0.7)];
+        let blocks = |base| Block::around(&Point3::from(base), &others).len();
+        assert_eq!([[1.0, 0.0, 0.0], [5.0, 0.0, 0.0]].map(blocks), [1, 2]);
+        assert_eq!(Block::around(&Point3::new(0.1, 0.0, 0.7), &others[1..]).len(), 1);
     }
 
     #[test]

@@ -38,7 +38,7 @@ pub fn plan(operator: &mut Operator<'_>, wanted: PlanRequest<'_>, others: &[Sigh
         Some(_) => Samples::new(operator.choose_samples(), MOST_SAMPLES),
         None => Samples::new(0.0, 0),
     };
-    let furniture: Vec<Block> = others.iter().filter(|seen| seen.furniture).map(Block::new).collect();
+    let furniture = Block::around(&operator.base().translation.vector.into(), others);
     let mut things: Vec<Pillar> = wanted.taken.iter().map(|thing| Pillar::new(thing)).collect();
     let n_taken = things.len();
     things.extend(others.iter().filter(|seen| !seen.furniture).map(Pillar::new));

@@ -61,6 +61,11 @@ pub(crate) struct Included<'a> {
     pub(crate) lookup: &'a Lookup<'a>,
 }
 
+/// Shortest length and width of a model that may be around the robot. Unit: metres.
+const ROOM_M: f64 = 2.5;
+/// Largest number of solids of a building that become pieces of their own: each is perceived on its own.
+const MOST_PIECES: usize = 200;
+
 /// Reads a Gazebo world. It is `None` if there are errors.
 ///
 /// # Errors
@@ -111,10 +116,32 @@ impl Gathering<'_> {
             let message = format!("there are two `{}`", piece.name);
             self.reader.error("W041", node, message, "give one of them another name");
         }
-        let own = self.world.models.iter().find(|model| model.name == piece.model);
-        let model = own.or_else(|| self.included.models.get(&piece.model).map(|model| &**model));
+        let own = self.world.models.iter().position(|model| model.name == piece.model);
+        let model = match own {
+            Some(idx) => Some(&self.world.models[idx]),
+            None => self.included.models.get(&piece.model).map(|model| &**model),
+        };
+        if let Some(building) = model.filter(|model| is_building(model)).cloned() {
+            if let Some(idx) = own {
+                self.world.models.remove(idx);
+            }
+            return self.add_solids(&piece, building);
+        }
         self.world.map.locations.extend(front(&piece, model));
         self.world.map.furniture.push(piece);
+    }
+
+    /// Adds each solid of a building as a piece of its own: the robot's map has a box for each piece, and the box of a
+    /// whole building would be around the robot.
+    fn add_solids(&mut self, piece: &Furniture, building: ObjectModel) {
+        let at = piece.pose.to_isometry();
+        for (number, part) in (1..).zip(building.parts) {
+            let (friction, restitution) = (Some(building.friction), Some(building.restitution));
+            let body = Body { parts: vec![part], friction, restitution, fixed: true, ..Body::default() };
+            let digest = digest_of(&format!("{} {number}", building.digest));
+            let solid = self.stand(body, digest, &at, &format!("{}_{number}", piece.name));
+            self.world.map.furniture.push(solid);
+        }
     }
 
     /// Reads a model that is defined inside the world. A model without solid shapes but planes is left out: every world
@@ -199,6 +226,11 @@ impl Gathering<'_> {
             self.reader.warning("W036", node, message, help);
         }
     }
+}
+
+/// Whether a model is so large that it may be around the robot, and consists of several solids.
+fn is_building(model: &ObjectModel) -> bool {
+    model.size_m[..2].iter().all(|extent| *extent > ROOM_M) && (2..=MOST_PIECES).contains(&model.parts.len())
 }
 
 fn is_true(node: Node) -> bool {
