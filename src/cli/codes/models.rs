@@ -67,6 +67,13 @@ const CODES_W: &[Code] = &[
         "correct `[physics]` in the configuration",
     ),
     code(
+        "W024",
+        "the opening of the robot's gripper can't be measured, or is smaller than `max_opening_m`",
+        "the grasp frame is not between the fingertips or is turned, or `finger_joints` or `finger_links` names others \
+         than those that move",
+        "follow the help: fingers open along the y axis of the grasp frame, whose origin is between the fingertips",
+    ),
+    code(
         "W030",
         "a model of another program can't be read",
         "its folder lacks `model.config` or the SDF file that it names",
