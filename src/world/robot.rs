@@ -343,8 +343,12 @@ pub(super) mod tests {
 
     pub(crate) fn lonely() -> World {
         let path = Path::new("models/robots/mobile_manipulator.toml");
-        let profile =
-            Arc::new(actcheck_config::robot::read(&Files::Shipped, path).expect("the shipped robot is valid"));
+        alone(actcheck_config::robot::read(&Files::Shipped, path).expect("the shipped robot is valid"))
+    }
+
+    /// A robot with nothing around it.
+    pub(crate) fn alone(profile: RobotProfile) -> World {
+        let profile = Arc::new(profile);
         let one = (1.0, 1.0);
         let scene = Scene {
             map: actcheck_data::SceneMap::default(),

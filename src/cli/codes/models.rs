@@ -179,7 +179,7 @@ const CODES_W: &[Code] = &[
     code(
         "W053",
         "a joint can't have its role",
-        "it has the wrong type, such as a finger that turns, or no limits",
+        "it has the wrong type, such as a base joint that turns where it must slide, or does not move",
         "name another joint, or correct its type in the URDF",
     ),
     code(
