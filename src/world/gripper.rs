@@ -387,6 +387,7 @@ mod tests {
     use std::path::Path;
 
     use super::*;
+    use crate::Joint;
     use crate::layout::check_robot;
     use crate::robot::tests::alone;
     use actcheck_base::{Files, Source};
@@ -417,7 +418,7 @@ mod tests {
             finger("left", 0.02, left),
             finger("right", -0.02, right),
         );
-        profile.urdf = Source::new("hand.urdf", &text);
+        profile.urdf = Source::new("hand.urdf", text);
         profile.base_joints = None;
         profile.arm_joints = vec!["lift".to_owned()];
         profile.home = vec![0.6];
@@ -473,7 +474,9 @@ mod tests {
         for (idx, (profile, positions, opening_m)) in hands().into_iter().enumerate() {
             let world = alone(profile);
             let gripper = &world.layout().gripper;
-            let all = [&[0.6], positions.as_slice()].concat();
+            let place = |joint: &Joint| ["left", "right"].iter().position(|name| *name == joint.name);
+            let joints = world.kinematics().joints().iter();
+            let all: Vec<f64> = joints.map(|joint| place(joint).map_or(0.6, |idx| positions[idx])).collect();
             let measured = gripper.opening_m(&all);
             assert!((measured - opening_m).abs() < 2e-5, "hand {idx}: {measured} m instead of {opening_m} m");
             let mut set = vec![0.6; all.len()];
