@@ -14,7 +14,6 @@ mod engine;
 mod error;
 mod factor;
 mod fault;
-mod finger_gap;
 mod forms;
 mod free_motion;
 mod fresh;
