@@ -152,8 +152,8 @@ fn recorded_efforts_and_targets_are_those_of_the_motors() {
             assert!(f64::from(joint.effort).abs() <= limit + 1e-2, "{} of {limit}", joint.effort);
             most = most.max(f64::from(joint.effort).abs() / limit);
         }
-        for finger in fingers {
-            let target = moment.joints().nth(finger).expect("it has as many joints as the robot").target;
+        for finger in &fingers {
+            let target = moment.joints().nth(*finger).expect("it has as many joints as the robot").target;
             assert!((target - moment.commanded_opening_m / 2.0).abs() < 1e-4);
         }
     }

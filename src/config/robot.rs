@@ -46,22 +46,15 @@ pub fn read_with(files: &Files, path: &Path, packages: &[PathBuf]) -> Result<Rob
         Diagnostic::error("W010", format!("cannot read the robot profile {}: {reason}", path.display()))
             .help("a profile is a TOML file that names a URDF and its joints")
     })?;
-    let folder = path.parent().unwrap_or(Path::new(""));
     let mut table = Table::parse(&source)?;
     table.require(&REQUIRED);
     let mut found = Diagnostics::new();
-    let mut folders: Vec<PathBuf> = values(table.strings("package_dirs").unwrap_or_default())
-        .into_iter()
-        .map(|written| resolve_path(folder, &written))
-        .collect();
-    let urdf = read_urdf(files, folder, &mut table);
+    let (urdf, lookup) = find_urdf(files, path, packages, &mut table);
     let mut roles = Roles::default();
     let profile = read_table(&mut table, urdf.as_ref().map(|(urdf, _)| urdf), &mut roles, &mut found);
     let mut read = None;
     if let Some((text, path)) = &urdf {
-        folders.extend(packages.iter().cloned());
-        folders.extend(path.ancestors().skip(1).take(PACKAGE_LEVELS).map(Path::to_path_buf));
-        let text = foreign::robot::read(text, path, &Lookup { files, folders }, &mut found);
+        let text = foreign::robot::read(text, path, &lookup, &mut found);
         if let Some(tree) = &text.tree {
             roles.check(tree, &mut table);
         }
@@ -72,6 +65,55 @@ pub fn read_with(files: &Files, path: &Path, packages: &[PathBuf]) -> Result<Rob
     // Every missing or wrong key was reported above, so this error only occurs together with another.
     let incomplete = || Diagnostic::error("W010", "the robot profile is incomplete").in_source(&source).into();
     profile.zip(read).map(|(profile, read)| with_meshes(profile, read)).ok_or_else(incomplete)
+}
+
+/// A URDF with moments of inertia that a body can have, where its own are impossible (W034, W036).
+#[derive(Debug, Clone, PartialEq)]
+pub struct MendedUrdf {
+    /// The file that was mended: the URDF, or the xacro that was expanded.
+    pub original: PathBuf,
+    /// The mended text.
+    pub text: String,
+    /// Each change as a sentence without a full stop.
+    pub changes: Vec<String>,
+}
+
+/// Mends the URDF of a profile. Returns `None` if it has no moments of inertia to mend, or can't be read: [`read_with`]
+/// reports the reason.
+pub fn mended(files: &Files, path: &Path, packages: &[PathBuf]) -> Option<MendedUrdf> {
+    let source = files.read(path).ok()?;
+    let mut table = Table::parse(&source).ok()?;
+    let (urdf, lookup) = find_urdf(files, path, packages, &mut table);
+    let (urdf, original) = urdf?;
+    let mut mends = foreign::robot::read(&urdf, &original, &lookup, &mut Diagnostics::new()).mends;
+    if mends.is_empty() {
+        return None;
+    }
+    // From the last place to the first, so that the others stay valid.
+    mends.sort_by_key(|mend| std::cmp::Reverse(mend.span.start));
+    let mut text = urdf.text.to_string();
+    for mend in &mends {
+        text.replace_range(mend.span.clone(), &mend.text);
+    }
+    Some(MendedUrdf { original, text, changes: mends.into_iter().rev().map(|mend| mend.change).collect() })
+}
+
+/// Finds the URDF of a profile, with its path, and the folders of its meshes.
+fn find_urdf<'a>(
+    files: &'a Files,
+    profile: &Path,
+    packages: &[PathBuf],
+    table: &mut Table,
+) -> (Option<(Source, PathBuf)>, Lookup<'a>) {
+    let folder = profile.parent().unwrap_or(Path::new(""));
+    let own = values(table.strings("package_dirs").unwrap_or_default());
+    let mut folders: Vec<PathBuf> = own.into_iter().map(|written| resolve_path(folder, &written)).collect();
+    let urdf = read_urdf(files, folder, table);
+    if let Some((_, path)) = &urdf {
+        folders.extend(packages.iter().cloned());
+        folders.extend(path.ancestors().skip(1).take(PACKAGE_LEVELS).map(Path::to_path_buf));
+    }
+    (urdf, Lookup { files, folders })
 }
 
 fn with_meshes(mut profile: RobotProfile, read: foreign::robot::RobotText) -> RobotProfile {
@@ -215,7 +257,7 @@ fn names<const N: usize>(table: &mut Table, key: &'static str, roles: &mut Roles
     if names.is_none() {
         let message = format!("`{key}` must list {N} names, but this list has {length}");
         let help = if key.starts_with("finger") {
-            "name the links of two fingertips, left then right; one of them may stand still"
+            "name the links of two fingertips, left then right; one of them may be fixed"
         } else {
             "see models/robots/mobile_manipulator.toml for an example"
         };

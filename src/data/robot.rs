@@ -5,6 +5,10 @@ use std::collections::BTreeMap;
 use crate::Shape;
 use actcheck_base::Source;
 
+/// Mass of links without a mass in the URDF, such as the stages of a base, and of lighter ones. Unit: kilograms. Small
+/// compared to any real link, large enough for 32-bit arithmetic.
+pub const LEAST_LINK_KG: f64 = 0.01;
+
 /// A robot: its URDF and the roles of its joints and links. Read from a profile next to the URDF.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RobotProfile {
@@ -32,7 +36,7 @@ pub struct RobotProfile {
     pub grasp_turned_rad: [f64; 3],
     /// Origin of the grasp frame in that link's frame, if it differs from the link's. Unit: metres.
     pub grasp_offset_m: [f64; 3],
-    /// Links of the fingertips, left then right; one of them may stand still.
+    /// Links of the fingertips, left then right; one of them may be fixed.
     pub finger_links: [String; 2],
     /// Link of the depth camera: its x axis points forwards, its z axis up in the image.
     pub camera_link: String,

@@ -100,8 +100,8 @@ const CODES_W: &[Code] = &[
     code(
         "W034",
         "a value in a model file is not allowed",
-        "a number is malformed, zero or negative where it must not be",
-        "correct the value",
+        "a number is malformed, zero or negative where it must not be, such as a moment of inertia of a moving link",
+        "correct the value; `actcheck check --mend` mends moments of inertia in a copy of a robot's URDF",
     ),
     code(
         "W035",
@@ -111,8 +111,9 @@ const CODES_W: &[Code] = &[
     ),
     code(
         "W036",
-        "a part of a model file is ignored",
-        "the simulation has no counterpart for it, such as plugins and air drag",
+        "a part of a model file is ignored, or is that of no real body",
+        "the simulation has no counterpart for it, such as plugins and air drag; or one moment of inertia exceeds the sum \
+         of the others",
         "nothing, if the model works without it; otherwise follow the help",
     ),
     code(

@@ -10,6 +10,7 @@ mod geometry;
 mod lookup;
 mod mesh_file;
 pub(crate) mod robot;
+pub(crate) mod robot_inertia;
 pub(crate) mod robot_tree;
 mod sdf;
 mod urdf;

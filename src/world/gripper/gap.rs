@@ -41,7 +41,7 @@ impl Gap {
     }
 }
 
-/// What a set of joints moves.
+/// The parts that a set of joints moves.
 pub(crate) struct Moving {
     /// Whether they move the grasp frame.
     pub(crate) grasp_frame: bool,
@@ -67,7 +67,7 @@ impl<'a> Probe<'a> {
         Self { model, links, grasp, solids }
     }
 
-    /// Returns what these joints move.
+    /// Returns the parts that these joints move.
     pub(crate) fn moving(&self, joints: &[usize]) -> Moving {
         let above = |link: usize| -> Vec<usize> {
             let parent = |joint: &usize| self.model.joints[*joint].parent.checked_sub(1);

@@ -65,7 +65,7 @@ fn sliding_from(lower: f64, upper: f64, y: f64) -> String {
 const FIXED: &str = "type=\"fixed\">";
 const MIMIC: &str = "<mimic joint=\"left\" multiplier=\"-1\"/>";
 
-/// Distance of the inner face from the middle: nearest 9 cm from the hinge, at the border of what is measured.
+/// Distance of the inner face from the middle: nearest 9 cm from the hinge, at the border of the measured region.
 fn turned(angle: f64) -> f64 {
     0.02 + 0.09 * libm::tan(angle)
 }
