@@ -108,7 +108,7 @@ fn fingers_keep_their_velocity_limit_when_the_object_slips_out() {
     assert!(world.poison("block_1", Poison::Teleport([3.0, 0.0, 0.1])));
     (0..60).for_each(|_| world.step(&command));
     let course = world.end_record().robot;
-    for idx in world.layout().fingers {
+    for idx in world.layout().gripper.joints().collect::<Vec<_>>() {
         let share = course.joints[idx].max_speed_share;
         assert!(share < 1.2, "{} moves with {share} of its limit", course.joints[idx].name);
     }
@@ -143,7 +143,7 @@ fn recorded_efforts_and_targets_are_those_of_the_motors() {
     let mut command = world.hold();
     command.gripper_opening_m = 0.02;
     (0..60).for_each(|_| world.step(&command));
-    let fingers = world.layout().fingers;
+    let fingers: Vec<usize> = world.layout().gripper.joints().collect();
     let limits: Vec<f64> = world.kinematics().joints().iter().map(|joint| joint.effort).collect();
     let motion = world.end_record().robot.motion;
     let mut most = 0.0f64;
@@ -152,8 +152,8 @@ fn recorded_efforts_and_targets_are_those_of_the_motors() {
             assert!(f64::from(joint.effort).abs() <= limit + 1e-2, "{} of {limit}", joint.effort);
             most = most.max(f64::from(joint.effort).abs() / limit);
         }
-        for finger in fingers {
-            let target = moment.joints().nth(finger).expect("it has as many joints as the robot").target;
+        for finger in &fingers {
+            let target = moment.joints().nth(*finger).expect("it has as many joints as the robot").target;
             assert!((target - moment.commanded_opening_m / 2.0).abs() < 1e-4);
         }
     }

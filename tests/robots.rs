@@ -35,6 +35,32 @@ fn every_wrong_robot_is_reported_with_its_place() {
     assert!(said.contains("there is no robot `fixed_amr`") && said.contains("did you mean `fixed_arm`?"), "{said}");
 }
 
+/// `check --mend` writes a copy with the proposed moments beside the URDF, once, and the copy has none to mend.
+#[test]
+fn a_mended_copy_has_possible_moments_of_inertia() {
+    let folder = tempfile::tempdir().unwrap();
+    copy(&root().join(WRONG).join("impossible_moments_of_inertia"), folder.path());
+    let text = "tests = [[\"Pick\"]]\ntest_count = 1\n[robot]\nprofile = \"robot.toml\"\n\
+        [pickObject]\nmodel_list = [\"can\"]\n[objectSurface]\nobject_surfaces = [\"coffee_table\"]\n";
+    std::fs::write(folder.path().join("c.toml"), text).unwrap();
+    let original = std::fs::read_to_string(folder.path().join("robot.urdf")).unwrap();
+    let check = || {
+        let output = actcheck(folder.path(), &["check", "c.toml", "--mend"]);
+        let said = format!("{}{}", stdout(&output), stderr(&output)).replace('│', " ");
+        (output.status.code(), said.split_whitespace().collect::<Vec<_>>().join(" "))
+    };
+    let (code, said) = check();
+    assert_eq!(code, Some(0), "{said}");
+    assert!(said.contains("`beam` has the moments of inertia of a box of 80 x 10 x 10 cm"), "{said}");
+    assert!(said.contains("wrote robot.mended.urdf"), "{said}");
+    assert_eq!(std::fs::read_to_string(folder.path().join("robot.urdf")).unwrap(), original);
+    let (code, said) = check();
+    assert!(code == Some(2) && said.contains("robot.mended.urdf already exists"), "{said}");
+    let profile = std::fs::read_to_string(folder.path().join("robot.toml")).unwrap();
+    std::fs::write(folder.path().join("robot.toml"), profile.replace("robot.urdf", "robot.mended.urdf")).unwrap();
+    assert_eq!(said_of(folder.path(), "robot.toml"), "");
+}
+
 /// The crane as xacro, checked with `xacro` as the shell finds it in the folders of `path`.
 fn check_xacro(path: &Path, body: &str) -> (Option<i32>, String) {
     let folder = tempfile::tempdir().unwrap();

@@ -136,8 +136,8 @@ fn advance(world: &mut World, command: &Command, mut is_so: impl FnMut(&World) -
 
 /// Whether all joints except the fingers are at their commanded positions.
 fn is_at(world: &World, command: &Command) -> bool {
-    let fingers = world.layout().fingers;
+    let gripper = &world.layout().gripper;
     let positions = world.observe().positions;
     let joints = positions.iter().zip(&command.positions).enumerate();
-    joints.filter(|(idx, _)| !fingers.contains(idx)).all(|(_, (is, wanted))| (is - wanted).abs() < REACHED)
+    joints.filter(|(idx, _)| !gripper.contains(*idx)).all(|(_, (is, wanted))| (is - wanted).abs() < REACHED)
 }

@@ -2,6 +2,7 @@
 
 use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion, Vector3};
 
+use crate::operator::Operator;
 use actcheck_world::Sighting;
 
 /// Approach direction of the hand.
@@ -79,6 +80,29 @@ pub fn all_grasps(thing: &Sighting, max_opening_m: f64) -> Vec<Grasp> {
         ways
     });
     fitting(thing, max_opening_m, ways)
+}
+
+/// The same grasps with the hand turned over: rolled by half a turn, which is the same for the object, but not for the
+/// arm.
+pub(crate) fn rolled(grasps: &[Grasp]) -> Vec<Grasp> {
+    let over = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI);
+    grasps.iter().map(|grasp| Grasp { pose: grasp.pose * over, ..grasp.clone() }).collect()
+}
+
+/// Moves the hand so that the object is in the middle of the gap when the fingers have nearly closed on it. This differs
+/// from the grasp frame if only one finger moves.
+pub fn centred(grasps: Vec<Grasp>, thing: &Sighting, robot: &Operator<'_>) -> Vec<Grasp> {
+    let gripper = &robot.layout().gripper;
+    let moved = grasps.into_iter().map(|grasp| {
+        let across = grasp.pose.rotation * Vector3::y();
+        let width = width_across(thing, libm::atan2(-across.x, across.y));
+        let middle = gripper.middle_m((width + LEAST_ROOM_M).min(grasp.opening_m));
+        match middle == 0.0 {
+            true => grasp,
+            false => Grasp { pose: grasp.pose * Translation3::new(0.0, -middle, 0.0), ..grasp },
+        }
+    });
+    moved.collect()
 }
 
 /// The grasps for which the gripper opens wide enough.

@@ -29,7 +29,7 @@ pub fn close(robot: &mut Operator<'_>) -> Result<bool, Interrupt> {
     let mut still_ticks = 0;
     while robot.elapsed_secs() < until && still_ticks < 10 {
         robot.wait(1e-3)?;
-        let speed = robot.layout().fingers.map(|idx| robot.observe().velocities[idx].abs());
+        let speed = robot.layout().gripper.speeds(&robot.observe().velocities).map(f64::abs);
         still_ticks = if speed[0].max(speed[1]) < STALLED && feels(robot) { still_ticks + 1 } else { 0 };
     }
     Ok(feels(robot))

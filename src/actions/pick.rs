@@ -34,6 +34,7 @@ pub fn pick(call: &ActionCall, robot: &mut Operator<'_>) -> Result<ActionReport,
     };
     let max_opening_m = robot.profile().max_opening_m;
     let (grasps, all) = (grasp::grasps(&seen, max_opening_m), grasp::all_grasps(&seen, max_opening_m));
+    let (grasps, all) = (grasp::centred(grasps, &seen, robot), grasp::centred(all, &seen, robot));
     if grasps.is_empty() {
         return Ok(failed(format!("{target} is too wide for the gripper")));
     }

@@ -2,7 +2,7 @@
 
 use nalgebra::{Isometry3, Point2, Point3, Vector3};
 
-use crate::grasp::{Approach, Grasp};
+use crate::grasp::{Approach, Grasp, rolled};
 use crate::link_points::LinkPoints;
 use crate::motion::{Samples, moved_links};
 use crate::operator::Operator;
@@ -72,7 +72,7 @@ pub struct PlanRequest<'a> {
 /// Returns the best plan among all grasps.
 ///
 /// With a mobile base, the arm unfolds straight, in front of the furniture; if no grasp is possible that way, unusual
-/// grasps and sampled paths are tried. For a fixed base, see [`standing`].
+/// grasps and sampled paths are tried, then the hand turned over. For a fixed base, see [`standing`].
 ///
 /// # Errors
 /// If there is no plan, the reason as a sentence for the action's report.
@@ -86,7 +86,10 @@ pub fn plan(operator: &mut Operator<'_>, wanted: PlanRequest<'_>, others: &[Sigh
     }
     let mut samples = Samples::new(operator.choose_samples(), MOST_SAMPLES);
     let all = [wanted.grasps, wanted.all].concat();
-    best(&Planner::new(operator, base, others), &all, &mut samples).ok_or_else(|| NO_WAY.to_owned())
+    let planner = Planner::new(operator, base, others);
+    let found = best(&planner, &all, &mut samples);
+    let turned_over = || wanted.taken.and_then(|_| best(&planner, &rolled(&all), &mut Samples::new(0.0, 0)));
+    found.or_else(turned_over).ok_or_else(|| NO_WAY.to_owned())
 }
 
 /// The best plan among these grasps.
@@ -212,9 +215,7 @@ impl<'a> Planner<'a> {
         for (idx, value) in self.layout.arm.iter().zip(posture) {
             positions[*idx] = *value;
         }
-        for idx in self.layout.fingers {
-            positions[idx] = grasp.opening_m / 2.0;
-        }
+        self.layout.gripper.set(&mut positions, grasp.opening_m);
         let [x, y, heading] = self.base;
         positions[heading] += wrapped(grasp.heading - positions[heading]);
         let miss = grasp.pose.translation.vector - self.kinematics.grasp(&positions).translation.vector;

@@ -2,7 +2,7 @@
 
 use nalgebra::{Isometry3, Vector3};
 
-use crate::grasp::{Approach, Grasp};
+use crate::grasp::{Approach, Grasp, rolled};
 use crate::motion::{self, ArmSpace, Room, Samples};
 use crate::operator::Operator;
 use crate::plan::{AMPLE_CLEAR_M, APPROACH_M, FURNITURE_CLEAR_M, LEAST_CLEAR_M, LIFTS_M, NO_WAY, Plan, PlanRequest};
@@ -29,7 +29,7 @@ const STEP_M: f64 = 0.03;
 /// Distances to retreat with the object, in order of preference. Unit: metres.
 const RETREATS_M: [f64; 2] = [0.1, 0.05];
 
-/// Returns the best plan among all grasps.
+/// Returns the best plan among all grasps; if there is none, among those with the hand turned over.
 ///
 /// # Errors
 /// If there is no plan, the reason as a sentence for the action's report.
@@ -44,6 +44,13 @@ pub fn plan(operator: &mut Operator<'_>, wanted: PlanRequest<'_>, others: &[Sigh
     things.extend(others.iter().filter(|seen| !seen.furniture).map(Pillar::new));
     let arm = Arm::new(operator, &furniture, (&things, &things[n_taken..]));
     let all = if wanted.all.is_empty() { wanted.grasps } else { wanted.all };
+    let found = best(&arm, all, &mut samples);
+    let turned_over = || wanted.taken.and_then(|_| best(&arm, &rolled(all), &mut samples));
+    found.or_else(turned_over).ok_or_else(|| NO_WAY.to_owned())
+}
+
+/// The best plan among these grasps.
+fn best(arm: &Arm<'_>, all: &[Grasp], samples: &mut Samples) -> Option<Plan> {
     let mut grasps: Vec<(f64, &Grasp)> = all.iter().map(|grasp| (arm.least_cost(grasp), grasp)).collect();
     grasps.sort_by(|a, b| a.0.total_cmp(&b.0));
     let mut best: Option<Plan> = None;
@@ -51,14 +58,14 @@ pub fn plan(operator: &mut Operator<'_>, wanted: PlanRequest<'_>, others: &[Sigh
         for seed in arm.seeds(grasp) {
             let bound = best.as_ref().map_or(f64::INFINITY, |best| best.cost);
             if cost >= bound {
-                return best.ok_or_else(|| NO_WAY.to_owned());
+                return best;
             }
-            if let Some(plan) = arm.plan(grasp, &seed, (cost, bound), &mut samples) {
+            if let Some(plan) = arm.plan(grasp, &seed, (cost, bound), samples) {
                 best = Some(plan);
             }
         }
     }
-    best.ok_or_else(|| NO_WAY.to_owned())
+    best
 }
 
 /// The arm, its initial posture, and the obstacles around it.
@@ -108,9 +115,7 @@ impl<'a> Arm<'a> {
             for (idx, value) in self.layout.arm.iter().zip(posture) {
                 positions[*idx] = *value;
             }
-            for idx in self.layout.fingers {
-                positions[idx] = grasp.opening_m / 2.0;
-            }
+            self.layout.gripper.set(&mut positions, grasp.opening_m);
             if let Some(first) = self.layout.arm.first().filter(|first| self.stands_upright(**first)) {
                 let hand = self.kinematics.grasp(&positions).translation.vector;
                 let joint = &self.kinematics.joints()[*first];

@@ -6,10 +6,12 @@ use std::sync::atomic::AtomicBool;
 
 use clap::Args;
 
+use crate::new_files::NewFiles;
 use crate::{configurations, output, regressions};
 use actcheck_base::Diagnostics;
 use actcheck_campaign::Env;
-use actcheck_config::Overrides;
+use actcheck_config::robot::MendedUrdf;
+use actcheck_config::{Overrides, mended_robot};
 use actcheck_rules::Budget;
 
 /// `actcheck check`
@@ -17,6 +19,11 @@ use actcheck_rules::Budget;
 pub struct CheckArgs {
     /// The campaign's configuration (TOML) [default: configs/pick.toml]
     pub config: Option<PathBuf>,
+
+    /// Write a copy of the robot's URDF beside it, in which impossible moments of inertia (W034, W036) are those of a box
+    /// around the link
+    #[arg(long)]
+    pub mend: bool,
 }
 
 /// Prints the parts that a campaign would use, or returns all its faults. `stop` interrupts it.
@@ -27,6 +34,10 @@ pub fn check(args: &CheckArgs, stop: &Arc<AtomicBool>) -> Result<(), Diagnostics
         None if usual.exists() => usual,
         None => return Err(configurations::none_given("check").into()),
     };
+    let mended = if args.mend { mended_robot(config) } else { None };
+    if let Some(mended) = mended {
+        return write_mended(mended);
+    }
     let budget = Budget { stop: Arc::clone(stop), ..Budget::default() };
     let env = Env::prepare_within(config, &Overrides::default(), budget.clone())?;
     let cases = if env.campaign.case.is_some() { Vec::new() } else { regressions::prepare(&env, &budget)? };
@@ -46,6 +57,25 @@ pub fn check(args: &CheckArgs, stop: &Arc<AtomicBool>) -> Result<(), Diagnostics
         counted(env.campaign.models.len() as u64, "model"),
         env.campaign.robot.name,
     ));
+    if args.mend {
+        output::print_prose("nothing to mend: all moments of inertia of the robot's moving links are possible\n");
+    }
+    Ok(())
+}
+
+/// Writes a mended URDF beside the original, and lists the changes.
+///
+/// # Errors
+/// As [`NewFiles::write`].
+fn write_mended(mended: MendedUrdf) -> Result<(), Diagnostics> {
+    let name = mended.original.file_name().unwrap_or_default().to_string_lossy();
+    let stem = name.trim_end_matches(".xacro").trim_end_matches(".urdf");
+    let copy = mended.original.with_file_name(format!("{stem}.mended.urdf"));
+    let mut files = NewFiles::default();
+    files.add(&copy, mended.text);
+    files.write("it may have been written before: name it as `urdf` in the profile, or delete it")?;
+    let changes: String = mended.changes.iter().map(|change| format!("- {change}\n")).collect();
+    output::print_prose(&format!("{changes}wrote {}: name it as `urdf` in the profile of the robot\n", copy.display()));
     Ok(())
 }
 

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use crate::designators::{self, Designators};
 use crate::paths::resolve_path;
+use crate::robot::{MendedUrdf, mended};
 use crate::{Campaign, Overrides, Table, case, model_library, ranges, skill};
 use actcheck_base::{Diagnostic, Diagnostics, Files, Severity, Source, Span, did_you_mean};
 use actcheck_search::Strategy;
@@ -108,6 +109,18 @@ pub fn load_text(source: Source, folder: &Path, overrides: &Overrides) -> Result
         places,
         warnings,
     })
+}
+
+/// Mends the URDF of a configuration's robot: see [`crate::robot::mended`]. Returns `None` if there is nothing to mend, or one of the
+/// files can't be read: [`load`] reports the reason.
+pub fn mended_robot(path: &Path) -> Option<MendedUrdf> {
+    let source = Files::Disk.read(path).ok()?;
+    let folder = path.parent().unwrap_or(Path::new(""));
+    let mut table = Table::parse(&source).ok()?;
+    let mut found = Diagnostics::new();
+    let mut library = model_library::read(&mut table, folder, &mut found);
+    let (files, profile, packages) = library.locate_robot(&mut table, folder, &mut found)?;
+    mended(&files, &profile, &packages)
 }
 
 /// Sorts the faults of each text by position; texts keep the order in which they were read.

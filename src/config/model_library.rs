@@ -286,6 +286,18 @@ impl ModelLibrary {
         folder: &Path,
         found: &mut Diagnostics,
     ) -> Option<Arc<RobotProfile>> {
+        let (files, path, packages) = self.locate_robot(root, folder, found)?;
+        robot::read_with(&files, &path, &packages).map(Arc::new).map_err(|faults| found.extend(faults)).ok()
+    }
+
+    /// Returns the profile of the robot, where it is, and the folders of `package_dirs`. Reports the faults of the
+    /// table `[robot]`.
+    pub(crate) fn locate_robot(
+        &mut self,
+        root: &mut Table,
+        folder: &Path,
+        found: &mut Diagnostics,
+    ) -> Option<(Files, PathBuf, Vec<PathBuf>)> {
         let mut table = root.table("robot");
         let written = table.as_mut().and_then(|table| table.string("profile"));
         let name = written.as_ref().map_or(DEFAULT_ROBOT, |written| &written.value);
@@ -313,7 +325,7 @@ impl ModelLibrary {
             table.finish(found);
         }
         let (files, path) = place.ok()?;
-        robot::read_with(&files, &path, &packages).map(Arc::new).map_err(|faults| found.extend(faults)).ok()
+        Some((files, path, packages))
     }
 
     /// Finds a robot's profile by name.

@@ -17,19 +17,14 @@ const PACKAGE_LEVELS: usize = 4;
 const PLANAR_JOINTS: [&str; 3] = ["planar_x_joint", "planar_y_joint", "planar_heading_joint"];
 
 /// Required keys of a profile.
-const REQUIRED: [&str; 11] = [
-    "name",
-    "urdf",
-    "arm_joints",
-    "finger_joints",
-    "finger_links",
-    "grasp_link",
-    "camera_link",
-    "max_opening_m",
-    "finger_friction",
-    "grip_force_n",
-    "home",
-];
+const REQUIRED: [&str; 8] =
+    ["urdf", "arm_joints", "finger_joints", "finger_links", "grasp_link", "camera_link", "max_opening_m", "home"];
+
+/// Friction of the fingertips if the profile has none: that of rubber pads.
+const FINGER_FRICTION: f64 = 0.8;
+
+/// Force of a finger if the profile has none: enough to lift 1 kg with such pads. Unit: newtons.
+const GRIP_FORCE_N: f64 = 15.0;
 
 /// Reads a profile with the meshes around its URDF: [`read_with`] without further folders.
 ///
@@ -51,22 +46,15 @@ pub fn read_with(files: &Files, path: &Path, packages: &[PathBuf]) -> Result<Rob
         Diagnostic::error("W010", format!("cannot read the robot profile {}: {reason}", path.display()))
             .help("a profile is a TOML file that names a URDF and its joints")
     })?;
-    let folder = path.parent().unwrap_or(Path::new(""));
     let mut table = Table::parse(&source)?;
     table.require(&REQUIRED);
     let mut found = Diagnostics::new();
-    let mut folders: Vec<PathBuf> = values(table.strings("package_dirs").unwrap_or_default())
-        .into_iter()
-        .map(|written| resolve_path(folder, &written))
-        .collect();
-    let urdf = read_urdf(files, folder, &mut table);
+    let (urdf, lookup) = find_urdf(files, path, packages, &mut table);
     let mut roles = Roles::default();
     let profile = read_table(&mut table, urdf.as_ref().map(|(urdf, _)| urdf), &mut roles, &mut found);
     let mut read = None;
     if let Some((text, path)) = &urdf {
-        folders.extend(packages.iter().cloned());
-        folders.extend(path.ancestors().skip(1).take(PACKAGE_LEVELS).map(Path::to_path_buf));
-        let text = foreign::robot::read(text, path, &Lookup { files, folders }, &mut found);
+        let text = foreign::robot::read(text, path, &lookup, &mut found);
         if let Some(tree) = &text.tree {
             roles.check(tree, &mut table);
         }
@@ -77,6 +65,55 @@ pub fn read_with(files: &Files, path: &Path, packages: &[PathBuf]) -> Result<Rob
     // Every missing or wrong key was reported above, so this error only occurs together with another.
     let incomplete = || Diagnostic::error("W010", "the robot profile is incomplete").in_source(&source).into();
     profile.zip(read).map(|(profile, read)| with_meshes(profile, read)).ok_or_else(incomplete)
+}
+
+/// A URDF with moments of inertia that a body can have, where its own are impossible (W034, W036).
+#[derive(Debug, Clone, PartialEq)]
+pub struct MendedUrdf {
+    /// The file that was mended: the URDF, or the xacro that was expanded.
+    pub original: PathBuf,
+    /// The mended text.
+    pub text: String,
+    /// Each change as a sentence without a full stop.
+    pub changes: Vec<String>,
+}
+
+/// Mends the URDF of a profile. Returns `None` if it has no moments of inertia to mend, or can't be read: [`read_with`]
+/// reports the reason.
+pub fn mended(files: &Files, path: &Path, packages: &[PathBuf]) -> Option<MendedUrdf> {
+    let source = files.read(path).ok()?;
+    let mut table = Table::parse(&source).ok()?;
+    let (urdf, lookup) = find_urdf(files, path, packages, &mut table);
+    let (urdf, original) = urdf?;
+    let mut mends = foreign::robot::read(&urdf, &original, &lookup, &mut Diagnostics::new()).mends;
+    if mends.is_empty() {
+        return None;
+    }
+    // From the last place to the first, so that the others stay valid.
+    mends.sort_by_key(|mend| std::cmp::Reverse(mend.span.start));
+    let mut text = urdf.text.to_string();
+    for mend in &mends {
+        text.replace_range(mend.span.clone(), &mend.text);
+    }
+    Some(MendedUrdf { original, text, changes: mends.into_iter().rev().map(|mend| mend.change).collect() })
+}
+
+/// Finds the URDF of a profile, with its path, and the folders of its meshes.
+fn find_urdf<'a>(
+    files: &'a Files,
+    profile: &Path,
+    packages: &[PathBuf],
+    table: &mut Table,
+) -> (Option<(Source, PathBuf)>, Lookup<'a>) {
+    let folder = profile.parent().unwrap_or(Path::new(""));
+    let own = values(table.strings("package_dirs").unwrap_or_default());
+    let mut folders: Vec<PathBuf> = own.into_iter().map(|written| resolve_path(folder, &written)).collect();
+    let urdf = read_urdf(files, folder, table);
+    if let Some((_, path)) = &urdf {
+        folders.extend(packages.iter().cloned());
+        folders.extend(path.ancestors().skip(1).take(PACKAGE_LEVELS).map(Path::to_path_buf));
+    }
+    (urdf, Lookup { files, folders })
 }
 
 fn with_meshes(mut profile: RobotProfile, read: foreign::robot::RobotText) -> RobotProfile {
@@ -132,23 +169,25 @@ fn read_table(
     roles: &mut Roles,
     found: &mut Diagnostics,
 ) -> Option<RobotProfile> {
-    let name = table.string("name");
+    let file_stem = Path::new(&*table.source().name).file_stem().map(|stem| stem.to_string_lossy().into_owned());
+    let name = table.string("name").map(|name| name.value).or(file_stem).unwrap_or_default();
     let base = read_base(table, roles);
     let arm_joints = table.non_empty_strings("arm_joints");
     roles.joints.push(("arm_joints", arm_joints.clone().unwrap_or_default()));
-    let finger_joints = names(table, "finger_joints", roles);
+    let finger_joints = finger_joints(table, roles);
     let finger_links = names(table, "finger_links", roles);
     let head_joints = table.strings("head_joints").unwrap_or_default();
     roles.joints.push(("head_joints", head_joints.clone()));
     let (grasp_link, camera_link) = (table.string("grasp_link"), table.string("camera_link"));
     roles.links.push(grasp_link.iter().chain(&camera_link).cloned().collect());
     let grasp_turned_rad = table.numbers("grasp_turned_rad", ..).unwrap_or([0.0; 3]);
+    let grasp_offset_m = table.numbers("grasp_offset_m", -1.0..=1.0).unwrap_or([0.0; 3]);
     let mount_height_m = table.number("mount_height_m", 0.0..=3.0).unwrap_or(0.0);
     let opening_span = table.key_span("max_opening_m");
     let max_opening_m = table.number("max_opening_m", 0.001..=1.0);
     roles.opening = opening_span.zip(max_opening_m);
-    let finger_friction = table.number("finger_friction", 0.0..=2.0);
-    let grip_force_n = table.number("grip_force_n", 0.1..=1000.0);
+    let finger_friction = table.number("finger_friction", 0.0..=2.0).unwrap_or(FINGER_FRICTION);
+    let grip_force_n = table.number("grip_force_n", 0.1..=1000.0).unwrap_or(GRIP_FORCE_N);
     let n_arm_joints = arm_joints.as_ref().map_or(0, Vec::len);
     let home = posture(table, "home", n_arm_joints, roles);
     let postures = table.tables("postures").into_iter().filter_map(|mut posture_table| {
@@ -163,7 +202,7 @@ fn read_table(
     digest.update(table.source().text.as_bytes());
     digest.update(urdf.text.as_bytes());
     Some(RobotProfile {
-        name: name?.value,
+        name,
         urdf,
         base_joints,
         planar_base,
@@ -173,13 +212,14 @@ fn read_table(
         head_joints: values(head_joints),
         grasp_link: grasp_link?.value,
         grasp_turned_rad,
+        grasp_offset_m,
         finger_links: finger_links?,
         camera_link: camera_link?.value,
         max_opening_m: max_opening_m?,
         home: home?,
         postures,
-        finger_friction: finger_friction?,
-        grip_force_n: grip_force_n?,
+        finger_friction,
+        grip_force_n,
         meshes: BTreeMap::new(),
         digest: digest.finish(),
     })
@@ -187,6 +227,20 @@ fn read_table(
 
 fn values(list: Vec<Located<String>>) -> Vec<String> {
     list.into_iter().map(|name| name.value).collect()
+}
+
+/// Reads the one or two joints whose motors move the fingers.
+fn finger_joints(table: &mut Table, roles: &mut Roles) -> Option<Vec<String>> {
+    let span = table.key_span("finger_joints")?;
+    let list = table.strings("finger_joints")?;
+    roles.joints.push(("finger_joints", list.clone()));
+    if !(1..=2).contains(&list.len()) {
+        let message = format!("`finger_joints` must list 1 or 2 names, but this list has {}", list.len());
+        let help = "name the joints with motors; joints that mimic them follow without being named";
+        table.fault("W011", span, message, help);
+        return None;
+    }
+    Some(values(list))
 }
 
 /// Reads a list of exactly `N` names: of links if the key ends in `_links`, else of joints.
@@ -203,7 +257,7 @@ fn names<const N: usize>(table: &mut Table, key: &'static str, roles: &mut Roles
     if names.is_none() {
         let message = format!("`{key}` must list {N} names, but this list has {length}");
         let help = if key.starts_with("finger") {
-            "only parallel grippers with two fingers are supported; add one to the URDF if the robot has none"
+            "name the links of two fingertips, left then right; one of them may be fixed"
         } else {
             "see models/robots/mobile_manipulator.toml for an example"
         };
@@ -236,7 +290,7 @@ mod tests {
         let source = Source::new(
             "r.toml",
             "name = \"r\"\nurdf = \"r.urdf\"\narm_joints = [\"a\", \"b\"]\nhome = [0]\n\
-            finger_joints = [\"left\"]\n",
+            finger_joints = [\"left\", \"right\", \"third\"]\n",
         );
         let mut table = Table::parse(&source).expect("it is TOML");
         let mut found = Diagnostics::new();
@@ -247,6 +301,6 @@ mod tests {
         let codes: Vec<&str> = found.iter().map(|d| d.code).collect();
         assert_eq!(codes.iter().filter(|code| **code == "W011").count(), 2, "{found}");
         assert_eq!(codes.iter().filter(|code| **code == "W010").count(), 1, "{found}");
-        assert_eq!(codes.iter().filter(|code| **code == "C005").count(), 6, "{found}");
+        assert_eq!(codes.iter().filter(|code| **code == "C005").count(), 4, "{found}");
     }
 }

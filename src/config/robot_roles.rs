@@ -74,14 +74,15 @@ impl Roles {
         }
     }
 
-    /// Checks that the fingers can open to `max_opening_m`.
+    /// Checks that two fingers that slide apart from 0 can open to `max_opening_m`. The opening of other grippers is
+    /// measured by the simulation.
     fn check_opening(&self, tree: &Tree, table: &mut Table) {
         let Some((span, opening)) = &self.opening else { return };
         let fingers: Vec<f64> = self
             .of("finger_joints")
             .iter()
             .filter_map(|joint| tree.joints.get(&joint.value))
-            .filter(|joint| joint.motion == Motion::Slides)
+            .filter(|joint| joint.motion == Motion::Slides && joint.lower >= -SLACK && joint.upper > SLACK)
             .map(|joint| joint.upper)
             .collect();
         let widest = 2.0 * fingers.iter().copied().fold(f64::INFINITY, f64::min);
@@ -103,16 +104,12 @@ fn check_joint(key: &str, place: usize, joint: &Located<String>, tree: &Tree, ta
         return;
     };
     let wanted = match (key, place) {
-        ("finger_joints", _) | ("base_joints", 0 | 1) => Some(Motion::Slides),
+        ("base_joints", 0 | 1) => Some(Motion::Slides),
         ("base_joints", _) => Some(Motion::Turns),
         _ => None,
     };
     let (fault, help) = match (found.motion, wanted) {
         (Motion::Fixed, _) => ("does not move", "name a joint of the type prismatic, revolute or continuous"),
-        (Motion::Turns, Some(Motion::Slides)) if key == "finger_joints" => (
-            "rotates, but finger joints must be prismatic",
-            "only parallel grippers are supported, with two prismatic finger joints",
-        ),
         (Motion::Turns, Some(Motion::Slides)) => {
             ("rotates, but must be prismatic", "`base_joints` are x, y and heading")
         }

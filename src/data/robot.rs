@@ -5,6 +5,10 @@ use std::collections::BTreeMap;
 use crate::Shape;
 use actcheck_base::Source;
 
+/// Mass of links without a mass in the URDF, such as the stages of a base, and of lighter ones. Unit: kilograms. Small
+/// compared to any real link, large enough for 32-bit arithmetic.
+pub const LEAST_LINK_KG: f64 = 0.01;
+
 /// A robot: its URDF and the roles of its joints and links. Read from a profile next to the URDF.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RobotProfile {
@@ -20,8 +24,9 @@ pub struct RobotProfile {
     pub mount_height_m: f64,
     /// Joints that position the hand (lift and arm), from the base outwards.
     pub arm_joints: Vec<String>,
-    /// Finger joints, left then right; they move the same distance.
-    pub finger_joints: [String; 2],
+    /// Joints with motors that move the fingers: left then right, or one for both or for the only finger that moves.
+    /// Joints that mimic them follow.
+    pub finger_joints: Vec<String>,
     /// Head joints, pan then tilt; empty if the head does not move.
     pub head_joints: Vec<String>,
     /// Link between the fingertips; its x axis points along the fingers, its y axis across them.
@@ -29,7 +34,9 @@ pub struct RobotProfile {
     /// Rotation of the grasp frame relative to that link, if the link's axes differ: about its fixed x, y and z axes,
     /// in this order. Unit: radians.
     pub grasp_turned_rad: [f64; 3],
-    /// Links of the fingers, left then right.
+    /// Origin of the grasp frame in that link's frame, if it differs from the link's. Unit: metres.
+    pub grasp_offset_m: [f64; 3],
+    /// Links of the fingertips, left then right; one of them may be fixed.
     pub finger_links: [String; 2],
     /// Link of the depth camera: its x axis points forwards, its z axis up in the image.
     pub camera_link: String,

@@ -126,7 +126,7 @@ pub fn introduction(world: &World, worker: usize, privileged: bool) -> Introduct
             joints: joints.iter().zip(roles).map(|(joint, role)| wire_joint(joint, role)).collect(),
             base_joints: layout.base.map_or_else(Vec::new, |base| names(&base)),
             arm_joints: names(&layout.arm),
-            gripper_joints: names(&layout.fingers),
+            gripper_joints: names(&layout.gripper.joints().collect::<Vec<_>>()),
             head_joints: names(&layout.head),
             mount_height_m: profile.mount_height_m,
             home: &profile.home,
@@ -168,7 +168,7 @@ fn roles(world: &World) -> Vec<Role> {
     let role = |idx: usize| match idx {
         idx if layout.base.is_some_and(|base| base.contains(&idx)) => Role::Base,
         idx if layout.arm.contains(&idx) => Role::Arm,
-        idx if layout.fingers.contains(&idx) => Role::Gripper,
+        idx if layout.gripper.contains(idx) => Role::Gripper,
         idx if layout.head.contains(&idx) => Role::Head,
         _ => Role::Other,
     };

@@ -41,8 +41,9 @@ pub(super) fn home(profile: &RobotProfile, model: &RobotModel, named: &Named, ba
     for (idx, position) in named.layout.base.iter().flatten().zip(base) {
         positions[*idx] = position;
     }
-    for idx in named.layout.fingers {
-        positions[idx] = (profile.max_opening_m / 4.0).clamp(model.joints[idx].lower, model.joints[idx].upper);
+    named.layout.gripper.set(&mut positions, profile.max_opening_m / 2.0);
+    for idx in named.layout.gripper.joints() {
+        positions[idx] = positions[idx].clamp(model.joints[idx].lower, model.joints[idx].upper);
     }
     positions
 }
@@ -89,10 +90,10 @@ pub(super) fn insert_links(
 /// Marks the links below a planar base, such as wheels, which do not collide with the floor. The planar joints support
 /// and move the base; wheels in contact with the floor would disturb it.
 pub(super) fn links_on_floor(model: &RobotModel, named: &Named, profile: &RobotProfile) -> Vec<bool> {
-    let Layout { arm, head, fingers, .. } = &named.layout;
+    let Layout { arm, head, gripper, .. } = &named.layout;
     let mut on_floor = vec![profile.planar_base];
     for (idx, joint) in model.joints.iter().enumerate() {
-        let lifted = arm.contains(&idx) || head.contains(&idx) || fingers.contains(&idx);
+        let lifted = arm.contains(&idx) || head.contains(&idx) || gripper.contains(idx);
         on_floor.push(on_floor[joint.parent] && !lifted);
     }
     on_floor
@@ -107,7 +108,6 @@ pub(super) fn insert_joints(
 ) -> Result<Vec<Motor>, WorldError> {
     let mut motors = Vec::with_capacity(model.joints.len());
     for (idx, joint) in model.joints.iter().enumerate() {
-        let is_finger = named.layout.fingers.contains(&idx);
         let (data, axis) = engine_joint(joint);
         let handle =
             engine.multibody_joints.insert(bodies[joint.parent], bodies[idx + 1], data, true).ok_or_else(|| {
@@ -124,10 +124,19 @@ pub(super) fn insert_joints(
                 multibody.damping_mut()[dof] = to_real(joint.damping);
             }
         }
+        let gripper = &named.layout.gripper;
         let saturation = if joint.kind == JointKind::Prismatic { SATURATION_M } else { SATURATION_RAD };
-        let max_effort = if is_finger { joint.effort.min(profile.grip_force_n) } else { joint.effort };
+        let (saturation, max_effort, damping_secs) = match gripper.lever_m(idx) {
+            Some(lever_m) => {
+                let force_n = profile.grip_force_n * lever_m;
+                (SATURATION_M / lever_m, joint.effort.min(force_n), FINGER_DAMPING_SECS)
+            }
+            // The coupling moves it.
+            None if gripper.follows(idx) => (saturation, 0.0, DAMPING_SECS),
+            None => (saturation, joint.effort, DAMPING_SECS),
+        };
         let stiffness = (max_effort / saturation).max(1.0);
-        let damping = stiffness * if is_finger { FINGER_DAMPING_SECS } else { DAMPING_SECS };
+        let damping = stiffness * damping_secs;
         motors.push(Motor {
             joint: handle,
             axis,
@@ -141,6 +150,7 @@ pub(super) fn insert_joints(
             began: 0.0,
             effort: 0.0,
             strength: 1.0,
+            fastest: gripper.fastest(idx, joint.velocity),
         });
     }
     Ok(motors)

@@ -6,7 +6,7 @@ use nalgebra::{Isometry3, Matrix3, Translation3, Unit, UnitQuaternion, Vector3};
 
 use crate::WorldError;
 use actcheck_base::did_you_mean;
-use actcheck_data::{Part, Pose, RobotProfile, Shape};
+use actcheck_data::{LEAST_LINK_KG, Part, Pose, RobotProfile, Shape};
 
 /// The type of a joint.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -72,10 +72,8 @@ pub struct RobotModel {
     name: String,
 }
 
-/// Mass of links without a mass in the URDF, such as the stages of a base. Unit: kilograms. Small compared to any real
-/// link, large enough for 32-bit arithmetic.
-const LEAST_MASS: f64 = 0.01;
-/// Moment of inertia of those links: that of a ball of this mass with a radius of 1 cm. Unit: kg·m².
+/// Moment of inertia of links lighter than [`LEAST_LINK_KG`]: that of a ball of this mass with a radius of 1 cm. Unit:
+/// kg·m².
 const LEAST_INERTIA: f64 = 4e-7;
 
 impl RobotModel {
@@ -179,8 +177,8 @@ impl<'a> Folding<'a> {
         }
         self.resolve_mimics()?;
         for link in &mut self.out.links {
-            if link.mass < LEAST_MASS {
-                link.mass = LEAST_MASS;
+            if link.mass < LEAST_LINK_KG {
+                link.mass = LEAST_LINK_KG;
                 link.inertia = Matrix3::identity() * LEAST_INERTIA;
             }
         }

@@ -34,6 +34,14 @@ pub enum WorldError {
         /// The element.
         what: String,
     },
+    /// The gripper's opening can't be measured.
+    #[error("{name}: {what}")]
+    Gripper {
+        /// The URDF's path.
+        name: String,
+        /// The message.
+        what: String,
+    },
     /// The scene has an invalid physics setting.
     #[error("{what}")]
     Scene {
@@ -52,6 +60,12 @@ impl WorldError {
             Self::Unsupported { .. } => Diagnostic::error("W022", self.to_string()).help(
                 "use fixed, revolute, continuous or prismatic joints, and boxes, cylinders, spheres, capsules or \
                  meshes",
+            ),
+            Self::Gripper { .. } => Diagnostic::error("W024", self.to_string()).help(
+                "name the joints that move the fingers in `finger_joints` and the links of the fingertips, left then \
+                 right, in `finger_links`; the origin of `grasp_link`, moved by `grasp_offset_m`, must be between the \
+                 fingertips, and its y axis, turned by `grasp_turned_rad`, must point from the right one to the left \
+                 one",
             ),
             Self::Scene { .. } => {
                 Diagnostic::error("W023", self.to_string()).help("see `[physics]` in the configuration")

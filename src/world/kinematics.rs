@@ -143,7 +143,7 @@ impl Kinematics {
     }
 }
 
-fn motion(joint: &Joint, position: f64) -> Isometry3<f64> {
+pub(super) fn motion(joint: &Joint, position: f64) -> Isometry3<f64> {
     match joint.kind {
         JointKind::Prismatic => {
             Isometry3::from_parts(Translation3::from(joint.axis.into_inner() * position), UnitQuaternion::identity())

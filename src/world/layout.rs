@@ -1,13 +1,13 @@
 //! Resolves the joints and links of a profile in the URDF.
 
-use nalgebra::{Isometry3, UnitQuaternion};
+use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
-use crate::WorldError;
 use crate::description::RobotModel;
+use crate::{Gripper, WorldError};
 use actcheck_data::RobotProfile;
 
 /// Indices of the robot's joints by their role.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Layout {
     /// Base: x, y, heading; `None` if it is fixed.
     pub base: Option<[usize; 3]>,
@@ -15,9 +15,12 @@ pub struct Layout {
     pub arm: Vec<usize>,
     /// Head: pan, tilt.
     pub head: Vec<usize>,
-    /// Fingers: left, right.
-    pub fingers: [usize; 2],
+    /// Joints of the fingers.
+    pub gripper: Gripper,
 }
+
+/// Tolerance of `max_opening_m`, which is often rounded. Unit: metres.
+const OPENING_SLACK_M: f64 = 2e-3;
 
 /// The profile's joints and links, resolved in the URDF.
 pub(super) struct Named {
@@ -34,22 +37,20 @@ impl Named {
             Some([x, y, heading]) => Some([model.joint(x)?, model.joint(y)?, model.joint(heading)?]),
             None => None,
         };
-        let [left, right] = &profile.finger_joints;
         let [left_link, right_link] = &profile.finger_links;
+        let [roll, pitch, yaw] = profile.grasp_turned_rad;
+        let (grasp_link, grasp_at) = model.frame(&profile.grasp_link)?;
+        let turned = UnitQuaternion::from_euler_angles(roll, pitch, yaw);
+        let moved = Translation3::from(Vector3::from(profile.grasp_offset_m));
+        let grasp = (grasp_link, grasp_at * moved * turned);
+        let finger_links = [model.frame(left_link)?.0, model.frame(right_link)?.0];
         let layout = Layout {
             base,
             arm: joints(&profile.arm_joints)?,
             head: joints(&profile.head_joints)?,
-            fingers: [model.joint(left)?, model.joint(right)?],
+            gripper: Gripper::find(profile, model, finger_links, grasp)?,
         };
-        let [roll, pitch, yaw] = profile.grasp_turned_rad;
-        let (grasp_link, grasp_at) = model.frame(&profile.grasp_link)?;
-        Ok(Self {
-            layout,
-            finger_links: [model.frame(left_link)?.0, model.frame(right_link)?.0],
-            grasp: (grasp_link, grasp_at * UnitQuaternion::from_euler_angles(roll, pitch, yaw)),
-            camera: model.frame(&profile.camera_link)?,
-        })
+        Ok(Self { layout, finger_links, grasp, camera: model.frame(&profile.camera_link)? })
     }
 }
 
@@ -59,5 +60,14 @@ impl Named {
 /// [`WorldError`] for the first missing or unsupported element.
 pub fn check_robot(profile: &RobotProfile) -> Result<(), WorldError> {
     let model = RobotModel::read(profile)?;
-    Named::find(profile, &model).map(|_| ())
+    let widest_m = Named::find(profile, &model)?.layout.gripper.widest_m();
+    if profile.max_opening_m > widest_m + OPENING_SLACK_M {
+        let name = profile.urdf.name.to_string();
+        let what = format!(
+            "`max_opening_m` is {} m, but the fingers open no wider than {widest_m:.3} m at the grasp frame",
+            profile.max_opening_m
+        );
+        return Err(WorldError::Gripper { name, what });
+    }
+    Ok(())
 }

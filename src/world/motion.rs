@@ -45,12 +45,12 @@ impl World {
         row.extend(observed.finger_efforts_n.map(|effort| grain(effort, EFFORT_GRAIN)));
         row.extend([grain(told.gripper_opening_m, GRAIN), grain(told.grip_force_n, EFFORT_GRAIN)]);
         row.extend(base.into_iter().chain(self.believed(base)).map(|value| grain(value, GRAIN)));
-        let fingers = self.robot.layout.fingers;
+        let gripper = &self.robot.layout.gripper;
         for (idx, position) in observed.positions.iter().enumerate() {
             let of = |values: &[f64]| values.get(idx).copied().unwrap_or(f64::NAN);
             let velocity = of(&observed.velocities);
             // The gap between the fingers is commanded, not their positions.
-            let target = if fingers.contains(&idx) { told.gripper_opening_m / 2.0 } else { of(&told.positions) };
+            let target = gripper.target(idx, told.gripper_opening_m).unwrap_or_else(|| of(&told.positions));
             row.extend([*position, velocity].map(|value| grain(value, GRAIN)));
             row.extend([grain(of(&observed.loads), EFFORT_GRAIN), grain(target, GRAIN)]);
         }

@@ -25,6 +25,8 @@ pub(super) struct Motor {
     pub(super) began: f64,
     /// Mean effort in the last control tick, without gravity compensation.
     pub(super) effort: f64,
+    /// Largest speed of its setpoint.
+    pub(super) fastest: f64,
     /// Largest commanded effort as a multiple of the joint's limit: 1 unless the motor is overdriven.
     pub(super) strength: f64,
 }

@@ -113,7 +113,7 @@ impl World {
             base_true,
             base_believed: self.believed(base_true),
             gripper: Pose::from_isometry(&self.robot.kinematics.grasp(&positions)),
-            gripper_opening_m: self.robot.layout.fingers.iter().map(|idx| positions[*idx]).sum(),
+            gripper_opening_m: self.robot.layout.gripper.opening_m(&positions),
             left_touches: touched_by(left),
             right_touches: touched_by(right),
             joints,

@@ -122,11 +122,11 @@ impl Robot {
     /// Returns the force of each finger's motor by its control law; positive closes. Unit: newtons.
     pub fn finger_efforts(&self, engine: &PhysicsWorld) -> [f64; 2] {
         let (positions, velocities) = self.state(engine);
-        self.layout.fingers.map(|idx| {
+        self.layout.gripper.sides().map(|(idx, sign, lever_m)| {
             let (motor, position) = (&self.motors[idx], positions[idx]);
-            let force = motor.stiffness * (position - motor.setpoint)
+            let effort = motor.stiffness * (position - motor.setpoint)
                 + motor.damping * (velocities[idx] - motor.setpoint_velocity);
-            force.clamp(-motor.max_effort, motor.max_effort)
+            effort.clamp(-motor.max_effort, motor.max_effort) * sign / lever_m
         })
     }
 
@@ -178,7 +178,7 @@ impl Robot {
             let told = efforts.iter().find(|(joint, effort)| *joint == idx && effort.is_finite());
             let limit = self.model.joints[idx].effort * motor.strength;
             motor.push =
-                told.filter(|_| !self.layout.fingers.contains(&idx)).map(|(_, effort)| effort.clamp(-limit, limit));
+                told.filter(|_| !self.layout.gripper.contains(idx)).map(|(_, effort)| effort.clamp(-limit, limit));
         }
     }
 
@@ -191,8 +191,8 @@ impl Robot {
 
     /// Limits the force of both fingers. Unit: newtons.
     pub fn limit_grip(&mut self, force: f64) {
-        for idx in self.layout.fingers {
-            self.motors[idx].max_effort = force.clamp(0.0, self.model.joints[idx].effort);
+        for (idx, lever_m) in self.layout.gripper.motors() {
+            self.motors[idx].max_effort = (force * lever_m).clamp(0.0, self.model.joints[idx].effort);
         }
     }
 
@@ -202,7 +202,7 @@ impl Robot {
         let substep_secs = dt / engine.integration_parameters.num_solver_iterations as f64;
         for (idx, motor) in self.motors.iter_mut().enumerate() {
             let held = holding.get(idx).copied().unwrap_or(0.0);
-            let largest = self.model.joints[idx].velocity * dt;
+            let largest = motor.fastest * dt;
             let Some((multibody, link)) = engine.multibody_joints.get_mut(motor.joint) else { continue };
             let Some(link) = multibody.link_mut(link) else { continue };
             let position = f64::from(link.joint.coords()[motor.axis as usize]);
@@ -215,7 +215,7 @@ impl Robot {
             motor.setpoint += change;
             motor.setpoint_velocity = change / dt;
             motor.began = position;
-            motor.keep_near(position, self.model.joints[idx].velocity, substep_secs);
+            motor.keep_near(position, motor.fastest, substep_secs);
             let position = motor.setpoint + held / motor.stiffness;
             let data = &mut link.joint.data;
             data.set_motor(
@@ -343,8 +343,12 @@ pub(super) mod tests {
 
     pub(crate) fn lonely() -> World {
         let path = Path::new("models/robots/mobile_manipulator.toml");
-        let profile =
-            Arc::new(actcheck_config::robot::read(&Files::Shipped, path).expect("the shipped robot is valid"));
+        alone(actcheck_config::robot::read(&Files::Shipped, path).expect("the shipped robot is valid"))
+    }
+
+    /// A robot with nothing around it.
+    pub(crate) fn alone(profile: RobotProfile) -> World {
+        let profile = Arc::new(profile);
         let one = (1.0, 1.0);
         let scene = Scene {
             map: actcheck_data::SceneMap::default(),
@@ -422,7 +426,7 @@ pub(super) mod tests {
             for (position, joint) in found.iter().zip(kinematics.joints()) {
                 assert!((joint.lower..=joint.upper).contains(position), "{} at {position}", joint.name);
             }
-            assert_eq!(found[layout.fingers[0]], seed[layout.fingers[0]]);
+            assert!(layout.gripper.joints().all(|idx| found[idx] == seed[idx]));
         }
         assert!(n_solved >= 60, "solved {n_solved} of 100 from random postures");
     }

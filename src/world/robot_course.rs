@@ -100,7 +100,7 @@ impl World {
             if joint.velocity > 0.0 {
                 course.max_speed_share = course.max_speed_share.max(velocity.abs() / joint.velocity);
             }
-            let grips = self.robot.layout.fingers.contains(&idx) || joint.mimic.is_some();
+            let grips = self.robot.layout.gripper.contains(idx) || joint.mimic.is_some();
             let overloaded = !grips && efforts.get(idx).is_some_and(|share| *share > OVERLOAD_SHARE);
             course.overloaded = if overloaded { course.overloaded + 1 } else { 0 };
             course.longest_overload = course.longest_overload.max(course.overloaded);

@@ -72,7 +72,7 @@ impl World {
         let (positions, velocities) = self.robot.state(&self.engine);
         let hand = Pose::from_isometry(&self.robot.kinematics.grasp(&positions));
         hand.position.into_iter().chain(hand.rotation).for_each(&mut put);
-        put(self.robot.layout.fingers.iter().filter_map(|idx| positions.get(*idx)).sum());
+        put(self.robot.layout.gripper.opening_m(&positions));
         let base = self.base_true();
         base.into_iter().chain(self.believed(base)).for_each(&mut put);
         let efforts = self.robot.loads();

@@ -329,7 +329,7 @@ impl World {
     /// Returns the robot's current measurements.
     pub fn observe(&self) -> Observation {
         let (mut positions, velocities) = self.robot.state(&self.engine);
-        let gripper_opening_m = self.robot.layout.fingers.iter().map(|idx| positions[*idx]).sum();
+        let gripper_opening_m = self.robot.layout.gripper.opening_m(&positions);
         let loads = self.robot.loads();
         if let Some(base) = self.robot.layout.base {
             let believed = self.believed(base.map(|idx| positions[idx]));
@@ -388,7 +388,7 @@ impl World {
         let n_joints = self.robot.model.joints.len();
         for (idx, position) in command.positions.iter().enumerate().take(n_joints) {
             let of_base = self.robot.layout.base.is_some_and(|base| base.contains(&idx));
-            if !of_base && !self.robot.layout.fingers.contains(&idx) {
+            if !of_base && !self.robot.layout.gripper.contains(idx) {
                 self.robot.aim(idx, *position);
             }
         }
@@ -400,8 +400,10 @@ impl World {
                 self.robot.aim(idx, value);
             }
         }
-        for idx in self.robot.layout.fingers {
-            self.robot.aim(idx, command.gripper_opening_m / 2.0);
+        for idx in 0..n_joints {
+            if let Some(target) = self.robot.layout.gripper.target(idx, command.gripper_opening_m) {
+                self.robot.aim(idx, target);
+            }
         }
         self.robot.limit_grip(command.grip_force_n);
         self.robot.push(&command.efforts);

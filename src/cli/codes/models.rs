@@ -67,6 +67,13 @@ const CODES_W: &[Code] = &[
         "correct `[physics]` in the configuration",
     ),
     code(
+        "W024",
+        "the opening of the robot's gripper can't be measured, or is smaller than `max_opening_m`",
+        "the grasp frame is not between the fingertips or is turned, or `finger_joints` or `finger_links` names others \
+         than those that move",
+        "follow the help: fingers open along the y axis of the grasp frame, whose origin is between the fingertips",
+    ),
+    code(
         "W030",
         "a model of another program can't be read",
         "its folder lacks `model.config` or the SDF file that it names",
@@ -93,8 +100,8 @@ const CODES_W: &[Code] = &[
     code(
         "W034",
         "a value in a model file is not allowed",
-        "a number is malformed, zero or negative where it must not be",
-        "correct the value",
+        "a number is malformed, zero or negative where it must not be, such as a moment of inertia of a moving link",
+        "correct the value; `actcheck check --mend` mends moments of inertia in a copy of a robot's URDF",
     ),
     code(
         "W035",
@@ -104,8 +111,9 @@ const CODES_W: &[Code] = &[
     ),
     code(
         "W036",
-        "a part of a model file is ignored",
-        "the simulation has no counterpart for it, such as plugins and air drag",
+        "a part of a model file is ignored, or is that of no real body",
+        "the simulation has no counterpart for it, such as plugins and air drag; or one moment of inertia exceeds the sum \
+         of the others",
         "nothing, if the model works without it; otherwise follow the help",
     ),
     code(
@@ -172,7 +180,7 @@ const CODES_W: &[Code] = &[
     code(
         "W053",
         "a joint can't have its role",
-        "it has the wrong type, such as a finger that turns, or no limits",
+        "it has the wrong type, such as a base joint that turns where it must slide, or does not move",
         "name another joint, or correct its type in the URDF",
     ),
     code(

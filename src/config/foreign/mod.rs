@@ -12,6 +12,7 @@ mod lookup;
 mod mesh_file;
 mod nested;
 pub(crate) mod robot;
+pub(crate) mod robot_inertia;
 pub(crate) mod robot_tree;
 mod sdf;
 mod urdf;

@@ -5,6 +5,7 @@ use std::path::Path;
 
 use crate::foreign::geometry::Shapes;
 use crate::foreign::lookup::Lookup;
+use crate::foreign::robot_inertia::{self, Mend};
 use crate::foreign::robot_tree::{self, Tree};
 use crate::foreign::xml::{self, Node, Reader};
 use actcheck_base::{Diagnostics, Source};
@@ -18,6 +19,8 @@ pub(crate) struct RobotText {
     pub(crate) digest: String,
     /// Its links and joints; `None` if the text is not a URDF or has no links.
     pub(crate) tree: Option<Tree>,
+    /// Proposed changes of impossible moments of inertia.
+    pub(crate) mends: Vec<Mend>,
 }
 
 /// Reads the links, joints and collision meshes, and reports every fault with its span.
@@ -28,7 +31,7 @@ pub(crate) fn read(source: &Source, path: &Path, lookup: &Lookup, found: &mut Di
         Ok(document) => document,
         Err(faults) => {
             found.extend(faults);
-            return RobotText { meshes, digest: shapes.digest.finish(), tree: None };
+            return RobotText { meshes, digest: shapes.digest.finish(), tree: None, mends: Vec::new() };
         }
     };
     let mut reader = Reader::new(source);
@@ -45,8 +48,9 @@ pub(crate) fn read(source: &Source, path: &Path, lookup: &Lookup, found: &mut Di
             read_collision(collision, &mut shapes, &mut meshes, &mut reader);
         }
     }
+    let mends = robot_inertia::check(root, &meshes, &mut reader);
     found.extend(reader.found);
-    RobotText { meshes, digest: shapes.digest.finish(), tree }
+    RobotText { meshes, digest: shapes.digest.finish(), tree, mends }
 }
 
 fn read_collision(

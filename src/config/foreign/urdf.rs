@@ -78,7 +78,7 @@ fn place(link: Node, joints: &[Node], reader: &mut Reader) -> Option<Isometry3<f
 }
 
 /// Reads the `<origin>` of an element; the identity if it has none.
-fn origin(node: Node, reader: &mut Reader) -> Option<Isometry3<f64>> {
+pub(crate) fn origin(node: Node, reader: &mut Reader) -> Option<Isometry3<f64>> {
     let Some(written) = xml::child(node, "origin") else { return Some(Isometry3::identity()) };
     let mut three = |name: &str| match written.attribute(name) {
         Some(text) => reader.numbers(written, text, Bound::Finite),

@@ -1,0 +1,121 @@
+//! The gap between two fingers: the distance of their inner surfaces at the grasp frame.
+
+use nalgebra::{Isometry3, Point3, Vector3};
+use parry3d::query::Ray;
+
+use crate::convert::{to_real, to_vector};
+use crate::description::RobotModel;
+use crate::engine::{Owner, collider};
+use crate::kinematics::motion;
+use rapier3d::prelude::Collider;
+
+/// Distances from the grasp frame along the fingers at which their surfaces are measured. Unit: metres.
+const ALONG_M: [f64; 5] = [-0.01, -0.005, 0.0, 0.005, 0.01];
+/// The same for the direction of the fingers' width. Fingertips are seldom narrower than 1 cm.
+const ACROSS_M: [f64; 5] = [-0.008, -0.004, 0.0, 0.004, 0.008];
+/// Distance from which surfaces are measured: beyond any finger. Unit: metres.
+const AWAY_M: f64 = 0.5;
+
+/// Where the inner surfaces of the fingers are, along the y axis of the grasp frame. Unit: metres.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub(crate) struct Gap {
+    pub(crate) left_m: f64,
+    pub(crate) right_m: f64,
+}
+
+impl Gap {
+    /// Distance between the surfaces; negative where they overlap.
+    pub(crate) fn width_m(&self) -> f64 {
+        self.left_m - self.right_m
+    }
+
+    /// The middle between the surfaces.
+    pub(crate) fn middle_m(&self) -> f64 {
+        f64::midpoint(self.left_m, self.right_m)
+    }
+
+    /// This gap at share 0 and another at share 1.
+    pub(crate) fn towards(&self, other: &Self, share: f64) -> Self {
+        let between = |from: f64, to: f64| from + share * (to - from);
+        Self { left_m: between(self.left_m, other.left_m), right_m: between(self.right_m, other.right_m) }
+    }
+}
+
+/// The parts that a set of joints moves.
+pub(crate) struct Moving {
+    /// Whether they move the grasp frame.
+    pub(crate) grasp_frame: bool,
+    /// Those that move the left and the right finger, from the finger inwards.
+    pub(crate) fingers: [Vec<usize>; 2],
+}
+
+/// Measures the gap between the fingers of a model.
+pub(crate) struct Probe<'a> {
+    model: &'a RobotModel,
+    links: [usize; 2],
+    grasp: (usize, Isometry3<f64>),
+    /// Shapes of the left and the right finger, in the frames of their links.
+    solids: [Vec<Collider>; 2],
+}
+
+impl<'a> Probe<'a> {
+    pub(crate) fn new(model: &'a RobotModel, links: [usize; 2], grasp: (usize, Isometry3<f64>)) -> Self {
+        let solids = links.map(|link| {
+            let solids = model.links[link].solids.iter();
+            solids.filter_map(|solid| collider(solid, Owner::Link(link), 0.0, 0.0)).map(|built| built.build()).collect()
+        });
+        Self { model, links, grasp, solids }
+    }
+
+    /// Returns the parts that these joints move.
+    pub(crate) fn moving(&self, joints: &[usize]) -> Moving {
+        let above = |link: usize| -> Vec<usize> {
+            let parent = |joint: &usize| self.model.joints[*joint].parent.checked_sub(1);
+            std::iter::successors(link.checked_sub(1), parent).filter(|joint| joints.contains(joint)).collect()
+        };
+        Moving { grasp_frame: !above(self.grasp.0).is_empty(), fingers: self.links.map(above) }
+    }
+
+    /// Measures the gap at these joint positions. Returns `None` if a finger has no surface at the grasp frame.
+    pub(crate) fn gap(&self, positions: &[f64]) -> Option<Gap> {
+        let grasp = self.pose(self.grasp.0, positions) * self.grasp.1;
+        let [left, right] = [0, 1].map(|side| {
+            // The left finger's inner surface is its lowest along y, the right finger's its highest.
+            let sign = if side == 0 { 1.0 } else { -1.0 };
+            let from_grasp = self.pose(self.links[side], positions).inverse() * grasp;
+            let nearest = Self::rays(&from_grasp, sign).filter_map(|ray| self.hit(side, &ray));
+            nearest.min_by(f64::total_cmp).map(|along| sign * (along - AWAY_M))
+        });
+        Some(Gap { left_m: left?, right_m: right? })
+    }
+
+    fn rays(from_grasp: &Isometry3<f64>, sign: f64) -> impl Iterator<Item = Ray> + '_ {
+        let direction = from_grasp.rotation * Vector3::new(0.0, sign, 0.0);
+        ALONG_M.into_iter().flat_map(move |x| {
+            ACROSS_M.into_iter().map(move |z| {
+                let origin = from_grasp * Point3::new(x, -sign * AWAY_M, z);
+                Ray::new(to_vector(&origin.coords), to_vector(&direction))
+            })
+        })
+    }
+
+    /// Distance to a finger's surface along a ray in the frame of its link.
+    fn hit(&self, side: usize, ray: &Ray) -> Option<f64> {
+        let hits = self.solids[side]
+            .iter()
+            .filter_map(|solid| solid.shape().cast_ray(solid.position(), ray, to_real(2.0 * AWAY_M), true));
+        hits.map(f64::from).min_by(f64::total_cmp)
+    }
+
+    /// Pose of a link in the frame of the root, with the other joints at 0.
+    fn pose(&self, link: usize, positions: &[f64]) -> Isometry3<f64> {
+        let mut pose = Isometry3::identity();
+        let mut at = link;
+        while let Some(idx) = at.checked_sub(1) {
+            let joint = &self.model.joints[idx];
+            pose = joint.origin * motion(joint, positions.get(idx).copied().unwrap_or(0.0)) * pose;
+            at = joint.parent;
+        }
+        pose
+    }
+}

@@ -1,0 +1,163 @@
+//! Finds the gripper of a profile; measures its opening on the model unless that is known.
+
+use nalgebra::Isometry3;
+
+use crate::WorldError;
+use crate::description::RobotModel;
+use crate::gripper::coupling::{Follower, coupled};
+use crate::gripper::gap::{Gap, Probe};
+use crate::gripper::opening::{Gripper, Leader};
+use crate::gripper::sliding::sliding;
+use crate::gripper::table::{Entry, longest_run, travel};
+use actcheck_data::RobotProfile;
+
+/// Intervals of the table. At this number, the error between entries is about 0.01 mm for a finger of 10 cm.
+const INTERVALS: usize = 60;
+/// Least difference between the widest and the smallest opening. Unit: metres.
+const LEAST_TRAVEL_M: f64 = 0.005;
+/// Least lever of a motor: below it, its force would be a guess. Unit: metres per radian.
+const LEAST_LEVER_M: f64 = 1e-4;
+
+impl Gripper {
+    /// Finds the gripper of a profile. `links` are the fingers, `grasp` is the grasp frame with its link.
+    ///
+    /// # Errors
+    /// [`WorldError::Gripper`] if the opening can't be measured, [`WorldError::Missing`] for an unknown joint.
+    pub(crate) fn find(
+        profile: &RobotProfile,
+        model: &RobotModel,
+        links: [usize; 2],
+        grasp: (usize, Isometry3<f64>),
+    ) -> Result<Self, WorldError> {
+        let named = profile.finger_joints.iter().map(|name| model.joint(name)).collect::<Result<Vec<_>, _>>()?;
+        let [left, right] = links;
+        // Some robots name their fingers as seen from the front.
+        let probes = [[left, right], [right, left]].map(|links| Probe::new(model, links, grasp));
+        if let Some(sliding) = probes.iter().find_map(|probe| sliding(&named, model, probe)) {
+            return Ok(sliding);
+        }
+        let [usual, swapped] = probes.map(|probe| measured(&named, model, &probe));
+        let found = match (usual, swapped) {
+            (Ok(usual), Ok(swapped)) if swapped.widest_m > usual.widest_m => Ok(swapped.with_sides_swapped()),
+            (Err(_), Ok(swapped)) => Ok(swapped.with_sides_swapped()),
+            (usual, _) => usual,
+        };
+        found.map_err(|what| WorldError::Gripper { name: profile.urdf.name.to_string(), what })
+    }
+
+    /// The same gripper with the fingers in the profile's order.
+    fn with_sides_swapped(mut self) -> Self {
+        self.sides.reverse();
+        self
+    }
+}
+
+/// Measures the opening on the model. The error is a sentence.
+fn measured(named: &[usize], model: &RobotModel, probe: &Probe<'_>) -> Result<Gripper, String> {
+    let drive = Drive::find(named, model, probe)?;
+    let best = drive
+        .ways()
+        .into_iter()
+        .filter_map(|ends| {
+            let gap = |idx: usize| probe.gap(&drive.posture(&ends, idx as f64 / INTERVALS as f64));
+            Some((longest_run(&(0..=INTERVALS).map(gap).collect::<Vec<_>>())?, ends))
+        })
+        .max_by(|a, b| travel(&a.0).total_cmp(&travel(&b.0)));
+    let Some((table, ends)) = best.filter(|(table, _)| travel(table) > LEAST_TRAVEL_M) else {
+        return Err(
+            "the opening of its gripper can't be measured: no two surfaces of `finger_links` that face each other at \
+             the grasp frame come closer"
+                .to_owned(),
+        );
+    };
+    Ok(drive.gripper(&table, &ends))
+}
+
+/// The joints that move the fingers.
+struct Drive<'a> {
+    model: &'a RobotModel,
+    leaders: Vec<usize>,
+    followers: Vec<Follower>,
+    /// Index of the leader that moves the left and the right finger.
+    sides: [usize; 2],
+}
+
+impl<'a> Drive<'a> {
+    fn find(named: &[usize], model: &'a RobotModel, probe: &Probe<'_>) -> Result<Self, String> {
+        let (mut leaders, followers) = coupled(named, model);
+        let all: Vec<usize> = leaders.iter().copied().chain(followers.iter().map(|own| own.joint)).collect();
+        let moving = probe.moving(&all);
+        if moving.grasp_frame {
+            return Err("its fingers can't be measured: the joints in `finger_joints` move the `grasp_link`".to_owned());
+        }
+        let leader_of = |joint: &usize| {
+            let followed = followers.iter().find(|own| own.joint == *joint).map(|own| own.leader);
+            followed.or_else(|| leaders.iter().position(|leader| leader == joint))
+        };
+        let sides = match moving.fingers.each_ref().map(|joints| joints.iter().find_map(leader_of)) {
+            [Some(left), Some(right)] => [left, right],
+            [Some(only), None] | [None, Some(only)] => [only; 2],
+            [None, None] => return Err("none of its `finger_joints` moves one of its `finger_links`".to_owned()),
+        };
+        // Joints that move neither finger stay where they are.
+        leaders.truncate(sides[0].max(sides[1]) + 1);
+        let unlimited = |joint: &&usize| !model.joints[**joint].upper.is_finite();
+        if let Some(joint) = leaders.iter().find(unlimited) {
+            let name = &model.joints[*joint].name;
+            return Err(format!("the opening of its gripper can't be measured: `{name}` has no limits"));
+        }
+        Ok(Self { model, leaders, followers, sides })
+    }
+
+    /// Returns the ways on which the gripper may open: the first and the last position of each leader.
+    fn ways(&self) -> Vec<Vec<(f64, f64)>> {
+        let limits = |joint: &usize| (self.model.joints[*joint].lower, self.model.joints[*joint].upper);
+        let rising: Vec<(f64, f64)> = self.leaders.iter().map(limits).collect();
+        let falling = |(from, to): (f64, f64)| (to, from);
+        let mut ways = vec![rising.clone(), rising.iter().copied().map(falling).collect()];
+        // Two joints may open in opposite directions.
+        if let [first, second] = rising[..] {
+            ways.extend([vec![first, falling(second)], vec![falling(first), second]]);
+        }
+        ways
+    }
+
+    /// Returns the positions of all joints at a share of a way.
+    fn posture(&self, ends: &[(f64, f64)], share: f64) -> Vec<f64> {
+        let mut positions = vec![0.0; self.model.joints.len()];
+        for (leader, (from, to)) in self.leaders.iter().zip(ends) {
+            positions[*leader] = from + share * (to - from);
+        }
+        for Follower { joint, leader, factor, offset } in &self.followers {
+            if let Some(leader) = self.leaders.get(*leader) {
+                positions[*joint] = factor * positions[*leader] + offset;
+            }
+        }
+        positions
+    }
+
+    /// The gripper with this table, on a way with these ends.
+    fn gripper(mut self, table: &[Entry], ends: &[(f64, f64)]) -> Gripper {
+        let first = table.first().map_or(0.0, |entry| entry.share);
+        let last = table.last().map_or(1.0, |entry| entry.share);
+        let gap_of = |entry: Option<&Entry>| entry.map_or(Gap::default(), |entry| entry.gap);
+        let (closed, open) = (gap_of(table.first()), gap_of(table.last()));
+        let travels = [open.left_m - closed.left_m, closed.right_m - open.right_m];
+        let leaders = self.leaders.iter().zip(ends).enumerate().map(|(idx, (joint, (from, to)))| {
+            let moved: f64 = (0..2).filter(|side| self.sides[*side] == idx).map(|side| travels[side]).sum();
+            let at = |share: f64| from + share * (to - from);
+            let lever_m = (moved / (at(last) - at(first))).abs().max(LEAST_LEVER_M);
+            Leader { joint: *joint, closed: at(first), open: at(last), lever_m }
+        });
+        let leaders: Vec<Leader> = leaders.collect();
+        self.followers.retain(|follower| follower.leader < leaders.len());
+        let shared = |entry: &Entry| Entry { share: (entry.share - first) / (last - first), gap: entry.gap };
+        Gripper {
+            leaders,
+            followers: self.followers,
+            sides: self.sides,
+            table: table.iter().map(shared).collect(),
+            widest_m: open.width_m(),
+        }
+    }
+}

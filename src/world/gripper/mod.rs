@@ -1,0 +1,18 @@
+//! The gripper: which joints move its fingers, and how far apart these are at any position of the joints.
+//!
+//! Two fingers that slide apart from 0 need no table: each is at half of the opening. For all other grippers (turning
+//! fingers, other directions, couplings, one moving finger), the opening is measured on the model at evenly spaced
+//! positions between open and closed.
+//!
+//! Never: knows the engine's state, or decides how wide to open.
+
+mod coupling;
+mod gap;
+mod measure;
+mod opening;
+mod sliding;
+mod table;
+#[cfg(test)]
+mod tests;
+
+pub use opening::Gripper;

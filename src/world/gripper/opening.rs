@@ -1,0 +1,141 @@
+//! The opening of a gripper as a function of its joints, and the reverse.
+
+use crate::gripper::coupling::Follower;
+use crate::gripper::table::{Entry, interpolated};
+
+/// Largest speed of a fingertip. Unit: m/s. A finger that is faster throws the object away before the other arrives.
+const FASTEST_M_S: f64 = 0.1;
+
+/// A joint that a motor of the gripper moves.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Leader {
+    pub(super) joint: usize,
+    /// Position where the gripper is closed.
+    pub(super) closed: f64,
+    /// Position where it is open.
+    pub(super) open: f64,
+    /// Way of the fingertips per way of the joint, on average. Unit: 1, or metres per radian.
+    pub(super) lever_m: f64,
+}
+
+/// The opening of a gripper as a function of its joints.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Gripper {
+    pub(super) leaders: Vec<Leader>,
+    /// Joints that mimic a leader, without a motor of their own.
+    pub(super) followers: Vec<Follower>,
+    /// Index of the leader that moves the left and the right finger. A finger that does not move has the other's.
+    pub(super) sides: [usize; 2],
+    /// From closed to open; empty for two sliding fingers, each at half of the opening.
+    pub(super) table: Vec<Entry>,
+    /// Widest opening; for two sliding fingers, twice the smaller upper limit. Unit: metres.
+    pub(super) widest_m: f64,
+}
+
+impl Gripper {
+    /// Returns all joints that move the fingers, those with a motor first.
+    pub fn joints(&self) -> impl Iterator<Item = usize> + '_ {
+        let leaders = self.leaders.iter().map(|leader| leader.joint);
+        leaders.chain(self.followers.iter().map(|follower| follower.joint))
+    }
+
+    /// Returns whether a joint moves a finger.
+    pub fn contains(&self, joint: usize) -> bool {
+        self.joints().any(|own| own == joint)
+    }
+
+    /// Returns whether a joint follows another of this gripper and has no motor.
+    pub(crate) fn follows(&self, joint: usize) -> bool {
+        self.followers.iter().any(|follower| follower.joint == joint)
+    }
+
+    /// Returns the joints with a motor, each with its lever: way of the fingertips per way of the joint.
+    pub(crate) fn motors(&self) -> impl Iterator<Item = (usize, f64)> + '_ {
+        self.leaders.iter().map(|leader| (leader.joint, leader.lever_m))
+    }
+
+    /// Returns the lever of a joint with a motor.
+    pub(crate) fn lever_m(&self, joint: usize) -> Option<f64> {
+        self.motors().find(|(own, _)| *own == joint).map(|(_, lever_m)| lever_m)
+    }
+
+    /// Returns the largest speed of a joint, given that of its URDF; fingers that were measured are slowed down.
+    pub(crate) fn fastest(&self, joint: usize, velocity: f64) -> f64 {
+        match self.lever_m(joint) {
+            Some(lever_m) if !self.table.is_empty() => velocity.min(FASTEST_M_S / lever_m),
+            _ => velocity,
+        }
+    }
+
+    /// For the left and the right finger: the joint that moves it, 1 or -1 for the direction of the joint in which the
+    /// finger opens, and the joint's lever.
+    pub(crate) fn sides(&self) -> [(usize, f64, f64); 2] {
+        self.sides.map(|side| {
+            let Leader { joint, closed, open, lever_m } = self.leaders[side];
+            (joint, (open - closed).signum(), lever_m)
+        })
+    }
+
+    /// Returns the speeds of the left and the right fingertip. Unit: m/s; positive opens.
+    pub fn speeds(&self, velocities: &[f64]) -> [f64; 2] {
+        self.sides().map(|(joint, sign, lever_m)| velocities[joint] * sign * lever_m)
+    }
+
+    /// Returns the widest opening. Unit: metres.
+    pub fn widest_m(&self) -> f64 {
+        self.widest_m
+    }
+
+    /// Returns the gap between the fingers at these joint positions. Unit: metres.
+    pub fn opening_m(&self, positions: &[f64]) -> f64 {
+        if self.table.is_empty() {
+            return self.leaders.iter().map(|leader| positions[leader.joint]).sum();
+        }
+        let shares = self.leaders.iter().map(|leader| {
+            let Leader { joint, closed, open, .. } = *leader;
+            (positions[joint] - closed) / (open - closed)
+        });
+        let gaps: f64 = shares.map(|share| interpolated(&self.table, |entry| entry.share, share).1.width_m()).sum();
+        (gaps / self.leaders.len() as f64).max(0.0)
+    }
+
+    /// Returns the position of one of its joints at an opening, or `None` for any other joint.
+    pub fn target(&self, joint: usize, opening_m: f64) -> Option<f64> {
+        if self.table.is_empty() {
+            return self.contains(joint).then_some(opening_m / 2.0);
+        }
+        let share = self.share(opening_m);
+        let at = |leader: &Leader| leader.closed + share * (leader.open - leader.closed);
+        if let Some(leader) = self.leaders.iter().find(|leader| leader.joint == joint) {
+            return Some(at(leader));
+        }
+        let Follower { leader, factor, offset, .. } = self.followers.iter().find(|own| own.joint == joint)?;
+        Some(factor * at(&self.leaders[*leader]) + offset)
+    }
+
+    /// Sets the positions of its joints to an opening.
+    pub fn set(&self, positions: &mut [f64], opening_m: f64) {
+        for joint in self.joints() {
+            if let (Some(position), Some(target)) = (positions.get_mut(joint), self.target(joint, opening_m)) {
+                *position = target;
+            }
+        }
+    }
+
+    /// Returns where the middle between the fingers is at an opening, along the y axis of the grasp frame: other than 0
+    /// if only one finger moves. Unit: metres.
+    pub fn middle_m(&self, opening_m: f64) -> f64 {
+        match self.table.is_empty() {
+            true => 0.0,
+            false => interpolated(&self.table, |entry| entry.share, self.share(opening_m)).1.middle_m(),
+        }
+    }
+
+    /// The share of the way from closed to open at an opening. Nothing closes the fingers completely.
+    fn share(&self, opening_m: f64) -> f64 {
+        match opening_m > 0.0 {
+            true => interpolated(&self.table, |entry| entry.gap.width_m(), opening_m).0,
+            false => 0.0,
+        }
+    }
+}

@@ -1,0 +1,148 @@
+//! The opening of grippers with known closed forms.
+
+use std::path::Path;
+
+use crate::Joint;
+use crate::layout::check_robot;
+use crate::robot::tests::alone;
+use actcheck_base::{Files, Source};
+use actcheck_data::RobotProfile;
+
+/// A hand with fingers of 10 cm whose inner faces are 2 cm off its middle at position 0. The grasp frame is 10 cm
+/// from the hinges. `left` and `right` are the types and limits of the finger joints.
+fn hand(left: &str, right: &str, finger_joints: &[&str]) -> RobotProfile {
+    let path = Path::new("models/robots/mobile_manipulator.toml");
+    let mut profile = actcheck_config::robot::read(&Files::Shipped, path).expect("the shipped robot is valid");
+    let inertial = "<inertial><mass value=\"0.1\"/>\
+                    <inertia ixx=\"1e-4\" ixy=\"0\" ixz=\"0\" iyy=\"1e-4\" iyz=\"0\" izz=\"1e-4\"/></inertial>";
+    let finger = |name: &str, y: f64, joint: &str| {
+        format!(
+            "<link name=\"{name}_finger\">{inertial}<collision><origin xyz=\"0.06 {} 0\"/><geometry>\
+             <box size=\"0.1 0.01 0.03\"/></geometry></collision></link>\
+             <joint name=\"{name}\" {joint}<parent link=\"palm\"/><child link=\"{name}_finger\"/>\
+             <origin xyz=\"0 {y} 0\"/></joint>",
+            0.005_f64.copysign(y)
+        )
+    };
+    let text = format!(
+        "<robot name=\"hand\"><link name=\"base\"/>\
+         <joint name=\"lift\" type=\"prismatic\"><parent link=\"base\"/><child link=\"palm\"/><axis xyz=\"0 0 1\"/>\
+         <limit lower=\"0.5\" upper=\"1\" effort=\"300\" velocity=\"0.2\"/></joint>\
+         <link name=\"palm\">{inertial}</link>{}{}\
+         <joint name=\"tip\" type=\"fixed\"><parent link=\"palm\"/><child link=\"grasp\"/>\
+         <origin xyz=\"0.1 0 0\"/></joint><link name=\"grasp\"/></robot>",
+        finger("left", 0.02, left),
+        finger("right", -0.02, right),
+    );
+    profile.urdf = Source::new("hand.urdf", text);
+    profile.base_joints = None;
+    profile.arm_joints = vec!["lift".to_owned()];
+    profile.home = vec![0.6];
+    profile.postures = Vec::new();
+    profile.head_joints = Vec::new();
+    profile.finger_joints = finger_joints.iter().map(|name| (*name).to_owned()).collect();
+    profile.finger_links = ["left_finger", "right_finger"].map(str::to_owned);
+    profile.grasp_link = "grasp".to_owned();
+    profile.camera_link = "base".to_owned();
+    profile.max_opening_m = 0.1;
+    profile
+}
+
+fn turning(lower: f64, upper: f64) -> String {
+    format!(
+        "type=\"revolute\"><axis xyz=\"0 0 1\"/>\
+         <limit lower=\"{lower}\" upper=\"{upper}\" effort=\"20\" velocity=\"2\"/>"
+    )
+}
+
+fn sliding_from(lower: f64, upper: f64, y: f64) -> String {
+    format!(
+        "type=\"prismatic\"><axis xyz=\"0 {y} 0\"/>\
+         <limit lower=\"{lower}\" upper=\"{upper}\" effort=\"20\" velocity=\"0.1\"/>"
+    )
+}
+
+const FIXED: &str = "type=\"fixed\">";
+const MIMIC: &str = "<mimic joint=\"left\" multiplier=\"-1\"/>";
+
+/// Distance of the inner face from the middle: nearest 9 cm from the hinge, at the border of the measured region.
+fn turned(angle: f64) -> f64 {
+    0.02 + 0.09 * libm::tan(angle)
+}
+
+/// Hands, each with its motors, the positions of left and right finger at share 0.5 of the way, and the opening
+/// there in closed form.
+fn hands() -> Vec<(RobotProfile, Vec<f64>, f64)> {
+    let (left, right) = (turning(0.0, 0.6), turning(-0.6, 0.0));
+    let coupled = format!("{right}{MIMIC}");
+    let (down, up) = (sliding_from(-0.04, 0.0, -1.0), sliding_from(-0.04, 0.0, 1.0));
+    vec![
+        (hand(&left, &right, &["left", "right"]), vec![0.3, -0.3], 2.0 * turned(0.3)),
+        (hand(&left, &coupled, &["left"]), vec![0.3, -0.3], 2.0 * turned(0.3)),
+        (hand(&left, &coupled, &["left", "right"]), vec![0.3, -0.3], 2.0 * turned(0.3)),
+        (hand(&left, FIXED, &["left"]), vec![0.3], 0.02 + turned(0.3)),
+        (hand(&down, &up, &["left", "right"]), vec![-0.02, -0.02], 0.08),
+    ]
+}
+
+#[test]
+fn the_opening_is_that_of_the_closed_form() {
+    for (idx, (profile, positions, opening_m)) in hands().into_iter().enumerate() {
+        let world = alone(profile);
+        let gripper = &world.layout().gripper;
+        let place = |joint: &Joint| ["left", "right"].iter().position(|name| *name == joint.name);
+        let joints = world.kinematics().joints().iter();
+        let all: Vec<f64> = joints.map(|joint| place(joint).map_or(0.6, |idx| positions[idx])).collect();
+        let measured = gripper.opening_m(&all);
+        assert!((measured - opening_m).abs() < 2e-5, "hand {idx}: {measured} m instead of {opening_m} m");
+        let mut set = vec![0.6; all.len()];
+        gripper.set(&mut set, opening_m);
+        let far = set.iter().zip(&all).map(|(is, wanted)| (is - wanted).abs()).fold(0.0, f64::max);
+        assert!(far < 2e-4, "hand {idx}: {set:?} instead of {all:?}");
+    }
+}
+
+#[test]
+fn one_moving_finger_has_its_middle_beside_the_grasp_frame() {
+    let world = alone(hands().swap_remove(3).0);
+    let middle_m = world.layout().gripper.middle_m(0.02 + turned(0.3));
+    let expected = f64::midpoint(turned(0.3), -0.02);
+    assert!((middle_m - expected).abs() < 2e-5, "{middle_m} m instead of {expected} m");
+}
+
+/// Motors and couplings bring the fingers to the commanded opening.
+#[test]
+fn all_hands_open_and_close() {
+    for (idx, (profile, _, _)) in hands().into_iter().enumerate() {
+        let mut world = alone(profile);
+        let mut command = world.hold();
+        for opening_m in [0.07, 0.06, 0.075] {
+            command.gripper_opening_m = opening_m;
+            (0..120).for_each(|_| world.step(&command));
+            let reached = world.observe().gripper_opening_m;
+            assert!((reached - opening_m).abs() < 1e-3, "hand {idx}: {reached} m instead of {opening_m} m");
+        }
+    }
+}
+
+#[test]
+fn a_gripper_that_cannot_be_measured_is_refused() {
+    let left = turning(0.0, 0.6);
+    let of = |profile: &RobotProfile| check_robot(profile).expect_err("it can't be measured").diagnostic();
+    let mut apart = hand(&left, FIXED, &["left"]);
+    apart.grasp_offset_m = [0.0, 0.0, 0.5];
+    let mut inside = hand(&left, FIXED, &["left"]);
+    inside.grasp_link = "left_finger".to_owned();
+    let mut wide = hand(&left, FIXED, &["left"]);
+    wide.max_opening_m = 0.12;
+    for (profile, part) in [
+        (apart, "no two surfaces"),
+        (inside, "move the `grasp_link`"),
+        (wide, "no wider than 0.1"),
+        (hand(FIXED, FIXED, &["lift"]), "move the `grasp_link`"),
+    ] {
+        let found = of(&profile);
+        assert_eq!(found.code, "W024");
+        assert!(found.message.contains(part), "{}", found.message);
+    }
+}
