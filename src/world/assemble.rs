@@ -45,6 +45,11 @@ pub(super) fn home(profile: &RobotProfile, model: &RobotModel, named: &Named, ba
     for idx in named.layout.gripper.joints() {
         positions[idx] = positions[idx].clamp(model.joints[idx].lower, model.joints[idx].upper);
     }
+    for (idx, joint) in model.joints.iter().enumerate().filter(|(idx, _)| !named.layout.gripper.contains(*idx)) {
+        if let Some((leader, factor, offset)) = joint.mimic {
+            positions[idx] = (factor * positions[leader] + offset).clamp(joint.lower, joint.upper);
+        }
+    }
     positions
 }
 

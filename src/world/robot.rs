@@ -166,6 +166,18 @@ impl Robot {
         }
     }
 
+    /// Sets the targets of mimic joints outside of the gripper to those of their leaders: their motors must not resist
+    /// the coupling.
+    pub fn aim_followers(&mut self) {
+        for idx in 0..self.motors.len() {
+            if let Some((leader, factor, offset)) = self.model.joints[idx].mimic
+                && !self.layout.gripper.contains(idx)
+            {
+                self.aim(idx, factor * self.motors[leader].target + offset);
+            }
+        }
+    }
+
     /// Returns a joint's target position.
     pub fn target(&self, joint: usize) -> f64 {
         self.motors[joint].target

@@ -405,6 +405,7 @@ impl World {
                 self.robot.aim(idx, target);
             }
         }
+        self.robot.aim_followers();
         self.robot.limit_grip(command.grip_force_n);
         self.robot.push(&command.efforts);
     }

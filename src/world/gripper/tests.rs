@@ -2,9 +2,9 @@
 
 use std::path::Path;
 
-use crate::Joint;
 use crate::layout::check_robot;
 use crate::robot::tests::alone;
+use crate::{Joint, World};
 use actcheck_base::{Files, Source};
 use actcheck_data::RobotProfile;
 
@@ -144,5 +144,31 @@ fn a_gripper_that_cannot_be_measured_is_refused() {
         let found = of(&profile);
         assert_eq!(found.code, "W024");
         assert!(found.message.contains(part), "{}", found.message);
+    }
+}
+
+/// A mast that mimics the lift has a motor of its own, which must not hold it back. (The torso of a robot whose arm and
+/// head are on one lift stayed at 0, and stopped the arm.)
+#[test]
+fn a_mimic_joint_outside_the_gripper_follows_its_leader() {
+    let (left, right) = (turning(0.0, 0.6), turning(-0.6, 0.0));
+    let mut profile = hand(&left, &right, &["left", "right"]);
+    let mast = "<joint name=\"mast\" type=\"prismatic\"><parent link=\"base\"/><child link=\"mast_link\"/>\
+                <axis xyz=\"0 0 1\"/><limit lower=\"0\" upper=\"1\" effort=\"300\" velocity=\"0.2\"/>\
+                <mimic joint=\"lift\" multiplier=\"0.5\"/></joint><link name=\"mast_link\"><inertial><mass value=\"5\"/>\
+                <inertia ixx=\"0.01\" ixy=\"0\" ixz=\"0\" iyy=\"0.01\" iyz=\"0\" izz=\"0.01\"/></inertial></link></robot>";
+    profile.urdf = Source::new("hand.urdf", profile.urdf.text.replace("</robot>", mast));
+    let mut world = alone(profile);
+    let at = |world: &World, name: &str| {
+        let idx = world.kinematics().joints().iter().position(|joint| joint.name == name).expect("it has this joint");
+        (idx, world.observe().positions[idx])
+    };
+    assert!((at(&world, "mast").1 - 0.3).abs() < 1e-6, "at home: {:?}", at(&world, "mast"));
+    let mut command = world.hold();
+    command.positions[at(&world, "lift").0] = 0.9;
+    (0..180).for_each(|_| world.step(&command));
+    for (name, wanted) in [("lift", 0.9), ("mast", 0.45)] {
+        let reached = at(&world, name).1;
+        assert!((reached - wanted).abs() < 2e-3, "{name}: {reached} m instead of {wanted} m");
     }
 }
