@@ -255,7 +255,7 @@ mod tests {
              <link name=\"a\">{moving}</link><link name=\"b\">{fixed}</link></robot>"
         );
         let source = Source::new("r.urdf", text);
-        let document = parse_model(&source).expect("it is XML");
+        let document = parse_model(&source, &source.text).expect("it is XML");
         let mut reader = Reader::new(&source);
         let mends = check(document.root_element(), &BTreeMap::new(), &mut reader);
         (reader.found.iter().map(|fault| fault.code).collect(), mends)
