@@ -154,7 +154,7 @@ fn a_mimic_joint_outside_the_gripper_follows_its_leader() {
     let (left, right) = (turning(0.0, 0.6), turning(-0.6, 0.0));
     let mut profile = hand(&left, &right, &["left", "right"]);
     let mast = "<joint name=\"mast\" type=\"prismatic\"><parent link=\"base\"/><child link=\"mast_link\"/>\
-                <axis xyz=\"0 0 1\"/><limit lower=\"0\" upper=\"1\" effort=\"300\" velocity=\"0.2\"/>\
+                <axis xyz=\"0 0 1\"/><limit lower=\"0\" upper=\"1\" effort=\"900\" velocity=\"0.2\"/>\
                 <mimic joint=\"lift\" multiplier=\"0.5\"/></joint><link name=\"mast_link\"><inertial><mass value=\"5\"/>\
                 <inertia ixx=\"0.01\" ixy=\"0\" ixz=\"0\" iyy=\"0.01\" iyz=\"0\" izz=\"0.01\"/></inertial></link></robot>";
     profile.urdf = Source::new("hand.urdf", profile.urdf.text.replace("</robot>", mast));
