@@ -72,12 +72,8 @@ impl<'a> Prefixes<'a> {
         let (mut quote, mut name) = (None, 1);
         for (idx, byte) in text.bytes().enumerate().skip(1) {
             match (quote, byte) {
-                (Some(open), _) => {
-                    if byte == open {
-                        quote = None;
-                        name = idx + 1;
-                    }
-                }
+                (Some(open), _) if byte == open => (quote, name) = (None, idx + 1),
+                (Some(_), _) => {}
                 (None, b'"' | b'\'') => quote = Some(byte),
                 (None, b'>') => return idx + 1,
                 (None, b':') => self.add(&text[name..idx], &text[idx + 1..], at + idx),

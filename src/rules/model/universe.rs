@@ -8,15 +8,18 @@ use crate::model::values::text_len;
 use crate::watch::{Stop, Watch};
 use actcheck_base::{ActionFacts, Course, Term, TermId, Terms};
 
+/// The IRI of a quantity over time, and the IRIs of the things it is of.
+type QuantityKey = (String, Vec<String>);
+
 /// Terms of three origins with common ids. The terms of the rules and of the run are borrowed, not copied.
 #[derive(Debug)]
 pub(crate) struct Universe<'a> {
     book: &'a Terms,
     run: Option<&'a Terms>,
     course: Option<&'a Course>,
-    /// Quantities over time that were computed so far, by their IRI and the things they are of; `None` if they are not
-    /// known. Several properties read the same ones.
-    quantities: RefCell<BTreeMap<(String, Vec<String>), Option<Rc<Vec<f64>>>>>,
+    /// Quantities over time that were computed so far; `None` if they are not known. Several properties read the same
+    /// ones.
+    quantities: RefCell<BTreeMap<QuantityKey, Option<Rc<Vec<f64>>>>>,
     /// Common id of each term of the run, or [`UNKNOWN`] until first used.
     run_ids: Vec<TermId>,
     created: Terms,
