@@ -42,6 +42,7 @@ mod intervals;
 mod journal;
 mod kills;
 mod last_failed;
+mod launch;
 mod margins;
 mod merge;
 mod mistakes;

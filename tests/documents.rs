@@ -10,11 +10,12 @@ use crate::support::expected::assert_expected;
 use crate::support::{actcheck, edit, root, script, stderr, stdout};
 
 /// Pages with commands. Each has a test, so that they run side by side.
-const WITH_COMMANDS: [&str; 9] = [
+const WITH_COMMANDS: [&str; 10] = [
     "bisect.md",
     "cookbook.md",
     "failures.md",
     "history.md",
+    "launch.md",
     "own-skill.md",
     "properties.md",
     "time.md",
@@ -64,6 +65,11 @@ fn commands_of_the_page_about_failures_work() {
 #[test]
 fn commands_of_the_page_about_histories_work() {
     commands_work("history.md");
+}
+
+#[test]
+fn commands_of_the_page_about_launches_work() {
+    commands_work("launch.md");
 }
 
 #[test]

@@ -30,6 +30,15 @@ pub enum Command {
     /// 130 interrupted by Ctrl-C (finished runs are kept).
     #[command(after_help = "Example:\n  actcheck run configs/pick.toml --runs 5 --history /tmp/try")]
     Run(crate::run_args::RunArgs),
+    /// Run a campaign in shards, each in a process of its own, and merge them into one history
+    ///
+    /// The results are those of `actcheck run`. A shard whose process was lost is resumed. Until they are merged, the
+    /// shards are in a folder beside the history (DIR.launch); after an interrupt, the same command continues there.
+    ///
+    /// Exit code: 0 everything passed, 1 a property failed, 2 a shard could not be completed, 130 interrupted by Ctrl-C
+    /// (finished runs are kept).
+    #[command(after_help = "Example:\n  actcheck launch configs/quick.toml --shards 2 --history /tmp/shards")]
+    Launch(crate::launch::LaunchArgs),
     /// Write a configuration or a property, ready to edit
     #[command(after_help = "Examples:\n  actcheck new campaign\n  actcheck new property StaysUpright --for Pick")]
     New(crate::new::NewArgs),
@@ -250,6 +259,12 @@ pub enum Command {
     /// Print the manual as a man page, or write one page for each command
     #[command(after_help = "Examples:\n  actcheck man | man -l -\n  actcheck man --out man1")]
     Man(crate::man::ManArgs),
+    /// Begin or resume one shard of `actcheck launch`
+    #[command(
+        hide = true,
+        after_help = "Example:\n  actcheck launch configs/quick.toml --shards 2    (starts this for each shard)"
+    )]
+    LaunchTask(crate::launch::LaunchTaskArgs),
     /// Answer one query of `actcheck serve`
     #[command(hide = true, after_help = "Example:\n  actcheck serve    (starts this for each query)")]
     ServeQuery(crate::serve::ServeQueryArgs),

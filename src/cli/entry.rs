@@ -24,6 +24,8 @@ pub fn run(sources_digest: &'static str) -> ExitCode {
         Command::Analyse(args) => crate::analyse::analyse(&args).map(|()| 0),
         Command::Report(args) => crate::report::report(&args).map(|()| 0),
         Command::Run(args) => crate::run::run(&args),
+        Command::Launch(args) => crate::launch::launch(&args),
+        Command::LaunchTask(args) => crate::launch::task(&args),
         Command::Replay(args) => crate::replay::replay(&args),
         Command::Check(args) => stop::interruptible(|stop| check::check(&args, stop).map(|()| 0)),
         Command::Compare(args) => crate::compare::compare(&args),

@@ -17,7 +17,7 @@ struct Group {
 
 /// All commands except hidden ones. They are declared in the same order, which completions and the manual use.
 const GROUPS: [Group; 4] = [
-    Group { title: "Run", commands: &["run", "new", "check", "replay", "shrink"] },
+    Group { title: "Run", commands: &["run", "launch", "new", "check", "replay", "shrink"] },
     Group {
         title: "Look",
         commands: &["list", "show", "report", "analyse", "compare", "bisect", "health", "query", "serve", "explain"],

@@ -26,6 +26,7 @@ mod groups;
 mod health;
 mod history_dir;
 mod integrity;
+mod launch;
 mod list;
 mod live_failures;
 mod man;

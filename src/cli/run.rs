@@ -36,7 +36,6 @@ const MIRROR_EVERY: usize = 1_000;
 pub fn run(args: &RunArgs) -> Result<u8, Diagnostics> {
     let (stop, shown) = interrupt();
     let budget = Budget { stop: Arc::clone(&stop), ..Budget::default() };
-    let clock = clock::system();
     let jobs = args.jobs.map_or_else(all_cores, usize::from);
     let session = match session::open(args, &budget, jobs)? {
         Opened::Case(env) => return case::run(args, *env),
@@ -47,20 +46,35 @@ pub fn run(args: &RunArgs) -> Result<u8, Diagnostics> {
         }
     };
     output::print_diagnostics(&session.env.campaign.warnings);
+    // From here on, an interrupt must end the campaign properly.
+    campaign(args, session, &stop, |bar| {
+        shown.get_or_init(|| bar);
+    })
+}
+
+/// Makes the runs that a campaign lacks, and prints its results. `on_bar` gets the bar before the first run. Returns the
+/// exit code.
+pub(super) fn campaign(
+    args: &RunArgs,
+    session: Session,
+    stop: &AtomicBool,
+    on_bar: impl FnOnce(ProgressBar),
+) -> Result<u8, Diagnostics> {
+    let jobs = args.jobs.map_or_else(all_cores, usize::from);
+    let clock = clock::system();
     let planned = session.runs_to_make();
     let verbosity = args.verbosity();
     let mut progress = match verbosity {
         Verbosity::Quiet => Progress::hidden(),
         _ => Progress::new(planned, session.env.campaign.limits.time_secs),
     };
-    // From here on, an interrupt must end the campaign properly.
-    shown.get_or_init(|| progress.bar());
+    on_bar(progress.bar());
     session.begin((clock.now)())?;
     let options = CampaignOptions { jobs, context: RunContext { clock, disturb: None } };
     let mut runs: Vec<RunSummary> = session.kept.iter().map(RunSummary::from_history).collect();
     runs.iter().for_each(|run| progress.run(run));
     let mut failures = LiveFailures::new(&session.env, &session.id, verbosity);
-    let (end, faults) = make_runs(&session, &options, &stop, |record| {
+    let (end, faults) = make_runs(&session, &options, stop, |record| {
         let summary = RunSummary::of(record);
         if let Some(text) = failures.text(&summary) {
             progress.tell(&text);
@@ -91,7 +105,7 @@ pub fn run(args: &RunArgs) -> Result<u8, Diagnostics> {
     let results = Results { summary: &summary, health: health.as_ref(), format: args.format, verbosity };
     let shrinks = args.shrink && finished.is_ok() && is_whole(&end);
     if shrinks {
-        results.print_with(|| shrink::shrink_modes(&env, &history, &examples(&summary), options.jobs, &stop))?;
+        results.print_with(|| shrink::shrink_modes(&env, &history, &examples(&summary), options.jobs, stop))?;
     } else {
         results.print();
     }

@@ -32,7 +32,7 @@ pub struct Session {
     /// Its id.
     pub id: String,
     /// Whether it is resumed.
-    goes_on: bool,
+    pub goes_on: bool,
     /// The runs of `--last-failed`, which replace the configuration's schedule.
     pub failed: Option<LastFailed>,
     /// Runs that are in the history already, by index.
@@ -140,7 +140,7 @@ fn find(args: &RunArgs, id: &str) -> Result<(History, CampaignRecord), Diagnosti
 }
 
 /// Runs of a campaign that are in the history.
-fn stored(history: &History, env: &Env, id: &str) -> Result<Vec<RunDetail>, Diagnostics> {
+pub fn stored(history: &History, env: &Env, id: &str) -> Result<Vec<RunDetail>, Diagnostics> {
     let rows = history.runs(&RunFilter { campaign: Some(id.to_owned()), ..RunFilter::default() })?;
     let mut kept: Vec<RunDetail> = rows.iter().map(|row| history.run(&row.run)).collect::<Result<_, _>>()?;
     kept.iter_mut().flat_map(|run| &mut run.actions).for_each(|action| order(action, env));

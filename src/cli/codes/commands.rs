@@ -273,6 +273,30 @@ const CODES_X: &[Code] = &[
         "run both with the same `--seed` and the same scenes",
     ),
     code(
+        "X072",
+        "a campaign can't be launched in shards",
+        "it is a case, has a budget, or has fewer runs than shards",
+        "change the configuration or `--shards` as the help says",
+    ),
+    code(
+        "X073",
+        "a folder belongs to another launch, or to none",
+        "the configuration, the seed, the number of runs or of shards changed before the launch was complete",
+        "give the first command again, remove the folder, or name another `--history`",
+    ),
+    code(
+        "X074",
+        "the folder of a launch can't be written",
+        "it lies beside the history, in a folder that is full or not writable",
+        "name a history in a writable folder with `--history DIR`",
+    ),
+    code(
+        "X075",
+        "a shard could not be completed",
+        "its process ended each time, for want of memory or because the configuration changed",
+        "read the end of its output in the help; the same command tries again",
+    ),
+    code(
         "X080",
         "a merged campaign lacks runs",
         "parts of it were not merged",

@@ -1,0 +1,211 @@
+//! The plan of a launch: one file in its folder, from which every task and the same command, given again, go on.
+
+use std::ffi::OsString;
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+
+use serde_json::{Value, json};
+
+use crate::launch::LaunchArgs;
+use crate::run_args::RunArgs;
+use actcheck_base::{Diagnostic, Diagnostics, Shard, digest_of, write_atomic};
+use actcheck_campaign::Env;
+
+/// A launch and its folder.
+#[derive(Debug, Clone)]
+pub(super) struct Plan {
+    /// Its folder, beside the history: `HISTORY.launch`.
+    pub folder: PathBuf,
+    /// The configuration, as the user named it.
+    pub config: PathBuf,
+    /// Digest of the configuration's text.
+    digest: String,
+    /// `--runs` and `--seed`.
+    pub runs: Option<u32>,
+    pub seed: Option<u64>,
+    pub shards: u64,
+    /// Workers of each shard.
+    pub jobs: u64,
+    /// Number of runs of all shards.
+    pub planned: u64,
+}
+
+/// Checks that a campaign can be split.
+///
+/// # Errors
+/// `X072` it is a case, has a budget that only a whole campaign can keep, or has fewer runs than shards.
+pub(super) fn check(env: &Env, shards: u64) -> Result<(), Diagnostics> {
+    let limits = &env.campaign.limits;
+    let planned = env.planned_runs();
+    let (message, help) = if env.campaign.case.is_some() {
+        ("a case has one scene, and no shards".to_owned(), "`actcheck run` runs it")
+    } else if limits.time_secs.is_some() || limits.until_width.is_some() || limits.max_failures.is_some() {
+        let message = "the campaign has a budget, which shards can't keep together".to_owned();
+        (message, "remove it from the configuration, and choose the number of runs with `--runs`")
+    } else if planned < shards {
+        (format!("{shards} shards are more than the {planned} runs"), "name a smaller number with `--shards`")
+    } else {
+        return Ok(());
+    };
+    Err(Diagnostic::error("X072", message).help(help).into())
+}
+
+impl Plan {
+    /// The plan of a command.
+    pub fn new(args: &LaunchArgs, env: &Env, jobs: u64) -> Self {
+        Self {
+            folder: with_ending(&env.campaign.history, ".launch"),
+            config: args.config.clone(),
+            digest: digest_of(&env.campaign.source.text),
+            runs: args.runs,
+            seed: args.seed,
+            shards: args.shards,
+            jobs,
+            planned: env.planned_runs(),
+        }
+    }
+
+    /// Reads the plan in a folder.
+    ///
+    /// # Errors
+    /// `X073` the folder has no plan that this program can read.
+    pub fn read(folder: &Path) -> Result<Self, Diagnostics> {
+        let value: Option<Value> =
+            fs::read(folder.join("plan.json")).ok().and_then(|text| serde_json::from_slice(&text).ok());
+        value.and_then(|value| Self::of_json(folder, &value)).ok_or_else(|| {
+            let message = format!("`{}` has no plan of a launch", folder.display());
+            Diagnostic::error("X073", message).help("`actcheck launch CONFIG --shards N` makes one").into()
+        })
+    }
+
+    fn of_json(folder: &Path, value: &Value) -> Option<Self> {
+        Some(Self {
+            folder: folder.to_path_buf(),
+            config: value["config"].as_str()?.into(),
+            digest: value["config_digest"].as_str()?.to_owned(),
+            runs: value["runs"].as_u64().and_then(|runs| runs.try_into().ok()),
+            seed: value["seed"].as_u64(),
+            shards: value["shards"].as_u64()?,
+            jobs: value["jobs"].as_u64()?,
+            planned: value["planned"].as_u64()?,
+        })
+    }
+
+    fn json(&self) -> Value {
+        json!({
+            "config": self.config.display().to_string(),
+            "config_digest": self.digest,
+            "runs": self.runs,
+            "seed": self.seed,
+            "shards": self.shards,
+            "jobs": self.jobs,
+            "planned": self.planned,
+        })
+    }
+
+    /// Writes the plan into its folder, or finds it there.
+    ///
+    /// # Errors
+    /// `X073` the folder belongs to another launch, `X074` it can't be written.
+    pub fn enter(&self) -> Result<(), Diagnostics> {
+        let file = self.folder.join("plan.json");
+        if file.exists() {
+            return self.same_as(&Self::read(&self.folder)?);
+        }
+        let folders = [self.folder.join("shards"), self.folder.join("done"), self.folder.join("logs")];
+        let made = folders.iter().try_for_each(fs::create_dir_all);
+        made.and_then(|()| write_atomic(&file, format!("{:#}\n", self.json()).as_bytes()))
+            .map_err(|error| self.unwritable(&error))
+    }
+
+    /// Checks that an unfinished launch in the folder has the same runs in the same shards.
+    fn same_as(&self, old: &Self) -> Result<(), Diagnostics> {
+        let other = |what: &str| -> Result<(), Diagnostics> {
+            let message = format!("`{}` has an unfinished launch with {what}", self.folder.display());
+            let help = "give the command of that launch again, remove the folder, or name another `--history`";
+            Err(Diagnostic::error("X073", message).help(help).into())
+        };
+        if self.digest != old.digest {
+            other("another configuration")
+        } else if self.shards != old.shards {
+            other(&format!("{} shards", old.shards))
+        } else if (self.runs, self.seed, self.planned) != (old.runs, old.seed, old.planned) {
+            other("another number of runs or another seed")
+        } else {
+            Ok(())
+        }
+    }
+
+    /// X074: a file of the launch can't be written.
+    pub fn unwritable(&self, error: &io::Error) -> Diagnostics {
+        let message = format!("the folder `{}` of the launch can't be written: {error}", self.folder.display());
+        Diagnostic::error("X074", message).help("name a history in a writable folder with `--history DIR`").into()
+    }
+
+    /// The folder of a shard's history.
+    pub fn shard_dir(&self, number: u64) -> PathBuf {
+        self.folder.join("shards").join(number.to_string())
+    }
+
+    /// The file in which a shard's process prints.
+    pub fn log(&self, number: u64) -> PathBuf {
+        self.folder.join("logs").join(format!("{number}.log"))
+    }
+
+    /// The file that says that a shard is complete: it holds the id of its campaign.
+    pub fn done_file(&self, number: u64) -> PathBuf {
+        self.folder.join("done").join(number.to_string())
+    }
+
+    /// The campaign of a complete shard.
+    pub fn done(&self, number: u64) -> Option<String> {
+        fs::read_to_string(self.done_file(number)).ok().filter(|id| !id.is_empty())
+    }
+
+    /// The options with which a shard runs.
+    pub fn run_args(&self, dir: &Path) -> RunArgs {
+        let jobs = u16::try_from(self.jobs).unwrap_or(1);
+        let Self { config, runs, seed, .. } = self;
+        RunArgs {
+            jobs: Some(jobs),
+            history: Some(dir.to_path_buf()),
+            quiet: true,
+            ..LaunchArgs::whole(config, *runs, *seed)
+        }
+    }
+
+    /// A shard by its number.
+    pub fn shard(&self, number: u64) -> Option<Shard> {
+        Shard::new(number, self.shards)
+    }
+
+    /// Number of runs that the shards have stored.
+    pub fn stored_runs(&self) -> u64 {
+        let traces = |number: u64| fs::read_dir(self.shard_dir(number).join("traces")).map_or(0, Iterator::count);
+        (1..=self.shards).map(|number| traces(number) as u64).sum()
+    }
+
+    /// Removes the folder of a merged launch. It gets another name first, so that no half of it is taken for a launch.
+    pub fn remove(&self) -> io::Result<()> {
+        let merged = with_ending(&self.folder, ".merged");
+        if merged.exists() {
+            fs::remove_dir_all(&merged)?;
+        }
+        fs::rename(&self.folder, &merged)?;
+        fs::remove_dir_all(&merged)
+    }
+
+    /// The commands of the shards.
+    pub fn dry_run(&self) -> String {
+        let of = |number| format!("actcheck launch-task {} {number}\n", self.folder.display());
+        format!("# {}\n{:#}\n", self.folder.join("plan.json").display(), self.json())
+            + &(1..=self.shards).map(of).collect::<String>()
+    }
+}
+
+fn with_ending(path: &Path, ending: &str) -> PathBuf {
+    let mut name = OsString::from(path);
+    name.push(ending);
+    name.into()
+}
