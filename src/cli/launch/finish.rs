@@ -8,7 +8,7 @@ use crate::launch::plan::Plan;
 use crate::session::{self, Session};
 use crate::work::all_cores;
 use crate::{clock, regressions, run, stop};
-use actcheck_base::Diagnostics;
+use actcheck_base::{Diagnostic, Diagnostics};
 use actcheck_campaign::Env;
 use actcheck_history::History;
 use actcheck_history::merge::{MergeOptions, carry_out, plan as plan_merge};
@@ -53,5 +53,10 @@ fn merged(plan: &Plan, history: &History, stop: &AtomicBool) -> Result<Option<St
         return Ok(None);
     }
     let first = format!("{}#{}", plan.shard_dir(1).display(), plan.done(1).unwrap_or_default());
-    Ok(planned.campaigns.into_iter().find(|campaign| campaign.from.contains(&first)).map(|campaign| campaign.id))
+    let whole = planned.campaigns.into_iter().find(|campaign| campaign.from.contains(&first));
+    let whole = whole.ok_or_else(|| {
+        Diagnostic::error("X073", format!("the merged history lacks the campaign of shard 1 in `{}`", first))
+            .help(format!("remove the folder `{}`, and launch again", plan.folder.display()))
+    })?;
+    Ok(Some(whole.id))
 }
