@@ -293,7 +293,7 @@ const CODES_X: &[Code] = &[
     code(
         "X075",
         "a shard could not be completed",
-        "its process ended each time, for want of memory or because the configuration changed",
+        "its process ended each time, because memory was missing or the configuration changed",
         "read the end of its output in the help; the same command tries again",
     ),
     code(

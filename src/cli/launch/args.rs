@@ -8,7 +8,7 @@ use crate::options::Format;
 use crate::run_args::RunArgs;
 use actcheck_config::Overrides;
 
-/// What starts the shards.
+/// The program that starts the shards.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum On {
     /// Processes on this machine
@@ -20,7 +20,7 @@ pub enum On {
 pub struct LaunchArgs {
     /// The campaign's configuration (TOML)
     pub config: PathBuf,
-    /// What starts the shards
+    /// The program that starts the shards
     #[arg(long, value_name = "WHERE", value_enum, default_value = "local")]
     pub on: On,
     /// Number of shards; a lost shard loses only its runs in flight, so more shards than processes are fine
@@ -42,7 +42,7 @@ pub struct LaunchArgs {
     /// until they are merged
     #[arg(long, value_name = "DIR")]
     pub history: Option<PathBuf>,
-    /// Print what would be started, and start nothing
+    /// Print the plan and the commands of the shards, and start nothing
     #[arg(long)]
     pub dry_run: bool,
     /// How results are printed
