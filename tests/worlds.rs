@@ -358,10 +358,10 @@ fn a_gazebo_world_gets_its_included_models() {
     let front = map.locations.iter().find(|location| location.name == "far_front").unwrap();
     assert!((front.at[0] - 3.0).abs() < 1e-3 && (front.at[1] - (1.0 - 0.4 - 0.69)).abs() < 1e-3, "{front:?}");
     for (inside, expected) in [
-        ("<include><uri>model://sofa_bed</uri></include>".to_owned(), "there is no usable model `sofa_bed`"),
+        ("<include><uri>model://sofa_bed</uri></include>".to_owned(), "the model `sofa_bed` is missing"),
         ("<include><uri>model://broken_lamp</uri></include>".to_owned(), "the model `broken_lamp` can't be used: "),
         (format!("{}{}", include("a", "0 0 0 0 0 0"), include("a", "3 0 0 0 0 0")), "W041"),
-        ("<model name=\"a\"><include><uri>model://b</uri></include></model>".to_owned(), "there is no model `b`"),
+        ("<model name=\"a\"><include><uri>model://b</uri></include></model>".to_owned(), "the model `b` is missing"),
         ("<model><link/></model>".to_owned(), "`<model>` has no attribute `name`"),
     ] {
         let said = read(&inside).unwrap_err().to_string();

@@ -104,11 +104,11 @@ impl Writer {
 
     /// Adds a number.
     pub(super) fn number(&mut self, subject: TermId, property: &str, value: f64) {
-        let value = self.shortest(value);
+        let value = self.number_term(value);
         self.state(subject, property, value);
     }
 
-    fn shortest(&mut self, value: f64) -> TermId {
+    fn number_term(&mut self, value: f64) -> TermId {
         #[expect(clippy::cast_possible_truncation, reason = "rounding to the precision of physics is intended")]
         let bits = (value as f32).to_bits();
         *self.numbers.entry(bits).or_insert_with(|| self.terms.intern(Term::Double(shortest(value))))

@@ -8,7 +8,7 @@ use crate::options::Format;
 use crate::run_args::RunArgs;
 use actcheck_config::Overrides;
 
-/// The program that starts the shards.
+/// Where the shards run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum On {
     /// Processes on this machine
@@ -20,7 +20,7 @@ pub enum On {
 pub struct LaunchArgs {
     /// The campaign's configuration (TOML)
     pub config: PathBuf,
-    /// The program that starts the shards
+    /// Where the shards run
     #[arg(long, value_name = "WHERE", value_enum, default_value = "local")]
     pub on: On,
     /// Number of shards; a lost shard loses only its runs in flight, so more shards than processes are fine

@@ -8,12 +8,12 @@ mod local;
 mod plan;
 mod task;
 
+use args::On;
 pub use args::{LaunchArgs, LaunchTaskArgs};
 pub use task::task;
 
-use std::sync::{Arc, OnceLock};
-
-use indicatif::ProgressBar;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use crate::work::all_cores;
 use crate::{output, stop};
@@ -26,11 +26,13 @@ use plan::Plan;
 pub fn launch(args: &LaunchArgs) -> Result<u8, Diagnostics> {
     let cores = u64::try_from(all_cores()).unwrap_or(1);
     let at_once = args.parallel.map_or(cores, u64::from).min(args.shards).max(1);
-    let bar = Arc::new(OnceLock::<ProgressBar>::new());
-    let shown = Arc::clone(&bar);
-    let stop = stop::on_interrupt(move || match shown.get() {
-        Some(bar) => bar.println("stopping; Ctrl-C again stops at once"),
-        None => stop::end_now(),
+    // Once shards run, an interrupt must end them too.
+    let has_shards = Arc::new(AtomicBool::new(false));
+    let is_started = Arc::clone(&has_shards);
+    let stop = stop::on_interrupt(move || {
+        if !is_started.load(Ordering::Relaxed) {
+            stop::end_now();
+        }
     });
     let budget = Budget { stop: Arc::clone(&stop), ..Budget::default() };
     let env = Env::prepare_within(&args.config, &args.overrides(), budget.clone())?;
@@ -41,9 +43,11 @@ pub fn launch(args: &LaunchArgs) -> Result<u8, Diagnostics> {
         return Ok(0);
     }
     plan.enter()?;
-    let _ = bar.set(ProgressBar::hidden());
-    let ended = local::run_all(&plan, at_once, args.tries, args.quiet, &stop);
-    if !ended? {
+    has_shards.store(true, Ordering::Relaxed);
+    let are_complete = match args.on {
+        On::Local => local::run_all(&plan, at_once, args.tries, args.quiet, &stop)?,
+    };
+    if !are_complete {
         let help = "finished runs are kept; the same command continues";
         output::print_diagnostics(&Diagnostic::error("X030", "interrupted").help(help).into());
         return Ok(stop::INTERRUPTED);

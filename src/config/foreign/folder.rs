@@ -8,9 +8,9 @@ use crate::foreign::lenient::repaired;
 use crate::foreign::lookup::Lookup;
 use crate::foreign::nested::Role;
 use crate::foreign::sdf::SdfModel;
-use crate::foreign::xml::{self, Reader};
+use crate::foreign::xml::{self, Node, Reader};
 use crate::foreign::{sdf, urdf};
-use actcheck_base::{Diagnostic, Diagnostics, Files};
+use actcheck_base::{Diagnostic, Diagnostics, Files, Severity, did_you_mean};
 use actcheck_data::ObjectModel;
 
 /// A model found in a folder.
@@ -64,7 +64,7 @@ pub(crate) fn read(found: &Found, lookup: &Lookup) -> Result<Read, Diagnostics> 
 ///
 /// # Errors
 /// As [`read`].
-pub(crate) fn read_sdf_model(
+fn read_sdf_model(
     found: &Found,
     lookup: &Lookup,
     role: Role,
@@ -95,8 +95,41 @@ pub(crate) fn name_in(uri: &str) -> String {
     }
 }
 
+/// Reads the model that the `<uri>` of an `<include>` names, which `depth` others include. `known` are the names that the
+/// user may have meant. Reports W040 and returns `None` if the model is missing or has faults.
+pub(crate) fn included<'a>(
+    uri: Node,
+    lookup: &Lookup,
+    role: Role,
+    depth: usize,
+    known: impl Iterator<Item = &'a str>,
+    reader: &mut Reader,
+) -> Option<SdfModel> {
+    let name = name_in(xml::text(uri));
+    let Some(found) = named(&name, lookup) else {
+        let message = format!("the model `{name}` is missing");
+        let known: Vec<&str> = known.collect();
+        let help = match known.is_empty() {
+            true => "put its folder beside the others".to_owned(),
+            false => did_you_mean(&name, known),
+        };
+        reader.error("W040", uri, message, help);
+        return None;
+    };
+    match read_sdf_model(&found, lookup, role, depth) {
+        Ok((model, _)) => Some(model),
+        Err(faults) => {
+            let first = faults.iter().find(|fault| fault.severity == Severity::Error);
+            let reason = first.map_or("", |fault| fault.message.as_str());
+            let message = format!("the model `{name}` can't be used: {reason}");
+            reader.error("W040", uri, message, "mend that model, or remove the `<include>`");
+            None
+        }
+    }
+}
+
 /// Finds a model by its path in the folders. Names of web addresses may differ from folders in case and spaces.
-pub(crate) fn named(name: &str, lookup: &Lookup) -> Option<Found> {
+fn named(name: &str, lookup: &Lookup) -> Option<Found> {
     let folder_name = name.to_lowercase().replace(' ', "_");
     let places = lookup.folders.iter().flat_map(|folder| [folder.join(name), folder.join(&folder_name)]);
     places.filter_map(|place| Some(Found { name: name.to_owned(), path: model_file(lookup.files, &place)? })).next()

@@ -7,7 +7,6 @@ use crate::foreign::folder;
 use crate::foreign::geometry::Shapes;
 use crate::foreign::sdf::pose;
 use crate::foreign::xml::{self, Node, Reader};
-use actcheck_base::Severity;
 use actcheck_data::{Part, Pose};
 
 /// Deepest inclusion of models: deeper ones include themselves.
@@ -116,33 +115,15 @@ impl<'a> Links<'a> {
 fn read_include(include: Node, role: Role, shapes: &mut Shapes, reader: &mut Reader) -> Option<(Body, Isometry3<f64>)> {
     reader.warn_about_unknown_children(include, &["uri", "name", "pose", "static", "plugin", "placement_frame"]);
     let uri = reader.required(include, "uri")?;
-    let name = folder::name_in(xml::text(uri));
     if shapes.depth >= DEEPEST {
         let message = format!("models are included more than {DEEPEST} levels deep: one includes itself");
         reader.error("W035", uri, message, "remove the `<include>`");
         return None;
     }
-    let Some(found) = folder::named(&name, shapes.lookup) else {
-        let message = format!("there is no model `{name}`");
-        reader.error("W040", uri, message, "put its folder beside the others");
-        return None;
-    };
-    match folder::read_sdf_model(&found, shapes.lookup, role, shapes.depth + 1) {
-        Ok((model, _)) => {
-            shapes.digest.update(model.digest.as_bytes());
-            let own = if xml::child(include, "pose").is_some() { pose(include, reader)? } else { model.pose };
-            Some((model.body, own))
-        }
-        Err(faults) => {
-            let first = faults
-                .iter()
-                .find(|fault| fault.severity == Severity::Error)
-                .map_or("", |fault| fault.message.as_str());
-            let message = format!("the included model `{name}` can't be used: {first}");
-            reader.error("W040", uri, message, "mend that model, or remove the `<include>`");
-            None
-        }
-    }
+    let model = folder::included(uri, shapes.lookup, role, shapes.depth + 1, std::iter::empty(), reader)?;
+    shapes.digest.update(model.digest.as_bytes());
+    let own = if xml::child(include, "pose").is_some() { pose(include, reader)? } else { model.pose };
+    Some((model.body, own))
 }
 
 /// Adds a body at a pose to another one.

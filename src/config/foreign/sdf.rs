@@ -46,7 +46,10 @@ pub(crate) fn read(
     let model = root_model(document.root_element(), &mut reader);
     let read = model.map(|model| {
         let pose = pose(model, &mut reader).unwrap_or_default();
-        (read_model(model, role, &mut shapes, &mut reader), pose, is_static(model, &mut reader))
+        let body = read_model(model, role, &mut shapes, &mut reader);
+        // Of furniture, every body is fixed.
+        let is_static = if role == Role::Object { body.fixed } else { is_static(model, &mut reader) };
+        (body, pose, is_static)
     });
     let found = reader.found;
     let complete = read.filter(|_| !found.has_errors());
@@ -131,7 +134,8 @@ pub(crate) fn read_model(model: Node, role: Role, shapes: &mut Shapes, reader: &
     body
 }
 
-fn is_static(model: Node, reader: &mut Reader) -> bool {
+/// Whether an element says that its model never moves.
+pub(crate) fn is_static(model: Node, reader: &mut Reader) -> bool {
     xml::child(model, "static").is_some_and(|node| reader.boolean(node).unwrap_or(false))
 }
 

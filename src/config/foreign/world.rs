@@ -15,7 +15,7 @@ use crate::foreign::sdf::{check_version, pose};
 use crate::foreign::xml::{self, Node, Reader};
 use crate::foreign::{folder, sdf};
 use crate::{Furniture, WorldMap};
-use actcheck_base::{Diagnostics, Severity, Source, did_you_mean, digest_of};
+use actcheck_base::{Diagnostics, Severity, Source, digest_of};
 use actcheck_data::{Location, ObjectModel, Pose};
 
 /// Elements of a world that are read, or that do not affect its geometry: light, Gazebo's display and time steps.
@@ -112,10 +112,6 @@ struct Gathering<'a> {
 
 impl Gathering<'_> {
     fn add(&mut self, piece: Furniture, node: Node) {
-        if self.world.map.furniture.iter().any(|other| other.name == piece.name) {
-            let message = format!("there are two `{}`", piece.name);
-            self.reader.error("W041", node, message, "give one of them another name");
-        }
         let own = self.world.models.iter().position(|model| model.name == piece.model);
         let model = match own {
             Some(idx) => Some(&self.world.models[idx]),
@@ -125,22 +121,30 @@ impl Gathering<'_> {
             if let Some(idx) = own {
                 self.world.models.remove(idx);
             }
-            return self.add_solids(&piece, building);
+            return self.add_solids(&piece, building, node);
         }
         self.world.map.locations.extend(front(&piece, model));
+        self.add_piece(piece, node);
+    }
+
+    fn add_piece(&mut self, piece: Furniture, node: Node) {
+        if self.world.map.furniture.iter().any(|other| other.name == piece.name) {
+            let message = format!("there are two `{}`", piece.name);
+            self.reader.error("W041", node, message, "give one of them another name");
+        }
         self.world.map.furniture.push(piece);
     }
 
     /// Adds each solid of a building as a piece of its own: the robot's map has a box for each piece, and the box of a
     /// whole building would be around the robot.
-    fn add_solids(&mut self, piece: &Furniture, building: ObjectModel) {
+    fn add_solids(&mut self, piece: &Furniture, building: ObjectModel, node: Node) {
         let at = piece.pose.to_isometry();
         for (number, part) in (1..).zip(building.parts) {
             let (friction, restitution) = (Some(building.friction), Some(building.restitution));
             let body = Body { parts: vec![part], friction, restitution, fixed: true, ..Body::default() };
             let digest = digest_of(&format!("{} {number}", building.digest));
-            let solid = self.stand(body, digest, &at, &format!("{}_{number}", piece.name));
-            self.world.map.furniture.push(solid);
+            let solid = self.place(body, digest, &at, &format!("{}_{number}", piece.name));
+            self.add_piece(solid, node);
         }
     }
 
@@ -157,9 +161,9 @@ impl Gathering<'_> {
         if is_faulty || body.parts.is_empty() {
             return None;
         }
-        let is_still = xml::child(model, "static").is_some_and(|fixed| is_true(fixed));
+        let is_still = sdf::is_static(model, &mut self.reader);
         self.warn_if_movable(is_still, name, model);
-        Some(self.stand(body, shapes.digest.finish(), &at, name))
+        Some(self.place(body, shapes.digest.finish(), &at, name))
     }
 
     fn include(&mut self, include: Node) -> Option<Furniture> {
@@ -172,7 +176,7 @@ impl Gathering<'_> {
         }
         let at = pose(include, &mut self.reader)?;
         let name = xml::child(include, "name").map_or(named.as_str(), xml::text);
-        let is_still = xml::child(include, "static").is_some_and(|fixed| is_true(fixed));
+        let is_still = sdf::is_static(include, &mut self.reader);
         let is_upright = (at.rotation * Vector3::z()).z >= UPRIGHT_COSINE;
         let has_pose = xml::child(include, "pose").is_some();
         if let Some(model) = self.included.models.get(&named)
@@ -184,31 +188,18 @@ impl Gathering<'_> {
             let foot = at * Point3::from(model.origin_m.map(|x| -x));
             return Some(Furniture { name: name.to_owned(), model: named.clone(), pose: upright(&at, foot) });
         }
-        let Some(found) = folder::named(&named, self.included.lookup) else {
-            let message = format!("there is no usable model `{named}`");
-            let known = self.included.models.keys().map(String::as_str);
-            self.reader.error("W040", uri, message, did_you_mean(&named, known));
+        let known = self.included.models.keys().map(String::as_str);
+        let model = folder::included(uri, self.included.lookup, Role::Furniture, 1, known, &mut self.reader)?;
+        if model.body.parts.is_empty() {
             return None;
-        };
-        match folder::read_sdf_model(&found, self.included.lookup, Role::Furniture, 1) {
-            Ok((model, _)) if model.body.parts.is_empty() => None,
-            Ok((model, _)) => {
-                self.warn_if_movable(is_still || model.is_static, &named, include);
-                let at = if has_pose { at } else { model.pose };
-                Some(self.stand(model.body, model.digest, &at, name))
-            }
-            Err(faults) => {
-                let first = faults.iter().find(|fault| fault.severity == Severity::Error);
-                let reason = first.map_or("", |fault| fault.message.as_str());
-                let message = format!("the model `{named}` can't be used: {reason}");
-                self.reader.error("W040", uri, message, "mend that model, or remove the `<include>`");
-                None
-            }
         }
+        self.warn_if_movable(is_still || model.is_static, &named, include);
+        let at = if has_pose { at } else { model.pose };
+        Some(self.place(model.body, model.digest, &at, name))
     }
 
-    /// Adds a body as a model of its own, which stands at a pose.
-    fn stand(&mut self, body: Body, digest: String, at: &Isometry3<f64>, name: &str) -> Furniture {
+    /// Adds a body as a model of its own, and returns the piece of furniture that it is at a pose.
+    fn place(&mut self, body: Body, digest: String, at: &Isometry3<f64>, name: &str) -> Furniture {
         let heading = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), Pose::from_isometry(at).yaw());
         let tilt = Isometry3::from_parts(Translation3::identity(), heading.inverse() * at.rotation);
         let model = body.into_model(&format!("{}/{name}", self.world.map.name), digest, &tilt);
@@ -231,10 +222,6 @@ impl Gathering<'_> {
 /// Whether a model is so large that it may be around the robot, and consists of several solids.
 fn is_building(model: &ObjectModel) -> bool {
     model.size_m[..2].iter().all(|extent| *extent > ROOM_M) && (2..=MOST_PIECES).contains(&model.parts.len())
-}
-
-fn is_true(node: Node) -> bool {
-    ["true", "1"].contains(&xml::text(node))
 }
 
 fn upright(at: &Isometry3<f64>, foot: Point3<f64>) -> Pose {
