@@ -9,6 +9,7 @@ mod digest;
 mod files;
 mod findings;
 mod judgement;
+mod keep;
 mod meaning;
 pub mod names;
 mod printable;
@@ -35,6 +36,7 @@ pub use digest::{Digest, digest_of, program_digest, set_program_digest};
 pub use files::Files;
 pub use findings::{Findings, RuleFault, WitnessRow};
 pub use judgement::{Judgement, Outcome};
+pub use keep::{Keep, Keeping};
 pub use printable::{printable, printable_in_colour};
 pub use query_texts::{
     COUNTED_TEXT, MOST_NESTED_CALLS, TEXT_FUNCTIONS, TextFunction, TextTooLong, bounded_texts, check_calls,

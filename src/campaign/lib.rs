@@ -21,6 +21,7 @@ mod outcome;
 mod recheck;
 mod replay;
 mod requirement;
+mod restore;
 mod resume;
 mod rule_set;
 mod run_all;
@@ -45,6 +46,7 @@ pub use line::{Clock, Disturbance, RunContext, RunInput, run_line, run_sabotaged
 pub use outcome::{CampaignResult, Ending, WeightedRate};
 pub use recheck::{RecheckEnd, RecheckOptions, judge_stored, recheck};
 pub use replay::{Fit, Misfit, MisfitKind, OutcomeChange, Replay, ReplayOptions, StoredCampaign, replay_all};
+pub use restore::{MayRun, restorer};
 pub use resume::{StoredRuns, unfinished};
 pub use rule_set::RuleSet;
 pub use run_all::{CampaignOptions, resume_all, run_all};

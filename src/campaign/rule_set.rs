@@ -28,6 +28,11 @@ impl RuleSet {
         Ok(Self { ontology, rules, actions })
     }
 
+    /// Whether a rule reads quantities over time.
+    pub fn reads_course(&self) -> bool {
+        self.rules.reads_course()
+    }
+
     /// Restricts it to some properties, given by local name or IRI. An empty list means all.
     ///
     /// # Errors

@@ -14,8 +14,8 @@ use crate::{
     CampaignResult, Clock, Ending, Env, ExhaustedBudget, Planned, RunContext, RunResult, Schedule, StoredRuns,
     schedule_of,
 };
-use actcheck_base::Diagnostics;
-use actcheck_history::{History, RunRecord};
+use actcheck_base::{Diagnostics, Keeping, Outcome};
+use actcheck_history::{History, RunRecord, RunStatus};
 
 /// Maximum number of runs per worker that are made but not stored yet, because an earlier run is missing.
 const AHEAD: usize = 4;
@@ -190,6 +190,7 @@ struct RunWriter<'a> {
     broken: BrokenRuns,
     /// Summaries of the batch's runs for the schedule.
     results: Vec<RunResult>,
+    keeping: Keeping,
 }
 
 impl<'a> RunWriter<'a> {
@@ -213,6 +214,7 @@ impl<'a> RunWriter<'a> {
             tally,
             broken: BrokenRuns::new(&env.campaign.launcher),
             results: Vec::new(),
+            keeping: env.campaign.keeping,
         }
     }
 
@@ -266,7 +268,13 @@ impl<'a> RunWriter<'a> {
     }
 
     fn commit(&mut self, record: &RunRecord) -> Result<(), Diagnostics> {
-        self.history.commit(record)
+        let failed = record.status != RunStatus::Completed
+            || record.judgements.iter().flatten().any(|judgement| judgement.outcome == Outcome::Failed);
+        if self.keeping.keeps_whole(record.seed, record.index, failed) {
+            self.history.commit(record)
+        } else {
+            self.history.commit_outline(record)
+        }
     }
 
     fn stop(&mut self, faults: Diagnostics) {

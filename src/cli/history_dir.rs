@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use crate::options::HistoryArgs;
+use crate::restore;
 use actcheck_base::{Diagnostic, Diagnostics};
 use actcheck_history::History;
 
@@ -14,7 +15,9 @@ const NONE_FOUND: &str = "X002";
 /// # Errors
 /// No history or several are found, or the history can't be opened.
 pub fn open(args: &HistoryArgs) -> Result<History, Diagnostics> {
-    History::open_existing(&folder(args)?)
+    let history = History::open_existing(&folder(args)?)?;
+    restore::allow(&history);
+    Ok(history)
 }
 
 /// Like [`open`], but the state of this moment for reading: other processes may read and write the history.
@@ -22,7 +25,9 @@ pub fn open(args: &HistoryArgs) -> Result<History, Diagnostics> {
 /// # Errors
 /// As [`open`].
 pub fn open_to_read(args: &HistoryArgs) -> Result<History, Diagnostics> {
-    History::open_to_read(&folder(args)?)
+    let history = History::open_to_read(&folder(args)?)?;
+    restore::allow(&history);
+    Ok(history)
 }
 
 /// Returns the folder of the named history, or of the one that is found.

@@ -51,6 +51,7 @@ mod report_formats;
 mod report_html;
 #[cfg(feature = "rerun")]
 mod report_rrd;
+mod restore;
 mod rules;
 mod run;
 mod run_args;

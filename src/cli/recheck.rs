@@ -8,7 +8,7 @@ use crate::options::{Format, HistoryArgs};
 use crate::progress::Progress;
 use crate::why::ontology_file;
 use crate::work::all_cores;
-use crate::{clock, history_dir, output, stop};
+use crate::{clock, history_dir, output, restore, stop};
 use actcheck_base::{Diagnostic, Diagnostics, Files, did_you_mean};
 use actcheck_campaign::{Ending, RecheckOptions, RuleSet, recheck as judge_anew};
 use actcheck_history::{History, RunFilter, RunRow};
@@ -58,6 +58,9 @@ pub fn recheck(args: &RecheckArgs) -> Result<u8, Diagnostics> {
         batch: RecheckOptions::BATCH,
         at: (clock::system().now)(),
     };
+    if rules.reads_course() {
+        restore::announce(&history, &runs, options.jobs)?;
+    }
     let mut summary = RecheckSummary::default();
     let end = judge_anew(
         &history,

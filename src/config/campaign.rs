@@ -1,6 +1,6 @@
 //! A validated campaign configuration.
 
-use actcheck_base::{Diagnostic, Diagnostics, Files, Shard, Source, Span};
+use actcheck_base::{Diagnostic, Diagnostics, Files, Keeping, Shard, Source, Span};
 use actcheck_data::{Budget, ObjectModel, Physics, Range, RobotProfile, Sensing};
 use actcheck_search::Strategy;
 use std::collections::{BTreeMap, BTreeSet};
@@ -71,6 +71,8 @@ pub struct Campaign {
     pub history: PathBuf,
     /// Whether each run is written to the disk at once (`[history] sync`; default `false`).
     pub sync_each_run: bool,
+    /// Which runs the history keeps whole (`[history] keep` and `keep_whole`; by default all).
+    pub keeping: Keeping,
     /// Spans of keys and values, for faults that only a later stage can find: `tests.0.1` is the second action of
     /// the first test, `pickObject` the table's header, `pickObject.2` its third candidate.
     pub places: BTreeMap<String, Span>,

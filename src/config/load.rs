@@ -7,7 +7,7 @@ use crate::designators::{self, Designators};
 use crate::paths::resolve_path;
 use crate::robot::{MendedUrdf, mended};
 use crate::{Campaign, Overrides, Table, case, model_library, ranges, skill};
-use actcheck_base::{Diagnostic, Diagnostics, Files, Severity, Source, Span, did_you_mean};
+use actcheck_base::{Diagnostic, Diagnostics, Files, Keep, Keeping, Severity, Source, Span, did_you_mean};
 use actcheck_search::Strategy;
 
 /// The ontology embedded in the program.
@@ -61,7 +61,7 @@ pub fn load_text(source: Source, folder: &Path, overrides: &Overrides) -> Result
     let sensing = ranges::read_sensing(&mut table, &mut found);
     let (budget, limits) = ranges::read_budget(&mut table, &mut found);
     let search = read_search(&mut table, &mut found);
-    let (history, sync_each_run) = read_history(&mut table, folder, &mut found);
+    let (history, sync_each_run, keeping) = read_history(&mut table, folder, &mut found);
     // Taken before the tables of designators, which may have any name.
     let case = table.table("case");
     let designators = designators::read(&mut table, &mut library, &mut places, &mut found);
@@ -106,6 +106,7 @@ pub fn load_text(source: Source, folder: &Path, overrides: &Overrides) -> Result
         case,
         history: overrides.history.clone().unwrap_or(history),
         sync_each_run,
+        keeping,
         places,
         warnings,
     })
@@ -199,15 +200,25 @@ fn read_scene_rule(table: &mut Table, folder: &Path, found: &mut Diagnostics) ->
     read
 }
 
-/// Reads the history's folder, and whether each run is written to the disk at once.
-fn read_history(table: &mut Table, folder: &Path, found: &mut Diagnostics) -> (PathBuf, bool) {
-    let (mut dir, mut sync) = (folder.join(HISTORY_DIR), false);
+/// Reads the history's folder, whether each run is written to the disk at once, and which runs are kept whole.
+fn read_history(table: &mut Table, folder: &Path, found: &mut Diagnostics) -> (PathBuf, bool, Keeping) {
+    let (mut dir, mut sync, mut keeping) = (folder.join(HISTORY_DIR), false, Keeping::default());
     if let Some(mut history) = table.table("history") {
         if let Some(written) = history.string("dir") {
             dir = resolve_path(folder, &written.value);
         }
         sync = history.boolean("sync").unwrap_or(false);
+        if let Some(written) = history.string("keep") {
+            match Keep::ALL.into_iter().find(|keep| keep.word() == written.value) {
+                Some(keep) => keeping.keep = keep,
+                None => {
+                    let help = did_you_mean(&written.value, Keep::ALL.map(Keep::word));
+                    history.fault("C017", written.span, format!("`keep` can't be `{}`", written.value), help);
+                }
+            }
+        }
+        keeping.whole_share = history.number("keep_whole", 0.0..=1.0).unwrap_or(0.0);
         history.finish(found);
     }
-    (dir, sync)
+    (dir, sync, keeping)
 }

@@ -5,7 +5,6 @@ use std::collections::BTreeSet;
 use oxigraph::sparql::QueryEvaluationError;
 use oxigraph::store::Store;
 
-use crate::wanted::Wanted;
 use crate::{History, RunFilter, RunRow, lists};
 use actcheck_base::Diagnostics;
 
@@ -33,6 +32,9 @@ impl History {
     /// # Errors
     /// The store can't be read.
     pub fn counted_runs(&self) -> Result<BTreeSet<String>, Diagnostics> {
-        counted_runs(&*self.store_with(|| Wanted::queries(&lists::COUNTED))?).map_err(|error| self.query_fault(&error))
+        let selected = self.selected_campaigns()?;
+        let mut runs = self.runs(&RunFilter::default())?;
+        runs.retain(|run| !selected.contains(&run.campaign));
+        Ok(newest_of_alike(&runs))
     }
 }

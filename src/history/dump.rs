@@ -8,6 +8,7 @@ use oxigraph::io::{RdfFormat, RdfSerializer};
 use oxigraph::model::GraphNameRef;
 
 use crate::rdf_text::serializer;
+use crate::wanted::Wanted;
 use crate::write_run::run_node;
 use crate::{History, RdfSyntax, graphs};
 use actcheck_base::{Diagnostic, Diagnostics, NewFile};
@@ -19,7 +20,7 @@ impl History {
     /// # Errors
     /// `H016` the file can't be written, or the store can't be read.
     pub fn write_nquads(&self, file: &Path) -> Result<(), Diagnostics> {
-        let store = self.store()?;
+        let store = self.store_for_query(Wanted::all)?;
         let write = || -> Result<(), String> {
             let (file, writer) = begin(file).map_err(|error| error.to_string())?;
             let mut writer = store.dump_to_writer(RdfFormat::NQuads, writer).map_err(|error| error.to_string())?;
@@ -34,7 +35,7 @@ impl History {
     /// # Errors
     /// As [`History::write_nquads`], and as [`History::trace`] for each run.
     pub fn write_complete_nquads(&self, file: &Path) -> Result<(), Diagnostics> {
-        let store = self.store()?;
+        let store = self.store_for_query(Wanted::all)?;
         let failed = |why: &dyn std::fmt::Display| unwritten(file, &why.to_string());
         let (new, writer) = begin(file).map_err(|error| failed(&error))?;
         let mut writer = RdfSerializer::from_format(RdfFormat::NQuads).for_writer(writer);
@@ -63,7 +64,7 @@ impl History {
     /// # Errors
     /// As [`History::write_nquads`].
     pub fn write_turtle(&self, file: &Path) -> Result<(), Diagnostics> {
-        let store = self.store()?;
+        let store = self.store_for_query(Wanted::all)?;
         let serializer = serializer(RdfSyntax::Turtle);
         let write = || -> Result<(), String> {
             let (file, writer) = begin(file).map_err(|error| error.to_string())?;

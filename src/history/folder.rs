@@ -2,7 +2,8 @@
 //!
 //! `VERSION` names the format; `lock` is held while a process writes; `store/` is the RDF store, and `seal/` has the
 //! checksums of its files; `journal` has the statements that are not in its tables yet; `traces/` has one file for each
-//! run; `hulls/` caches the convex solids of meshes, which can be recomputed at any time.
+//! run that is kept whole, `outlines/` the others; `hulls/` caches the convex solids of meshes, which can be recomputed at
+//! any time.
 
 use std::fs::{self, File, OpenOptions, TryLockError};
 use std::io::ErrorKind;
@@ -15,9 +16,10 @@ use actcheck_base::{Diagnostics, write_atomic};
 
 /// Format of a folder without a journal.
 const FORMAT: u64 = 1;
-/// Format of a folder with a journal, which earlier versions do not read: they would miss its runs. The newest that this
-/// program reads.
+/// Format of a folder with a journal, which earlier versions do not read: they would miss its runs.
 const FORMAT_WITH_JOURNAL: u64 = 2;
+/// Format of a folder with outlines, which earlier versions do not read either. The newest that this program reads.
+const FORMAT_WITH_OUTLINES: u64 = 3;
 const TITLE: &str = "actcheck history";
 /// Longest version file. Unit: bytes.
 const LONGEST_VERSION: u64 = 1_000;
@@ -77,8 +79,21 @@ impl Folder {
     /// Marks the folder before its journal is created, or after it was removed, so that programs which know no journals
     /// read only complete histories.
     pub(super) fn mark_journal(&self, exists: bool) -> Result<(), Diagnostics> {
-        let format = if exists { FORMAT_WITH_JOURNAL } else { FORMAT };
+        let format = match exists {
+            _ if self.outlines().exists() => FORMAT_WITH_OUTLINES,
+            true => FORMAT_WITH_JOURNAL,
+            false => FORMAT,
+        };
         if version(&self.dir)? == Some(format) { Ok(()) } else { self.write_version(format) }
+    }
+
+    /// Creates the folder of outlines, and marks the history before.
+    pub(super) fn begin_outlines(&self) -> Result<(), Diagnostics> {
+        if self.outlines().exists() {
+            return Ok(());
+        }
+        self.write_version(FORMAT_WITH_OUTLINES)?;
+        fs::create_dir_all(self.outlines()).map_err(|error| fault::io(&self.dir, "creating its outlines", &error))
     }
 
     fn write_version(&self, format: u64) -> Result<(), Diagnostics> {
@@ -106,6 +121,11 @@ impl Folder {
         self.dir.join("traces")
     }
 
+    /// Where the outlines of runs are that are not kept whole.
+    pub(super) fn outlines(&self) -> PathBuf {
+        self.dir.join("outlines")
+    }
+
     /// The ids of the runs that have a trace, sorted.
     pub(super) fn traced(&self) -> Vec<String> {
         let entries = fs::read_dir(self.traces()).into_iter().flatten().filter_map(Result::ok);
@@ -124,7 +144,7 @@ impl Folder {
 /// Whether the folder has a history that this program can read.
 fn has_version(dir: &Path) -> Result<bool, Diagnostics> {
     match version(dir)? {
-        Some(version) if version > FORMAT_WITH_JOURNAL => Err(fault::newer(dir, version, FORMAT_WITH_JOURNAL)),
+        Some(version) if version > FORMAT_WITH_OUTLINES => Err(fault::newer(dir, version, FORMAT_WITH_OUTLINES)),
         version => Ok(version.is_some()),
     }
 }

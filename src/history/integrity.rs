@@ -82,7 +82,9 @@ impl History {
 
     /// Compares the traces with the runs of the store.
     fn compare_traces(&self, found: &mut Integrity) -> Result<(), Diagnostics> {
-        let runs = self.runs(&RunFilter::default())?;
+        let mut runs = self.runs(&RunFilter::default()).or_else(|faults| self.whole_runs().map_err(|_| faults))?;
+        let outlines: BTreeSet<String> = self.outlined_ids(None).unwrap_or_default().into_iter().collect();
+        runs.retain(|run| !outlines.contains(&run.run));
         found.runs = runs.len();
         let mut known = BTreeSet::new();
         for run in &runs {
@@ -99,6 +101,13 @@ impl History {
             found.damage.extend(reason.map(damage));
             known.insert(file);
         }
+        let (outlines, damaged) = self.examine_outlines();
+        found.runs += outlines;
+        found.damage.extend(damaged.into_iter().map(|(file, reason)| Damage {
+            file: relative(self.dir(), &file),
+            run: None,
+            reason,
+        }));
         let folder = std::fs::read_dir(self.folder.traces()).into_iter().flatten();
         let files = folder.filter_map(|entry| Some(entry.ok()?.path()));
         found.unused = files.filter(|file| !known.contains(file)).map(|file| relative(self.dir(), &file)).collect();

@@ -188,9 +188,10 @@ pub(super) enum Written<'a> {
 
 /// Terms, and statements: the numbers of subject, property, value, and graph. Numbers of graphs begin at 1; the default
 /// graph is 0.
-type Content<'a> = (Vec<Written<'a>>, Vec<[u32; 4]>);
+pub(super) type Content<'a> = (Vec<Written<'a>>, Vec<[u32; 4]>);
 
-fn encode(quads: &[Quad]) -> io::Result<Vec<u8>> {
+/// Replaces the terms of statements by numbers.
+pub(super) fn numbered<'q>(quads: impl IntoIterator<Item = &'q Quad>) -> Content<'q> {
     let mut terms = Vec::new();
     let mut known: HashMap<TermRef<'_>, u32> = HashMap::new();
     let mut number = |term| {
@@ -200,7 +201,7 @@ fn encode(quads: &[Quad]) -> io::Result<Vec<u8>> {
         })
     };
     let rows: Vec<[u32; 4]> = quads
-        .iter()
+        .into_iter()
         .map(|quad| {
             let graph = match &quad.graph_name {
                 GraphName::DefaultGraph => 0,
@@ -212,8 +213,11 @@ fn encode(quads: &[Quad]) -> io::Result<Vec<u8>> {
             [subject, property, value, graph]
         })
         .collect();
-    let content: Content<'_> = (terms, rows);
-    let content = postcard::to_stdvec(&content).map_err(io::Error::other)?;
+    (terms, rows)
+}
+
+fn encode(quads: &[Quad]) -> io::Result<Vec<u8>> {
+    let content = postcard::to_stdvec(&numbered(quads)).map_err(io::Error::other)?;
     let mut encoder = DeflateEncoder::new(vec![0; HEADER], Compression::fast());
     encoder.write_all(&content)?;
     let mut record = encoder.finish()?;
@@ -250,13 +254,18 @@ fn decode(content: &[u8], count: usize, wanted: &Wanted, part: &mut Part) -> Opt
     if rows.len() != count {
         return None;
     }
-    let chosen = Chosen::of(wanted, &written);
+    collect(&written, &rows, wanted, part)
+}
+
+/// Adds the wanted statements. Returns `None` if they are damaged.
+pub(super) fn collect(written: &[Written<'_>], rows: &[[u32; 4]], wanted: &Wanted, part: &mut Part) -> Option<()> {
+    let chosen = Chosen::of(wanted, written);
     let mut terms: Vec<Option<Term>> = vec![None; written.len()];
     let mut term = |number: u32| {
         let (known, written) = (terms.get_mut(number as usize)?, written.get(number as usize)?);
         Some(known.get_or_insert_with(|| read_term(*written)).clone())
     };
-    for row in &rows {
+    for row in rows {
         if wanted.graphs && row[3] > 0 {
             part.graphs.insert(term(row[3] - 1)?);
         }
@@ -283,7 +292,8 @@ fn read_term(written: Written<'_>) -> Term {
     }
 }
 
-fn sum_of(bytes: &[u8]) -> u32 {
+/// Checksum of bytes.
+pub(super) fn sum_of(bytes: &[u8]) -> u32 {
     let mut crc = Crc::new();
     crc.update(bytes);
     crc.sum()

@@ -54,6 +54,26 @@ SELECT ?run ?campaign ?index ?test ?status ?step ?action ?property ?outcome ?mar
     ?run act:campaign ?campaign ; act:index ?index ; act:test ?test ; act:status ?status .
 }";
 
+/// Judgements made after the run that no later one supersedes, without the run, which the store may lack.
+const RECHECKED_ALONE: &str = "
+SELECT ?execution ?property ?outcome ?margin ?rule WHERE {
+    GRAPH act:rechecked {
+        ?assertion earl:subject ?execution ; earl:test ?property ; earl:result ?result .
+        ?result act:outcome ?outcome ; act:ruleDigest ?rule .
+        OPTIONAL { ?result act:margin ?margin }
+    }
+    FILTER NOT EXISTS { GRAPH act:rechecked { ?later act:supersedes ?assertion } }
+}";
+
+/// All judgements made after the run, with the values that distinguish them, without the run.
+const LATER_ALONE: &str = "
+SELECT ?execution ?property ?at ?outcome ?rule WHERE {
+    GRAPH act:rechecked {
+        ?assertion earl:subject ?execution ; earl:test ?property ; act:recheckedAt ?at ; earl:result ?result .
+        ?result act:outcome ?outcome ; act:ruleDigest ?rule .
+    }
+}";
+
 /// Campaigns whose scenes were selected because they fail: shrunk runs, failed runs that ran again, and cases, which have
 /// the table `case` in their configuration. The prefix is [`FAILED_AGAIN`].
 const SELECTED: &str = r"
@@ -103,12 +123,12 @@ pub(super) fn of_outcomes() -> Wanted {
 
 /// The statements that [`rechecked`] reads.
 pub(super) fn of_rechecked() -> Wanted {
-    Wanted::queries(&[RECHECKED])
+    Wanted::queries(&[RECHECKED, RECHECKED_ALONE])
 }
 
 /// The statements that [`later_judgements`] reads.
 pub(super) fn of_later_judgements() -> Wanted {
-    Wanted::queries(&[LATER])
+    Wanted::queries(&[LATER, LATER_ALONE])
 }
 
 /// The statements that [`selected_campaigns`] and [`campaign_ids`] read.
@@ -232,14 +252,39 @@ pub(super) fn runs(store: &Store, filter: &RunFilter) -> Result<Vec<RunRow>, Que
             started: text(row, 7),
         })
         .collect();
-    rows.sort_by(|a, b| (ranks.get(&a.campaign), a.index, &a.run).cmp(&(ranks.get(&b.campaign), b.index, &b.run)));
+    sort_by_rank(&ranks, &mut rows);
     Ok(rows)
+}
+
+fn sort_by_rank(ranks: &BTreeMap<String, usize>, rows: &mut [RunRow]) {
+    rows.sort_by(|a, b| (ranks.get(&a.campaign), a.index, &a.run).cmp(&(ranks.get(&b.campaign), b.index, &b.run)));
+}
+
+/// Sorts runs by the start of their campaign, then by index; removes those of campaigns that the store does not have.
+pub(super) fn sort_runs(store: &Store, rows: &mut Vec<RunRow>) -> Result<(), QueryEvaluationError> {
+    let ranks = ranks(store)?;
+    rows.retain(|row| ranks.contains_key(&row.campaign));
+    sort_by_rank(&ranks, rows);
+    Ok(())
+}
+
+/// Sorts outcomes as [`outcomes`] does; removes those of campaigns that the store does not have.
+pub(super) fn sort_outcomes(store: &Store, rows: &mut Vec<OutcomeRow>) -> Result<(), QueryEvaluationError> {
+    let ranks = ranks(store)?;
+    rows.retain(|row| ranks.contains_key(&row.campaign));
+    sort_outcomes_by_rank(&ranks, rows);
+    Ok(())
 }
 
 /// Outcomes of the runs that match a filter, in the same order, then by step and property.
 pub(super) fn outcomes(store: &Store, filter: &RunFilter) -> Result<Vec<OutcomeRow>, QueryEvaluationError> {
     let ranks = ranks(store)?;
     let mut rows: Vec<OutcomeRow> = of_filtered(store, OUTCOMES, filter)?.iter().map(outcome_row).collect();
+    sort_outcomes_by_rank(&ranks, &mut rows);
+    Ok(rows)
+}
+
+fn sort_outcomes_by_rank(ranks: &BTreeMap<String, usize>, rows: &mut [OutcomeRow]) {
     rows.sort_by(|a, b| {
         (ranks.get(&a.campaign), a.index, &a.run, a.step, &a.property).cmp(&(
             ranks.get(&b.campaign),
@@ -249,12 +294,55 @@ pub(super) fn outcomes(store: &Store, filter: &RunFilter) -> Result<Vec<OutcomeR
             &b.property,
         ))
     });
-    Ok(rows)
 }
 
 /// The judgements made after the run that no other supersedes, each with the digest of its rule, unsorted.
 pub(super) fn rechecked(store: &Store, filter: &RunFilter) -> Result<Vec<(OutcomeRow, String)>, QueryEvaluationError> {
     Ok(select(store, RECHECKED, given(filter))?.iter().map(|row| (outcome_row(row), text(row, 10))).collect())
+}
+
+/// A judgement made after the run, without its run's other values.
+pub(super) struct LaterOutcome {
+    pub run: String,
+    pub step: u32,
+    pub property: String,
+    pub outcome: Outcome,
+    pub margin: Option<f64>,
+    /// Digest of its rule.
+    pub rule: String,
+}
+
+/// As [`rechecked`], also for runs that the store lacks.
+pub(super) fn rechecked_alone(store: &Store) -> Result<Vec<LaterOutcome>, QueryEvaluationError> {
+    let of = |row: &Row| {
+        let (run, step) = run_and_step(row)?;
+        Some(LaterOutcome {
+            run,
+            step,
+            property: text(row, 1),
+            outcome: outcome(Some(&text(row, 2))),
+            margin: optional(row, 3),
+            rule: text(row, 4),
+        })
+    };
+    Ok(select(store, RECHECKED_ALONE, Vec::new())?.iter().filter_map(of).collect())
+}
+
+/// The run and the step of an execution, from its IRI in the first column.
+fn run_and_step(row: &Row) -> Option<(String, u32)> {
+    let execution = id(row, 0);
+    let (run, step) = execution.rsplit_once('/')?;
+    Some((run.to_owned(), step.parse().ok()?))
+}
+
+/// As [`later_judgements`], for runs that the store lacks.
+pub(super) fn later_judgements_alone(store: &Store) -> Result<Vec<(String, String)>, QueryEvaluationError> {
+    let judgement = |row: &Row| {
+        let (run, step) = run_and_step(row)?;
+        let values = (1..5).map(|column| text(row, column));
+        Some((run, std::iter::once(step.to_string()).chain(values).collect::<Vec<_>>().join(" ")))
+    };
+    Ok(select(store, LATER_ALONE, Vec::new())?.iter().filter_map(judgement).collect())
 }
 
 /// Pairs of a run's id and a judgement made after the run, as one text; unsorted.

@@ -2,7 +2,8 @@
 
 use std::ops::Deref;
 use std::path::Path;
-use std::sync::{Arc, Mutex, PoisonError, RwLock};
+use std::sync::atomic::AtomicUsize;
+use std::sync::{Arc, Mutex, OnceLock, PoisonError, RwLock};
 use std::thread::sleep;
 use std::time::Duration;
 
@@ -10,6 +11,7 @@ use oxigraph::store::{StorageError, Store};
 
 use crate::folder::Folder;
 use crate::journal::{self, Journal};
+use crate::outlines::LoadedFiles;
 use crate::pending;
 use crate::salvage::salvage;
 use crate::seal::{Found, Seal};
@@ -56,8 +58,18 @@ pub(super) struct Opened {
 }
 
 impl Opened {
+    /// Whether the history has changed since a reader opened it.
+    pub(super) fn is_stale(&self, folder: &Folder) -> bool {
+        self.snapshot.as_ref().is_some_and(|snapshot| snapshot.is_stale(folder))
+    }
+
+    /// A handle of the store.
+    pub(super) fn handle(&self) -> OpenStore {
+        self.store.clone()
+    }
+
     /// Adds statements of the snapshot's journal to a reader's store, if they are not in it.
-    fn load(&self, dir: &Path, wanted: impl FnOnce() -> Wanted) -> Result<(), Diagnostics> {
+    pub(super) fn load(&self, dir: &Path, wanted: impl FnOnce() -> Wanted) -> Result<(), Diagnostics> {
         let Some(snapshot) = self.snapshot.as_ref().filter(|snapshot| !snapshot.journal.is_empty()) else {
             return Ok(());
         };
@@ -158,7 +170,15 @@ impl History {
 
     fn with(opened: Opened, folder: Folder) -> Self {
         let journal = Mutex::new(Journal::new(folder.dir()));
-        Self { opened: RwLock::new(Some(opened)), folder, journal }
+        Self {
+            opened: RwLock::new(Some(opened)),
+            folder,
+            journal,
+            view: Mutex::default(),
+            loaded: LoadedFiles::default(),
+            single_outlines: AtomicUsize::new(0),
+            restore: OnceLock::new(),
+        }
     }
 
     /// Returns a handle of the store with every statement. (All clones use the same store.)
@@ -250,6 +270,13 @@ fn read(folder: &Folder, snapshot: Snapshot) -> Result<Opened, Diagnostics> {
     if snapshot.journal.is_empty() {
         return read_tables(folder, snapshot);
     }
+    let store = pending::open(&snapshot);
+    opened(folder, store, snapshot)
+}
+
+/// Opens the present state of a store so that statements can be added: it is the reader's own.
+pub(super) fn read_with_outlines(folder: &Folder) -> Result<Opened, Diagnostics> {
+    let snapshot = Snapshot::take(folder)?;
     let store = pending::open(&snapshot);
     opened(folder, store, snapshot)
 }

@@ -31,6 +31,11 @@ impl History {
         self.journal().synced = true;
     }
 
+    /// Whether each run is on the disk before it is reported.
+    pub(super) fn syncs_each_run(&self) -> bool {
+        self.journal().synced
+    }
+
     fn journal(&self) -> std::sync::MutexGuard<'_, Journal> {
         self.journal.lock().unwrap_or_else(PoisonError::into_inner)
     }

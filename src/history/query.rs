@@ -38,7 +38,7 @@ const COLUMNS: Range<u64> = 16 << 20..1 << 30;
 pub(super) fn answer(history: &History, text: &Source, cancel: &Cancel) -> Result<QueryAnswer, Diagnostics> {
     refuse_update(text)?;
     refuse_excess(text)?;
-    let store = history.store_with(|| Wanted::query(&text.text))?;
+    let store = history.store_for_query(|| Wanted::query(&text.text))?;
     let query = prepare(text, &store, cancel)?;
     let prepared = query.prepared.clone();
     let evaluated = evaluate(&store, cancel, move |store| prepared.on_store(store).execute().and_then(collect));

@@ -61,7 +61,9 @@ impl History {
     pub fn newest(&self, run: &str, step: u32, properties: &[String]) -> Result<Vec<StoredJudgement>, Diagnostics> {
         let execution = execution(run, step);
         let store = self.store_with(|| Wanted::run(run_node(run).as_str()))?;
-        newest(&store, &execution, properties).map_err(|error| self.fault("reading a run's outcomes", &error))
+        let outline = self.outlined_store(run)?;
+        newest([outline.as_ref().unwrap_or(&store), &store], &execution, properties)
+            .map_err(|error| self.fault("reading a run's outcomes", &error))
     }
 
     /// Returns all details of a run as [`History::run`] does, with its newest judgements: later ones replace those of the
@@ -135,11 +137,16 @@ fn execution(run: &str, step: u32) -> NamedNode {
     below(&run_node(run), &step.to_string())
 }
 
-fn newest(store: &Store, execution: &NamedNode, properties: &[String]) -> Result<Vec<StoredJudgement>, StorageError> {
+/// `own` is the store with the campaign's own outcomes, `later` the one with those made after the run.
+fn newest(
+    [own, later]: [&Store; 2],
+    execution: &NamedNode,
+    properties: &[String],
+) -> Result<Vec<StoredJudgement>, StorageError> {
     let (graph, test) = (iri(GRAPH), iri("earl:test"));
     let mut superseded = BTreeSet::new();
     let mut found = Vec::new();
-    for graph in [GraphNameRef::DefaultGraph, GraphNameRef::NamedNode(graph.as_ref())] {
+    for (store, graph) in [(own, GraphNameRef::DefaultGraph), (later, GraphNameRef::NamedNode(graph.as_ref()))] {
         // A new property was judged nowhere: no outcome of the action needs to be looked at.
         if !is_judged(store, properties, graph)? {
             continue;

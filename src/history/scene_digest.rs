@@ -29,9 +29,15 @@ impl History {
     pub fn scenes(&self, runs: &[RunRow]) -> Result<BTreeMap<String, SceneDigest>, Diagnostics> {
         let store = self.store_with(Wanted::details)?;
         runs.iter()
-            .map(|row| Ok((row.run.clone(), read(&store, &run_node(&row.run))?)))
-            .collect::<Result<_, StorageError>>()
-            .map_err(|error| self.fault("reading scenes", &error))
+            .map(|row| {
+                let node = run_node(&row.run);
+                let digest = match self.outlined_store(&row.run)? {
+                    Some(outline) => read(&outline, &node),
+                    None => read(&store, &node),
+                };
+                Ok((row.run.clone(), digest.map_err(|error| self.fault("reading scenes", &error))?))
+            })
+            .collect()
     }
 }
 

@@ -9,6 +9,7 @@ use std::fs::{self, File};
 use std::io::{self, ErrorKind, Seek as _};
 use std::path::{Path, PathBuf};
 use std::thread::yield_now;
+use std::time::SystemTime;
 
 use crate::fault;
 use crate::folder::Folder;
@@ -36,13 +37,15 @@ pub(super) struct Snapshot {
     pub(super) journal: Vec<u8>,
 }
 
-/// Identifies the state of a store: current manifest, its size, and the logs and the journal with their sizes.
+/// Identifies the state of a store: current manifest, its size, the logs and the journal with their sizes, and the time
+/// of the last outline.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Stamp {
     manifest: Vec<u8>,
     size: u64,
     logs: Vec<(String, u64)>,
     journal: u64,
+    outlines: Option<SystemTime>,
 }
 
 impl Snapshot {
@@ -169,7 +172,8 @@ fn stamp(folder: &Folder, store: &Path) -> Option<Stamp> {
         .collect();
     logs.sort();
     let journal = fs::metadata(folder.dir().join(journal::NAME)).map_or(0, |found| found.len());
-    Some(Stamp { manifest: current, size, logs, journal })
+    let outlines = fs::metadata(folder.outlines()).and_then(|found| found.modified()).ok();
+    Some(Stamp { manifest: current, size, logs, journal, outlines })
 }
 
 fn copy(file: &mut File, to: &Path) -> io::Result<()> {

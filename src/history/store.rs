@@ -2,7 +2,8 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
-use std::sync::{Mutex, RwLock};
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Mutex, OnceLock, RwLock};
 
 use oxigraph::model::vocab::rdf;
 use oxigraph::model::{GraphNameRef, NamedNode, QuadRef};
@@ -12,6 +13,7 @@ use oxigraph::store::StorageError;
 use crate::folder::Folder;
 use crate::journal::Journal;
 use crate::open::Opened;
+use crate::outlines::{LoadedFiles, Outline, Restore, Shelf, View};
 use crate::read::{short_id, subjects, text_of};
 use crate::statements::iri;
 use crate::wanted::Wanted;
@@ -38,6 +40,13 @@ pub struct History {
     pub(super) folder: Folder,
     /// The statements that are not in the store yet.
     pub(super) journal: Mutex<Journal>,
+    /// The store of queries, if there are outlines.
+    pub(super) view: Mutex<Option<View>>,
+    /// The files of outlines that were read last.
+    pub(super) loaded: LoadedFiles,
+    /// Number of outlines that this process has written.
+    pub(super) single_outlines: AtomicUsize,
+    pub(super) restore: OnceLock<Box<Restore>>,
 }
 
 impl History {
@@ -111,6 +120,34 @@ impl History {
         self.load_long_journal()
     }
 
+    /// Stores the outline of a run, completely or (on an error) not at all: everything except its motion over time, which
+    /// comes back when the run is simulated again.
+    ///
+    /// # Errors
+    /// As [`History::commit`].
+    pub fn commit_outline(&self, record: &RunRecord) -> Result<(), Diagnostics> {
+        self.check_ids("run", [&record.id])?;
+        let doing = format!("writing run {}", record.id);
+        let outline =
+            Outline::of(record).map_err(|error| Diagnostic::error("H006", format!("{doing} failed: {error}")))?;
+        self.enter_outline(&record.campaign, record.index, &outline)
+    }
+
+    /// Stores an outline.
+    pub(super) fn enter_outline(&self, campaign: &str, index: u64, outline: &Outline) -> Result<(), Diagnostics> {
+        let doing = format!("writing run {campaign}-{}", index + 1);
+        self.folder.begin_outlines()?;
+        let shelf = self.shelf();
+        let synced = self.syncs_each_run();
+        shelf
+            .add(campaign, index, outline, synced)
+            .and_then(|()| match self.single_outlines.fetch_add(1, Ordering::Relaxed) % Shelf::RUNS_IN_A_FILE {
+                last if last + 1 == Shelf::RUNS_IN_A_FILE => shelf.pack(campaign),
+                _ => Ok(()),
+            })
+            .map_err(|error| fault::io(self.dir(), &doing, &error))
+    }
+
     /// Flushes all committed data to the disk.
     ///
     /// # Errors
@@ -126,6 +163,7 @@ impl History {
     /// Writing failed: `H005`, `H006`.
     pub fn finish_campaign(&self, id: &str, end: &CampaignEnd) -> Result<(), Diagnostics> {
         self.enter(&write_campaign::end(id, end), "writing the end of the campaign")?;
+        self.shelf().pack(id).map_err(|error| fault::io(self.dir(), "writing outlines", &error))?;
         self.load_journal()?;
         self.flush()?;
         self.reopen()
@@ -136,8 +174,11 @@ impl History {
     /// # Errors
     /// The store can't be read; `H026` an id is not an id.
     pub fn campaigns(&self) -> Result<Vec<CampaignRow>, Diagnostics> {
-        let campaigns =
+        let mut campaigns =
             lists::campaigns(&*self.store_with(lists::of_campaigns)?).map_err(|error| self.query_fault(&error))?;
+        for campaign in &mut campaigns {
+            campaign.runs += self.outlined_ids(Some(&campaign.id))?.len() as u64;
+        }
         self.check_ids("campaign", campaigns.iter().map(|campaign| &campaign.id))?;
         Ok(campaigns)
     }
@@ -169,9 +210,20 @@ impl History {
     /// # Errors
     /// The store can't be read; `H026` an id is not an id.
     pub fn runs(&self, filter: &RunFilter) -> Result<Vec<RunRow>, Diagnostics> {
-        let runs = lists::runs(&*self.store_with(lists::of_runs)?, filter).map_err(|error| self.query_fault(&error))?;
+        let store = self.store_with(lists::of_runs)?;
+        let mut runs = lists::runs(&store, filter).map_err(|error| self.query_fault(&error))?;
+        let whole = runs.len();
+        self.each_outlined(filter, &mut |outlined| runs.push(outlined.as_run()))?;
+        if runs.len() > whole {
+            lists::sort_runs(&store, &mut runs).map_err(|error| self.query_fault(&error))?;
+        }
         self.check_ids("run", runs.iter().flat_map(|run| [&run.run, &run.campaign]))?;
         Ok(runs)
+    }
+
+    /// The runs that are kept whole.
+    pub(super) fn whole_runs(&self) -> Result<Vec<RunRow>, Diagnostics> {
+        lists::runs(&*self.store_with(lists::of_runs)?, &RunFilter::default()).map_err(|error| self.query_fault(&error))
     }
 
     /// Returns the ids of all campaigns except those of [`History::selected_campaigns`], sorted by start, each with its
@@ -189,9 +241,10 @@ impl History {
             let runs = runs.map_err(|error| self.fault("reading", &error))?;
             let mut runs: Vec<String> =
                 runs.into_iter().map(|run| short_id(&text_of(&run.into())).to_owned()).collect();
-            runs.sort();
             self.check_ids("campaign", [&id])?;
             self.check_ids("run", &runs)?;
+            runs.extend(self.outlined_ids(Some(&id))?);
+            runs.sort();
             found.push((id, runs));
         }
         Ok(found)
@@ -203,7 +256,14 @@ impl History {
     /// # Errors
     /// The store can't be read.
     pub fn outcomes(&self, filter: &RunFilter) -> Result<Vec<OutcomeRow>, Diagnostics> {
-        lists::outcomes(&*self.store_with(lists::of_outcomes)?, filter).map_err(|error| self.query_fault(&error))
+        let store = self.store_with(lists::of_outcomes)?;
+        let mut outcomes = lists::outcomes(&store, filter).map_err(|error| self.query_fault(&error))?;
+        let whole = outcomes.len();
+        self.each_outlined(filter, &mut |outlined| outcomes.extend(outlined.as_outcomes()))?;
+        if outcomes.len() > whole {
+            lists::sort_outcomes(&store, &mut outcomes).map_err(|error| self.query_fault(&error))?;
+        }
+        Ok(outcomes)
     }
 
     /// Returns all details of a run, named as in [`History::resolve`].
@@ -212,6 +272,9 @@ impl History {
     /// `H008` there is no such run.
     pub fn run(&self, name: &str) -> Result<RunDetail, Diagnostics> {
         let id = self.resolve(name)?;
+        if let Some(run) = self.outlined_run(&id)? {
+            return Ok(run);
+        }
         let node = run_node(&id);
         let store = self.store_with(|| Wanted::run(node.as_str()))?;
         detail::read(&store, &node).map_err(|error| self.fault("reading a run", &error))
@@ -223,6 +286,11 @@ impl History {
     /// `H008` there is no such run, `H009` its trace is missing, `H007` its trace is damaged.
     pub fn trace(&self, name: &str) -> Result<Trace, Diagnostics> {
         let id = self.resolve(name)?;
+        if self.is_outline(&id)? {
+            // With the precision of a stored trace.
+            let (choices, trace) = self.restored(&id)?;
+            return Ok(self.encoded_again(&id, &choices, &trace, trace_file::decode)?.1);
+        }
         Ok(self.decoded(&id, trace_file::decode)?.1)
     }
 
@@ -233,6 +301,10 @@ impl History {
     /// As [`History::trace`].
     pub fn sampled(&self, name: &str) -> Result<Trace, Diagnostics> {
         let id = self.resolve(name)?;
+        if self.is_outline(&id)? {
+            let (choices, trace) = self.restored(&id)?;
+            return Ok(self.encoded_again(&id, &choices, &trace, trace_file::decode_sampled)?.1);
+        }
         Ok(self.decoded(&id, trace_file::decode_sampled)?.1)
     }
 
@@ -243,7 +315,10 @@ impl History {
     /// As [`History::trace`].
     pub fn states(&self, name: &str) -> Result<Trace, Diagnostics> {
         let id = self.resolve(name)?;
-        Ok(self.decoded(&id, trace_file::decode_states)?.1)
+        match self.outlined_states(&id)? {
+            Some((_, trace)) => Ok(trace),
+            None => Ok(self.decoded(&id, trace_file::decode_states)?.1),
+        }
     }
 
     /// Returns every choice of a run, named as in [`History::resolve`].
@@ -252,6 +327,9 @@ impl History {
     /// As [`History::trace`].
     pub fn choices(&self, name: &str) -> Result<Vec<Choice>, Diagnostics> {
         let id = self.resolve(name)?;
+        if let Some((choices, _)) = self.outlined_states(&id)? {
+            return Ok(choices);
+        }
         self.decoded(&id, trace_file::decode_choices)
     }
 
@@ -261,7 +339,10 @@ impl History {
     /// As [`History::trace`].
     pub fn recorded(&self, name: &str) -> Result<(Vec<Choice>, Trace), Diagnostics> {
         let id = self.resolve(name)?;
-        self.decoded(&id, trace_file::decode_states)
+        match self.outlined_states(&id)? {
+            Some(recorded) => Ok(recorded),
+            None => self.decoded(&id, trace_file::decode_states),
+        }
     }
 
     /// Calls `each` with the health data of every run of a campaign, in the order of their indices.
@@ -270,11 +351,18 @@ impl History {
     /// `H014` there is no such campaign; otherwise as [`History::trace`].
     pub fn each_vitals(&self, campaign: &str, mut each: impl FnMut(&RunVitals)) -> Result<(), Diagnostics> {
         self.campaign(campaign)?;
-        let rows = self.runs(&RunFilter { campaign: Some(campaign.to_owned()), ..RunFilter::default() })?;
+        let filter = RunFilter { campaign: Some(campaign.to_owned()), ..RunFilter::default() };
+        let rows = self.runs(&filter)?;
+        let mut outlines: BTreeMap<String, RunVitals> =
+            self.outlined_vitals(campaign)?.into_iter().map(|vitals| (vitals.run.clone(), vitals)).collect();
         let store = self.store_with(vitals::wanted)?;
         let fault = |error| self.fault("reading a run", &error);
         let columns = vitals::Columns::read(&store).map_err(fault)?;
         for row in rows {
+            if let Some(vitals) = outlines.remove(&row.run) {
+                each(&vitals);
+                continue;
+            }
             let choices = self.decoded(&row.run, trace_file::decode_choices)?;
             each(&columns.of(&store, &row, choices).map_err(fault)?);
         }
@@ -331,7 +419,23 @@ impl History {
         decode(&bytes).map_err(|why| fault::damaged(self.dir(), &format!("the trace of run {id}: {why}")))
     }
 
+    /// Writes a trace as a trace file, and reads it.
+    fn encoded_again<T>(
+        &self,
+        id: &str,
+        choices: &[Choice],
+        trace: &Trace,
+        decode: impl FnOnce(&[u8]) -> Result<T, String>,
+    ) -> Result<T, Diagnostics> {
+        trace_file::encode(choices, trace)
+            .and_then(|bytes| decode(&bytes))
+            .map_err(|why| fault::damaged(self.dir(), &format!("the trace of run {id}: {why}")))
+    }
+
     pub(super) fn has_run(&self, id: &str) -> Result<bool, Diagnostics> {
+        if self.is_outline(id)? {
+            return Ok(true);
+        }
         let (run, class) = (run_node(id), iri("act:Run"));
         // A question about one run is often followed by questions about others.
         self.store_with(|| Wanted::individuals("act:Run"))?
@@ -345,6 +449,9 @@ impl History {
         let class = iri(class);
         let found = subjects(&store, "rdf:type", class.as_ref()).map_err(|error| self.fault("reading", &error))?;
         let mut ids: Vec<String> = found.into_iter().map(|node| short_id(&text_of(&node.into())).to_owned()).collect();
+        if class.as_str().ends_with("Run") {
+            ids.extend(self.outlined_ids(None)?);
+        }
         ids.sort();
         self.check_ids(if class.as_str().ends_with("Run") { "run" } else { "campaign" }, &ids)?;
         Ok(ids)

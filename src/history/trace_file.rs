@@ -30,15 +30,23 @@ type Head = (Vec<Choice>, Vec<Snapshot>, Vec<ActionTrace>, f64, Vec<String>, Str
 /// # Errors
 /// A message, if a part can't be encoded. (The current types never cause this.)
 pub(super) fn encode(choices: &[Choice], trace: &Trace) -> Result<Vec<u8>, String> {
+    let head = compressed(&encode_head(choices, trace)?)?;
+    let course = compressed(&[frames::encode(&trace.frames.rows), encode_motions(trace)?].concat())?;
+    let length = u32::try_from(head.len()).map_err(|_| "its trace is larger than 4 GB".to_owned())?;
+    Ok([MAGIC.as_slice(), &length.to_le_bytes(), &head, &course].concat())
+}
+
+/// Encodes the choices and the data from which facts are extracted.
+///
+/// # Errors
+/// As [`encode`].
+pub(super) fn encode_head(choices: &[Choice], trace: &Trace) -> Result<Vec<u8>, String> {
     let frames = &trace.frames;
     let head = (choices, &trace.snapshots, &trace.actions, frames.period_secs, &frames.names, &trace.hash);
     let mut head = postcard::to_stdvec(&head).map_err(|error| error.to_string())?;
     let later = (&trace.map, &trace.forms, &trace.robot_courses, Details::of(trace), Intervals::of(trace));
     head.extend(postcard::to_stdvec(&later).map_err(|error| error.to_string())?);
-    let head = compressed(&head)?;
-    let course = compressed(&[frames::encode(&frames.rows), encode_motions(trace)?].concat())?;
-    let length = u32::try_from(head.len()).map_err(|_| "its trace is larger than 4 GB".to_owned())?;
-    Ok([MAGIC.as_slice(), &length.to_le_bytes(), &head, &course].concat())
+    Ok(head)
 }
 
 /// Decodes the choices and the whole trace.
@@ -47,7 +55,7 @@ pub(super) fn encode(choices: &[Choice], trace: &Trace) -> Result<Vec<u8>, Strin
 /// A message that names the damaged part.
 pub(super) fn decode(bytes: &[u8]) -> Result<(Vec<Choice>, Trace), String> {
     let (head, course) = parts(bytes)?;
-    let (choices, mut trace) = decode_head(head)?;
+    let (choices, mut trace) = decode_head(&expanded(head)?)?;
     let course = Arc::new(expanded(course)?);
     let (rows, rest) = frames::decode_next(&course).ok_or("the motion of the bodies can't be read")?;
     trace.frames.rows = rows;
@@ -146,7 +154,7 @@ fn read_motions(
 /// A message that names the damaged part.
 pub(super) fn decode_sampled(bytes: &[u8]) -> Result<(Vec<Choice>, Trace), String> {
     let (head, course) = parts(bytes)?;
-    let (choices, mut trace) = decode_head(head)?;
+    let (choices, mut trace) = decode_head(&expanded(head)?)?;
     let course = Arc::new(expanded(course)?);
     let rest = frames::skip_next(&course).ok_or("the motion of the bodies can't be read")?;
     read_motions(&course, course.len() - rest.len(), &mut trace, skip_motion)
@@ -159,7 +167,7 @@ pub(super) fn decode_sampled(bytes: &[u8]) -> Result<(Vec<Choice>, Trace), Strin
 /// # Errors
 /// A message that names the damaged part.
 pub(super) fn decode_states(bytes: &[u8]) -> Result<(Vec<Choice>, Trace), String> {
-    decode_head(parts(bytes)?.0)
+    decode_head(&expanded(parts(bytes)?.0)?)
 }
 
 /// Decodes the choices alone: they come first.
@@ -167,15 +175,25 @@ pub(super) fn decode_states(bytes: &[u8]) -> Result<(Vec<Choice>, Trace), String
 /// # Errors
 /// A message that names the damaged part.
 pub(super) fn decode_choices(bytes: &[u8]) -> Result<Vec<Choice>, String> {
-    let head = expanded(parts(bytes)?.0)?;
-    let (choices, _) = postcard::take_from_bytes(&head).map_err(|error| error.to_string().to_lowercase())?;
+    head_choices(&expanded(parts(bytes)?.0)?)
+}
+
+/// Decodes the choices of what [`encode_head`] returns.
+///
+/// # Errors
+/// As [`decode_choices`].
+pub(super) fn head_choices(head: &[u8]) -> Result<Vec<Choice>, String> {
+    let (choices, _) = postcard::take_from_bytes(head).map_err(|error| error.to_string().to_lowercase())?;
     Ok(choices)
 }
 
-fn decode_head(head: &[u8]) -> Result<(Vec<Choice>, Trace), String> {
-    let head = expanded(head)?;
+/// Decodes what [`encode_head`] returns.
+///
+/// # Errors
+/// A message that names the damaged part.
+pub(super) fn decode_head(head: &[u8]) -> Result<(Vec<Choice>, Trace), String> {
     let read = |error: postcard::Error| error.to_string().to_lowercase();
-    let (head, rest): (Head, &[u8]) = postcard::take_from_bytes(&head).map_err(read)?;
+    let (head, rest): (Head, &[u8]) = postcard::take_from_bytes(head).map_err(read)?;
     let (map, rest): (SceneMap, &[u8]) = part_of(rest).map_err(read)?;
     let (forms, rest): (Vec<Form>, &[u8]) = part_of(rest).map_err(read)?;
     let (robot_courses, rest): (Vec<RobotCourse>, &[u8]) = part_of(rest).map_err(read)?;

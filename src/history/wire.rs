@@ -99,7 +99,7 @@ impl History {
             let fault = Diagnostic::error("H017", "`SERVICE` queries another endpoint, which is not supported");
             return Err(WireFault::Refused(fault.at(text, span).into()));
         }
-        let store = self.store_with(|| Wanted::query(&text.text)).map_err(WireFault::Failed)?;
+        let store = self.store_for_query(|| Wanted::query(&text.text)).map_err(WireFault::Failed)?;
         let query = prepare(text, &store, &Cancel::new()).map_err(WireFault::Malformed)?;
         let answer = evaluated(&store, query.prepared.clone(), text, choose, limits);
         query.check_texts(text).map_err(WireFault::Refused)?;
@@ -119,7 +119,7 @@ impl History {
         cancel: &Cancel,
     ) -> Option<Result<WireAnswer, WireFault>> {
         let query = light(&text.text)?;
-        let store = self.store_with(|| Wanted::parsed(&query)).map_err(WireFault::Failed);
+        let store = self.store_for_query(|| Wanted::parsed(&query)).map_err(WireFault::Failed);
         let prepared = SparqlEvaluator::new().with_cancellation_token(cancel.token()).for_query(query);
         Some(store.and_then(|store| evaluated(&store, prepared, text, choose, limits)))
     }

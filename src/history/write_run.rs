@@ -20,6 +20,13 @@ pub(super) fn run_node(id: &str) -> NamedNode {
 
 /// All quads of a run.
 pub(super) fn quads(record: &RunRecord) -> Vec<Quad> {
+    let mut quads = quads_without_facts(record);
+    graphs::write(&record.facts, &run_node(&record.id), &mut quads);
+    quads
+}
+
+/// The quads of a run in the default graph.
+pub(super) fn quads_without_facts(record: &RunRecord) -> Vec<Quad> {
     let run = run_node(&record.id);
     let mut statements = Statements::default();
     write_run(record, &run, &mut statements);
@@ -28,9 +35,7 @@ pub(super) fn quads(record: &RunRecord) -> Vec<Quad> {
     for step in 0..record.trace.actions.len() {
         write_execution(record, step, &run, &mut statements);
     }
-    let mut quads = statements.quads;
-    graphs::write(&record.facts, &run, &mut quads);
-    quads
+    statements.quads
 }
 
 fn write_run(record: &RunRecord, run: &NamedNode, statements: &mut Statements) {

@@ -9,6 +9,7 @@ use oxigraph::store::{StorageError, Store};
 use crate::merge::copy::about;
 use crate::merge::plan::{MergePlan, PlannedEnd, PlannedMerge};
 use crate::merge::renames::Renames;
+use crate::outlines::Outline;
 use crate::read::text_of;
 use crate::statements::{Statements, iri, time};
 use crate::write_campaign::{self, campaign_node};
@@ -63,6 +64,7 @@ pub fn carry_out(
         for (source, run) in campaign.work.judgements.values() {
             writer.judgements(*source, run)?;
         }
+        into.shelf().pack(&campaign.id).map_err(|error| fault::io(into.dir(), "writing outlines", &error))?;
         writer.end(campaign)?;
     }
     into.load_journal()?;
@@ -116,6 +118,14 @@ impl Writer<'_> {
 
     fn run(&mut self, source: usize, run: &str, new: &str) -> Result<(), Diagnostics> {
         let doing = format!("writing run {new}");
+        if let Some((outline, later)) = self.outlined(source, run)? {
+            if let (Some((campaign, _)), Some(row)) = (new.rsplit_once('-'), outline.rows.rows.first()) {
+                self.into.enter_outline(campaign, row.index, &outline)?;
+            }
+            self.write(&later, &[])?;
+            self.merged.runs += 1;
+            return Ok(());
+        }
         match Files::Disk.read_bytes(&self.sources[source].trace_path(run)) {
             Ok(bytes) => write_atomic(&self.into.trace_path(new), &bytes)
                 .map_err(|error| fault::io(self.into.dir(), &doing, &error))?,
@@ -129,7 +139,10 @@ impl Writer<'_> {
     /// Copies only later judgements: the destination has the rest of the run.
     fn judgements(&self, source: usize, run: &str) -> Result<(), Diagnostics> {
         let later = GraphName::from(iri("act:rechecked"));
-        let mut quads = self.about(source, &run_node(run))?;
+        let mut quads = match self.outlined(source, run)? {
+            Some((_, later)) => later,
+            None => self.about(source, &run_node(run))?,
+        };
         quads.retain(|quad| quad.graph_name == later);
         self.write(&quads, &[])
     }
@@ -146,6 +159,19 @@ impl Writer<'_> {
         };
         self.write(&quads, &[])?;
         self.into.flush()
+    }
+
+    /// The outline of a run and the judgements made after it, with the ids of the destination. Returns `None` if the run is
+    /// kept whole.
+    fn outlined(&self, source: usize, run: &str) -> Result<Option<(Outline, Vec<Quad>)>, Diagnostics> {
+        let history = &self.sources[source];
+        let Some(outline) = history.outline(run)? else { return Ok(None) };
+        // Together, because later judgements name those that they supersede.
+        let mut quads = outline.quads;
+        quads.extend(history.later_about_outline(run, &*history.store()?)?);
+        let (own, later) =
+            self.renames[source].apply(quads).into_iter().partition(|quad| quad.graph_name == GraphName::DefaultGraph);
+        Ok(Some((Outline { quads: own, ..outline }, later)))
     }
 
     /// All statements of a source about a campaign or run, with the ids of the destination.

@@ -79,7 +79,11 @@ pub(super) fn survey(history: &History, source: Option<usize>) -> Result<Vec<Fou
     let shrunk = history.selected_campaigns()?;
     let store = history.store_with(lists::of_later_judgements)?;
     let mut later: BTreeMap<String, BTreeSet<String>> = BTreeMap::new();
-    for (run, judgement) in lists::later_judgements(&store).map_err(|error| history.query_fault(&error))? {
+    let mut judgements = lists::later_judgements(&store).map_err(|error| history.query_fault(&error))?;
+    if history.shelf().exists() {
+        judgements.extend(lists::later_judgements_alone(&store).map_err(|error| history.query_fault(&error))?);
+    }
+    for (run, judgement) in judgements {
         later.entry(run).or_default().insert(judgement);
     }
     let mut all = Vec::new();
@@ -112,13 +116,23 @@ fn runs(
     }
     let store = history.store()?;
     let mut runs = BTreeMap::new();
+    let mut outlined: BTreeMap<String, u64> = BTreeMap::new();
+    history.each_outlined(&filter, &mut |outline| {
+        outlined.insert(outline.run(), outline.row.discards.len() as u64);
+    })?;
     for row in history.runs(&filter)? {
-        let node = Node::read(&store, &run_node(&row.run)).map_err(|error| history.fault("reading a run", &error))?;
+        let discards = match outlined.get(&row.run) {
+            Some(discards) => *discards,
+            None => Node::read(&store, &run_node(&row.run))
+                .map_err(|error| history.fault("reading a run", &error))?
+                .count("act:discards")
+                .unwrap_or_default(),
+        };
         let outcomes = outcomes.remove(&row.run).unwrap_or_default();
         let run = FoundRun {
             content: content(&row, &outcomes),
             counts: Counts::of(outcomes.iter().map(|outcome| outcome.outcome)),
-            discards: node.count("act:discards").unwrap_or_default(),
+            discards,
             later: later.remove(&row.run).unwrap_or_default(),
             row,
         };

@@ -1,0 +1,52 @@
+//! Makes the motion of runs that have only an outline: simulates them again from their recorded choices.
+
+use std::collections::BTreeMap;
+use std::sync::{Arc, Mutex, PoisonError};
+
+use crate::attempt::Attempt;
+use crate::replay::{cut_secs, rerun};
+use crate::{Env, RunContext, StoredCampaign};
+use actcheck_actions::Cut;
+use actcheck_base::{Diagnostic, Diagnostics};
+use actcheck_data::Choices;
+use actcheck_history::{CampaignRecord, History, Restore};
+
+/// Decides whether a campaign of a history may be simulated again: it may start a program.
+pub type MayRun = dyn Fn(&Env, &History, &CampaignRecord) -> Result<(), Diagnostics> + Send + Sync;
+
+/// Returns the function that simulates runs again for [`History::restore_with`]. `on_start` is called with the id of each
+/// run before.
+pub fn restorer(
+    context: RunContext,
+    may_run: Box<MayRun>,
+    on_start: impl Fn(&str) + Send + Sync + 'static,
+) -> Box<Restore> {
+    // Preparing a campaign takes longer than a run.
+    let known: Mutex<BTreeMap<String, Arc<StoredCampaign>>> = Mutex::default();
+    Box::new(move |history, run| {
+        let detail = history.run(run)?;
+        let (choices, was) = history.recorded(run)?;
+        let campaign = {
+            let mut known = known.lock().unwrap_or_else(PoisonError::into_inner);
+            match known.get(&detail.row.campaign) {
+                Some(campaign) => Arc::clone(campaign),
+                None => {
+                    let (env, record) = Env::from_history(history, &detail.row.campaign, None)?;
+                    may_run(&env, history, &record)?;
+                    let campaign = Arc::new((env, record));
+                    known.insert(detail.row.campaign.clone(), Arc::clone(&campaign));
+                    campaign
+                }
+            }
+        };
+        on_start(run);
+        let (env, record) = &*campaign;
+        let index = env.index_of(&detail.row.test, &choices)?;
+        // The wall clock is not part of a run's choices: the run is cut off at the same simulated time.
+        let cut = cut_secs(&was).map_or(Cut::Never, |at_secs| Cut::Simulated { at_secs });
+        let attempt = Attempt { campaign: &record.id, index, choices: &|| Choices::recorded(&choices), cut };
+        let made = rerun(env, &attempt, &context)
+            .map_err(|why| Diagnostic::error("H031", format!("run {run} can't be simulated again: {why}")))?;
+        Ok((made.choices, made.trace))
+    })
+}

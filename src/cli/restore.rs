@@ -1,0 +1,37 @@
+//! Simulates runs again that are kept as outlines, when a command needs their motion.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use crate::{clock, output, trust};
+use actcheck_base::Diagnostics;
+use actcheck_campaign::{RunContext, restorer};
+use actcheck_history::{History, RunRow};
+
+/// Lets a history simulate runs again. The first time, a note says so.
+pub fn allow(history: &History) {
+    let is_noted = AtomicBool::new(false);
+    let context = RunContext { clock: clock::system(), disturb: None };
+    history.restore_with(restorer(context, Box::new(trust::check_stored), move |run| {
+        if !is_noted.swap(true, Ordering::Relaxed) {
+            note(format!("run {run} is kept as an outline: its motion is simulated again"));
+        }
+    }));
+}
+
+/// Tells what it costs to simulate the runs that are kept as outlines, if there are many.
+///
+/// # Errors
+/// The history can't be read.
+pub fn announce(history: &History, runs: &[RunRow], jobs: usize) -> Result<(), Diagnostics> {
+    let (runs, secs) = history.outlined_cost(runs)?;
+    if runs > 1 {
+        let secs = secs / jobs.max(1) as f64;
+        let time = if secs < 100.0 { format!("{secs:.0} s") } else { format!("{:.0} min", secs / 60.0) };
+        note(format!("{runs} runs are kept as outlines: their motion is simulated again, which takes about {time}"));
+    }
+    Ok(())
+}
+
+fn note(message: String) {
+    output::print_error_text(&format!("{message}\n"));
+}

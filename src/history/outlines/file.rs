@@ -1,0 +1,176 @@
+//! A file of outlines: the indices of its runs, their values in lists, their statements, and their states.
+//!
+//! After the magic bytes, a table has the compressed size and the checksum of each part, and then its own checksum: four
+//! bytes each, the lowest first. Each part is compressed on its own, because most readers need only one.
+
+use oxigraph::model::Quad;
+
+use crate::journal::{self, Content, Part};
+use crate::outlines::row::Rows;
+use crate::trace_file;
+use crate::wanted::Wanted;
+use crate::{RunRecord, write_run};
+use actcheck_base::{ByteReader, put_varint};
+
+/// Magic bytes at the start of each file. The last one is the format version.
+const MAGIC: &[u8; 8] = b"acoutln1";
+/// Number of parts.
+const PARTS: usize = 4;
+/// Size of the magic bytes and the table. Unit: bytes.
+pub(super) const HEADER: usize = MAGIC.len() + 8 * PARTS + 4;
+/// Compression level: higher ones take many times as long and save some percent.
+const LEVEL: i32 = 6;
+
+/// The outline of one run.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Outline {
+    /// The values of this run alone.
+    pub rows: Rows,
+    /// The statements about it in the default graph.
+    pub quads: Vec<Quad>,
+    /// Its choices and states, encoded as in the first part of a trace file.
+    pub head: Vec<u8>,
+}
+
+impl Outline {
+    /// The outline of a run.
+    ///
+    /// # Errors
+    /// A message, if a part can't be encoded.
+    pub(crate) fn of(record: &RunRecord) -> Result<Self, String> {
+        Ok(Self {
+            rows: Rows::of(record),
+            quads: write_run::quads_without_facts(record),
+            head: trace_file::encode_head(&record.choices, &record.trace)?,
+        })
+    }
+}
+
+/// Encodes a file.
+///
+/// # Errors
+/// A message, if a part can't be encoded.
+pub(super) fn encode(outlines: &[Outline]) -> Result<Vec<u8>, String> {
+    let fault = |error: postcard::Error| error.to_string();
+    let rows = Rows::joined(outlines.iter().map(|outline| &outline.rows));
+    let mut indices = Vec::new();
+    put_varint(&mut indices, rows.rows.len() as u64);
+    rows.rows.iter().for_each(|row| put_varint(&mut indices, row.index));
+    let statements = journal::numbered(outlines.iter().flat_map(|outline| &outline.quads));
+    let counts: Vec<u32> = outlines.iter().map(|outline| outline.quads.len() as u32).collect();
+    let heads: Vec<&[u8]> = outlines.iter().map(|outline| outline.head.as_slice()).collect();
+    let parts = [
+        indices,
+        postcard::to_stdvec(&rows).map_err(fault)?,
+        postcard::to_stdvec(&(statements, counts)).map_err(fault)?,
+        postcard::to_stdvec(&heads).map_err(fault)?,
+    ];
+    let (mut bytes, mut body) = (MAGIC.to_vec(), Vec::new());
+    for part in parts {
+        let part = zstd::bulk::compress(&part, LEVEL).map_err(|error| error.to_string())?;
+        let size = u32::try_from(part.len()).map_err(|_| "it is larger than 4 GB".to_owned())?;
+        bytes.extend(size.to_le_bytes());
+        bytes.extend(journal::sum_of(&part).to_le_bytes());
+        body.extend(part);
+    }
+    bytes.extend(journal::sum_of(&bytes).to_le_bytes());
+    bytes.extend(body);
+    Ok(bytes)
+}
+
+/// The parts of a file, compressed.
+pub(super) struct Opened<'a> {
+    parts: [&'a [u8]; PARTS],
+    sums: [u32; PARTS],
+}
+
+impl<'a> Opened<'a> {
+    /// Finds the parts of a file, of which the end may be missing: its parts are then empty.
+    ///
+    /// # Errors
+    /// A message that names the damage.
+    pub(super) fn new(bytes: &'a [u8]) -> Result<Self, String> {
+        let (header, mut rest) = bytes.split_at_checked(HEADER).ok_or("it ends too early")?;
+        let (magic, table) = header.split_at(MAGIC.len());
+        if magic != MAGIC {
+            return Err("it has no outlines of this format".to_owned());
+        }
+        let number = |at: usize| u32::from_le_bytes([table[at], table[at + 1], table[at + 2], table[at + 3]]);
+        if journal::sum_of(&header[..HEADER - 4]) != number(8 * PARTS) {
+            return Err(CHANGED.to_owned());
+        }
+        let (mut parts, mut sums) = ([[].as_slice(); PARTS], [0; PARTS]);
+        for at in 0..PARTS {
+            sums[at] = number(8 * at + 4);
+            let part;
+            (part, rest) = rest.split_at_checked(number(8 * at) as usize).unwrap_or((&[], &[]));
+            parts[at] = part;
+        }
+        Ok(Self { parts, sums })
+    }
+
+    /// Size of the file up to the end of the first part. Unit: bytes.
+    pub(super) fn size_of_start(header: &[u8]) -> Option<usize> {
+        let size = header.get(MAGIC.len()..MAGIC.len() + 4)?;
+        Some(HEADER + u32::from_le_bytes([size[0], size[1], size[2], size[3]]) as usize)
+    }
+
+    fn part(&self, at: usize) -> Result<Vec<u8>, String> {
+        if journal::sum_of(self.parts[at]) != self.sums[at] {
+            return Err(CHANGED.to_owned());
+        }
+        zstd::stream::decode_all(self.parts[at]).map_err(|error| error.to_string())
+    }
+
+    /// The indices of its runs, in the order of the file.
+    pub(super) fn indices(&self) -> Result<Vec<u64>, String> {
+        let bytes = self.part(0)?;
+        let mut reader = ByteReader { bytes: &bytes };
+        let read = || -> Option<Vec<u64>> {
+            let count = reader.varint()?;
+            (0..count).map(|_| reader.varint()).collect()
+        };
+        let mut read = read;
+        read().ok_or_else(|| CHANGED.to_owned())
+    }
+
+    /// The values of its runs.
+    pub(super) fn rows(&self) -> Result<Rows, String> {
+        postcard::from_bytes(&self.part(1)?).map_err(unread)
+    }
+
+    /// Adds the wanted statements of its runs.
+    pub(super) fn add_statements(&self, wanted: &Wanted, part: &mut Part) -> Result<(), String> {
+        let bytes = self.part(2)?;
+        let ((terms, rows), _): (Content<'_>, Vec<u32>) = postcard::from_bytes(&bytes).map_err(unread)?;
+        journal::collect(&terms, &rows, wanted, part).ok_or_else(|| CHANGED.to_owned())
+    }
+
+    /// The statements about each run.
+    pub(super) fn statements(&self) -> Result<Vec<Vec<Quad>>, String> {
+        let bytes = self.part(2)?;
+        let ((terms, rows), counts): (Content<'_>, Vec<u32>) = postcard::from_bytes(&bytes).map_err(unread)?;
+        let mut part = Part::default();
+        journal::collect(&terms, &rows, &Wanted::all(), &mut part).ok_or(CHANGED)?;
+        let mut quads = part.quads.into_iter();
+        Ok(counts.into_iter().map(|count| quads.by_ref().take(count as usize).collect()).collect())
+    }
+
+    /// The choices and states of all runs, encoded.
+    pub(super) fn heads(&self) -> Result<Vec<Vec<u8>>, String> {
+        postcard::from_bytes(&self.part(3)?).map_err(unread)
+    }
+
+    /// All of it.
+    pub(super) fn outlines(&self) -> Result<Vec<Outline>, String> {
+        let (rows, statements) = (self.rows()?, self.statements()?);
+        let of = |(at, (head, quads))| Outline { rows: rows.only(at), quads, head };
+        Ok(self.heads()?.into_iter().zip(statements).enumerate().map(of).collect())
+    }
+}
+
+const CHANGED: &str = "it has changed since it was written";
+
+fn unread(error: postcard::Error) -> String {
+    error.to_string().to_lowercase()
+}

@@ -1,0 +1,215 @@
+//! Reads outlines as runs.
+
+use std::collections::{BTreeSet, HashSet};
+
+use oxigraph::model::Quad;
+use oxigraph::store::Store;
+
+use crate::outlines::file::{Opened, Outline};
+use crate::outlines::loaded::Loaded;
+use crate::outlines::row::{Outlined, Rows};
+use crate::outlines::shelf::{Shelf, Unread, unread, without};
+use crate::{History, RunDetail, RunFilter, RunRow, RunVitals, detail, trace_file};
+use crate::{merge, write_run};
+use actcheck_base::Diagnostics;
+use actcheck_data::{Choice, Trace};
+
+/// The campaign and the index of a run, from its id.
+fn place_of(run: &str) -> Option<(&str, u64)> {
+    let (campaign, number) = run.rsplit_once('-')?;
+    Some((campaign, number.parse::<u64>().ok()?.checked_sub(1)?))
+}
+
+impl History {
+    /// The folder of its outlines.
+    pub(crate) fn shelf(&self) -> Shelf {
+        Shelf::new(self.folder.outlines())
+    }
+
+    /// Calls `each` with the outlines that match a filter, by campaign.
+    ///
+    /// # Errors
+    /// `H007` a file is damaged.
+    pub(crate) fn each_outlined(
+        &self,
+        filter: &RunFilter,
+        each: &mut dyn FnMut(Outlined<'_>),
+    ) -> Result<(), Diagnostics> {
+        if !self.shelf().exists() {
+            return Ok(());
+        }
+        // Read before the first call: a reader may have to begin anew.
+        let all = self.of_outlines(|shelf| {
+            let mut all: Vec<(String, Rows)> = Vec::new();
+            shelf.each_file(filter.campaign.as_deref(), false, &mut |file, opened, there| {
+                all.push((file.campaign.clone(), without(opened.rows()?, there)));
+                Ok(())
+            })?;
+            Ok(all)
+        })?;
+        for (campaign, rows) in &all {
+            rows.of_campaign(campaign).filter(|outlined| outlined.matches(filter)).for_each(&mut *each);
+        }
+        Ok(())
+    }
+
+    /// The ids of the outlines of a campaign, or of all, unsorted.
+    ///
+    /// # Errors
+    /// `H007` a file is damaged.
+    pub(crate) fn outlined_ids(&self, campaign: Option<&str>) -> Result<Vec<String>, Diagnostics> {
+        if !self.shelf().exists() {
+            return Ok(Vec::new());
+        }
+        self.of_outlines(|shelf| {
+            let mut ids = Vec::new();
+            shelf.each_file(campaign, true, &mut |file, opened, there| {
+                let own = opened.indices()?.into_iter().filter(|index| !there.contains(index));
+                ids.extend(own.map(|index| format!("{}-{}", file.campaign, index + 1)));
+                Ok(())
+            })?;
+            Ok(ids)
+        })
+    }
+
+    /// Reads a part of the outline of a run by `read`, which gets the run's position in the file. Returns `None` if the run
+    /// has no outline.
+    fn of_outline<T>(
+        &self,
+        run: &str,
+        read: impl Fn(&Loaded, usize) -> Result<T, String>,
+    ) -> Result<Option<T>, Diagnostics> {
+        let Some((campaign, index)) = place_of(run).filter(|_| self.shelf().exists()) else { return Ok(None) };
+        self.of_outlines(|shelf| {
+            let known = self.loaded.with(campaign, index);
+            for file in known.is_none().then(|| shelf.files_with(campaign, index)).into_iter().flatten() {
+                let damaged = |why| Unread::Damaged(file.clone(), why);
+                let bytes = std::fs::read(&file).map_err(|error| unread(&file, &error))?;
+                self.loaded.add(Loaded::new(campaign, file.clone(), bytes).map_err(damaged)?);
+            }
+            let Some(loaded) = known.or_else(|| self.loaded.with(campaign, index)) else { return Ok(None) };
+            let damaged = |why| Unread::Damaged(loaded.path.clone(), why);
+            loaded.position(index).map(|at| read(&loaded, at).map_err(damaged)).transpose()
+        })
+    }
+
+    /// Whether a run has only an outline, by its id.
+    ///
+    /// # Errors
+    /// `H007` a file is damaged.
+    pub fn is_outline(&self, run: &str) -> Result<bool, Diagnostics> {
+        Ok(self.of_outline(run, |_, _| Ok(()))?.is_some())
+    }
+
+    /// The outline of a run. Returns `None` if it has none.
+    pub(crate) fn outline(&self, run: &str) -> Result<Option<Outline>, Diagnostics> {
+        self.of_outline(run, |loaded, at| {
+            Ok(Outline {
+                rows: loaded.rows()?.only(at),
+                quads: loaded.statements(at)?.to_vec(),
+                head: loaded.head(at)?.to_vec(),
+            })
+        })
+    }
+
+    /// The statements of a run that has an outline, in a store in memory. Returns `None` if it has none.
+    pub(crate) fn outlined_store(&self, run: &str) -> Result<Option<Store>, Diagnostics> {
+        let Some(quads) = self.of_outline(run, |loaded, at| loaded.statements(at).map(<[Quad]>::to_vec))? else {
+            return Ok(None);
+        };
+        in_memory(quads).map(Some).map_err(|error| self.fault("reading a run", &error))
+    }
+
+    /// All details of a run that has an outline. Returns `None` if it has none.
+    pub(crate) fn outlined_run(&self, run: &str) -> Result<Option<RunDetail>, Diagnostics> {
+        let Some(store) = self.outlined_store(run)? else { return Ok(None) };
+        detail::read(&store, &write_run::run_node(run)).map(Some).map_err(|error| self.fault("reading a run", &error))
+    }
+
+    /// Choices and states of a run that has an outline. Returns `None` if it has none.
+    pub(crate) fn outlined_states(&self, run: &str) -> Result<Option<(Vec<Choice>, Trace)>, Diagnostics> {
+        self.of_outline(run, |loaded, at| trace_file::decode_head(loaded.head(at)?))
+    }
+
+    /// Number of runs that have only an outline, and the wall time that they took together. Unit: seconds.
+    ///
+    /// # Errors
+    /// `H007` a file is damaged.
+    pub fn outlined_cost(&self, runs: &[RunRow]) -> Result<(usize, f64), Diagnostics> {
+        let (mut count, mut secs) = (0, 0.0);
+        let wanted: HashSet<(&str, u64)> = runs.iter().map(|row| (row.campaign.as_str(), row.index)).collect();
+        self.each_outlined(&RunFilter::default(), &mut |outlined| {
+            if wanted.contains(&(outlined.campaign, outlined.row.index)) {
+                count += 1;
+                secs += outlined.row.wall_secs;
+            }
+        })?;
+        Ok((count, secs))
+    }
+
+    /// The health data of the outlines of a campaign, by index.
+    pub(crate) fn outlined_vitals(&self, campaign: &str) -> Result<Vec<RunVitals>, Diagnostics> {
+        if !self.shelf().exists() {
+            return Ok(Vec::new());
+        }
+        self.of_outlines(|shelf| {
+            let mut vitals = Vec::new();
+            shelf.each_file(Some(campaign), false, &mut |_, opened, there| {
+                let (rows, heads) = (opened.rows()?, opened.heads()?);
+                for (outlined, head) in rows.of_campaign(campaign).zip(heads) {
+                    if !there.contains(&outlined.row.index) {
+                        vitals.push(outlined.as_vitals(trace_file::head_choices(&head)?));
+                    }
+                }
+                Ok(())
+            })?;
+            Ok(vitals)
+        })
+    }
+
+    /// The judgements in the store that were made after a run that has an outline.
+    pub(crate) fn later_about_outline(&self, run: &str, store: &Store) -> Result<Vec<Quad>, Diagnostics> {
+        let Some(memory) = self.outlined_store(run)? else { return Ok(Vec::new()) };
+        let fault = |error| self.fault("reading a run", &error);
+        let node = write_run::run_node(run);
+        let mut later = Vec::new();
+        for execution in crate::read::subjects(&memory, "act:ofRun", node.as_ref()).map_err(fault)? {
+            if let oxigraph::model::NamedOrBlankNode::NamedNode(execution) = execution {
+                later.extend(merge::about(store, &execution).map_err(fault)?);
+            }
+        }
+        Ok(later)
+    }
+
+    /// Compares the outlines with their checksums and hashes. Returns the number of runs, and each damaged file with the
+    /// reason.
+    pub(crate) fn examine_outlines(&self) -> (usize, Vec<(std::path::PathBuf, String)>) {
+        let (mut seen, mut damaged) = (BTreeSet::new(), Vec::new());
+        for file in self.shelf().files(None) {
+            let mut examined = || -> Result<(), String> {
+                let bytes = std::fs::read(&file.path).map_err(|error| error.to_string())?;
+                for outline in Opened::new(&bytes)?.outlines()? {
+                    let (_, trace) = trace_file::decode_head(&outline.head)?;
+                    for outlined in outline.rows.of_campaign(&file.campaign) {
+                        if outlined.trace_hash() != trace.hash {
+                            let run = outlined.run();
+                            return Err(format!("run {run} has the states of {}", trace.hash));
+                        }
+                        seen.insert(outlined.run());
+                    }
+                }
+                Ok(())
+            };
+            if let Err(why) = examined() {
+                damaged.push((file.path.clone(), why));
+            }
+        }
+        (seen.len(), damaged)
+    }
+}
+
+fn in_memory(quads: Vec<Quad>) -> Result<Store, oxigraph::store::StorageError> {
+    let store = Store::new()?;
+    store.extend(quads)?;
+    Ok(store)
+}

@@ -1,0 +1,236 @@
+//! The files of outlines in the folder of a history.
+//!
+//! `CAMPAIGN-NUMBER.outline` has one run. `CAMPAIGN.FIRST-LAST.outlines` has many, whose indices lie between these. A process
+//! that is killed while it puts single files together leaves runs in both; they count once.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs::{self, File};
+use std::io::{self, ErrorKind, Read as _};
+use std::path::{Path, PathBuf};
+
+use crate::outlines::file::{HEADER, Opened, Outline, encode};
+use crate::outlines::row::Rows;
+use crate::{History, fault};
+use actcheck_base::{Diagnostics, write_atomic};
+
+/// Number of times that a reader looks again if the owner has put a file together with others meanwhile.
+const TRIES: usize = 100;
+
+/// A file of outlines.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) struct OutlineFile {
+    pub campaign: String,
+    /// The lowest and the highest index of its runs.
+    first: u64,
+    last: u64,
+    is_single: bool,
+    pub path: PathBuf,
+}
+
+/// The folder of outlines.
+#[derive(Debug, Clone)]
+pub(crate) struct Shelf {
+    dir: PathBuf,
+}
+
+/// The reason why a file can't be used.
+pub(super) enum Unread {
+    /// It was removed meanwhile.
+    Gone,
+    Damaged(PathBuf, String),
+}
+
+impl Shelf {
+    /// Number of runs of a campaign in a file. Each takes 30 kB of memory while it is written.
+    pub(crate) const RUNS_IN_A_FILE: usize = 128;
+
+    pub(crate) fn new(dir: PathBuf) -> Self {
+        Self { dir }
+    }
+
+    /// Whether there may be outlines.
+    pub(crate) fn exists(&self) -> bool {
+        self.dir.exists()
+    }
+
+    /// The files, sorted by campaign and index; a larger one before the single ones that it may contain.
+    pub(crate) fn files(&self, campaign: Option<&str>) -> Vec<OutlineFile> {
+        let entries = fs::read_dir(&self.dir).into_iter().flatten().filter_map(Result::ok);
+        let mut files: Vec<OutlineFile> = entries.filter_map(|entry| named(entry.path())).collect();
+        files.retain(|file| campaign.is_none_or(|campaign| campaign == file.campaign));
+        files.sort();
+        files
+    }
+
+    /// Writes the outline of a run.
+    pub(crate) fn add(&self, campaign: &str, index: u64, outline: &Outline, synced: bool) -> io::Result<()> {
+        let bytes = encode(std::slice::from_ref(outline)).map_err(io::Error::other)?;
+        let path = self.dir.join(format!("{campaign}-{}.outline", index + 1));
+        write_atomic(&path, &bytes)?;
+        if synced { File::open(&self.dir)?.sync_all() } else { Ok(()) }
+    }
+
+    /// Puts the single files of a campaign together.
+    pub(crate) fn pack(&self, campaign: &str) -> io::Result<()> {
+        let files = self.files(Some(campaign));
+        let (singles, larger): (Vec<_>, Vec<_>) = files.into_iter().partition(|file| file.is_single);
+        if singles.is_empty() {
+            return Ok(());
+        }
+        for singles in singles.chunks(Self::RUNS_IN_A_FILE) {
+            let mut outlines = Vec::new();
+            for single in singles {
+                // Left by a killed process in both.
+                if larger.iter().any(|file| file.has(single.first) && indices(&file.path).contains(&single.first)) {
+                    continue;
+                }
+                let bytes = fs::read(&single.path)?;
+                let read = Opened::new(&bytes).and_then(|opened| opened.outlines()).map_err(io::Error::other)?;
+                outlines.extend(read);
+            }
+            if let (Some(first), Some(last)) = (index_of(outlines.first()), index_of(outlines.last())) {
+                let bytes = encode(&outlines).map_err(io::Error::other)?;
+                write_atomic(&self.dir.join(format!("{campaign}.{first:09}-{last:09}.outlines")), &bytes)?;
+            }
+            for single in singles {
+                fs::remove_file(&single.path)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Calls `each` with every file and its bytes up to the end of the first part (`only_indices`), or with all of them. If a
+    /// file was removed meanwhile, begins anew.
+    pub(super) fn each_file(
+        &self,
+        campaign: Option<&str>,
+        only_indices: bool,
+        each: &mut dyn FnMut(&OutlineFile, &Opened<'_>, &BTreeSet<u64>) -> Result<(), String>,
+    ) -> Result<(), Unread> {
+        for file in self.chosen(campaign)? {
+            let (file, wanted) = file;
+            let bytes = if only_indices { start(&file.path) } else { fs::read(&file.path) };
+            let bytes = bytes.map_err(|error| unread(&file.path, &error))?;
+            let read = Opened::new(&bytes).and_then(|opened| each(&file, &opened, &wanted));
+            read.map_err(|why| Unread::Damaged(file.path.clone(), why))?;
+        }
+        Ok(())
+    }
+
+    /// The files that are needed for all runs of a campaign, or of all campaigns, each with the indices that earlier files
+    /// have already.
+    fn chosen(&self, campaign: Option<&str>) -> Result<Vec<(OutlineFile, BTreeSet<u64>)>, Unread> {
+        let files = self.files(campaign);
+        let mut chosen: Vec<(OutlineFile, BTreeSet<u64>)> = Vec::new();
+        let mut larger: BTreeMap<String, Vec<OutlineFile>> = BTreeMap::new();
+        for file in files.iter().filter(|file| !file.is_single) {
+            larger.entry(file.campaign.clone()).or_default().push(file.clone());
+        }
+        // The highest index so far: files are sorted by their lowest one, and few overlap.
+        let mut highest: BTreeMap<String, u64> = BTreeMap::new();
+        for file in files {
+            let mut there = BTreeSet::new();
+            let highest = highest.entry(file.campaign.clone()).or_default();
+            let may_overlap = file.is_single || file.first <= *highest;
+            *highest = file.last.max(*highest);
+            let others = larger.get(&file.campaign).filter(|_| may_overlap).into_iter().flatten();
+            for other in others.filter(|other| **other < file || file.is_single) {
+                if other.path != file.path && other.first <= file.last && file.first <= other.last {
+                    let bytes = start(&other.path).map_err(|error| unread(&other.path, &error))?;
+                    let read = Opened::new(&bytes).and_then(|opened| opened.indices());
+                    there.extend(read.map_err(|why| Unread::Damaged(other.path.clone(), why))?);
+                }
+            }
+            if !(file.is_single && there.contains(&file.first)) {
+                chosen.push((file, there));
+            }
+        }
+        Ok(chosen)
+    }
+}
+
+impl OutlineFile {
+    fn has(&self, index: u64) -> bool {
+        (self.first..=self.last).contains(&index)
+    }
+}
+
+impl History {
+    /// Reads outlines, again if the owner of the history changed them meanwhile.
+    ///
+    /// # Errors
+    /// `H007` a file is damaged.
+    pub(super) fn of_outlines<T>(&self, read: impl Fn(&Shelf) -> Result<T, Unread>) -> Result<T, Diagnostics> {
+        let shelf = self.shelf();
+        for _ in 0..TRIES {
+            match read(&shelf) {
+                Ok(found) => return Ok(found),
+                Err(Unread::Gone) => {}
+                Err(Unread::Damaged(file, why)) => {
+                    return Err(fault::damaged(self.dir(), &format!("`{}`: {why}", file.display())));
+                }
+            }
+        }
+        Err(fault::in_use(self.dir()))
+    }
+}
+
+pub(super) fn unread(path: &Path, error: &io::Error) -> Unread {
+    match error.kind() {
+        ErrorKind::NotFound => Unread::Gone,
+        _ => Unread::Damaged(path.to_path_buf(), error.to_string()),
+    }
+}
+
+/// The bytes of a file up to the end of its first part.
+fn start(path: &Path) -> io::Result<Vec<u8>> {
+    let mut file = File::open(path)?;
+    let mut bytes = vec![0; HEADER];
+    file.read_exact(&mut bytes)?;
+    let size = Opened::size_of_start(&bytes).unwrap_or(HEADER).max(HEADER) - HEADER;
+    io::Read::take(&mut file, size as u64).read_to_end(&mut bytes)?;
+    Ok(bytes)
+}
+
+fn indices(path: &Path) -> Vec<u64> {
+    let read = start(path).ok().and_then(|bytes| Opened::new(&bytes).ok()?.indices().ok());
+    read.unwrap_or_default()
+}
+
+fn index_of(outline: Option<&Outline>) -> Option<u64> {
+    outline?.rows.rows.first().map(|row| row.index)
+}
+
+/// The name of a file. Returns `None` for other files.
+fn named(path: PathBuf) -> Option<OutlineFile> {
+    let name = path.file_name()?.to_str()?;
+    if let Some(run) = name.strip_suffix(".outline") {
+        let (campaign, number) = run.rsplit_once('-')?;
+        let index = number.parse::<u64>().ok()?.checked_sub(1)?;
+        return Some(OutlineFile { campaign: campaign.to_owned(), first: index, last: index, is_single: true, path });
+    }
+    let (campaign, range) = name.strip_suffix(".outlines")?.rsplit_once('.')?;
+    let (first, last) = range.split_once('-')?;
+    let (first, last) = (first.parse().ok()?, last.parse().ok()?);
+    Some(OutlineFile { campaign: campaign.to_owned(), first, last, is_single: false, path })
+}
+
+/// Removes the rows of runs that earlier files have.
+pub(super) fn without(mut rows: Rows, there: &BTreeSet<u64>) -> Rows {
+    if !there.is_empty() {
+        rows.rows.retain(|row| !there.contains(&row.index));
+    }
+    rows
+}
+
+impl Shelf {
+    /// The files that may have a run, single ones first.
+    pub(crate) fn files_with(&self, campaign: &str, index: u64) -> Vec<PathBuf> {
+        let single = self.dir.join(format!("{campaign}-{}.outline", index + 1));
+        if single.exists() {
+            return vec![single];
+        }
+        let files = self.files(Some(campaign)).into_iter();
+        files.filter(|file| !file.is_single && file.has(index)).map(|file| file.path).collect()
+    }
+}

@@ -1,0 +1,106 @@
+//! A store for queries that has the statements of outlines too.
+
+use std::sync::{Mutex, PoisonError};
+
+use crate::folder::Folder;
+use crate::graphs;
+use crate::journal::{self, Part};
+use crate::open::{OpenStore, Opened, read_with_outlines};
+use crate::outlines::shelf::Unread;
+use crate::trace_file;
+use crate::wanted::{InGraph, Wanted};
+use crate::write_run::run_node;
+use crate::{History, fault, pending};
+use actcheck_base::{Diagnostic, Diagnostics};
+use actcheck_facts::extract;
+
+/// Largest number of statements that a query may need from outlines: they take a minute and some gigabytes of disk.
+const MOST_STATEMENTS: usize = 20_000_000;
+
+/// The store of a reader, with the statements of outlines that queries have asked for so far.
+pub(crate) struct View {
+    opened: Opened,
+    /// The statements of outlines that are in it.
+    loaded: Mutex<Wanted>,
+}
+
+impl History {
+    /// Returns a handle of a store with the wanted statements at least, also those of outlines.
+    pub(crate) fn store_for_query(&self, wanted: impl FnOnce() -> Wanted) -> Result<OpenStore, Diagnostics> {
+        if !self.shelf().exists() {
+            return self.store_with(wanted);
+        }
+        let wanted = wanted();
+        let mut view = self.view.lock().unwrap_or_else(PoisonError::into_inner);
+        if view.as_ref().is_some_and(|view| view.opened.is_stale(&self.folder)) {
+            *view = None;
+        }
+        let view = match view.take() {
+            Some(known) => view.insert(known),
+            None => {
+                // The owner's statements that are only in its memory so far.
+                self.complete_store()?;
+                let opened = read_with_outlines(&Folder::to_read(self.dir())?)?;
+                view.insert(View { opened, loaded: Mutex::default() })
+            }
+        };
+        view.opened.load(self.dir(), || wanted.clone())?;
+        let mut loaded = view.loaded.lock().unwrap_or_else(PoisonError::into_inner);
+        let missing = wanted.beyond(&loaded);
+        let store = view.opened.handle();
+        if !missing.is_empty() {
+            let part = self.outlined_statements(&missing)?;
+            pending::add(&store, part).map_err(|error| fault::unread(self.dir(), &error))?;
+            loaded.add(missing);
+        }
+        Ok(store)
+    }
+
+    /// The wanted statements of all outlines, with facts, as if the runs were kept whole.
+    pub(crate) fn outlined_statements(&self, wanted: &Wanted) -> Result<Part, Diagnostics> {
+        let with_facts = wanted.graphs || wanted.patterns.iter().any(|pattern| pattern.graph != InGraph::Default);
+        let found = self.of_outlines(|shelf| {
+            let mut part = Part::default();
+            shelf.each_file(None, false, &mut |file, opened, there| {
+                if part.quads.len() > MOST_STATEMENTS {
+                    return Ok(());
+                }
+                // A run in two files has the same statements in both.
+                opened.add_statements(wanted, &mut part)?;
+                if with_facts {
+                    for (index, head) in opened.indices()?.into_iter().zip(opened.heads()?) {
+                        if there.contains(&index) {
+                            continue;
+                        }
+                        let (_, trace) = trace_file::decode_head(&head)?;
+                        let mut quads = Vec::new();
+                        graphs::write(
+                            &extract(&trace),
+                            &run_node(&format!("{}-{}", file.campaign, index + 1)),
+                            &mut quads,
+                        );
+                        let (terms, rows) = journal::numbered(&quads);
+                        journal::collect(&terms, &rows, wanted, &mut part).ok_or("its states can't be read")?;
+                    }
+                }
+                Ok(())
+            })?;
+            Ok::<Part, Unread>(part)
+        })?;
+        if found.quads.len() > MOST_STATEMENTS {
+            return Err(too_many(self));
+        }
+        Ok(found)
+    }
+}
+
+fn too_many(history: &History) -> Diagnostics {
+    let message = format!(
+        "the query needs over {} million statements about runs of `{}` that are kept as outlines",
+        MOST_STATEMENTS / 1_000_000,
+        history.dir().display()
+    );
+    Diagnostic::error("H030", message)
+        .help("`actcheck list`, `analyse` and `compare` read columns instead; or ask for fewer properties, or export the campaign's tables (`actcheck export --parquet DIR`)")
+        .into()
+}
