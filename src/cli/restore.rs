@@ -7,12 +7,14 @@ use actcheck_base::Diagnostics;
 use actcheck_campaign::{RunContext, restorer};
 use actcheck_history::{History, RunRow};
 
+/// Whether the user was told that runs are simulated again.
+static IS_NOTED: AtomicBool = AtomicBool::new(false);
+
 /// Lets a history simulate runs again. The first time, a note says so.
 pub fn allow(history: &History) {
-    let is_noted = AtomicBool::new(false);
     let context = RunContext { clock: clock::system(), disturb: None };
     history.restore_with(restorer(context, Box::new(trust::check_stored), move |run| {
-        if !is_noted.swap(true, Ordering::Relaxed) {
+        if !IS_NOTED.swap(true, Ordering::Relaxed) {
             note(format!("run {run} is kept as an outline: its motion is simulated again"));
         }
     }));
@@ -25,6 +27,7 @@ pub fn allow(history: &History) {
 pub fn announce(history: &History, runs: &[RunRow], jobs: usize) -> Result<(), Diagnostics> {
     let (runs, secs) = history.outlined_cost(runs)?;
     if runs > 1 {
+        IS_NOTED.store(true, Ordering::Relaxed);
         let secs = secs / jobs.max(1) as f64;
         let time = if secs < 100.0 { format!("{secs:.0} s") } else { format!("{:.0} min", secs / 60.0) };
         note(format!("{runs} runs are kept as outlines: their motion is simulated again, which takes about {time}"));

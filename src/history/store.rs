@@ -471,6 +471,7 @@ impl History {
 
     /// Removes traces without a run. Only killed processes leave them, and their campaigns have no end.
     fn remove_orphans(&self) -> Result<(), Diagnostics> {
+        self.shelf().clean();
         let mut ended = BTreeMap::new();
         for entry in std::fs::read_dir(self.folder.traces()).into_iter().flatten().filter_map(Result::ok) {
             let name = entry.file_name().to_string_lossy().into_owned();

@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 use crate::outlines::file::{HEADER, Opened, Outline, encode};
 use crate::outlines::row::Rows;
 use crate::{History, fault};
-use actcheck_base::{Diagnostics, write_atomic};
+use actcheck_base::{Diagnostics, write_atomic, write_quickly};
 
 /// Number of times that a reader looks again if the owner has put a file together with others meanwhile.
 const TRIES: usize = 100;
@@ -62,12 +62,21 @@ impl Shelf {
         files
     }
 
-    /// Writes the outline of a run.
+    /// Removes what killed processes left while they wrote files.
+    pub(crate) fn clean(&self) {
+        for entry in fs::read_dir(&self.dir).into_iter().flatten().filter_map(Result::ok) {
+            if entry.file_name().to_string_lossy().ends_with(".tmp") {
+                // Harmless if it remains.
+                let _ = fs::remove_file(entry.path());
+            }
+        }
+    }
+
+    /// Writes the outline of a run. `synced`: to the disk at once, so that it survives a power cut.
     pub(crate) fn add(&self, campaign: &str, index: u64, outline: &Outline, synced: bool) -> io::Result<()> {
         let bytes = encode(std::slice::from_ref(outline)).map_err(io::Error::other)?;
         let path = self.dir.join(format!("{campaign}-{}.outline", index + 1));
-        write_atomic(&path, &bytes)?;
-        if synced { File::open(&self.dir)?.sync_all() } else { Ok(()) }
+        if synced { write_atomic(&path, &bytes) } else { write_quickly(&path, &bytes) }
     }
 
     /// Puts the single files of a campaign together.
