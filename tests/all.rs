@@ -56,6 +56,7 @@ mod notebooks;
 mod obstacles;
 mod ontology;
 mod oracle;
+mod outlines;
 mod patterns;
 mod perceive;
 mod physics;

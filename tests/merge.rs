@@ -324,8 +324,19 @@ fn an_incomplete_copy_is_completed() {
 
 #[test]
 fn later_judgements_and_shrunk_runs_are_merged_under_new_names() {
+    merge_of_judgements("");
+}
+
+#[test]
+fn outlines_are_merged_as_whole_runs_are() {
+    merge_of_judgements("\n[history]\nkeep = \"outcomes\"\n");
+}
+
+fn merge_of_judgements(keeping: &str) {
     let project = looking();
     let folder = project.path();
+    let config = folder.join("configs/look.toml");
+    std::fs::write(&config, std::fs::read_to_string(&config).unwrap() + keeping).unwrap();
     for part in 1..=2 {
         run(folder, &["--shard", &format!("{part}/2"), "--history", "together"]);
     }

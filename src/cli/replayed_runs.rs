@@ -1,6 +1,7 @@
 //! Runs to be replayed in a report, read in order, a batch at a time. Reading and explaining them takes most of a report's
 //! time, so all cores share the work.
 
+use std::collections::HashSet;
 use std::ops::ControlFlow;
 
 use crate::work::all_cores;
@@ -11,6 +12,8 @@ use actcheck_ontology::Ontology;
 use actcheck_report::{Explained, ReplayedRun};
 use actcheck_rules::{Budget, RuleBook};
 
+/// Most runs of a report that are simulated again, because the history keeps only their outlines.
+pub(super) const MOST_RESTORED: usize = 20;
 /// Number of runs that a worker reads ahead.
 const RUNS_OF_A_WORKER: usize = 8;
 
@@ -35,6 +38,7 @@ pub(super) fn for_each_batch(
         let explained = rules.as_ref().zip(trace.as_ref()).map(|(rules, trace)| explained(trace, rules, &run, &budget));
         Ok((run, trace, explained.unwrap_or_default()))
     };
+    let order = affordable(history, order)?;
     for runs in order.chunks(all_cores() * RUNS_OF_A_WORKER) {
         let shares: Vec<Vec<Result<ReplayedRun, Diagnostics>>> = std::thread::scope(|scope| {
             let share = |runs: &'_ [String]| runs.iter().map(read).collect();
@@ -49,6 +53,19 @@ pub(super) fn for_each_batch(
         }
     }
     Ok(())
+}
+
+/// Leaves out runs that are kept as outlines, except the first ones: each must be simulated again.
+fn affordable(history: &History, order: &[String]) -> Result<Vec<String>, Diagnostics> {
+    let outlines: HashSet<String> = history.outline_ids()?.into_iter().collect();
+    let mut left = MOST_RESTORED;
+    let mut is_affordable = |id: &&String| {
+        let restored = outlines.contains(*id);
+        let affordable = !restored || left > 0;
+        left -= usize::from(restored && affordable);
+        affordable
+    };
+    Ok(order.iter().filter(|id| is_affordable(id)).cloned().collect())
 }
 
 /// Explains the failed properties of a run, given its trace. Omits those that the current rules can't explain.

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 
+use crate::replayed_runs::MOST_RESTORED;
 use crate::report::ReportArgs;
 use crate::{chosen, output, output_file, replayed_runs, show};
 use actcheck_base::{Diagnostics, Outcome};
@@ -173,6 +174,8 @@ struct AllureFolder<'a> {
     results: usize,
     /// Number of runs whose trace can't be read: it is missing, or another version wrote it.
     untraced: usize,
+    /// Runs that are kept as outlines, with a failure.
+    restored: usize,
 }
 
 impl<'a> AllureFolder<'a> {
@@ -187,7 +190,16 @@ impl<'a> AllureFolder<'a> {
         let rules = RuleBook::prepare_within(&args.chosen.ontology()?, &budget).ok();
         std::fs::create_dir_all(folder).map_err(|error| output_file::cannot_write(folder, error))?;
         let ids: Vec<String> = campaigns.iter().map(|row| row.id.clone()).collect();
-        let made = Self { folder, history, rules, budget, repetitions: Repetitions::new(), results: 0, untraced: 0 };
+        let made = Self {
+            folder,
+            history,
+            rules,
+            budget,
+            repetitions: Repetitions::new(),
+            results: 0,
+            untraced: 0,
+            restored: 0,
+        };
         made.write(&allure_common(env!("CARGO_PKG_VERSION"), &ids))?;
         Ok(made)
     }
@@ -203,6 +215,11 @@ impl<'a> AllureFolder<'a> {
     fn attachments(&mut self, run: &RunDetail) -> Vec<Attachment> {
         let mut judgements = run.actions.iter().flat_map(|action| &action.judgements);
         if judgements.all(|judgement| judgement.outcome == Outcome::Passed) {
+            return Vec::new();
+        }
+        let is_outline = self.history.is_outline(&run.row.run).unwrap_or(false);
+        self.restored += usize::from(is_outline);
+        if is_outline && self.restored > MOST_RESTORED {
             return Vec::new();
         }
         let Ok(trace) = self.history.trace(&run.row.run) else {
@@ -245,6 +262,10 @@ impl<'a> AllureFolder<'a> {
     fn told(&self) -> Vec<String> {
         let folder = self.folder.display();
         let mut told = vec![format!("{folder} holds {} results: npx allure generate {folder}", self.results)];
+        if self.restored > MOST_RESTORED {
+            let others = self.restored - MOST_RESTORED;
+            told.push(format!("{others} runs have no pictures and explanations: they are kept as outlines"));
+        }
         if self.untraced > 0 {
             told.push(format!("{} runs have no pictures and explanations: their traces can't be read", self.untraced));
         }

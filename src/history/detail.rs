@@ -3,8 +3,9 @@
 use std::collections::BTreeMap;
 
 use oxigraph::model::{GraphNameRef, NamedNode, Term};
-use oxigraph::store::{StorageError, Store};
+use oxigraph::store::StorageError;
 
+use crate::quad_source::QuadSource;
 use crate::read::{Node, id_of, subjects, text_of};
 use crate::statements::iri;
 use crate::write_scene::NOISE_TERMS;
@@ -13,7 +14,7 @@ use actcheck_base::{Judgement, Outcome, names};
 use actcheck_data::Role;
 
 /// Reads an existing run.
-pub(super) fn read(store: &Store, run: &NamedNode) -> Result<RunDetail, StorageError> {
+pub(super) fn read(store: &impl QuadSource, run: &NamedNode) -> Result<RunDetail, StorageError> {
     let node = Node::read(store, run)?;
     Ok(RunDetail {
         row: row(run, &node),
@@ -52,7 +53,7 @@ fn row(run: &NamedNode, node: &Node) -> RunRow {
 }
 
 /// Reasons of the discards before a run, in order.
-pub(super) fn discards(store: &Store, run: &NamedNode, node: &Node) -> Result<Vec<String>, StorageError> {
+pub(super) fn discards(store: &impl QuadSource, run: &NamedNode, node: &Node) -> Result<Vec<String>, StorageError> {
     if node.count("act:discards").unwrap_or_default() == 0 {
         return Ok(Vec::new());
     }
@@ -95,7 +96,7 @@ pub(super) fn designators(node: &Node) -> BTreeMap<String, Vec<String>> {
     found
 }
 
-fn of_run(store: &Store, run: &NamedNode, class: &str) -> Result<Vec<(Term, Node)>, StorageError> {
+fn of_run(store: &impl QuadSource, run: &NamedNode, class: &str) -> Result<Vec<(Term, Node)>, StorageError> {
     let class = iri(class);
     let mut found = Vec::new();
     for subject in subjects(store, "act:ofRun", run.as_ref())? {
@@ -108,7 +109,7 @@ fn of_run(store: &Store, run: &NamedNode, class: &str) -> Result<Vec<(Term, Node
 }
 
 /// The objects of a run's scene, sorted by role, then by id.
-pub(super) fn objects(store: &Store, run: &NamedNode) -> Result<Vec<ObjectDetail>, StorageError> {
+pub(super) fn objects(store: &impl QuadSource, run: &NamedNode) -> Result<Vec<ObjectDetail>, StorageError> {
     let mut objects: Vec<ObjectDetail> =
         of_run(store, run, "act:SceneObject")?.iter().map(|(_, node)| object(node)).collect();
     objects.sort_by(|a, b| (a.role, &a.id).cmp(&(b.role, &b.id)));
@@ -137,7 +138,7 @@ fn object(node: &Node) -> ObjectDetail {
     }
 }
 
-fn actions(store: &Store, run: &NamedNode) -> Result<Vec<ActionDetail>, StorageError> {
+fn actions(store: &impl QuadSource, run: &NamedNode) -> Result<Vec<ActionDetail>, StorageError> {
     let mut actions = Vec::new();
     for (execution, node) in of_run(store, run, "act:ActionExecution")? {
         actions.push(ActionDetail {
@@ -156,7 +157,7 @@ fn actions(store: &Store, run: &NamedNode) -> Result<Vec<ActionDetail>, StorageE
     Ok(actions)
 }
 
-fn judgements(store: &Store, execution: &Term) -> Result<Vec<Judgement>, StorageError> {
+fn judgements(store: &impl QuadSource, execution: &Term) -> Result<Vec<Judgement>, StorageError> {
     let mut judgements = Vec::new();
     for assertion in subjects(store, "earl:subject", execution.as_ref())? {
         let assertion = Node::read(store, &assertion)?;
@@ -167,7 +168,11 @@ fn judgements(store: &Store, execution: &Term) -> Result<Vec<Judgement>, Storage
 }
 
 /// Reads the judgement of an assertion, whose result is in the same graph.
-pub(super) fn judgement(store: &Store, assertion: &Node, graph: GraphNameRef<'_>) -> Result<Judgement, StorageError> {
+pub(super) fn judgement(
+    store: &impl QuadSource,
+    assertion: &Node,
+    graph: GraphNameRef<'_>,
+) -> Result<Judgement, StorageError> {
     let result = match assertion.all("earl:result").first() {
         Some(Term::BlankNode(result)) => Node::read_in(store, result, graph)?,
         Some(Term::NamedNode(result)) => Node::read_in(store, result, graph)?,

@@ -22,6 +22,7 @@ mod newest;
 mod open;
 mod outlines;
 mod pending;
+mod quad_source;
 mod query;
 mod rdf_text;
 mod read;

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use oxigraph::model::{GraphNameRef, NamedNodeRef, NamedOrBlankNode, NamedOrBlankNodeRef, Term, TermRef, Variable};
+use oxigraph::model::{GraphNameRef, NamedOrBlankNode, NamedOrBlankNodeRef, Term, TermRef, Variable};
 use oxigraph::sparql::{PreparedSparqlQuery, QueryEvaluationError, QueryResults};
 use oxigraph::store::{StorageError, Store};
 
@@ -10,6 +10,7 @@ use crate::Cancel;
 use crate::columns::by_columns;
 use crate::evaluation::{Unfinished, evaluate};
 use crate::light::parser;
+use crate::quad_source::QuadSource;
 use crate::query::evaluator;
 use crate::statements::iri;
 use actcheck_base::names;
@@ -22,19 +23,21 @@ pub(super) struct Node {
 
 impl Node {
     /// Reads a subject from the default graph. The node of an unknown subject is empty.
-    pub(super) fn read<'a>(store: &Store, subject: impl Into<NamedOrBlankNodeRef<'a>>) -> Result<Self, StorageError> {
+    pub(super) fn read<'a>(
+        store: &impl QuadSource,
+        subject: impl Into<NamedOrBlankNodeRef<'a>>,
+    ) -> Result<Self, StorageError> {
         Self::read_in(store, subject, GraphNameRef::DefaultGraph)
     }
 
     /// Like [`Node::read`], for any graph.
     pub(super) fn read_in<'a>(
-        store: &Store,
+        store: &impl QuadSource,
         subject: impl Into<NamedOrBlankNodeRef<'a>>,
         graph: GraphNameRef<'_>,
     ) -> Result<Self, StorageError> {
         let mut node = Self::default();
-        for quad in store.quads_for_pattern(Some(subject.into()), None, None, Some(graph)) {
-            let quad = quad?;
+        for quad in store.about(subject.into(), graph)? {
             node.values.entry(quad.predicate.into_string()).or_default().push(quad.object);
         }
         Ok(node)
@@ -100,7 +103,7 @@ pub(super) fn short_id(iri: &str) -> &str {
 
 /// The subjects that have a value of a property in the default graph, unsorted.
 pub(super) fn subjects<'a>(
-    store: &Store,
+    store: &impl QuadSource,
     property: &str,
     value: impl Into<TermRef<'a>>,
 ) -> Result<Vec<NamedOrBlankNode>, StorageError> {
@@ -109,17 +112,12 @@ pub(super) fn subjects<'a>(
 
 /// Like [`subjects`], for any graph.
 pub(super) fn subjects_in<'a>(
-    store: &Store,
+    store: &impl QuadSource,
     property: &str,
     value: impl Into<TermRef<'a>>,
     graph: GraphNameRef<'_>,
 ) -> Result<Vec<NamedOrBlankNode>, StorageError> {
-    let property = iri(property);
-    let property: NamedNodeRef<'_> = property.as_ref();
-    store
-        .quads_for_pattern(None, Some(property), Some(value.into()), Some(graph))
-        .map(|quad| quad.map(|quad| quad.subject))
-        .collect()
+    store.with_value(iri(property).as_ref(), value.into(), graph)
 }
 
 /// Runs an internal query with some of its variables bound, and returns its rows.

@@ -11,6 +11,7 @@ use oxigraph::store::{StorageError, Store};
 
 use crate::detail::judgement;
 use crate::graphs::below;
+use crate::quad_source::QuadSource;
 use crate::read::{Node, id_of, subjects_in};
 use crate::statements::{Statements, iri, time};
 use crate::wanted::Wanted;
@@ -61,9 +62,11 @@ impl History {
     pub fn newest(&self, run: &str, step: u32, properties: &[String]) -> Result<Vec<StoredJudgement>, Diagnostics> {
         let execution = execution(run, step);
         let store = self.store_with(|| Wanted::run(run_node(run).as_str()))?;
-        let outline = self.outlined_store(run)?;
-        newest([outline.as_ref().unwrap_or(&store), &store], &execution, properties)
-            .map_err(|error| self.fault("reading a run's outcomes", &error))
+        let newest = match self.outlined_quads(run)? {
+            Some(outline) => newest(&outline, &store, &execution, properties),
+            None => newest(&*store, &store, &execution, properties),
+        };
+        newest.map_err(|error| self.fault("reading a run's outcomes", &error))
     }
 
     /// Returns all details of a run as [`History::run`] does, with its newest judgements: later ones replace those of the
@@ -137,50 +140,57 @@ fn execution(run: &str, step: u32) -> NamedNode {
     below(&run_node(run), &step.to_string())
 }
 
-/// `own` is the store with the campaign's own outcomes, `later` the one with those made after the run.
+/// `own` has the campaign's own outcomes, `later` those made after the run.
 fn newest(
-    [own, later]: [&Store; 2],
+    own: &impl QuadSource,
+    later: &Store,
     execution: &NamedNode,
     properties: &[String],
 ) -> Result<Vec<StoredJudgement>, StorageError> {
-    let (graph, test) = (iri(GRAPH), iri("earl:test"));
+    let graph = iri(GRAPH);
     let mut superseded = BTreeSet::new();
-    let mut found = Vec::new();
-    for (store, graph) in [(own, GraphNameRef::DefaultGraph), (later, GraphNameRef::NamedNode(graph.as_ref()))] {
-        // A new property was judged nowhere: no outcome of the action needs to be looked at.
-        if !is_judged(store, properties, graph)? {
-            continue;
-        }
-        for node in subjects_in(store, "earl:subject", execution.as_ref(), graph)? {
-            // Those of the campaign supersede nothing. A look-up takes a tenth of the time of reading a node.
-            if let ([property], GraphNameRef::DefaultGraph) = (properties, graph)
-                && !store.contains(QuadRef::new(&node, &test, NamedNodeRef::new_unchecked(property), graph))?
-            {
-                continue;
-            }
-            let assertion = Node::read_in(store, &node, graph)?;
-            superseded.extend(assertion.all("act:supersedes").iter().map(Term::to_string));
-            if assertion.text("earl:test").is_some_and(|property| properties.contains(&property)) {
-                found.push(StoredJudgement { judgement: judgement(store, &assertion, graph)?, assertion: node });
-            }
-        }
-    }
+    let mut found = stored(own, GraphNameRef::DefaultGraph, execution, properties, &mut superseded)?;
+    found.extend(stored(later, GraphNameRef::NamedNode(graph.as_ref()), execution, properties, &mut superseded)?);
     found.retain(|stored| !superseded.contains(&stored.assertion.to_string()));
     found.sort_by(|a, b| a.judgement.property.cmp(&b.judgement.property));
     Ok(found)
 }
 
+/// The judgements of properties in a graph. Adds the assertions that they supersede to `superseded`.
+fn stored(
+    store: &impl QuadSource,
+    graph: GraphNameRef<'_>,
+    execution: &NamedNode,
+    properties: &[String],
+    superseded: &mut BTreeSet<String>,
+) -> Result<Vec<StoredJudgement>, StorageError> {
+    let mut found = Vec::new();
+    // A new property was judged nowhere: no outcome of the action needs to be looked at.
+    if !is_judged(store, properties, graph)? {
+        return Ok(found);
+    }
+    let test = iri("earl:test");
+    for node in subjects_in(store, "earl:subject", execution.as_ref(), graph)? {
+        // Those of the campaign supersede nothing. A look-up takes a tenth of the time of reading a node.
+        if let ([property], GraphNameRef::DefaultGraph) = (properties, graph)
+            && !store.has(QuadRef::new(&node, &test, NamedNodeRef::new_unchecked(property), graph))?
+        {
+            continue;
+        }
+        let assertion = Node::read_in(store, &node, graph)?;
+        superseded.extend(assertion.all("act:supersedes").iter().map(Term::to_string));
+        if assertion.text("earl:test").is_some_and(|property| properties.contains(&property)) {
+            found.push(StoredJudgement { judgement: judgement(store, &assertion, graph)?, assertion: node });
+        }
+    }
+    Ok(found)
+}
+
 /// Returns whether any of the properties has an outcome in a graph.
-fn is_judged(store: &Store, properties: &[String], graph: GraphNameRef<'_>) -> Result<bool, StorageError> {
+fn is_judged(store: &impl QuadSource, properties: &[String], graph: GraphNameRef<'_>) -> Result<bool, StorageError> {
     let test = iri("earl:test");
     for property in properties {
-        let property = NamedNodeRef::new_unchecked(property);
-        if store
-            .quads_for_pattern(None, Some(test.as_ref()), Some(property.into()), Some(graph))
-            .next()
-            .transpose()?
-            .is_some()
-        {
+        if store.has_value(test.as_ref(), NamedNodeRef::new_unchecked(property).into(), graph)? {
             return Ok(true);
         }
     }

@@ -3,9 +3,10 @@
 use std::collections::BTreeMap;
 
 use oxigraph::model::NamedNode;
-use oxigraph::store::{StorageError, Store};
+use oxigraph::store::StorageError;
 
 use crate::detail::{designators, objects};
+use crate::quad_source::QuadSource;
 use crate::read::Node;
 use crate::wanted::Wanted;
 use crate::write_run::run_node;
@@ -31,9 +32,9 @@ impl History {
         runs.iter()
             .map(|row| {
                 let node = run_node(&row.run);
-                let digest = match self.outlined_store(&row.run)? {
+                let digest = match self.outlined_quads(&row.run)? {
                     Some(outline) => read(&outline, &node),
-                    None => read(&store, &node),
+                    None => read(&*store, &node),
                 };
                 Ok((row.run.clone(), digest.map_err(|error| self.fault("reading scenes", &error))?))
             })
@@ -41,7 +42,7 @@ impl History {
     }
 }
 
-fn read(store: &Store, run: &NamedNode) -> Result<SceneDigest, StorageError> {
+fn read(store: &impl QuadSource, run: &NamedNode) -> Result<SceneDigest, StorageError> {
     let node = Node::read(store, run)?;
     let objects = objects(store, run)?;
     let mut arrangement = Digest::new();

@@ -237,7 +237,7 @@ impl History {
         let campaigns = lists::campaign_ids(&store).map_err(|error| self.query_fault(&error))?;
         let mut found = Vec::new();
         for id in campaigns.into_iter().filter(|id| !shrunk.contains(id)) {
-            let runs = subjects(&store, "act:campaign", &campaign_node(&id));
+            let runs = subjects(&*store, "act:campaign", &campaign_node(&id));
             let runs = runs.map_err(|error| self.fault("reading", &error))?;
             let mut runs: Vec<String> =
                 runs.into_iter().map(|run| short_id(&text_of(&run.into())).to_owned()).collect();
@@ -277,7 +277,7 @@ impl History {
         }
         let node = run_node(&id);
         let store = self.store_with(|| Wanted::run(node.as_str()))?;
-        detail::read(&store, &node).map_err(|error| self.fault("reading a run", &error))
+        detail::read(&*store, &node).map_err(|error| self.fault("reading a run", &error))
     }
 
     /// Returns the trace of a run, named as in [`History::resolve`].
@@ -447,7 +447,7 @@ impl History {
     pub(super) fn ids(&self, class: &str) -> Result<Vec<String>, Diagnostics> {
         let store = self.store_with(|| Wanted::individuals(class))?;
         let class = iri(class);
-        let found = subjects(&store, "rdf:type", class.as_ref()).map_err(|error| self.fault("reading", &error))?;
+        let found = subjects(&*store, "rdf:type", class.as_ref()).map_err(|error| self.fault("reading", &error))?;
         let mut ids: Vec<String> = found.into_iter().map(|node| short_id(&text_of(&node.into())).to_owned()).collect();
         if class.as_str().ends_with("Run") {
             ids.extend(self.outlined_ids(None)?);

@@ -98,6 +98,12 @@ const CODES_C: &[Code] = &[
         "take one of the names in the help",
     ),
     code(
+        "C017",
+        "a history can't keep runs in this way",
+        "the word in `[history] keep` is misspelt",
+        "write `all`, `failures` or `outcomes`",
+    ),
+    code(
         "C020",
         "there is no such world",
         "the world's name is misspelt, or its file can't be read",

@@ -141,4 +141,16 @@ const CODES_H: &[Code] = &[
         "another program wrote or changed the history; such an id could name a file outside of the history",
         "don't use the history; ids have only letters, digits, `-` and `_`",
     ),
+    code(
+        "H030",
+        "a query needs too many statements about runs that are kept as outlines",
+        "outlines are stored outside of the RDF store, and their statements are added to it for each query",
+        "`actcheck list`, `analyse` and `compare` read columns; or ask for fewer properties",
+    ),
+    code(
+        "H031",
+        "a run that is kept as an outline can't be simulated again",
+        "a model, a rule of the scene or the program changed since, so that another run would result",
+        "`actcheck replay` names the changes; the run's outcomes and states are intact",
+    ),
 ];

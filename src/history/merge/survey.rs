@@ -88,8 +88,8 @@ pub(super) fn survey(history: &History, source: Option<usize>) -> Result<Vec<Fou
     }
     let mut all = Vec::new();
     for row in history.campaigns()? {
-        let node =
-            Node::read(&store, &campaign_node(&row.id)).map_err(|error| history.fault("reading a campaign", &error))?;
+        let node = Node::read(&*store, &campaign_node(&row.id))
+            .map_err(|error| history.fault("reading a campaign", &error))?;
         let runs = runs(history, &row.id, &mut later)?;
         all.push(Found {
             source,
@@ -123,7 +123,7 @@ fn runs(
     for row in history.runs(&filter)? {
         let discards = match outlined.get(&row.run) {
             Some(discards) => *discards,
-            None => Node::read(&store, &run_node(&row.run))
+            None => Node::read(&*store, &run_node(&row.run))
                 .map_err(|error| history.fault("reading a run", &error))?
                 .count("act:discards")
                 .unwrap_or_default(),

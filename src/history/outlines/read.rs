@@ -9,6 +9,7 @@ use crate::outlines::file::{Opened, Outline};
 use crate::outlines::loaded::Loaded;
 use crate::outlines::row::{Outlined, Rows};
 use crate::outlines::shelf::{Shelf, Unread, unread, without};
+use crate::quad_source::RunQuads;
 use crate::{History, RunDetail, RunFilter, RunRow, RunVitals, detail, trace_file};
 use crate::{merge, write_run};
 use actcheck_base::Diagnostics;
@@ -51,6 +52,14 @@ impl History {
             rows.of_campaign(campaign).filter(|outlined| outlined.matches(filter)).for_each(&mut *each);
         }
         Ok(())
+    }
+
+    /// The ids of all runs that have only an outline, unsorted.
+    ///
+    /// # Errors
+    /// `H007` a file is damaged.
+    pub fn outline_ids(&self) -> Result<Vec<String>, Diagnostics> {
+        self.outlined_ids(None)
     }
 
     /// The ids of the outlines of a campaign, or of all, unsorted.
@@ -112,17 +121,15 @@ impl History {
         })
     }
 
-    /// The statements of a run that has an outline, in a store in memory. Returns `None` if it has none.
-    pub(crate) fn outlined_store(&self, run: &str) -> Result<Option<Store>, Diagnostics> {
-        let Some(quads) = self.of_outline(run, |loaded, at| loaded.statements(at).map(<[Quad]>::to_vec))? else {
-            return Ok(None);
-        };
-        in_memory(quads).map(Some).map_err(|error| self.fault("reading a run", &error))
+    /// The statements of a run that has an outline. Returns `None` if it has none.
+    pub(crate) fn outlined_quads(&self, run: &str) -> Result<Option<RunQuads>, Diagnostics> {
+        let quads = self.of_outline(run, |loaded, at| loaded.statements(at).map(<[Quad]>::to_vec))?;
+        Ok(quads.map(RunQuads::new))
     }
 
     /// All details of a run that has an outline. Returns `None` if it has none.
     pub(crate) fn outlined_run(&self, run: &str) -> Result<Option<RunDetail>, Diagnostics> {
-        let Some(store) = self.outlined_store(run)? else { return Ok(None) };
+        let Some(store) = self.outlined_quads(run)? else { return Ok(None) };
         detail::read(&store, &write_run::run_node(run)).map(Some).map_err(|error| self.fault("reading a run", &error))
     }
 
@@ -169,7 +176,7 @@ impl History {
 
     /// The judgements in the store that were made after a run that has an outline.
     pub(crate) fn later_about_outline(&self, run: &str, store: &Store) -> Result<Vec<Quad>, Diagnostics> {
-        let Some(memory) = self.outlined_store(run)? else { return Ok(Vec::new()) };
+        let Some(memory) = self.outlined_quads(run)? else { return Ok(Vec::new()) };
         let fault = |error| self.fault("reading a run", &error);
         let node = write_run::run_node(run);
         let mut later = Vec::new();
@@ -206,10 +213,4 @@ impl History {
         }
         (seen.len(), damaged)
     }
-}
-
-fn in_memory(quads: Vec<Quad>) -> Result<Store, oxigraph::store::StorageError> {
-    let store = Store::new()?;
-    store.extend(quads)?;
-    Ok(store)
 }
