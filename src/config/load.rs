@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+use crate::Launcher;
 use crate::designators::{self, Designators};
 use crate::paths::resolve_path;
 use crate::robot::{MendedUrdf, mended};
@@ -62,6 +63,16 @@ pub fn load_text(source: Source, folder: &Path, overrides: &Overrides) -> Result
     let (budget, limits) = ranges::read_budget(&mut table, &mut found);
     let search = read_search(&mut table, &mut found);
     let (history, sync_each_run, keeping) = read_history(&mut table, folder, &mut found);
+    if keeping.keep != Keep::All && launcher != Launcher::Reference {
+        let span = places.get("test_launcher").cloned().unwrap_or(0..0);
+        let message =
+            "runs of a program may not be the same a second time: motion that the history does not keep may be lost";
+        found.push(
+            Diagnostic::warning("C018", message)
+                .at(&source, span)
+                .help("`keep = \"all\"` in `[history]` keeps it; outcomes, states and facts are kept in any case"),
+        );
+    }
     // Taken before the tables of designators, which may have any name.
     let case = table.table("case");
     let designators = designators::read(&mut table, &mut library, &mut places, &mut found);

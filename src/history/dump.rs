@@ -8,7 +8,6 @@ use oxigraph::io::{RdfFormat, RdfSerializer};
 use oxigraph::model::GraphNameRef;
 
 use crate::rdf_text::serializer;
-use crate::wanted::Wanted;
 use crate::write_run::run_node;
 use crate::{History, RdfSyntax, graphs};
 use actcheck_base::{Diagnostic, Diagnostics, NewFile};
@@ -20,13 +19,22 @@ impl History {
     /// # Errors
     /// `H016` the file can't be written, or the store can't be read.
     pub fn write_nquads(&self, file: &Path) -> Result<(), Diagnostics> {
-        let store = self.store_for_query(Wanted::all)?;
-        let write = || -> Result<(), String> {
-            let (file, writer) = begin(file).map_err(|error| error.to_string())?;
-            let mut writer = store.dump_to_writer(RdfFormat::NQuads, writer).map_err(|error| error.to_string())?;
-            writer.flush().and_then(|()| file.finish()).map_err(|error| error.to_string())
-        };
-        write().map_err(|why| unwritten(file, &why))
+        let store = self.store()?;
+        let failed = |why: &dyn std::fmt::Display| unwritten(file, &why.to_string());
+        let (new, writer) = begin(file).map_err(|error| failed(&error))?;
+        let mut writer = RdfSerializer::from_format(RdfFormat::NQuads).for_writer(writer);
+        for quad in store.iter() {
+            let quad = quad.map_err(|error| failed(&error))?;
+            writer.serialize_quad(&quad).map_err(|error| failed(&error))?;
+        }
+        self.each_outlines_quads(true, &mut |quads| {
+            quads.iter().try_for_each(|quad| writer.serialize_quad(quad)).map_err(|error| failed(&error))
+        })?;
+        writer
+            .finish()
+            .and_then(|mut writer| writer.flush())
+            .and_then(|()| new.finish())
+            .map_err(|error| failed(&error))
     }
 
     /// Writes the whole history as N-Quads like [`History::write_nquads`], but with complete facts from the traces in
@@ -35,7 +43,7 @@ impl History {
     /// # Errors
     /// As [`History::write_nquads`], and as [`History::trace`] for each run.
     pub fn write_complete_nquads(&self, file: &Path) -> Result<(), Diagnostics> {
-        let store = self.store_for_query(Wanted::all)?;
+        let store = self.store()?;
         let failed = |why: &dyn std::fmt::Display| unwritten(file, &why.to_string());
         let (new, writer) = begin(file).map_err(|error| failed(&error))?;
         let mut writer = RdfSerializer::from_format(RdfFormat::NQuads).for_writer(writer);
@@ -45,6 +53,9 @@ impl History {
                 writer.serialize_quad(&quad).map_err(|error| failed(&error))?;
             }
         }
+        self.each_outlines_quads(false, &mut |quads| {
+            quads.iter().try_for_each(|quad| writer.serialize_quad(quad)).map_err(|error| failed(&error))
+        })?;
         for run in self.ids("act:Run")? {
             let facts = extract_complete(&self.states(&run)?);
             for quad in graphs::complete(&facts, &run_node(&run)) {
@@ -64,16 +75,22 @@ impl History {
     /// # Errors
     /// As [`History::write_nquads`].
     pub fn write_turtle(&self, file: &Path) -> Result<(), Diagnostics> {
-        let store = self.store_for_query(Wanted::all)?;
-        let serializer = serializer(RdfSyntax::Turtle);
-        let write = || -> Result<(), String> {
-            let (file, writer) = begin(file).map_err(|error| error.to_string())?;
-            let mut writer = store
-                .dump_graph_to_writer(GraphNameRef::DefaultGraph, serializer, writer)
-                .map_err(|error| error.to_string())?;
-            writer.flush().and_then(|()| file.finish()).map_err(|error| error.to_string())
-        };
-        write().map_err(|why| unwritten(file, &why))
+        let store = self.store()?;
+        let failed = |why: &dyn std::fmt::Display| unwritten(file, &why.to_string());
+        let (new, writer) = begin(file).map_err(|error| failed(&error))?;
+        let mut writer = serializer(RdfSyntax::Turtle).for_writer(writer);
+        for quad in store.quads_for_pattern(None, None, None, Some(GraphNameRef::DefaultGraph)) {
+            let quad = quad.map_err(|error| failed(&error))?;
+            writer.serialize_triple(quad.as_ref()).map_err(|error| failed(&error))?;
+        }
+        self.each_outlines_quads(false, &mut |quads| {
+            quads.iter().try_for_each(|quad| writer.serialize_triple(quad.as_ref())).map_err(|error| failed(&error))
+        })?;
+        writer
+            .finish()
+            .and_then(|mut writer| writer.flush())
+            .and_then(|()| new.finish())
+            .map_err(|error| failed(&error))
     }
 }
 

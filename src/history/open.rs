@@ -277,7 +277,7 @@ fn read(folder: &Folder, snapshot: Snapshot) -> Result<Opened, Diagnostics> {
 /// Opens the present state of a store so that statements can be added: it is the reader's own.
 pub(super) fn read_with_outlines(folder: &Folder) -> Result<Opened, Diagnostics> {
     let snapshot = Snapshot::take(folder)?;
-    let store = pending::open(&snapshot);
+    let store = pending::open_for_outlines(&snapshot);
     opened(folder, store, snapshot)
 }
 

@@ -22,6 +22,8 @@ const FEWEST_LOADED: usize = 4_000;
 const TRANSACTION: usize = 20_000;
 /// Largest store that may have no statements. Unit: bytes.
 const MOST_EMPTY: u64 = 1 << 20;
+/// Largest store that is copied into memory. Unit: bytes.
+const MOST_COPIED: u64 = 4 << 20;
 /// The reason why a journal can't be read.
 pub(super) const DAMAGED: &str = "its journal has changed since it was written";
 
@@ -137,6 +139,18 @@ pub(super) fn open(snapshot: &Snapshot) -> Result<Store, StorageError> {
         return Store::new();
     }
     Store::open(snapshot.store())
+}
+
+/// Opens a snapshot, so that the statements of many outlines can be added: in memory, where they take a third of the time,
+/// unless it has many statements itself.
+pub(super) fn open_for_outlines(snapshot: &Snapshot) -> Result<Store, StorageError> {
+    if snapshot.size > MOST_COPIED {
+        return Store::open(snapshot.store());
+    }
+    let (tables, memory) = (Store::open_read_only(snapshot.store())?, Store::new()?);
+    let quads: Vec<Quad> = tables.iter().collect::<Result<_, _>>()?;
+    extend(&memory, quads)?;
+    Ok(memory)
 }
 
 /// Adds statements of a journal.

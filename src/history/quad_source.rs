@@ -95,6 +95,11 @@ impl RunQuads {
         }
         Self { quads, by_subject, by_value }
     }
+
+    /// The statements, in their order.
+    pub(super) fn into_quads(self) -> Vec<Quad> {
+        self.quads
+    }
 }
 
 impl QuadSource for RunQuads {

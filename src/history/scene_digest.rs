@@ -2,6 +2,8 @@
 
 use std::collections::BTreeMap;
 
+use serde::{Deserialize, Serialize};
+
 use oxigraph::model::NamedNode;
 use oxigraph::store::StorageError;
 
@@ -10,11 +12,11 @@ use crate::quad_source::QuadSource;
 use crate::read::Node;
 use crate::wanted::Wanted;
 use crate::write_run::run_node;
-use crate::{History, ObjectDetail, RunRow};
+use crate::{History, ObjectDetail, RunFilter, RunRow};
 use actcheck_base::{Diagnostics, Digest};
 
 /// The scene of a run, in two digests.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct SceneDigest {
     /// The test, the world, the designators, the objects with their poses, and the pose of the robot's base.
     pub arrangement: String,
@@ -29,11 +31,15 @@ impl History {
     /// The store can't be read.
     pub fn scenes(&self, runs: &[RunRow]) -> Result<BTreeMap<String, SceneDigest>, Diagnostics> {
         let store = self.store_with(Wanted::details)?;
+        let mut outlines = BTreeMap::new();
+        self.each_outlined(&RunFilter::default(), &mut |outlined| {
+            outlines.insert(outlined.run(), outlined.row.scene.clone());
+        })?;
         runs.iter()
             .map(|row| {
                 let node = run_node(&row.run);
-                let digest = match self.outlined_quads(&row.run)? {
-                    Some(outline) => read(&outline, &node),
+                let digest = match outlines.remove(&row.run) {
+                    Some(digest) => Ok(digest),
                     None => read(&*store, &node),
                 };
                 Ok((row.run.clone(), digest.map_err(|error| self.fault("reading scenes", &error))?))
@@ -42,7 +48,11 @@ impl History {
     }
 }
 
-fn read(store: &impl QuadSource, run: &NamedNode) -> Result<SceneDigest, StorageError> {
+/// Reads the scene of a run.
+///
+/// # Errors
+/// The store can't be read.
+pub(super) fn read(store: &impl QuadSource, run: &NamedNode) -> Result<SceneDigest, StorageError> {
     let node = Node::read(store, run)?;
     let objects = objects(store, run)?;
     let mut arrangement = Digest::new();

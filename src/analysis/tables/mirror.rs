@@ -212,8 +212,8 @@ impl Mirror {
         let missing: Vec<&String> = runs.iter().filter(|run| !there.contains(*run)).collect();
         for runs in missing.chunks(RUNS_IN_A_FILE) {
             let mut rows = Rows::default();
-            for run in runs {
-                rows.add(&table_run(history, run)?);
+            for run in table_runs(history, runs) {
+                rows.add(&run?);
             }
             let file = self.write(campaign, rows)?;
             self.files.push((campaign.to_owned(), file));
@@ -328,6 +328,19 @@ fn present(tables: &Path, may_change: bool) -> BTreeMap<String, Vec<PathBuf>> {
     }
     found.values_mut().for_each(|files| files.sort());
     found
+}
+
+/// Reads runs on all cores.
+fn table_runs(history: &History, runs: &[&String]) -> Vec<Result<TableRun, Diagnostics>> {
+    let cores = std::thread::available_parallelism().map_or(1, usize::from);
+    let share = runs.len().div_ceil(cores).max(1);
+    std::thread::scope(|scope| {
+        let read = |runs: &'_ [&String]| runs.iter().map(|run| table_run(history, run)).collect::<Vec<_>>();
+        let shares: Vec<_> = runs.chunks(share).map(|runs| scope.spawn(move || read(runs))).collect();
+        let joined =
+            shares.into_iter().map(|share| share.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)));
+        joined.flatten().collect()
+    })
 }
 
 /// Reads a run. Noise and effects are unknown if its trace is missing, damaged, or of an unknown version.

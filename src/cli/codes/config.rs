@@ -104,6 +104,12 @@ const CODES_C: &[Code] = &[
         "write `all`, `failures` or `outcomes`",
     ),
     code(
+        "C018",
+        "motion of runs that a program performs may be lost",
+        "the history keeps outlines, and a program may not do the same a second time",
+        "`keep = \"all\"` in `[history]` keeps the motion",
+    ),
+    code(
         "C020",
         "there is no such world",
         "the world's name is misspelt, or its file can't be read",

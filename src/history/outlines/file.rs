@@ -7,9 +7,10 @@ use oxigraph::model::Quad;
 
 use crate::journal::{self, Content, Part};
 use crate::outlines::row::Rows;
+use crate::quad_source::RunQuads;
 use crate::trace_file;
 use crate::wanted::Wanted;
-use crate::{RunRecord, write_run};
+use crate::{RunRecord, scene_digest, write_run};
 use actcheck_base::{ByteReader, put_varint};
 
 /// Magic bytes at the start of each file. The last one is the format version.
@@ -38,9 +39,11 @@ impl Outline {
     /// # Errors
     /// A message, if a part can't be encoded.
     pub(crate) fn of(record: &RunRecord) -> Result<Self, String> {
+        let quads = RunQuads::new(write_run::quads_without_facts(record));
+        let scene = scene_digest::read(&quads, &write_run::run_node(&record.id)).map_err(|error| error.to_string())?;
         Ok(Self {
-            rows: Rows::of(record),
-            quads: write_run::quads_without_facts(record),
+            rows: Rows::of(record, scene),
+            quads: quads.into_quads(),
             head: trace_file::encode_head(&record.choices, &record.trace)?,
         })
     }

@@ -11,9 +11,10 @@ use crate::outlines::row::{Outlined, Rows};
 use crate::outlines::shelf::{Shelf, Unread, unread, without};
 use crate::quad_source::RunQuads;
 use crate::{History, RunDetail, RunFilter, RunRow, RunVitals, detail, trace_file};
-use crate::{merge, write_run};
+use crate::{graphs, merge, write_run};
 use actcheck_base::Diagnostics;
 use actcheck_data::{Choice, Trace};
+use actcheck_facts::extract;
 
 /// The campaign and the index of a run, from its id.
 fn place_of(run: &str) -> Option<(&str, u64)> {
@@ -125,6 +126,29 @@ impl History {
     pub(crate) fn outlined_quads(&self, run: &str) -> Result<Option<RunQuads>, Diagnostics> {
         let quads = self.of_outline(run, |loaded, at| loaded.statements(at).map(<[Quad]>::to_vec))?;
         Ok(quads.map(RunQuads::new))
+    }
+
+    /// Calls `each` with all statements of every outline, also its facts (`with_facts`), run by run.
+    ///
+    /// # Errors
+    /// `H007` a file is damaged; those of `each`.
+    pub(crate) fn each_outlines_quads(
+        &self,
+        with_facts: bool,
+        each: &mut dyn FnMut(Vec<Quad>) -> Result<(), Diagnostics>,
+    ) -> Result<(), Diagnostics> {
+        for run in self.outlined_ids(None)? {
+            let read = self.of_outline(&run, |loaded, at| {
+                let mut quads = loaded.statements(at)?.to_vec();
+                if with_facts {
+                    let (_, trace) = trace_file::decode_head(loaded.head(at)?)?;
+                    graphs::write(&extract(&trace), &write_run::run_node(&run), &mut quads);
+                }
+                Ok(quads)
+            });
+            read?.map_or(Ok(()), &mut *each)?;
+        }
+        Ok(())
     }
 
     /// All details of a run that has an outline. Returns `None` if it has none.

@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use serde::{Deserialize, Serialize};
 
 use crate::detail::{outcome, status};
-use crate::{OutcomeRow, Repetition, RunFilter, RunRecord, RunRow, RunVitals};
+use crate::{OutcomeRow, Repetition, RunFilter, RunRecord, RunRow, RunVitals, SceneDigest};
 use actcheck_base::Outcome;
 use actcheck_data::Choice;
 
@@ -27,6 +27,7 @@ pub(crate) struct Row {
     deepest_penetration_m: Option<f64>,
     energy_gain_j: Option<f64>,
     pub discards: Vec<String>,
+    pub scene: SceneDigest,
     outcomes: Vec<Judged>,
 }
 
@@ -57,7 +58,7 @@ pub(crate) struct Outlined<'a> {
 
 impl Rows {
     /// The values of a new run.
-    pub(crate) fn of(record: &RunRecord) -> Self {
+    pub(crate) fn of(record: &RunRecord, scene: SceneDigest) -> Self {
         let mut texts = Texts::default();
         let mut outcomes = Vec::new();
         for (step, (action, judgements)) in (1..).zip(record.actions.iter().zip(&record.judgements)) {
@@ -85,6 +86,7 @@ impl Rows {
             deepest_penetration_m: record.quality.map(|quality| quality.deepest_penetration_m),
             energy_gain_j: record.quality.map(|quality| quality.energy_gain_j),
             discards: record.discards.clone(),
+            scene,
             outcomes,
         };
         Self { texts: texts.all, rows: vec![row] }

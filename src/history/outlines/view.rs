@@ -14,8 +14,8 @@ use crate::{History, fault, pending};
 use actcheck_base::{Diagnostic, Diagnostics};
 use actcheck_facts::extract;
 
-/// Largest number of statements that a query may need from outlines: they take a minute and some gigabytes of disk.
-const MOST_STATEMENTS: usize = 20_000_000;
+/// Largest number of statements that a query may need from outlines: they take half a minute and two gigabytes of memory.
+const MOST_STATEMENTS: usize = 5_000_000;
 
 /// The store of a reader, with the statements of outlines that queries have asked for so far.
 pub(crate) struct View {
