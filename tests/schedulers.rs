@@ -1,4 +1,4 @@
-//! Launches on schedulers: their files, and stand-ins for their commands that run the shards as processes. The stand-ins
+//! Launches on schedulers: their files, and substitutes for their commands that run the shards as processes. The substitutes
 //! are in `tests/data/launch/schedulers`.
 
 use std::fs;
@@ -23,7 +23,7 @@ fn data() -> PathBuf {
     root().join("tests/data/launch")
 }
 
-/// A project and a place for the stand-ins' state.
+/// A project and a place for the substitutes' state.
 struct Site {
     project: TempDir,
     state: TempDir,

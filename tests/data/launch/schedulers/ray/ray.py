@@ -1,4 +1,4 @@
-"""A stand-in for the package: tasks are threads of this process. The first attempt of the tasks in $SCHEDULER/lose fails
+"""A substitute for the package: tasks are threads of this process. The first attempt of the tasks in $SCHEDULER/lose fails
 in the middle, as if their workers were killed."""
 
 import os
