@@ -11,6 +11,9 @@ use actcheck_base::{Diagnostic, Diagnostics};
 
 /// Name of the script in the folder of the launch.
 const SCRIPT: &str = "slurm.sh";
+/// Parts of reasons that don't go away by themselves, in lower case. An array that asks for more cores than any node has is
+/// accepted, and waits for `PartitionConfig`.
+const TROUBLES: [&str; 5] = ["held", "badconstraints", "timelimit", "partitionconfig", "partitionnodelimit"];
 
 /// Slurm through its commands.
 pub(super) struct Slurm {
@@ -151,7 +154,7 @@ fn look_of(lines: &str) -> Look {
     }
     let needs_user = |reason: &&&str| {
         let reason = reason.to_ascii_lowercase();
-        reason.contains("held") || reason.contains("badconstraints") || reason.contains("timelimit")
+        TROUBLES.iter().any(|trouble| reason.contains(trouble))
     };
     let trouble = reasons.keys().find(needs_user).map(|reason| (*reason).to_owned());
     let reason = reasons.iter().max_by_key(|(_, number)| **number).map(|(reason, _)| (*reason).to_owned());
@@ -201,7 +204,9 @@ mod tests {
         let lines = "RUNNING|None\nCOMPLETING|None\nPENDING|Resources\nPENDING|Priority\nPENDING|Resources\n";
         assert_eq!(look_of(lines), active(2, 3, Some("Resources"), None));
         let held = "launch failed requeued held";
-        assert_eq!(look_of(&format!("PENDING|{held}\n")), active(0, 1, Some(held), Some(held)));
+        for reason in [held, "PartitionConfig"] {
+            assert_eq!(look_of(&format!("PENDING|{reason}\n")), active(0, 1, Some(reason), Some(reason)));
+        }
     }
 
     #[test]
