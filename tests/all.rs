@@ -79,6 +79,7 @@ mod rule_budgets;
 mod rules;
 mod rules_library;
 mod scenario;
+mod schedulers;
 mod schema;
 mod search;
 mod second_judge;

@@ -32,12 +32,14 @@ pub enum Command {
     Run(crate::run_args::RunArgs),
     /// Run a campaign in shards, each in a process of its own, and merge them into one history
     ///
-    /// The results are those of `actcheck run`. A shard whose process was lost is resumed. Until they are merged, the
-    /// shards are in a folder beside the history (DIR.launch); after an interrupt, the same command continues there.
+    /// The processes run here, or where Slurm, Kubernetes or Ray starts them (`--on`). The results are those of `actcheck
+    /// run`. A shard whose process was lost is resumed. Until they are merged, the shards are in a folder beside the
+    /// history (DIR.launch); after an interrupt, the same command continues there, and follows a submitted job again.
     ///
     /// Exit code: 0 everything passed, 1 a property failed, 2 a shard could not be completed, 130 interrupted by Ctrl-C
     /// (finished runs are kept).
-    #[command(after_help = "Example:\n  actcheck launch configs/quick.toml --shards 2 --history /tmp/shards")]
+    #[command(after_help = "Examples:\n  actcheck launch configs/quick.toml --shards 2 --history /tmp/shards\n  \
+                      actcheck launch configs/quick.toml --shards 3 --on slurm --resources cpus=2,time=1h --dry-run")]
     Launch(crate::launch::LaunchArgs),
     /// Write a configuration or a property, ready to edit
     #[command(after_help = "Examples:\n  actcheck new campaign\n  actcheck new property StaysUpright --for Pick")]

@@ -297,9 +297,45 @@ const CODES_X: &[Code] = &[
         "read the end of its output in the help; the same command tries again",
     ),
     code(
+        "X076",
+        "`--resources` is wrong",
+        "a key is unknown, has no meaning with this `--on`, or has a wrong value; or a needed one is missing",
+        "take the suggested key, or the example of the help",
+    ),
+    code(
+        "X077",
+        "a scheduler's command is missing",
+        "`sbatch`, `squeue`, `kubectl`, Python or its package ray is not installed here, or not on PATH",
+        "give the command where the scheduler's programs are, or install them",
+    ),
+    code(
+        "X078",
+        "a scheduler refused a job",
+        "its words are in the message: often a partition, a limit, a right, or a cluster that can't be reached",
+        "change `--resources`, and give the same command again",
+    ),
+    code(
+        "X079",
+        "a scheduler doesn't answer",
+        "its server is down or busy, or the network is",
+        "give the same command again later: it follows the job, which may go on",
+    ),
+    code(
         "X080",
         "a merged campaign lacks runs",
         "parts of it were not merged",
         "merge the missing parts into the same folder",
+    ),
+    code(
+        "X081",
+        "a scheduler doesn't start the shards of a job",
+        "the job is held, asks for more than any node has, or its image can't be loaded",
+        "remove the cause that the message names; or end the job, and give the same command with other resources",
+    ),
+    code(
+        "X082",
+        "the program of a shard is not that of its launch",
+        "a node or an image has another version of actcheck, which could give other results",
+        "use the same program everywhere, or remove the folder of the launch and launch again",
     ),
 ];

@@ -13,6 +13,24 @@ use actcheck_config::Overrides;
 pub enum On {
     /// Processes on this machine
     Local,
+    /// An array of jobs
+    Slurm,
+    /// An Indexed Job
+    Kubernetes,
+    /// Tasks of a Ray cluster
+    Ray,
+}
+
+impl On {
+    /// The name in options and files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Local => "local",
+            Self::Slurm => "slurm",
+            Self::Kubernetes => "kubernetes",
+            Self::Ray => "ray",
+        }
+    }
 }
 
 /// `actcheck launch`
@@ -26,10 +44,15 @@ pub struct LaunchArgs {
     /// Number of shards; a lost shard loses only its runs in flight, so more shards than processes are fine
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=10_000))]
     pub shards: u64,
-    /// Shards that run at once [default: all cores]
+    /// The needs of a shard, such as `cpus=2,memory=4G`. Everywhere: `cpus`. With a scheduler also `memory` and `program`
+    /// (the path of actcheck there); `time` (not Ray); Slurm: `partition`, `account`; Kubernetes: `image`, `volume` (the
+    /// claim of the shared volume), `mount`, `namespace`; Ray: `address`, `python`
+    #[arg(long, value_name = "KEY=VALUE,…", value_delimiter = ',')]
+    pub resources: Vec<String>,
+    /// Shards that run at once [default: all cores; with a scheduler, as many as it starts]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub parallel: Option<u16>,
-    /// How often a shard is started before it is given up
+    /// How often a shard is started before it is given up: with a scheduler, in each job, and this many jobs
     #[arg(long, value_name = "N", default_value_t = 4, value_parser = clap::value_parser!(u32).range(1..=100))]
     pub tries: u32,
     /// Scenes for each test, instead of the configuration's `test_count`
@@ -42,7 +65,7 @@ pub struct LaunchArgs {
     /// until they are merged
     #[arg(long, value_name = "DIR")]
     pub history: Option<PathBuf>,
-    /// Print the plan and the commands of the shards, and start nothing
+    /// Print the plan and the scheduler's files and commands, or those of the shards, and start nothing
     #[arg(long)]
     pub dry_run: bool,
     /// How results are printed

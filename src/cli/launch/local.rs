@@ -7,6 +7,7 @@ use std::process::{Child, Command, Stdio};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
+use crate::launch::lost::lost;
 use crate::launch::plan::Plan;
 use crate::progress::Progress;
 use actcheck_base::{Diagnostic, Diagnostics};
@@ -15,8 +16,6 @@ use actcheck_base::{Diagnostic, Diagnostics};
 const INTERVAL: Duration = Duration::from_millis(100);
 /// The shards' folders are counted once in this many looks.
 const COUNT_EVERY: u64 = 10;
-/// Maximum number of lines of a shard's output in a message.
-const MAX_LINES: usize = 5;
 
 /// A shard that runs.
 struct Running {
@@ -62,7 +61,10 @@ pub(super) fn run_all(
                     again += 1;
                     waiting.push_back((shard.number, shard.tries));
                 }
-                Some(_) => faults.push(lost(plan, &shard)),
+                Some(_) => {
+                    let how = format!("ended {} times before it was complete", shard.tries);
+                    faults.push(lost(plan, shard.number, &how));
+                }
             }
         }
         running = left;
@@ -100,20 +102,9 @@ fn end(mut child: Child) {
 }
 
 fn show(progress: &Progress, plan: &Plan, again: u64) {
-    let done = (1..=plan.shards).filter(|&number| plan.done_file(number).exists()).count();
     let lost = if again > 0 { format!(", {again} started again") } else { String::new() };
     let bar = progress.bar();
-    bar.set_message(format!("{done}/{} shards{lost}", plan.shards));
-    bar.set_position(plan.stored_runs().min(plan.planned));
-}
-
-/// X075: a shard that was lost too often, with the end of its output.
-fn lost(plan: &Plan, shard: &Running) -> Diagnostic {
-    let log = plan.log(shard.number);
-    let text = std::fs::read_to_string(&log).unwrap_or_default();
-    let lines: Vec<&str> = text.lines().filter(|line| !line.trim().is_empty()).collect();
-    let last = lines[lines.len().saturating_sub(MAX_LINES)..].join("\n");
-    let message = format!("shard {}/{} ended {} times before it was complete", shard.number, plan.shards, shard.tries);
-    Diagnostic::error("X075", message)
-        .help(format!("the same command tries again; the end of `{}`:\n{last}", log.display()))
+    let done = plan.complete();
+    bar.set_message(format!("{}/{} shards{lost}", done.len(), plan.shards));
+    bar.set_position(plan.stored_runs(&done).min(plan.planned));
 }

@@ -1,22 +1,33 @@
 //! The plan of a launch: one file in its folder, from which every task and the same command, given again, go on.
 
+use std::collections::BTreeSet;
 use std::ffi::OsString;
-use std::fs;
+use std::fs::{self, File, TryLockError};
 use std::io;
 use std::path::{Path, PathBuf};
+use std::thread;
+use std::time::{Duration, Instant};
 
 use serde_json::{Value, json};
 
+use crate::clock;
 use crate::launch::LaunchArgs;
 use crate::run_args::RunArgs;
-use actcheck_base::{Diagnostic, Diagnostics, Shard, digest_of, write_atomic};
+use actcheck_base::{Diagnostic, Diagnostics, Shard, digest_of, program_digest, write_atomic};
 use actcheck_campaign::Env;
+
+/// Interval between attempts to take a shard.
+const INTERVAL: Duration = Duration::from_millis(250);
 
 /// A launch and its folder.
 #[derive(Debug, Clone)]
 pub(super) struct Plan {
     /// Its folder, beside the history: `HISTORY.launch`.
     pub folder: PathBuf,
+    /// A name that no other launch has: eight hexadecimal digits.
+    pub id: String,
+    /// Digest of the program that planned it, which its tasks must have too.
+    pub program: String,
     /// The configuration, as the user named it.
     pub config: PathBuf,
     /// Digest of the configuration's text.
@@ -54,8 +65,12 @@ pub(super) fn check(env: &Env, shards: u64) -> Result<(), Diagnostics> {
 impl Plan {
     /// The plan of a command.
     pub fn new(args: &LaunchArgs, env: &Env, jobs: u64) -> Self {
+        let folder = with_ending(&env.campaign.history, ".launch");
+        let unique = format!("{} {} {}", folder.display(), (clock::system().now)(), std::process::id());
         Self {
-            folder: with_ending(&env.campaign.history, ".launch"),
+            folder,
+            id: digest_of(&unique).chars().take(8).collect(),
+            program: program_digest().to_owned(),
             config: args.config.clone(),
             digest: digest_of(&env.campaign.source.text),
             runs: args.runs,
@@ -82,6 +97,8 @@ impl Plan {
     fn of_json(folder: &Path, value: &Value) -> Option<Self> {
         Some(Self {
             folder: folder.to_path_buf(),
+            id: value["id"].as_str()?.to_owned(),
+            program: value["program"].as_str()?.to_owned(),
             config: value["config"].as_str()?.into(),
             digest: value["config_digest"].as_str()?.to_owned(),
             runs: value["runs"].as_u64().and_then(|runs| runs.try_into().ok()),
@@ -94,6 +111,8 @@ impl Plan {
 
     fn json(&self) -> Value {
         json!({
+            "id": self.id,
+            "program": self.program,
             "config": self.config.display().to_string(),
             "config_digest": self.digest,
             "runs": self.runs,
@@ -104,19 +123,68 @@ impl Plan {
         })
     }
 
-    /// Writes the plan into its folder, or finds it there.
+    /// Writes the plan into its folder, or finds it there. The launch has the folder alone while it keeps the returned
+    /// file.
     ///
     /// # Errors
     /// `X073` the folder belongs to another launch, `X074` it can't be written.
-    pub fn enter(&self) -> Result<(), Diagnostics> {
+    pub fn enter(&mut self) -> Result<File, Diagnostics> {
         let file = self.folder.join("plan.json");
         if file.exists() {
-            return self.same_as(&Self::read(&self.folder)?);
+            self.find()?;
         }
-        let folders = [self.folder.join("shards"), self.folder.join("done"), self.folder.join("logs")];
-        let made = folders.iter().try_for_each(fs::create_dir_all);
-        made.and_then(|()| write_atomic(&file, format!("{:#}\n", self.json()).as_bytes()))
-            .map_err(|error| self.unwritable(&error))
+        // A launch that was killed while it removed its folder.
+        let _ = fs::remove_dir_all(with_ending(&self.folder, ".merged"));
+        // Shards are tried again, with whatever their users repaired.
+        let _ = fs::remove_dir_all(self.folder.join("faults"));
+        let folders = ["shards", "done", "faults", "locks", "logs"].map(|name| self.folder.join(name));
+        folders.iter().try_for_each(fs::create_dir_all).map_err(|error| self.unwritable(&error))?;
+        let alone = self.alone()?;
+        if !file.exists() {
+            write_atomic(&file, format!("{:#}\n", self.json()).as_bytes()).map_err(|error| self.unwritable(&error))?;
+        }
+        Ok(alone)
+    }
+
+    /// Takes the identity of the unfinished launch in the folder, if there is one.
+    ///
+    /// # Errors
+    /// `X073` that launch has other shards.
+    pub fn find(&mut self) -> Result<(), Diagnostics> {
+        if self.folder.join("plan.json").exists() {
+            let old = Self::read(&self.folder)?;
+            self.same_as(&old)?;
+            self.id = old.id;
+        }
+        Ok(())
+    }
+
+    /// X073 if another process follows this launch.
+    fn alone(&self) -> Result<File, Diagnostics> {
+        let file = File::create(self.folder.join("lock")).map_err(|error| self.unwritable(&error))?;
+        match file.try_lock() {
+            Err(TryLockError::WouldBlock) => {
+                let message = format!("another `actcheck launch` uses the folder `{}`", self.folder.display());
+                Err(Diagnostic::error("X073", message).help("wait until it has ended, or end it").into())
+            }
+            // Some network file systems have no locks.
+            Ok(()) | Err(TryLockError::Error(_)) => Ok(file),
+        }
+    }
+
+    /// Takes a shard, which one process at a time may run: a process that lost its scheduler may live on. Returns `None` if
+    /// another process keeps it for longer than `wait`.
+    pub fn hold(&self, number: u64, wait: Duration) -> Result<Option<File>, Diagnostics> {
+        let asked = Instant::now();
+        let path = self.folder.join("locks").join(number.to_string());
+        let file = File::create(path).map_err(|error| self.unwritable(&error))?;
+        while let Err(TryLockError::WouldBlock) = file.try_lock() {
+            if asked.elapsed() > wait {
+                return Ok(None);
+            }
+            thread::sleep(INTERVAL);
+        }
+        Ok(Some(file))
     }
 
     /// Checks that an unfinished launch in the folder has the same runs in the same shards.
@@ -128,6 +196,8 @@ impl Plan {
         };
         if self.digest != old.digest {
             other("another configuration")
+        } else if self.program != old.program {
+            other("another version of actcheck")
         } else if self.shards != old.shards {
             other(&format!("{} shards", old.shards))
         } else if (self.runs, self.seed, self.planned) != (old.runs, old.seed, old.planned) {
@@ -163,6 +233,33 @@ impl Plan {
         fs::read_to_string(self.done_file(number)).ok().filter(|id| !id.is_empty())
     }
 
+    /// The file that says that a shard ended with a diagnostic, which another start would not change.
+    pub fn fault_file(&self, number: u64) -> PathBuf {
+        self.folder.join("faults").join(number.to_string())
+    }
+
+    /// The numbers of complete shards.
+    pub fn complete(&self) -> BTreeSet<u64> {
+        self.numbers_in("done")
+    }
+
+    /// The numbers of shards that are neither complete nor ended with a diagnostic.
+    pub fn missing(&self) -> BTreeSet<u64> {
+        let (done, faulty) = (self.complete(), self.numbers_in("faults"));
+        (1..=self.shards).filter(|number| !done.contains(number) && !faulty.contains(number)).collect()
+    }
+
+    /// The numbers of shards that ended with a diagnostic.
+    pub fn faulty(&self) -> BTreeSet<u64> {
+        let done = self.complete();
+        self.numbers_in("faults").into_iter().filter(|number| !done.contains(number)).collect()
+    }
+
+    fn numbers_in(&self, folder: &str) -> BTreeSet<u64> {
+        let entries = fs::read_dir(self.folder.join(folder)).into_iter().flatten().flatten();
+        entries.filter_map(|entry| entry.file_name().to_str()?.parse().ok()).collect()
+    }
+
     /// The options with which a shard runs.
     pub fn run_args(&self, dir: &Path) -> RunArgs {
         let jobs = u16::try_from(self.jobs).unwrap_or(1);
@@ -180,10 +277,15 @@ impl Plan {
         Shard::new(number, self.shards)
     }
 
-    /// Number of runs that the shards have stored.
-    pub fn stored_runs(&self) -> u64 {
-        let traces = |number: u64| fs::read_dir(self.shard_dir(number).join("traces")).map_or(0, Iterator::count);
-        (1..=self.shards).map(|number| traces(number) as u64).sum()
+    /// Number of runs that the shards have stored; `done` are complete.
+    pub fn stored_runs(&self, done: &BTreeSet<u64>) -> u64 {
+        let traces =
+            |number: u64| fs::read_dir(self.shard_dir(number).join("traces")).map_or(0, Iterator::count) as u64;
+        let of = |number: u64| match self.shard(number) {
+            Some(shard) if done.contains(&number) => shard.share(self.planned),
+            _ => traces(number),
+        };
+        (1..=self.shards).map(of).sum()
     }
 
     /// Removes the folder of a merged launch. It gets another name first, so that no half of it is taken for a launch.
@@ -196,11 +298,15 @@ impl Plan {
         fs::remove_dir_all(&merged)
     }
 
-    /// The commands of the shards.
+    /// The plan's file.
     pub fn dry_run(&self) -> String {
-        let of = |number| format!("actcheck launch-task {} {number}\n", self.folder.display());
         format!("# {}\n{:#}\n", self.folder.join("plan.json").display(), self.json())
-            + &(1..=self.shards).map(of).collect::<String>()
+    }
+
+    /// The commands of the shards.
+    pub fn commands(&self) -> String {
+        let of = |number| format!("actcheck launch-task {} {number}\n", self.folder.display());
+        (1..=self.shards).map(of).collect()
     }
 }
 

@@ -7,13 +7,16 @@ use std::time::{Duration, Instant};
 
 use crate::launch::LaunchTaskArgs;
 use crate::launch::plan::Plan;
-use crate::{run, stop};
-use actcheck_base::{Diagnostic, Diagnostics, write_atomic};
+use crate::{output, run, stop};
+use actcheck_base::{Diagnostic, Diagnostics, Shard, program_digest, write_atomic};
 use actcheck_history::History;
 
-/// Time in which an earlier process of the same shard must have closed its history.
+/// Time in which an earlier process of the same shard must have ended.
 const WAIT: Duration = Duration::from_secs(120);
 const INTERVAL: Duration = Duration::from_millis(500);
+
+/// Exit code if another process runs the shard. Unlike 2, a later start may succeed.
+pub const BUSY: u8 = 75;
 
 /// How far a shard is.
 enum State {
@@ -35,7 +38,31 @@ pub fn task(args: &LaunchTaskArgs) -> Result<u8, Diagnostics> {
         Diagnostic::error("X073", format!("the launch has {} shards, and no shard {}", plan.shards, args.number))
             .help("name a number from 1 to that")
     })?;
-    let dir = plan.shard_dir(args.number);
+    match alone(&plan, shard) {
+        Err(faults) if is_open_elsewhere(&faults) => {
+            output::print_diagnostics(&faults);
+            Ok(BUSY)
+        }
+        Err(faults) => {
+            let text: String = faults.iter().map(|fault| format!("{}: {}\n", fault.code, fault.message)).collect();
+            // The exit code says it too.
+            let _ = write_atomic(&plan.fault_file(args.number), text.as_bytes());
+            Err(faults)
+        }
+        done => done,
+    }
+}
+
+/// Runs a shard that no other process runs.
+fn alone(plan: &Plan, shard: Shard) -> Result<u8, Diagnostics> {
+    if plan.program != program_digest() {
+        let message = "this is not the version of actcheck that planned the launch";
+        let help = "use the same program everywhere, or remove the folder of the launch and launch again";
+        return Err(Diagnostic::error("X082", message).help(help).into());
+    }
+    let number = shard.number();
+    let Some(_held) = plan.hold(number, WAIT)? else { return Ok(BUSY) };
+    let dir = plan.shard_dir(number);
     let mut options = plan.run_args(&dir);
     match state(&dir)? {
         State::Done(_) => {}
@@ -50,7 +77,7 @@ pub fn task(args: &LaunchTaskArgs) -> Result<u8, Diagnostics> {
     }
     match state(&dir)? {
         State::Done(id) => {
-            write_atomic(&plan.done_file(args.number), id.as_bytes()).map_err(|error| plan.unwritable(&error))?;
+            write_atomic(&plan.done_file(number), id.as_bytes()).map_err(|error| plan.unwritable(&error))?;
             Ok(0)
         }
         State::New | State::Begun(_) => Ok(stop::INTERRUPTED),
