@@ -9,6 +9,7 @@ mod external;
 mod forced;
 mod grasp;
 mod grip;
+mod hindrance;
 mod link_points;
 mod memory;
 mod misperception;
@@ -24,6 +25,7 @@ mod plan_cost;
 mod route;
 mod sabotage;
 mod skills;
+mod slant;
 mod standing;
 mod whereabouts;
 
