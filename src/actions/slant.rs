@@ -21,8 +21,16 @@ const CLEAR_M: f64 = FURNITURE_CLEAR_M + 0.0015;
 const BESIDE_M: f64 = 0.003;
 /// Number of hand headings, the first along the object.
 const N_HEADINGS: u32 = 24;
-/// Penalty per radian between the hand and the vertical: a slanted hand holds a flat object with less of its fingers.
+/// Penalty per radian between the hand and the vertical.
 const SLANT_COST: f64 = 0.2;
+/// The same for flat objects, which a slanted hand holds with less of its fingers.
+const FLAT_SLANT_COST: f64 = 1.5;
+/// How far from the middle of an object, towards the hand, it is grasped if the palm does not fit over it. Unit: metres.
+const SHIFTS_M: [f64; 3] = [0.0, 0.02, 0.04];
+/// Least length of the object beyond the grasp frame. Unit: metres. Half the width of a finger.
+const HELD_M: f64 = 0.012;
+/// Penalty per metre of that shift.
+const SHIFT_COST: f64 = 2.0;
 /// Penalty of fingers at 45 degrees to the sides of an object that is not round: it turns between them.
 const CORNER_COST: f64 = 0.4;
 /// Penalty per radian between the headings of hand and base.
@@ -103,13 +111,16 @@ fn at(thing: &Sighting, shape: &Hand, robot: &Operator<'_>, (heading, pitch): (f
     let top = thing.size_m[2];
     let height = (top - TOP_DEPTH_M).max(lowest_m + CLEAR_M);
     // Only the fingertips reach an object below the grasp frame: its middle belongs between them.
-    let shift = if top < height { forward * -ahead_m } else { nalgebra::Vector3::zeros() };
-    let pose = Translation3::from(shift) * hand(thing, height, heading, pitch);
-    if !shape.is_beside(&pose, thing) {
-        return None;
-    }
+    let is_flat = top < height;
+    let tips = if is_flat { ahead_m } else { 0.0 };
+    let pose = |back_m: f64| Translation3::from(forward * -(tips + back_m)) * hand(thing, height, heading, pitch);
+    let half = width_across(thing, heading + FRAC_PI_2) / 2.0;
+    let mut shifts = SHIFTS_M.into_iter().filter(|back_m| *back_m == 0.0 || *back_m + HELD_M <= half);
+    let back_m = shifts.find(|back_m| shape.is_beside(&pose(*back_m), thing))?;
     let askew = if is_round(thing) { 0.0 } else { libm::sin(2.0 * (heading - thing.pose.yaw())).abs() };
-    let penalty = SLANT_COST * (FRAC_PI_2 - pitch) + CORNER_COST * askew;
+    let slant_cost = if is_flat { FLAT_SLANT_COST } else { SLANT_COST };
+    let penalty = slant_cost * (FRAC_PI_2 - pitch) + CORNER_COST * askew + SHIFT_COST * back_m;
+    let pose = pose(back_m);
     let opening_m = robot.profile().max_opening_m;
     Some(Grasp { approach: Approach::Top, pose, heading, opening_m, penalty })
 }
