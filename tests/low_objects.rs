@@ -37,7 +37,7 @@ fn low_objects_are_picked_from_high_and_wide_surfaces() {
     let project = project();
     let cases = [
         ("mobile_manipulator", "workbench", "cube"),
-        ("mobile_manipulator", "workbench", "carton"),
+        ("mobile_manipulator", "shelf", "cube"),
         ("mobile_manipulator", "table", "brick"),
         ("mobile_manipulator", "table", "spoon"),
         ("fixed_arm", "coffee_table", "cube"),
@@ -51,7 +51,7 @@ fn low_objects_are_picked_from_high_and_wide_surfaces() {
 #[test]
 fn a_failed_plan_names_the_obstacle_or_the_distance() {
     let project = project();
-    let (said, passed) = run(project.path(), ("mobile_manipulator", "shelf", "cube"), "1");
+    let (said, passed) = run(project.path(), ("mobile_manipulator", "high_shelf", "cube"), "1");
     assert_eq!(passed, 0, "{said}");
     assert!(said.contains("no reachable, collision-free path to it was found: "), "{said}");
     assert!(said.contains(" cm "), "{said}");
@@ -75,16 +75,16 @@ fn check_predicts_what_gripper_arm_and_camera_can_not_do() {
     assert!(said.contains("S070") && said.contains("8.8 cm × 8.8 cm across and needs 10.0 cm"), "{said}");
     assert!(said.contains("open 8.0 cm") && said.contains("c.toml:17"), "{said}");
 
-    let said = check(project.path(), &configuration("mobile_manipulator", "shelf", "cube"), &[]);
-    assert!(said.contains("S071") && said.contains("of 3 places on `shelf`"), "{said}");
+    let said = check(project.path(), &configuration("mobile_manipulator", "high_shelf", "cube"), &[]);
+    assert!(said.contains("S071") && said.contains("of 3 places on `high_shelf`"), "{said}");
 
     let heavy = configuration("mobile_manipulator", "coffee_table", "can");
     let said = check(project.path(), &heavy.replace("mass_scale = [0.9, 1.1]", "mass_scale = [5, 9]"), &[]);
     assert!(said.contains("S072") && said.contains("it has at least 1.75 kg"), "{said}");
 
-    let blind = configuration("mobile_manipulator", "shelf", "cube").replace("\"Pick\"", "\"PerceivePlane\"");
+    let blind = configuration("mobile_manipulator", "high_shelf", "cube").replace("\"Pick\"", "\"PerceivePlane\"");
     let said = check(project.path(), &blind, &[]);
-    assert!(said.contains("S073") && said.contains("the top at 110.0 cm"), "{said}");
+    assert!(said.contains("S073") && said.contains("the top at 150.0 cm"), "{said}");
 }
 
 /// A prediction that is wrong for a configuration that works would make all others worthless.

@@ -56,6 +56,11 @@ impl Nearest {
         }
     }
 
+    /// Whether no posture brought the hand to the object.
+    pub fn is_out_of_reach(&self) -> bool {
+        matches!(self.0, None | Some(Hindrance::Dearer | Hindrance::OutOfReach))
+    }
+
     /// The reason for the action's report.
     pub fn reason(&self, thing: Option<&Sighting>, around: &Surroundings<'_>) -> String {
         let why = match &self.0 {

@@ -105,9 +105,13 @@ pub fn plan(operator: &mut Operator<'_>, wanted: PlanRequest<'_>, others: &[Sigh
         found = straight(&planner, &rolled(&all));
         let hand = Hand::new(operator);
         planner.heading_mobility = TURNED_MOBILITY;
-        for of in [slant::ahead, slant::aside] {
-            let slants = if found.is_none() { of(thing, &hand, operator) } else { Vec::new() };
-            found = found.or_else(|| straight(&planner, &slants)).or_else(|| straight(&planner, &rolled(&slants)));
+        let slants = if found.is_none() { slant::ahead(thing, &hand, operator) } else { Vec::new() };
+        found = found.or_else(|| straight(&planner, &slants)).or_else(|| straight(&planner, &rolled(&slants)));
+        // Where no hand ahead of the base reaches, one aside of it does not either.
+        if found.is_none() && !nearest.is_out_of_reach() {
+            let slants = slant::aside(thing, &hand, operator);
+            let mut straight = |grasps: &[Grasp]| best(&planner, grasps, &mut Samples::new(0.0, 0), &mut nearest);
+            found = straight(&slants).or_else(|| straight(&rolled(&slants)));
         }
     }
     found.ok_or_else(|| nearest.reason(wanted.taken, &planner.surroundings()))

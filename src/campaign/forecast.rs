@@ -146,7 +146,7 @@ impl Env {
                     weakest = Some(pick);
                 }
                 Ok(_) => {}
-                Err(reason) => reasons.push(reason),
+                Err(reason) => reasons.push(reason.trim_start_matches(&format!("{target}: ")).to_owned()),
             }
         }
         if let Some(reason) = reasons.first() {

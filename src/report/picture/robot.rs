@@ -73,16 +73,22 @@ fn draw(drawing: &mut Drawing, posture: &RobotView, window: &Window) {
     drawing.shape(outlines, true, paint::ROBOT);
     let mut labels = Labels::new(window.panel, Vec::new());
     ruler(drawing, window, &mut labels);
+    let mut spots = Vec::new();
     for (name, pose) in &posture.frames {
         let pose = pose.to_isometry();
         let origin = mirrored(window.pixel(pose.translation.vector.into()));
+        let mut spot = Rect { left: origin[0], top: origin[1], width: 0.0, height: 0.0 };
         for (axis, rgb) in AXES.into_iter().enumerate() {
             let mut tip = Point3::origin();
             tip[axis] = AXIS_PX / window.scale;
             let end = mirrored(window.pixel((pose * tip).coords.into()));
             drawing.line(vec![origin, end], Line::new(Paint::solid(rgb), 2.2));
+            spot = spot.with(end);
         }
-        let at = Rect { left: origin[0], top: origin[1], width: 0.0, height: 0.0 }.grown(3.0);
+        labels.keep_out(spot);
+        spots.push((name, spot));
+    }
+    for (name, at) in spots {
         labels.write(drawing, &Label { text: name, size: SIZE_PX, bold: false, rgb: paint::INK, at });
     }
     drawing.clip(None);
