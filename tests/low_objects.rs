@@ -9,7 +9,8 @@ use crate::support::{actcheck, copy, root, shipped_project, stderr, stdout};
 /// A configuration with a lone object on a surface and perfect sensors.
 fn configuration(robot: &str, surface: &str, object: &str) -> String {
     let text = std::fs::read_to_string(root().join("configs/lone_glass.toml")).unwrap();
-    let text = text.replace("\"glass\"", &format!("\"{object}\"")).replace("\"coffee_table\"", &format!("\"{surface}\""));
+    let text =
+        text.replace("\"glass\"", &format!("\"{object}\"")).replace("\"coffee_table\"", &format!("\"{surface}\""));
     format!("{text}\n[robot]\nprofile = \"{robot}\"\n")
 }
 
@@ -70,7 +71,8 @@ fn check_predicts_what_gripper_arm_and_camera_can_not_do() {
     let project = project();
     let robots = project.path().join("models/robots");
     let profile = std::fs::read_to_string(robots.join("fixed_arm.toml")).unwrap();
-    std::fs::write(robots.join("narrow.toml"), profile.replace("max_opening_m = 0.14", "max_opening_m = 0.08")).unwrap();
+    std::fs::write(robots.join("narrow.toml"), profile.replace("max_opening_m = 0.14", "max_opening_m = 0.08"))
+        .unwrap();
     let said = check(project.path(), &configuration("narrow", "coffee_table", "glass"), &[]);
     assert!(said.contains("S070") && said.contains("8.8 cm × 8.8 cm across and needs 10.0 cm"), "{said}");
     assert!(said.contains("open 8.0 cm") && said.contains("c.toml:17"), "{said}");

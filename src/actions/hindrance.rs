@@ -134,7 +134,8 @@ fn out_of_reach(thing: Option<&Sighting>, furniture: &[Block]) -> String {
     let Some(thing) = thing else { return "it is out of reach".to_owned() };
     let place = Point3::from(thing.pose.position);
     let below = furniture.iter().find(|block| block.beside(&place) < 0.0);
-    let inwards = below.map(|block| format!(" and {} from the edge of {}", centimetres(-block.beside(&place)), block.id));
+    let inwards =
+        below.map(|block| format!(" and {} from the edge of {}", centimetres(-block.beside(&place)), block.id));
     format!("it is out of reach, {} above the floor{}", centimetres(place.z), inwards.unwrap_or_default())
 }
 

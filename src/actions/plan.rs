@@ -99,9 +99,8 @@ pub fn plan(operator: &mut Operator<'_>, wanted: PlanRequest<'_>, others: &[Sigh
     let all = [wanted.grasps, wanted.all].concat();
     let mut found = best(&planner, &all, &mut samples, &mut nearest);
     if let (None, Some(thing)) = (&found, wanted.taken) {
-        let mut straight = |planner: &Planner<'_>, grasps: &[Grasp]| {
-            best(planner, grasps, &mut Samples::new(0.0, 0), &mut nearest)
-        };
+        let mut straight =
+            |planner: &Planner<'_>, grasps: &[Grasp]| best(planner, grasps, &mut Samples::new(0.0, 0), &mut nearest);
         found = straight(&planner, &rolled(&all));
         let hand = Hand::new(operator);
         planner.heading_mobility = TURNED_MOBILITY;

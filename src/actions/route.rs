@@ -44,7 +44,12 @@ impl Block {
     pub fn new(seen: &Sighting) -> Self {
         let [width, depth, height] = seen.size_m;
         let half = [width / 2.0, depth / 2.0];
-        Self { id: seen.id.clone(), from_world: seen.pose.to_isometry().inverse(), half, height: seen.pose.position[2] + height }
+        Self {
+            id: seen.id.clone(),
+            from_world: seen.pose.to_isometry().inverse(),
+            half,
+            height: seen.pose.position[2] + height,
+        }
     }
 
     /// The boxes of all perceived furniture, except of a piece around the robot: it is a room, whose box says nothing

@@ -119,7 +119,8 @@ impl Env {
              {carried_kg:.2} kg at a friction coefficient of {friction:.2}",
             model.name, robot.grip_force_n,
         );
-        let help = "every pick of it will fail: reduce the object's mass, or raise `grip_force_n` in the robot's profile";
+        let help =
+            "every pick of it will fail: reduce the object's mass, or raise `grip_force_n` in the robot's profile";
         Some(self.campaign.warning("S072", key, message).help(help))
     }
 
@@ -140,7 +141,9 @@ impl Env {
             set(ObjectAxis::X, ChoiceValue::Number(x));
             set(ObjectAxis::Y, ChoiceValue::Number(y));
             let Some(scene) = self.draw(&values, test) else { continue };
-            let (Some(target), Ok(mut world)) = (designated(&scene, "pickObject"), world::build(&scene)) else { continue };
+            let (Some(target), Ok(mut world)) = (designated(&scene, "pickObject"), world::build(&scene)) else {
+                continue;
+            };
             match actions::foresee_pick(&target, &mut world, &mut Choices::named(&values)) {
                 Ok(pick) if weakest.as_ref().is_none_or(|least| pick.payload_kg < least.payload_kg) => {
                     weakest = Some(pick);
@@ -156,7 +159,8 @@ impl Env {
                 reasons.len(),
                 PLACES_M.len(),
             );
-            let help = "picks there will fail: name a lower or smaller surface, or add `postures` to the robot's profile";
+            let help =
+                "picks there will fail: name a lower or smaller surface, or add `postures` to the robot's profile";
             return Some(self.campaign.warning("S071", key, message).help(help));
         }
         let pick = weakest?;
@@ -188,7 +192,8 @@ impl Env {
             let (Some(top_m), Ok(world)) = (top_of(&scene), world::build(&scene)) else { continue };
             let Some(why) = self.unseen(&world, top_m, is_in_front) else { continue };
             let key = format!("objectSurface.{}", keys.get(surface).copied().unwrap_or_default());
-            let message = format!("the camera of {} does not see the top of `{surface}`: {why}", self.campaign.robot.name);
+            let message =
+                format!("the camera of {} does not see the top of `{surface}`: {why}", self.campaign.robot.name);
             let help = "change `camera_link` or `home` in the robot's profile, `[camera]`, or the surface";
             found.push(self.campaign.warning("S073", &key, message).help(help));
         }
