@@ -1,4 +1,4 @@
-//! Low and flat objects: the shipped robots take them from tables of all heights, and report what is in the way if not.
+//! Low and flat objects: the shipped robots take them from tables of all heights, and report the obstacle if not.
 
 use std::path::Path;
 
@@ -67,7 +67,7 @@ fn check(folder: &Path, text: &str, arguments: &[&str]) -> String {
 }
 
 #[test]
-fn check_predicts_what_gripper_arm_and_camera_can_not_do() {
+fn check_predicts_the_limits_of_gripper_arm_and_camera() {
     let project = project();
     let robots = project.path().join("models/robots");
     let profile = std::fs::read_to_string(robots.join("fixed_arm.toml")).unwrap();

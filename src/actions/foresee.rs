@@ -1,4 +1,4 @@
-//! What the reference skills would do in a scene, planned without moving the robot: for checks before a campaign.
+//! Plans of the reference skills without moving the robot: for checks before a campaign.
 //!
 //! Never: moves the robot.
 

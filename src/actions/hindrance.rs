@@ -76,7 +76,7 @@ impl Nearest {
     }
 }
 
-/// What a planner knows about the robot and the obstacles around it.
+/// The robot and the obstacles around it, as a planner knows them.
 pub struct Surroundings<'a> {
     pub(super) kinematics: &'a Kinematics,
     /// Points on the links, with those of the hand marked in `is_hand` by the link's index.
