@@ -43,6 +43,7 @@ mod journal;
 mod kills;
 mod last_failed;
 mod launch;
+mod low_objects;
 mod margins;
 mod merge;
 mod mistakes;

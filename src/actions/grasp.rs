@@ -35,11 +35,11 @@ const TALL_M: f64 = 0.1;
 /// objects, which is seldom as wide as the foot. Unit: metres.
 const SIDE_HEIGHT_M: (f64, f64) = (0.055, 0.11);
 /// How far below the top of the object the hand goes from above. Unit: metres.
-const TOP_DEPTH_M: f64 = 0.03;
+pub(crate) const TOP_DEPTH_M: f64 = 0.03;
 /// Lowest position of the grasp link from above: the fingers reach 2.5 cm further. Unit: metres.
 const TOP_LOWEST_M: f64 = 0.0275;
 /// Total room that the widest opening must leave beside an object, both sides together. Unit: metres.
-const LEAST_ROOM_M: f64 = 0.012;
+pub(crate) const LEAST_ROOM_M: f64 = 0.012;
 /// Objects whose sides differ by less are treated as round. Unit: metres. Perceived sizes are off by some millimetres.
 const ROUND_M: f64 = 0.015;
 /// Downward pitch of a slanted hand, used where a hand that points straight down is out of reach. Unit: radians. Steep
@@ -143,7 +143,7 @@ fn downwards(thing: &Sighting, heading: f64, pitch: f64, penalty: f64) -> (f64, 
 }
 
 /// Pose of the grasp link at a height above an object's foot, with this heading and downward pitch.
-fn hand(thing: &Sighting, height: f64, heading: f64, pitch: f64) -> Isometry3<f64> {
+pub(crate) fn hand(thing: &Sighting, height: f64, heading: f64, pitch: f64) -> Isometry3<f64> {
     let [x, y, z] = thing.pose.position;
     let (sin, cos) = (libm::sin(heading), libm::cos(heading));
     let forward = Vector3::new(cos * libm::cos(pitch), sin * libm::cos(pitch), -libm::sin(pitch));
@@ -153,10 +153,16 @@ fn hand(thing: &Sighting, height: f64, heading: f64, pitch: f64) -> Isometry3<f6
     Isometry3::from_parts(Translation3::new(x, y, z + height), rotation)
 }
 
-/// Width of an object across the fingers of a hand with this heading. Unit: metres.
-fn width_across(thing: &Sighting, heading: f64) -> f64 {
+/// Whether an object is treated as round: its sides are about equally long.
+pub(crate) fn is_round(thing: &Sighting) -> bool {
     let [width, depth, _] = thing.size_m;
-    if (width - depth).abs() < ROUND_M {
+    (width - depth).abs() < ROUND_M
+}
+
+/// Width of an object across the fingers of a hand with this heading. Unit: metres.
+pub(crate) fn width_across(thing: &Sighting, heading: f64) -> f64 {
+    let [width, depth, _] = thing.size_m;
+    if is_round(thing) {
         return width.max(depth);
     }
     let turn = heading - thing.pose.yaw();

@@ -32,16 +32,9 @@ pub fn pick(call: &ActionCall, robot: &mut Operator<'_>) -> Result<ActionReport,
         Ok(found) => found,
         Err(reason) => return Ok(failed(reason)),
     };
-    let max_opening_m = robot.profile().max_opening_m;
-    let (grasps, all) = (grasp::grasps(&seen, max_opening_m), grasp::all_grasps(&seen, max_opening_m));
-    let (grasps, all) = (grasp::centred(grasps, &seen, robot), grasp::centred(all, &seen, robot));
-    if grasps.is_empty() {
-        return Ok(failed(format!("{target} is too wide for the gripper")));
-    }
-    let wanted = PlanRequest { grasps: &grasps, all: &all, taken: Some(&seen) };
-    let way = match plan::plan(robot, wanted, &others) {
+    let way = match planned(&seen, &others, robot) {
         Ok(way) => way,
-        Err(reason) => return Ok(failed(format!("{target}: {reason}"))),
+        Err(reason) => return Ok(failed(reason)),
     };
     robot.begin("drive");
     robot.follow(&way.drive, 0.0)?;
@@ -69,6 +62,21 @@ pub fn pick(call: &ActionCall, robot: &mut Operator<'_>) -> Result<ActionReport,
     let held = robot.memory().held.clone().filter(|_| report.succeeded);
     robot.hold(held.map(|held| Held { opening_m, ..held }));
     Ok(report)
+}
+
+/// Plans how to pick an object among others.
+///
+/// # Errors
+/// The reason for the action's report if it can't be picked.
+pub(super) fn planned(seen: &Sighting, others: &[Sighting], robot: &mut Operator<'_>) -> Result<Plan, String> {
+    let max_opening_m = robot.profile().max_opening_m;
+    let (grasps, all) = (grasp::grasps(seen, max_opening_m), grasp::all_grasps(seen, max_opening_m));
+    let (grasps, all) = (grasp::centred(grasps, seen, robot), grasp::centred(all, seen, robot));
+    if grasps.is_empty() {
+        return Err(format!("{} is too wide for the gripper", seen.id));
+    }
+    let wanted = PlanRequest { grasps: &grasps, all: &all, taken: Some(seen) };
+    plan::plan(robot, wanted, others).map_err(|reason| format!("{}: {reason}", seen.id))
 }
 
 /// The target and all other objects: as perceived by an earlier action of the run, otherwise from the abstract

@@ -3,10 +3,12 @@
 use nalgebra::{Isometry3, Point2, Point3, Vector3};
 
 use crate::grasp::{Approach, Grasp, rolled};
+use crate::hindrance::{Hindrance, Nearest, Surroundings};
 use crate::link_points::LinkPoints;
 use crate::motion::{Samples, moved_links};
 use crate::operator::Operator;
 use crate::route::{Block, Ground, Pillar, length, wrapped};
+use crate::slant::{self, Hand};
 use crate::standing;
 use actcheck_world::{Kinematics, Layout, SelfContact, Sighting, ik};
 
@@ -52,6 +54,8 @@ pub(super) const LEAST_CLEAR_M: f64 = -0.025;
 const CHECK_M: f64 = 0.03;
 /// The head is turned aside by at most this. Unit: radians.
 const QUARTER: f64 = std::f64::consts::FRAC_PI_2;
+/// Weight of the base's heading where the hand may turn relative to the base.
+const TURNED_MOBILITY: f64 = 0.1;
 /// Postures sampled if the arm can't unfold straight to any grasp.
 const MOST_SAMPLES: u32 = 4000;
 /// Reason reported if there is no plan.
@@ -72,28 +76,48 @@ pub struct PlanRequest<'a> {
 /// Returns the best plan among all grasps.
 ///
 /// With a mobile base, the arm unfolds straight, in front of the furniture; if no grasp is possible that way, unusual
-/// grasps and sampled paths are tried, then the hand turned over. For a fixed base, see [`standing`].
+/// grasps and sampled paths are tried, then the hand turned over, then hands at many slants, and last those turned
+/// relative to the base. For a fixed base, see [`standing`].
 ///
 /// # Errors
 /// If there is no plan, the reason as a sentence for the action's report.
 pub fn plan(operator: &mut Operator<'_>, wanted: PlanRequest<'_>, others: &[Sighting]) -> Result<Plan, String> {
     let Some(base) = operator.layout().base else { return standing::plan(operator, wanted, others) };
-    if let Some(plan) = best(&Planner::new(operator, base, others), wanted.grasps, &mut Samples::new(0.0, 0)) {
+    let mut nearest = Nearest::default();
+    let found = best(&Planner::new(operator, base, others), wanted.grasps, &mut Samples::new(0.0, 0), &mut nearest);
+    if let Some(plan) = found {
         return Ok(plan);
     }
+    let mut samples = match wanted.all.is_empty() {
+        true => Samples::new(0.0, 0),
+        false => Samples::new(operator.choose_samples(), MOST_SAMPLES),
+    };
+    let mut planner = Planner::new(operator, base, others);
     if wanted.all.is_empty() {
-        return Err(NO_WAY.to_owned());
+        return Err(nearest.reason(wanted.taken, &planner.surroundings()));
     }
-    let mut samples = Samples::new(operator.choose_samples(), MOST_SAMPLES);
     let all = [wanted.grasps, wanted.all].concat();
-    let planner = Planner::new(operator, base, others);
-    let found = best(&planner, &all, &mut samples);
-    let turned_over = || wanted.taken.and_then(|_| best(&planner, &rolled(&all), &mut Samples::new(0.0, 0)));
-    found.or_else(turned_over).ok_or_else(|| NO_WAY.to_owned())
+    let mut found = best(&planner, &all, &mut samples, &mut nearest);
+    if let (None, Some(thing)) = (&found, wanted.taken) {
+        let mut straight =
+            |planner: &Planner<'_>, grasps: &[Grasp]| best(planner, grasps, &mut Samples::new(0.0, 0), &mut nearest);
+        found = straight(&planner, &rolled(&all));
+        let hand = Hand::new(operator);
+        planner.heading_mobility = TURNED_MOBILITY;
+        let slants = if found.is_none() { slant::ahead(thing, &hand, operator) } else { Vec::new() };
+        found = found.or_else(|| straight(&planner, &slants)).or_else(|| straight(&planner, &rolled(&slants)));
+        // Where no hand ahead of the base reaches, one aside of it does not either.
+        if found.is_none() && !nearest.is_out_of_reach() {
+            let slants = slant::aside(thing, &hand, operator);
+            let mut straight = |grasps: &[Grasp]| best(&planner, grasps, &mut Samples::new(0.0, 0), &mut nearest);
+            found = straight(&slants).or_else(|| straight(&rolled(&slants)));
+        }
+    }
+    found.ok_or_else(|| nearest.reason(wanted.taken, &planner.surroundings()))
 }
 
 /// The best plan among these grasps.
-fn best(planner: &Planner<'_>, grasps: &[Grasp], samples: &mut Samples) -> Option<Plan> {
+fn best(planner: &Planner<'_>, grasps: &[Grasp], samples: &mut Samples, nearest: &mut Nearest) -> Option<Plan> {
     let mut seeds: Vec<(f64, &Grasp, Vec<f64>)> = Vec::new();
     for grasp in grasps {
         for posture in &planner.postures {
@@ -108,8 +132,9 @@ fn best(planner: &Planner<'_>, grasps: &[Grasp], samples: &mut Samples) -> Optio
     let mut best: Option<Plan> = None;
     for (_, grasp, seed) in seeds {
         let bound = best.as_ref().map_or(f64::INFINITY, |best| best.cost);
-        if let Some(plan) = planner.plan(grasp, &seed, bound, samples) {
-            best = Some(plan);
+        match planner.plan(grasp, &seed, bound, samples) {
+            Ok(plan) => best = Some(plan),
+            Err(hindrance) => nearest.note(hindrance),
         }
     }
     best
@@ -144,6 +169,8 @@ pub(super) struct Planner<'a> {
     pub(super) itself: SelfContact,
     /// Positions of the head's joints, the present ones first.
     heads: Vec<Vec<f64>>,
+    /// Weight of the base's heading in inverse kinematics, from 0 to 1: 1 if the hand points ahead of the base.
+    heading_mobility: f64,
 }
 
 impl<'a> Planner<'a> {
@@ -161,20 +188,46 @@ impl<'a> Planner<'a> {
         let is_hand = moved_links(kinematics, layout.arm.last().copied().as_slice());
         let heads = heads(kinematics, layout, &start);
         let points = LinkPoints::grouped(&points);
-        Self { kinematics, layout, base, start, postures, points, is_hand, furniture, things, ground, itself, heads }
+        let heading_mobility = 1.0;
+        Self {
+            kinematics,
+            layout,
+            base,
+            start,
+            postures,
+            points,
+            is_hand,
+            furniture,
+            things,
+            ground,
+            itself,
+            heads,
+            heading_mobility,
+        }
     }
 
-    /// A plan near the seed that costs less than `bound`, if there is one.
-    fn plan(&self, grasp: &Grasp, seed: &[f64], bound: f64, samples: &mut Samples) -> Option<Plan> {
+    fn surroundings(&self) -> Surroundings<'_> {
+        Surroundings {
+            kinematics: self.kinematics,
+            points: &self.points,
+            is_hand: &self.is_hand,
+            furniture: &self.furniture,
+            things: &self.things,
+            arm_farther: true,
+        }
+    }
+
+    /// A plan near the seed that costs less than `bound`.
+    fn plan(&self, grasp: &Grasp, seed: &[f64], bound: f64, samples: &mut Samples) -> Result<Plan, Hindrance> {
         let back = -Vector3::new(libm::cos(grasp.heading), libm::sin(grasp.heading), 0.0);
-        let way = self.way_out(&grasp.pose.translation.vector, &back)?;
+        let way = self.way_out(&grasp.pose.translation.vector, &back).ok_or(Hindrance::OutOfReach)?;
         // Cost of the drive alone, before inverse kinematics. (Inverse kinematics moves the base by centimetres.)
         if self.travel_cost(&self.moved(seed, &(back * way))) + grasp.penalty > bound + 0.05 {
-            return None;
+            return Err(Hindrance::Dearer);
         }
-        let at_thing = self.solve(seed, &grasp.pose, 1.0)?;
+        let at_thing = self.solve(seed, &grasp.pose, 1.0).ok_or(Hindrance::OutOfReach)?;
         let (at_thing, lift) = self.lifted(at_thing)?;
-        let lifted = lift.last()?.clone();
+        let lifted = lift.last().ok_or(Hindrance::NoLift)?.clone();
         let (near, approach) = match grasp.approach {
             Approach::Side => {
                 let before = self.moved(&at_thing, &(back * APPROACH_M.min(way)));
@@ -186,18 +239,22 @@ impl<'a> Planner<'a> {
             }
         };
         let reach = self.moved(
-            near.last()?,
+            &near[0],
             &(back * (way - if grasp.approach == Approach::Side { APPROACH_M.min(way) } else { 0.0 })),
         );
-        let drive = self.drive(&reach)?;
+        let drive = self.drive(&reach).ok_or(Hindrance::NoRoute)?;
         let retreat = vec![self.moved(&lifted, &(back * way))];
         let mut plan = Plan { drive, reach: vec![reach], near, approach, lift, retreat, cost: 0.0 };
         plan.cost = grasp.penalty + self.cost(&mut plan, bound - grasp.penalty, samples)?;
-        Some(plan)
+        Ok(plan)
     }
 
-    /// Whether the hand of a seed points within 45 degrees of the grasp's direction.
+    /// Whether the hand of a seed points within 45 degrees of the grasp's direction. Not required of a hand that turns
+    /// relative to the base.
     fn points_along(&self, seed: &[f64], grasp: &Grasp) -> bool {
+        if self.heading_mobility < 1.0 {
+            return true;
+        }
         let forward = |pose: &Isometry3<f64>| pose.rotation * Vector3::x();
         forward(&self.kinematics.grasp(seed)).dot(&forward(&grasp.pose)) > std::f64::consts::FRAC_1_SQRT_2
     }
@@ -232,6 +289,7 @@ impl<'a> Planner<'a> {
         for idx in self.base {
             mobility[idx] = base_mobility;
         }
+        mobility[self.base[2]] *= self.heading_mobility;
         ik::solve(self.kinematics, seed, &ik::Reach { target: *target, mobility })
     }
 
@@ -262,17 +320,22 @@ impl<'a> Planner<'a> {
         self.itself.touches(&self.kinematics.links(posture))
     }
 
-    /// A posture and the path straight up from it, with the head out of the arm's way. Returns `None` if the arm would
-    /// collide with the robot in every posture of the head.
-    fn lifted(&self, at_thing: Vec<f64>) -> Option<(Vec<f64>, Vec<Vec<f64>>)> {
-        LIFTS_M.iter().filter_map(|height| self.vertically(&at_thing, *height)).find_map(|lift| {
+    /// A posture and the path straight up from it, with the head out of the arm's way.
+    ///
+    /// # Errors
+    /// The hindrance if the arm can't follow, or would collide with the robot in every posture of the head.
+    fn lifted(&self, at_thing: Vec<f64>) -> Result<(Vec<f64>, Vec<Vec<f64>>), Hindrance> {
+        let mut hindrance = Hindrance::NoLift;
+        let found = LIFTS_M.iter().filter_map(|height| self.vertically(&at_thing, *height)).find_map(|lift| {
+            hindrance = Hindrance::Itself;
             self.heads.iter().find_map(|head| {
                 let at_thing = self.with_head(&at_thing, head);
                 let lift: Vec<Vec<f64>> = lift.iter().map(|posture| self.with_head(posture, head)).collect();
                 let is_free = std::iter::once(&at_thing).chain(&lift).all(|posture| !self.touches_itself(posture));
                 is_free.then_some((at_thing, lift))
             })
-        })
+        });
+        found.ok_or(hindrance)
     }
 
     fn with_head(&self, posture: &[f64], head: &[f64]) -> Vec<f64> {

@@ -1,5 +1,6 @@
 //! The cost of a mobile robot's plan, and arm paths around obstacles.
 
+use crate::hindrance::Hindrance;
 use crate::motion::{self, ArmSpace, Room, Samples};
 use crate::plan::{AMPLE_BODY_CLEAR_M, AMPLE_CLEAR_M, BODY_CLEAR_M, FURNITURE_CLEAR_M, LEAST_CLEAR_M, Plan, Planner};
 use crate::route::length;
@@ -14,36 +15,47 @@ const FURNITURE_COST: f64 = 30.0;
 const SAMPLES_A_GRASP: u32 = 400;
 
 impl Planner<'_> {
-    /// Cost of a plan: proximity to obstacles, then path length. Returns `None` if the path is not free or costs at
-    /// least `bound`. If the arm can't unfold in a straight line, a path around the obstacles is sampled while samples
-    /// remain.
-    pub(super) fn cost(&self, plan: &mut Plan, bound: f64, samples: &mut Samples) -> Option<f64> {
-        let travel = self.travel_cost(plan.drive.last()?) + 0.4 * self.detour(&plan.drive);
-        let course = [plan.reach.last()?, &plan.near[0], plan.approach.last()?, plan.lift.last()?];
+    /// Cost of a plan: proximity to obstacles, then path length. If the arm can't unfold in a straight line, a path
+    /// around the obstacles is sampled while samples remain.
+    ///
+    /// # Errors
+    /// The hindrance if the path is not free or costs at least `bound`.
+    pub(super) fn cost(&self, plan: &mut Plan, bound: f64, samples: &mut Samples) -> Result<f64, Hindrance> {
+        let below_bound = |cost: f64| if cost < bound { Ok(cost) } else { Err(Hindrance::Dearer) };
+        let [Some(stand), Some(unfolded), Some(at_thing), Some(lifted)] =
+            [plan.drive.last(), plan.reach.last(), plan.approach.last(), plan.lift.last()]
+        else {
+            return Err(Hindrance::NoRoute);
+        };
+        let travel = self.travel_cost(stand) + 0.4 * self.detour(&plan.drive);
+        let course = [unfolded, &plan.near[0], at_thing, lifted];
         let mut cost = travel;
         // Check the last leg first: most plans fail there.
         for pair in course.windows(2).rev() {
-            cost = cost.max(self.leg_cost(pair[0], pair[1], travel).filter(|cost| *cost < bound)?);
+            cost = cost.max(below_bound(self.leg_cost(pair[0], pair[1], travel)?)?);
         }
-        let stand = plan.drive.last()?;
-        let unfolded = plan.reach.last()?;
-        let straight = self.leg_cost(stand, unfolded, travel);
-        if let Some(leg) = straight.filter(|_| self.keeps_off_itself(stand, unfolded)) {
-            return Some(cost.max(leg)).filter(|cost| *cost < bound);
-        }
+        let hindrance = match self.leg_cost(stand, unfolded, travel) {
+            Ok(leg) if self.keeps_off_itself(stand, unfolded) => return below_bound(cost.max(leg)),
+            Ok(_) => Hindrance::Itself,
+            Err(hindrance) => hindrance,
+        };
         let mut samples = samples.share(SAMPLES_A_GRASP);
-        plan.reach = self.around(stand, plan.reach.last()?, &mut samples)?;
-        for (from, to) in std::iter::once(stand).chain(&plan.reach).zip(&plan.reach) {
+        let around = self.around(stand, unfolded, &mut samples).ok_or(hindrance)?;
+        for (from, to) in std::iter::once(stand).chain(&around).zip(&around) {
             cost = cost.max(self.leg_cost(from, to, travel)?);
         }
-        Some(cost).filter(|cost| *cost < bound)
+        plan.reach = around;
+        below_bound(cost)
     }
 
-    /// Cost of one leg. Returns `None` if something is in the way.
-    fn leg_cost(&self, from: &[f64], to: &[f64], travel: f64) -> Option<f64> {
+    /// Cost of one leg.
+    ///
+    /// # Errors
+    /// [`Hindrance::Blocked`] if something is in the way.
+    fn leg_cost(&self, from: &[f64], to: &[f64], travel: f64) -> Result<f64, Hindrance> {
         let nearest = self.clearance(from, to)?;
         let lack_of_room = AMPLE_BODY_CLEAR_M - nearest.body_m;
-        Some(travel + (AMPLE_CLEAR_M - nearest.things_m) * THING_COST + lack_of_room * FURNITURE_COST)
+        Ok(travel + (AMPLE_CLEAR_M - nearest.things_m) * THING_COST + lack_of_room * FURNITURE_COST)
     }
 
     /// Whether the path is free of self-collisions.
@@ -81,8 +93,11 @@ impl Planner<'_> {
     }
 
     /// Smallest distances to furniture and to objects along the path between two postures, up to the distance beyond
-    /// which more brings no benefit. Returns `None` if the path is not free.
-    fn clearance(&self, from: &[f64], to: &[f64]) -> Option<Nearest> {
+    /// which more brings no benefit.
+    ///
+    /// # Errors
+    /// [`Hindrance::Blocked`] with the first posture that is not free.
+    fn clearance(&self, from: &[f64], to: &[f64]) -> Result<Nearest, Hindrance> {
         let mut nearest = Nearest::AMPLE;
         for step in 0..=N_CHECKS {
             let share = step as f64 / N_CHECKS as f64;
@@ -98,11 +113,11 @@ impl Planner<'_> {
                     nearest.things_m = points.nearest(pose, nearest.things_m, |point| pillar.distance(point));
                 }
                 if !nearest.is_free() {
-                    return None;
+                    return Err(Hindrance::Blocked { posture: positions, lack_m: nearest.lack_m() });
                 }
             }
         }
-        Some(nearest)
+        Ok(nearest)
     }
 }
 
@@ -119,6 +134,11 @@ struct Nearest {
 impl Nearest {
     /// Distances beyond which more brings no benefit.
     const AMPLE: Self = Self { hand_m: FURNITURE_CLEAR_M, body_m: AMPLE_BODY_CLEAR_M, things_m: AMPLE_CLEAR_M };
+
+    /// Largest lack of clearance. Unit: metres.
+    fn lack_m(&self) -> f64 {
+        (FURNITURE_CLEAR_M - self.hand_m).max(BODY_CLEAR_M - self.body_m).max(LEAST_CLEAR_M - self.things_m)
+    }
 
     /// Whether nothing is in the way.
     fn is_free(&self) -> bool {

@@ -18,6 +18,8 @@ const ON_FLOOR_M: f64 = 0.2;
 /// Furniture: a box on the floor. The space below a table counts as occupied.
 #[derive(Debug, Clone)]
 pub struct Block {
+    /// Id of the furniture.
+    pub id: String,
     from_world: Isometry3<f64>,
     half: [f64; 2],
     height: f64,
@@ -29,6 +31,8 @@ const ON_TOP_M: f64 = 0.05;
 /// The vertical cylinder around an object.
 #[derive(Debug, Clone)]
 pub struct Pillar {
+    /// Id of the object.
+    pub id: String,
     centre: Point2<f64>,
     radius: f64,
     foot: f64,
@@ -40,7 +44,12 @@ impl Block {
     pub fn new(seen: &Sighting) -> Self {
         let [width, depth, height] = seen.size_m;
         let half = [width / 2.0, depth / 2.0];
-        Self { from_world: seen.pose.to_isometry().inverse(), half, height: seen.pose.position[2] + height }
+        Self {
+            id: seen.id.clone(),
+            from_world: seen.pose.to_isometry().inverse(),
+            half,
+            height: seen.pose.position[2] + height,
+        }
     }
 
     /// The boxes of all perceived furniture, except of a piece around the robot: it is a room, whose box says nothing
@@ -76,7 +85,7 @@ impl Pillar {
         let [width, depth, height] = seen.size_m;
         // Between the inscribed and the circumscribed circle: corners seldom point at the hand.
         let radius = (width.max(depth) + length(width, depth)) / 4.0;
-        Self { centre: Point2::new(x, y), radius, foot, top: foot + height }
+        Self { id: seen.id.clone(), centre: Point2::new(x, y), radius, foot, top: foot + height }
     }
 
     /// Distance to the cylinder (a lower bound near its edges), negative inside. Unit: metres.

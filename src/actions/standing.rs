@@ -3,10 +3,12 @@
 use nalgebra::{Isometry3, Vector3};
 
 use crate::grasp::{Approach, Grasp, rolled};
+use crate::hindrance::{Hindrance, Nearest};
 use crate::motion::{self, ArmSpace, Room, Samples};
 use crate::operator::Operator;
-use crate::plan::{AMPLE_CLEAR_M, APPROACH_M, FURNITURE_CLEAR_M, LEAST_CLEAR_M, LIFTS_M, NO_WAY, Plan, PlanRequest};
+use crate::plan::{AMPLE_CLEAR_M, APPROACH_M, FURNITURE_CLEAR_M, LEAST_CLEAR_M, LIFTS_M, Plan, PlanRequest};
 use crate::route::{Block, Pillar, wrapped};
+use crate::slant::{self, Hand};
 use actcheck_world::{JointKind, Kinematics, Layout, Sighting, ik};
 
 /// Samples allowed for one plan over all grasps: half a second's work together with the limit per grasp.
@@ -29,7 +31,8 @@ const STEP_M: f64 = 0.03;
 /// Distances to retreat with the object, in order of preference. Unit: metres.
 const RETREATS_M: [f64; 2] = [0.1, 0.05];
 
-/// Returns the best plan among all grasps; if there is none, among those with the hand turned over.
+/// Returns the best plan among all grasps; if there is none, among those with the hand turned over, then among hands at
+/// many slants.
 ///
 /// # Errors
 /// If there is no plan, the reason as a sentence for the action's report.
@@ -44,13 +47,18 @@ pub fn plan(operator: &mut Operator<'_>, wanted: PlanRequest<'_>, others: &[Sigh
     things.extend(others.iter().filter(|seen| !seen.furniture).map(Pillar::new));
     let arm = Arm::new(operator, &furniture, (&things, &things[n_taken..]));
     let all = if wanted.all.is_empty() { wanted.grasps } else { wanted.all };
-    let found = best(&arm, all, &mut samples);
-    let turned_over = || wanted.taken.and_then(|_| best(&arm, &rolled(all), &mut samples));
-    found.or_else(turned_over).ok_or_else(|| NO_WAY.to_owned())
+    let mut nearest = Nearest::default();
+    let mut found = best(&arm, all, &mut samples, &mut nearest);
+    if let (None, Some(thing)) = (&found, wanted.taken) {
+        let mut next = |grasps: &[Grasp]| best(&arm, grasps, &mut samples, &mut nearest);
+        let slants = slant::ahead(thing, &Hand::new(operator), operator);
+        found = next(&rolled(all)).or_else(|| next(&slants)).or_else(|| next(&rolled(&slants)));
+    }
+    found.ok_or_else(|| nearest.reason(wanted.taken, &arm.meanwhile.surroundings()))
 }
 
 /// The best plan among these grasps.
-fn best(arm: &Arm<'_>, all: &[Grasp], samples: &mut Samples) -> Option<Plan> {
+fn best(arm: &Arm<'_>, all: &[Grasp], samples: &mut Samples, nearest: &mut Nearest) -> Option<Plan> {
     let mut grasps: Vec<(f64, &Grasp)> = all.iter().map(|grasp| (arm.least_cost(grasp), grasp)).collect();
     grasps.sort_by(|a, b| a.0.total_cmp(&b.0));
     let mut best: Option<Plan> = None;
@@ -60,8 +68,9 @@ fn best(arm: &Arm<'_>, all: &[Grasp], samples: &mut Samples) -> Option<Plan> {
             if cost >= bound {
                 return best;
             }
-            if let Some(plan) = arm.plan(grasp, &seed, (cost, bound), samples) {
-                best = Some(plan);
+            match arm.plan(grasp, &seed, (cost, bound), samples) {
+                Ok(plan) => best = Some(plan),
+                Err(hindrance) => nearest.note(hindrance),
             }
         }
     }
@@ -134,36 +143,52 @@ impl<'a> Arm<'a> {
         joint.kind == JointKind::Revolute && axis.z > 0.99
     }
 
-    /// A plan near a seed. `least` is the lower bound of its cost; returns `None` if the cost reaches `bound`.
-    fn plan(&self, grasp: &Grasp, seed: &[f64], (least, bound): (f64, f64), samples: &mut Samples) -> Option<Plan> {
-        let at_thing = self.solve(seed, &grasp.pose)?;
-        let lift = LIFTS_M.iter().find_map(|height| self.straight(&at_thing, &(Vector3::z() * *height)))?;
+    /// A plan near a seed that costs less than `bound`. `least` is the lower bound of its cost.
+    fn plan(
+        &self,
+        grasp: &Grasp,
+        seed: &[f64],
+        (least, bound): (f64, f64),
+        samples: &mut Samples,
+    ) -> Result<Plan, Hindrance> {
+        let at_thing = self.solve(seed, &grasp.pose).ok_or(Hindrance::OutOfReach)?;
+        let lift = LIFTS_M.iter().find_map(|height| self.straight(&at_thing, &(Vector3::z() * *height)));
+        let lift = lift.ok_or(Hindrance::NoLift)?;
         let back = -Vector3::new(libm::cos(grasp.heading), libm::sin(grasp.heading), 0.0);
         let mut approach = match grasp.approach {
-            Approach::Side => self.straight(&at_thing, &(back * APPROACH_M))?,
+            Approach::Side => self.straight(&at_thing, &(back * APPROACH_M)).ok_or(Hindrance::NoLift)?,
             Approach::Top => lift.clone(),
         };
         approach.reverse();
         let near = approach.remove(0);
         approach.push(at_thing);
         let legs = [approach.as_slice(), lift.as_slice()].concat();
-        let nearest =
-            legs.iter().map(|posture| self.meanwhile.room(posture)).try_fold(f64::INFINITY, |least, (room, own)| {
-                let is_free = own && room.furniture_m >= FURNITURE_CLEAR_M && room.things_m >= LEAST_CLEAR_M;
-                is_free.then(|| least.min(room.things_m))
-            })?;
+        let mut nearest = f64::INFINITY;
+        for posture in legs {
+            let (room, clear_of_itself) = self.meanwhile.room(&posture);
+            if !clear_of_itself {
+                return Err(Hindrance::Itself);
+            }
+            let lack_m = (FURNITURE_CLEAR_M - room.furniture_m).max(LEAST_CLEAR_M - room.things_m);
+            let is_free = room.furniture_m >= FURNITURE_CLEAR_M && room.things_m >= LEAST_CLEAR_M;
+            if !is_free {
+                return Err(Hindrance::Blocked { posture, lack_m });
+            }
+            nearest = nearest.min(room.things_m);
+        }
         let cost = least + (AMPLE_CLEAR_M - nearest).max(0.0) * 50.0;
         if cost >= bound {
-            return None;
+            return Err(Hindrance::Dearer);
         }
-        let way = self.way(&near, samples)?;
+        let way = self.way(&near, samples).ok_or(Hindrance::NoPath)?;
         let length: f64 =
             std::iter::once(&self.start).chain(&way).zip(&way).map(|(from, to)| self.before.span(from, to)).sum();
         let cost = cost + length * WAY_COST;
-        let lifted = lift.last()?;
+        let lifted = lift.last().ok_or(Hindrance::NoLift)?;
         let retreat = RETREATS_M.iter().find_map(|way| self.straight(lifted, &(back * *way))).unwrap_or_default();
         let (drive, reach) = (Vec::new(), Vec::new());
-        (cost < bound).then_some(Plan { drive, reach, near: way, approach, lift, retreat, cost })
+        let plan = Plan { drive, reach, near: way, approach, lift, retreat, cost };
+        if cost < bound { Ok(plan) } else { Err(Hindrance::Dearer) }
     }
 
     /// A path from the current posture to another.

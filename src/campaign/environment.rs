@@ -11,7 +11,7 @@ use actcheck_actions as actions;
 use actcheck_base::{Diagnostic, Diagnostics, Source, program_digest};
 use actcheck_config as config;
 use actcheck_config::{Campaign, Launcher, Overrides};
-use actcheck_data::{Choice, ChoiceName};
+use actcheck_data::{Choice, ChoiceName, RobotView};
 use actcheck_history::{CampaignRecord, History, SkillRecord};
 use actcheck_ontology as ontology;
 use actcheck_ontology::Ontology;
@@ -166,6 +166,11 @@ impl Env {
         warnings.extend(self.rules.warnings().iter().cloned().collect());
         warnings.extend(self.rules.beyond(self.campaign.budget.action_secs));
         warnings
+    }
+
+    /// The robot in its postures, for a picture. Empty if its model can't be read.
+    pub fn robot_views(&self) -> Vec<RobotView> {
+        world::robot_views(&self.campaign.robot).unwrap_or_default()
     }
 
     /// The campaign's record for the history.

@@ -12,6 +12,7 @@ mod environment;
 mod export;
 mod failure;
 mod finished_run;
+mod forecast;
 mod judging;
 mod last_failed;
 mod line;

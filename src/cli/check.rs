@@ -7,11 +7,13 @@ use std::sync::atomic::AtomicBool;
 use clap::Args;
 
 use crate::new_files::NewFiles;
+use crate::picture::Picture;
 use crate::{configurations, output, regressions};
 use actcheck_base::Diagnostics;
 use actcheck_campaign::Env;
 use actcheck_config::robot::MendedUrdf;
 use actcheck_config::{Overrides, mended_robot};
+use actcheck_report::robot_picture;
 use actcheck_rules::Budget;
 
 /// `actcheck check`
@@ -24,6 +26,11 @@ pub struct CheckArgs {
     /// around the link
     #[arg(long)]
     pub mend: bool,
+
+    /// Draw the robot in its postures into this file, with the frames of base, grasp and camera, as a raster (.png) or
+    /// vector image (.svg)
+    #[arg(long, value_name = "FILE.png")]
+    pub picture: Option<PathBuf>,
 }
 
 /// Prints the parts that a campaign would use, or returns all its faults. `stop` interrupts it.
@@ -34,6 +41,7 @@ pub fn check(args: &CheckArgs, stop: &Arc<AtomicBool>) -> Result<(), Diagnostics
         None if usual.exists() => usual,
         None => return Err(configurations::none_given("check").into()),
     };
+    let picture = args.picture.as_deref().map(Picture::new).transpose()?;
     let mended = if args.mend { mended_robot(config) } else { None };
     if let Some(mended) = mended {
         return write_mended(mended);
@@ -42,6 +50,7 @@ pub fn check(args: &CheckArgs, stop: &Arc<AtomicBool>) -> Result<(), Diagnostics
     let env = Env::prepare_within(config, &Overrides::default(), budget.clone())?;
     let cases = if env.campaign.case.is_some() { Vec::new() } else { regressions::prepare(&env, &budget)? };
     output::print_diagnostics(&env.warnings());
+    output::print_diagnostics(&env.forecast());
     output::print_prose(&format!(
         "{}: {}, {}, {}; {} and {} in {}; {}; robot {}\n",
         config.display(),
@@ -59,6 +68,9 @@ pub fn check(args: &CheckArgs, stop: &Arc<AtomicBool>) -> Result<(), Diagnostics
     ));
     if args.mend {
         output::print_prose("nothing to mend: all moments of inertia of the robot's moving links are possible\n");
+    }
+    if let (Some(picture), Some(drawing)) = (picture, robot_picture(&env.campaign.robot.name, &env.robot_views())) {
+        picture.write(&drawing)?;
     }
     Ok(())
 }

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use crate::Shape;
+use crate::{Part, Pose, Shape};
 use actcheck_base::Source;
 
 /// Mass of links without a mass in the URDF, such as the stages of a base, and of lighter ones. Unit: kilograms. Small
@@ -54,4 +54,15 @@ pub struct RobotProfile {
     pub meshes: BTreeMap<String, Vec<Shape>>,
     /// Digest of profile, URDF and meshes.
     pub digest: String,
+}
+
+/// A robot in one posture, for a picture.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RobotView {
+    /// Name of the posture.
+    pub title: String,
+    /// The robot's collision shapes. Frame: world, with the robot's base at the origin.
+    pub solids: Vec<Part>,
+    /// Named frames of the profile. Frame: as the shapes.
+    pub frames: Vec<(String, Pose)>,
 }

@@ -27,7 +27,7 @@ pub use json::{
     campaign_json, case_json, compare_json, findings_json, health_json, oracles_json, recheck_json, run_json,
     shrunk_json,
 };
-pub use picture::{Caption, Chart, Drawing, collisions_picture, patterns_picture, run_picture};
+pub use picture::{Caption, Chart, Drawing, collisions_picture, patterns_picture, robot_picture, run_picture};
 #[cfg(feature = "rerun")]
 pub use recording::{RecordingFault, Recordings};
 pub use summary::{

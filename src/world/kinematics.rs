@@ -37,6 +37,11 @@ impl Kinematics {
         &self.model.joints
     }
 
+    /// Returns the URDF name of a link, by its index in [`Kinematics::links`].
+    pub fn link_name(&self, link: usize) -> &str {
+        self.model.links.get(link).map_or("", |link| link.name.as_str())
+    }
+
     /// Samples points on the robot's collision shapes, at most about `spacing` apart. Returns each with the index of
     /// its link, in the link's frame. Unit: metres.
     pub fn surface_points(&self, spacing: f64) -> Vec<(usize, Point3<f64>)> {

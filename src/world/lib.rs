@@ -42,6 +42,7 @@ mod sense;
 mod settle;
 mod silhouette;
 mod simulation;
+mod views;
 
 pub use body::RobotBody;
 pub use camera::DepthImage;
@@ -58,6 +59,7 @@ pub use self_contact::SelfContact;
 pub use sense::Sighting;
 pub use settle::Settling;
 pub use simulation::{Command, Observation, World, build};
+pub use views::robot_views;
 
 /// Version of the physics: the same scene and commands give the same bits only with the same version. It rises with each
 /// change of these bits.

@@ -2,6 +2,7 @@
 
 use nalgebra::{Isometry3, Point3};
 
+use crate::hindrance::Surroundings;
 use crate::link_points::LinkPoints;
 use crate::route::{Block, Pillar};
 use actcheck_world::{JointKind, Kinematics, Layout, SelfContact};
@@ -81,6 +82,18 @@ impl<'a> ArmSpace<'a> {
     /// The same space with other objects.
     pub fn among(&self, things: &'a [Pillar]) -> Self {
         Self { things, ..self.clone() }
+    }
+
+    /// The robot and the obstacles, for messages.
+    pub fn surroundings(&self) -> Surroundings<'_> {
+        Surroundings {
+            kinematics: self.kinematics,
+            points: &self.points,
+            is_hand: &self.is_hand,
+            furniture: self.furniture,
+            things: self.things,
+            arm_farther: false,
+        }
     }
 
     /// The posture at a point of the unit cube: arm joints within their limits, all others as in `like`.

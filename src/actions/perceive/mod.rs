@@ -18,6 +18,6 @@ mod sight;
 mod skill;
 mod survey;
 
-pub use gaze::safely_towards;
+pub use gaze::{safely_towards, towards};
 pub use skill::perceive_plane;
 pub use survey::{Survey, look_again, survey};

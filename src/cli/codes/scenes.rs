@@ -164,4 +164,28 @@ const CODES_S: &[Code] = &[
         "an old version of the program exported the case, and the choice has several candidates",
         "write the name of the candidate instead, as the help suggests",
     ),
+    code(
+        "S070",
+        "an object is too wide for the gripper",
+        "its narrower side and a room of 1.2 cm are wider than `max_opening_m`",
+        "name a narrower object, or a robot whose gripper opens wider",
+    ),
+    code(
+        "S071",
+        "the arm can't pick an object from a surface",
+        "no grasp is reachable and free in the middle or at two corners of the surface, even without sensor noise",
+        "name a lower or smaller surface, or add `postures` to the robot's profile",
+    ),
+    code(
+        "S072",
+        "an object is too heavy for the gripper or the arm",
+        "friction between the fingers, or the effort of a joint, can't carry it",
+        "reduce the object's mass, or raise `grip_force_n` or the joint's `effort`",
+    ),
+    code(
+        "S073",
+        "the camera does not see a surface",
+        "the camera is too low, or the surface is out of its range or of the head's",
+        "change `camera_link` or `home` in the robot's profile, `[camera]`, or the surface",
+    ),
 ];

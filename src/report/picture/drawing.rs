@@ -31,6 +31,12 @@ impl Rect {
         Self { left: self.left - by, top: self.top - by, width: self.width + 2.0 * by, height: self.height + 2.0 * by }
     }
 
+    /// The smallest rectangle around this one and a point.
+    pub(super) fn with(&self, [x, y]: [f64; 2]) -> Self {
+        let (left, top) = (self.left.min(x), self.top.min(y));
+        Self { left, top, width: self.right().max(x) - left, height: self.bottom().max(y) - top }
+    }
+
     /// Area of the intersection of two rectangles.
     pub(super) fn shared(&self, other: &Self) -> f64 {
         let across = self.right().min(other.right()) - self.left.max(other.left);

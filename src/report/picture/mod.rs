@@ -4,7 +4,7 @@
 //! [`paths`] compute the outlines of bodies and the paths of motions, and [`labels`] places names. The result is a
 //! [`drawing`] of plain shapes, which [`svg`] writes and [`png`] rasterises, with glyphs from [`font`]. [`patterns`]
 //! draws the runs of patterns in the same way, [`collisions`] the things that were hit, and [`charts`] the signals that
-//! decided properties about time.
+//! decided properties about time. [`robot`] draws a robot in its postures.
 //!
 //! Never: reads or writes a file, or uses a shape that is not in the trace.
 
@@ -21,6 +21,7 @@ mod panel;
 mod paths;
 mod patterns;
 mod png;
+mod robot;
 mod run;
 mod svg;
 mod window;
@@ -30,4 +31,5 @@ pub use collisions::collisions_picture;
 pub use drawing::Drawing;
 pub use header::Caption;
 pub use patterns::patterns_picture;
+pub use robot::robot_picture;
 pub use run::run_picture;

@@ -20,7 +20,7 @@ pub(super) fn silhouette(parts: &[Part], pose: &Isometry3<f64>, window: &Window)
 }
 
 /// Points whose convex hull is the shape, within a few percent. Frame: shape.
-fn corners(shape: &Shape) -> Vec<Point3<f64>> {
+pub(super) fn corners(shape: &Shape) -> Vec<Point3<f64>> {
     match shape {
         Shape::Box { size } => {
             let [x, y, z] = size.map(|extent| extent / 2.0);

@@ -225,7 +225,7 @@ fn things(shown: &[&BodyState], window: &Window) -> Vec<Rect> {
 }
 
 /// Draws a scale bar of a round length in the lower left corner.
-fn ruler(drawing: &mut Drawing, window: &Window, labels: &mut Labels) {
+pub(super) fn ruler(drawing: &mut Drawing, window: &Window, labels: &mut Labels) {
     let lengths = [0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0];
     let length = lengths.into_iter().find(|metres| metres * window.scale >= 45.0).unwrap_or(5.0);
     let (left, bottom) = (window.panel.left + 10.0, window.panel.bottom() - 9.0);

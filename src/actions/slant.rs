@@ -1,0 +1,126 @@
+//! Grasps of objects that the usual grasps don't reach: the hand slants at many angles and comes as close to the surface
+//! as its own shape allows.
+
+use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, TAU};
+
+use nalgebra::{Isometry3, Point3, Translation3};
+
+use crate::grasp::{Approach, Grasp, LEAST_ROOM_M, TOP_DEPTH_M, centred, hand, is_round, width_across};
+use crate::motion::moved_links;
+use crate::operator::Operator;
+use crate::plan::FURNITURE_CLEAR_M;
+use actcheck_world::Sighting;
+
+/// Downward pitches of the hand, from straight down to nearly level. Unit: radians.
+const PITCHES_RAD: [f64; 7] = [FRAC_PI_2, 1.3, 1.1, 0.95, 0.75, 0.55, 0.4];
+/// Pitches tried where the hand's heading differs from that of the base.
+const TURNED_PITCHES_RAD: [f64; 4] = [FRAC_PI_2, 1.2, 0.9, 0.6];
+/// Distance of the hand from the surface: the planner's least, and the error of inverse kinematics. Unit: metres.
+const CLEAR_M: f64 = FURNITURE_CLEAR_M + 0.0015;
+/// Distance of the hand from the object before the fingers close. Unit: metres.
+const BESIDE_M: f64 = 0.003;
+/// Number of hand headings, the first along the object.
+const N_HEADINGS: u32 = 24;
+/// Penalty per radian between the hand and the vertical.
+const SLANT_COST: f64 = 0.2;
+/// The same for flat objects, which a slanted hand holds with less of its fingers.
+const FLAT_SLANT_COST: f64 = 1.5;
+/// How far from the middle of an object, towards the hand, it is grasped if the palm does not fit over it. Unit: metres.
+const SHIFTS_M: [f64; 3] = [0.0, 0.02, 0.04];
+/// Least length of the object beyond the grasp frame. Unit: metres. Half the width of a finger.
+const HELD_M: f64 = 0.012;
+/// Penalty per metre of that shift.
+const SHIFT_COST: f64 = 2.0;
+/// Penalty of fingers at 45 degrees to the sides of an object that is not round: it turns between them.
+const CORNER_COST: f64 = 0.4;
+/// Penalty per radian between the headings of hand and base.
+const TURNED_COST: f64 = 0.1;
+/// Spacing of the points on the hand. Unit: metres.
+const SPACING_M: f64 = 0.02;
+
+/// Points on the open hand, in the frame of the grasp.
+pub(crate) struct Hand(Vec<Point3<f64>>);
+
+impl Hand {
+    /// The hand of a robot, opened as far as possible.
+    pub(crate) fn new(robot: &Operator<'_>) -> Self {
+        let (kinematics, layout) = (robot.kinematics(), robot.layout());
+        let mut posture = robot.commanded().to_vec();
+        layout.gripper.set(&mut posture, robot.profile().max_opening_m);
+        let links = kinematics.links(&posture);
+        let from_world = kinematics.grasp(&posture).inverse();
+        let is_hand = moved_links(kinematics, layout.arm.last().copied().as_slice());
+        let points = kinematics.surface_points(SPACING_M).into_iter().filter(|(link, _)| is_hand[*link]);
+        Self(points.map(|(link, point)| from_world * links[link] * point).collect())
+    }
+
+    /// Height of the grasp frame above the lowest point of a hand, and how far ahead of it that point is. Unit: metres.
+    fn lowest(&self, turned: &Isometry3<f64>, ahead: &nalgebra::Vector3<f64>) -> (f64, f64) {
+        let points = self.0.iter().map(|point| turned.rotation * point.coords);
+        let lowest = points.min_by(|a, b| a.z.total_cmp(&b.z)).unwrap_or_default();
+        (-lowest.z, lowest.dot(ahead))
+    }
+
+    /// Whether the hand at a pose is clear of the object, also on the way straight down to it.
+    fn is_beside(&self, pose: &Isometry3<f64>, thing: &Sighting) -> bool {
+        let from_world = thing.pose.to_isometry().inverse() * pose;
+        let [width, depth, height] = thing.size_m;
+        let is_over = |point: &Point3<f64>| match is_round(thing) {
+            true => point.x * point.x + point.y * point.y < (width.max(depth) / 2.0 + BESIDE_M).powi(2),
+            false => point.x.abs() < width / 2.0 + BESIDE_M && point.y.abs() < depth / 2.0 + BESIDE_M,
+        };
+        self.0.iter().map(|point| from_world * point).all(|point| point.z > height + BESIDE_M || !is_over(&point))
+    }
+}
+
+/// Grasps with the hand ahead of the base, at many slants.
+pub(crate) fn ahead(thing: &Sighting, hand: &Hand, robot: &Operator<'_>) -> Vec<Grasp> {
+    all(thing, hand, robot, (&PITCHES_RAD, &[0.0]))
+}
+
+/// Grasps with the hand turned relative to the base.
+pub(crate) fn aside(thing: &Sighting, hand: &Hand, robot: &Operator<'_>) -> Vec<Grasp> {
+    all(thing, hand, robot, (&TURNED_PITCHES_RAD, &[FRAC_PI_4, -FRAC_PI_4, FRAC_PI_2, -FRAC_PI_2]))
+}
+
+fn all(thing: &Sighting, hand: &Hand, robot: &Operator<'_>, (pitches, turns): (&[f64], &[f64])) -> Vec<Grasp> {
+    let along = thing.pose.yaw();
+    let mut found = Vec::new();
+    for idx in 0..N_HEADINGS {
+        let heading = along + TAU * f64::from(idx) / f64::from(N_HEADINGS);
+        if width_across(thing, heading) + LEAST_ROOM_M > robot.profile().max_opening_m {
+            continue;
+        }
+        for pitch in pitches {
+            let Some(grasp) = at(thing, hand, robot, (heading, *pitch)) else { continue };
+            found.extend(turns.iter().map(|turn| Grasp {
+                heading: heading + turn,
+                penalty: grasp.penalty + TURNED_COST * turn.abs(),
+                ..grasp.clone()
+            }));
+        }
+    }
+    centred(found, thing, robot)
+}
+
+/// The grasp with this heading and downward pitch of the hand; `None` if the hand would touch the object.
+fn at(thing: &Sighting, shape: &Hand, robot: &Operator<'_>, (heading, pitch): (f64, f64)) -> Option<Grasp> {
+    let level = hand(thing, 0.0, heading, pitch);
+    let forward = nalgebra::Vector3::new(libm::cos(heading), libm::sin(heading), 0.0);
+    let (lowest_m, ahead_m) = shape.lowest(&level, &forward);
+    let top = thing.size_m[2];
+    let height = (top - TOP_DEPTH_M).max(lowest_m + CLEAR_M);
+    // Only the fingertips reach an object below the grasp frame: its middle belongs between them.
+    let is_flat = top < height;
+    let tips = if is_flat { ahead_m } else { 0.0 };
+    let pose = |back_m: f64| Translation3::from(forward * -(tips + back_m)) * hand(thing, height, heading, pitch);
+    let half = width_across(thing, heading + FRAC_PI_2) / 2.0;
+    let mut shifts = SHIFTS_M.into_iter().filter(|back_m| *back_m == 0.0 || *back_m + HELD_M <= half);
+    let back_m = shifts.find(|back_m| shape.is_beside(&pose(*back_m), thing))?;
+    let askew = if is_round(thing) { 0.0 } else { libm::sin(2.0 * (heading - thing.pose.yaw())).abs() };
+    let slant_cost = if is_flat { FLAT_SLANT_COST } else { SLANT_COST };
+    let penalty = slant_cost * (FRAC_PI_2 - pitch) + CORNER_COST * askew + SHIFT_COST * back_m;
+    let pose = pose(back_m);
+    let opening_m = robot.profile().max_opening_m;
+    Some(Grasp { approach: Approach::Top, pose, heading, opening_m, penalty })
+}
