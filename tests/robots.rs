@@ -25,12 +25,15 @@ fn said_of(folder: &Path, profile: &str) -> String {
 
 #[test]
 fn every_wrong_robot_is_reported_with_its_place() {
-    assert_eq!(said_of(Path::new("tests/models"), "crane/robot.toml"), "");
+    // The same robot in each format.
+    for crane in ["crane", "crane_mjcf", "crane_sdf"] {
+        assert_eq!(said_of(Path::new("tests/models"), &format!("{crane}/robot.toml")), "");
+    }
     let report = |case: PathBuf| {
         let profile = format!("{}/robot.toml", case.file_name().unwrap().display());
         (case.join("expected"), said_of(Path::new(WRONG), &profile))
     };
-    assert_diagnostics(30, Files::Disk.folders(Path::new(WRONG)).into_iter().map(report));
+    assert_diagnostics(45, Files::Disk.folders(Path::new(WRONG)).into_iter().map(report));
     let said = said_of(Path::new(WRONG), "fixed_amr");
     assert!(said.contains("there is no robot `fixed_amr`") && said.contains("did you mean `fixed_arm`?"), "{said}");
 }

@@ -49,6 +49,36 @@ pub fn decompose(mesh: &Mesh) -> Result<Vec<Shape>, String> {
     Ok(if hulls.is_empty() { vec![whole] } else { hulls })
 }
 
+/// Directions in which the corners of a simplified hull are the outermost ones.
+const DIRECTIONS: u32 = 96;
+
+/// Returns a hull with fewer corners: the outermost ones in evenly spread directions. Links of robots are often scanned or
+/// rounded surfaces with thousands of corners, and each costs time in every distance query. Returns other shapes
+/// unchanged.
+#[must_use]
+pub fn simplified(shape: &Shape) -> Shape {
+    let Shape::Hull { points, .. } = shape else { return shape.clone() };
+    if points.len() <= DIRECTIONS as usize {
+        return shape.clone();
+    }
+    let turn = std::f64::consts::PI * (3.0 - 5.0_f64.sqrt());
+    let mut kept: Vec<usize> = Vec::new();
+    for number in 0..DIRECTIONS {
+        let z = 1.0 - (2.0 * f64::from(number) + 1.0) / f64::from(DIRECTIONS);
+        let (across, angle) = ((1.0 - z * z).sqrt(), turn * f64::from(number));
+        let direction = [across * libm::cos(angle), across * libm::sin(angle), z];
+        let along = |idx: usize| (0..3).map(|axis| direction[axis] * points[idx][axis]).sum::<f64>();
+        kept.extend((0..points.len()).max_by(|a, b| along(*a).total_cmp(&along(*b))));
+    }
+    kept.sort_unstable();
+    kept.dedup();
+    let points: Vec<[f64; 3]> = kept.into_iter().map(|idx| points[idx]).collect();
+    let reduced = Mesh { triangles: Vec::new(), vertices: points };
+    let frame = Frame::around(&reduced);
+    let inside: Vec<Vector> = reduced.vertices.iter().map(|point| frame.inside(point)).collect();
+    frame.hull(&inside).unwrap_or_else(|| shape.clone())
+}
+
 /// Returns the points of the surface within each piece.
 fn pieces(points: &[Vector], triangles: &[[u32; 3]]) -> Vec<Vec<Vector>> {
     let parameters = VHACDParameters {
