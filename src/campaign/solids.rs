@@ -58,7 +58,7 @@ pub fn proposed_robot(
 
 fn decompose_with(cache: &mut HullCache, robot: &mut RobotProfile, faults: &mut Diagnostics) {
     for (file, shapes) in &mut robot.meshes {
-        let apart: Result<Vec<Vec<Shape>>, String> = shapes.iter().map(|shape| cache.solids(shape)).collect();
+        let apart: Result<Vec<Vec<Shape>>, String> = shapes.iter().map(|shape| cache.solids_of_link(shape)).collect();
         match apart {
             Ok(apart) => *shapes = apart.concat().iter().map(world::simplified).collect(),
             Err(reason) => faults.push(unusable(&format!("the robot's mesh {file}"), &reason)),
@@ -90,6 +90,14 @@ impl HullCache {
         let solids = self.cached_or_new(&key, mesh);
         self.known.insert(key, solids.clone());
         solids
+    }
+
+    /// As [`HullCache::solids`]; a flat mesh of a robot becomes a thin solid.
+    fn solids_of_link(&mut self, shape: &Shape) -> Result<Vec<Shape>, String> {
+        self.solids(shape).or_else(|reason| match shape {
+            Shape::Mesh { mesh } => world::sheet(mesh).map(|sheet| vec![sheet]).ok_or(reason),
+            _ => Err(reason),
+        })
     }
 
     fn cached_or_new(&self, key: &str, mesh: &Mesh) -> Result<Vec<Shape>, String> {

@@ -161,6 +161,7 @@ mod tests {
     use parry3d::shape::{Ball, Cuboid};
 
     use super::*;
+    use crate::robot::tests::{alone, lonely};
 
     const SMALL: Camera = Camera { width: 64, height: 48, ..Camera::IDEAL };
 
@@ -171,6 +172,21 @@ mod tests {
 
     fn middle(image: &DepthImage) -> f64 {
         f64::from(image.depths[image.height / 2 * image.width + image.width / 2])
+    }
+
+    /// A lens inside of its housing sees what it sees without one: nothing of its own head.
+    #[test]
+    fn a_camera_does_not_see_its_housing() {
+        let open = lonely();
+        let mut profile = open.robot.profile.as_ref().clone();
+        let housing = "<link name=\"head_camera_link\"><collision><geometry><box size=\"0.1 0.1 0.1\"/></geometry></collision></link>";
+        let text = profile.urdf.text.replace("<link name=\"head_camera_link\"/>", housing);
+        assert_ne!(text, *profile.urdf.text);
+        profile.urdf.text = text.into();
+        let housed = alone(profile);
+        let image = open.look(&mut Choices::random(1, 0));
+        assert!(image.depths.iter().any(|depth| *depth > 0.0), "it sees the floor");
+        assert_eq!(housed.look(&mut Choices::random(1, 0)), image);
     }
 
     #[test]

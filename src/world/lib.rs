@@ -46,7 +46,7 @@ mod simulation;
 
 pub use body::RobotBody;
 pub use camera::DepthImage;
-pub use decompose::{decompose, decomposition_key, simplified};
+pub use decompose::{decompose, decomposition_key, sheet, simplified};
 pub use description::{Joint, JointKind};
 pub use error::WorldError;
 pub use fault::{Fault, Perturbation, Poison};

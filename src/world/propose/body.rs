@@ -36,12 +36,13 @@ pub(super) fn find(model: &RobotModel, palm: usize, notes: &mut BTreeMap<&'stati
         path.drain(..3);
         notes.insert("base_joints", "the first joints of the arm's chain slide in x and y and turn".to_owned());
     }
-    let wheel = model.joints.iter().enumerate().find(|(idx, joint)| {
-        let name = joint.name.to_lowercase();
-        !path.contains(idx) && (name.contains("wheel") || name.contains("caster"))
-    });
-    if let (Some((_, wheel)), None) = (wheel, own_base) {
-        notes.insert("base", format!("it has wheels, such as that of `{}`", wheel.name));
+    let is_wheel = |name: &&str| {
+        let name = name.to_lowercase();
+        name.contains("wheel") || name.contains("caster")
+    };
+    let wheel = model.frames().map(|(name, _)| name).find(is_wheel);
+    if let (Some(wheel), None) = (wheel, own_base) {
+        notes.insert("base", format!("it has wheels, such as `{wheel}`"));
     }
     let drives = own_base.is_some() || wheel.is_some();
     let arm: Vec<usize> = path.into_iter().filter(|idx| model.joints[*idx].mimic.is_none()).collect();

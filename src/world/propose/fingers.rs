@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use nalgebra::{Isometry3, Point3, Translation3};
+use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion};
 
 use super::body::chain;
 use super::frames::{Pair, likely};
@@ -16,9 +16,11 @@ use actcheck_data::RobotProfile;
 const WORDS: [&str; 11] =
     ["finger", "grip", "jaw", "knuckle", "hand", "thumb", "claw", "driver", "distal", "proximal", "pad"];
 /// Most pairs of fingers that are measured.
-const MOST_PAIRS: usize = 60;
+const MOST_PAIRS: usize = 40;
 /// Opening at which a single moving finger is centred. Unit: metres. The width of a can.
 const CENTRED_AT_M: f64 = 0.06;
+/// Least change of the gap between two fingers. Unit: metres.
+const LEAST_CHANGE_M: f64 = 0.008;
 /// Openings wider than this are worth no more. Unit: metres.
 const WIDE_M: f64 = 0.12;
 
@@ -53,10 +55,13 @@ pub(super) fn find(bare: &RobotProfile, model: &RobotModel) -> Result<Hand, Stri
 
 /// Joints with a gripper's name, by the link that carries them.
 fn groups(model: &RobotModel) -> BTreeMap<usize, BTreeSet<usize>> {
-    let named = |idx: usize| {
-        let names = [&model.joints[idx].name, &model.links[idx + 1].name].map(|name| name.to_lowercase());
-        names.iter().any(|name| WORDS.iter().any(|word| name.contains(word)))
+    let has_word = |name: &str| WORDS.iter().any(|word| name.to_lowercase().contains(word));
+    let has_either = |idx: usize| has_word(&model.joints[idx].name) || has_word(&model.links[idx + 1].name);
+    // A link with such a name that carries others is a palm, unless its joint has such a name too.
+    let carries = |idx: usize| {
+        (0..model.joints.len()).any(|other| other != idx && has_either(other) && chain(model, other + 1).contains(&idx))
     };
+    let named = |idx: usize| has_word(&model.joints[idx].name) || has_either(idx) && !carries(idx);
     let mut groups: BTreeMap<usize, BTreeSet<usize>> = BTreeMap::new();
     for idx in (0..model.joints.len()).filter(|idx| named(*idx)) {
         let path = chain(model, idx + 1);
@@ -97,6 +102,10 @@ fn measure(bare: &RobotProfile, model: &RobotModel, palm: usize, joints: &BTreeS
     }
     let mut found = best?;
     centre(bare, model, palm, &mut found);
+    found.frame = as_written(&found.frame);
+    if let Some(gripper) = gripper(bare, model, palm, (found.links, &found.named, found.frame)) {
+        found.widest_m = gripper.widest_m();
+    }
     let mut profile = bare.clone();
     profile.finger_joints = found.named.iter().map(|idx| model.joints[*idx].name.clone()).collect();
     profile.finger_links = found.links.map(|link| model.links[link].name.clone());
@@ -104,8 +113,8 @@ fn measure(bare: &RobotProfile, model: &RobotModel, palm: usize, joints: &BTreeS
     profile.grasp_offset_m = rounded(found.frame.translation.vector.into());
     let (roll, pitch, yaw) = found.frame.rotation.euler_angles();
     profile.grasp_turned_rad = rounded([roll, pitch, yaw]);
-    // Never wider than measured.
-    profile.max_opening_m = (found.widest_m.min(1.0) * 1000.0).floor() / 1000.0;
+    // Not wider than measured, up to the rounding of limits.
+    profile.max_opening_m = (found.widest_m.min(1.0) * 1000.0 + 0.1).floor() / 1000.0;
     let mut notes = BTreeMap::new();
     notes.insert("finger_joints", "their names, and the links that they move".to_owned());
     notes.insert("finger_links", "these two face each other and open widest".to_owned());
@@ -113,6 +122,14 @@ fn measure(bare: &RobotProfile, model: &RobotModel, palm: usize, joints: &BTreeS
     notes.insert("grasp_turned_rad", "x along the fingers, y from the right to the left one".to_owned());
     notes.insert("max_opening_m", "measured at that place".to_owned());
     Some(Hand { profile, palm, notes })
+}
+
+/// The frame with the numbers that a profile has.
+fn as_written(frame: &Isometry3<f64>) -> Isometry3<f64> {
+    let [x, y, z] = rounded(frame.translation.vector.into());
+    let (roll, pitch, yaw) = frame.rotation.euler_angles();
+    let [roll, pitch, yaw] = rounded([roll, pitch, yaw]);
+    Isometry3::from_parts(Translation3::new(x, y, z), UnitQuaternion::from_euler_angles(roll, pitch, yaw))
 }
 
 /// Rounds to the tenth of a millimetre or milliradian.
@@ -138,12 +155,15 @@ fn pairs(model: &RobotModel, palm: usize, joints: &BTreeSet<usize>) -> Vec<([usi
         for right in moved[place + 1..].iter().copied().chain(is_solid(palm).then_some(palm)) {
             let mut ways: Vec<Vec<usize>> = Vec::new();
             let of_right = if right == palm { Vec::new() } else { drivers(right) };
+            let of_both: Vec<usize> = drivers(*left).into_iter().filter(|joint| of_right.contains(joint)).collect();
+            if let Some(common) = of_both.first() {
+                found.push(([*left, right], vec![vec![*common]]));
+                continue;
+            }
             for first in drivers(*left) {
                 match of_right.as_slice() {
                     [] => ways.push(vec![first]),
-                    several => ways.extend(several.iter().map(|second| {
-                        if first == *second { vec![first] } else { vec![first, *second] }
-                    })),
+                    several => ways.extend(several.iter().map(|second| vec![first, *second])),
                 }
             }
             ways.dedup();
@@ -159,7 +179,7 @@ fn leader(model: &RobotModel, joint: usize) -> usize {
     std::iter::successors(Some(joint), next).take(model.joints.len()).last().unwrap_or(joint)
 }
 
-/// Likely grasp frames of a pair, in the palm's frame.
+/// Likely grasp frames of a pair, in the palm's frame: those at which both fingers have surfaces at several openings.
 fn frames(
     model: &RobotModel,
     palm: usize,
@@ -167,24 +187,59 @@ fn frames(
     named: &[usize],
     from: &Point3<f64>,
 ) -> Vec<Isometry3<f64>> {
-    let ways: &[[bool; 2]] =
-        if named.len() == 1 { &[[true, true]] } else { &[[true, true], [true, false]] };
-    let posture = |at_upper: [bool; 2]| {
-        let mut positions: Vec<f64> =
-            model.joints.iter().map(|joint| 0.0_f64.clamp(joint.lower, joint.upper)).collect();
-        for (joint, upper) in named.iter().zip(at_upper) {
-            let joint_limits = (model.joints[*joint].lower.max(-2.0), model.joints[*joint].upper.min(2.0));
-            positions[*joint] = if upper { joint_limits.1 } else { joint_limits.0 };
+    let ways: &[[bool; 2]] = if named.len() == 1 { &[[true, true]] } else { &[[true, true], [true, false]] };
+    let mut found: Vec<Isometry3<f64>> = Vec::new();
+    for way in ways {
+        let ends = [posture(model, named, *way, 1.0), posture(model, named, *way, 0.0)];
+        let ends = ends.map(|positions| Pair::new(model, links, &poses(model, &positions), palm));
+        for frame in likely(&ends, from) {
+            let is_known = found.iter().any(|known| {
+                let off = (known.translation.vector - frame.translation.vector).norm();
+                off < 1e-3 && known.rotation.angle_to(&frame.rotation) < 1e-2
+            });
+            if !is_known && closes(model, palm, links, &frame, |share| posture(model, named, *way, share)) {
+                found.push(frame);
+            }
         }
+    }
+    found
+}
+
+/// Positions at a share of the way between the ends of the named joints; of the second one, in the opposite direction if
+/// the ends differ.
+fn posture(model: &RobotModel, named: &[usize], at_upper: [bool; 2], share: f64) -> Vec<f64> {
+    let mut positions: Vec<f64> = model.joints.iter().map(|joint| 0.0_f64.clamp(joint.lower, joint.upper)).collect();
+    for (joint, rises) in named.iter().zip(at_upper) {
+        let (lower, upper) = (model.joints[*joint].lower.max(-2.0), model.joints[*joint].upper.min(2.0));
+        positions[*joint] = lower + (upper - lower) * if rises { share } else { 1.0 - share };
+    }
+    // Leaders come before their followers, or the chain is longer than one.
+    for _ in 0..2 {
         for idx in 0..positions.len() {
             if let Some((leader, factor, offset)) = model.joints[idx].mimic {
                 positions[idx] = factor * positions[leader] + offset;
             }
         }
-        Pair::new(model, links, &poses(model, &positions), palm)
-    };
-    let ends = ways.iter().map(|way| [posture(*way), posture(way.map(|upper| !upper))]);
-    ends.flat_map(|ends| likely(&ends, from)).collect()
+    }
+    positions
+}
+
+/// Whether the gap between two fingers is measurable at two openings at least, and changes.
+fn closes(
+    model: &RobotModel,
+    palm: usize,
+    links: [usize; 2],
+    frame: &Isometry3<f64>,
+    posture: impl Fn(f64) -> Vec<f64>,
+) -> bool {
+    let [left, right] = links;
+    [[left, right], [right, left]].into_iter().any(|links| {
+        let probe = Probe::new(model, links, (palm, *frame));
+        let gaps = (0..=8).filter_map(|eighth| probe.gap(&posture(f64::from(eighth) / 8.0)));
+        let widths: Vec<f64> = gaps.map(|gap| gap.width_m()).collect();
+        let (least, most) = widths.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), w| (a.min(*w), b.max(*w)));
+        widths.len() >= 2 && most - least > LEAST_CHANGE_M
+    })
 }
 
 fn poses(model: &RobotModel, positions: &[f64]) -> Vec<Isometry3<f64>> {
@@ -219,13 +274,17 @@ fn rate(
     // Surfaces at the grasp frame must have been found for both fingers.
     let mut positions = vec![0.0; model.joints.len()];
     gripper.set(&mut positions, gripper.widest_m());
-    let gap = Probe::new(model, links, (palm, frame)).gap(&positions)?;
+    let probe = Probe::new(model, links, (palm, frame));
+    let gap = probe.gap(&positions)?;
+    // At the width of a can, where the fingers hold most objects.
+    gripper.set(&mut positions, CENTRED_AT_M.min(gripper.widest_m()));
+    let flat = probe.flat_share(&positions);
     let widest_m = gripper.widest_m();
     let closes_m = gripper.travel_m();
     let off_m = gap.middle_m().abs();
     let both = if links.contains(&palm) { 0.6 } else { 1.0 };
     let reach_m = frame.translation.vector.norm().min(0.3);
-    let score = both * closes_m.min(WIDE_M) * (0.05 + reach_m) / (1.0 + 10.0 * off_m);
+    let score = (0.3 + flat) * both * closes_m.min(WIDE_M) * (0.05 + reach_m) / (1.0 + 10.0 * off_m);
     Some(Found { score, named: named.to_vec(), links, frame, widest_m })
 }
 

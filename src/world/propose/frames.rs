@@ -5,9 +5,11 @@ use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaterni
 use crate::description::RobotModel;
 use actcheck_data::{Part, Shape};
 
-/// Distance of the grasp frame from the tips of the fingers. Unit: metres. Skills assume that fingers reach this much
-/// further.
-const TIP_M: f64 = 0.025;
+/// Distances of the grasp frame from the tips of the fingers. Unit: metres. Skills assume that fingers reach as much
+/// further as the first of them; the others are for short pads, and for fingers that turn, which open wider there.
+const DEPTHS_M: [f64; 4] = [0.025, 0.018, 0.012, 0.045];
+/// Length of the fingertips, which decide about the other directions. Unit: metres.
+const TIP_M: f64 = 0.05;
 /// Axes closer than this to an axis of the palm are taken to be that axis. Unit: cosine (about 10 degrees).
 const ALIGNED_COSINE: f64 = 0.985;
 
@@ -60,16 +62,14 @@ pub(super) fn likely(ends: &[Pair; 2], from: &Point3<f64>) -> Vec<Isometry3<f64>
     let moved = ends[0].apart() - ends[1].apart();
     for across in [moved, ends[0].apart(), ends[1].apart()] {
         for open in ends {
-            if let Some(frame) = at(open, &across, from) {
-                found.push(frame);
-            }
+            found.extend(DEPTHS_M.into_iter().filter_map(|depth_m| at(open, &across, from, depth_m)));
         }
     }
     found
 }
 
 /// The frame with its y axis along `across`, and its x axis from a point towards the fingers.
-fn at(pair: &Pair, across: &Vector3<f64>, from: &Point3<f64>) -> Option<Isometry3<f64>> {
+fn at(pair: &Pair, across: &Vector3<f64>, from: &Point3<f64>, depth_m: f64) -> Option<Isometry3<f64>> {
     let y = aligned(across.try_normalize(1e-4)?);
     // The axis points from the right finger to the left one.
     let y = if y.dot(&pair.apart()) < 0.0 { -y } else { y };
@@ -83,10 +83,10 @@ fn at(pair: &Pair, across: &Vector3<f64>, from: &Point3<f64>) -> Option<Isometry
     };
     let (left, right) = (along(&x, &pair.left), along(&x, &pair.right));
     let (tip, root) = (left.1.min(right.1), left.0.max(right.0));
-    let depth = TIP_M.min((tip - root) / 2.0);
+    let depth = depth_m.min((tip - root) / 2.0);
     // Only the parts near the tips decide about the other axes.
     let near = |points: &[Point3<f64>]| -> Vec<Point3<f64>> {
-        points.iter().copied().filter(|point| point.coords.dot(&x) > tip - 2.0 * TIP_M).collect()
+        points.iter().copied().filter(|point| point.coords.dot(&x) > tip - TIP_M).collect()
     };
     let (left, right) = (near(&pair.left), near(&pair.right));
     let (left_z, right_z) = (along(&z, &left), along(&z, &right));

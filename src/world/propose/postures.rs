@@ -45,14 +45,16 @@ pub(super) fn find(
     let base: Vec<usize> = named.layout.base.iter().flatten().copied().collect();
     let mut start: Vec<f64> = model.joints.iter().map(|joint| 0.0_f64.clamp(joint.lower, joint.upper)).collect();
     named.layout.gripper.set(&mut start, profile.max_opening_m / 2.0);
-    let mut search = Search { kinematics: &kinematics, start, arm, base, contact: None, n_drawn: 0 };
+    let mut search = Search { kinematics: &kinematics, start, arm, base, contact: None, near: None, n_drawn: 0 };
     let samples: Vec<Vec<f64>> = (0..N_SAMPLES).map(|_| search.random()).collect();
     search.contact = Some(contact(&kinematics, &samples));
+    let aside = if profile.base_joints.is_none() { search.aside() } else { None };
+    search.near.clone_from(&aside);
     let targets = search.targets();
     let postures: Vec<Vec<f64>> = targets.iter().filter_map(|target| search.reach(target)).collect();
     let home = match profile.base_joints {
         Some(_) => search.compact(samples, &postures),
-        None => search.aside().or_else(|| postures.first().cloned()),
+        None => aside.or_else(|| postures.first().cloned()),
     };
     let home = home.unwrap_or_else(|| search.start.clone());
     notes.insert("home", match profile.base_joints {
@@ -95,6 +97,8 @@ struct Search<'a> {
     arm: Vec<usize>,
     base: Vec<usize>,
     contact: Option<SelfContact>,
+    /// A posture that others should be close to.
+    near: Option<Vec<f64>>,
     n_drawn: u64,
 }
 
@@ -143,15 +147,27 @@ impl Search<'_> {
         targets
     }
 
-    /// A free posture that reaches a target.
+    /// A free posture that reaches a target; with a base, one that does not turn it if there is any.
     fn reach(&mut self, target: &Isometry3<f64>) -> Option<Vec<f64>> {
-        let mut mobility = vec![0.0; self.start.len()];
-        self.arm.iter().chain(&self.base).for_each(|idx| mobility[*idx] = 1.0);
-        let reach = Reach { target: *target, mobility };
+        let n_slides = self.base.len().min(2);
+        let with = |search: &mut Self, n_base: usize| {
+            let mut mobility = vec![0.0; search.start.len()];
+            search.arm.iter().chain(&search.base[..n_base]).for_each(|idx| mobility[*idx] = 1.0);
+            search.reach_with(target, &mobility)
+        };
+        with(self, n_slides).or_else(|| if self.base.is_empty() { None } else { with(self, self.base.len()) })
+    }
+
+    /// As [`Search::reach`], with these joints free.
+    fn reach_with(&mut self, target: &Isometry3<f64>, mobility: &[f64]) -> Option<Vec<f64>> {
+        // The fingers are alike, so the hand may be turned over.
+        let over = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI);
+        let reaches = [*target, target * over].map(|target| Reach { target, mobility: mobility.to_vec() });
         let mut best: Option<(f64, Vec<f64>)> = None;
-        for number in 0..N_SEEDS {
-            let seed = if number == 0 { self.start.clone() } else { self.random() };
-            let Some(found) = ik::solve(self.kinematics, &seed, &reach) else { continue };
+        for number in 0..2 * N_SEEDS {
+            let seed = if number < 2 { self.near.clone().unwrap_or(self.start.clone()) } else { self.random() };
+            let reach = &reaches[usize::from(number % 2 == 1)];
+            let Some(found) = ik::solve(self.kinematics, &seed, reach) else { continue };
             if !self.is_free(&found) {
                 continue;
             }
@@ -169,9 +185,15 @@ impl Search<'_> {
             let joint = &self.kinematics.joints()[*idx];
             let (lower, upper) = (joint.lower.max(-3.2), joint.upper.min(3.2));
             let middle = f64::midpoint(lower, upper);
-            ((posture[*idx] - middle) / (upper - middle).max(1e-6)).powi(2) + 0.2 * posture[*idx].powi(2)
+            let off = ((posture[*idx] - middle) / (upper - middle).max(1e-6)).powi(2);
+            match &self.near {
+                // The first joint turns the arm towards objects anyway.
+                Some(near) if self.arm.first() == Some(idx) => 0.1 * (posture[*idx] - near[*idx]).powi(2),
+                Some(near) => (posture[*idx] - near[*idx]).powi(2) + 0.2 * off,
+                None => 0.2 * off + posture[*idx].powi(2),
+            }
         };
-        self.arm.iter().map(of_joint).sum::<f64>() + self.base.iter().map(|idx| posture[*idx].powi(2)).sum::<f64>()
+        self.arm.iter().map(of_joint).sum()
     }
 
     /// The free posture with the arm nearest to the body, not in front of it.
