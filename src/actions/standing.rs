@@ -28,7 +28,7 @@ const LARGEST_STEP: f64 = 0.6;
 const STEP_M: f64 = 0.03;
 /// An arm with fewer joints reaches only some orientations at each place.
 const FULL_ARM: usize = 6;
-/// Times that a grasp is turned towards what such an arm reaches.
+/// Times that a grasp is turned towards an orientation that such an arm reaches.
 const MOST_TURNS: usize = 8;
 /// A turn that ends this. Unit: radians.
 const SMALL_TURN_RAD: f64 = 1e-3;
@@ -76,6 +76,21 @@ fn best(arm: &Arm<'_>, all: &[Grasp], samples: &mut Samples) -> Option<Plan> {
     best
 }
 
+/// Postures in which links may be as close to each other as they are: the present one, and those of the profile, with the
+/// gripper as wide open as it is for a grasp. Links of a gripper touch each other in some openings.
+pub(crate) fn right_postures(operator: &Operator<'_>, start: &[f64]) -> Vec<Vec<f64>> {
+    let (layout, profile) = (operator.layout(), operator.profile());
+    let arms = profile.postures.iter().chain([&profile.home]).map(|posture| {
+        let mut positions = start.to_vec();
+        layout.arm.iter().zip(posture).for_each(|(idx, value)| positions[*idx] = *value);
+        positions
+    });
+    let mut right: Vec<Vec<f64>> = [start.to_vec()].into_iter().chain(arms).collect();
+    right.iter_mut().for_each(|positions| layout.gripper.set(positions, profile.max_opening_m));
+    right.push(start.to_vec());
+    right
+}
+
 /// The arm, its initial posture, and the obstacles around it.
 struct Arm<'a> {
     kinematics: &'a Kinematics,
@@ -95,8 +110,7 @@ impl<'a> Arm<'a> {
         let start = operator.commanded().to_vec();
         let mut postures = operator.profile().postures.clone();
         postures.push(operator.profile().home.clone());
-        let right = std::slice::from_ref(&start);
-        let before = ArmSpace::new(kinematics, layout, furniture, things, right);
+        let before = ArmSpace::new(kinematics, layout, furniture, things, &right_postures(operator, &start));
         let meanwhile = before.among(others);
         Self { kinematics, layout, start, postures, before, meanwhile }
     }

@@ -35,10 +35,8 @@ pub enum NewKind {
     /// A robot's profile, proposed from its model
     ///
     /// Finds base, arm, gripper, grasp frame, opening, camera, head and postures by the kinematics and the names in a URDF
-    /// or xacro file, and writes them with comments on what was guessed. Existing files are never overwritten.
-    #[command(
-        after_help = "Example:\n  actcheck new robot models/robots/fixed_arm.urdf --out /tmp/my_arm.toml"
-    )]
+    /// or xacro file, and writes them with a comment for each guess. Existing files are never overwritten.
+    #[command(after_help = "Example:\n  actcheck new robot models/robots/fixed_arm.urdf --out /tmp/my_arm.toml")]
     Robot(NewRobotArgs),
 }
 

@@ -56,17 +56,10 @@ pub fn robot(args: &NewRobotArgs) -> Result<(), Diagnostics> {
     Ok(())
 }
 
-/// The profile as TOML, with comments on what was guessed.
-fn text(
-    profile: &RobotProfile,
-    notes: &BTreeMap<&'static str, String>,
-    args: &NewRobotArgs,
-    folder: &Path,
-) -> String {
-    let mut lines = vec![
-        format!("# Proposed by `actcheck new robot {}`: check what was guessed.", args.model.display()),
-        String::new(),
-    ];
+/// The profile as TOML, with a comment for each guess.
+fn text(profile: &RobotProfile, notes: &BTreeMap<&'static str, String>, args: &NewRobotArgs, folder: &Path) -> String {
+    let mut lines =
+        vec![format!("# Proposed by `actcheck new robot {}`: check each guess.", args.model.display()), String::new()];
     let mut add = |key: &str, value: String| {
         if let Some(note) = notes.get(key) {
             lines.push(format!("# Guessed: {note}."));

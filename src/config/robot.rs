@@ -149,8 +149,7 @@ pub fn bare(
     arguments: &[String],
 ) -> Result<RobotProfile, Diagnostics> {
     let folders = around(path, packages);
-    let urdf = text_of(files, path, Inputs { arguments, folders: &folders })
-        .map_err(Unread::faults)?;
+    let urdf = text_of(files, path, Inputs { arguments, folders: &folders }).map_err(Unread::faults)?;
     let mut found = Diagnostics::new();
     let read = foreign::robot::read(&urdf, path, &Lookup { files, folders }, &mut found);
     found.or(())?;

@@ -73,12 +73,7 @@ pub(super) fn expand(path: &Path, inputs: Inputs<'_>) -> Result<Source, Unexpand
     expand_with(&program, path, inputs, LIMIT)
 }
 
-fn expand_with(
-    program: &PathBuf,
-    path: &Path,
-    inputs: Inputs<'_>,
-    limit: Duration,
-) -> Result<Source, Unexpanded> {
+fn expand_with(program: &PathBuf, path: &Path, inputs: Inputs<'_>, limit: Duration) -> Result<Source, Unexpanded> {
     let shown = path.display();
     let output = run(program, path, inputs, limit).map_err(|error| not_started(path, &error.to_string()))?;
     let refused = |message: String| Unexpanded {
@@ -166,7 +161,7 @@ impl Finder {
         let name = format!("actcheck-xacro-{}-{}", std::process::id(), NUMBER.fetch_add(1, Ordering::Relaxed));
         let finder = Self(std::env::temp_dir().join(name));
         let module = finder.0.join("ament_index_python");
-        // Fails if the folder exists, so that nobody else's module is run.
+        // Fails if the folder exists, so that no other user's module is run.
         std::fs::create_dir(&finder.0)?;
         std::fs::create_dir(&module)?;
         std::fs::write(module.join("__init__.py"), "")?;

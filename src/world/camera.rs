@@ -174,7 +174,7 @@ mod tests {
         f64::from(image.depths[image.height / 2 * image.width + image.width / 2])
     }
 
-    /// A lens inside of its housing sees what it sees without one: nothing of its own head.
+    /// A lens inside of its housing takes the same image as one without: its own head is not in it.
     #[test]
     fn a_camera_does_not_see_its_housing() {
         let open = lonely();

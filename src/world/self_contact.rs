@@ -141,10 +141,6 @@ impl Form {
             let form = collider(solid, Owner::Floor, 0.0, 0.0)?;
             Some(Solid { pose: form.position, shape: form.shape, ball: Ball::around(std::slice::from_ref(solid))? })
         });
-        Self {
-            solids: forms.collect(),
-            middle: around.middle,
-            radius: around.radius,
-        }
+        Self { solids: forms.collect(), middle: around.middle, radius: around.radius }
     }
 }

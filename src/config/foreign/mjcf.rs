@@ -64,7 +64,8 @@ fn mimics(root: Node, reader: &mut Reader) -> BTreeMap<String, (String, f64, f64
         let numbers: Vec<f64> = written.split_whitespace().filter_map(|word| word.parse().ok()).collect();
         let (offset, factor) = (numbers.first().copied().unwrap_or(0.0), numbers.get(1).copied().unwrap_or(1.0));
         if numbers.iter().skip(2).any(|number| *number != 0.0) {
-            let message = format!("the coupling of `{follower}` to `{leader}` is not linear: only its linear part is used");
+            let message =
+                format!("the coupling of `{follower}` to `{leader}` is not linear: only its linear part is used");
             reader.warning("W036", joint, message, "the joint then deviates from its mechanism");
         }
         found.insert(follower.to_owned(), (leader.to_owned(), factor, offset));
@@ -80,7 +81,9 @@ fn efforts(root: Node, compiler: &Compiler, reader: &mut Reader) -> BTreeMap<Str
         let Some(joint) = actuator.attribute("joint") else { continue };
         let is_motor = actuator.tag_name().name() == "motor";
         let limits = attributes.get("forcerange").or(if is_motor { attributes.get("ctrlrange") } else { None });
-        let Some([lower, upper]) = limits.and_then(|text| reader.numbers(actuator, text, Bound::Finite)) else { continue };
+        let Some([lower, upper]) = limits.and_then(|text| reader.numbers(actuator, text, Bound::Finite)) else {
+            continue;
+        };
         found.insert(joint.to_owned(), f64::max(-lower, upper));
     }
     found
@@ -178,7 +181,8 @@ impl Robot {
             }
         };
         let name = joint.attribute("name").map_or_else(|| format!("{child}_joint"), str::to_owned);
-        let axis = attributes.get("axis").map_or(Some([0.0, 0.0, 1.0]), |text| reader.numbers(joint, text, Bound::Finite))?;
+        let axis =
+            attributes.get("axis").map_or(Some([0.0, 0.0, 1.0]), |text| reader.numbers(joint, text, Bound::Finite))?;
         let range = match attributes.get("range") {
             Some(text) => Some(reader.numbers::<2>(joint, text, Bound::Finite)?),
             None => None,
@@ -195,8 +199,10 @@ impl Robot {
             (None, false) => ("continuous", [0.0; 2]),
         };
         let damping = attributes.get("damping").and_then(|text| text.split_whitespace().next()?.parse().ok());
-        let own_effort = attributes.get("actuatorfrcrange").and_then(|text| reader.numbers::<2>(joint, text, Bound::Finite));
-        let effort = own_effort.map(|[lower, upper]| f64::max(-lower, upper)).or_else(|| self.efforts.get(&name).copied());
+        let own_effort =
+            attributes.get("actuatorfrcrange").and_then(|text| reader.numbers::<2>(joint, text, Bound::Finite));
+        let effort =
+            own_effort.map(|[lower, upper]| f64::max(-lower, upper)).or_else(|| self.efforts.get(&name).copied());
         let unique = self.unique(&name);
         self.out.joint(&UrdfJoint {
             name: &unique,
@@ -260,11 +266,15 @@ impl Robot {
             return Some((None, format!("<mesh filename=\"{file}\" scale=\"{scale}\"/>"), None));
         }
         if !["sphere", "box", "cylinder", "capsule", "ellipsoid"].contains(&kind) {
-            // A plane or a height field is no part of a robot.
+            // A plane or a height field does not belong to a robot.
             return None;
         }
-        let size: Vec<f64> =
-            attributes.get("size").unwrap_or_default().split_whitespace().filter_map(|word| word.parse().ok()).collect();
+        let size: Vec<f64> = attributes
+            .get("size")
+            .unwrap_or_default()
+            .split_whitespace()
+            .filter_map(|word| word.parse().ok())
+            .collect();
         let ends = match attributes.get("fromto") {
             Some(text) => Some(reader.numbers::<6>(geom, text, Bound::Finite)?),
             None => None,
@@ -272,9 +282,8 @@ impl Robot {
         let (moved, half_length) = match ends {
             Some([ax, ay, az, bx, by, bz]) => {
                 let (a, b) = (Point3::new(ax, ay, az), Point3::new(bx, by, bz));
-                let turned = UnitQuaternion::rotation_between(&Vector3::z(), &(b - a)).unwrap_or_else(|| {
-                    UnitQuaternion::from_axis_angle(&Vector3::x_axis(), PI)
-                });
+                let turned = UnitQuaternion::rotation_between(&Vector3::z(), &(b - a))
+                    .unwrap_or_else(|| UnitQuaternion::from_axis_angle(&Vector3::x_axis(), PI));
                 let middle = nalgebra::center(&a, &b);
                 (Some(Isometry3::from_parts(Translation3::from(middle.coords), turned)), Some((b - a).norm() / 2.0))
             }

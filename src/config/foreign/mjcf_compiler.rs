@@ -1,4 +1,4 @@
-//! What applies to a whole MJCF file: included files, default classes, units, and meshes.
+//! Settings of a whole MJCF file: included files, default classes, units, and meshes.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -169,7 +169,8 @@ pub(super) fn with_includes(source: &Source, path: &Path, files: &Files, depth: 
             return Err(fault(format!("`{file}` is included {DEEPEST} files deep: it may include itself")));
         }
         let other = path.parent().unwrap_or(Path::new("")).join(file);
-        let included = files.read(&other).map_err(|reason| fault(format!("cannot read {}: {reason}", other.display())))?;
+        let included =
+            files.read(&other).map_err(|reason| fault(format!("cannot read {}: {reason}", other.display())))?;
         let whole = with_includes(&included, &other, files, depth + 1)?;
         let whole = Source::new(included.name.to_string(), whole);
         let elements = xml::parse_model(&whole, &whole.text)?;

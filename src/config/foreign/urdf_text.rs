@@ -56,8 +56,7 @@ impl UrdfText {
             );
         }
         for (pose, shape) in solids {
-            let _ =
-                writeln!(self.text, "    <collision>{}<geometry>{shape}</geometry></collision>", origin(pose));
+            let _ = writeln!(self.text, "    <collision>{}<geometry>{shape}</geometry></collision>", origin(pose));
         }
         self.text.push_str("  </link>\n");
     }

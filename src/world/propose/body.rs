@@ -8,8 +8,7 @@ use crate::description::{JointKind, RobotModel};
 use crate::kinematics::motion;
 
 /// Words in the names of cameras, the best first.
-const CAMERA_WORDS: [&str; 9] =
-    ["rgbd", "depth", "xtion", "astra", "kinect", "realsense", "d435", "camera", "stereo"];
+const CAMERA_WORDS: [&str; 9] = ["rgbd", "depth", "xtion", "astra", "kinect", "realsense", "d435", "camera", "stereo"];
 /// Height of a table-top arm's root. Unit: metres. That of a low table.
 const TABLE_M: f64 = 0.4;
 /// A root with shapes further below it than this is on its own pedestal. Unit: metres.
@@ -108,11 +107,7 @@ fn lowest(model: &RobotModel) -> f64 {
 
 /// Chooses a camera by its name and place: on a head rather than on a base or hand. Returns the link, the merged link and
 /// the rotation of the lens.
-fn camera(
-    model: &RobotModel,
-    palm: usize,
-    notes: &mut BTreeMap<&'static str, String>,
-) -> (String, usize, [f64; 3]) {
+fn camera(model: &RobotModel, palm: usize, notes: &mut BTreeMap<&'static str, String>) -> (String, usize, [f64; 3]) {
     let poses = poses_at_zero(model);
     let on_hand = |link: usize| {
         let above = chain(model, link);

@@ -7,7 +7,7 @@ use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion};
 use super::body::chain;
 use super::frames::{Pair, likely};
 use crate::Gripper;
-use crate::description::RobotModel;
+use crate::description::{JointKind, RobotModel};
 use crate::gripper::Probe;
 use crate::kinematics::motion;
 use actcheck_data::RobotProfile;
@@ -39,9 +39,11 @@ pub(super) struct Hand {
 pub(super) fn find(bare: &RobotProfile, model: &RobotModel) -> Result<Hand, String> {
     let groups = groups(model);
     if groups.is_empty() {
-        return Err("no gripper was found: none of its movable joints or their links has a name with `finger`, `grip`, \
+        return Err(
+            "no gripper was found: none of its movable joints or their links has a name with `finger`, `grip`, \
                     `hand`, `jaw`, `knuckle` or `thumb`"
-            .to_owned());
+                .to_owned(),
+        );
     }
     let mut rated: Vec<(usize, usize, &BTreeSet<usize>)> =
         groups.iter().map(|(palm, joints)| (rank(model, *palm), *palm, joints)).collect();
@@ -107,7 +109,8 @@ fn measure(bare: &RobotProfile, model: &RobotModel, palm: usize, joints: &BTreeS
         found.widest_m = gripper.widest_m();
     }
     let mut profile = bare.clone();
-    profile.finger_joints = found.named.iter().map(|idx| model.joints[*idx].name.clone()).collect();
+    let named = alike(model, found.links).unwrap_or(found.named);
+    profile.finger_joints = named.iter().map(|idx| model.joints[*idx].name.clone()).collect();
     profile.finger_links = found.links.map(|link| model.links[link].name.clone());
     profile.grasp_link = model.links[palm].name.clone();
     profile.grasp_offset_m = rounded(found.frame.translation.vector.into());
@@ -122,6 +125,19 @@ fn measure(bare: &RobotProfile, model: &RobotModel, palm: usize, joints: &BTreeS
     notes.insert("grasp_turned_rad", "x along the fingers, y from the right to the left one".to_owned());
     notes.insert("max_opening_m", "measured at that place".to_owned());
     Some(Hand { profile, palm, notes })
+}
+
+/// The joints of two fingers that slide alike, one of which mimics the other: each has a motor of its own then.
+fn alike(model: &RobotModel, links: [usize; 2]) -> Option<Vec<usize>> {
+    let [left, right] = links.map(|link| link.checked_sub(1));
+    let (left, right) = (left?, right?);
+    let slides = |idx: usize| model.joints[idx].kind == JointKind::Prismatic && model.joints[idx].lower >= -1e-3;
+    let follows = |idx: usize, other: usize| {
+        let mimic = model.joints[idx].mimic;
+        mimic.is_some_and(|(leader, factor, offset)| leader == other && (factor - 1.0).abs() < 1e-9 && offset == 0.0)
+    };
+    let is_alike = slides(left) && slides(right) && (follows(left, right) || follows(right, left));
+    is_alike.then(|| vec![left, right])
 }
 
 /// The frame with the numbers that a profile has.
@@ -282,7 +298,13 @@ fn rate(
     let widest_m = gripper.widest_m();
     let closes_m = gripper.travel_m();
     let off_m = gap.middle_m().abs();
-    let both = if links.contains(&palm) { 0.6 } else { 1.0 };
+    // Fingertips are alike; a fingertip and a knuckle are not.
+    let [left, right] = links.map(|link| chain(model, link).len());
+    let both = match (links.contains(&palm), left == right) {
+        (true, _) => 0.6,
+        (false, true) => 1.0,
+        (false, false) => 0.4,
+    };
     let reach_m = frame.translation.vector.norm().min(0.3);
     let score = (0.3 + flat) * both * closes_m.min(WIDE_M) * (0.05 + reach_m) / (1.0 + 10.0 * off_m);
     Some(Found { score, named: named.to_vec(), links, frame, widest_m })

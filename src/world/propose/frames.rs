@@ -49,10 +49,11 @@ impl Pair {
 }
 
 fn middle(points: &[Point3<f64>]) -> Point3<f64> {
-    let (low, high) = points.iter().fold(
-        (Vector3::repeat(f64::INFINITY), Vector3::repeat(f64::NEG_INFINITY)),
-        |(low, high), point| (low.inf(&point.coords), high.sup(&point.coords)),
-    );
+    let (low, high) = points
+        .iter()
+        .fold((Vector3::repeat(f64::INFINITY), Vector3::repeat(f64::NEG_INFINITY)), |(low, high), point| {
+            (low.inf(&point.coords), high.sup(&point.coords))
+        });
     Point3::from((low + high) / 2.0)
 }
 

@@ -16,7 +16,7 @@ use crate::description::RobotModel;
 use crate::layout::frame;
 use actcheck_data::RobotProfile;
 
-/// A profile with all roles assigned, and what it is based on.
+/// A profile with all roles assigned, and the basis of its guesses.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Proposal {
     /// The profile.

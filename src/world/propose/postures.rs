@@ -57,10 +57,13 @@ pub(super) fn find(
         None => aside.or_else(|| postures.first().cloned()),
     };
     let home = home.unwrap_or_else(|| search.start.clone());
-    notes.insert("home", match profile.base_joints {
-        Some(_) => "the hand is near the body, and no links overlap".to_owned(),
-        None => "the hand points down beside the base".to_owned(),
-    });
+    notes.insert(
+        "home",
+        match profile.base_joints {
+            Some(_) => "the hand is near the body, and no links overlap".to_owned(),
+            None => "the hand points down beside the base".to_owned(),
+        },
+    );
     notes.insert("postures", "reaching level, at a slant and down, near and far".to_owned());
     let of_arm = |posture: &Vec<f64>| -> Vec<f64> {
         search.arm.iter().map(|idx| (posture[*idx] * 1e3).round() / 1e3 + 0.0).collect()
@@ -136,7 +139,8 @@ impl Search<'_> {
     fn targets(&self) -> Vec<Isometry3<f64>> {
         let (shoulder, length) = self.arm_reach();
         let root = self.kinematics.links(&self.start)[0].translation.vector.z;
-        let heights = if self.base.is_empty() { ABOVE_M.map(|above| root + above.min(0.5 * length)) } else { HEIGHTS_M };
+        let heights =
+            if self.base.is_empty() { ABOVE_M.map(|above| root + above.min(0.5 * length)) } else { HEIGHTS_M };
         let mut targets = Vec::new();
         for pitch in PITCHES_RAD {
             for (share, height) in SHARES.into_iter().zip(heights).chain(SHARES.into_iter().rev().zip(heights)) {
