@@ -60,6 +60,13 @@ fn mimics(root: Node, reader: &mut Reader) -> BTreeMap<String, (String, f64, f64
     let mut found = BTreeMap::new();
     for joint in xml::children(root, "equality").flat_map(|all| xml::children(all, "joint").collect::<Vec<_>>()) {
         let (Some(follower), Some(leader)) = (joint.attribute("joint1"), joint.attribute("joint2")) else { continue };
+        let mut known =
+            root.descendants().filter(|node| node.has_tag_name("joint")).filter_map(|node| node.attribute("name"));
+        if !known.any(|name| name == leader) {
+            let message = format!("there is no movable joint `{leader}` to mimic");
+            reader.error("W051", joint, message, "`joint2` names the joint that `joint1` follows");
+            continue;
+        }
         let written = joint.attribute("polycoef").unwrap_or("0 1 0 0 0");
         let numbers: Vec<f64> = written.split_whitespace().filter_map(|word| word.parse().ok()).collect();
         let (offset, factor) = (numbers.first().copied().unwrap_or(0.0), numbers.get(1).copied().unwrap_or(1.0));
@@ -156,7 +163,7 @@ impl Robot {
             self.out.joint(&UrdfJoint::fixed(&fixed, parent, &name, at));
         }
         let solids = self.solids(body, &own, class, reader);
-        let inertial = self.inertial(body, &own, class, reader);
+        let inertial = self.inertial(body, &own, class, &solids, reader);
         let solids: Vec<(Isometry3<f64>, String)> = solids.into_iter().map(|(pose, shape, _)| (pose, shape)).collect();
         self.out.link(&name, Some(&inertial), &solids);
         self.children(body, &name, &own, class, reader);
@@ -187,6 +194,11 @@ impl Robot {
             Some(text) => Some(reader.numbers::<2>(joint, text, Bound::Finite)?),
             None => None,
         };
+        if let Some([lower, upper]) = range.filter(|[lower, upper]| lower > upper) {
+            let message = format!("the joint `{name}` has a lower limit of {lower} above its upper limit of {upper}");
+            reader.error("W034", joint, message, "write the smaller number of `range` first");
+            return None;
+        }
         let limited = match attributes.get("limited") {
             Some("true") => true,
             Some("false") => false,
@@ -316,7 +328,14 @@ impl Robot {
     }
 
     /// The inertia of a body: stated, or that of its geoms as points with the inertia of small cubes.
-    fn inertial(&self, body: Node, own: &Isometry3<f64>, class: Option<&str>, reader: &mut Reader) -> Inertial {
+    fn inertial(
+        &self,
+        body: Node,
+        own: &Isometry3<f64>,
+        class: Option<&str>,
+        solids: &[(Isometry3<f64>, String, Option<f64>)],
+        reader: &mut Reader,
+    ) -> Inertial {
         let stated = xml::child(body, "inertial").and_then(|node| {
             let attributes = self.compiler.attributes(node, class);
             let pose = own * self.compiler.pose(&attributes, node, reader);
@@ -336,9 +355,8 @@ impl Robot {
         if let Some(stated) = stated {
             return stated;
         }
-        let parts: Vec<(Vector3<f64>, f64)> = self
-            .solids(body, own, class, reader)
-            .into_iter()
+        let parts: Vec<(Vector3<f64>, f64)> = solids
+            .iter()
             .filter_map(|(pose, _, kg)| Some((pose.translation.vector, kg.filter(|kg| *kg > 0.0)?)))
             .collect();
         let kg: f64 = parts.iter().map(|(_, kg)| kg).sum();

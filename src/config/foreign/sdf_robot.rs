@@ -43,6 +43,10 @@ fn convert(root: Node, reader: &mut Reader) -> Option<String> {
         let name = reader.attribute(link, "name")?;
         links.insert(name, (link, pose(link, reader)?));
     }
+    if links.is_empty() {
+        reader.error("W051", model, "the robot has no links".to_owned(), "add `<link name=\"base_link\"/>`");
+        return None;
+    }
     // The frame of a link in URDF is that of its joint.
     let mut frames: BTreeMap<&str, Isometry3<f64>> = links.iter().map(|(name, (_, at))| (*name, *at)).collect();
     let mut joints: Vec<(Node, &str, &str)> = Vec::new();
