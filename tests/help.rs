@@ -36,7 +36,7 @@ fn commands_are_listed_in_groups_and_run_comes_first() {
     let expected: Vec<String> = commands()
         .into_iter()
         .flat_map(|command| match command.as_str() {
-            "new" => vec!["new campaign".to_owned(), "new property".to_owned()],
+            "new" => vec!["new campaign".to_owned(), "new property".to_owned(), "new robot".to_owned()],
             _ => vec![command],
         })
         .collect();

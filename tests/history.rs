@@ -49,6 +49,8 @@ fn robot() -> Arc<RobotProfile> {
         head_joints: Vec::new(),
         grasp_link: String::new(),
         grasp_turned_rad: [0.0; 3],
+        camera_turned_rad: [0.0; 3],
+        camera_offset_m: [0.0; 3],
         grasp_offset_m: [0.0; 3],
         finger_links: [String::new(), String::new()],
         camera_link: String::new(),

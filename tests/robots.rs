@@ -25,14 +25,44 @@ fn said_of(folder: &Path, profile: &str) -> String {
 
 #[test]
 fn every_wrong_robot_is_reported_with_its_place() {
-    assert_eq!(said_of(Path::new("tests/models"), "crane/robot.toml"), "");
+    // The same robot in each format.
+    for crane in ["crane", "crane_mjcf", "crane_sdf"] {
+        assert_eq!(said_of(Path::new("tests/models"), &format!("{crane}/robot.toml")), "");
+    }
     let report = |case: PathBuf| {
         let profile = format!("{}/robot.toml", case.file_name().unwrap().display());
         (case.join("expected"), said_of(Path::new(WRONG), &profile))
     };
-    assert_diagnostics(30, Files::Disk.folders(Path::new(WRONG)).into_iter().map(report));
+    assert_diagnostics(45, Files::Disk.folders(Path::new(WRONG)).into_iter().map(report));
     let said = said_of(Path::new(WRONG), "fixed_amr");
     assert!(said.contains("there is no robot `fixed_amr`") && said.contains("did you mean `fixed_arm`?"), "{said}");
+}
+
+/// The proposed profile of a shipped robot names the joints of its own profile, and passes `check`.
+#[test]
+fn a_proposed_profile_is_complete() {
+    let folder = tempfile::tempdir().unwrap();
+    for robot in ["mobile_manipulator", "fixed_arm"] {
+        let urdf = root().join(format!("models/robots/{robot}.urdf"));
+        let written = actcheck(folder.path(), &["new", "robot", urdf.to_str().unwrap()]);
+        assert!(written.status.success(), "{}", stderr(&written));
+        let [proposed, shipped] = [folder.path().to_owned(), root().join("models/robots")].map(|place| {
+            let text = std::fs::read_to_string(place.join(format!("{robot}.toml"))).unwrap();
+            toml::from_str::<toml::Table>(&text).unwrap()
+        });
+        for key in ["base_joints", "arm_joints", "head_joints"] {
+            assert_eq!(proposed.get(key), shipped.get(key), "{key} of {robot}");
+        }
+        let opening = |table: &toml::Table| table["max_opening_m"].as_float().unwrap();
+        assert!((opening(&proposed) - opening(&shipped)).abs() < 0.006, "{proposed}");
+        let text = format!(
+            "tests = [[\"Pick\"]]\ntest_count = 1\n[robot]\nprofile = \"{robot}.toml\"\n\
+             [pickObject]\nmodel_list = [\"can\"]\n[objectSurface]\nobject_surfaces = [\"coffee_table\"]\n"
+        );
+        std::fs::write(folder.path().join("c.toml"), text).unwrap();
+        let checked = actcheck(folder.path(), &["check", "c.toml"]);
+        assert!(checked.status.success(), "{}", stderr(&checked));
+    }
 }
 
 /// `check --mend` writes a copy with the proposed moments beside the URDF, once, and the copy has none to mend.

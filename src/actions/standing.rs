@@ -1,6 +1,6 @@
 //! Grasp planning for an arm with a fixed base.
 
-use nalgebra::{Isometry3, Vector3};
+use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 
 use crate::grasp::{Approach, Grasp, rolled};
 use crate::hindrance::{Hindrance, Nearest};
@@ -28,6 +28,14 @@ const WAY_COST: f64 = 0.02;
 const LARGEST_STEP: f64 = 0.6;
 /// Step length of a straight path. Unit: metres.
 const STEP_M: f64 = 0.03;
+/// An arm with fewer joints reaches only some orientations at each place.
+const FULL_ARM: usize = 6;
+/// Times that a grasp is turned towards an orientation that such an arm reaches.
+const MOST_TURNS: usize = 8;
+/// A turn that ends this. Unit: radians.
+const SMALL_TURN_RAD: f64 = 1e-3;
+/// Largest turn: somewhat more than half the angle between two candidates. Unit: radians.
+const LARGEST_TURN_RAD: f64 = 0.2;
 /// Distances to retreat with the object, in order of preference. Unit: metres.
 const RETREATS_M: [f64; 2] = [0.1, 0.05];
 
@@ -77,6 +85,21 @@ fn best(arm: &Arm<'_>, all: &[Grasp], samples: &mut Samples, nearest: &mut Neare
     best
 }
 
+/// Postures in which links may be as close to each other as they are: the present one, and those of the profile, with the
+/// gripper as wide open as it is for a grasp. Links of a gripper touch each other in some openings.
+pub(crate) fn right_postures(operator: &Operator<'_>, start: &[f64]) -> Vec<Vec<f64>> {
+    let (layout, profile) = (operator.layout(), operator.profile());
+    let arms = profile.postures.iter().chain([&profile.home]).map(|posture| {
+        let mut positions = start.to_vec();
+        layout.arm.iter().zip(posture).for_each(|(idx, value)| positions[*idx] = *value);
+        positions
+    });
+    let mut right: Vec<Vec<f64>> = [start.to_vec()].into_iter().chain(arms).collect();
+    right.iter_mut().for_each(|positions| layout.gripper.set(positions, profile.max_opening_m));
+    right.push(start.to_vec());
+    right
+}
+
 /// The arm, its initial posture, and the obstacles around it.
 struct Arm<'a> {
     kinematics: &'a Kinematics,
@@ -96,8 +119,7 @@ impl<'a> Arm<'a> {
         let start = operator.commanded().to_vec();
         let mut postures = operator.profile().postures.clone();
         postures.push(operator.profile().home.clone());
-        let right = std::slice::from_ref(&start);
-        let before = ArmSpace::new(kinematics, layout, furniture, things, right);
+        let before = ArmSpace::new(kinematics, layout, furniture, things, &right_postures(operator, &start));
         let meanwhile = before.among(others);
         Self { kinematics, layout, start, postures, before, meanwhile }
     }
@@ -151,6 +173,12 @@ impl<'a> Arm<'a> {
         (least, bound): (f64, f64),
         samples: &mut Samples,
     ) -> Result<Plan, Hindrance> {
+        let turned = if self.layout.arm.len() < FULL_ARM {
+            Some(self.turned_to_arm(grasp, seed).ok_or(Hindrance::OutOfReach)?)
+        } else {
+            None
+        };
+        let grasp = turned.as_ref().unwrap_or(grasp);
         let at_thing = self.solve(seed, &grasp.pose).ok_or(Hindrance::OutOfReach)?;
         let lift = LIFTS_M.iter().find_map(|height| self.straight(&at_thing, &(Vector3::z() * *height)));
         let lift = lift.ok_or(Hindrance::NoLift)?;
@@ -199,6 +227,29 @@ impl<'a> Arm<'a> {
             return None;
         }
         motion::way(&self.before, &self.start, to, least, &mut samples.share(SAMPLES_A_GRASP))
+    }
+
+    /// The grasp with its heading turned to the nearest one that an arm of few joints reaches: such an arm moves its hand
+    /// in a vertical plane. Returns `None` if that is far from the grasp's own.
+    fn turned_to_arm(&self, grasp: &Grasp, seed: &[f64]) -> Option<Grasp> {
+        let mut mobility = vec![0.0; seed.len()];
+        self.layout.arm.iter().for_each(|idx| mobility[*idx] = 1.0);
+        let mut turned = grasp.clone();
+        for _ in 0..MOST_TURNS {
+            let reach = ik::Reach { target: turned.pose, mobility: mobility.clone() };
+            let nearest = ik::nearest(self.kinematics, seed, &reach);
+            let off = self.kinematics.grasp(&nearest).rotation * turned.pose.rotation.inverse();
+            let turn = off.scaled_axis().z;
+            if turn.abs() < SMALL_TURN_RAD {
+                break;
+            }
+            turned.heading += turn;
+            turned.pose.rotation = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), turn) * turned.pose.rotation;
+            if (turned.heading - grasp.heading).abs() > LARGEST_TURN_RAD {
+                return None;
+            }
+        }
+        Some(turned)
     }
 
     fn solve(&self, seed: &[f64], target: &Isometry3<f64>) -> Option<Vec<f64>> {

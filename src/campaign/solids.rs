@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use actcheck_base::{Diagnostic, Diagnostics, Digest, Files};
 use actcheck_config::Campaign;
-use actcheck_data::{Mesh, ObjectModel, Part, Shape};
+use actcheck_data::{Mesh, ObjectModel, Part, RobotProfile, Shape};
 use actcheck_world as world;
 
 /// Cache folder in the history's folder.
@@ -36,11 +36,31 @@ pub(super) fn decompose_meshes(campaign: &mut Campaign, faults: &mut Diagnostics
             }
         }
     }
-    let robot = Arc::make_mut(&mut campaign.robot);
+    decompose_with(&mut cache, Arc::make_mut(&mut campaign.robot), faults);
+}
+
+/// Proposes a profile for a robot without roles, with the basis of each guess by the profile's key. Meshes are decomposed
+/// with the cache in the folder of a history.
+///
+/// # Errors
+/// W037 for each mesh without a convex decomposition; W020 to W024 if no profile can be proposed.
+pub fn proposed_robot(
+    mut robot: RobotProfile,
+    history: &Path,
+) -> Result<(RobotProfile, BTreeMap<&'static str, String>), Diagnostics> {
+    let mut cache = HullCache { folder: history.join(FOLDER), known: BTreeMap::new() };
+    let mut faults = Diagnostics::new();
+    decompose_with(&mut cache, &mut robot, &mut faults);
+    faults.or(())?;
+    let proposal = world::propose(&robot).map_err(|error| error.diagnostic())?;
+    Ok((proposal.profile, proposal.notes))
+}
+
+fn decompose_with(cache: &mut HullCache, robot: &mut RobotProfile, faults: &mut Diagnostics) {
     for (file, shapes) in &mut robot.meshes {
-        let apart: Result<Vec<Vec<Shape>>, String> = shapes.iter().map(|shape| cache.solids(shape)).collect();
+        let apart: Result<Vec<Vec<Shape>>, String> = shapes.iter().map(|shape| cache.solids_of_link(shape)).collect();
         match apart {
-            Ok(apart) => *shapes = apart.concat(),
+            Ok(apart) => *shapes = apart.concat().iter().map(world::simplified).collect(),
             Err(reason) => faults.push(unusable(&format!("the robot's mesh {file}"), &reason)),
         }
     }
@@ -70,6 +90,14 @@ impl HullCache {
         let solids = self.cached_or_new(&key, mesh);
         self.known.insert(key, solids.clone());
         solids
+    }
+
+    /// As [`HullCache::solids`]; a flat mesh of a robot becomes a thin solid.
+    fn solids_of_link(&mut self, shape: &Shape) -> Result<Vec<Shape>, String> {
+        self.solids(shape).or_else(|reason| match shape {
+            Shape::Mesh { mesh } => world::sheet(mesh).map(|sheet| vec![sheet]).ok_or(reason),
+            _ => Err(reason),
+        })
     }
 
     fn cached_or_new(&self, key: &str, mesh: &Mesh) -> Result<Vec<Shape>, String> {

@@ -37,6 +37,7 @@ mod new;
 mod new_campaign;
 mod new_files;
 mod new_property;
+mod new_robot;
 mod options;
 mod output;
 mod output_file;

@@ -4,6 +4,7 @@ use clap::{Args, Subcommand};
 
 use crate::new_campaign::{self, NewCampaignArgs};
 use crate::new_property::{self, NewPropertyArgs};
+use crate::new_robot::{self, NewRobotArgs};
 use actcheck_base::Diagnostics;
 
 /// `actcheck new`
@@ -31,12 +32,19 @@ pub enum NewKind {
     /// `actcheck new campaign` use it from then on.
     #[command(after_help = "Example:\n  actcheck new property StaysUpright --for Pick")]
     Property(NewPropertyArgs),
+    /// A robot's profile, proposed from its model
+    ///
+    /// Finds base, arm, gripper, grasp frame, opening, camera, head and postures by the kinematics and the names in a URDF
+    /// or xacro file, and writes them with a comment for each guess. Existing files are never overwritten.
+    #[command(after_help = "Example:\n  actcheck new robot models/robots/fixed_arm.urdf --out /tmp/my_arm.toml")]
+    Robot(NewRobotArgs),
 }
 
-/// Creates a configuration or a property.
+/// Creates a configuration, a property or a profile.
 pub fn new(args: &NewArgs) -> Result<(), Diagnostics> {
     match &args.kind {
         NewKind::Campaign(args) => new_campaign::campaign(args),
         NewKind::Property(args) => new_property::property(args),
+        NewKind::Robot(args) => new_robot::robot(args),
     }
 }

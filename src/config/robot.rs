@@ -8,7 +8,8 @@ use std::path::{Path, PathBuf};
 use crate::foreign::{self, Lookup};
 use crate::paths::resolve_path;
 use crate::robot_roles::Roles;
-use crate::{Located, Table, xacro};
+use crate::xacro::{self, Inputs, Unexpanded};
+use crate::{Located, Table};
 
 /// Number of folders above the URDF that are searched for `package://`. `PACKAGE/robots/FILE.urdf` needs two.
 const PACKAGE_LEVELS: usize = 4;
@@ -22,6 +23,10 @@ const REQUIRED: [&str; 8] =
 
 /// Friction of the fingertips if the profile has none: that of rubber pads.
 const FINGER_FRICTION: f64 = 0.8;
+
+/// Rotation of the camera's frame relative to a link whose name contains `optical`, if the profile has none: by ROS's
+/// convention, z points forwards and y down in the frame of such a link. Unit: radians.
+pub const OPTICAL_TURNED_RAD: [f64; 3] = [std::f64::consts::FRAC_PI_2, -std::f64::consts::FRAC_PI_2, 0.0];
 
 /// Force of a finger if the profile has none: enough to lift 1 kg with such pads. Unit: newtons.
 const GRIP_FORCE_N: f64 = 15.0;
@@ -49,7 +54,7 @@ pub fn read_with(files: &Files, path: &Path, packages: &[PathBuf]) -> Result<Rob
     let mut table = Table::parse(&source)?;
     table.require(&REQUIRED);
     let mut found = Diagnostics::new();
-    let (urdf, lookup) = find_urdf(files, path, packages, &mut table);
+    let (urdf, lookup) = find_urdf(files, path, packages, &mut table, &mut found);
     let mut roles = Roles::default();
     let profile = read_table(&mut table, urdf.as_ref().map(|(urdf, _)| urdf), &mut roles, &mut found);
     let mut read = None;
@@ -83,7 +88,7 @@ pub struct MendedUrdf {
 pub fn mended(files: &Files, path: &Path, packages: &[PathBuf]) -> Option<MendedUrdf> {
     let source = files.read(path).ok()?;
     let mut table = Table::parse(&source).ok()?;
-    let (urdf, lookup) = find_urdf(files, path, packages, &mut table);
+    let (urdf, lookup) = find_urdf(files, path, packages, &mut table, &mut Diagnostics::new());
     let (urdf, original) = urdf?;
     let mut mends = foreign::robot::read(&urdf, &original, &lookup, &mut Diagnostics::new()).mends;
     if mends.is_empty() {
@@ -104,16 +109,110 @@ fn find_urdf<'a>(
     profile: &Path,
     packages: &[PathBuf],
     table: &mut Table,
+    found: &mut Diagnostics,
 ) -> (Option<(Source, PathBuf)>, Lookup<'a>) {
     let folder = profile.parent().unwrap_or(Path::new(""));
     let own = values(table.strings("package_dirs").unwrap_or_default());
+    let arguments = values(table.strings("xacro_args").unwrap_or_default());
     let mut folders: Vec<PathBuf> = own.into_iter().map(|written| resolve_path(folder, &written)).collect();
-    let urdf = read_urdf(files, folder, table);
-    if let Some((_, path)) = &urdf {
-        folders.extend(packages.iter().cloned());
-        folders.extend(path.ancestors().skip(1).take(PACKAGE_LEVELS).map(Path::to_path_buf));
-    }
+    let Some(written) = table.string("urdf") else { return (None, Lookup { files, folders }) };
+    let path = resolve_path(folder, &written.value);
+    folders.extend(around(&path, packages));
+    let urdf = match text_of(files, &path, Inputs { arguments: &arguments, folders: &folders }) {
+        Ok(urdf) => Some((urdf, path)),
+        Err(Unread::File(code, fault)) => {
+            table.fault(code, written.span, fault.message, fault.help);
+            None
+        }
+        Err(Unread::Inside(faults)) => {
+            found.extend(faults);
+            None
+        }
+    };
     (urdf, Lookup { files, folders })
+}
+
+/// Folders in which the packages of a robot's file are looked up: those given, then those around the file.
+fn around(path: &Path, packages: &[PathBuf]) -> Vec<PathBuf> {
+    let above = path.ancestors().skip(1).take(PACKAGE_LEVELS).map(Path::to_path_buf);
+    packages.iter().cloned().chain(above).collect()
+}
+
+/// Reads a robot's file without a profile: its model, meshes and name, with no roles assigned.
+///
+/// # Errors
+/// As [`read_with`], without the faults of roles.
+pub fn bare(
+    files: &Files,
+    path: &Path,
+    packages: &[PathBuf],
+    arguments: &[String],
+) -> Result<RobotProfile, Diagnostics> {
+    let folders = around(path, packages);
+    let urdf = text_of(files, path, Inputs { arguments, folders: &folders }).map_err(Unread::faults)?;
+    let mut found = Diagnostics::new();
+    let read = foreign::robot::read(&urdf, path, &Lookup { files, folders }, &mut found);
+    found.or(())?;
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    let none = String::new;
+    let profile = RobotProfile {
+        name: name.split('.').next().unwrap_or_default().to_owned(),
+        digest: digest_of(&urdf.text),
+        urdf,
+        base_joints: None,
+        planar_base: false,
+        mount_height_m: 0.0,
+        arm_joints: Vec::new(),
+        finger_joints: Vec::new(),
+        head_joints: Vec::new(),
+        grasp_link: none(),
+        grasp_turned_rad: [0.0; 3],
+        grasp_offset_m: [0.0; 3],
+        finger_links: [none(), none()],
+        camera_link: none(),
+        camera_turned_rad: [0.0; 3],
+        camera_offset_m: [0.0; 3],
+        max_opening_m: 0.0,
+        home: Vec::new(),
+        postures: Vec::new(),
+        finger_friction: FINGER_FRICTION,
+        grip_force_n: GRIP_FORCE_N,
+        meshes: BTreeMap::new(),
+    };
+    Ok(with_meshes(profile, read))
+}
+
+/// Why a robot's file can't be read.
+enum Unread {
+    /// A fault of the whole file, with its code.
+    File(&'static str, Unexpanded),
+    /// Faults in its text.
+    Inside(Diagnostics),
+}
+
+impl Unread {
+    fn faults(self) -> Diagnostics {
+        match self {
+            Self::File(code, fault) => Diagnostic::error(code, fault.message).help(fault.help).into(),
+            Self::Inside(faults) => faults,
+        }
+    }
+}
+
+/// Reads a robot's file: URDF as it is, xacro after expansion, MJCF and SDF after conversion.
+fn text_of(files: &Files, path: &Path, inputs: Inputs<'_>) -> Result<Source, Unread> {
+    let text = files.read(path).map_err(|reason| {
+        let message = format!("cannot read the URDF {}: {reason}", path.display());
+        Unread::File("W010", Unexpanded { message, help: "the path is relative to the profile".to_owned() })
+    })?;
+    if xacro::is_xacro(path) {
+        return xacro::expand(path, inputs).map_err(|fault| Unread::File("W012", fault));
+    }
+    match foreign::root_name(&text.text) {
+        Some("mujoco") => foreign::mjcf::to_urdf(&text, path, files).map_err(Unread::Inside),
+        Some("sdf") => foreign::sdf_robot::to_urdf(&text).map_err(Unread::Inside),
+        _ => Ok(text),
+    }
 }
 
 fn with_meshes(mut profile: RobotProfile, read: foreign::robot::RobotText) -> RobotProfile {
@@ -122,24 +221,6 @@ fn with_meshes(mut profile: RobotProfile, read: foreign::robot::RobotText) -> Ro
         profile.meshes = read.meshes;
     }
     profile
-}
-
-/// Reads the URDF, after expansion if it is xacro. Returns its text and path.
-fn read_urdf(files: &Files, folder: &Path, table: &mut Table) -> Option<(Source, PathBuf)> {
-    let written = table.string("urdf")?;
-    let path = resolve_path(folder, &written.value);
-    match files.read(&path) {
-        Ok(_) if xacro::is_xacro(&path) => match xacro::expand(&path) {
-            Ok(urdf) => return Some((urdf, path)),
-            Err(fault) => table.fault("W012", written.span, fault.message, fault.help),
-        },
-        Ok(urdf) => return Some((urdf, path)),
-        Err(reason) => {
-            let message = format!("cannot read the URDF {}: {reason}", path.display());
-            table.fault("W010", written.span, message, "the path is relative to the profile");
-        }
-    }
-    None
 }
 
 /// Reads the base: joints of the URDF, joints added below its root (`true`), or none.
@@ -182,6 +263,11 @@ fn read_table(
     roles.links.push(grasp_link.iter().chain(&camera_link).cloned().collect());
     let grasp_turned_rad = table.numbers("grasp_turned_rad", ..).unwrap_or([0.0; 3]);
     let grasp_offset_m = table.numbers("grasp_offset_m", -1.0..=1.0).unwrap_or([0.0; 3]);
+    let camera_turned_rad = table.numbers("camera_turned_rad", ..).unwrap_or_else(|| {
+        let is_optical = camera_link.as_ref().is_some_and(|link| link.value.contains("optical"));
+        if is_optical { OPTICAL_TURNED_RAD } else { [0.0; 3] }
+    });
+    let camera_offset_m = table.numbers("camera_offset_m", -1.0..=1.0).unwrap_or([0.0; 3]);
     let mount_height_m = table.number("mount_height_m", 0.0..=3.0).unwrap_or(0.0);
     let opening_span = table.key_span("max_opening_m");
     let max_opening_m = table.number("max_opening_m", 0.001..=1.0);
@@ -215,6 +301,8 @@ fn read_table(
         grasp_offset_m,
         finger_links: finger_links?,
         camera_link: camera_link?.value,
+        camera_turned_rad,
+        camera_offset_m,
         max_opening_m: max_opening_m?,
         home: home?,
         postures,
@@ -295,7 +383,7 @@ mod tests {
         let mut table = Table::parse(&source).expect("it is TOML");
         let mut found = Diagnostics::new();
         table.require(&REQUIRED);
-        assert!(read_urdf(&Files::Disk, Path::new("no/such"), &mut table).is_none());
+        assert!(find_urdf(&Files::Disk, Path::new("no/such/r.toml"), &[], &mut table, &mut found).0.is_none());
         assert!(read_table(&mut table, None, &mut Roles::default(), &mut found).is_none());
         table.finish(&mut found);
         let codes: Vec<&str> = found.iter().map(|d| d.code).collect();

@@ -7,6 +7,7 @@ use std::io::Read;
 use std::os::unix::process::CommandExt as _;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, ExitStatus, Stdio};
+use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
 use std::time::Duration;
 
@@ -15,6 +16,11 @@ use actcheck_base::Source;
 
 /// The program, as installed by ROS or by `pip install xacro`.
 const PROGRAM: &str = "xacro";
+/// A Python module that answers `$(find PACKAGE)` from folders of packages, so that neither ROS nor an installed package
+/// is needed. Packages that are not in these folders are left to the module of ROS.
+const FINDER: &str = include_str!("find_packages.py");
+/// Environment variable with the folders of packages, separated by line breaks.
+const FOLDERS_VARIABLE: &str = "ACTCHECK_PACKAGE_DIRS";
 /// Time limit of an expansion; the largest robots take a few seconds.
 const LIMIT: Duration = Duration::from_secs(60);
 /// Longest expansion. Unit: bytes.
@@ -48,19 +54,28 @@ pub(super) fn is_xacro(path: &Path) -> bool {
     path.extension().is_some_and(|ending| ending == "xacro")
 }
 
+/// The parts of an expansion besides the file.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Inputs<'a> {
+    /// Arguments as `NAME:=VALUE`.
+    pub(super) arguments: &'a [String],
+    /// Folders in which `$(find PACKAGE)` looks for packages, in order.
+    pub(super) folders: &'a [PathBuf],
+}
+
 /// Expands a xacro file to URDF with the program `xacro`.
 ///
 /// # Errors
 /// The program can't be started, takes longer than a minute, prints more than 16 MiB, reports an error in the file, or
 /// prints something other than UTF-8.
-pub(super) fn expand(path: &Path) -> Result<Source, Unexpanded> {
+pub(super) fn expand(path: &Path, inputs: Inputs<'_>) -> Result<Source, Unexpanded> {
     let program = on_path(PROGRAM).ok_or_else(|| not_started(path, "it is not in `PATH`"))?;
-    expand_with(&program, path, LIMIT)
+    expand_with(&program, path, inputs, LIMIT)
 }
 
-fn expand_with(program: &PathBuf, path: &Path, limit: Duration) -> Result<Source, Unexpanded> {
+fn expand_with(program: &PathBuf, path: &Path, inputs: Inputs<'_>, limit: Duration) -> Result<Source, Unexpanded> {
     let shown = path.display();
-    let output = run(program, path, limit).map_err(|error| not_started(path, &error.to_string()))?;
+    let output = run(program, path, inputs, limit).map_err(|error| not_started(path, &error.to_string()))?;
     let refused = |message: String| Unexpanded {
         message,
         help: format!("expand it elsewhere, and name the result: `xacro {shown} > robot.urdf`"),
@@ -76,7 +91,10 @@ fn expand_with(program: &PathBuf, path: &Path, limit: Duration) -> Result<Source
         let said: Vec<&str> = said.lines().map(str::trim).filter(|line| !line.is_empty()).collect();
         return Err(Unexpanded {
             message: format!("xacro cannot expand {shown}: {}", plain(&said.join("; "))),
-            help: format!("run `xacro {shown}` to see the error; the packages that it refers to must be installed"),
+            help: format!(
+                "run `xacro {shown}` to see the error; name the folders of the packages that it refers to in \
+                 `package_dirs` of the profile, and its arguments in `xacro_args`"
+            ),
         });
     }
     let text = String::from_utf8(output.text).map_err(|_| Unexpanded {
@@ -101,10 +119,19 @@ struct Output {
     error: Vec<u8>,
 }
 
-/// Runs a program with a file as its argument. Returns `None` if it takes longer than `limit`.
-fn run(program: &PathBuf, path: &Path, limit: Duration) -> std::io::Result<Option<Output>> {
+/// Runs a program with a file and further arguments. Returns `None` if it takes longer than `limit`.
+fn run(program: &PathBuf, path: &Path, inputs: Inputs<'_>, limit: Duration) -> std::io::Result<Option<Output>> {
+    let finder = Finder::new()?;
     let mut command = Command::new("/bin/sh");
-    command.args(["-c", GUARDED, "sh"]).arg(program).arg(path);
+    command.args(["-c", GUARDED, "sh"]).arg(program).arg(path).args(inputs.arguments);
+    let others = std::env::var_os("PYTHONPATH").filter(|paths| !paths.is_empty());
+    let mut paths = finder.0.as_os_str().to_owned();
+    if let Some(others) = others {
+        paths.push(":");
+        paths.push(others);
+    }
+    let folders: Vec<String> = inputs.folders.iter().map(|folder| absolute(folder)).collect();
+    command.env("PYTHONPATH", paths).env(FOLDERS_VARIABLE, folders.join("\n"));
     command.process_group(0).stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
     let mut child = command.spawn()?;
     let received = read_both(&mut child).recv_timeout(limit);
@@ -123,6 +150,37 @@ fn run(program: &PathBuf, path: &Path, limit: Duration) -> std::io::Result<Optio
     // The shell waits for the program and its guard, which hold no pipe any more; the guard ends with the input.
     let status = child.wait()?;
     Ok(Some(Output { status, text, error }))
+}
+
+/// A temporary folder with the module [`FINDER`], removed when dropped.
+struct Finder(PathBuf);
+
+impl Finder {
+    fn new() -> std::io::Result<Self> {
+        static NUMBER: AtomicU32 = AtomicU32::new(0);
+        let name = format!("actcheck-xacro-{}-{}", std::process::id(), NUMBER.fetch_add(1, Ordering::Relaxed));
+        let finder = Self(std::env::temp_dir().join(name));
+        let module = finder.0.join("ament_index_python");
+        // Fails if the folder exists, so that no other user's module is run.
+        std::fs::create_dir(&finder.0)?;
+        std::fs::create_dir(&module)?;
+        std::fs::write(module.join("__init__.py"), "")?;
+        std::fs::write(module.join("packages.py"), FINDER)?;
+        Ok(finder)
+    }
+}
+
+impl Drop for Finder {
+    fn drop(&mut self) {
+        // A folder that can't be removed does no harm.
+        let _ = std::fs::remove_dir_all(&self.0);
+    }
+}
+
+/// Folders are given to a program of another language: as absolute paths.
+fn absolute(folder: &Path) -> String {
+    let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
+    std::path::absolute(folder).unwrap_or_else(|_| folder.to_owned()).display().to_string()
 }
 
 /// Closes the input, so that the process group is killed, and waits for its end.
@@ -188,7 +246,7 @@ mod tests {
         let program = folder.path().join("xacro");
         fs::write(&program, format!("#!/bin/sh\n{script}\n")).expect("a script");
         fs::set_permissions(&program, fs::Permissions::from_mode(0o755)).expect("it is executable");
-        expand_with(&program, Path::new("r.urdf.xacro"), limit)
+        expand_with(&program, Path::new("r.urdf.xacro"), Inputs::default(), limit)
     }
 
     #[test]
@@ -197,6 +255,24 @@ mod tests {
         assert_eq!((&*source.text, &*source.name), ("<robot/>\n", "r.urdf.xacro (expanded)"));
         let fault = expanded("echo 'no such arm' >&2; exit 3", LIMIT).expect_err("it fails");
         assert_eq!(fault.message, "xacro cannot expand r.urdf.xacro: no such arm");
+    }
+
+    /// The module that finds packages is where Python looks first, and is removed afterwards.
+    #[test]
+    fn folders_of_packages_and_arguments_reach_the_program() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let program = folder.path().join("xacro");
+        let script = "#!/bin/sh\nfound=${PYTHONPATH%%:*}\ncat \"$found/ament_index_python/packages.py\" > /dev/null || exit 1\n\
+                      echo \"$found|$ACTCHECK_PACKAGE_DIRS|$2 $3\"\n";
+        fs::write(&program, script).expect("a script");
+        fs::set_permissions(&program, fs::Permissions::from_mode(0o755)).expect("it is executable");
+        let folders = [PathBuf::from("/a/packages"), PathBuf::from("/b")];
+        let arguments = ["arm:=left".to_owned(), "hand:=none".to_owned()];
+        let inputs = Inputs { arguments: &arguments, folders: &folders };
+        let source = expand_with(&program, Path::new("r.urdf.xacro"), inputs, LIMIT).expect("it expands");
+        let (found, rest) = source.text.split_once('|').expect("three parts");
+        assert_eq!(rest, "/a/packages\n/b|arm:=left hand:=none\n");
+        assert!(!Path::new(found).exists(), "{found}");
     }
 
     /// The program prints mutated texts, and the expansion is read as a robot's URDF.
@@ -223,7 +299,7 @@ mod tests {
             effort=\"1\" velocity=\"1\"/></joint></robot>";
         cases("xacro", 20, |mut random| {
             fs::write(&printed, random.text(urdf, &WORDS, &[])).expect("a text");
-            match expand_with(&program, Path::new("r.urdf.xacro"), LIMIT) {
+            match expand_with(&program, Path::new("r.urdf.xacro"), Inputs::default(), LIMIT) {
                 Ok(source) => {
                     let lookup = Lookup { files: &Files::Disk, folders: Vec::new() };
                     let mut found = Diagnostics::new();

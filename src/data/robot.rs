@@ -20,7 +20,7 @@ pub struct RobotProfile {
     pub base_joints: Option<[String; 3]>,
     /// Whether those joints are added below the URDF's root instead of being part of it: `base = "planar"`.
     pub planar_base: bool,
-    /// Height of the root above the floor, for a base on a mount; the mount itself is not simulated. Unit: metres.
+    /// Height of the root above the floor, for a base on a mount, which is not simulated, or on wheels. Unit: metres.
     pub mount_height_m: f64,
     /// Joints that position the hand (lift and arm), from the base outwards.
     pub arm_joints: Vec<String>,
@@ -40,6 +40,11 @@ pub struct RobotProfile {
     pub finger_links: [String; 2],
     /// Link of the depth camera: its x axis points forwards, its z axis up in the image.
     pub camera_link: String,
+    /// Rotation of the camera's frame relative to that link, if the link's axes differ: about its fixed x, y and z axes,
+    /// in this order. Unit: radians.
+    pub camera_turned_rad: [f64; 3],
+    /// Position of the lens in that link's frame, if it differs from the link's origin. Unit: metres.
+    pub camera_offset_m: [f64; 3],
     /// Widest gap between the fingers. Unit: metres.
     pub max_opening_m: f64,
     /// Arm posture for driving, in the order of `arm_joints`. Units: metres or radians.

@@ -10,10 +10,14 @@ use parry3d::shape::Shape;
 use rapier3d::prelude::Collider;
 
 use crate::World;
-use crate::convert::{from_pose, to_real};
+use crate::convert::{from_pose, to_real, to_vector};
 use crate::engine::Owner;
 use crate::rays::{Lens, Solids};
 use actcheck_data::{Camera, ChoiceName, Choices, Look, Pose, Stream};
+
+/// Distance from the lens within which the camera does not see its own link: housings surround their lens, and their
+/// convex hulls close its opening. Unit: metres.
+const HOUSING_M: f64 = 0.1;
 
 /// Number of noise seeds, including 0 (no noise).
 const FRAMES: usize = 1 << 32;
@@ -59,7 +63,7 @@ impl World {
         let frame = choices.index(ChoiceName::CameraFrame, FRAMES);
         let noise = (frame > 0).then(|| Noise { camera, stream: Stream::new(frame as u64) });
         let eye = self.robot.kinematics.camera(&self.robot.state(&self.engine).0);
-        let solids = Solids::new(lens(camera), &eye, self.solids());
+        let solids = Solids::new(lens(camera), &eye, self.solids(&eye));
         let image = picture(camera, &solids, noise.as_ref());
         self.looked(began_secs);
         image
@@ -76,9 +80,16 @@ impl World {
         }
     }
 
-    /// All shapes at the poses where sensors see them.
-    fn solids(&self) -> impl Iterator<Item = (Isometry3<f64>, &dyn Shape)> {
-        self.engine.colliders.iter().map(|(_, collider)| (self.shown_at(collider), collider.shape()))
+    /// All shapes at the poses where sensors see them, except for the housing of a lens here.
+    fn solids(&self, eye: &Isometry3<f64>) -> impl Iterator<Item = (Isometry3<f64>, &dyn Shape)> {
+        let lens = to_vector(&eye.translation.vector);
+        let own = self.robot.kinematics.camera_link();
+        let visible = self.engine.colliders.iter().map(|(_, collider)| collider).filter(move |collider| {
+            let Owner::Link(link) = Owner::from_tag(collider.user_data) else { return true };
+            let away = f64::from(collider.shape().distance_to_point(collider.position(), lens, true));
+            away > if link == own { HOUSING_M } else { 0.0 }
+        });
+        visible.map(|collider| (self.shown_at(collider), collider.shape()))
     }
 
     fn shown_at(&self, collider: &Collider) -> Isometry3<f64> {
@@ -150,6 +161,7 @@ mod tests {
     use parry3d::shape::{Ball, Cuboid};
 
     use super::*;
+    use crate::robot::tests::{alone, lonely};
 
     const SMALL: Camera = Camera { width: 64, height: 48, ..Camera::IDEAL };
 
@@ -160,6 +172,21 @@ mod tests {
 
     fn middle(image: &DepthImage) -> f64 {
         f64::from(image.depths[image.height / 2 * image.width + image.width / 2])
+    }
+
+    /// A lens inside of its housing takes the same image as one without: its own head is not in it.
+    #[test]
+    fn a_camera_does_not_see_its_housing() {
+        let open = lonely();
+        let mut profile = open.robot.profile.as_ref().clone();
+        let housing = "<link name=\"head_camera_link\"><collision><geometry><box size=\"0.1 0.1 0.1\"/></geometry></collision></link>";
+        let text = profile.urdf.text.replace("<link name=\"head_camera_link\"/>", housing);
+        assert_ne!(text, *profile.urdf.text);
+        profile.urdf.text = text.into();
+        let housed = alone(profile);
+        let image = open.look(&mut Choices::random(1, 0));
+        assert!(image.depths.iter().any(|depth| *depth > 0.0), "it sees the floor");
+        assert_eq!(housed.look(&mut Choices::random(1, 0)), image);
     }
 
     #[test]

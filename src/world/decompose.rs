@@ -2,6 +2,7 @@
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
+use nalgebra::{Matrix3, Vector3};
 use parry3d::math::Vector;
 use parry3d::transformation::try_convex_hull;
 use parry3d::transformation::vhacd::{VHACD, VHACDParameters};
@@ -47,6 +48,55 @@ pub fn decompose(mesh: &Mesh) -> Result<Vec<Shape>, String> {
     // Slivers without a hull have no relevant volume.
     let hulls: Vec<Shape> = pieces.iter().filter_map(|piece| frame.hull(piece)).collect();
     Ok(if hulls.is_empty() { vec![whole] } else { hulls })
+}
+
+/// Thickness of a sheet. Unit: metres. That of a sticker or a pane.
+const SHEET_M: f64 = 1e-3;
+
+/// Returns a thin solid for a mesh whose points lie in a plane, such as a marker on a robot. Returns `None` if they lie on
+/// a line.
+pub fn sheet(mesh: &Mesh) -> Option<Shape> {
+    let count = mesh.vertices.len().max(1) as f64;
+    let points: Vec<Vector3<f64>> = mesh.vertices.iter().map(|vertex| Vector3::from(*vertex)).collect();
+    let middle = points.iter().sum::<Vector3<f64>>() / count;
+    let spread: Matrix3<f64> = points.iter().map(|point| (point - middle) * (point - middle).transpose()).sum();
+    let axes = spread.symmetric_eigen();
+    let normal = axes.eigenvectors.column(axes.eigenvalues.imin()) * (SHEET_M / 2.0);
+    let vertices = points.iter().flat_map(|point| [(point + normal).into(), (point - normal).into()]).collect();
+    let thick = Mesh { vertices, triangles: Vec::new() };
+    let frame = Frame::around(&thick);
+    let inside: Vec<Vector> = thick.vertices.iter().map(|point| frame.inside(point)).collect();
+    frame.hull(&inside)
+}
+
+/// Directions in which the corners of a simplified hull are the outermost ones.
+const DIRECTIONS: u32 = 96;
+
+/// Returns a hull with fewer corners: the outermost ones in evenly spread directions. Links of robots are often scanned or
+/// rounded surfaces with thousands of corners, and each costs time in every distance query. Returns other shapes
+/// unchanged.
+#[must_use]
+pub fn simplified(shape: &Shape) -> Shape {
+    let Shape::Hull { points, .. } = shape else { return shape.clone() };
+    if points.len() <= DIRECTIONS as usize {
+        return shape.clone();
+    }
+    let turn = std::f64::consts::PI * (3.0 - 5.0_f64.sqrt());
+    let mut kept: Vec<usize> = Vec::new();
+    for number in 0..DIRECTIONS {
+        let z = 1.0 - (2.0 * f64::from(number) + 1.0) / f64::from(DIRECTIONS);
+        let (across, angle) = ((1.0 - z * z).sqrt(), turn * f64::from(number));
+        let direction = [across * libm::cos(angle), across * libm::sin(angle), z];
+        let along = |idx: usize| (0..3).map(|axis| direction[axis] * points[idx][axis]).sum::<f64>();
+        kept.extend((0..points.len()).max_by(|a, b| along(*a).total_cmp(&along(*b))));
+    }
+    kept.sort_unstable();
+    kept.dedup();
+    let points: Vec<[f64; 3]> = kept.into_iter().map(|idx| points[idx]).collect();
+    let reduced = Mesh { triangles: Vec::new(), vertices: points };
+    let frame = Frame::around(&reduced);
+    let inside: Vec<Vector> = reduced.vertices.iter().map(|point| frame.inside(point)).collect();
+    frame.hull(&inside).unwrap_or_else(|| shape.clone())
 }
 
 /// Returns the points of the surface within each piece.
@@ -126,6 +176,22 @@ mod tests {
         assert_eq!(decomposition_key(&angle()), decomposition_key(&angle()));
     }
 
+    /// A ball of a thousand corners keeps its extent with a tenth of them; a hull of few corners is not changed.
+    #[test]
+    fn a_simplified_hull_has_fewer_corners_and_nearly_the_same_size() {
+        let ball = |count: u32| {
+            let at = |number: u32| {
+                let (z, angle) = (1.0 - (2.0 * f64::from(number) + 1.0) / f64::from(count), 2.4 * f64::from(number));
+                let across = (1.0 - z * z).sqrt();
+                [across * libm::cos(angle), across * libm::sin(angle), z]
+            };
+            Shape::Hull { points: (0..count).map(at).collect(), volume: 4.0 }
+        };
+        let Shape::Hull { points, volume } = simplified(&ball(1000)) else { panic!("it is a hull") };
+        assert!(points.len() <= DIRECTIONS as usize && volume > 0.9 * 4.18, "{} {volume}", points.len());
+        assert_eq!(simplified(&ball(20)), ball(20));
+    }
+
     #[test]
     fn a_convex_mesh_is_one_solid_and_a_flat_one_none() {
         let corners = vec![[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
@@ -135,5 +201,7 @@ mod tests {
         let flat = Mesh::new(vec![[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]], vec![[0, 1, 2]])
             .expect("the mesh is valid");
         assert!(decompose(&flat).is_err());
+        let volume = sheet(&flat).expect("it becomes a thin solid").volume();
+        assert!((volume - 0.5 * SHEET_M).abs() < 1e-6, "{volume}");
     }
 }

@@ -104,6 +104,11 @@ impl RobotModel {
         })
     }
 
+    /// All URDF links, each with the link that it was merged into and its pose in that link's frame, by name.
+    pub(crate) fn frames(&self) -> impl Iterator<Item = (&str, &(usize, Isometry3<f64>))> {
+        self.frames.iter().map(|(name, frame)| (name.as_str(), frame))
+    }
+
     /// Returns the index of the link that a URDF link was merged into, and its pose in that link's frame.
     ///
     /// # Errors

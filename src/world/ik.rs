@@ -27,6 +27,17 @@ const LARGEST_STEP: f64 = 0.3;
 ///
 /// Uses damped least squares; a joint that reaches its limit is held there and the others are solved again.
 pub fn solve(kinematics: &Kinematics, seed: &[f64], reach: &Reach) -> Option<Vec<f64>> {
+    approach(kinematics, seed, reach).ok()
+}
+
+/// Returns joint positions near `seed` that come as close to the target as the solver gets: for arms with fewer than six
+/// joints, which reach few orientations.
+pub fn nearest(kinematics: &Kinematics, seed: &[f64], reach: &Reach) -> Vec<f64> {
+    approach(kinematics, seed, reach).unwrap_or_else(|nearest| nearest)
+}
+
+/// The error has the last positions of the solver, which do not reach the target.
+fn approach(kinematics: &Kinematics, seed: &[f64], reach: &Reach) -> Result<Vec<f64>, Vec<f64>> {
     let mut positions = seed.to_vec();
     for (position, joint) in positions.iter_mut().zip(kinematics.joints()) {
         *position = position.clamp(joint.lower, joint.upper);
@@ -35,12 +46,12 @@ pub fn solve(kinematics: &Kinematics, seed: &[f64], reach: &Reach) -> Option<Vec
         let (grasp, jacobian) = kinematics.grasp_jacobian(&positions);
         let error = pose_error(&grasp, &reach.target);
         if error.fixed_rows::<3>(0).norm() < REACHED_M && error.fixed_rows::<3>(3).norm() < REACHED_RAD {
-            return Some(positions);
+            return Ok(positions);
         }
         let jacobian = DMatrix::from_iterator(6, positions.len(), jacobian.iter().copied());
         step(kinematics, &mut positions, &jacobian, &error, &reach.mobility);
     }
-    None
+    Err(positions)
 }
 
 /// Performs one iteration. Joints that would pass a limit stop at it, and the others compensate.

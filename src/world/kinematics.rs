@@ -75,6 +75,11 @@ impl Kinematics {
         self.links(positions)[self.camera.0] * self.camera.1
     }
 
+    /// Returns the link that the camera is on.
+    pub(crate) fn camera_link(&self) -> usize {
+        self.camera.0
+    }
+
     /// Returns the nearest ancestor link with shapes. (Stages of a mobile base have none.)
     pub(crate) fn solid_parent(&self, mut link: usize) -> Option<usize> {
         while link > 0 {

@@ -38,11 +38,8 @@ impl Named {
             None => None,
         };
         let [left_link, right_link] = &profile.finger_links;
-        let [roll, pitch, yaw] = profile.grasp_turned_rad;
-        let (grasp_link, grasp_at) = model.frame(&profile.grasp_link)?;
-        let turned = UnitQuaternion::from_euler_angles(roll, pitch, yaw);
-        let moved = Translation3::from(Vector3::from(profile.grasp_offset_m));
-        let grasp = (grasp_link, grasp_at * moved * turned);
+        let grasp = frame(model, &profile.grasp_link, profile.grasp_offset_m, profile.grasp_turned_rad)?;
+        let camera = frame(model, &profile.camera_link, profile.camera_offset_m, profile.camera_turned_rad)?;
         let finger_links = [model.frame(left_link)?.0, model.frame(right_link)?.0];
         let layout = Layout {
             base,
@@ -50,8 +47,20 @@ impl Named {
             head: joints(&profile.head_joints)?,
             gripper: Gripper::find(profile, model, finger_links, grasp)?,
         };
-        Ok(Self { layout, finger_links, grasp, camera: model.frame(&profile.camera_link)? })
+        Ok(Self { layout, finger_links, grasp, camera })
     }
+}
+
+/// A frame in a link's frame, moved and turned: the merged link, and the pose in its frame.
+pub(super) fn frame(
+    model: &RobotModel,
+    link: &str,
+    offset_m: [f64; 3],
+    [roll, pitch, yaw]: [f64; 3],
+) -> Result<(usize, Isometry3<f64>), WorldError> {
+    let (link, at) = model.frame(link)?;
+    let turned = UnitQuaternion::from_euler_angles(roll, pitch, yaw);
+    Ok((link, at * Translation3::from(Vector3::from(offset_m)) * turned))
 }
 
 /// Checks that a profile matches its URDF, without simulating.

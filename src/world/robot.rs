@@ -51,8 +51,8 @@ pub fn geometry(start: &RobotStart) -> Result<(Kinematics, Layout, Vec<f64>), Wo
 fn root_of(start: &RobotStart, layout: &Layout) -> Isometry3<f64> {
     let [x, y, heading] = start.base;
     match layout.base {
-        // The root of a mobile robot is at the world's origin, which is the frame of its odometry.
-        Some(_) => Isometry3::identity(),
+        // The root of a mobile robot is above the world's origin, which is the frame of its odometry.
+        Some(_) => Isometry3::translation(0.0, 0.0, start.profile.mount_height_m),
         None => Pose::upright([x, y, start.profile.mount_height_m], heading).to_isometry(),
     }
 }

@@ -15,6 +15,9 @@ const CLEAR_M: f64 = 0.01;
 /// Share of their distance in a valid posture that links keep if that distance is smaller.
 const KEPT_SHARE: f64 = 0.9;
 
+/// Error of distances in 32 bits. Unit: metres.
+const ROUNDING_M: f64 = 1e-4;
+
 /// The shapes of a robot's links, and the pairs of links that could collide.
 #[derive(Clone)]
 pub struct SelfContact {
@@ -29,10 +32,18 @@ struct Pair {
     clear_m: f64,
 }
 
+/// A convex solid with the ball around it, in its link's frame.
+#[derive(Clone)]
+struct Solid {
+    pose: EnginePose,
+    shape: SharedShape,
+    ball: Ball,
+}
+
 /// The convex solids of one link, in its frame.
 #[derive(Clone)]
 struct Form {
-    solids: Vec<(EnginePose, SharedShape)>,
+    solids: Vec<Solid>,
     /// Centre of their bounding sphere.
     middle: Point3<f64>,
     radius: f64,
@@ -61,6 +72,18 @@ impl SelfContact {
         Self { links, pairs }
     }
 
+    /// Returns the pairs that overlap at these link poses.
+    pub(crate) fn overlaps(&self, poses: &[Isometry3<f64>]) -> Vec<(usize, usize)> {
+        let overlap = |pair: &&Pair| gap(&self.links, **pair, poses) <= 0.0;
+        self.pairs.iter().filter(overlap).map(|pair| pair.links).collect()
+    }
+
+    /// Drops these pairs: such links always overlap.
+    pub(crate) fn without(mut self, overlapping: &[(usize, usize)]) -> Self {
+        self.pairs.retain(|pair| !overlapping.contains(&pair.links));
+        self
+    }
+
     /// Whether any two links collide, or nearly so, at these link poses (see [`Kinematics::links`]).
     pub fn touches(&self, poses: &[Isometry3<f64>]) -> bool {
         self.pairs.iter().any(|pair| gap(&self.links, *pair, poses) < pair.clear_m)
@@ -76,10 +99,17 @@ fn gap(links: &[Form], Pair { links: (first, second), clear_m }: Pair, poses: &[
     }
     let (at_a, at_b) = (to_pose(&poses[first]), to_pose(&poses[second]));
     let mut nearest = clear_m;
-    for (on_a, solid_a) in &a.solids {
-        for (on_b, solid_b) in &b.solids {
+    let middles: Vec<Point3<f64>> = b.solids.iter().map(|solid| poses[second] * solid.ball.middle).collect();
+    for solid_a in &a.solids {
+        let middle = poses[first] * solid_a.ball.middle;
+        let on_a = at_a * solid_a.pose;
+        for (solid_b, middle_b) in b.solids.iter().zip(&middles) {
+            let apart = (middle - middle_b).norm() - solid_a.ball.radius - solid_b.ball.radius;
+            if apart > nearest + ROUNDING_M {
+                continue;
+            }
             // Convex solids are always supported; an unsupported pair would count as a collision.
-            let found = distance(&(at_a * *on_a), solid_a.as_ref(), &(at_b * *on_b), solid_b.as_ref());
+            let found = distance(&on_a, solid_a.shape.as_ref(), &(at_b * solid_b.pose), solid_b.shape.as_ref());
             nearest = nearest.min(found.map_or(0.0, |found| f64::from(found.distance)));
         }
     }
@@ -107,11 +137,10 @@ impl Ball {
 impl Form {
     fn new(solids: &[actcheck_data::Part]) -> Self {
         let around = Ball::around(solids).unwrap_or(Ball { middle: Point3::origin(), radius: 0.0 });
-        let forms = solids.iter().filter_map(|solid| collider(solid, Owner::Floor, 0.0, 0.0));
-        Self {
-            solids: forms.map(|form| (form.position, form.shape)).collect(),
-            middle: around.middle,
-            radius: around.radius,
-        }
+        let forms = solids.iter().filter_map(|solid| {
+            let form = collider(solid, Owner::Floor, 0.0, 0.0)?;
+            Some(Solid { pose: form.position, shape: form.shape, ball: Ball::around(std::slice::from_ref(solid))? })
+        });
+        Self { solids: forms.collect(), middle: around.middle, radius: around.radius }
     }
 }

@@ -30,6 +30,14 @@ impl Lookup<'_> {
 
     fn find(&self, path: &str) -> Option<PathBuf> {
         let places = self.folders.iter().map(|folder| folder.join(path));
-        places.into_iter().find(|place| self.files.list(place.parent().unwrap_or(place)).contains(place))
+        let exists = |place: &PathBuf| self.files.list(place.parent().unwrap_or(place)).contains(place);
+        places.into_iter().find(exists).or_else(|| self.find_in_package(path).filter(exists))
+    }
+
+    /// The path in a folder that is the package itself, by its name.
+    fn find_in_package(&self, path: &str) -> Option<PathBuf> {
+        let (package, inside) = path.split_once('/')?;
+        let own = self.folders.iter().find(|folder| folder.file_name().is_some_and(|name| name == package))?;
+        Some(own.join(inside))
     }
 }

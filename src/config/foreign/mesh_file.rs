@@ -1,5 +1,6 @@
 //! Reads mesh files: stl and obj with the `mesh_loader` crate, dae with [`collada`](super::collada).
 
+use std::borrow::Cow;
 use std::path::Path;
 
 use crate::foreign::collada;
@@ -39,7 +40,7 @@ pub(crate) fn read(files: &Files, path: &Path) -> Result<MeshFile, Diagnostics> 
             .into()
     };
     let mesh = match ending.as_str() {
-        "stl" => of_scene(mesh_loader::stl::from_slice(&bytes)),
+        "stl" => of_scene(mesh_loader::stl::from_slice(&as_binary(&bytes))),
         // Materials do not affect collisions, so their files are not read.
         "obj" => of_scene(mesh_loader::obj::from_slice(&bytes, Some(path), |_| Ok(Vec::new()))),
         "dae" => {
@@ -54,6 +55,19 @@ pub(crate) fn read(files: &Files, path: &Path) -> Result<MeshFile, Diagnostics> 
     };
     let mesh = mesh.map_err(unusable)?;
     Ok(MeshFile { mesh, bytes, warnings })
+}
+
+/// Returns the bytes of an STL file so that a binary one is recognised as such: many begin with `solid`, the word that
+/// marks files of text. The length of a binary file follows from its number of triangles.
+fn as_binary(bytes: &[u8]) -> Cow<'_, [u8]> {
+    let count = bytes.get(80..84).and_then(|count| count.try_into().ok()).map(u32::from_le_bytes);
+    let is_binary = count.is_some_and(|count| bytes.len() as u64 == 84 + 50 * u64::from(count));
+    if !(is_binary && bytes.starts_with(b"solid")) {
+        return Cow::Borrowed(bytes);
+    }
+    let mut marked = bytes.to_vec();
+    marked[..5].copy_from_slice(b"     ");
+    Cow::Owned(marked)
 }
 
 /// Merges all meshes of a file.
@@ -79,4 +93,25 @@ pub(crate) fn checked(vertices: Vec<[f64; 3]>, triangles: Vec<[u32; 3]>) -> Resu
     }
     let welded = Mesh::new(vertices, triangles)?.welded();
     Mesh::new(welded.vertices, welded.triangles)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Binary files of some exporters begin with the word that marks files of text.
+    #[test]
+    fn a_binary_stl_that_begins_with_solid_is_read() {
+        let mut bytes = b"solid exported".to_vec();
+        bytes.resize(80, b' ');
+        bytes.extend(1u32.to_le_bytes());
+        for number in [0.0_f32, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0] {
+            bytes.extend(number.to_le_bytes());
+        }
+        bytes.extend([0, 0]);
+        let mesh = of_scene(mesh_loader::stl::from_slice(&as_binary(&bytes))).expect("it is an STL file");
+        assert_eq!(mesh.triangles.len(), 1);
+        let text = b"solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\nendsolid a\n";
+        assert!(matches!(as_binary(text), Cow::Borrowed(_)));
+    }
 }

@@ -10,14 +10,35 @@ mod geometry;
 pub(crate) mod lenient;
 mod lookup;
 mod mesh_file;
+pub(crate) mod mjcf;
+mod mjcf_compiler;
 mod nested;
 pub(crate) mod robot;
 pub(crate) mod robot_inertia;
 pub(crate) mod robot_tree;
 mod sdf;
+pub(crate) mod sdf_robot;
 mod urdf;
+mod urdf_text;
 pub(crate) mod world;
 mod xml;
 
 pub(crate) use folder::{find, read};
 pub(crate) use lookup::Lookup;
+
+/// Returns the name of the first element of an XML text.
+pub(crate) fn root_name(text: &str) -> Option<&str> {
+    let mut rest = text.trim_start_matches('\u{feff}').trim_start();
+    loop {
+        let end = if rest.starts_with("<!--") {
+            "-->"
+        } else if rest.starts_with("<?") || rest.starts_with("<!") {
+            ">"
+        } else {
+            break;
+        };
+        rest = rest[rest.find(end)? + end.len()..].trim_start();
+    }
+    let name = rest.strip_prefix('<')?;
+    name.split(|c: char| c.is_whitespace() || c == '>' || c == '/').next()
+}

@@ -13,6 +13,8 @@ use rapier3d::prelude::Collider;
 const ALONG_M: [f64; 5] = [-0.01, -0.005, 0.0, 0.005, 0.01];
 /// The same for the direction of the fingers' width. Fingertips are seldom narrower than 1 cm.
 const ACROSS_M: [f64; 5] = [-0.008, -0.004, 0.0, 0.004, 0.008];
+/// Surfaces that differ by less than this are flat. Unit: metres.
+const FLAT_M: f64 = 0.0015;
 /// Distance from which surfaces are measured: beyond any finger. Unit: metres.
 const AWAY_M: f64 = 0.5;
 
@@ -87,6 +89,26 @@ impl<'a> Probe<'a> {
             nearest.min_by(f64::total_cmp).map(|along| sign * (along - AWAY_M))
         });
         Some(Gap { left_m: left?, right_m: right? })
+    }
+
+    /// Returns the share of the measured length along the fingers at which their gap is nearly the smallest: 1 if the
+    /// grasp frame is in the middle of two parallel pads.
+    pub(crate) fn flat_share(&self, positions: &[f64]) -> f64 {
+        let grasp = self.pose(self.grasp.0, positions) * self.grasp.1;
+        let width = |row: usize| -> Option<f64> {
+            let [left, right] = [0, 1].map(|side| {
+                let sign = if side == 0 { 1.0 } else { -1.0 };
+                let from_grasp = self.pose(self.links[side], positions).inverse() * grasp;
+                let rays = Self::rays(&from_grasp, sign).skip(row * ACROSS_M.len()).take(ACROSS_M.len());
+                let nearest = rays.filter_map(|ray| self.hit(side, &ray)).min_by(f64::total_cmp);
+                nearest.map(|along| along - AWAY_M)
+            });
+            Some(left? + right?)
+        };
+        let widths: Vec<Option<f64>> = (0..ALONG_M.len()).map(width).collect();
+        let least = widths.iter().flatten().copied().fold(f64::INFINITY, f64::min);
+        let flat = widths.iter().flatten().filter(|width| **width < least + FLAT_M).count();
+        flat as f64 / ALONG_M.len() as f64
     }
 
     fn rays(from_grasp: &Isometry3<f64>, sign: f64) -> impl Iterator<Item = Ray> + '_ {

@@ -15,4 +15,5 @@ mod table;
 #[cfg(test)]
 mod tests;
 
+pub(crate) use gap::Probe;
 pub use opening::Gripper;

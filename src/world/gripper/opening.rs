@@ -86,6 +86,14 @@ impl Gripper {
         self.widest_m
     }
 
+    /// Returns the difference between the widest and the smallest opening. Unit: metres.
+    pub(crate) fn travel_m(&self) -> f64 {
+        match self.table.first() {
+            Some(closed) => self.widest_m - closed.gap.width_m().max(0.0),
+            None => self.widest_m,
+        }
+    }
+
     /// Returns the gap between the fingers at these joint positions. Unit: metres.
     pub fn opening_m(&self, positions: &[f64]) -> f64 {
         if self.table.is_empty() {

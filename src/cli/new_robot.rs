@@ -1,0 +1,129 @@
+//! `actcheck new robot`
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+
+use crate::new_files::NewFiles;
+use crate::output;
+use actcheck_base::{Diagnostics, Files};
+use actcheck_campaign::proposed_robot;
+use actcheck_config::robot;
+use actcheck_data::RobotProfile;
+
+/// Folder of the cache of convex meshes: the usual history beside a configuration.
+const HISTORY: &str = ".actcheck";
+
+/// `actcheck new robot`
+#[derive(Debug, Args)]
+pub struct NewRobotArgs {
+    /// The robot's model: URDF, or xacro (FILE.xacro)
+    #[arg(value_name = "FILE")]
+    pub model: PathBuf,
+    /// Folders in which `package://NAME` and `$(find NAME)` look for packages, besides those around the model
+    #[arg(long = "packages", value_name = "DIR")]
+    pub package_dirs: Vec<PathBuf>,
+    /// An argument of the xacro file, such as `gripper:=robotiq_2f_85`
+    #[arg(long = "xacro-arg", value_name = "NAME:=VALUE")]
+    pub xacro_args: Vec<String>,
+    /// The profile to write [default: the model's name with the extension .toml, in this folder]
+    #[arg(long, value_name = "PROFILE")]
+    pub out: Option<PathBuf>,
+}
+
+/// Writes a profile proposed for a robot's model.
+pub fn robot(args: &NewRobotArgs) -> Result<(), Diagnostics> {
+    let bare = robot::bare(&Files::Disk, &args.model, &args.package_dirs, &args.xacro_args)?;
+    let name = bare.name.clone();
+    let out = args.out.clone().unwrap_or_else(|| PathBuf::from(format!("{name}.toml")));
+    let folder = out.parent().unwrap_or(Path::new(""));
+    let (profile, notes) = proposed_robot(bare, &folder.join(HISTORY))?;
+    let mut files = NewFiles::default();
+    files.add(&out, text(&profile, &notes, args, folder));
+    files.write("name another file with `--out PROFILE`, or delete it")?;
+    output::print_prose(&format!(
+        "wrote {}: {} with an arm of {} joints, fingers {} and {} that open {:.0} mm, camera {}\n\
+         next: name it as `profile` in `[robot]` of a configuration, then `actcheck check CONFIG`\n",
+        out.display(),
+        if profile.base_joints.is_some() { "a mobile robot" } else { "a fixed robot" },
+        profile.arm_joints.len(),
+        profile.finger_links[0],
+        profile.finger_links[1],
+        profile.max_opening_m * 1e3,
+        profile.camera_link,
+    ));
+    Ok(())
+}
+
+/// The profile as TOML, with a comment for each guess.
+fn text(profile: &RobotProfile, notes: &BTreeMap<&'static str, String>, args: &NewRobotArgs, folder: &Path) -> String {
+    let mut lines =
+        vec![format!("# Proposed by `actcheck new robot {}`: check each guess.", args.model.display()), String::new()];
+    let mut add = |key: &str, value: String| {
+        if let Some(note) = notes.get(key) {
+            lines.push(format!("# Guessed: {note}."));
+        }
+        lines.push(format!("{key} = {value}"));
+    };
+    add("urdf", quoted(&seen_from(folder, &args.model)));
+    if !args.package_dirs.is_empty() {
+        let folders: Vec<String> = args.package_dirs.iter().map(|packages| seen_from(folder, packages)).collect();
+        add("package_dirs", list(&folders));
+    }
+    if !args.xacro_args.is_empty() {
+        add("xacro_args", list(&args.xacro_args));
+    }
+    match &profile.base_joints {
+        Some(_) if profile.planar_base => add("base", quoted("planar")),
+        Some(joints) => add("base_joints", list(joints)),
+        None => {}
+    }
+    if profile.mount_height_m != 0.0 {
+        add("mount_height_m", profile.mount_height_m.to_string());
+    }
+    add("arm_joints", list(&profile.arm_joints));
+    add("finger_joints", list(&profile.finger_joints));
+    add("finger_links", list(&profile.finger_links));
+    add("grasp_link", quoted(&profile.grasp_link));
+    add("grasp_offset_m", numbers(&profile.grasp_offset_m));
+    add("grasp_turned_rad", numbers(&profile.grasp_turned_rad));
+    add("max_opening_m", profile.max_opening_m.to_string());
+    add("camera_link", quoted(&profile.camera_link));
+    let usual = if profile.camera_link.contains("optical") { robot::OPTICAL_TURNED_RAD } else { [0.0; 3] };
+    if profile.camera_turned_rad != usual {
+        add("camera_turned_rad", numbers(&profile.camera_turned_rad));
+    }
+    if !profile.head_joints.is_empty() {
+        add("head_joints", list(&profile.head_joints));
+    }
+    add("home", numbers(&profile.home));
+    add("postures", postures(profile));
+    lines.join("\n") + "\n"
+}
+
+fn postures(profile: &RobotProfile) -> String {
+    let each = profile.postures.iter().map(|arm| format!("    {{ arm = {} }},\n", numbers(arm)));
+    format!("[\n{}]", each.collect::<String>())
+}
+
+/// A path as it is written in a profile in this folder.
+fn seen_from(folder: &Path, path: &Path) -> String {
+    match folder.as_os_str().is_empty() {
+        true => path.display().to_string(),
+        false => std::path::absolute(path).unwrap_or_else(|_| path.to_owned()).display().to_string(),
+    }
+}
+
+/// A basic string of TOML.
+fn quoted(text: &str) -> String {
+    format!("\"{}\"", text.replace('\\', "\\\\").replace('"', "\\\""))
+}
+
+fn list(names: &[String]) -> String {
+    format!("[{}]", names.iter().map(|name| quoted(name)).collect::<Vec<_>>().join(", "))
+}
+
+fn numbers(values: &[f64]) -> String {
+    format!("[{}]", values.iter().map(f64::to_string).collect::<Vec<_>>().join(", "))
+}

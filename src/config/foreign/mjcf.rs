@@ -1,0 +1,385 @@
+//! Converts a robot in MJCF, MuJoCo's format, to URDF: bodies, joints, geoms, inertias, equalities of joints.
+//!
+//! Sites and cameras become links, so that a profile can name them. Tendons, contacts and options are not read.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::rc::Rc;
+
+use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
+
+use crate::foreign::mjcf_compiler::{Attributes, Compiler};
+use crate::foreign::urdf_text::{Inertial, UrdfJoint, UrdfText, escaped};
+use crate::foreign::xml::{self, Bound, Node, Reader};
+use actcheck_base::{Diagnostics, Source};
+
+/// Density of geoms: MuJoCo's default. Unit: kg/m³.
+const DENSITY: f64 = 1000.0;
+/// Mass of a body with neither a mass nor a shape whose volume is known. Unit: kilograms.
+const UNKNOWN_KG: f64 = 0.1;
+/// Edge of the cube whose inertia such a body gets. Unit: metres.
+const UNKNOWN_M: f64 = 0.05;
+/// Largest effort of a joint without limits of its actuator. Units: newtons or newton metres.
+const EFFORT: f64 = 100.0;
+/// Largest velocity of joints, which MJCF does not have. Units: rad/s and m/s.
+const VELOCITY: [f64; 2] = [2.0, 0.5];
+/// Range of an unlimited sliding joint. Unit: metres.
+const SLIDES_M: f64 = 10.0;
+
+/// Converts a text.
+///
+/// # Errors
+/// Faults of the text: W031 to W036, W055.
+pub(crate) fn to_urdf(source: &Source, path: &Path, files: &actcheck_base::Files) -> Result<Source, Diagnostics> {
+    let text = crate::foreign::mjcf_compiler::with_includes(source, path, files, 0)?;
+    let source = &Source::new(source.name.to_string(), text);
+    let document = xml::parse_model(source, &source.text)?;
+    let root = document.root_element();
+    let mut reader = Reader::new(source);
+    let compiler = Compiler::read(root, &mut reader);
+    let mut robot = Robot {
+        out: UrdfText::default(),
+        mimics: mimics(root, &mut reader),
+        efforts: efforts(root, &compiler, &mut reader),
+        compiler: Rc::new(compiler),
+        names: BTreeMap::new(),
+    };
+    let world = robot.unique("world");
+    robot.out.link(&world, None, &[]);
+    match xml::child(root, "worldbody") {
+        Some(worldbody) => robot.children(worldbody, &world, &Isometry3::identity(), None, &mut reader),
+        None => reader.error("W033", root, "`<mujoco>` has no `<worldbody>`".to_owned(), "add the robot's bodies"),
+    }
+    reader.found.or(())?;
+    let name = root.attribute("model").unwrap_or("robot").to_owned();
+    Ok(Source::new(format!("{} (as URDF)", source.name), robot.out.finish(&name)))
+}
+
+/// Joints that equalities couple to others, with the leader, factor and offset.
+fn mimics(root: Node, reader: &mut Reader) -> BTreeMap<String, (String, f64, f64)> {
+    let mut found = BTreeMap::new();
+    for joint in xml::children(root, "equality").flat_map(|all| xml::children(all, "joint").collect::<Vec<_>>()) {
+        let (Some(follower), Some(leader)) = (joint.attribute("joint1"), joint.attribute("joint2")) else { continue };
+        let mut known =
+            root.descendants().filter(|node| node.has_tag_name("joint")).filter_map(|node| node.attribute("name"));
+        if !known.any(|name| name == leader) {
+            let message = format!("there is no movable joint `{leader}` to mimic");
+            reader.error("W051", joint, message, "`joint2` names the joint that `joint1` follows");
+            continue;
+        }
+        let written = joint.attribute("polycoef").unwrap_or("0 1 0 0 0");
+        let numbers: Vec<f64> = written.split_whitespace().filter_map(|word| word.parse().ok()).collect();
+        let (offset, factor) = (numbers.first().copied().unwrap_or(0.0), numbers.get(1).copied().unwrap_or(1.0));
+        if numbers.iter().skip(2).any(|number| *number != 0.0) {
+            let message =
+                format!("the coupling of `{follower}` to `{leader}` is not linear: only its linear part is used");
+            reader.warning("W036", joint, message, "the joint then deviates from its mechanism");
+        }
+        found.insert(follower.to_owned(), (leader.to_owned(), factor, offset));
+    }
+    found
+}
+
+/// Largest effort of joints by the force limits of their actuators.
+fn efforts(root: Node, compiler: &Compiler, reader: &mut Reader) -> BTreeMap<String, f64> {
+    let mut found = BTreeMap::new();
+    for actuator in xml::children(root, "actuator").flat_map(|all| all.children().filter(Node::is_element)) {
+        let attributes = compiler.attributes(actuator, None);
+        let Some(joint) = actuator.attribute("joint") else { continue };
+        let is_motor = actuator.tag_name().name() == "motor";
+        let limits = attributes.get("forcerange").or(if is_motor { attributes.get("ctrlrange") } else { None });
+        let Some([lower, upper]) = limits.and_then(|text| reader.numbers(actuator, text, Bound::Finite)) else {
+            continue;
+        };
+        found.insert(joint.to_owned(), f64::max(-lower, upper));
+    }
+    found
+}
+
+struct Robot {
+    out: UrdfText,
+    compiler: Rc<Compiler>,
+    mimics: BTreeMap<String, (String, f64, f64)>,
+    efforts: BTreeMap<String, f64>,
+    /// Names in use, each with the number of its copies.
+    names: BTreeMap<String, u32>,
+}
+
+impl Robot {
+    /// A name that no other link or joint has.
+    fn unique(&mut self, name: &str) -> String {
+        let count = self.names.entry(name.to_owned()).or_insert(0);
+        *count += 1;
+        if *count == 1 { name.to_owned() } else { format!("{name}_{count}") }
+    }
+
+    /// Writes the bodies, sites and cameras in a body. `shift` is the body's frame in the frame of its link.
+    fn children(&mut self, node: Node, link: &str, shift: &Isometry3<f64>, class: Option<&str>, reader: &mut Reader) {
+        for child in node.children().filter(Node::is_element) {
+            match child.tag_name().name() {
+                "body" => self.body(child, link, shift, class, reader),
+                "frame" => {
+                    let pose = self.compiler.pose(&self.compiler.attributes(child, class), child, reader);
+                    let class = child.attribute("childclass").or(class);
+                    self.children(child, link, &(shift * pose), class, reader);
+                }
+                "site" | "camera" => {
+                    let Some(name) = child.attribute("name") else { continue };
+                    let pose = self.compiler.pose(&self.compiler.attributes(child, class), child, reader);
+                    let turned = if child.tag_name().name() == "camera" { lens() } else { Isometry3::identity() };
+                    let name = self.unique(name);
+                    self.out.frame(&name, link, shift * pose * turned);
+                }
+                _ => {}
+            }
+        }
+    }
+
+    fn body(&mut self, body: Node, parent: &str, shift: &Isometry3<f64>, class: Option<&str>, reader: &mut Reader) {
+        let compiler = Rc::clone(&self.compiler);
+        let class = body.attribute("childclass").or(class);
+        let name = self.unique(body.attribute("name").unwrap_or("body"));
+        let attributes = compiler.attributes(body, class);
+        let mut at = shift * compiler.pose(&attributes, body, reader);
+        let joints: Vec<Node> = xml::children(body, "joint").collect();
+        let mut from = parent.to_owned();
+        // Position of the body's origin in the frame of its link.
+        let mut own = Isometry3::identity();
+        for (idx, joint) in joints.iter().enumerate() {
+            let attributes = compiler.attributes(*joint, class);
+            let anchor = attributes.get("pos").and_then(|text| reader.numbers(*joint, text, Bound::Finite));
+            let anchor = Translation3::from(Vector3::from(anchor.unwrap_or([0.0; 3])));
+            let link = if idx + 1 == joints.len() { name.clone() } else { self.unique(&format!("{name}_{}", idx + 1)) };
+            if idx + 1 < joints.len() {
+                self.out.link(&link, None, &[]);
+            }
+            if self.joint(*joint, &attributes, (&from, &link), at * anchor, reader).is_some() {
+                (from, own) = (link, Isometry3::from_parts(anchor, UnitQuaternion::identity()).inverse());
+                at = own;
+            }
+        }
+        if joints.is_empty() {
+            let fixed = self.unique(&format!("{name}_fixed"));
+            self.out.joint(&UrdfJoint::fixed(&fixed, parent, &name, at));
+        }
+        let solids = self.solids(body, &own, class, reader);
+        let inertial = self.inertial(body, &own, class, &solids, reader);
+        let solids: Vec<(Isometry3<f64>, String)> = solids.into_iter().map(|(pose, shape, _)| (pose, shape)).collect();
+        self.out.link(&name, Some(&inertial), &solids);
+        self.children(body, &name, &own, class, reader);
+    }
+
+    /// Writes a joint. Returns `None` after it has reported a fault.
+    fn joint(
+        &mut self,
+        joint: Node,
+        attributes: &Attributes<'_>,
+        (parent, child): (&str, &str),
+        origin: Isometry3<f64>,
+        reader: &mut Reader,
+    ) -> Option<()> {
+        let (kind, slides) = match attributes.get("type").unwrap_or("hinge") {
+            "hinge" => ("revolute", false),
+            "slide" => ("prismatic", true),
+            other => {
+                let message = format!("a joint of the type {other} can't be simulated");
+                reader.error("W035", joint, message, "joints of robots are `hinge` or `slide`");
+                return None;
+            }
+        };
+        let name = joint.attribute("name").map_or_else(|| format!("{child}_joint"), str::to_owned);
+        let axis =
+            attributes.get("axis").map_or(Some([0.0, 0.0, 1.0]), |text| reader.numbers(joint, text, Bound::Finite))?;
+        let range = match attributes.get("range") {
+            Some(text) => Some(reader.numbers::<2>(joint, text, Bound::Finite)?),
+            None => None,
+        };
+        if let Some([lower, upper]) = range.filter(|[lower, upper]| lower > upper) {
+            let message = format!("the joint `{name}` has a lower limit of {lower} above its upper limit of {upper}");
+            reader.error("W034", joint, message, "write the smaller number of `range` first");
+            return None;
+        }
+        let limited = match attributes.get("limited") {
+            Some("true") => true,
+            Some("false") => false,
+            _ => range.is_some(),
+        };
+        let unit = if slides { 1.0 } else { self.compiler.angle };
+        let (kind, range) = match (range.filter(|_| limited), slides) {
+            (Some(range), _) => (kind, range.map(|end| end * unit)),
+            (None, true) => (kind, [-SLIDES_M, SLIDES_M]),
+            (None, false) => ("continuous", [0.0; 2]),
+        };
+        let damping = attributes.get("damping").and_then(|text| text.split_whitespace().next()?.parse().ok());
+        let own_effort =
+            attributes.get("actuatorfrcrange").and_then(|text| reader.numbers::<2>(joint, text, Bound::Finite));
+        let effort =
+            own_effort.map(|[lower, upper]| f64::max(-lower, upper)).or_else(|| self.efforts.get(&name).copied());
+        let unique = self.unique(&name);
+        self.out.joint(&UrdfJoint {
+            name: &unique,
+            kind,
+            parent,
+            child,
+            origin,
+            axis: Vector3::from(axis),
+            range,
+            effort: effort.filter(|effort| *effort > 0.0).unwrap_or(EFFORT),
+            velocity: VELOCITY[usize::from(slides)],
+            damping: damping.unwrap_or(0.0),
+            mimic: self.mimics.get(&name).cloned(),
+        });
+        Some(())
+    }
+
+    /// Returns the colliding geoms of a body, each with its mass if its volume is known.
+    fn solids(
+        &self,
+        body: Node,
+        own: &Isometry3<f64>,
+        class: Option<&str>,
+        reader: &mut Reader,
+    ) -> Vec<(Isometry3<f64>, String, Option<f64>)> {
+        let mut found = Vec::new();
+        for geom in xml::children(body, "geom") {
+            let attributes = self.compiler.attributes(geom, class);
+            if attributes.get("contype") == Some("0") && attributes.get("conaffinity") == Some("0") {
+                continue;
+            }
+            let pose = own * self.compiler.pose(&attributes, geom, reader);
+            if let Some((moved, shape, volume)) = self.shape(geom, &attributes, reader) {
+                let density = attributes.get("density").and_then(|text| text.parse().ok()).unwrap_or(DENSITY);
+                let stated = attributes.get("mass").and_then(|text| text.parse().ok());
+                // An end-to-end geom has its pose from its ends.
+                let pose = moved.map_or(pose, |moved| own * moved);
+                found.push((pose, shape, stated.or(volume.map(|volume| volume * density))));
+            }
+        }
+        found
+    }
+
+    /// The pose of a geom that is given by its ends, its element of a `<geometry>`, and its volume if it is known.
+    fn shape(
+        &self,
+        geom: Node,
+        attributes: &Attributes<'_>,
+        reader: &mut Reader,
+    ) -> Option<(Option<Isometry3<f64>>, String, Option<f64>)> {
+        use std::f64::consts::PI;
+        let kind = attributes.get("type").unwrap_or(if attributes.get("mesh").is_some() { "mesh" } else { "sphere" });
+        if kind == "mesh" {
+            let name = attributes.get("mesh").unwrap_or_default();
+            let Some((file, scale)) = self.compiler.meshes.get(name) else {
+                let message = format!("there is no mesh `{name}` in `<asset>`");
+                reader.error("W035", geom, message, "add `<mesh name=\"…\" file=\"…\"/>` to `<asset>`");
+                return None;
+            };
+            let file = escaped(file);
+            return Some((None, format!("<mesh filename=\"{file}\" scale=\"{scale}\"/>"), None));
+        }
+        if !["sphere", "box", "cylinder", "capsule", "ellipsoid"].contains(&kind) {
+            // A plane or a height field does not belong to a robot.
+            return None;
+        }
+        let size: Vec<f64> = attributes
+            .get("size")
+            .unwrap_or_default()
+            .split_whitespace()
+            .filter_map(|word| word.parse().ok())
+            .collect();
+        let ends = match attributes.get("fromto") {
+            Some(text) => Some(reader.numbers::<6>(geom, text, Bound::Finite)?),
+            None => None,
+        };
+        let (moved, half_length) = match ends {
+            Some([ax, ay, az, bx, by, bz]) => {
+                let (a, b) = (Point3::new(ax, ay, az), Point3::new(bx, by, bz));
+                let turned = UnitQuaternion::rotation_between(&Vector3::z(), &(b - a))
+                    .unwrap_or_else(|| UnitQuaternion::from_axis_angle(&Vector3::x_axis(), PI));
+                let middle = nalgebra::center(&a, &b);
+                (Some(Isometry3::from_parts(Translation3::from(middle.coords), turned)), Some((b - a).norm() / 2.0))
+            }
+            None => (None, size.get(1).copied()),
+        };
+        let wanted = match (kind, ends) {
+            ("sphere", _) | ("cylinder" | "capsule", Some(_)) => 1,
+            ("cylinder" | "capsule", None) => 2,
+            _ => 3,
+        };
+        if size.len() < wanted || size.iter().any(|number| !(number.is_finite() && *number >= 0.0)) {
+            let message = format!("a geom of the type {kind} needs {wanted} positive numbers in `size`");
+            reader.error("W034", geom, message, "sizes are radii and half lengths in metres");
+            return None;
+        }
+        let (r, half) = (size[0], half_length.unwrap_or(0.0));
+        let (shape, volume) = match kind {
+            "sphere" => (format!("<sphere radius=\"{r}\"/>"), 4.0 / 3.0 * PI * r.powi(3)),
+            "cylinder" => (format!("<cylinder radius=\"{r}\" length=\"{}\"/>", 2.0 * half), 2.0 * PI * r * r * half),
+            "capsule" => (
+                format!("<capsule radius=\"{r}\" length=\"{}\"/>", 2.0 * half),
+                2.0 * PI * r * r * half + 4.0 / 3.0 * PI * r.powi(3),
+            ),
+            _ => {
+                let [x, y, z] = [size[0], size[1], size[2]].map(|extent| 2.0 * extent);
+                (format!("<box size=\"{x} {y} {z}\"/>"), x * y * z)
+            }
+        };
+        Some((moved, shape, Some(volume)))
+    }
+
+    /// The inertia of a body: stated, or that of its geoms as points with the inertia of small cubes.
+    fn inertial(
+        &self,
+        body: Node,
+        own: &Isometry3<f64>,
+        class: Option<&str>,
+        solids: &[(Isometry3<f64>, String, Option<f64>)],
+        reader: &mut Reader,
+    ) -> Inertial {
+        let stated = xml::child(body, "inertial").and_then(|node| {
+            let attributes = self.compiler.attributes(node, class);
+            let pose = own * self.compiler.pose(&attributes, node, reader);
+            let [kg] = reader.numbers::<1>(node, attributes.get("mass")?, Bound::Mass)?;
+            let about_com = match (attributes.get("fullinertia"), attributes.get("diaginertia")) {
+                (Some(text), _) => {
+                    let [xx, yy, zz, xy, xz, yz] = reader.numbers(node, text, Bound::Finite)?;
+                    Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz)
+                }
+                (None, Some(text)) => {
+                    Matrix3::from_diagonal(&Vector3::from(reader.numbers::<3>(node, text, Bound::Finite)?))
+                }
+                (None, None) => cube(kg),
+            };
+            Some(Inertial { pose, kg, about_com })
+        });
+        if let Some(stated) = stated {
+            return stated;
+        }
+        let parts: Vec<(Vector3<f64>, f64)> = solids
+            .iter()
+            .filter_map(|(pose, _, kg)| Some((pose.translation.vector, kg.filter(|kg| *kg > 0.0)?)))
+            .collect();
+        let kg: f64 = parts.iter().map(|(_, kg)| kg).sum();
+        if kg <= 0.0 {
+            return Inertial { pose: *own, kg: UNKNOWN_KG, about_com: cube(UNKNOWN_KG) };
+        }
+        let com = parts.iter().map(|(at, kg)| at * *kg).sum::<Vector3<f64>>() / kg;
+        let of_point = |(at, kg): &(Vector3<f64>, f64)| {
+            let d = at - com;
+            (Matrix3::identity() * d.norm_squared() - d * d.transpose()) * *kg + cube(*kg)
+        };
+        Inertial { pose: Isometry3::translation(com.x, com.y, com.z), kg, about_com: parts.iter().map(of_point).sum() }
+    }
+}
+
+/// The inertia of a cube of this mass.
+fn cube(kg: f64) -> Matrix3<f64> {
+    Matrix3::identity() * (kg * UNKNOWN_M * UNKNOWN_M / 6.0)
+}
+
+/// Our camera frame in MuJoCo's, in which the view is along -z and y is up.
+fn lens() -> Isometry3<f64> {
+    let axes = Matrix3::from_columns(&[-Vector3::z(), -Vector3::x(), Vector3::y()]);
+    let turned = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(axes));
+    Isometry3::from_parts(Translation3::identity(), turned)
+}

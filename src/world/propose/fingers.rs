@@ -1,0 +1,322 @@
+//! The gripper: which joints move it, which links are its fingertips, and where an object is between them.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion};
+
+use super::body::chain;
+use super::frames::{Pair, likely};
+use crate::Gripper;
+use crate::description::{JointKind, RobotModel};
+use crate::gripper::Probe;
+use crate::kinematics::motion;
+use actcheck_data::RobotProfile;
+
+/// Words in the names of a gripper's joints and links.
+const WORDS: [&str; 11] =
+    ["finger", "grip", "jaw", "knuckle", "hand", "thumb", "claw", "driver", "distal", "proximal", "pad"];
+/// Most pairs of fingers that are measured.
+const MOST_PAIRS: usize = 40;
+/// Opening at which a single moving finger is centred. Unit: metres. The width of a can.
+const CENTRED_AT_M: f64 = 0.06;
+/// Least change of the gap between two fingers. Unit: metres.
+const LEAST_CHANGE_M: f64 = 0.008;
+/// Openings wider than this are worth no more. Unit: metres.
+const WIDE_M: f64 = 0.12;
+
+/// A gripper, as a profile without other roles.
+pub(super) struct Hand {
+    pub(super) profile: RobotProfile,
+    /// The link that carries the fingers.
+    pub(super) palm: usize,
+    pub(super) notes: BTreeMap<&'static str, String>,
+}
+
+/// Finds the best gripper.
+///
+/// # Errors
+/// A sentence if there is none.
+pub(super) fn find(bare: &RobotProfile, model: &RobotModel) -> Result<Hand, String> {
+    let groups = groups(model);
+    if groups.is_empty() {
+        return Err(
+            "no gripper was found: none of its movable joints or their links has a name with `finger`, `grip`, \
+                    `hand`, `jaw`, `knuckle` or `thumb`"
+                .to_owned(),
+        );
+    }
+    let mut rated: Vec<(usize, usize, &BTreeSet<usize>)> =
+        groups.iter().map(|(palm, joints)| (rank(model, *palm), *palm, joints)).collect();
+    rated.sort_by_key(|(rank, palm, _)| (std::cmp::Reverse(*rank), *palm));
+    // The meshes are in the model already.
+    let light = RobotProfile { meshes: BTreeMap::new(), ..bare.clone() };
+    let best = rated.iter().find_map(|(_, palm, joints)| measure(&light, model, *palm, joints));
+    let best = best.map(|hand| Hand { profile: RobotProfile { meshes: bare.meshes.clone(), ..hand.profile }, ..hand });
+    best.ok_or_else(|| "no two links of its gripper face each other and come closer".to_owned())
+}
+
+/// Joints with a gripper's name, by the link that carries them.
+fn groups(model: &RobotModel) -> BTreeMap<usize, BTreeSet<usize>> {
+    let has_word = |name: &str| WORDS.iter().any(|word| name.to_lowercase().contains(word));
+    let has_either = |idx: usize| has_word(&model.joints[idx].name) || has_word(&model.links[idx + 1].name);
+    // A link with such a name that carries others is a palm, unless its joint has such a name too.
+    let carries = |idx: usize| {
+        (0..model.joints.len()).any(|other| other != idx && has_either(other) && chain(model, other + 1).contains(&idx))
+    };
+    let named = |idx: usize| has_word(&model.joints[idx].name) || has_either(idx) && !carries(idx);
+    let mut groups: BTreeMap<usize, BTreeSet<usize>> = BTreeMap::new();
+    for idx in (0..model.joints.len()).filter(|idx| named(*idx)) {
+        let path = chain(model, idx + 1);
+        let top = path.iter().copied().find(|joint| named(*joint)).unwrap_or(idx);
+        groups.entry(model.joints[top].parent).or_default().insert(idx);
+    }
+    groups
+}
+
+/// Long chains before short ones, then right hands.
+fn rank(model: &RobotModel, palm: usize) -> usize {
+    let name = model.links[palm].name.to_lowercase();
+    let is_right = name.contains("right") || name.starts_with("r_") || name.contains("_r_");
+    4 * chain(model, palm).len().min(6) + usize::from(is_right)
+}
+
+/// A measured candidate.
+struct Found {
+    score: f64,
+    named: Vec<usize>,
+    links: [usize; 2],
+    frame: Isometry3<f64>,
+    widest_m: f64,
+}
+
+fn measure(bare: &RobotProfile, model: &RobotModel, palm: usize, joints: &BTreeSet<usize>) -> Option<Hand> {
+    let from = Point3::origin();
+    let mut best: Option<Found> = None;
+    for (links, drives) in pairs(model, palm, joints).into_iter().take(MOST_PAIRS) {
+        for named in drives {
+            for frame in frames(model, palm, links, &named, &from) {
+                let Some(found) = rate(bare, model, palm, links, &named, frame) else { continue };
+                if best.as_ref().is_none_or(|best| found.score > best.score + 1e-9) {
+                    best = Some(found);
+                }
+            }
+        }
+    }
+    let mut found = best?;
+    centre(bare, model, palm, &mut found);
+    found.frame = as_written(&found.frame);
+    if let Some(gripper) = gripper(bare, model, palm, (found.links, &found.named, found.frame)) {
+        found.widest_m = gripper.widest_m();
+    }
+    let mut profile = bare.clone();
+    let named = alike(model, found.links).unwrap_or(found.named);
+    profile.finger_joints = named.iter().map(|idx| model.joints[*idx].name.clone()).collect();
+    profile.finger_links = found.links.map(|link| model.links[link].name.clone());
+    profile.grasp_link = model.links[palm].name.clone();
+    profile.grasp_offset_m = rounded(found.frame.translation.vector.into());
+    let (roll, pitch, yaw) = found.frame.rotation.euler_angles();
+    profile.grasp_turned_rad = rounded([roll, pitch, yaw]);
+    // Not wider than measured, up to the rounding of limits.
+    profile.max_opening_m = (found.widest_m.min(1.0) * 1000.0 + 0.1).floor() / 1000.0;
+    let mut notes = BTreeMap::new();
+    notes.insert("finger_joints", "their names, and the links that they move".to_owned());
+    notes.insert("finger_links", "these two face each other and open widest".to_owned());
+    notes.insert("grasp_offset_m", "between the fingertips, 2.5 cm before their ends".to_owned());
+    notes.insert("grasp_turned_rad", "x along the fingers, y from the right to the left one".to_owned());
+    notes.insert("max_opening_m", "measured at that place".to_owned());
+    Some(Hand { profile, palm, notes })
+}
+
+/// The joints of two fingers that slide alike, one of which mimics the other: each has a motor of its own then.
+fn alike(model: &RobotModel, links: [usize; 2]) -> Option<Vec<usize>> {
+    let [left, right] = links.map(|link| link.checked_sub(1));
+    let (left, right) = (left?, right?);
+    let slides = |idx: usize| model.joints[idx].kind == JointKind::Prismatic && model.joints[idx].lower >= -1e-3;
+    let follows = |idx: usize, other: usize| {
+        let mimic = model.joints[idx].mimic;
+        mimic.is_some_and(|(leader, factor, offset)| leader == other && (factor - 1.0).abs() < 1e-9 && offset == 0.0)
+    };
+    let is_alike = slides(left) && slides(right) && (follows(left, right) || follows(right, left));
+    is_alike.then(|| vec![left, right])
+}
+
+/// The frame with the numbers that a profile has.
+fn as_written(frame: &Isometry3<f64>) -> Isometry3<f64> {
+    let [x, y, z] = rounded(frame.translation.vector.into());
+    let (roll, pitch, yaw) = frame.rotation.euler_angles();
+    let [roll, pitch, yaw] = rounded([roll, pitch, yaw]);
+    Isometry3::from_parts(Translation3::new(x, y, z), UnitQuaternion::from_euler_angles(roll, pitch, yaw))
+}
+
+/// Rounds to the tenth of a millimetre or milliradian.
+fn rounded(values: [f64; 3]) -> [f64; 3] {
+    values.map(|value| (value * 1e4).round() / 1e4 + 0.0)
+}
+
+/// Pairs of links that could be fingertips, each with the joints that could drive them.
+fn pairs(model: &RobotModel, palm: usize, joints: &BTreeSet<usize>) -> Vec<([usize; 2], Vec<Vec<usize>>)> {
+    let is_solid = |link: usize| !model.links[link].solids.is_empty();
+    let moved: Vec<usize> = joints.iter().map(|joint| joint + 1).filter(|link| is_solid(*link)).collect();
+    // The outermost first: fingertips rather than knuckles.
+    let mut moved = moved;
+    moved.sort_by_key(|link| std::cmp::Reverse(chain(model, *link).len()));
+    let drivers = |link: usize| -> Vec<usize> {
+        let own = chain(model, link).into_iter().filter(|joint| joints.contains(joint));
+        let mut leaders: Vec<usize> = own.map(|joint| leader(model, joint)).collect();
+        leaders.dedup();
+        leaders
+    };
+    let mut found = Vec::new();
+    for (place, left) in moved.iter().enumerate() {
+        for right in moved[place + 1..].iter().copied().chain(is_solid(palm).then_some(palm)) {
+            let mut ways: Vec<Vec<usize>> = Vec::new();
+            let of_right = if right == palm { Vec::new() } else { drivers(right) };
+            let of_both: Vec<usize> = drivers(*left).into_iter().filter(|joint| of_right.contains(joint)).collect();
+            if let Some(common) = of_both.first() {
+                found.push(([*left, right], vec![vec![*common]]));
+                continue;
+            }
+            for first in drivers(*left) {
+                match of_right.as_slice() {
+                    [] => ways.push(vec![first]),
+                    several => ways.extend(several.iter().map(|second| vec![first, *second])),
+                }
+            }
+            ways.dedup();
+            found.push(([*left, right], ways));
+        }
+    }
+    found
+}
+
+/// The joint that a joint follows, or itself.
+fn leader(model: &RobotModel, joint: usize) -> usize {
+    let next = |joint: &usize| model.joints[*joint].mimic.map(|(leader, ..)| leader);
+    std::iter::successors(Some(joint), next).take(model.joints.len()).last().unwrap_or(joint)
+}
+
+/// Likely grasp frames of a pair, in the palm's frame: those at which both fingers have surfaces at several openings.
+fn frames(
+    model: &RobotModel,
+    palm: usize,
+    links: [usize; 2],
+    named: &[usize],
+    from: &Point3<f64>,
+) -> Vec<Isometry3<f64>> {
+    let ways: &[[bool; 2]] = if named.len() == 1 { &[[true, true]] } else { &[[true, true], [true, false]] };
+    let mut found: Vec<Isometry3<f64>> = Vec::new();
+    for way in ways {
+        let ends = [posture(model, named, *way, 1.0), posture(model, named, *way, 0.0)];
+        let ends = ends.map(|positions| Pair::new(model, links, &poses(model, &positions), palm));
+        for frame in likely(&ends, from) {
+            let is_known = found.iter().any(|known| {
+                let off = (known.translation.vector - frame.translation.vector).norm();
+                off < 1e-3 && known.rotation.angle_to(&frame.rotation) < 1e-2
+            });
+            if !is_known && closes(model, palm, links, &frame, |share| posture(model, named, *way, share)) {
+                found.push(frame);
+            }
+        }
+    }
+    found
+}
+
+/// Positions at a share of the way between the ends of the named joints; of the second one, in the opposite direction if
+/// the ends differ.
+fn posture(model: &RobotModel, named: &[usize], at_upper: [bool; 2], share: f64) -> Vec<f64> {
+    let mut positions: Vec<f64> = model.joints.iter().map(|joint| 0.0_f64.clamp(joint.lower, joint.upper)).collect();
+    for (joint, rises) in named.iter().zip(at_upper) {
+        let (lower, upper) = (model.joints[*joint].lower.max(-2.0), model.joints[*joint].upper.min(2.0));
+        positions[*joint] = lower + (upper - lower) * if rises { share } else { 1.0 - share };
+    }
+    // Leaders come before their followers, or the chain is longer than one.
+    for _ in 0..2 {
+        for idx in 0..positions.len() {
+            if let Some((leader, factor, offset)) = model.joints[idx].mimic {
+                positions[idx] = factor * positions[leader] + offset;
+            }
+        }
+    }
+    positions
+}
+
+/// Whether the gap between two fingers is measurable at two openings at least, and changes.
+fn closes(
+    model: &RobotModel,
+    palm: usize,
+    links: [usize; 2],
+    frame: &Isometry3<f64>,
+    posture: impl Fn(f64) -> Vec<f64>,
+) -> bool {
+    let [left, right] = links;
+    [[left, right], [right, left]].into_iter().any(|links| {
+        let probe = Probe::new(model, links, (palm, *frame));
+        let gaps = (0..=8).filter_map(|eighth| probe.gap(&posture(f64::from(eighth) / 8.0)));
+        let widths: Vec<f64> = gaps.map(|gap| gap.width_m()).collect();
+        let (least, most) = widths.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), w| (a.min(*w), b.max(*w)));
+        widths.len() >= 2 && most - least > LEAST_CHANGE_M
+    })
+}
+
+fn poses(model: &RobotModel, positions: &[f64]) -> Vec<Isometry3<f64>> {
+    let mut poses = vec![Isometry3::identity()];
+    for (joint, position) in model.joints.iter().zip(positions) {
+        poses.push(poses[joint.parent] * joint.origin * motion(joint, *position));
+    }
+    poses
+}
+
+fn gripper(
+    bare: &RobotProfile,
+    model: &RobotModel,
+    palm: usize,
+    (links, named, frame): ([usize; 2], &[usize], Isometry3<f64>),
+) -> Option<Gripper> {
+    let mut profile = bare.clone();
+    profile.finger_joints = named.iter().map(|idx| model.joints[*idx].name.clone()).collect();
+    Gripper::find(&profile, model, links, (palm, frame)).ok()
+}
+
+/// Rates a candidate: how far its fingers open and close, and how far it is from the palm.
+fn rate(
+    bare: &RobotProfile,
+    model: &RobotModel,
+    palm: usize,
+    links: [usize; 2],
+    named: &[usize],
+    frame: Isometry3<f64>,
+) -> Option<Found> {
+    let gripper = gripper(bare, model, palm, (links, named, frame))?;
+    // Surfaces at the grasp frame must have been found for both fingers.
+    let mut positions = vec![0.0; model.joints.len()];
+    gripper.set(&mut positions, gripper.widest_m());
+    let probe = Probe::new(model, links, (palm, frame));
+    let gap = probe.gap(&positions)?;
+    // At the width of a can, where the fingers hold most objects.
+    gripper.set(&mut positions, CENTRED_AT_M.min(gripper.widest_m()));
+    let flat = probe.flat_share(&positions);
+    let widest_m = gripper.widest_m();
+    let closes_m = gripper.travel_m();
+    let off_m = gap.middle_m().abs();
+    // Fingertips are alike; a fingertip and a knuckle are not.
+    let [left, right] = links.map(|link| chain(model, link).len());
+    let both = match (links.contains(&palm), left == right) {
+        (true, _) => 0.6,
+        (false, true) => 1.0,
+        (false, false) => 0.4,
+    };
+    let reach_m = frame.translation.vector.norm().min(0.3);
+    let score = (0.3 + flat) * both * closes_m.min(WIDE_M) * (0.05 + reach_m) / (1.0 + 10.0 * off_m);
+    Some(Found { score, named: named.to_vec(), links, frame, widest_m })
+}
+
+/// Moves the frame into the middle between the fingers at the width of a can.
+fn centre(bare: &RobotProfile, model: &RobotModel, palm: usize, found: &mut Found) {
+    let of = |frame| gripper(bare, model, palm, (found.links, &found.named, frame));
+    let Some(now) = of(found.frame) else { return };
+    let middle_m = now.middle_m(CENTRED_AT_M.min(now.widest_m()));
+    let moved = found.frame * Translation3::new(0.0, middle_m, 0.0);
+    if let Some(moved_gripper) = of(moved).filter(|moved| moved.widest_m() > 0.8 * now.widest_m()) {
+        (found.frame, found.widest_m) = (moved, moved_gripper.widest_m());
+    }
+}

@@ -1,0 +1,114 @@
+//! Likely grasp frames between two fingers.
+
+use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
+
+use crate::description::RobotModel;
+use actcheck_data::{Part, Shape};
+
+/// Distances of the grasp frame from the tips of the fingers. Unit: metres. Skills assume that fingers reach as much
+/// further as the first of them; the others are for short pads, and for fingers that turn, which open wider there.
+const DEPTHS_M: [f64; 4] = [0.025, 0.018, 0.012, 0.045];
+/// Length of the fingertips, which decide about the other directions. Unit: metres.
+const TIP_M: f64 = 0.05;
+/// Axes closer than this to an axis of the palm are taken to be that axis. Unit: cosine (about 10 degrees).
+const ALIGNED_COSINE: f64 = 0.985;
+
+/// Returns the corners of a shape, or of the box around it, in its link's frame.
+pub(super) fn corners(part: &Part) -> Vec<Point3<f64>> {
+    let at = part.pose.to_isometry();
+    match &part.shape {
+        Shape::Hull { points, .. } => points.iter().map(|point| at * Point3::from(*point)).collect(),
+        Shape::Mesh { mesh } => mesh.vertices.iter().map(|point| at * Point3::from(*point)).collect(),
+        _ => {
+            let (low, high) = part.bounds();
+            let pick = |axis: usize, bit: usize| if bit == 0 { low[axis] } else { high[axis] };
+            (0..8).map(|bits: usize| Point3::new(pick(0, bits & 1), pick(1, bits & 2), pick(2, bits & 4))).collect()
+        }
+    }
+}
+
+/// The corners of two fingers at one opening, in the palm's frame.
+pub(super) struct Pair {
+    pub(super) left: Vec<Point3<f64>>,
+    pub(super) right: Vec<Point3<f64>>,
+}
+
+impl Pair {
+    pub(super) fn new(model: &RobotModel, links: [usize; 2], poses: &[Isometry3<f64>], palm: usize) -> Self {
+        let [left, right] = links.map(|link| {
+            let from_link = poses[palm].inverse() * poses[link];
+            let points = model.links[link].solids.iter().flat_map(corners);
+            points.map(|point| from_link * point).collect::<Vec<_>>()
+        });
+        Self { left, right }
+    }
+
+    pub(super) fn apart(&self) -> Vector3<f64> {
+        middle(&self.left) - middle(&self.right)
+    }
+}
+
+fn middle(points: &[Point3<f64>]) -> Point3<f64> {
+    let (low, high) = points
+        .iter()
+        .fold((Vector3::repeat(f64::INFINITY), Vector3::repeat(f64::NEG_INFINITY)), |(low, high), point| {
+            (low.inf(&point.coords), high.sup(&point.coords))
+        });
+    Point3::from((low + high) / 2.0)
+}
+
+/// Returns likely grasp frames in the palm's frame. `ends` are the fingers at both ends of their way.
+pub(super) fn likely(ends: &[Pair; 2], from: &Point3<f64>) -> Vec<Isometry3<f64>> {
+    let mut found = Vec::new();
+    let moved = ends[0].apart() - ends[1].apart();
+    for across in [moved, ends[0].apart(), ends[1].apart()] {
+        for open in ends {
+            found.extend(DEPTHS_M.into_iter().filter_map(|depth_m| at(open, &across, from, depth_m)));
+        }
+    }
+    found
+}
+
+/// The frame with its y axis along `across`, and its x axis from a point towards the fingers.
+fn at(pair: &Pair, across: &Vector3<f64>, from: &Point3<f64>, depth_m: f64) -> Option<Isometry3<f64>> {
+    let y = aligned(across.try_normalize(1e-4)?);
+    // The axis points from the right finger to the left one.
+    let y = if y.dot(&pair.apart()) < 0.0 { -y } else { y };
+    let ahead = nalgebra::center(&middle(&pair.left), &middle(&pair.right)) - from;
+    let x = aligned((ahead - y * ahead.dot(&y)).try_normalize(1e-3)?);
+    let x = (x - y * x.dot(&y)).try_normalize(1e-3)?;
+    let z = x.cross(&y);
+    let along = |axis: &Vector3<f64>, points: &[Point3<f64>]| -> (f64, f64) {
+        let values = points.iter().map(|point| point.coords.dot(axis));
+        values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(value), high.max(value)))
+    };
+    let (left, right) = (along(&x, &pair.left), along(&x, &pair.right));
+    let (tip, root) = (left.1.min(right.1), left.0.max(right.0));
+    let depth = depth_m.min((tip - root) / 2.0);
+    // Only the parts near the tips decide about the other axes.
+    let near = |points: &[Point3<f64>]| -> Vec<Point3<f64>> {
+        points.iter().copied().filter(|point| point.coords.dot(&x) > tip - TIP_M).collect()
+    };
+    let (left, right) = (near(&pair.left), near(&pair.right));
+    let (left_z, right_z) = (along(&z, &left), along(&z, &right));
+    let height = f64::midpoint(left_z.0.max(right_z.0), left_z.1.min(right_z.1));
+    let (left_y, right_y) = (along(&y, &left), along(&y, &right));
+    let side = f64::midpoint(left_y.0, right_y.1);
+    let origin = x * (tip - depth) + y * side + z * height;
+    origin.iter().all(|value| value.is_finite()).then(|| {
+        let axes = Matrix3::from_columns(&[x, y, z]);
+        let rotation = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(axes));
+        Isometry3::from_parts(Translation3::from(origin), rotation)
+    })
+}
+
+/// Returns the nearest axis of the frame if a direction is close to it.
+fn aligned(direction: Vector3<f64>) -> Vector3<f64> {
+    let axis = direction.iamax();
+    if direction[axis].abs() > ALIGNED_COSINE {
+        let mut unit = Vector3::zeros();
+        unit[axis] = direction[axis].signum();
+        return unit;
+    }
+    direction
+}
