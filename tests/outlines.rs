@@ -102,7 +102,7 @@ fn queries_see_outlines_and_their_facts() {
         let answers = [&outlines, &whole].map(|history| format!("{:?}", history.query(query).unwrap()));
         assert_eq!(answers[0], answers[1], "{query}");
     }
-    // Lists do not count what queries loaded.
+    // Statements that queries loaded are not counted twice.
     assert_eq!(outlines.runs(&RunFilter::default()).unwrap().len(), RUNS as usize);
 }
 
@@ -190,7 +190,7 @@ fn keep(folder: &Path, name: &str, lines: &str) {
     std::fs::write(folder.join(format!("configs/{name}.toml")), format!("{text}\n[history]\n{lines}\n")).unwrap();
 }
 
-fn told(folder: &Path, args: &[&str], history: &str) -> String {
+fn printed(folder: &Path, args: &[&str], history: &str) -> String {
     let output = actcheck(folder, &[args, &["--history", history]].concat());
     assert!(matches!(output.status.code(), Some(0 | 1)), "{}", stderr(&output));
     stdout(&output)
@@ -207,11 +207,12 @@ fn the_motion_of_outlines_comes_back_bit_for_bit() {
     let folder = project.path();
     keep(folder, "outlines", "keep = \"outcomes\"");
     keep(folder, "some", "keep = \"failures\"\nkeep_whole = 0.3");
-    let run = |name: &str| told(folder, &["run", &format!("configs/{name}.toml"), "--runs", "6", "--seed", "5"], name);
+    let run =
+        |name: &str| printed(folder, &["run", &format!("configs/{name}.toml"), "--runs", "6", "--seed", "5"], name);
     for name in ["pick", "outlines", "some"] {
         run(name);
     }
-    let listed = |name: &str| without_ids(&told(folder, &["list", "--format", "csv"], name));
+    let listed = |name: &str| without_ids(&printed(folder, &["list", "--format", "csv"], name));
     assert_eq!(listed("outlines"), listed("pick"));
     assert_eq!(listed("some"), listed("pick"));
     let [whole, outlines, some] =
@@ -229,7 +230,7 @@ fn the_motion_of_outlines_comes_back_bit_for_bit() {
     }
     // Quantities over time are not in outlines, so all runs are simulated again.
     let recheck = ["recheck", "HeldWhileLifted", "--ontology", "ontology/time.ttl", "--format", "csv"];
-    let rechecked = |name: &str| without_ids(&told(folder, &recheck, name));
+    let rechecked = |name: &str| without_ids(&printed(folder, &recheck, name));
     assert_eq!(rechecked("outlines"), rechecked("pick"));
     let judged = |name: &str| {
         let history = History::open_to_read(&folder.join(name)).unwrap();
@@ -239,7 +240,7 @@ fn the_motion_of_outlines_comes_back_bit_for_bit() {
             .collect::<Vec<_>>()
     };
     assert_eq!(judged("outlines"), judged("pick"));
-    let replayed = told(folder, &["replay", "@last"], "outlines");
+    let replayed = printed(folder, &["replay", "@last"], "outlines");
     assert!(replayed.contains("the same, every bit of every state"), "{replayed}");
     // A changed model changes the run: nothing is made up.
     edit(&folder.join("models/objects/glass.toml"), "mass_kg = 0.", "mass_kg = 1.");
@@ -249,7 +250,7 @@ fn the_motion_of_outlines_comes_back_bit_for_bit() {
 }
 
 #[test]
-fn what_is_kept_is_checked() {
+fn a_misspelt_way_to_keep_runs_is_reported() {
     let project = project();
     let folder = project.path();
     keep(folder, "wrong", "keep = \"outcome\"\nkeep_whole = 1.5");

@@ -7,7 +7,7 @@ use actcheck_base::Diagnostics;
 use actcheck_campaign::{RunContext, restorer};
 use actcheck_history::{History, RunRow};
 
-/// Whether the user was told that runs are simulated again.
+/// Whether a note has said that runs are simulated again.
 static IS_NOTED: AtomicBool = AtomicBool::new(false);
 
 /// Lets a history simulate runs again. The first time, a note says so.
@@ -20,7 +20,7 @@ pub fn allow(history: &History) {
     }));
 }
 
-/// Tells what it costs to simulate the runs that are kept as outlines, if there are many.
+/// Prints the cost of simulating the runs that are kept as outlines, if there are many.
 ///
 /// # Errors
 /// The history can't be read.

@@ -178,7 +178,7 @@ pub(super) fn decode_choices(bytes: &[u8]) -> Result<Vec<Choice>, String> {
     head_choices(&expanded(parts(bytes)?.0)?)
 }
 
-/// Decodes the choices of what [`encode_head`] returns.
+/// Decodes the choices of a result of [`encode_head`].
 ///
 /// # Errors
 /// As [`decode_choices`].
@@ -187,7 +187,7 @@ pub(super) fn head_choices(head: &[u8]) -> Result<Vec<Choice>, String> {
     Ok(choices)
 }
 
-/// Decodes what [`encode_head`] returns.
+/// Decodes a result of [`encode_head`].
 ///
 /// # Errors
 /// A message that names the damaged part.

@@ -35,6 +35,6 @@ impl History {
 
 fn unrestored(run: &str, why: &str) -> Diagnostics {
     Diagnostic::error("H031", format!("the motion of run {run} can't be simulated again: {why}"))
-        .help("`actcheck replay` tells which inputs have changed since; its outcomes and states are intact")
+        .help("`actcheck replay` names the inputs that have changed since; its outcomes and states are intact")
         .into()
 }

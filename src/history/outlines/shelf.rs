@@ -62,7 +62,7 @@ impl Shelf {
         files
     }
 
-    /// Removes what killed processes left while they wrote files.
+    /// Removes the partial files of killed processes.
     pub(crate) fn clean(&self) {
         for entry in fs::read_dir(&self.dir).into_iter().flatten().filter_map(Result::ok) {
             if entry.file_name().to_string_lossy().ends_with(".tmp") {
