@@ -184,7 +184,7 @@ impl<'a> Planner<'a> {
         let ground = Ground::new(&furniture, &things, radius(kinematics, base, &start, &points), &from);
         let mut postures = operator.profile().postures.clone();
         postures.push(operator.profile().home.clone());
-        let itself = SelfContact::new(kinematics, &standing::right_postures(operator, &start));
+        let itself = SelfContact::new(kinematics, std::slice::from_ref(&start));
         let is_hand = moved_links(kinematics, layout.arm.last().copied().as_slice());
         let heads = heads(kinematics, layout, &start);
         let points = LinkPoints::grouped(&points);

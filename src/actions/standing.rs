@@ -85,21 +85,6 @@ fn best(arm: &Arm<'_>, all: &[Grasp], samples: &mut Samples, nearest: &mut Neare
     best
 }
 
-/// Postures in which links may be as close to each other as they are: the present one, and those of the profile, with the
-/// gripper as wide open as it is for a grasp. Links of a gripper touch each other in some openings.
-pub(crate) fn right_postures(operator: &Operator<'_>, start: &[f64]) -> Vec<Vec<f64>> {
-    let (layout, profile) = (operator.layout(), operator.profile());
-    let arms = profile.postures.iter().chain([&profile.home]).map(|posture| {
-        let mut positions = start.to_vec();
-        layout.arm.iter().zip(posture).for_each(|(idx, value)| positions[*idx] = *value);
-        positions
-    });
-    let mut right: Vec<Vec<f64>> = [start.to_vec()].into_iter().chain(arms).collect();
-    right.iter_mut().for_each(|positions| layout.gripper.set(positions, profile.max_opening_m));
-    right.push(start.to_vec());
-    right
-}
-
 /// The arm, its initial posture, and the obstacles around it.
 struct Arm<'a> {
     kinematics: &'a Kinematics,
@@ -119,7 +104,8 @@ impl<'a> Arm<'a> {
         let start = operator.commanded().to_vec();
         let mut postures = operator.profile().postures.clone();
         postures.push(operator.profile().home.clone());
-        let before = ArmSpace::new(kinematics, layout, furniture, things, &right_postures(operator, &start));
+        let right = std::slice::from_ref(&start);
+        let before = ArmSpace::new(kinematics, layout, furniture, things, right);
         let meanwhile = before.among(others);
         Self { kinematics, layout, start, postures, before, meanwhile }
     }
@@ -173,10 +159,9 @@ impl<'a> Arm<'a> {
         (least, bound): (f64, f64),
         samples: &mut Samples,
     ) -> Result<Plan, Hindrance> {
-        let turned = if self.layout.arm.len() < FULL_ARM {
-            Some(self.turned_to_arm(grasp, seed).ok_or(Hindrance::OutOfReach)?)
-        } else {
-            None
+        let turned = match self.layout.arm.len() < FULL_ARM {
+            true => Some(self.turned_to_arm(grasp, seed).ok_or(Hindrance::OutOfReach)?),
+            false => None,
         };
         let grasp = turned.as_ref().unwrap_or(grasp);
         let at_thing = self.solve(seed, &grasp.pose).ok_or(Hindrance::OutOfReach)?;

@@ -52,7 +52,8 @@ fn convert(root: Node, reader: &mut Reader) -> Option<String> {
     let mut joints: Vec<(Node, &str, &str)> = Vec::new();
     for joint in xml::children(model, "joint") {
         let (parent, child) = (end(joint, "parent", reader)?, end(joint, "child", reader)?);
-        for name in [parent, child].into_iter().filter(|name| *name != "world" && !links.contains_key(name)) {
+        let is_unknown = |name: &&str| *name != "world" && !links.contains_key(name);
+        if let Some(name) = [parent, child].into_iter().find(is_unknown) {
             let help = did_you_mean(name, links.keys().copied());
             reader.error("W051", joint, format!("there is no link `{name}`"), help);
             return None;
