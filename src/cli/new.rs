@@ -36,7 +36,7 @@ pub enum NewKind {
     ///
     /// Finds base, arm, gripper, grasp frame, opening, camera, head and postures by the kinematics and the names in a URDF
     /// or xacro file, and writes them with a comment for each guess. Existing files are never overwritten.
-    #[command(after_help = "Example:\n  actcheck new robot models/robots/fixed_arm.urdf --out /tmp/my_arm.toml")]
+    #[command(after_help = "Example:\n  actcheck new robot models/robots/fixed_arm.urdf")]
     Robot(NewRobotArgs),
 }
 

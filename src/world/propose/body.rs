@@ -47,7 +47,8 @@ pub(super) fn find(model: &RobotModel, palm: usize, notes: &mut BTreeMap<&'stati
     let arm: Vec<usize> = path.into_iter().filter(|idx| model.joints[*idx].mimic.is_none()).collect();
     notes.insert("arm_joints", format!("the joints between the root and the hand `{}`", model.links[palm].name));
     let (camera_link, camera, camera_turned_rad) = camera(model, palm, notes);
-    let head = head(model, camera, &arm);
+    let others: Vec<usize> = arm.iter().copied().chain(own_base.into_iter().flatten()).collect();
+    let head = head(model, camera, &others);
     let lowest_m = lowest(model);
     let mount_height_m = match (drives, lowest_m < -PEDESTAL_M) {
         (true, _) => (-lowest_m).clamp(0.0, 3.0),
@@ -151,12 +152,12 @@ fn looks_forwards(frame: &Isometry3<f64>) -> Option<[f64; 3]> {
     }
 }
 
-/// The last two joints above the camera that are not the arm's: pan, then tilt.
-fn head(model: &RobotModel, camera: usize, arm: &[usize]) -> Vec<usize> {
+/// Two joints above the camera, other than those of arm and base: pan, then tilt.
+fn head(model: &RobotModel, camera: usize, others: &[usize]) -> Vec<usize> {
     let poses = poses_at_zero(model);
     let path: Vec<usize> = chain(model, camera)
         .into_iter()
-        .filter(|idx| !arm.contains(idx) && model.joints[*idx].kind == JointKind::Revolute)
+        .filter(|idx| !others.contains(idx) && model.joints[*idx].kind == JointKind::Revolute)
         .filter(|idx| model.joints[*idx].mimic.is_none())
         .collect();
     let is_upright = |idx: usize| {
