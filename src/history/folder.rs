@@ -123,7 +123,12 @@ impl Folder {
 
     /// Where the outlines of runs are that are not kept whole.
     pub(super) fn outlines(&self) -> PathBuf {
-        self.dir.join("outlines")
+        Self::outlines_in(&self.dir)
+    }
+
+    /// Where the outlines are in the folder of a history.
+    pub(super) fn outlines_in(dir: &Path) -> PathBuf {
+        dir.join("outlines")
     }
 
     /// The ids of the runs that have a trace, sorted.

@@ -15,6 +15,7 @@ use crate::launch::LaunchArgs;
 use crate::run_args::RunArgs;
 use actcheck_base::{Diagnostic, Diagnostics, Shard, digest_of, program_digest, write_atomic};
 use actcheck_campaign::Env;
+use actcheck_history::History;
 
 /// Interval between attempts to take a shard.
 const INTERVAL: Duration = Duration::from_millis(250);
@@ -279,11 +280,14 @@ impl Plan {
 
     /// Number of runs that the shards have stored; `done` are complete.
     pub fn stored_runs(&self, done: &BTreeSet<u64>) -> u64 {
-        let traces =
-            |number: u64| fs::read_dir(self.shard_dir(number).join("traces")).map_or(0, Iterator::count) as u64;
+        let stored = |number: u64| {
+            let folder = self.shard_dir(number);
+            let whole = fs::read_dir(folder.join("traces")).map_or(0, Iterator::count) as u64;
+            whole + History::count_outlines(&folder)
+        };
         let of = |number: u64| match self.shard(number) {
             Some(shard) if done.contains(&number) => shard.share(self.planned),
-            _ => traces(number),
+            _ => stored(number),
         };
         (1..=self.shards).map(of).sum()
     }

@@ -8,6 +8,7 @@ use std::fs::{self, File};
 use std::io::{self, ErrorKind, Read as _};
 use std::path::{Path, PathBuf};
 
+use crate::folder::Folder;
 use crate::outlines::file::{HEADER, Opened, Outline, encode};
 use crate::outlines::row::Rows;
 use crate::{History, fault};
@@ -32,6 +33,9 @@ pub(crate) struct OutlineFile {
 pub(crate) struct Shelf {
     dir: PathBuf,
 }
+
+/// Receives a file, its parts, and the indices that earlier files have already.
+pub(super) type EachFile<'e> = dyn FnMut(&OutlineFile, &Opened<'_>, &BTreeSet<u64>) -> Result<(), String> + 'e;
 
 /// The reason why a file can't be used.
 pub(super) enum Unread {
@@ -114,7 +118,7 @@ impl Shelf {
         &self,
         campaign: Option<&str>,
         only_indices: bool,
-        each: &mut dyn FnMut(&OutlineFile, &Opened<'_>, &BTreeSet<u64>) -> Result<(), String>,
+        each: &mut EachFile<'_>,
     ) -> Result<(), Unread> {
         for file in self.chosen(campaign)? {
             let (file, wanted) = file;
@@ -155,6 +159,19 @@ impl Shelf {
             }
         }
         Ok(chosen)
+    }
+}
+
+impl History {
+    /// Number of outlines in a folder of a history, which another process may be writing: about, if it is.
+    pub fn count_outlines(dir: &Path) -> u64 {
+        let mut count = 0;
+        // A file that can't be read is reported when the history is opened.
+        let _ = Shelf::new(Folder::outlines_in(dir)).each_file(None, true, &mut |_, opened, there| {
+            count += opened.indices()?.iter().filter(|index| !there.contains(index)).count() as u64;
+            Ok(())
+        });
+        count
     }
 }
 
