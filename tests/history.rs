@@ -538,7 +538,7 @@ fn a_history_of_a_newer_program_is_not_changed() {
     let (folder, history) = filled();
     drop(history);
     let dir = folder.path().join("history");
-    std::fs::write(dir.join("VERSION"), "actcheck history 3\n").unwrap();
+    std::fs::write(dir.join("VERSION"), "actcheck history 4\n").unwrap();
     let fault = code(History::open(&dir));
     assert!(fault.starts_with("H004") && fault.contains("update actcheck"), "{fault}");
     std::fs::write(dir.join("VERSION"), "actcheck history 1\n").unwrap();

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 use std::process::Command;
 
-use actcheck::base::{Diagnostics, Files, Severity};
+use actcheck::base::{Diagnostics, Files, Keep, Severity};
 use actcheck::config::{self, Campaign, CampaignTemplate, Launcher, Overrides, SCHEMA, campaign_template};
 use actcheck::search::Strategy;
 use serde_json::Value as Json;
@@ -228,9 +228,11 @@ fn every_key_of_the_program_is_in_the_schema() {
 }
 
 #[test]
-fn strategy_names_equal_the_programs() {
+fn words_equal_the_programs() {
     let names = schema()["properties"]["search"]["properties"]["strategy"]["enum"].clone();
     assert_eq!(names, Json::from(Strategy::ALL.map(Strategy::name).to_vec()));
+    let ways = schema()["properties"]["history"]["properties"]["keep"]["enum"].clone();
+    assert_eq!(ways, Json::from(Keep::ALL.map(Keep::word).to_vec()));
 }
 
 /// A configuration with every default of the schema written out equals one without them.
@@ -260,6 +262,7 @@ fn schema_defaults_equal_the_programs() {
     assert_eq!((few.seed, few.repeat, few.search), (all.seed, all.repeat, all.search));
     assert_eq!((few.nav_obstacles, few.nav_obstacle_count), (all.nav_obstacles, all.nav_obstacle_count));
     assert_eq!((few.launcher, few.robot, few.history), (all.launcher, all.robot, all.history));
+    assert_eq!((few.keeping, few.sync_each_run), (all.keeping, all.sync_each_run));
 }
 
 #[test]

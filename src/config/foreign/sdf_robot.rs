@@ -220,7 +220,7 @@ fn write_joint(
         (true, _) => ("continuous", [0.0; 2]),
         (false, _) => (kind, range),
     };
-    // Negative values stand for none.
+    // Negative values mean that there is none.
     let stated = |value: f64, otherwise: f64| if value > 0.0 { value } else { otherwise };
     out.joint(&UrdfJoint {
         name,
