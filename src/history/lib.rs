@@ -41,6 +41,7 @@ mod syntax_fault;
 mod terms;
 mod trace_details;
 mod trace_file;
+mod vertical;
 mod vitals;
 mod wanted;
 mod wire;

@@ -1,0 +1,15 @@
+//! Statements about outlines by property, and queries that read them so.
+//!
+//! A store of all statements of a million runs has two hundred million of them, but a query uses a few properties, and joins
+//! nearly always stay within one run. So each file of outlines has its statements by property, a query's patterns are
+//! evaluated file by file, and only the joined rows, equal ones counted, are given to the evaluator.
+//!
+//! Never: has an answer of its own; what does not fit is left to the store.
+
+mod column;
+mod encode;
+mod nodes;
+mod sheet;
+
+pub(super) use encode::encode;
+pub(super) use sheet::{CHANGED, Sheet, Source};
