@@ -74,14 +74,12 @@ impl Table {
     }
 
     fn csv(&self) -> String {
-        let mut writer = csv::WriterBuilder::new().from_writer(Vec::new());
-        let rows =
-            std::iter::once(self.columns.clone()).chain(self.rows.iter().map(|row| row.iter().map(plain).collect()));
-        for row in rows {
-            writer.write_record(&row).expect("writing to memory does not fail, and every row has all columns");
-        }
-        let bytes = writer.into_inner().expect("writing to memory does not fail");
-        String::from_utf8(bytes).expect("only text was written")
+        csv_lines(std::iter::once(self.columns.clone())) + &self.csv_rows()
+    }
+
+    /// The rows as comma-separated values, without the header line.
+    pub fn csv_rows(&self) -> String {
+        csv_lines(self.rows.iter().map(|row| row.iter().map(plain).collect()))
     }
 
     fn json(&self) -> String {
@@ -96,6 +94,15 @@ impl Table {
         };
         Value::Array(self.rows.iter().map(object).collect())
     }
+}
+
+fn csv_lines(rows: impl Iterator<Item = Vec<String>>) -> String {
+    let mut writer = csv::WriterBuilder::new().from_writer(Vec::new());
+    for row in rows {
+        writer.write_record(&row).expect("writing to memory does not fail, and every row has all columns");
+    }
+    let bytes = writer.into_inner().expect("writing to memory does not fail");
+    String::from_utf8(bytes).expect("only text was written")
 }
 
 /// Formats a cell as text: strings without quotes, `null` as an empty string.
