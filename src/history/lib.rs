@@ -21,6 +21,7 @@ mod lists;
 pub mod merge;
 mod newest;
 mod open;
+mod outlined;
 mod outlines;
 mod pending;
 mod quad_source;

@@ -2,8 +2,8 @@
 //!
 //! After the magic bytes, a table has the compressed size and the checksum of each part, and then its own checksum: four
 //! bytes each, the lowest first. Each part is compressed on its own, because most readers need only one. The statements are
-//! stored by property ([`crate::vertical`]), and their checksum is that of their directory. In files of the first format,
-//! they are one compressed part.
+//! stored by property ([`crate::vertical`]), which has parts and checksums of its own. In files of the first format, they are
+//! one compressed part.
 
 use oxigraph::model::Quad;
 
@@ -82,17 +82,13 @@ pub(super) fn encode(outlines: &[Outline]) -> Result<Vec<u8>, String> {
     ];
     let (mut bytes, mut body) = (if by_property.is_some() { MAGIC } else { AS_ROWS }.to_vec(), Vec::new());
     for (at, part) in parts.into_iter().enumerate() {
-        let (part, sum) = match by_property.as_ref().filter(|_| at == STATEMENTS) {
-            Some(statements) => (statements.bytes.clone(), statements.sum),
-            None => {
-                let part = zstd::bulk::compress(&part, LEVEL).map_err(|error| error.to_string())?;
-                let sum = journal::sum_of(&part);
-                (part, sum)
-            }
+        let part = match &by_property {
+            Some(statements) if at == STATEMENTS => statements.clone(),
+            _ => zstd::bulk::compress(&part, LEVEL).map_err(|error| error.to_string())?,
         };
         let size = u32::try_from(part.len()).map_err(|_| "it is larger than 4 GB".to_owned())?;
         bytes.extend(size.to_le_bytes());
-        bytes.extend(sum.to_le_bytes());
+        bytes.extend(journal::sum_of(&part).to_le_bytes());
         body.extend(part);
     }
     bytes.extend(journal::sum_of(&bytes).to_le_bytes());
@@ -203,7 +199,14 @@ impl<'a> Opened<'a> {
 
     fn by_property(&self) -> Result<Sheet<&'a [u8]>, String> {
         let bytes = self.parts[STATEMENTS];
-        Sheet::open(bytes, self.sums[STATEMENTS], bytes.len())
+        Sheet::open(bytes, bytes.len())
+    }
+
+    /// Whether the statements are stored by property, and where they are in the file. `header`: its first bytes.
+    pub(super) fn statements_at(header: &[u8]) -> Result<(bool, std::ops::Range<usize>), String> {
+        let opened = Opened::new(header)?;
+        let end = |parts: usize| Self::size_of_start(header, parts).ok_or(CHANGED);
+        Ok((!opened.as_rows, end(STATEMENTS)?..end(STATEMENTS + 1)?))
     }
 
     /// The choices and states of all runs, encoded.

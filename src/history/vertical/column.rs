@@ -113,8 +113,10 @@ impl Column {
 }
 
 fn encode_values(values: &[Value], out: &mut Vec<u8>) -> Result<(), String> {
-    let doubles: Option<Vec<[u8; WIDTH]>> =
-        values.iter().map(|value| if let Value::Double(bits) = value { Some(bits.to_be_bytes()) } else { None }).collect();
+    let doubles: Option<Vec<[u8; WIDTH]>> = values
+        .iter()
+        .map(|value| if let Value::Double(bits) = value { Some(bits.to_be_bytes()) } else { None })
+        .collect();
     let integers: Option<Vec<i64>> =
         values.iter().map(|value| if let Value::Integer(number) = value { Some(*number) } else { None }).collect();
     if let Some(doubles) = doubles {
@@ -174,10 +176,8 @@ mod tests {
     use oxigraph::model::NamedNode;
 
     fn sample() -> Vec<Column> {
-        let values = |terms: Vec<Term>, codes: Vec<u32>| Column::Values {
-            values: terms.iter().map(Value::of).collect(),
-            codes,
-        };
+        let values =
+            |terms: Vec<Term>, codes: Vec<u32>| Column::Values { values: terms.iter().map(Value::of).collect(), codes };
         let typed = |text: &str, datatype| Term::from(Literal::new_typed_literal(text, datatype));
         vec![
             Column::Nodes(vec![4, 0, 2]),
@@ -202,7 +202,8 @@ mod tests {
     #[test]
     fn columns_are_decoded_as_they_were() {
         for column in sample() {
-            let subjects: &[u32] = if matches!(&column, Column::Values { codes, .. } if codes.is_empty()) { &[] } else { &[1, 2, 3] };
+            let subjects: &[u32] =
+                if matches!(&column, Column::Values { codes, .. } if codes.is_empty()) { &[] } else { &[1, 2, 3] };
             let bytes = column.encode(subjects).expect("it can be encoded");
             assert_eq!(Column::decode(&bytes, subjects, 5), Some(column));
         }

@@ -4,12 +4,13 @@ use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 use oxigraph::model::Term;
 
+use crate::RunRow;
 use crate::read::id_of;
 use crate::statements::iri;
 use crate::vertical::column::{Column, Value};
 use crate::vertical::join::FileColumns;
 use crate::vertical::sheet::Pairs;
-use crate::{RunRow, vertical::stop::Stop};
+use crate::vertical::stop::Stop;
 use actcheck_base::{Digest, names};
 
 /// A set of numbers of runs.
@@ -101,7 +102,8 @@ pub(super) fn traced(file: &FileColumns, is_left_out: impl Fn(u64) -> bool) -> R
         if file.node_of_run(run) != Some(node) || is_left_out(number) {
             continue;
         }
-        if let [Some(Value::Term(campaign)), Some(Value::Integer(index)), Some(Value::Term(Term::Literal(trace)))] = row {
+        if let [Some(Value::Term(campaign)), Some(Value::Integer(index)), Some(Value::Term(Term::Literal(trace)))] = row
+        {
             found.push(Traced {
                 hash: hash(trace.value()).unwrap_or_default(),
                 campaign: id_of(&campaign),

@@ -1,7 +1,7 @@
 //! Encodes the statements of many outlines property by property, so that a query reads only the properties that it uses.
 //!
-//! The size of the directory comes first (four bytes, the lowest first), then the directory, then its parts: the nodes, and
-//! one column for each property. Each part is compressed on its own.
+//! The size and the checksum of the directory come first (four bytes each, the lowest first), then the directory, then its
+//! parts: the nodes, and one column for each property. Each part is compressed on its own.
 
 use std::collections::HashMap;
 
@@ -37,18 +37,11 @@ pub(super) struct PartSize {
     pub statements: u32,
 }
 
-/// Encoded statements.
-pub(crate) struct Encoded {
-    pub bytes: Vec<u8>,
-    /// Checksum of the directory.
-    pub sum: u32,
-}
-
 /// Encodes the statements about each run. Returns `None` if they differ from those of a run too much.
 ///
 /// # Errors
 /// A message, if a part can't be encoded.
-pub(crate) fn encode(runs: &[&[Quad]]) -> Result<Option<Encoded>, String> {
+pub(crate) fn encode(runs: &[&[Quad]]) -> Result<Option<Vec<u8>>, String> {
     let Some(read) = Read::of(runs) else { return Ok(None) };
     let (mut body, mut columns) = (Vec::new(), Vec::new());
     let mut add = |part: &[u8], statements: usize| {
@@ -66,10 +59,10 @@ pub(crate) fn encode(runs: &[&[Quad]]) -> Result<Option<Encoded>, String> {
     let directory = postcard::to_stdvec(&Directory { nodes, columns }).map_err(|error| error.to_string())?;
     let directory = zstd::bulk::compress(&directory, LEVEL).map_err(|error| error.to_string())?;
     let mut bytes = (directory.len() as u32).to_le_bytes().to_vec();
+    bytes.extend(journal::sum_of(&directory).to_le_bytes());
     bytes.extend(directory);
-    let sum = journal::sum_of(&bytes);
     bytes.extend(body);
-    Ok(Some(Encoded { bytes, sum }))
+    Ok(Some(bytes))
 }
 
 /// The object of a statement.

@@ -185,8 +185,9 @@ fn calculated<'a>(operation: Operation, one: &Cell<'a>, other: &Cell<'a>) -> Res
             Operation::Multiply => one.checked_mul(*other),
         }
         .map(Cell::Integer),
-        (Cell::Double(one), Cell::Double(other) | Cell::Decimal(other))
-        | (Cell::Decimal(one), Cell::Double(other)) => Some(doubles(*one, *other)),
+        (Cell::Double(one), Cell::Double(other) | Cell::Decimal(other)) | (Cell::Decimal(one), Cell::Double(other)) => {
+            Some(doubles(*one, *other))
+        }
         (Cell::Double(one), Cell::Integer(other)) => Some(doubles(*one, *other as f64)),
         (Cell::Integer(one), Cell::Double(other)) => Some(doubles(*one as f64, *other)),
         (Cell::Other(_) | Cell::Decimal(_), _) | (_, Cell::Other(_) | Cell::Decimal(_)) => {

@@ -12,7 +12,7 @@ use crate::vertical::leaf::{Leaf, Limit, Step, is_within_run};
 use crate::vertical::nodes::{Name, Nodes};
 use crate::vertical::sheet::Pairs;
 use crate::vertical::stop::{Stop, unfit};
-use crate::vertical::value::Cell;
+use crate::vertical::value::{Cell, canonical};
 
 /// The code of a value that is missing.
 pub(super) const UNBOUND: u32 = u32::MAX;
@@ -87,11 +87,8 @@ impl FileColumns {
             first += nodes.profiles.get(*profile as usize).map_or(0, |profile| profile.names.len() as u32);
         }
         let is_run = |name: &u32| matches!(nodes.names.get(*name as usize), Some(Name::Below(rest)) if rest.is_empty());
-        let run_nodes = nodes
-            .profiles
-            .iter()
-            .map(|profile| profile.names.iter().position(is_run).map(|at| at as u32))
-            .collect();
+        let run_nodes =
+            nodes.profiles.iter().map(|profile| profile.names.iter().position(is_run).map(|at| at as u32)).collect();
         Self { nodes, count, properties, columns, firsts, run_nodes }
     }
 
@@ -278,9 +275,12 @@ impl<'a> Rows<'a> {
 
     /// Joins a step. `origins`: for each row, the row that it comes from, which is kept up to date.
     fn join(&mut self, step: &Step, leaf: &Leaf, origins: Option<&mut Vec<u32>>) -> Result<(), Stop> {
-        let Some((at, indexed)) = self.file.column(&step.property).map(|(at, _)| at).and_then(|at| {
-            Some((at, self.file.columns.get(at)?.as_ref()?))
-        }) else {
+        let Some((at, indexed)) = self
+            .file
+            .column(&step.property)
+            .map(|(at, _)| at)
+            .and_then(|at| Some((at, self.file.columns.get(at)?.as_ref()?)))
+        else {
             self.keep(&[]);
             origins.into_iter().for_each(Vec::clear);
             return Ok(());
@@ -293,8 +293,7 @@ impl<'a> Rows<'a> {
             Column::Nodes(nodes) => nodes,
             Column::Values { codes, .. } => codes,
         };
-        let [subject_known, value_known] =
-            [step.subject, step.value].map(|place| self.kinds[place] != Kind::Unknown);
+        let [subject_known, value_known] = [step.subject, step.value].map(|place| self.kinds[place] != Kind::Unknown);
         if subject_known && self.kinds[step.subject] != Kind::Node {
             return unfit(format!("`{}` about something else than a run", step.property));
         }
@@ -322,12 +321,12 @@ impl<'a> Rows<'a> {
                 Cow::Owned((0..indexed.pairs.subjects.len() as u32).collect())
             };
             for candidate in candidates.iter().copied().filter(|candidate| fits(*candidate)) {
-                let is_same = same.as_ref().is_none_or(|same| {
-                    same.equal(self.codes[step.value][row], codes[candidate as usize])
-                });
+                let is_same =
+                    same.as_ref().is_none_or(|same| same.equal(self.codes[step.value][row], codes[candidate as usize]));
                 // A pattern such as `?a act:x ?a`.
                 let is_loop_free = step.subject != step.value
-                    || (value_kind == Kind::Node && indexed.pairs.subjects[candidate as usize] == codes[candidate as usize]);
+                    || (value_kind == Kind::Node
+                        && indexed.pairs.subjects[candidate as usize] == codes[candidate as usize]);
                 if is_same && is_loop_free {
                     found.push((row as u32, candidate));
                 }
@@ -380,7 +379,8 @@ impl<'a> Rows<'a> {
 
     /// The codes that a place may have, if they are limited.
     fn allowed(&self, place: usize, kind: Kind, leaf: &Leaf) -> Result<Option<Vec<bool>>, Stop> {
-        let mut limits = leaf.among.iter().filter(|(limited, _)| *limited == place).map(|(_, values)| values).peekable();
+        let mut limits =
+            leaf.among.iter().filter(|(limited, _)| *limited == place).map(|(_, values)| values).peekable();
         if limits.peek().is_none() || self.kinds[place] != Kind::Unknown {
             return Ok(None);
         }
@@ -388,7 +388,11 @@ impl<'a> Rows<'a> {
         Ok(Some(match kind {
             Kind::Values(column) => match &self.file.columns[column].as_ref().map(|column| &column.pairs.column) {
                 Some(Column::Values { values, .. }) => {
-                    values.iter().map(|value| limits.iter().all(|limit| limit.values.contains(value))).collect()
+                    let is_in = |value: &Value| {
+                        let value = canonical(value).unwrap_or(Cow::Borrowed(value));
+                        limits.iter().all(|limit| limit.values.contains(value.as_ref()))
+                    };
+                    values.iter().map(is_in).collect()
                 }
                 _ => Vec::new(),
             },
@@ -405,7 +409,7 @@ impl<'a> Rows<'a> {
         match (self.kinds[place], kind) {
             (Kind::Node, Kind::Node) => Ok(Same::Codes),
             (Kind::Values(one), Kind::Values(other)) => {
-                let mut numbers: HashMap<&Value, u32> = HashMap::new();
+                let mut numbers: HashMap<Cow<'_, Value>, u32> = HashMap::new();
                 let mut of = |column: usize| -> Vec<u32> {
                     let values = match self.file.columns[column].as_ref().map(|column| &column.pairs.column) {
                         Some(Column::Values { values, .. }) => values.as_slice(),
@@ -413,7 +417,7 @@ impl<'a> Rows<'a> {
                     };
                     let mut number = |value| {
                         let next = numbers.len() as u32;
-                        *numbers.entry(value).or_insert(next)
+                        *numbers.entry(canonical(value).unwrap_or(Cow::Borrowed(value))).or_insert(next)
                     };
                     values.iter().map(&mut number).collect()
                 };

@@ -7,9 +7,28 @@
 //! Never: has an answer of its own; what does not fit is left to the store.
 
 mod column;
+mod counts;
 mod encode;
+mod expression;
+mod flat;
+mod group;
+mod join;
+mod joined;
+mod leaf;
+mod need;
 mod nodes;
+mod plan;
+mod reduce;
+mod rewrite;
+mod scan;
 mod sheet;
+mod stop;
+mod value;
+mod walk;
 
+pub(super) use counts::Counts;
 pub(super) use encode::encode;
+pub(super) use plan::{Plan, plan};
+pub(super) use rewrite::MakeEvaluator;
 pub(super) use sheet::{CHANGED, Sheet, Source};
+pub(super) use stop::Stop;

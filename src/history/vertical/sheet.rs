@@ -29,11 +29,23 @@ impl Source for &[u8] {
     }
 }
 
+impl Source for Box<dyn Source> {
+    fn bytes(&self, from: usize, to: usize) -> Result<Vec<u8>, String> {
+        self.as_ref().bytes(from, to)
+    }
+}
+
+impl Source for Vec<u8> {
+    fn bytes(&self, from: usize, to: usize) -> Result<Vec<u8>, String> {
+        self.as_slice().bytes(from, to)
+    }
+}
+
 /// The statements of a file, of which no column has been read yet.
 pub(crate) struct Sheet<S> {
     source: S,
     directory: Directory,
-    /// Size of the directory with its own size in front. Unit: bytes.
+    /// Where the parts begin. Unit: bytes.
     start: usize,
 }
 
@@ -44,29 +56,32 @@ pub(crate) struct Pairs {
     pub column: Column,
 }
 
+/// Size of the size and the checksum of the directory. Unit: bytes.
+const HEADER: usize = 8;
 /// Bytes that are read at first: nearly all directories are shorter.
 const FIRST: usize = 4096;
 
 impl<S: Source> Sheet<S> {
-    /// Reads the directory. `sum`: its checksum. `length`: size of the statements.
+    /// Reads the directory. `length`: size of the statements.
     ///
     /// # Errors
     /// A message that names the damage.
-    pub(crate) fn open(source: S, sum: u32, length: usize) -> Result<Self, String> {
+    pub(crate) fn open(source: S, length: usize) -> Result<Self, String> {
         let mut bytes = source.bytes(0, FIRST.min(length))?;
-        let size = bytes.get(..4).and_then(|size| size.try_into().ok()).map(u32::from_le_bytes).ok_or(CHANGED)?;
-        let start = 4 + size as usize;
+        let number = |at: usize| bytes.get(at..at + 4).and_then(|four| four.try_into().ok()).map(u32::from_le_bytes);
+        let (size, sum) = number(0).zip(number(4)).ok_or(CHANGED)?;
+        let start = HEADER + size as usize;
         if start > length {
             return Err(CHANGED.to_owned());
         }
         if start > bytes.len() {
             bytes = source.bytes(0, start)?;
         }
-        if journal::sum_of(&bytes[..start]) != sum {
+        let directory = bytes.get(HEADER..start).ok_or(CHANGED)?;
+        if journal::sum_of(directory) != sum {
             return Err(CHANGED.to_owned());
         }
-        let directory = unpacked(&bytes[4..start])?;
-        let directory: Directory = postcard::from_bytes(&directory).map_err(|_| CHANGED)?;
+        let directory: Directory = postcard::from_bytes(&unpacked(directory)?).map_err(|_| CHANGED)?;
         Ok(Self { source, directory, start })
     }
 
@@ -181,8 +196,7 @@ struct Labels {
 
 impl Labels {
     fn read(nodes: &Nodes, read: &[&str], columns: &[Option<Pairs>], labels: &[NamedNode; 3]) -> Self {
-        let mut found =
-            Self { subject_of: HashMap::new(), test_of: HashMap::new(), assertion_of: HashMap::new() };
+        let mut found = Self { subject_of: HashMap::new(), test_of: HashMap::new(), assertion_of: HashMap::new() };
         if !nodes.names.iter().any(|name| matches!(name, Name::Assertion | Name::Outcome)) {
             return found;
         }

@@ -5,8 +5,6 @@ use std::path::PathBuf;
 use oxigraph::sparql::QueryEvaluationError;
 use oxigraph::store::StorageError;
 
-use actcheck_base::Diagnostics;
-
 /// The reason why there is no answer from columns.
 pub(crate) enum Stop {
     /// The query needs the store: the part of it that does.
@@ -21,7 +19,6 @@ pub(crate) enum Stop {
     Failed(QueryEvaluationError),
     Crashed,
     Store(StorageError),
-    Told(Diagnostics),
 }
 
 pub(super) fn unfit<T>(part: impl Into<String>) -> Result<T, Stop> {

@@ -128,6 +128,19 @@ impl<'a> Cell<'a> {
     }
 }
 
+/// A value in the form in which equal values are the same; `None` if its type is not known here.
+pub(super) fn canonical(value: &Value) -> Option<Cow<'_, Value>> {
+    let Value::Term(Term::Literal(literal)) = value else { return Some(Cow::Borrowed(value)) };
+    if literal.language().is_some() || literal.datatype() == xsd::STRING {
+        return Some(Cow::Borrowed(value));
+    }
+    let Value::Term(term) = value else { return None };
+    let (seconds, fraction) = moment(term)?;
+    let dot = if fraction.is_empty() { "" } else { "." };
+    let text = format!("{seconds}{dot}{fraction}Z");
+    Some(Cow::Owned(Value::Term(oxigraph::model::Literal::new_typed_literal(text, xsd::DATE_TIME).into())))
+}
+
 /// The double of a decimal with few digits.
 fn decimal(text: &str) -> Option<f64> {
     let digits = text.bytes().filter(u8::is_ascii_digit).count();
