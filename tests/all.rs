@@ -57,6 +57,7 @@ mod notebooks;
 mod obstacles;
 mod ontology;
 mod oracle;
+mod outlined_queries;
 mod outlines;
 mod patterns;
 mod perceive;

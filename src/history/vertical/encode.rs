@@ -96,7 +96,9 @@ impl<'q> Read<'q> {
             }
             read.nodes.numbers.push(number);
             let mut known = Numbers::<&NamedOrBlankNode>::default();
-            quads.iter().for_each(|quad| drop(known.of(&quad.subject)));
+            for quad in *quads {
+                known.of(&quad.subject);
+            }
             let of_run: HashMap<TermRef<'_>, u32> =
                 known.all.iter().map(|node| TermRef::from(node.as_ref())).zip(0..).collect();
             let NamedOrBlankNode::NamedNode(run) = &quads.first()?.subject else { return None };

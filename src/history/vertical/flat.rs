@@ -87,7 +87,9 @@ impl Flat {
     fn optional_variables(&self) -> BTreeSet<Variable> {
         let mut own: BTreeSet<Variable> = self.optionals.iter().flat_map(|(pattern, _)| bound(pattern)).collect();
         let others = self.others.iter().flat_map(bound).chain(variables(&self.triples));
-        others.for_each(|variable| drop(own.remove(&variable)));
+        for variable in others {
+            own.remove(&variable);
+        }
         own
     }
 

@@ -29,6 +29,5 @@ mod walk;
 pub(super) use counts::Counts;
 pub(super) use encode::encode;
 pub(super) use plan::{Plan, plan};
-pub(super) use rewrite::MakeEvaluator;
 pub(super) use sheet::{CHANGED, Sheet, Source};
 pub(super) use stop::Stop;

@@ -118,6 +118,8 @@ fn mentioned(pattern: &GraphPattern) -> BTreeSet<Variable> {
 /// The variables that a pattern can bind.
 pub(super) fn bound(pattern: &GraphPattern) -> BTreeSet<Variable> {
     let mut all = BTreeSet::new();
-    pattern.on_in_scope_variable(|variable| drop(all.insert(variable.clone())));
+    pattern.on_in_scope_variable(|variable| {
+        all.insert(variable.clone());
+    });
     all
 }
