@@ -1,8 +1,9 @@
 //! SPARQL queries of users: prefixes are predefined, faults have their place, updates are refused.
 
+use std::collections::BTreeMap;
 use std::ops::Range;
 use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::{Arc, OnceLock};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use oxigraph::model::{Literal, NamedNode, Term as StoreTerm};
 use oxigraph::sparql::{PreparedSparqlQuery, QueryEvaluationError, QueryResults, SparqlEvaluator, SparqlSyntaxError};
@@ -30,6 +31,11 @@ const UPDATES: [&str; 10] = ["INSERT", "DELETE", "LOAD", "CLEAR", "DROP", "CREAT
 const MOST_TEXT: usize = 512 << 20;
 /// Maximum length of one of these texts. Unit: bytes.
 const LONGEST_TEXT: usize = 32 << 20;
+
+/// Number of texts that are made once for equal arguments, and their longest length (unit: bytes): a pattern takes long to
+/// compile, and most queries apply it to the names of a few properties.
+const MOST_KNOWN: usize = 256;
+const LONGEST_KNOWN: usize = 512;
 
 /// Sizes of stores whose columns are joined. In smaller ones it does not matter; in larger ones the columns may not fit
 /// in memory. Unit: bytes.
@@ -117,14 +123,28 @@ pub(super) fn with_text_functions(
         });
     TEXT_FUNCTIONS.into_iter().fold(evaluator, |evaluator, (_, iri, function)| {
         let (cancel, made) = (cancel.clone(), Arc::clone(made));
+        let known: Mutex<BTreeMap<Vec<Term>, Option<Term>>> = Mutex::default();
         evaluator.with_custom_function(NamedNode::new_unchecked(iri), move |args: &[StoreTerm]| {
             let args: Vec<Term> = args.iter().map(from_store).collect();
             let left = LONGEST_TEXT.min(MOST_TEXT.saturating_sub(made.load(Ordering::Relaxed)));
-            let Ok(found) = function(&args, left) else {
+            let mut known = known.lock().unwrap_or_else(PoisonError::into_inner);
+            let result = match known.get(&args) {
+                Some(found) => Ok(found.clone()),
+                None => function(&args, left),
+            };
+            let Ok(found) = result else {
                 made.fetch_add(MOST_TEXT + 1, Ordering::Relaxed);
                 cancel.cancel();
                 return None;
             };
+            let is_short = |term: &Term| match term {
+                Term::String(text) | Term::LangString(text, _) => text.len() <= LONGEST_KNOWN,
+                _ => true,
+            };
+            if known.len() < MOST_KNOWN && args.iter().chain(&found).all(is_short) {
+                known.insert(args, found.clone());
+            }
+            drop(known);
             if let Some(Term::String(text) | Term::LangString(text, _)) = &found {
                 made.fetch_add(text.len(), Ordering::Relaxed);
             }

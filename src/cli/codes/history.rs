@@ -144,8 +144,8 @@ const CODES_H: &[Code] = &[
     code(
         "H030",
         "a query needs too many statements about runs that are kept as outlines",
-        "outlines are stored outside of the RDF store, and their statements are added to it for each query",
-        "`actcheck list`, `analyse` and `compare` read columns; or ask for fewer properties",
+        "most queries read columns of outlines; facts, any property, paths and blank nodes as values need their statements in the store",
+        "leave that part out, ask a smaller history, or export tables (`actcheck export --parquet`)",
     ),
     code(
         "H031",

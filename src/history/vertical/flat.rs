@@ -41,9 +41,19 @@ impl Flat {
                 Self { others: vec![left.1, right.1], ..Self::default() }
             }
             GraphPattern::Filter { expr, inner } => {
-                let mut flat = Self::of(*inner);
                 let mut all = Vec::new();
                 conjuncts(expr, &mut all);
+                let (mut flat, all) = match *inner {
+                    GraphPattern::Extend { inner, variable, expression } => {
+                        // Conditions that do not use the new value may come first, so that fewer values are needed later.
+                        let (before, after): (Vec<_>, Vec<_>) =
+                            all.into_iter().partition(|condition| !used(condition).contains(&variable));
+                        let inner = Box::new(filtered(*inner, before));
+                        let extend = GraphPattern::Extend { inner, variable, expression };
+                        (Self { others: vec![extend], ..Self::default() }, after)
+                    }
+                    inner => (Self::of(inner), all),
+                };
                 let known = variables(&flat.triples);
                 for condition in all {
                     let is_early = !has_pattern(&condition) && used(&condition).is_subset(&known);

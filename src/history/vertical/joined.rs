@@ -120,7 +120,10 @@ impl Rewriter<'_> {
                 let joined = self.left_join(left, *right, expression, &inner_need, false)?;
                 return self.conditioned(joined, flat.late);
             }
-            flat.others.push(only);
+            let late: Vec<Variable> = flat.late.iter().flat_map(used).collect();
+            let need = if flat.late.is_empty() { need.clone() } else { need.and(late) };
+            let inner = self.rewrite(only, &need)?;
+            return self.conditioned(inner, flat.late);
         }
         let (components, stored) = self.components(&mut flat)?;
         let mut items: Vec<BTreeSet<Variable>> = components.iter().map(Component::variables).collect();
