@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::{Mutex, OnceLock, RwLock};
+use std::sync::{Arc, Mutex, OnceLock, RwLock};
 
 use oxigraph::model::vocab::rdf;
 use oxigraph::model::{GraphNameRef, NamedNode, QuadRef};
@@ -15,6 +15,7 @@ use crate::journal::Journal;
 use crate::open::Opened;
 use crate::outlines::{LoadedFiles, Outline, Restore, Shelf, View};
 use crate::read::{short_id, subjects, text_of};
+use crate::snapshot::Snapshot;
 use crate::statements::iri;
 use crate::wanted::Wanted;
 use crate::write_campaign::{self, campaign_node};
@@ -37,6 +38,8 @@ use actcheck_facts::extract;
 pub struct History {
     // Dropped before the folder, which releases the lock. `None` only if reopening failed.
     pub(super) opened: RwLock<Option<Opened>>,
+    /// The state of a reader whose store is closed until it is needed.
+    pub(super) resting: Mutex<Option<Arc<Snapshot>>>,
     pub(super) folder: Folder,
     /// The statements that are not in the store yet.
     pub(super) journal: Mutex<Journal>,
@@ -131,6 +134,20 @@ impl History {
         let outline =
             Outline::of(record).map_err(|error| Diagnostic::error("H006", format!("{doing} failed: {error}")))?;
         self.enter_outline(&record.campaign, record.index, &outline)
+    }
+
+    /// Stores the outlines of several runs of a campaign in one file: all of them or, on an error, none.
+    ///
+    /// # Errors
+    /// As [`History::commit`].
+    pub fn commit_outlines(&self, campaign: &str, records: &[RunRecord]) -> Result<(), Diagnostics> {
+        self.check_ids("run", records.iter().map(|record| &record.id))?;
+        let doing = "writing outlines";
+        let outlines = records.iter().map(Outline::of).collect::<Result<Vec<_>, _>>();
+        let outlines =
+            outlines.map_err(|error| Diagnostic::error("H006", format!("{doing} failed: {error}")))?;
+        self.folder.begin_outlines()?;
+        self.shelf().add_all(campaign, &outlines).map_err(|error| fault::io(self.dir(), doing, &error))
     }
 
     /// Stores an outline.
