@@ -63,7 +63,7 @@ SELECT ?execution ?property ?at ?outcome ?rule WHERE {
 
 /// Campaigns whose scenes were selected because they fail: shrunk runs, failed runs that ran again, and cases, which have
 /// the table `case` in their configuration. The prefix is [`FAILED_AGAIN`].
-const SELECTED: &str = r"
+pub(super) const SELECTED: &str = r"
 SELECT DISTINCT ?campaign WHERE {
     { ?run act:shrunkFrom ?original ; act:campaign ?campaign }
     UNION

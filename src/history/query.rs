@@ -13,6 +13,7 @@ use crate::evaluation::{Unfinished, evaluate};
 use crate::fault;
 use crate::light::parser;
 use crate::open::OpenStore;
+use crate::outlined;
 use crate::syntax_fault::syntax_fault;
 use crate::terms::{from_store, to_store};
 use crate::wanted::Wanted;
@@ -32,30 +33,39 @@ const LONGEST_TEXT: usize = 32 << 20;
 
 /// Sizes of stores whose columns are joined. In smaller ones it does not matter; in larger ones the columns may not fit
 /// in memory. Unit: bytes.
-const COLUMNS: Range<u64> = 16 << 20..1 << 30;
+pub(super) const COLUMNS: Range<u64> = 16 << 20..1 << 30;
 
 /// Answers a query.
 pub(super) fn answer(history: &History, text: &Source, cancel: &Cancel) -> Result<QueryAnswer, Diagnostics> {
     refuse_update(text)?;
     refuse_excess(text)?;
+    if history.shelf().exists() {
+        if let Some(answer) = outlined::answer(history, text, cancel)? {
+            return Ok(answer);
+        }
+    }
     let store = history.store_for_query(|| Wanted::query(&text.text))?;
     let query = prepare(text, &store, cancel)?;
     let prepared = query.prepared.clone();
     let evaluated = evaluate(&store, cancel, move |store| prepared.on_store(store).execute().and_then(collect));
     query.check_texts(text)?;
-    evaluated.map_err(|fault| match fault {
+    evaluated.map_err(|fault| unfinished(history, text, fault))
+}
+
+pub(super) fn unfinished(history: &History, text: &Source, fault: Unfinished) -> Diagnostics {
+    match fault {
         Unfinished::Stopped => stopped(text).into(),
         Unfinished::Failed(error) => evaluation_fault(text, &error).into(),
         Unfinished::Crashed => Diagnostic::error("H012", "the query made the evaluator crash").in_source(text).into(),
         Unfinished::Damaged(error) => fault::damaged(history.dir(), &error.to_string()),
-    })
+    }
 }
 
 /// A query that can be evaluated, with limits on the texts that it makes.
 pub(super) struct Prepared {
     pub prepared: PreparedSparqlQuery,
     /// Length of the texts so far. Unit: bytes.
-    made: Arc<AtomicUsize>,
+    pub made: Arc<AtomicUsize>,
 }
 
 impl Prepared {
@@ -88,7 +98,11 @@ pub(super) fn prepare(text: &Source, store: &OpenStore, cancel: &Cancel) -> Resu
 
 /// Adds functions that make texts of limited length: the evaluator keeps them until the query ends. Beyond the limit, they
 /// stop the query. `made`: their length so far, in bytes.
-fn with_text_functions(evaluator: SparqlEvaluator, cancel: &Cancel, made: &Arc<AtomicUsize>) -> SparqlEvaluator {
+pub(super) fn with_text_functions(
+    evaluator: SparqlEvaluator,
+    cancel: &Cancel,
+    made: &Arc<AtomicUsize>,
+) -> SparqlEvaluator {
     let appended = (cancel.clone(), Arc::clone(made));
     let evaluator =
         evaluator.with_custom_function(NamedNode::new_unchecked(COUNTED_TEXT), move |args: &[StoreTerm]| {
@@ -174,7 +188,7 @@ fn with_counts(evaluator: SparqlEvaluator, store: OpenStore) -> SparqlEvaluator 
     })
 }
 
-fn collect(results: QueryResults<'_>) -> Result<QueryAnswer, QueryEvaluationError> {
+pub(super) fn collect(results: QueryResults<'_>) -> Result<QueryAnswer, QueryEvaluationError> {
     Ok(match results {
         QueryResults::Boolean(value) => QueryAnswer::Boolean(value),
         QueryResults::Solutions(solutions) => {
