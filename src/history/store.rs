@@ -352,24 +352,21 @@ impl History {
         }
     }
 
-    /// Calls `each` with the health data of every run of a campaign, in the order of their indices.
+    /// Calls `each` with the health data of every run of a campaign: first those of outlines, file by file, then those of runs
+    /// that are kept whole, by index.
     ///
     /// # Errors
     /// `H014` there is no such campaign; otherwise as [`History::trace`].
     pub fn each_vitals(&self, campaign: &str, mut each: impl FnMut(&RunVitals)) -> Result<(), Diagnostics> {
         self.campaign(campaign)?;
+        self.each_outlined_vitals(campaign, &mut each)?;
         let filter = RunFilter { campaign: Some(campaign.to_owned()), ..RunFilter::default() };
-        let rows = self.runs(&filter)?;
-        let mut outlines: BTreeMap<String, RunVitals> =
-            self.outlined_vitals(campaign)?.into_iter().map(|vitals| (vitals.run.clone(), vitals)).collect();
+        let whole =
+            lists::runs(&*self.store_with(lists::of_runs)?, &filter).map_err(|error| self.query_fault(&error))?;
         let store = self.store_with(vitals::wanted)?;
         let fault = |error| self.fault("reading a run", &error);
         let columns = vitals::Columns::read(&store).map_err(fault)?;
-        for row in rows {
-            if let Some(vitals) = outlines.remove(&row.run) {
-                each(&vitals);
-                continue;
-            }
+        for row in whole {
             let choices = self.decoded(&row.run, trace_file::decode_choices)?;
             each(&columns.of(&store, &row, choices).map_err(fault)?);
         }

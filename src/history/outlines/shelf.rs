@@ -180,7 +180,7 @@ impl Shelf {
 }
 
 /// Whether no range of indices begins before the end of an earlier one. The files are sorted.
-fn are_apart(files: &[OutlineFile]) -> bool {
+pub(super) fn are_apart(files: &[OutlineFile]) -> bool {
     let mut highest: Option<u64> = None;
     files.iter().all(|file| {
         let is_apart = highest.is_none_or(|highest| file.first > highest);

@@ -8,6 +8,7 @@ class Runs {
     Object.assign(this, columns);
     this.summary = summary;
     this.searched = [];
+    this.gathered = 0;
     this.slots = summary.slots;
     this.replayed = new Map(summary.replays.map((id, number) => [id, number]));
     this.parameter = new Map(columns.parameters.map((parameter) => [parameter.name, parameter]));
@@ -166,7 +167,11 @@ class Runs {
 
   /** Builds the searchable text of some more runs. Returns whether all are done. */
   gather(some) {
-    if (this.count > MANY_RUNS) return true;
+    if (this.count > MANY_RUNS) {
+      const runs = this.detailed ?? [], end = Math.min(runs.length, this.gathered + some);
+      for (; this.gathered < end; this.gathered++) this.searched[runs[this.gathered]] ??= this.lettersOf(runs[this.gathered]);
+      return this.gathered >= runs.length;
+    }
     const end = Math.min(this.count, this.searched.length + some);
     for (let run = this.searched.length; run < end; run++) this.searched.push(this.lettersOf(run));
     return end === this.count;
