@@ -23,6 +23,8 @@ const MOST_BYTES: f64 = 10_000.0;
 /// Size of a shard, unless there would be too many.
 const RUNS_IN_A_SHARD: u64 = 1_000;
 const MOST_SHARDS: u64 = 1_000;
+/// Size of a file of outlines, as a shard writes it.
+const RUNS_IN_A_FILE: usize = 128;
 /// Number of shards that are made at the same time.
 const THREADS: usize = 2;
 
@@ -129,9 +131,11 @@ fn make_shard(env: &Env, made: &[RunRecord], size: u64, shard: Shard, folder: &P
         let mut record = env.record(campaign.to_owned(), "pick".to_owned(), "2026-01-01T00:00:00.000Z".to_owned());
         (record.planned_runs, record.seed, record.shards) = (size / 2, seed, vec![shard]);
         history.begin_campaign(&record).expect("the disk has room");
-        for index in (0..size / 2).filter(|index| shard.has(*index)) {
-            let run = changed(&made[index as usize % made.len()], campaign, index, rate);
-            history.commit_outline(&run).expect("the disk has room");
+        let indices: Vec<u64> = (0..size / 2).filter(|index| shard.has(*index)).collect();
+        for indices in indices.chunks(RUNS_IN_A_FILE) {
+            let changed = |index: &u64| changed(&made[*index as usize % made.len()], campaign, *index, rate);
+            let runs: Vec<RunRecord> = indices.iter().map(changed).collect();
+            history.commit_outlines(campaign, &runs).expect("the disk has room");
         }
         let end = CampaignEnd { ended: "2026-01-02T00:00:00.000Z".to_owned(), ..CampaignEnd::default() };
         history.finish_campaign(campaign, &end).expect("the disk has room");

@@ -44,6 +44,7 @@ mod kills;
 mod last_failed;
 mod launch;
 mod low_objects;
+mod many_runs;
 mod margins;
 mod merge;
 mod mistakes;

@@ -93,7 +93,8 @@ impl HealthMeter {
     pub fn add(&mut self, run: &RunVitals) {
         self.runs += 1;
         self.discards += run.discards.len() as u64;
-        if let (None, Some(reason)) = (&self.first_discard, run.discards.first()) {
+        let is_first = self.first_discard.as_ref().is_none_or(|(first, _)| run.index + 1 < *first);
+        if let (true, Some(reason)) = (is_first, run.discards.first()) {
             self.first_discard = Some((run.index + 1, reason.clone()));
         }
         self.is_weighted |= run.is_weighted;

@@ -38,7 +38,7 @@ pub use failure_modes::{FailureMode, failure_modes};
 pub use false_discovery::benjamini_hochberg;
 pub use findings::{
     Cascade, ChangePoint, Collisions, Example, FINDING_COLUMNS, FlakyScene, HitKind, Judged, JudgedProperty, Mined,
-    PlacedThing, PropertyFindings, Quantiles, Sector, Trend, TrendPoint, TwoWay, TwoWayCell, cascades, collisions,
+    PlacedThing, PropertyFindings, Quantiles, RATE_COLUMNS, Sector, Trend, TrendPoint, TwoWay, TwoWayCell, cascades, collisions,
     finding_columns, flaky_scenes, judged, property_findings, quantiles, table_failure_modes, trend, two_way,
 };
 pub use fisher::{FisherTest, TwoByTwo};

@@ -92,18 +92,35 @@ pub fn list(args: &ListArgs) -> Result<(), Diagnostics> {
         let words = words.get(&row.run).into_iter().flatten().map(|words| words.as_str().into());
         shown.iter().map(|(.., cell)| cell(row)).chain(words).collect()
     };
+    // The rows of all runs together would take a gigabyte for each million.
+    let chunks = runs.chunks(ROWS_AT_A_TIME).enumerate();
     match args.format {
-        // The rows of all runs together would take a gigabyte for each million.
+        _ if runs.len() <= ROWS_AT_A_TIME => {
+            table.rows = runs.iter().map(row).collect();
+            output::print(&table.render(args.format.into(), output::page()));
+        }
         Format::Csv => {
             output::print(&table.render(args.format.into(), output::page()));
-            for runs in runs.chunks(ROWS_AT_A_TIME) {
+            for (_, runs) in chunks {
                 table.rows = runs.iter().map(row).collect();
                 output::print(&table.csv_rows());
             }
         }
-        Format::Text | Format::Json => {
-            table.rows = runs.iter().map(row).collect();
-            output::print(&table.render(args.format.into(), output::page()));
+        Format::Text => {
+            for (_, runs) in chunks {
+                table.rows = runs.iter().map(row).collect();
+                output::print(&table.render(args.format.into(), output::page()));
+            }
+        }
+        Format::Json => {
+            for (place, runs) in chunks {
+                table.rows = runs.iter().map(row).collect();
+                // The array of each part without its brackets.
+                let part = table.render(args.format.into(), output::page());
+                let items = part.trim_end().trim_start_matches('[').trim_end_matches(']').trim_end();
+                output::print(&format!("{}{items}", if place == 0 { "[" } else { "," }));
+            }
+            output::print("\n]\n");
         }
     }
     if runs.is_empty() {

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::{Mutex, OnceLock, RwLock};
+use std::sync::{Arc, Mutex, OnceLock, RwLock};
 
 use oxigraph::model::vocab::rdf;
 use oxigraph::model::{GraphNameRef, NamedNode, QuadRef};
@@ -15,6 +15,7 @@ use crate::journal::Journal;
 use crate::open::Opened;
 use crate::outlines::{LoadedFiles, Outline, Restore, Shelf, View};
 use crate::read::{short_id, subjects, text_of};
+use crate::snapshot::Snapshot;
 use crate::statements::iri;
 use crate::wanted::Wanted;
 use crate::write_campaign::{self, campaign_node};
@@ -37,6 +38,8 @@ use actcheck_facts::extract;
 pub struct History {
     // Dropped before the folder, which releases the lock. `None` only if reopening failed.
     pub(super) opened: RwLock<Option<Opened>>,
+    /// The state of a reader whose store is closed until it is needed.
+    pub(super) resting: Mutex<Option<Arc<Snapshot>>>,
     pub(super) folder: Folder,
     /// The statements that are not in the store yet.
     pub(super) journal: Mutex<Journal>,
@@ -131,6 +134,20 @@ impl History {
         let outline =
             Outline::of(record).map_err(|error| Diagnostic::error("H006", format!("{doing} failed: {error}")))?;
         self.enter_outline(&record.campaign, record.index, &outline)
+    }
+
+    /// Stores the outlines of several runs of a campaign in one file: all of them or, on an error, none.
+    ///
+    /// # Errors
+    /// As [`History::commit`].
+    pub fn commit_outlines(&self, campaign: &str, records: &[RunRecord]) -> Result<(), Diagnostics> {
+        self.check_ids("run", records.iter().map(|record| &record.id))?;
+        let doing = "writing outlines";
+        let outlines = records.iter().map(Outline::of).collect::<Result<Vec<_>, _>>();
+        let outlines =
+            outlines.map_err(|error| Diagnostic::error("H006", format!("{doing} failed: {error}")))?;
+        self.folder.begin_outlines()?;
+        self.shelf().add_all(campaign, &outlines).map_err(|error| fault::io(self.dir(), doing, &error))
     }
 
     /// Stores an outline.
@@ -335,24 +352,21 @@ impl History {
         }
     }
 
-    /// Calls `each` with the health data of every run of a campaign, in the order of their indices.
+    /// Calls `each` with the health data of every run of a campaign: first those of outlines, file by file, then those of runs
+    /// that are kept whole, by index.
     ///
     /// # Errors
     /// `H014` there is no such campaign; otherwise as [`History::trace`].
     pub fn each_vitals(&self, campaign: &str, mut each: impl FnMut(&RunVitals)) -> Result<(), Diagnostics> {
         self.campaign(campaign)?;
+        self.each_outlined_vitals(campaign, &mut each)?;
         let filter = RunFilter { campaign: Some(campaign.to_owned()), ..RunFilter::default() };
-        let rows = self.runs(&filter)?;
-        let mut outlines: BTreeMap<String, RunVitals> =
-            self.outlined_vitals(campaign)?.into_iter().map(|vitals| (vitals.run.clone(), vitals)).collect();
+        let whole =
+            lists::runs(&*self.store_with(lists::of_runs)?, &filter).map_err(|error| self.query_fault(&error))?;
         let store = self.store_with(vitals::wanted)?;
         let fault = |error| self.fault("reading a run", &error);
         let columns = vitals::Columns::read(&store).map_err(fault)?;
-        for row in rows {
-            if let Some(vitals) = outlines.remove(&row.run) {
-                each(&vitals);
-                continue;
-            }
+        for row in whole {
             let choices = self.decoded(&row.run, trace_file::decode_choices)?;
             each(&columns.of(&store, &row, choices).map_err(fault)?);
         }

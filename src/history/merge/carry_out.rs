@@ -136,7 +136,9 @@ impl Writer<'_> {
         let sources: BTreeSet<usize> = campaign.work.runs.values().map(|(source, _)| *source).collect();
         for source in sources {
             let history = &self.sources[source];
-            if !history.shelf().exists() || history.has_later_judgements()? {
+            let is_simple = history.shelf().exists() && !history.has_later_judgements()?;
+            history.rest();
+            if !is_simple {
                 continue;
             }
             let is_wanted = |index: u64| {

@@ -42,7 +42,10 @@ impl History {
         let bytes = std::fs::read(file).map_err(fault)?;
         let whole = Opened::new(&bytes).and_then(|opened| opened.check());
         whole.map_err(|why| fault::damaged(self.dir(), &format!("`{}`: {why}", file.display())))?;
-        write_quickly(&new, &bytes).map_err(fault)?;
+        // A link takes no space. Files of outlines are never changed, only replaced.
+        if std::fs::hard_link(file, &new).is_err() {
+            write_quickly(&new, &bytes).map_err(fault)?;
+        }
         Ok(Some(new))
     }
 

@@ -8,7 +8,7 @@ use oxigraph::store::Store;
 use crate::outlines::file::{Opened, Outline};
 use crate::outlines::loaded::Loaded;
 use crate::outlines::row::Outlined;
-use crate::outlines::shelf::{IndexSet, Needed, Shelf, Unread, unread};
+use crate::outlines::shelf::{IndexSet, Needed, Shelf, Unread, are_apart, unread};
 use crate::quad_source::RunQuads;
 use crate::{History, RunDetail, RunFilter, RunRow, RunVitals, detail, trace_file};
 use crate::{graphs, merge, write_run};
@@ -110,7 +110,33 @@ impl History {
         if !self.shelf().exists() {
             return Ok(());
         }
-        let places = self.of_outlines(&mut |shelf| {
+        let places = self.places(campaign)?;
+        runs.sort_by_key(|run| {
+            let index = place_of(run.as_ref()).map_or(u64::MAX, |(_, index)| index);
+            (places.get(&index).copied().unwrap_or(usize::MAX), index)
+        });
+        Ok(())
+    }
+
+    /// Sorts the runs of each campaign whose files of outlines overlap as [`History::sort_as_stored`] does. The runs of other
+    /// campaigns remain sorted by index. The argument must be sorted by campaign.
+    ///
+    /// # Errors
+    /// `H007` a file is damaged.
+    pub fn sort_interleaved(&self, runs: &mut [RunRow]) -> Result<(), Diagnostics> {
+        for runs in runs.chunk_by_mut(|one, next| one.campaign == next.campaign) {
+            let Some(campaign) = runs.first().map(|run| run.campaign.clone()) else { continue };
+            if !are_apart(&self.shelf().files(Some(&campaign))) {
+                let places = self.places(&campaign)?;
+                runs.sort_by_key(|run| (places.get(&run.index).copied().unwrap_or(usize::MAX), run.index));
+            }
+        }
+        Ok(())
+    }
+
+    /// The place of each outline of a campaign in its files, by index.
+    fn places(&self, campaign: &str) -> Result<HashMap<u64, usize>, Diagnostics> {
+        self.of_outlines(&mut |shelf| {
             let mut places: HashMap<u64, usize> = HashMap::new();
             shelf.each_file(Some(campaign), Needed::Indices, &mut |_, opened, _| {
                 for index in opened.indices()? {
@@ -120,12 +146,7 @@ impl History {
                 Ok(())
             })?;
             Ok(places)
-        })?;
-        runs.sort_by_key(|run| {
-            let index = place_of(run.as_ref()).map_or(u64::MAX, |(_, index)| index);
-            (places.get(&index).copied().unwrap_or(usize::MAX), index)
-        });
-        Ok(())
+        })
     }
 
     /// Reads a part of the outline of a run by `read`, which gets the run's position in the file. Returns `None` if the run
@@ -224,23 +245,30 @@ impl History {
         Ok((count, secs))
     }
 
-    /// The health data of the outlines of a campaign, by index.
-    pub(crate) fn outlined_vitals(&self, campaign: &str) -> Result<Vec<RunVitals>, Diagnostics> {
+    /// Calls `each` with the health data of the outlines of a campaign, file by file.
+    ///
+    /// # Errors
+    /// `H007` a file is damaged.
+    pub(crate) fn each_outlined_vitals(
+        &self,
+        campaign: &str,
+        each: &mut dyn FnMut(&RunVitals),
+    ) -> Result<(), Diagnostics> {
         if !self.shelf().exists() {
-            return Ok(Vec::new());
+            return Ok(());
         }
+        // If a file was removed meanwhile, the others are read again.
+        let mut done = IndexSet::default();
         self.of_outlines(&mut |shelf| {
-            let mut vitals = Vec::new();
-            shelf.each_file(Some(campaign), Needed::All, &mut |_, opened, there| {
+            shelf.each_file(Some(campaign), Needed::All, &mut |_, opened, _| {
                 let (rows, heads) = (opened.rows()?, opened.heads()?);
                 for (outlined, head) in rows.of_campaign(campaign).zip(heads) {
-                    if !there.contains(&outlined.row.index) {
-                        vitals.push(outlined.as_vitals(trace_file::head_choices(&head)?));
+                    if done.insert(outlined.row.index) {
+                        each(&outlined.as_vitals(trace_file::head_choices(&head)?));
                     }
                 }
                 Ok(())
-            })?;
-            Ok(vitals)
+            })
         })
     }
 

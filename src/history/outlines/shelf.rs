@@ -93,6 +93,13 @@ impl Shelf {
         if synced { write_atomic(&path, &bytes) } else { write_quickly(&path, &bytes) }
     }
 
+    /// Writes outlines, sorted by index, in one file.
+    pub(crate) fn add_all(&self, campaign: &str, outlines: &[Outline]) -> io::Result<()> {
+        let (Some(first), Some(last)) = (index_of(outlines.first()), index_of(outlines.last())) else { return Ok(()) };
+        let bytes = encode(outlines).map_err(io::Error::other)?;
+        write_atomic(&self.dir.join(format!("{campaign}.{first:09}-{last:09}.outlines")), &bytes)
+    }
+
     /// Puts the single files of a campaign together.
     pub(crate) fn pack(&self, campaign: &str) -> io::Result<()> {
         let files = self.files(Some(campaign));
@@ -111,10 +118,7 @@ impl Shelf {
                 let read = Opened::new(&bytes).and_then(|opened| opened.outlines()).map_err(io::Error::other)?;
                 outlines.extend(read);
             }
-            if let (Some(first), Some(last)) = (index_of(outlines.first()), index_of(outlines.last())) {
-                let bytes = encode(&outlines).map_err(io::Error::other)?;
-                write_atomic(&self.dir.join(format!("{campaign}.{first:09}-{last:09}.outlines")), &bytes)?;
-            }
+            self.add_all(campaign, &outlines)?;
             for single in singles {
                 fs::remove_file(&single.path)?;
             }
@@ -176,7 +180,7 @@ impl Shelf {
 }
 
 /// Whether no range of indices begins before the end of an earlier one. The files are sorted.
-fn are_apart(files: &[OutlineFile]) -> bool {
+pub(super) fn are_apart(files: &[OutlineFile]) -> bool {
     let mut highest: Option<u64> = None;
     files.iter().all(|file| {
         let is_apart = highest.is_none_or(|highest| file.first > highest);
