@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use clap::{ArgGroup, Args};
 
 use crate::chosen::{self, ChosenRuns};
+use crate::export_sparql::{self, SparqlArgs};
 use crate::{output, output_file};
 use actcheck_analysis::{Dataset, DatasetRuns, Mirror, export_csv, export_dataset, export_facts, export_parquet};
 use actcheck_base::{Diagnostic, Diagnostics};
@@ -14,14 +15,16 @@ use actcheck_history::History;
 
 /// `actcheck export`
 #[derive(Debug, Args)]
-#[command(group(ArgGroup::new("with_facts").args(["parquet", "nquads"]).multiple(true)))]
+#[command(group(ArgGroup::new("with_facts").args(["parquet", "nquads", "sparql"]).multiple(true)))]
 pub struct ExportArgs {
     /// Id of the run to write as a configuration, or a unique prefix
-    #[arg(required_unless_present_any = ["parquet", "csv", "dataset", "nquads", "turtle", "rebuild_mirror"])]
+    #[arg(required_unless_present_any = ["parquet", "csv", "dataset", "nquads", "turtle", "sparql", "rebuild_mirror"])]
     pub run: Option<String>,
     /// The file to write (TOML); `-` prints it
     #[arg(short, long, value_name = "FILE.toml", conflicts_with = "regression", requires = "run")]
-    #[arg(required_unless_present_any = ["regression", "parquet", "csv", "dataset", "nquads", "turtle", "rebuild_mirror"])]
+    #[arg(required_unless_present_any = [
+        "regression", "parquet", "csv", "dataset", "nquads", "turtle", "sparql", "rebuild_mirror",
+    ])]
     pub output: Option<PathBuf>,
     /// Write it into the project's folder `regressions`, named after the run; every campaign runs these files first
     #[arg(long, requires = "run")]
@@ -44,7 +47,10 @@ pub struct ExportArgs {
     /// Write the whole history as RDF, with facts in their named graphs (N-Quads)
     #[arg(long, value_name = "FILE.nq")]
     pub nquads: Option<PathBuf>,
-    /// With `--nquads`: all facts from the traces, not only those in the history. With `--parquet`: also the tables from
+    /// The store that the history is sent to.
+    #[command(flatten)]
+    pub sparql: SparqlArgs,
+    /// With `--nquads` and `--sparql`: all facts from the traces, not only those in the history. With `--parquet`: also the tables from
     /// which outcomes follow: `actions`, `percepts`, `planes`, `states`, `bodies`, `links`, `contacts`, `self_contacts`,
     /// `extremes`, `joint_extremes`, `shapes` and `places`
     #[arg(long, requires = "with_facts")]
@@ -60,8 +66,8 @@ pub struct ExportArgs {
     pub chosen: ChosenRuns,
 }
 
-/// Writes a stored run as a configuration, or the history as tables or RDF.
-pub fn export(args: &ExportArgs) -> Result<(), Diagnostics> {
+/// Writes a stored run as a configuration, or the history as tables or RDF, or sends it to a store. Returns the exit code.
+pub fn export(args: &ExportArgs) -> Result<u8, Diagnostics> {
     let history = args.chosen.open()?;
     if let Some(run) = &args.run {
         export_run(args, &history, run)?;
@@ -83,7 +89,10 @@ pub fn export(args: &ExportArgs) -> Result<(), Diagnostics> {
     if args.parquet.is_some() || args.csv.is_some() || args.dataset.is_some() || args.rebuild_mirror {
         export_tables(args, &history)?;
     }
-    Ok(())
+    match &args.sparql.sparql {
+        Some(url) => export_sparql::send(&args.sparql, url, args.complete, &history),
+        None => Ok(0),
+    }
 }
 
 fn export_tables(args: &ExportArgs, history: &History) -> Result<(), Diagnostics> {

@@ -458,7 +458,11 @@ impl History {
     }
 
     /// Ids are parts of file names, so those of a foreign history must not lead out of its folder.
-    fn check_ids<'a>(&self, kind: &str, ids: impl IntoIterator<Item = &'a String>) -> Result<(), Diagnostics> {
+    pub(super) fn check_ids<'a>(
+        &self,
+        kind: &str,
+        ids: impl IntoIterator<Item = &'a String>,
+    ) -> Result<(), Diagnostics> {
         match ids.into_iter().find(|id| !names::is_id(id)) {
             Some(id) => Err(fault::foreign_id(self.dir(), kind, id)),
             None => Ok(()),
