@@ -57,6 +57,7 @@ mod notebooks;
 mod obstacles;
 mod ontology;
 mod oracle;
+mod other_stores;
 mod outlines;
 mod patterns;
 mod perceive;

@@ -33,7 +33,7 @@ const FLOORS: [(&str, &[&str]); 18] = [
 ];
 
 /// Libraries of the field and the crates that may depend on them.
-const FENCES: [(&str, &[&str]); 30] = [
+const FENCES: [(&str, &[&str]); 31] = [
     ("toml", &["config"]),
     ("roxmltree", &["config"]),
     ("mesh-loader", &["config"]),
@@ -58,6 +58,7 @@ const FENCES: [(&str, &[&str]); 30] = [
     ("spargebra", &["history"]),
     ("ureq", &["remote"]),
     ("rustls", &["remote"]),
+    ("rusty-s3", &["remote"]),
     ("rustls-native-certs", &["remote"]),
     ("re_chunk", &["report"]),
     ("re_log_encoding", &["report"]),

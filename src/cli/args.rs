@@ -228,7 +228,7 @@ pub enum Command {
     /// shrunk runs, no cases, and no runs of `run --last-failed`. Their column `counts` is false for runs that are
     /// bit-identical to a later one.
     #[command(
-        after_help = "Examples:\n  actcheck export k7f3-3 -o case.toml    (a run id from `actcheck list`; a prefix is enough)\n  actcheck export --parquet tables    (after `actcheck run configs/pick.toml`)\n  actcheck export --nquads history.nq --turtle history.ttl\n  actcheck export --sparql http://localhost:3030/history/update    (another store, such as Fuseki)"
+        after_help = "Examples:\n  actcheck export k7f3-3 -o case.toml    (a run id from `actcheck list`; a prefix is enough)\n  actcheck export --parquet tables    (after `actcheck run configs/pick.toml`)\n  actcheck export --tables /tmp/columns    (or s3://BUCKET/PREFIX)\n  actcheck export --nquads history.nq --turtle history.ttl\n  actcheck export --sparql http://localhost:3030/history/update    (another store, such as Fuseki)"
     )]
     Export(crate::export::ExportArgs),
     /// Merge histories into one: parts of a campaign (`run --shard`) become one campaign, duplicates are kept once

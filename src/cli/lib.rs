@@ -23,6 +23,7 @@ mod explain;
 mod explanations;
 mod export;
 mod export_sparql;
+mod export_tables;
 mod groups;
 mod health;
 mod history_dir;

@@ -5,7 +5,7 @@ use std::io::Read;
 use ureq::http::Method;
 
 use crate::Address;
-use crate::client::{Client, Request};
+use crate::client::{Client, Content, Request};
 use crate::fault::Fault;
 use actcheck_base::Diagnostics;
 
@@ -41,7 +41,7 @@ pub fn ask(
             ("content-type", "application/x-www-form-urlencoded".to_owned()),
             ("accept", ACCEPTED.to_owned()),
         ],
-        content: form.as_bytes(),
+        content: Content::Bytes(form.as_bytes()),
     };
     match client.send(&request) {
         Ok(response) => Ok(Answer { media_type: response.media_type(), body: Box::new(response.into_reader()) }),

@@ -21,6 +21,16 @@ const FIRST_TRIES: u32 = 3;
 /// While it waits, a client looks at the flag that stops it this often.
 const LOOK: Duration = Duration::from_millis(50);
 
+/// The body of a request. A file is opened for each try.
+#[derive(Clone, Copy)]
+pub(crate) enum Content<'a> {
+    Bytes(&'a [u8]),
+    #[cfg(feature = "object-storage")]
+    File(&'a std::path::Path),
+    #[cfg(feature = "object-storage")]
+    None,
+}
+
 /// A request, which may be sent several times.
 pub(crate) struct Request<'a> {
     pub method: Method,
@@ -28,7 +38,7 @@ pub(crate) struct Request<'a> {
     /// Parameters that are part of the target but not of the address in messages.
     pub target: String,
     pub headers: Vec<(&'static str, String)>,
-    pub content: &'a [u8],
+    pub content: Content<'a>,
 }
 
 /// A client of HTTP servers. Reuses connections.
@@ -126,7 +136,21 @@ impl Client {
         if let Some(header) = self.credentials.header() {
             new = new.header("authorization", header);
         }
-        self.run(new.body(request.content))
+        match request.content {
+            Content::Bytes(bytes) => self.run(new.body(bytes)),
+            #[cfg(feature = "object-storage")]
+            Content::None => self.run(new.body(())),
+            #[cfg(feature = "object-storage")]
+            Content::File(path) => {
+                let cannot = |error: std::io::Error| Fault::Unreachable {
+                    why: format!("{} can't be read: {error}", path.display()),
+                    is_temporary: false,
+                };
+                let file = std::fs::File::open(path).map_err(cannot)?;
+                let length = file.metadata().map_err(cannot)?.len();
+                self.run(new.header("content-length", length).body(&file))
+            }
+        }
     }
 
     fn run(&self, request: Result<HttpRequest<impl AsSendBody>, ureq::http::Error>) -> Result<Response, Fault> {

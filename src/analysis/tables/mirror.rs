@@ -176,7 +176,7 @@ impl Mirror {
     }
 
     /// Iterates over its files with their campaigns.
-    pub(super) fn files(&self) -> impl Iterator<Item = (&str, &Path)> {
+    pub fn files(&self) -> impl Iterator<Item = (&str, &Path)> {
         self.files.iter().map(|(campaign, file)| (campaign.as_str(), file.as_path()))
     }
 

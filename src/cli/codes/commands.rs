@@ -374,4 +374,10 @@ const CODES_X: &[Code] = &[
         "an environment variable is missing or malformed, or the netrc file can't be read",
         "set ACTCHECK_SPARQL_USER and ACTCHECK_SPARQL_PASSWORD, or ACTCHECK_SPARQL_TOKEN alone, or use `--netrc`",
     ),
+    code(
+        "X097",
+        "files can't be copied to or from a folder or an object storage",
+        "credentials, region, address or rights are wrong, or the disk is full; the message has the first lines of the answer",
+        "set AWS_ACCESS_KEY_ID, AWS_SECRET_ACCESS_KEY, AWS_REGION and, for storages of others, AWS_ENDPOINT_URL; then give the same command again",
+    ),
 ];
