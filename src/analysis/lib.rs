@@ -26,7 +26,7 @@ mod tables;
 
 pub use answer::Answer;
 pub use bisect::{Likeness, OutcomeFlip, like_by_outcomes, like_by_rates, outcome_flips};
-pub use compare::{Compared, ComparedLine, ComparedRun, Comparison, compare, compared_runs};
+pub use compare::{Compared, ComparedLine, ComparedRun, ComparedRuns, Comparison, compare, compared_runs};
 pub use consistency::{Consistency, PassPower, Repeated, SceneCounts, SceneRuns, Variance, consistency};
 pub use coverage::{Coverage, PairCoverage, ParameterCoverage};
 pub use dataset::{Dataset, DatasetRuns, export_dataset, export_facts};

@@ -20,8 +20,8 @@ use crate::wanted::Wanted;
 use crate::write_campaign::{self, campaign_node};
 use crate::write_run::{self, run_node};
 use crate::{
-    CampaignEnd, CampaignRecord, CampaignRow, Cancel, OutcomeRow, QueryAnswer, RunDetail, RunFilter, RunRecord, RunRow,
-    RunVitals, detail, fault, query, trace_file, vitals,
+    CampaignEnd, CampaignRecord, CampaignRow, Cancel, Judgements, OutcomeRow, QueryAnswer, RunDetail, RunFilter,
+    RunRecord, RunRow, RunVitals, Wish, detail, fault, query, trace_file, vitals,
 };
 use crate::{lists, read_campaign};
 use actcheck_base::{Diagnostic, Diagnostics, Digest, Files, RunFacts, Source, names, nearest, write_atomic};
@@ -177,7 +177,7 @@ impl History {
         let mut campaigns =
             lists::campaigns(&*self.store_with(lists::of_campaigns)?).map_err(|error| self.query_fault(&error))?;
         for campaign in &mut campaigns {
-            campaign.runs += self.outlined_ids(Some(&campaign.id))?.len() as u64;
+            campaign.runs += self.count_outlined(&campaign.id)?;
         }
         self.check_ids("campaign", campaigns.iter().map(|campaign| &campaign.id))?;
         Ok(campaigns)
@@ -210,14 +210,9 @@ impl History {
     /// # Errors
     /// The store can't be read; `H026` an id is not an id.
     pub fn runs(&self, filter: &RunFilter) -> Result<Vec<RunRow>, Diagnostics> {
-        let store = self.store_with(lists::of_runs)?;
-        let mut runs = lists::runs(&store, filter).map_err(|error| self.query_fault(&error))?;
-        let whole = runs.len();
-        self.each_outlined(filter, &mut |outlined| runs.push(outlined.as_run()))?;
-        if runs.len() > whole {
-            lists::sort_runs(&store, &mut runs).map_err(|error| self.query_fault(&error))?;
-        }
-        self.check_ids("run", runs.iter().flat_map(|run| [&run.run, &run.campaign]))?;
+        let mut runs = Vec::new();
+        let wish = Wish { judgements: Judgements::None, ..Wish::default() };
+        self.each_judged(filter, wish, &mut |run| runs.push(run.row))?;
         Ok(runs)
     }
 
@@ -256,13 +251,8 @@ impl History {
     /// # Errors
     /// The store can't be read.
     pub fn outcomes(&self, filter: &RunFilter) -> Result<Vec<OutcomeRow>, Diagnostics> {
-        let store = self.store_with(lists::of_outcomes)?;
-        let mut outcomes = lists::outcomes(&store, filter).map_err(|error| self.query_fault(&error))?;
-        let whole = outcomes.len();
-        self.each_outlined(filter, &mut |outlined| outcomes.extend(outlined.as_outcomes()))?;
-        if outcomes.len() > whole {
-            lists::sort_outcomes(&store, &mut outcomes).map_err(|error| self.query_fault(&error))?;
-        }
+        let mut outcomes = Vec::new();
+        self.each_judged(filter, Wish::default(), &mut |run| outcomes.extend(run.outcome_rows()))?;
         Ok(outcomes)
     }
 

@@ -209,7 +209,8 @@ impl Mirror {
         outdated.iter().try_for_each(|file| self.remove(file))?;
         self.files.extend(kept.into_iter().map(|file| (campaign.to_owned(), file)));
         change.kept += there.len();
-        let missing: Vec<&String> = runs.iter().filter(|run| !there.contains(*run)).collect();
+        let mut missing: Vec<&String> = runs.iter().filter(|run| !there.contains(*run)).collect();
+        history.sort_as_stored(campaign, &mut missing)?;
         for runs in missing.chunks(RUNS_IN_A_FILE) {
             let mut rows = Rows::default();
             for run in table_runs(history, runs) {

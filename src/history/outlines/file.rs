@@ -112,10 +112,13 @@ impl<'a> Opened<'a> {
         Ok(Self { parts, sums })
     }
 
-    /// Size of the file up to the end of the first part. Unit: bytes.
-    pub(super) fn size_of_start(header: &[u8]) -> Option<usize> {
-        let size = header.get(MAGIC.len()..MAGIC.len() + 4)?;
-        Some(HEADER + u32::from_le_bytes([size[0], size[1], size[2], size[3]]) as usize)
+    /// Size of the file up to the end of its first `parts` parts. Unit: bytes.
+    pub(super) fn size_of_start(header: &[u8], parts: usize) -> Option<usize> {
+        let sizes = (0..parts).map(|part| {
+            let size = header.get(MAGIC.len() + 8 * part..MAGIC.len() + 8 * part + 4)?;
+            Some(u32::from_le_bytes([size[0], size[1], size[2], size[3]]) as usize)
+        });
+        sizes.sum::<Option<usize>>().map(|size| HEADER + size)
     }
 
     fn part(&self, at: usize) -> Result<Vec<u8>, String> {
@@ -123,6 +126,15 @@ impl<'a> Opened<'a> {
             return Err(CHANGED.to_owned());
         }
         zstd::stream::decode_all(self.parts[at]).map_err(|error| error.to_string())
+    }
+
+    /// Compares all parts with their checksums.
+    ///
+    /// # Errors
+    /// A message, if a part differs.
+    pub(super) fn check(&self) -> Result<(), String> {
+        let is_same = |(part, sum): (&&[u8], &u32)| journal::sum_of(part) == *sum;
+        if self.parts.iter().zip(&self.sums).all(is_same) { Ok(()) } else { Err(CHANGED.to_owned()) }
     }
 
     /// The indices of its runs, in the order of the file.

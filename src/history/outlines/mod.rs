@@ -9,16 +9,19 @@
 //!
 //! Never: has a run that the store has too.
 
+mod copy;
 mod file;
 mod loaded;
 mod read;
 mod restore;
 mod row;
 mod shelf;
+mod stream;
 mod view;
 
 pub(super) use file::Outline;
 pub(super) use loaded::LoadedFiles;
 pub use restore::Restore;
+pub(super) use row::Outlined;
 pub(super) use shelf::Shelf;
 pub(super) use view::View;

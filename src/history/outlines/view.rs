@@ -6,7 +6,7 @@ use crate::folder::Folder;
 use crate::graphs;
 use crate::journal::{self, Part};
 use crate::open::{OpenStore, Opened, read_with_outlines};
-use crate::outlines::shelf::Unread;
+use crate::outlines::shelf::{Needed, Unread};
 use crate::trace_file;
 use crate::wanted::{InGraph, Wanted};
 use crate::write_run::run_node;
@@ -59,9 +59,9 @@ impl History {
     /// The wanted statements of all outlines, with facts, as if the runs were kept whole.
     pub(crate) fn outlined_statements(&self, wanted: &Wanted) -> Result<Part, Diagnostics> {
         let with_facts = wanted.graphs || wanted.patterns.iter().any(|pattern| pattern.graph != InGraph::Default);
-        let found = self.of_outlines(|shelf| {
+        let found = self.of_outlines(&mut |shelf| {
             let mut part = Part::default();
-            shelf.each_file(None, false, &mut |file, opened, there| {
+            shelf.each_file(None, Needed::All, &mut |file, opened, there| {
                 if part.quads.len() > MOST_STATEMENTS {
                     return Ok(());
                 }

@@ -74,14 +74,12 @@ impl Table {
     }
 
     fn csv(&self) -> String {
-        let mut writer = csv::WriterBuilder::new().from_writer(Vec::new());
-        let rows =
-            std::iter::once(self.columns.clone()).chain(self.rows.iter().map(|row| row.iter().map(plain).collect()));
-        for row in rows {
-            writer.write_record(&row).expect("writing to memory does not fail, and every row has all columns");
-        }
-        let bytes = writer.into_inner().expect("writing to memory does not fail");
-        String::from_utf8(bytes).expect("only text was written")
+        csv_lines(std::iter::once(self.columns.clone())) + &self.csv_rows()
+    }
+
+    /// The rows as comma-separated values, without the header line.
+    pub fn csv_rows(&self) -> String {
+        csv_lines(self.rows.iter().map(|row| row.iter().map(plain).collect()))
     }
 
     fn json(&self) -> String {
@@ -124,9 +122,8 @@ impl TableParts {
         let text = table.render(self.format, self.page);
         match self.format {
             TableFormat::Table => text,
-            // The first line is the header, whose names of variables have no line breaks.
             TableFormat::Csv if is_first => text,
-            TableFormat::Csv => text.split_once('\n').map_or_else(String::new, |(_, rows)| rows.to_owned()),
+            TableFormat::Csv => table.csv_rows(),
             TableFormat::Json => {
                 let objects = text.strip_prefix("[\n").and_then(|text| text.strip_suffix("\n]\n")).unwrap_or_default();
                 format!("{}{objects}", if is_first { "[\n" } else { ",\n" })
@@ -143,6 +140,15 @@ impl TableParts {
             (_, false) => self.part(Vec::new()),
         }
     }
+}
+
+fn csv_lines(rows: impl Iterator<Item = Vec<String>>) -> String {
+    let mut writer = csv::WriterBuilder::new().from_writer(Vec::new());
+    for row in rows {
+        writer.write_record(&row).expect("writing to memory does not fail, and every row has all columns");
+    }
+    let bytes = writer.into_inner().expect("writing to memory does not fail");
+    String::from_utf8(bytes).expect("only text was written")
 }
 
 /// Formats a cell as text: strings without quotes, `null` as an empty string.
