@@ -58,6 +58,7 @@ mod notebooks;
 mod obstacles;
 mod ontology;
 mod oracle;
+mod other_stores;
 mod outlined_queries;
 mod outlines;
 mod patterns;

@@ -178,7 +178,8 @@ fn a_sample_has_files_at_equal_distances_and_rates_are_of_all_runs() {
     let options = PatternOptions::default();
     let (of_all, of_sample) = (judged(&rates), judged(&sample));
     let exact = property_findings(&all, &judged(&all)[0], &Default::default(), &options);
-    let found = property_findings(&sample, &of_sample[0], &Default::default(), &options).with_rates_of(&rates, &of_all[0]);
+    let found =
+        property_findings(&sample, &of_sample[0], &Default::default(), &options).with_rates_of(&rates, &of_all[0]);
     assert_eq!((found.counts, found.failing), (exact.counts, exact.failing));
     assert_eq!((&found.margins, found.twins, found.repeated), (&exact.margins, exact.twins, exact.repeated));
     assert!(found.patterns.runs < exact.patterns.runs);

@@ -38,8 +38,9 @@ pub use failure_modes::{FailureMode, failure_modes};
 pub use false_discovery::benjamini_hochberg;
 pub use findings::{
     Cascade, ChangePoint, Collisions, Example, FINDING_COLUMNS, FlakyScene, HitKind, Judged, JudgedProperty, Mined,
-    PlacedThing, PropertyFindings, Quantiles, RATE_COLUMNS, Sector, Trend, TrendPoint, TwoWay, TwoWayCell, cascades, collisions,
-    finding_columns, flaky_scenes, judged, property_findings, quantiles, table_failure_modes, trend, two_way,
+    PlacedThing, PropertyFindings, Quantiles, RATE_COLUMNS, Sector, Trend, TrendPoint, TwoWay, TwoWayCell, cascades,
+    collisions, finding_columns, flaky_scenes, judged, property_findings, quantiles, table_failure_modes, trend,
+    two_way,
 };
 pub use fisher::{FisherTest, TwoByTwo};
 pub use health::{Health, HealthMeter, HealthProblem};

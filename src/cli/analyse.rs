@@ -10,8 +10,8 @@ use crate::output;
 use crate::picture::Picture;
 use crate::work::all_cores;
 use actcheck_analysis::{
-    Column, Hierarchy, JudgedProperty, Mirror, OutcomeTable, PatternOptions, RATE_COLUMNS, TableFilter, cascades, collisions,
-    columns, finding_columns, flaky_scenes, judged, property_findings, table_failure_modes, trend, two_way,
+    Column, Hierarchy, JudgedProperty, Mirror, OutcomeTable, PatternOptions, RATE_COLUMNS, TableFilter, cascades,
+    collisions, columns, finding_columns, flaky_scenes, judged, property_findings, table_failure_modes, trend, two_way,
 };
 use actcheck_base::{Diagnostic, Diagnostics, did_you_mean};
 use actcheck_history::History;

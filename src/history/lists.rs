@@ -65,11 +65,11 @@ SELECT ?execution ?property ?at ?outcome ?rule WHERE {
 /// the table `case` in their configuration. The prefix is [`FAILED_AGAIN`].
 pub(super) const SELECTED: &str = r"
 SELECT DISTINCT ?campaign WHERE {
-    { ?run act:shrunkFrom ?original ; act:campaign ?campaign }
+    { ?ac_run act:shrunkFrom ?ac_original ; act:campaign ?campaign }
     UNION
-    { ?campaign a act:Campaign ; rdfs:label ?name FILTER(STRSTARTS(?name, 'failed runs of ')) }
+    { ?campaign a act:Campaign ; rdfs:label ?ac_name FILTER(STRSTARTS(?ac_name, 'failed runs of ')) }
     UNION
-    { ?campaign a act:Campaign ; act:configText ?text FILTER(REGEX(?text, '^[ \\t]*(\\[[ \\t]*case[ \\t]*(\\]|\\.)|case[ \\t]*(\\.|=))', 'm')) }
+    { ?campaign a act:Campaign ; act:configText ?ac_text FILTER(REGEX(?ac_text, '^[ \\t]*(\\[[ \\t]*case[ \\t]*(\\]|\\.)|case[ \\t]*(\\.|=))', 'm')) }
 }";
 
 /// Name prefix of campaigns that ran the failed runs of another campaign again.
@@ -121,6 +121,14 @@ pub(super) fn of_later_judgements() -> Wanted {
 /// The statements that [`selected_campaigns`] and [`campaign_ids`] read.
 pub(super) fn of_selected_campaigns() -> Wanted {
     Wanted::queries(&[SELECTED, STARTS])
+}
+
+/// A pattern on one line that matches if a campaign is one of [`selected_campaigns`]. `campaign` is a variable.
+pub(super) fn is_selected(campaign: &str) -> String {
+    let pattern =
+        SELECTED.split_once('{').and_then(|(_, rest)| rest.rsplit_once('}')).map_or("", |(pattern, _)| pattern);
+    let words: Vec<&str> = pattern.lines().map(str::trim).collect();
+    words.join(" ").replace("?campaign", campaign)
 }
 
 type Row = Vec<Option<Term>>;

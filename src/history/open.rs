@@ -319,11 +319,7 @@ fn read_tables(folder: &Folder, snapshot: Arc<Snapshot>) -> Result<Opened, Diagn
     opened(folder, store, snapshot)
 }
 
-fn opened(
-    folder: &Folder,
-    store: Result<Store, StorageError>,
-    snapshot: Arc<Snapshot>,
-) -> Result<Opened, Diagnostics> {
+fn opened(folder: &Folder, store: Result<Store, StorageError>, snapshot: Arc<Snapshot>) -> Result<Opened, Diagnostics> {
     let store = store.map_err(|error| fault::unread(folder.dir(), &error))?;
     let snapshot = Some(snapshot);
     let store = OpenStore { store, snapshot: snapshot.clone() };

@@ -144,8 +144,7 @@ impl History {
         self.check_ids("run", records.iter().map(|record| &record.id))?;
         let doing = "writing outlines";
         let outlines = records.iter().map(Outline::of).collect::<Result<Vec<_>, _>>();
-        let outlines =
-            outlines.map_err(|error| Diagnostic::error("H006", format!("{doing} failed: {error}")))?;
+        let outlines = outlines.map_err(|error| Diagnostic::error("H006", format!("{doing} failed: {error}")))?;
         self.folder.begin_outlines()?;
         self.shelf().add_all(campaign, &outlines).map_err(|error| fault::io(self.dir(), doing, &error))
     }

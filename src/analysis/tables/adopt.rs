@@ -45,7 +45,8 @@ impl Mirror {
             let found = files_of(source)?;
             source.rest();
             let known = Checked::read(&tables_of(source));
-            for (campaign, digest, file) in found.into_iter().filter(|(campaign, ..)| kept.contains(campaign.as_str())) {
+            for (campaign, digest, file) in found.into_iter().filter(|(campaign, ..)| kept.contains(campaign.as_str()))
+            {
                 let runs = match known.get(&file) {
                     Some(runs) => runs.clone(),
                     None if is_whole(&file) => match runs_of(&file) {

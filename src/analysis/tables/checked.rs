@@ -136,7 +136,9 @@ mod tests {
 
     #[test]
     fn damaged_lines_are_ignored() {
-        for text in ["", "k", "k 1 1 1", "k 1 1 5 0+1*6", "k 1 1 5 0+1", "k 1 1 9 18446744073709551615+1*2", "k x 1 1 0+1*1"] {
+        for text in
+            ["", "k", "k 1 1 1", "k 1 1 5 0+1*6", "k 1 1 5 0+1", "k 1 1 9 18446744073709551615+1*2", "k x 1 1 0+1*1"]
+        {
             assert_eq!(line(text), None, "{text}");
         }
     }

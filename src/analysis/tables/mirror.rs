@@ -179,12 +179,8 @@ impl Mirror {
         runs: impl IntoIterator<Item = impl Into<TableRun>>,
     ) -> Result<Self, Diagnostics> {
         fs::create_dir_all(folder).map_err(|error| unwritten(folder, &error))?;
-        let mut mirror = Self {
-            folder: folder.to_path_buf(),
-            files: Vec::new(),
-            checked: Checked::default(),
-            _place: Place::Given,
-        };
+        let mut mirror =
+            Self { folder: folder.to_path_buf(), files: Vec::new(), checked: Checked::default(), _place: Place::Given };
         let mut runs = runs.into_iter().peekable();
         while runs.peek().is_some() {
             let mut rows = Rows::default();
@@ -202,6 +198,11 @@ impl Mirror {
     /// Number of rows of the campaigns that a filter selects.
     pub fn rows(&self, filter: &TableFilter) -> usize {
         self.files.iter().filter(|file| filter.takes_campaign(&file.campaign)).map(|file| file.rows).sum()
+    }
+
+    /// Iterates over its files with their campaigns.
+    pub fn paths(&self) -> impl Iterator<Item = (&str, &Path)> {
+        self.files.iter().map(|file| (file.campaign.as_str(), file.path.as_path()))
     }
 
     /// Its files, by campaign.

@@ -139,9 +139,7 @@ impl OutcomeTable {
             for (at, file) in files.iter().enumerate() {
                 // A thread without a further frame has panicked, which the scope reports.
                 let Ok(frame) = frames[at % threads].recv() else { break };
-                frame
-                    .and_then(|frame| table.append(&frame, &mut known))
-                    .map_err(|error| unread(&file.path, &error))?;
+                frame.and_then(|frame| table.append(&frame, &mut known)).map_err(|error| unread(&file.path, &error))?;
             }
             Ok(table)
         })

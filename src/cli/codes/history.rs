@@ -153,4 +153,10 @@ const CODES_H: &[Code] = &[
         "a model, a rule of the scene or the program changed since, so that another run would result",
         "`actcheck replay` names the changes; the run's outcomes and states are intact",
     ),
+    code(
+        "H040",
+        "the answer of another store can't be read",
+        "the address is that of another service, or the server or the connection ended the answer early",
+        "check the address; ask for less, or give the server more time with `--timeout`",
+    ),
 ];

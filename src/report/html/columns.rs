@@ -140,8 +140,10 @@ fn ids(table: &OutcomeTable, rows: &[usize], pack: &mut Pack) {
 /// Packs the failure mode of each run: its number from 1, or 0.
 fn modes(report: &HtmlReport<'_>, pack: &mut Pack) {
     let runs = &report.table.text("run").texts;
-    let place_of: HashMap<&str, u32> =
-        (1..).zip(&report.findings.modes).flat_map(|(mode, of)| of.runs.iter().map(move |run| (run.as_str(), mode))).collect();
+    let place_of: HashMap<&str, u32> = (1..)
+        .zip(&report.findings.modes)
+        .flat_map(|(mode, of)| of.runs.iter().map(move |run| (run.as_str(), mode)))
+        .collect();
     let modes: Vec<u32> = runs.iter().map(|run| place_of.get(run.as_str()).copied().unwrap_or(0)).collect();
     let modes = pack.places(&modes);
     pack.set("mode", modes);

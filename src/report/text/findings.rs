@@ -26,7 +26,10 @@ pub fn findings_text(summary: &FindingsSummary, page: Page) -> String {
     }
     let _ = writeln!(out, "{} outcomes: {}", summary.counts.total(), counts(summary.counts));
     if let Some(sampled) = summary.sampled_runs {
-        let _ = writeln!(out, "counts, rates, margins and failure modes are of all runs; patterns and collisions of a sample of {sampled}");
+        let _ = writeln!(
+            out,
+            "counts, rates, margins and failure modes are of all runs; patterns and collisions of a sample of {sampled}"
+        );
     }
     modes(&mut out, summary, page);
     cascades(&mut out, summary);
