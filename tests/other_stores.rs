@@ -280,3 +280,54 @@ fn credentials_come_from_the_environment_or_a_netrc_file() {
     assert_eq!(fault(&with(&[("ACTCHECK_SPARQL_PASSWORD", "abc")], &[])).0, "X096");
     assert_eq!(fault(&with(&[("NETRC", "/nonexistent")], &["--netrc"])).0, "X096");
 }
+
+/// The files below a folder, with their contents.
+fn files(folder: &Path) -> std::collections::BTreeMap<String, Vec<u8>> {
+    let mut found = std::collections::BTreeMap::new();
+    for entry in std::fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        if path.is_dir() {
+            found.extend(files(&path));
+        } else {
+            found.insert(path.display().to_string(), std::fs::read(&path).unwrap());
+        }
+    }
+    found
+}
+
+#[test]
+fn tables_are_copied_completely_and_outdated_ones_are_removed() {
+    let (history, folder) = (history(), tempfile::tempdir().unwrap());
+    let (name, to) = (history.path().display().to_string(), folder.path().join("to"));
+    let words = ["export", "--tables", &to.display().to_string(), "--history", &name];
+    let copied = |words: &[&str]| {
+        let output = actcheck(root(), words);
+        assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+        stdout(&output)
+    };
+    let told = copied(&words);
+    assert!(told.contains("2 tables: 2 were copied"), "{told}");
+    let first = files(&to);
+    assert!(copied(&words).contains("2 tables: 0 were copied"));
+    assert_eq!(files(&to), first);
+    // A copy that was interrupted: a file is missing, another is short, and there is no list yet. Files of others are kept.
+    let tables: Vec<&String> = first.keys().filter(|name| name.ends_with(".parquet")).collect();
+    std::fs::remove_file(tables[0]).unwrap();
+    std::fs::write(tables[1], "short").unwrap();
+    std::fs::remove_file(to.join("tables.json")).unwrap();
+    std::fs::write(to.join("notes.txt"), "mine").unwrap();
+    assert!(copied(&words).contains("2 were copied"));
+    let mut again = files(&to);
+    assert_eq!(again.remove(&to.join("notes.txt").display().to_string()).as_deref(), Some(&b"mine"[..]));
+    assert_eq!(again, first);
+    // New judgements make new tables, and the old ones disappear.
+    let project = project_with(crate::support::COARSEST);
+    edit(&project.path().join("rules/moved_object.rls"), "?d > 0.02", "?d > 9");
+    let recheck = actcheck(project.path(), &["recheck", "MovedObject", "--history", &name]);
+    assert!(recheck.status.code().is_some_and(|code| code < 2), "{}", stderr(&recheck));
+    let told = copied(&words);
+    assert!(told.contains("outdated ones were removed"), "{told}");
+    assert_eq!(files(&to).keys().filter(|name| name.ends_with(".parquet")).count(), 2);
+    let refused = actcheck(root(), &["export", "--tables", "gs://bucket/x", "--history", &name]);
+    assert_eq!(fault(&refused).0, "X090");
+}
