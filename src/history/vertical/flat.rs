@@ -1,4 +1,4 @@
-//! A group of patterns as lists: what is joined, what is optional, and which conditions apply.
+//! A group of patterns as lists: joined patterns, optional ones, and conditions.
 
 use std::collections::BTreeSet;
 

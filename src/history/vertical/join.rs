@@ -143,7 +143,7 @@ impl FileColumns {
     }
 }
 
-/// What the codes of a place are.
+/// The meaning of the codes of a place.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Kind {
     Unknown,

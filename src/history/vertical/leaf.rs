@@ -47,7 +47,7 @@ pub(super) struct Leaf {
     pub conditions: Vec<Native>,
     /// Conditions on all values.
     pub late: Vec<Native>,
-    /// What is at each place.
+    /// The content of each place.
     pub places: Vec<Place>,
     /// The values that a place may have; the others can be left out.
     pub among: Vec<(usize, Arc<Limit>)>,
@@ -57,7 +57,7 @@ pub(super) struct Leaf {
 #[derive(Debug, Clone, Default)]
 pub(super) struct Limit {
     pub values: HashSet<Value>,
-    /// Those that are nodes of runs: by the IRI of the run without its number, by the number, and what follows it.
+    /// Those that are nodes of runs: by the IRI of the run without its number, by the number, and the rest of the IRI.
     pub nodes: HashMap<String, HashMap<u64, HashSet<String>>>,
 }
 
@@ -78,7 +78,7 @@ impl Limit {
     }
 }
 
-/// What a place holds.
+/// The content of a place.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) enum Place {
     Variable(Variable),

@@ -4,7 +4,7 @@
 //! nearly always stay within one run. So each file of outlines has its statements by property, a query's patterns are
 //! evaluated file by file, and only the joined rows, equal ones counted, are given to the evaluator.
 //!
-//! Never: has an answer of its own; what does not fit is left to the store.
+//! Never: has an answer of its own; queries that do not fit are left to the store.
 
 mod column;
 mod counts;

@@ -1,4 +1,4 @@
-//! What the rest of a query needs of a pattern.
+//! The values and rows of a pattern that the rest of a query needs.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -30,7 +30,7 @@ pub(super) struct Asked {
     pub expression: Expression,
 }
 
-/// What is needed of a pattern.
+/// The need of a pattern.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Need {
     /// Variables whose values are needed.
@@ -67,7 +67,7 @@ impl Need {
     }
 }
 
-/// A pattern in which what outlines need is a table.
+/// A pattern in which tables replace the statements of outlines.
 #[derive(Debug, Clone)]
 pub(super) struct Rewritten {
     pub pattern: GraphPattern,

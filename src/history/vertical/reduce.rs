@@ -15,7 +15,7 @@ const MOST_VALUES: usize = 12_000_000;
 /// Number of rows from which those that can't be among the first are removed.
 const MANY_ROWS: usize = 4096;
 
-/// What remains of the rows of a leaf.
+/// The values that remain of the rows of a leaf.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Output {
     /// Places whose values remain.
