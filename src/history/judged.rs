@@ -49,7 +49,7 @@ pub struct JudgedRun {
 /// Digests of the rules of later judgements, by the IRI of the property.
 pub type LaterRules = BTreeMap<String, BTreeSet<String>>;
 
-/// What a reader of runs needs.
+/// The data that a reader of runs needs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Wish {
     /// The judgements of the runs.

@@ -13,7 +13,7 @@ use actcheck_history::merge::MergePlan;
 
 impl Mirror {
     /// Links or copies the files of the sources' mirrors into that of the destination, after a merge: those of campaigns that
-    /// keep their ids, from histories without later judgements. [`Mirror::update`] adds what is missing. Returns the number of
+    /// keep their ids, from histories without later judgements. [`Mirror::update`] adds missing runs. Returns the number of
     /// files.
     ///
     /// # Errors

@@ -22,7 +22,7 @@ pub(super) struct FileRuns {
     pub indices: Vec<u64>,
 }
 
-/// What is known of the files of a folder.
+/// The known files of a folder.
 #[derive(Debug, Default, PartialEq, Eq)]
 pub(super) struct Checked {
     files: BTreeMap<String, (Stamp, FileRuns)>,
@@ -33,7 +33,7 @@ pub(super) struct Checked {
 type Stamp = (u64, u128);
 
 impl Checked {
-    /// Reads what is known of the files of a folder: nothing if the list is missing or damaged.
+    /// Reads the list of a folder. It is empty if it is missing or damaged.
     pub fn read(folder: &Path) -> Self {
         let text = fs::read_to_string(folder.join(NAME)).unwrap_or_default();
         Self { files: text.lines().filter_map(line).collect(), changed: false }
