@@ -21,7 +21,7 @@ fn run(campaign: &str, index: u64) -> RunRecord {
     run.started =
         format!("2026-08-0{}T12:{:02}:{:02}.{:03}Z", 1 + index % 3, index % 7, index % 60, index * 100 % 1000);
     run.repetition = (campaign == "k").then_some(Repetition { scene: index / 2, number: index % 2 });
-    run.weight = (index % 4 == 0).then(|| next());
+    run.weight = index.is_multiple_of(4).then(&mut next);
     for object in &mut run.scene.objects {
         object.mass_kg *= 0.5 + next();
         object.friction *= 0.5 + next();

@@ -107,6 +107,9 @@ pub fn compared_runs(
     found.sorted()
 }
 
+/// Status and outcomes of a run: the addresses of the texts of each action and property, and the outcome.
+type OutcomeKey = Vec<(usize, usize, u8)>;
+
 /// Collects the runs of a campaign for a comparison.
 #[derive(Debug, Default)]
 pub struct ComparedRuns {
@@ -114,7 +117,7 @@ pub struct ComparedRuns {
     len: usize,
     /// The outcomes so far, by status and the outcomes of each action and property. The texts are kept, so that addresses
     /// stay theirs.
-    known: HashMap<Vec<(usize, usize, u8)>, Arc<BTreeMap<Compared, Outcome>>>,
+    known: HashMap<OutcomeKey, Arc<BTreeMap<Compared, Outcome>>>,
     texts: HashMap<usize, Arc<str>>,
 }
 

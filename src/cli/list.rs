@@ -93,7 +93,7 @@ pub fn list(args: &ListArgs) -> Result<(), Diagnostics> {
         shown.iter().map(|(.., cell)| cell(row)).chain(words).collect()
     };
     // The rows of all runs together would take a gigabyte for each million.
-    let chunks = runs.chunks(ROWS_AT_A_TIME).enumerate();
+    let chunks = runs.chunks(ROWS_AT_A_TIME);
     match args.format {
         _ if runs.len() <= ROWS_AT_A_TIME => {
             table.rows = runs.iter().map(row).collect();
@@ -101,19 +101,19 @@ pub fn list(args: &ListArgs) -> Result<(), Diagnostics> {
         }
         Format::Csv => {
             output::print(&table.render(args.format.into(), output::page()));
-            for (_, runs) in chunks {
+            for runs in chunks {
                 table.rows = runs.iter().map(row).collect();
                 output::print(&table.csv_rows());
             }
         }
         Format::Text => {
-            for (_, runs) in chunks {
+            for runs in chunks {
                 table.rows = runs.iter().map(row).collect();
                 output::print(&table.render(args.format.into(), output::page()));
             }
         }
         Format::Json => {
-            for (place, runs) in chunks {
+            for (place, runs) in chunks.enumerate() {
                 table.rows = runs.iter().map(row).collect();
                 // The array of each part without its brackets.
                 let part = table.render(args.format.into(), output::page());
@@ -133,13 +133,16 @@ fn outcome(word: &str) -> Result<Outcome, String> {
     Outcome::from_word(word).ok_or_else(|| did_you_mean(word, Outcome::ALL.map(Outcome::word)))
 }
 
+/// The outcomes of the named properties by run: one text for each property.
+type OutcomeWords = BTreeMap<String, Vec<String>>;
+
 /// The runs that the options choose, and the outcomes of the named properties in each: one text for each property, with the
 /// outcomes of all actions that have it.
 fn chosen_runs(
     args: &ListArgs,
     history: &History,
     filter: &RunFilter,
-) -> Result<(Vec<RunRow>, BTreeMap<String, Vec<String>>), Diagnostics> {
+) -> Result<(Vec<RunRow>, OutcomeWords), Diagnostics> {
     let wanted = args.wanted();
     let by_outcome = wanted.is_some() || !args.property.is_empty();
     let judgements = if by_outcome { Judgements::Newest } else { Judgements::None };

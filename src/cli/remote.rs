@@ -59,11 +59,14 @@ fn from_netrc(address: &Address, variable: &dyn Fn(&str) -> Option<OsString>) ->
 }
 
 fn from_environment(variable: &dyn Fn(&str) -> Option<OsString>) -> Result<Credentials, Diagnostics> {
-    let text = |name: &str| match variable(name).map(OsString::into_string) {
-        None => Ok(None),
-        Some(Ok(text)) => Ok(Some(text).filter(|text| !text.is_empty())),
-        Some(Err(_)) => Err(Diagnostic::error("X096", format!("{name} is not valid Unicode"))
-            .help(format!("set {name} again, or unset it"))),
+    let text = |name: &str| -> Result<Option<String>, Diagnostics> {
+        match variable(name).map(OsString::into_string) {
+            None => Ok(None),
+            Some(Ok(text)) => Ok(Some(text).filter(|text| !text.is_empty())),
+            Some(Err(_)) => Err(Diagnostic::error("X096", format!("{name} is not valid Unicode"))
+                .help(format!("set {name} again, or unset it"))
+                .into()),
+        }
     };
     match (text(TOKEN)?, text(USER)?, text(PASSWORD)?) {
         (None, None, None) => Ok(Credentials::default()),

@@ -131,7 +131,9 @@ mod tests {
         {"a":{"type":"uri","value":"http://x"},"b":{"type":"literal","value":"1","datatype":"http://www.w3.org/2001/XMLSchema#integer"}},
         {"a":{"type":"bnode","value":"n"}}]}}"#;
 
-    fn rows(media_type: &str, text: &'static str) -> Result<(Vec<String>, Vec<Vec<Option<Term>>>), Diagnostics> {
+    type Row = Vec<Option<Term>>;
+
+    fn rows(media_type: &str, text: &'static str) -> Result<(Vec<String>, Vec<Row>), Diagnostics> {
         match ForeignAnswer::read(media_type, text.as_bytes())? {
             ForeignAnswer::Table { columns, rows } => Ok((columns, rows.collect::<Result<_, _>>()?)),
             ForeignAnswer::Boolean(value) => Ok((vec![value.to_string()], Vec::new())),

@@ -190,10 +190,10 @@ impl<'h> Reading<'h> {
         let row = outlined.as_run();
         let mut outcomes = Vec::new();
         if self.wish.judgements != Judgements::None {
-            outlined.each_outcome(&mut |step, [action, property], outcome, margin| {
+            for (step, [action, property], outcome, margin) in outlined.outcomes() {
                 let (action, property) = (self.text(action), self.text(property));
                 outcomes.push(JudgedOutcome { step, action, property, outcome, margin });
-            });
+            }
             sort(&mut outcomes);
             self.add_later(&row.run, &mut outcomes)?;
         }

@@ -45,10 +45,10 @@ pub(super) const COLUMNS: Range<u64> = 16 << 20..1 << 30;
 pub(super) fn answer(history: &History, text: &Source, cancel: &Cancel) -> Result<QueryAnswer, Diagnostics> {
     refuse_update(text)?;
     refuse_excess(text)?;
-    if history.shelf().exists() {
-        if let Some(answer) = outlined::answer(history, text, cancel)? {
-            return Ok(answer);
-        }
+    if history.shelf().exists()
+        && let Some(answer) = outlined::answer(history, text, cancel)?
+    {
+        return Ok(answer);
     }
     let store = history.store_for_query(|| Wanted::query(&text.text))?;
     let query = prepare(text, &store, cancel)?;

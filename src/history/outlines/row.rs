@@ -161,12 +161,12 @@ impl Outlined<'_> {
         }
     }
 
-    /// Calls `each` with its outcomes: step, action and property, outcome, and margin; unsorted.
-    pub(crate) fn each_outcome(&self, each: &mut dyn FnMut(u32, [&str; 2], Outcome, Option<f64>)) {
-        for judged in &self.row.outcomes {
+    /// Its outcomes, unsorted: step, action and property, outcome, and margin.
+    pub(crate) fn outcomes(&self) -> impl Iterator<Item = (u32, [&str; 2], Outcome, Option<f64>)> {
+        self.row.outcomes.iter().map(|judged| {
             let names = [self.text(judged.action), self.text(judged.property)];
-            each(judged.step, names, self.outcome(judged), judged.margin);
-        }
+            (judged.step, names, self.outcome(judged), judged.margin)
+        })
     }
 
     fn outcome(&self, judged: &Judged) -> Outcome {
