@@ -10,7 +10,7 @@ use actcheck::analysis::{
 use actcheck::base::Shard;
 use actcheck::history::merge::{MergeOptions, carry_out, plan};
 use actcheck::history::{CampaignEnd, History, RunFilter, RunRecord};
-use actcheck::report::{HTML_COLUMNS, HtmlReport, Replays, html};
+use actcheck::report::{HTML_COLUMNS, HtmlReport, PackedRuns, Replays, html};
 use serde_json::Value;
 
 use crate::findings::runs as made_up;
@@ -203,12 +203,13 @@ fn a_report_with_a_sample_filters_all_runs() {
     let sample = OutcomeTable::read_sample(&mirror, &filter, &names, all.len() / 10).unwrap();
     let findings = paged::findings(&sample, "h");
     let modes = paged::findings(&all, "h").modes;
+    let findings = actcheck::report::FindingsSummary { modes, sampled_runs: Some(2_000), ..findings };
     let page = html(&HtmlReport {
         version: "0.1.0",
         made: "2026-01-01T00:00:00Z",
-        findings: &actcheck::report::FindingsSummary { modes, sampled_runs: Some(2_000), ..findings },
+        findings: &findings,
         table: &all,
-        sample: Some(&sample),
+        runs: &PackedRuns::of(&findings, &all, Some(&sample)),
         campaigns: &[],
         words: &Default::default(),
         replays: &Replays::default(),

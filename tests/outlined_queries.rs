@@ -105,7 +105,7 @@ fn comparable(answer: &QueryAnswer, text: &str) -> Vec<String> {
     rows
 }
 
-const QUERIES: [&str; 34] = [
+const QUERIES: [&str; 44] = [
     "SELECT ?run ?score { ?run a act:Run ; act:score ?score }",
     "SELECT ?run { ?run act:status ?status FILTER(?status != 'completed') } ORDER BY ?run",
     "SELECT ?run ?reason { ?run a act:Run OPTIONAL { ?run act:reason ?reason } } ORDER BY ?run",
@@ -138,6 +138,17 @@ const QUERIES: [&str; 34] = [
     "CONSTRUCT { ?run act:was ?status } WHERE { ?run act:status ?status ; act:index ?i FILTER(?i IN (1, 5, 16)) }",
     "SELECT (COUNT(*) AS ?n) (SAMPLE(?t) AS ?test) { ?run act:test ?t }",
     "SELECT ?p (COUNT(*) AS ?n) { GRAPH act:rechecked { ?a earl:test ?p } ?b earl:test ?p } GROUP BY ?p",
+    // Lists whose order does not show.
+    "SELECT ?p (GROUP_CONCAT('x') AS ?all) { ?a earl:test ?p ; earl:result/act:outcome 'failed' } GROUP BY ?p ORDER BY ?p",
+    "SELECT ?k (GROUP_CONCAT(STR(?k); SEPARATOR = '; ') AS ?all) { ?run act:objectCount ?k } GROUP BY ?k ORDER BY ?k",
+    "SELECT ?k (GROUP_CONCAT(?k) AS ?all) { ?run act:objectCount ?k } GROUP BY ?k ORDER BY ?k",
+    "SELECT ?s (GROUP_CONCAT(REPLACE(?s, '[aeiou]', '')) AS ?all) (COUNT(?s) AS ?n) { ?run act:status ?s } GROUP BY ?s ORDER BY ?s",
+    "SELECT ?s (GROUP_CONCAT(REPLACE(?s, '[aeiou]', '-$0')) AS ?all) { ?run act:status ?s } GROUP BY ?s ORDER BY ?s",
+    "SELECT ?s (GROUP_CONCAT(?s) AS ?all) { ?run act:status ?s ; act:objectCount ?k . ?other act:objectCount ?k ; act:index 3 } GROUP BY ?s ORDER BY ?s",
+    "SELECT (GROUP_CONCAT(?s) AS ?all) { ?run act:status ?s ; act:index 1000000 }",
+    "SELECT ?run (COUNT(*) AS ?n) (AVG(?m) AS ?mean) (MIN(?m) AS ?least) (SUM(?m) AS ?sum) { ?a earl:subject/act:ofRun ?run ; earl:result/act:margin ?m } GROUP BY ?run ORDER BY ?run",
+    "SELECT ?run (COUNT(*) AS ?n) (MAX(?m) AS ?most) { ?a earl:subject/act:ofRun ?run ; earl:test ?p ; earl:result/act:margin ?m FILTER(STRLEN(STR(?p)) > 40) } GROUP BY ?run ORDER BY ?run",
+    "SELECT ?run (COUNT(DISTINCT ?p) AS ?n) (MAX(?m) AS ?most) { ?a earl:subject/act:ofRun ?run ; earl:test ?p ; earl:result/act:margin ?m } GROUP BY ?run ORDER BY ?run",
     "SELECT ?held (COUNT(*) AS ?n) { ?r act:outcome 'passed' OPTIONAL { ?r act:heldBefore ?held } } GROUP BY ?held ORDER BY ?held",
     "SELECT (COUNT(*) AS ?n) { ?run act:index ?i ; act:discards ?d FILTER(?d > 0 || ?i = 4) }",
 ];

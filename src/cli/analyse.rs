@@ -8,7 +8,7 @@ use crate::chosen::{self, ChosenRuns, is_meant};
 use crate::options::{Format, level};
 use crate::output;
 use crate::picture::Picture;
-use crate::work::all_cores;
+use crate::work::{all_cores, both};
 use actcheck_analysis::{
     Column, Hierarchy, JudgedProperty, Mirror, OutcomeTable, PatternOptions, RATE_COLUMNS, TableFilter, cascades,
     collisions, columns, finding_columns, flaky_scenes, judged, property_findings, table_failure_modes, trend, two_way,
@@ -167,7 +167,13 @@ pub(super) fn analysed(
     });
     let wanted = wanted(all, asked.property)?;
     let sampled = sample.as_ref().map(|sample| (sample, judged(sample)));
-    let properties = reports(&wanted, |of| report(asked, &table, of, sampled.as_ref(), &hierarchy, &ontology));
+    let ((modes, cascades, collisions), properties) = both(
+        || {
+            let collisions = collisions(sample.as_ref().unwrap_or(&table));
+            (table_failure_modes(&table), cascades(&table, asked.level), collisions)
+        },
+        || reports(&wanted, |of| report(asked, &table, of, sampled.as_ref(), &hierarchy, &ontology)),
+    );
     let summary = FindingsSummary {
         history: history.dir().display().to_string(),
         program: std::env::args().next().unwrap_or_else(|| "actcheck".to_owned()),
@@ -177,9 +183,9 @@ pub(super) fn analysed(
         twins: table.counted_runs().iter().filter(|counts| !**counts).count() as u64,
         sampled_runs: sample.as_ref().map(|sample| sample.text("run").texts.len() as u64),
         counts,
-        modes: table_failure_modes(&table),
-        cascades: cascades(&table, asked.level),
-        collisions: collisions(sample.as_ref().unwrap_or(&table)),
+        modes,
+        cascades,
+        collisions,
         properties,
         level: asked.level,
     };

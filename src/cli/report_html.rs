@@ -5,11 +5,11 @@ use std::ops::ControlFlow;
 
 use crate::analyse::Analysed;
 use crate::margin_bounds::margin_bounds;
-use crate::{clock, replayed_runs};
+use crate::{clock, replayed_runs, work};
 use actcheck_base::Diagnostics;
 use actcheck_history::History;
 use actcheck_ontology::{Ontology, RuleLanguage};
-use actcheck_report::{HtmlReport, PropertyWords, Replays, html, replay_order};
+use actcheck_report::{HtmlReport, PackedRuns, PropertyWords, Replays, html, replay_order};
 
 /// Renders the whole page, with as many replays as fit into `room` bytes.
 ///
@@ -17,13 +17,17 @@ use actcheck_report::{HtmlReport, PropertyWords, Replays, html, replay_order};
 /// The history can't be read.
 pub(super) fn page(found: &Analysed, history: &History, room: f64) -> Result<String, Diagnostics> {
     let Analysed { table, sample, summary, ontology } = found;
-    let replays = replays(history, ontology, &replay_order(summary, sample.as_ref().unwrap_or(table)), room)?;
+    let order = replay_order(summary, sample.as_ref().unwrap_or(table));
+    // Of a million runs, each takes seconds.
+    let (runs, replays) =
+        work::both(|| PackedRuns::of(summary, table, sample.as_ref()), || replays(history, ontology, &order, room));
+    let replays = replays?;
     Ok(html(&HtmlReport {
         version: env!("CARGO_PKG_VERSION"),
         made: &(clock::system().now)(),
         findings: summary,
         table,
-        sample: sample.as_ref(),
+        runs: &runs,
         campaigns: &history.campaigns()?,
         words: &words(ontology),
         replays: &replays,

@@ -1,7 +1,6 @@
 //! A bucket of an object storage with the interface of S3.
 
 use std::collections::BTreeMap;
-use std::io::Read as _;
 use std::path::Path;
 use std::time::Duration;
 
@@ -14,7 +13,6 @@ use crate::Address;
 use crate::client::{Client, Content, Request};
 use crate::fault::Fault;
 use crate::place::BucketSettings;
-use crate::response::Response;
 use actcheck_base::{Diagnostic, Diagnostics};
 
 /// Time for which a signature is valid: longer than a request with all its tries.
@@ -76,9 +74,8 @@ impl Bucket {
                 action.with_continuation_token(String::from(next));
             }
             let target = action.sign(VALID).into();
-            let response =
-                self.send(Method::GET, target, Content::None).map_err(|fault| self.fault(fault, "listing"))?;
-            let text = String::from_utf8_lossy(&self.body(response)?).into_owned();
+            let body = self.body(target).map_err(|fault| self.fault(fault, "listing"))?;
+            let text = String::from_utf8_lossy(&body);
             let page = ListObjectsV2::parse_response(&text).map_err(|error| self.malformed(&error.to_string()))?;
             for object in page.contents {
                 if let Some(name) = object.key.strip_prefix(&self.prefix).filter(|name| !name.is_empty()) {
@@ -110,8 +107,8 @@ impl Bucket {
     pub fn get(&self, name: &str) -> Result<Option<Vec<u8>>, Diagnostics> {
         let key = self.key(name);
         let target = self.signer.get_object(self.credentials.as_ref(), &key).sign(VALID).into();
-        match self.send(Method::GET, target, Content::None) {
-            Ok(response) => self.body(response).map(Some),
+        match self.body(target) {
+            Ok(body) => Ok(Some(body)),
             // Without the right to list, a missing object is 403; then writing fails, too, with its reason.
             Err(Fault::Refused { status: 404, words, .. }) if !words.contains("NoSuchBucket") => Ok(None),
             Err(fault) => Err(self.fault(fault, &format!("reading {name}"))),
@@ -135,11 +132,10 @@ impl Bucket {
         self.client.send(&Request { method, address: &self.address, target, headers: Vec::new(), content })
     }
 
-    fn body(&self, response: Response) -> Result<Vec<u8>, Diagnostics> {
-        let mut bytes = Vec::new();
-        let read = response.into_reader().take(MOST_READ).read_to_end(&mut bytes);
-        read.map_err(|error| self.malformed(&error.to_string()))?;
-        Ok(bytes)
+    fn body(&self, target: String) -> Result<Vec<u8>, Fault> {
+        let (method, headers) = (Method::GET, Vec::new());
+        let request = Request { method, address: &self.address, target, headers, content: Content::None };
+        self.client.body(&request, MOST_READ)
     }
 
     fn malformed(&self, why: &str) -> Diagnostics {

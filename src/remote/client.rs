@@ -77,13 +77,28 @@ impl Client {
     /// Sends a request until it has an answer with a status of success. Waits longer after each failure of a kind that may
     /// pass.
     pub(crate) fn send(&self, request: &Request<'_>) -> Result<Response, Fault> {
+        self.retried(request, Ok)
+    }
+
+    /// Like [`Self::send`], but also sends the request again if the answer's body ends too early. Returns the body, up to `most`
+    /// bytes.
+    #[cfg(any(test, feature = "object-storage"))]
+    pub(crate) fn body(&self, request: &Request<'_>, most: u64) -> Result<Vec<u8>, Fault> {
+        self.retried(request, |response| {
+            let mut bytes = Vec::new();
+            let read = std::io::Read::read_to_end(&mut std::io::Read::take(response.into_reader(), most), &mut bytes);
+            read.map(|_| bytes).map_err(|error| Fault::unreachable(format!("its answer was cut off: {error}")))
+        })
+    }
+
+    fn retried<T>(&self, request: &Request<'_>, read: impl Fn(Response) -> Result<T, Fault>) -> Result<T, Fault> {
         let mut tries = 0;
         loop {
             if self.is_stopped() {
                 return Err(Fault::Stopped);
             }
-            let fault = match self.follow(request) {
-                Ok(response) => return Ok(response),
+            let fault = match self.follow(request).and_then(&read) {
+                Ok(read) => return Ok(read),
                 Err(fault) => fault,
             };
             tries += 1;
@@ -181,5 +196,32 @@ impl Client {
             left -= part;
         }
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::io::{Read as _, Write as _};
+    use std::net::TcpListener;
+
+    #[test]
+    fn a_request_is_sent_again_if_its_answer_is_cut_off() {
+        let listener = TcpListener::bind("127.0.0.1:0").expect("there is a port");
+        let address = format!("http://{}/", listener.local_addr().expect("it is bound"));
+        let server = std::thread::spawn(move || {
+            for body in ["wh", "", "whole"] {
+                let (mut stream, _) = listener.accept().expect("a client connects");
+                let _ = stream.read(&mut [0; 1024]);
+                let head = "HTTP/1.1 200 OK\r\nconnection: close\r\ncontent-length: 5\r\n\r\n";
+                stream.write_all(format!("{head}{body}").as_bytes()).expect("the client reads");
+            }
+        });
+        let client = Client::new(Credentials::default(), Duration::from_secs(5), Arc::default());
+        let to = Address::parse(&address).expect("it is valid");
+        let content = Content::Bytes(&[]);
+        let request = Request { method: Method::POST, address: &to, target: address, headers: Vec::new(), content };
+        assert_eq!(client.body(&request, 100).ok().as_deref(), Some("whole".as_bytes()));
+        server.join().expect("it has answered all");
     }
 }

@@ -21,7 +21,8 @@ pub use formats::{
     observation,
 };
 pub use html::{
-    Explained, HTML_COLUMNS, HtmlReport, MarginBound, PropertyWords, ReplayedRun, Replays, html, replay_order,
+    Explained, HTML_COLUMNS, HtmlReport, MarginBound, PackedRuns, PropertyWords, ReplayedRun, Replays, html,
+    replay_order,
 };
 pub use json::{
     campaign_json, case_json, compare_json, findings_json, health_json, oracles_json, recheck_json, run_json,

@@ -7,7 +7,9 @@ use actcheck::analysis::{
     Hierarchy, Mirror, OutcomeTable, PatternOptions, TableFilter, TableRun, cascades, collisions, finding_columns,
     flaky_scenes, judged, property_findings, table_failure_modes, trend, two_way,
 };
-use actcheck::report::{FindingsSummary, HTML_COLUMNS, HtmlReport, PropertyReport, PropertyWords, Replays, html};
+use actcheck::report::{
+    FindingsSummary, HTML_COLUMNS, HtmlReport, PackedRuns, PropertyReport, PropertyWords, Replays, html,
+};
 use actcheck::verdict::Counts;
 
 /// The accepted false discovery rate.
@@ -60,12 +62,13 @@ pub fn mirror(folder: &Path, campaign: &str, runs: impl IntoIterator<Item = impl
 pub fn page(mirror: &Mirror, history: &str, words: &BTreeMap<String, PropertyWords>, replays: &Replays) -> String {
     let names: Vec<&str> = finding_columns().into_iter().chain(HTML_COLUMNS).collect();
     let table = OutcomeTable::read(mirror, &TableFilter::default(), &names).unwrap();
+    let findings = findings(&table, history);
     html(&HtmlReport {
         version: "0.1.0",
         made: "2026-01-01T00:00:00Z",
-        findings: &findings(&table, history),
+        findings: &findings,
         table: &table,
-        sample: None,
+        runs: &PackedRuns::of(&findings, &table, None),
         campaigns: &[],
         words,
         replays,

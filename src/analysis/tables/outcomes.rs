@@ -1,10 +1,11 @@
 //! The table in memory, with interned texts, as the analyses read it.
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::BTreeMap;
 use std::sync::mpsc::sync_channel;
 use std::thread::available_parallelism;
 
 use polars::prelude::{BooleanChunked, DataFrame, DataType, NewChunkedArray as _, PolarsError};
+use rustc_hash::FxHashMap;
 
 use crate::tables::columns::{ColumnKind, columns};
 use crate::tables::mirror::{Mirror, TableFile, read, unread};
@@ -112,7 +113,7 @@ impl OutcomeTable {
                 _ => drop(table.numbers.insert(column.name, Vec::new())),
             }
         }
-        let mut known: BTreeMap<&'static str, HashMap<String, u32>> = BTreeMap::new();
+        let mut known: BTreeMap<&'static str, FxHashMap<String, u32>> = BTreeMap::new();
         let frame = |file: &TableFile| read(&file.path, Some(&names)).and_then(|frame| filter.rows_of(frame));
         let threads = available_parallelism().map_or(1, usize::from);
         if files.len() < MANY || threads == 1 {
@@ -191,7 +192,7 @@ impl OutcomeTable {
     fn append(
         &mut self,
         frame: &DataFrame,
-        known: &mut BTreeMap<&'static str, HashMap<String, u32>>,
+        known: &mut BTreeMap<&'static str, FxHashMap<String, u32>>,
     ) -> Result<(), PolarsError> {
         for (name, column) in &mut self.texts {
             let known = known.entry(name).or_default();
@@ -219,7 +220,7 @@ impl OutcomeTable {
 }
 
 /// Returns the index of a text, adding it if it is new.
-fn place_of(text: &str, known: &mut HashMap<String, u32>, texts: &mut Vec<String>) -> u32 {
+fn place_of(text: &str, known: &mut FxHashMap<String, u32>, texts: &mut Vec<String>) -> u32 {
     if let Some(place) = known.get(text) {
         return *place;
     }

@@ -20,7 +20,7 @@ pub(crate) struct SheetFile {
 
 /// Statements in a file.
 struct InFile {
-    path: PathBuf,
+    file: File,
     start: usize,
     length: usize,
 }
@@ -31,7 +31,7 @@ impl Source for InFile {
             return Err("it ends too early".to_owned());
         }
         let read = || {
-            let mut file = File::open(&self.path)?;
+            let mut file = &self.file;
             file.seek(SeekFrom::Start((self.start + from) as u64))?;
             let mut bytes = vec![0; to - from];
             file.read_exact(&mut bytes).map(|()| bytes)
@@ -46,16 +46,16 @@ impl SheetFile {
     /// # Errors
     /// It is gone or damaged.
     pub(crate) fn open(&self) -> Result<Sheet<Box<dyn Source>>, Stop> {
-        let read = || -> std::io::Result<[u8; HEADER]> {
-            let mut header = [0; HEADER];
-            File::open(&self.path)?.read_exact(&mut header).map(|()| header)
+        let read = || -> std::io::Result<([u8; HEADER], File)> {
+            let (mut header, mut file) = ([0; HEADER], File::open(&self.path)?);
+            file.read_exact(&mut header).map(|()| (header, file))
         };
-        let header = read().map_err(|error| stop(unread(&self.path, &error)))?;
+        let (header, file) = read().map_err(|error| stop(unread(&self.path, &error)))?;
         let damaged = |why| Stop::Damaged(self.path.clone(), why);
         let (by_property, place) = Opened::statements_at(&header).map_err(damaged)?;
         let length = place.len();
         if by_property {
-            let source = InFile { path: self.path.clone(), start: place.start, length };
+            let source = InFile { file, start: place.start, length };
             return Sheet::open(Box::new(source) as Box<dyn Source>, length).map_err(damaged);
         }
         let bytes = std::fs::read(&self.path).map_err(|error| stop(unread(&self.path, &error)))?;

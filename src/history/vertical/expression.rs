@@ -2,15 +2,21 @@
 //!
 //! Only expressions that most queries use, with values of the types that runs have: everything else is left to the evaluator.
 
-use oxigraph::model::Term;
-use oxigraph::model::Variable;
+use std::borrow::Cow;
+
+use oxigraph::model::vocab::xsd;
+use oxigraph::model::{NamedNode, Term, Variable};
+use regex::{Regex, RegexBuilder};
 use spargebra::algebra::{Expression, Function};
 
 use crate::vertical::column::Value;
 use crate::vertical::join::Rows;
 use crate::vertical::stop::{Stop, unfit};
 use crate::vertical::value::Cell;
-use actcheck_base::names;
+use actcheck_base::{COUNTED_TEXT, TEXT_FUNCTIONS, names};
+
+/// Largest size of a compiled pattern, as the evaluator has it.
+const MOST_PATTERN_BYTES: usize = 1_000_000;
 
 /// An expression with places of variables instead of their names.
 #[derive(Debug, Clone)]
@@ -28,6 +34,10 @@ pub(super) enum Native {
     LessOrEqual(Box<[Native; 2]>),
     If(Box<[Native; 3]>),
     Coalesce(Vec<Native>),
+    /// `STR`
+    Text(Box<Native>),
+    /// `REPLACE` of a constant pattern by nothing, which makes no text longer.
+    Removed(Box<Native>, Regex),
     /// Sum, difference and product.
     Arithmetic(Operation, Box<[Native; 2]>),
 }
@@ -70,6 +80,26 @@ impl Native {
             E::Add(one, other) => Self::Arithmetic(Operation::Add, pair(one, other)?),
             E::Subtract(one, other) => Self::Arithmetic(Operation::Subtract, pair(one, other)?),
             E::Multiply(one, other) => Self::Arithmetic(Operation::Multiply, pair(one, other)?),
+            E::FunctionCall(Function::Str, args) => match args.as_slice() {
+                [value] => Self::Text(Box::new(of(value)?)),
+                _ => return None,
+            },
+            E::FunctionCall(Function::Custom(function), args) if is_replace(function) => match args.as_slice() {
+                [value, E::Literal(pattern), E::Literal(by)]
+                    if [pattern, by].iter().all(|text| text.datatype() == xsd::STRING) && by.value().is_empty() =>
+                {
+                    let pattern = RegexBuilder::new(pattern.value()).size_limit(MOST_PATTERN_BYTES).build().ok()?;
+                    Self::Removed(Box::new(of(value)?), pattern)
+                }
+                _ => return None,
+            },
+            // The length of lists is limited where they are made.
+            E::FunctionCall(Function::Custom(function), args) if function.as_str() == COUNTED_TEXT => {
+                match args.as_slice() {
+                    [text] => of(text)?,
+                    _ => return None,
+                }
+            }
             E::FunctionCall(Function::Custom(function), args) if function.as_str() == names::act("counts") => {
                 match args.as_slice() {
                     [E::Variable(run)] => Self::Counts(place(run)?),
@@ -91,7 +121,7 @@ impl Native {
             | Self::Less(parts)
             | Self::LessOrEqual(parts)
             | Self::Arithmetic(_, parts) => parts.iter().for_each(|part| part.places(into)),
-            Self::Not(part) => part.places(into),
+            Self::Not(part) | Self::Text(part) | Self::Removed(part, _) => part.places(into),
             Self::If(parts) => parts.iter().for_each(|part| part.places(into)),
             Self::Coalesce(parts) => parts.iter().for_each(|part| part.places(into)),
         }
@@ -150,6 +180,18 @@ impl Native {
                 }
                 None
             }
+            Self::Text(part) => match part.value(rows, row)? {
+                Some(value) => value.text()?.map(Cell::Text),
+                None => None,
+            },
+            Self::Removed(part, pattern) => match part.value(rows, row)? {
+                Some(Cell::Text(text)) => Some(Cell::Text(match pattern.replace_all(&text, "") {
+                    Cow::Owned(replaced) => Cow::Owned(replaced),
+                    Cow::Borrowed(_) => text,
+                })),
+                Some(Cell::Other(_)) => return unfit("a replacement in a value of a rare type"),
+                _ => None,
+            },
             Self::Arithmetic(operation, parts) => match both(parts)? {
                 Some([one, other]) => calculated(*operation, &one, &other)?,
                 None => None,
@@ -168,6 +210,10 @@ impl Native {
             None => Ok(None),
         }
     }
+}
+
+fn is_replace(function: &NamedNode) -> bool {
+    TEXT_FUNCTIONS.iter().any(|(name, iri, _)| *name == "REPLACE" && *iri == function.as_str())
 }
 
 fn calculated<'a>(operation: Operation, one: &Cell<'a>, other: &Cell<'a>) -> Result<Option<Cell<'a>>, Stop> {

@@ -18,14 +18,33 @@ impl Rewriter<'_> {
         variables: Vec<Variable>,
         aggregates: Vec<(Variable, AggregateExpression)>,
     ) -> Result<Rewritten, Stop> {
-        let needs_rows = |aggregate: &AggregateExpression| {
-            let AggregateExpression::FunctionCall { name, distinct: false, .. } = aggregate else { return false };
-            matches!(name, AggregateFunction::GroupConcat { .. } | AggregateFunction::Custom(_))
+        let has = |is: fn(&AggregateFunction) -> bool| {
+            aggregates.iter().any(|(_, aggregate)| match aggregate {
+                AggregateExpression::FunctionCall { name, distinct: false, .. } => is(name),
+                _ => false,
+            })
         };
-        let mode = match aggregates.iter().any(|(_, aggregate)| needs_rows(aggregate)) {
-            true => Mode::Bag,
-            false => Mode::Counted,
-        };
+        if has(|name| matches!(name, AggregateFunction::Custom(_))) {
+            return self.grouped(inner, variables, aggregates, Mode::Bag).map(|(grouped, _)| grouped);
+        }
+        if !has(|name| matches!(name, AggregateFunction::GroupConcat { .. })) {
+            return self.grouped(inner, variables, aggregates, Mode::Counted).map(|(grouped, _)| grouped);
+        }
+        // Lists of texts can't be repeated by a number: if they are not made by one table, the rows are needed.
+        match self.grouped(inner.clone(), variables.clone(), aggregates.clone(), Mode::Counted)? {
+            (grouped, true) => Ok(grouped),
+            (_, false) => self.grouped(inner, variables, aggregates, Mode::Bag).map(|(grouped, _)| grouped),
+        }
+    }
+
+    /// The group, and whether lists of texts are right.
+    fn grouped(
+        &mut self,
+        inner: GraphPattern,
+        variables: Vec<Variable>,
+        aggregates: Vec<(Variable, AggregateExpression)>,
+        mode: Mode,
+    ) -> Result<(Rewritten, bool), Stop> {
         let mut need = Need::of(variables.iter().cloned().collect::<BTreeSet<_>>(), mode);
         for (id, (_, aggregate)) in aggregates.iter().enumerate() {
             match aggregate {
@@ -38,6 +57,9 @@ impl Rewriter<'_> {
                         AggregateFunction::Sum | AggregateFunction::Avg => Some(Kind::Sum),
                         AggregateFunction::Min => Some(Kind::Least),
                         AggregateFunction::Max => Some(Kind::Greatest),
+                        AggregateFunction::GroupConcat { separator } => {
+                            Some(Kind::Joined(separator.as_deref().unwrap_or(" ").into()))
+                        }
                         _ => None,
                     };
                     match kind {
@@ -48,6 +70,18 @@ impl Rewriter<'_> {
             }
         }
         let inner = self.rewrite(inner, &need)?;
+        let is_right = aggregates.iter().enumerate().all(|(id, (_, aggregate))| match aggregate {
+            AggregateExpression::FunctionCall {
+                name: AggregateFunction::GroupConcat { .. }, distinct: false, ..
+            } => {
+                let own = inner.taken.get(&id).and_then(|taken| taken.own.as_ref());
+                mode == Mode::Bag || inner.taken.contains_key(&id) && number(&inner, own).is_none()
+            }
+            _ => true,
+        });
+        if let Some(rows) = alone(&inner, &variables, &aggregates) {
+            return Ok((Rewritten::plain(rows), true));
+        }
         let (mut all, mut means) = (Vec::new(), Vec::new());
         for (id, (variable, aggregate)) in aggregates.into_iter().enumerate() {
             let AggregateExpression::FunctionCall { name: AggregateFunction::Avg, distinct: false, .. } = &aggregate
@@ -77,8 +111,43 @@ impl Rewriter<'_> {
             );
             pattern = GraphPattern::Extend { inner: Box::new(pattern), variable, expression };
         }
-        Ok(Rewritten::plain(pattern))
+        Ok((Rewritten::plain(pattern), is_right))
     }
+}
+
+/// The groups, if each has one row and that has its aggregates: grouping half a million rows takes seconds.
+fn alone(
+    inner: &Rewritten,
+    variables: &[Variable],
+    aggregates: &[(Variable, AggregateExpression)],
+) -> Option<GraphPattern> {
+    let is_apart = |distinct: &Vec<Variable>| distinct.iter().all(|variable| variables.contains(variable));
+    // Without variables, no rows are one group, too.
+    if variables.is_empty() || !inner.distinct.as_ref().is_some_and(is_apart) {
+        return None;
+    }
+    let mut pattern = inner.pattern.clone();
+    for (id, (variable, aggregate)) in aggregates.iter().enumerate() {
+        let expression = match aggregate {
+            AggregateExpression::CountSolutions { distinct: false } => number(inner, None)?,
+            AggregateExpression::FunctionCall { name, distinct: false, .. } => {
+                let taken = inner.taken.get(&id)?;
+                let result = Expression::Variable(taken.result.clone());
+                if number(inner, taken.own.as_ref()).is_some() {
+                    return None;
+                }
+                match name {
+                    AggregateFunction::Avg => Expression::Divide(Box::new(result), Box::new(number(inner, None)?)),
+                    _ => result,
+                }
+            }
+            _ => return None,
+        };
+        pattern = GraphPattern::Extend { inner: Box::new(pattern), variable: variable.clone(), expression };
+    }
+    let results = aggregates.iter().map(|(variable, _)| variable);
+    let variables = variables.iter().chain(results).cloned().collect();
+    Some(GraphPattern::Project { inner: Box::new(pattern), variables })
 }
 
 /// The number of equal rows of the tables, except of one.

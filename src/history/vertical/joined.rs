@@ -343,7 +343,7 @@ impl Rewriter<'_> {
         }
         let place = |variable: &Variable| leaf.place(variable);
         let aggregates: Option<Vec<(Kind, Native)>> =
-            need.asked.iter().map(|asked| Some((asked.kind, Native::of(&asked.expression, &place)?))).collect();
+            need.asked.iter().map(|asked| Some((asked.kind.clone(), Native::of(&asked.expression, &place)?))).collect();
         let Some(aggregates) = aggregates else { return unfit("an aggregate") };
         let first = need.first.as_ref().and_then(|(keys, most)| {
             let key = |key: &OrderExpression| match key {
@@ -363,6 +363,7 @@ impl Rewriter<'_> {
         let results: Vec<Variable> = need.asked.iter().map(|_| self.fresh()).collect();
         let names: Vec<Variable> = keys.iter().cloned().chain(count.clone()).chain(results.iter().cloned()).collect();
         let mut rows: Vec<Vec<Option<Value>>> = Vec::new();
+        let mut is_distinct = output.grouped;
         if !is_empty {
             for row in self.files.rows(&leaf, &output, self.counts.as_deref())? {
                 let mut values = row.values.clone();
@@ -370,7 +371,9 @@ impl Rewriter<'_> {
                 values.extend(row.results());
                 rows.push(values);
             }
-            rows.extend(self.stored_rows(component, need, &keys, count.as_ref(), &results, &names)?);
+            let stored = self.stored_rows(component, need, &keys, count.as_ref(), &results, &names)?;
+            is_distinct &= stored.is_empty() || rows.is_empty();
+            rows.extend(stored);
         }
         if rows.len() <= MOST_KNOWN {
             let values: Vec<Vec<Option<Value>>> = rows.iter().map(|row| row[..keys.len()].to_vec()).collect();
@@ -382,7 +385,9 @@ impl Rewriter<'_> {
         };
         let taken = need.asked.iter().zip(results);
         let taken = taken.map(|(asked, result)| (asked.id, Taken { result, own: count.clone() })).collect();
-        Ok((Rewritten { pattern: table(names, bindings), counts: count.into_iter().collect(), taken }, none))
+        let counts = count.into_iter().collect();
+        let distinct = is_distinct.then_some(keys);
+        Ok((Rewritten { pattern: table(names, bindings), counts, taken, distinct }, none))
     }
 
     /// The rows of the runs that the store has.
@@ -399,11 +404,14 @@ impl Rewriter<'_> {
         if let Some(count) = count {
             let mut aggregates = vec![(count.clone(), AggregateExpression::CountSolutions { distinct: false })];
             for (asked, result) in need.asked.iter().zip(results) {
-                let name = match asked.kind {
+                let name = match &asked.kind {
                     Kind::Count => AggregateFunction::Count,
                     Kind::Sum => AggregateFunction::Sum,
                     Kind::Least => AggregateFunction::Min,
                     Kind::Greatest => AggregateFunction::Max,
+                    Kind::Joined(separator) => {
+                        AggregateFunction::GroupConcat { separator: Some(separator.to_string()) }
+                    }
                 };
                 let expr = asked.expression.clone();
                 aggregates.push((result.clone(), AggregateExpression::FunctionCall { name, expr, distinct: false }));

@@ -75,6 +75,8 @@ pub(super) struct Rewritten {
     pub counts: Vec<Variable>,
     /// Aggregates that are computed.
     pub taken: BTreeMap<usize, Taken>,
+    /// Variables of which no two rows have the same values, if they are known.
+    pub distinct: Option<Vec<Variable>>,
 }
 
 /// An aggregate of the rows of one table.
@@ -87,7 +89,7 @@ pub(super) struct Taken {
 
 impl Rewritten {
     pub(super) fn plain(pattern: GraphPattern) -> Self {
-        Self { pattern, counts: Vec::new(), taken: BTreeMap::new() }
+        Self { pattern, counts: Vec::new(), taken: BTreeMap::new(), distinct: None }
     }
 
     /// The variables that were added.
@@ -108,6 +110,6 @@ impl Rewritten {
     ) -> Self {
         self.counts.extend(other.counts);
         self.taken.extend(other.taken);
-        Self { pattern: make(Box::new(self.pattern), Box::new(other.pattern)), ..self }
+        Self { pattern: make(Box::new(self.pattern), Box::new(other.pattern)), distinct: None, ..self }
     }
 }

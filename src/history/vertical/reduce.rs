@@ -3,6 +3,9 @@
 use std::cell::RefCell;
 use std::cmp::Ordering;
 use std::collections::HashMap;
+use std::sync::Arc;
+
+use oxigraph::model::Literal;
 
 use crate::vertical::column::Value;
 use crate::vertical::expression::Native;
@@ -12,6 +15,10 @@ use crate::vertical::value::Cell;
 
 /// Largest number of values that are kept: they take about a gigabyte.
 const MOST_VALUES: usize = 12_000_000;
+/// Largest size of a text. Unit: bytes.
+const LONGEST_TEXT: usize = 1 << 20;
+/// Largest size of all texts. Unit: bytes.
+const MOST_TEXT: usize = 256 << 20;
 /// Number of rows from which those that can't be among the first are removed.
 const MANY_ROWS: usize = 4096;
 
@@ -30,13 +37,15 @@ pub(super) struct Output {
 }
 
 /// An aggregate.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) enum Kind {
     /// Number of values.
     Count,
     Sum,
     Least,
     Greatest,
+    /// Texts with this separator between them.
+    Joined(Arc<str>),
 }
 
 /// A sum.
@@ -76,6 +85,7 @@ pub(super) enum State<T> {
     Count(u64),
     Sum(Option<Sum>),
     Best(Option<T>),
+    Joined(Option<String>),
 }
 
 /// A row that remains: its values, the number of equal ones, and its aggregates.
@@ -95,6 +105,7 @@ impl Reduced {
             State::Count(count) => i64::try_from(*count).ok().map(Value::Integer),
             State::Sum(sum) => sum.map(Sum::value),
             State::Best(best) => best.clone(),
+            State::Joined(text) => text.as_ref().map(|text| Value::Term(Literal::new_simple_literal(text).into())),
         })
     }
 }
@@ -118,14 +129,14 @@ pub(super) fn reduced(rows: &Rows<'_>, output: &Output) -> Result<Vec<Reduced>, 
             Some(at) => *at,
             None => {
                 groups.insert(key.clone(), found.len());
-                found.push((row, 0, output.aggregates.iter().map(|(kind, _)| empty(*kind)).collect()));
+                found.push((row, 0, output.aggregates.iter().map(|(kind, _)| empty(kind)).collect()));
                 found.len() - 1
             }
         };
         let (_, count, states) = &mut found[at];
         *count += 1;
         for ((kind, expression), state) in output.aggregates.iter().zip(states) {
-            add(*kind, state, expression.value(rows, row)?, *count == 1)?;
+            add(kind, state, expression.value(rows, row)?, *count == 1)?;
         }
     }
     found
@@ -144,16 +155,17 @@ fn single(rows: &Rows<'_>, output: &Output, row: usize, order: Vec<Option<Value>
     Ok(Reduced { values: values.collect::<Result<_, Stop>>()?, count: 1, states: Vec::new(), order })
 }
 
-fn empty<T>(kind: Kind) -> State<T> {
+fn empty<T>(kind: &Kind) -> State<T> {
     match kind {
         Kind::Count => State::Count(0),
         Kind::Sum => State::Sum(Some(Sum::Integer(0))),
         Kind::Least | Kind::Greatest => State::Best(None),
+        Kind::Joined(_) => State::Joined(Some(String::new())),
     }
 }
 
 /// Adds a value to an aggregate. `is_first`: whether it is the first one.
-fn add<'a>(kind: Kind, state: &mut State<Cell<'a>>, value: Option<Cell<'a>>, is_first: bool) -> Result<(), Stop> {
+fn add<'a>(kind: &Kind, state: &mut State<Cell<'a>>, value: Option<Cell<'a>>, is_first: bool) -> Result<(), Stop> {
     match state {
         State::Count(count) => *count += u64::from(value.is_some()),
         State::Sum(sum) => {
@@ -166,6 +178,12 @@ fn add<'a>(kind: Kind, state: &mut State<Cell<'a>>, value: Option<Cell<'a>>, is_
                 _ => None,
             }
         }
+        State::Joined(text) => match (&mut *text, value) {
+            (Some(text), Some(Cell::Text(further))) => join(text, kind, is_first, &further)?,
+            (Some(_), Some(Cell::Other(_) | Cell::Decimal(_))) => return unfit("a list of values of a rare type"),
+            // As in the evaluator, the list is an error if a value is not a text.
+            _ => *text = None,
+        },
         State::Best(best) => match (&best, value) {
             (_, None) => *best = None,
             (None, value) => *best = value.filter(|_| is_first),
@@ -179,14 +197,25 @@ fn add<'a>(kind: Kind, state: &mut State<Cell<'a>>, value: Option<Cell<'a>>, is_
     Ok(())
 }
 
-fn wanted(kind: Kind) -> Ordering {
-    if kind == Kind::Least { Ordering::Less } else { Ordering::Greater }
+fn join(text: &mut String, kind: &Kind, is_first: bool, further: &str) -> Result<(), Stop> {
+    if let Kind::Joined(separator) = kind
+        && !is_first
+    {
+        text.push_str(separator);
+    }
+    text.push_str(further);
+    if text.len() > LONGEST_TEXT { unfit("a long text") } else { Ok(()) }
+}
+
+fn wanted(kind: &Kind) -> Ordering {
+    if *kind == Kind::Least { Ordering::Less } else { Ordering::Greater }
 }
 
 fn owned(state: State<Cell<'_>>) -> Result<State<Value>, Stop> {
     Ok(match state {
         State::Count(count) => State::Count(count),
         State::Sum(sum) => State::Sum(sum),
+        State::Joined(text) => State::Joined(text),
         State::Best(best) => State::Best(best.map(|cell| cell.value()).transpose()?),
     })
 }
@@ -238,6 +267,8 @@ fn sort<T, C>(
 #[derive(Debug, Default)]
 pub(super) struct Gathered {
     pub rows: Vec<Reduced>,
+    /// Size of the texts of lists. Unit: bytes.
+    text: usize,
     known: HashMap<Vec<Option<Value>>, usize>,
 }
 
@@ -245,6 +276,7 @@ impl Gathered {
     /// Adds the rows of a file.
     pub(super) fn add(&mut self, rows: Vec<Reduced>, output: &Output) -> Result<(), Stop> {
         for row in rows {
+            self.text += row.text();
             if !output.grouped {
                 self.rows.push(row);
                 continue;
@@ -261,6 +293,9 @@ impl Gathered {
             && self.rows.len() > MANY_ROWS.max(4 * most)
         {
             self.keep_first(keys, *most)?;
+        }
+        if self.text > MOST_TEXT {
+            return unfit(format!("texts of over {} MiB", MOST_TEXT >> 20));
         }
         let each = output.keys.len() + output.aggregates.len() + 1;
         if self.rows.len().saturating_mul(each) > MOST_VALUES {
@@ -291,6 +326,12 @@ impl Gathered {
 }
 
 impl Reduced {
+    /// Size of its lists of texts. Unit: bytes.
+    fn text(&self) -> usize {
+        let text = |state: &State<Value>| if let State::Joined(Some(text)) = state { text.len() } else { 0 };
+        self.states.iter().map(text).sum()
+    }
+
     fn merge(&mut self, other: Self, output: &Output) -> Result<(), Stop> {
         self.count += other.count;
         for ((kind, _), (state, other)) in output.aggregates.iter().zip(self.states.iter_mut().zip(other.states)) {
@@ -299,9 +340,13 @@ impl Reduced {
                 (State::Sum(sum), State::Sum(other)) => {
                     *sum = sum.zip(other).and_then(|(sum, other)| sum.plus(other));
                 }
+                (State::Joined(text), State::Joined(other)) => match (&mut *text, other) {
+                    (Some(text), Some(other)) => join(text, kind, false, &other)?,
+                    _ => *text = None,
+                },
                 (State::Best(best), State::Best(other)) => match (&best, other) {
                     (Some(known), Some(other)) => {
-                        if Cell::of(&other).order(&Cell::of(known))? == wanted(*kind) {
+                        if Cell::of(&other).order(&Cell::of(known))? == wanted(kind) {
                             *best = Some(other);
                         }
                     }

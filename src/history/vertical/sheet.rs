@@ -1,8 +1,11 @@
 //! Reads the statements of a file of outlines by property.
 
+use std::cell::RefCell;
 use std::collections::HashMap;
 
 use oxigraph::model::{BlankNode, GraphName, NamedNode, NamedOrBlankNode, Quad, Term};
+use zstd::stream::read::Decoder;
+use zstd::zstd_safe::DCtx;
 
 use crate::journal;
 use crate::statements::iri;
@@ -260,6 +263,15 @@ impl Labels {
     }
 }
 
+thread_local! {
+    /// A part is so short that a new context for each would take longer than its decompression.
+    static CONTEXT: RefCell<DCtx<'static>> = RefCell::new(DCtx::create());
+}
+
 fn unpacked(bytes: &[u8]) -> Result<Vec<u8>, String> {
-    zstd::stream::decode_all(bytes).map_err(|error| error.to_string())
+    CONTEXT.with_borrow_mut(|context| {
+        let mut unpacked = Vec::with_capacity(bytes.len() * 4);
+        let read = std::io::Read::read_to_end(&mut Decoder::with_context(bytes, context), &mut unpacked);
+        read.map(|_| unpacked).map_err(|error| error.to_string())
+    })
 }

@@ -16,7 +16,7 @@ const MOST_DIGITS: usize = 15;
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Cell<'a> {
     Iri(Cow<'a, str>),
-    Text(&'a str),
+    Text(Cow<'a, str>),
     Integer(i64),
     Double(f64),
     /// Its value as a double, which has all of its digits.
@@ -34,7 +34,9 @@ impl<'a> Cell<'a> {
             Value::Boolean(value) => Self::Boolean(*value),
             Value::Term(term) => match term {
                 Term::NamedNode(node) => Self::Iri(Cow::Borrowed(node.as_str())),
-                Term::Literal(literal) if literal.datatype() == xsd::STRING => Self::Text(literal.value()),
+                Term::Literal(literal) if literal.datatype() == xsd::STRING => {
+                    Self::Text(Cow::Borrowed(literal.value()))
+                }
                 Term::Literal(literal) if literal.datatype() == xsd::DECIMAL => {
                     decimal(literal.value()).map_or(Self::Other(term), Self::Decimal)
                 }
@@ -47,12 +49,25 @@ impl<'a> Cell<'a> {
     pub(super) fn value(&self) -> Result<Value, Stop> {
         Ok(match self {
             Self::Iri(iri) => Value::Term(NamedNode::new_unchecked(iri.as_ref()).into()),
-            Self::Text(text) => Value::Term(oxigraph::model::Literal::new_simple_literal(*text).into()),
+            Self::Text(text) => Value::Term(oxigraph::model::Literal::new_simple_literal(text.as_ref()).into()),
             Self::Integer(number) => Value::Integer(*number),
             Self::Double(number) => Value::Double(number.to_bits()),
             Self::Decimal(_) => return unfit("a decimal"),
             Self::Boolean(value) => Value::Boolean(*value),
             Self::Other(term) => Value::Term((*term).clone()),
+        })
+    }
+
+    /// Its text, as `STR` has it; `None` if it is an error.
+    pub(super) fn text(self) -> Result<Option<Cow<'a, str>>, Stop> {
+        Ok(match self {
+            Self::Iri(text) | Self::Text(text) => Some(text),
+            Self::Other(Term::Literal(literal)) => Some(Cow::Borrowed(literal.value())),
+            Self::Other(_) => None,
+            number => match number.value()?.term() {
+                Term::Literal(literal) => Some(Cow::Owned(literal.destruct().0)),
+                _ => None,
+            },
         })
     }
 

@@ -1,11 +1,11 @@
 //! Packs all runs as columns: their outcomes, their conditions and effects.
 
-use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::collections::{BTreeMap, BTreeSet};
 
+use rustc_hash::FxHashMap;
 use serde_json::{Value, json};
 
 use crate::FindingsSummary;
-use crate::html::HtmlReport;
 use crate::html::pack::Pack;
 use actcheck_analysis::{ColumnKind, OutcomeTable, columns};
 use actcheck_base::{Outcome, names};
@@ -35,6 +35,7 @@ pub(super) struct Slot {
 }
 
 /// The displayed properties, and the slot of each table row.
+#[derive(Debug)]
 pub(super) struct Slots {
     pub slots: Vec<Slot>,
     /// Slot of each table row; `None` if its property is not displayed.
@@ -53,7 +54,7 @@ impl Slots {
             let step = steps.get(row).filter(|step| !step.is_nan())?;
             Some((*step as u32, actions.of_row[row]?, properties.of_row[row]?))
         };
-        let mut keys: HashMap<(u32, u32, u32), Option<usize>> = HashMap::new();
+        let mut keys: FxHashMap<(u32, u32, u32), Option<usize>> = FxHashMap::default();
         keys.extend((0..table.len()).filter_map(key).map(|key| (key, None)));
         let mut slots: Vec<(Slot, (u32, u32, u32))> = Vec::new();
         for key @ (step, action, property) in keys.keys().copied() {
@@ -71,9 +72,24 @@ impl Slots {
     }
 }
 
-/// Packs all runs: their outcomes, and the parameters, messages and explanations of all or of a sample.
-pub(super) fn runs(report: &HtmlReport<'_>, slots: &Slots) -> String {
-    let table = report.table;
+/// All runs of a page, packed.
+#[derive(Debug)]
+pub struct PackedRuns {
+    pub(super) slots: Slots,
+    pub(super) packed: String,
+}
+
+impl PackedRuns {
+    /// Packs the runs in `table`: their outcomes, and the parameters, messages and explanations of all or of a sample.
+    /// `table` has [`HTML_COLUMNS`] and the columns of the findings; if there is a sample, only the columns of rates.
+    pub fn of(findings: &FindingsSummary, table: &OutcomeTable, sample: Option<&OutcomeTable>) -> Self {
+        let slots = Slots::of(table, findings);
+        let packed = runs(findings, table, sample, &slots);
+        Self { slots, packed }
+    }
+}
+
+fn runs(findings: &FindingsSummary, table: &OutcomeTable, sample: Option<&OutcomeTable>, slots: &Slots) -> String {
     let mut pack = Pack::default();
     let rows = first_rows(table);
     ids(table, &rows, &mut pack);
@@ -87,13 +103,13 @@ pub(super) fn runs(report: &HtmlReport<'_>, slots: &Slots) -> String {
     }
     let score = pack.numbers(&of_rows(table, "score", &rows));
     pack.set("score", score);
-    modes(report, &mut pack);
+    modes(findings, table, &mut pack);
     outcomes(table, slots, &mut pack);
-    let (detailed, rows) = match report.sample {
+    let (detailed, rows) = match sample {
         None => (table, rows),
         Some(sample) => (sample, first_rows(sample)),
     };
-    let places = report.sample.map(|sample| places_in(table, sample));
+    let places = sample.map(|sample| places_in(table, sample));
     if let Some(places) = &places {
         let places = pack.places(places);
         pack.set("detailed", places);
@@ -138,12 +154,10 @@ fn ids(table: &OutcomeTable, rows: &[usize], pack: &mut Pack) {
 }
 
 /// Packs the failure mode of each run: its number from 1, or 0.
-fn modes(report: &HtmlReport<'_>, pack: &mut Pack) {
-    let runs = &report.table.text("run").texts;
-    let place_of: HashMap<&str, u32> = (1..)
-        .zip(&report.findings.modes)
-        .flat_map(|(mode, of)| of.runs.iter().map(move |run| (run.as_str(), mode)))
-        .collect();
+fn modes(findings: &FindingsSummary, table: &OutcomeTable, pack: &mut Pack) {
+    let runs = &table.text("run").texts;
+    let place_of: FxHashMap<&str, u32> =
+        (1..).zip(&findings.modes).flat_map(|(mode, of)| of.runs.iter().map(move |run| (run.as_str(), mode))).collect();
     let modes: Vec<u32> = runs.iter().map(|run| place_of.get(run.as_str()).copied().unwrap_or(0)).collect();
     let modes = pack.places(&modes);
     pack.set("mode", modes);
@@ -152,7 +166,7 @@ fn modes(report: &HtmlReport<'_>, pack: &mut Pack) {
 /// For each run of a sample, its place among all runs.
 fn places_in(table: &OutcomeTable, sample: &OutcomeTable) -> Vec<u32> {
     let wanted = &sample.text("run").texts;
-    let mut places: HashMap<&str, u32> = wanted.iter().map(|run| (run.as_str(), 0)).collect();
+    let mut places: FxHashMap<&str, u32> = wanted.iter().map(|run| (run.as_str(), 0)).collect();
     for (place, run) in (0..).zip(&table.text("run").texts) {
         if let Some(of) = places.get_mut(run.as_str()) {
             *of = place;

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use crate::FindingsSummary;
-use crate::html::Replays;
+use crate::html::{PackedRuns, Replays};
 use actcheck_analysis::OutcomeTable;
 use actcheck_base::DecidingSignal;
 use actcheck_history::CampaignRow;
@@ -19,9 +19,8 @@ pub struct HtmlReport<'a> {
     pub findings: &'a FindingsSummary,
     /// The outcomes, with [`HTML_COLUMNS`](crate::HTML_COLUMNS) and the columns of the findings.
     pub table: &'a OutcomeTable,
-    /// A sample of the rows, if there are so many that `table` has only the columns of rates: the parameters, messages and
-    /// explanations of its runs are in the page.
-    pub sample: Option<&'a OutcomeTable>,
+    /// Its runs, packed.
+    pub runs: &'a PackedRuns,
     /// All campaigns of the history, in order of start.
     pub campaigns: &'a [CampaignRow],
     /// Names of properties, by IRI.

@@ -18,7 +18,7 @@ mod shapes;
 mod signals;
 mod summary;
 
-pub use columns::HTML_COLUMNS;
+pub use columns::{HTML_COLUMNS, PackedRuns};
 pub use input::{Explained, HtmlReport, MarginBound, PropertyWords};
 pub use order::replay_order;
 pub use page::html;

@@ -5,7 +5,6 @@ use base64::engine::general_purpose::STANDARD;
 use sha2::{Digest as _, Sha256};
 
 use crate::html::HtmlReport;
-use crate::html::columns::{Slots, runs};
 use crate::html::pack::packed;
 use crate::html::scripts::{SCRIPT, SHELL, STYLE, THREE};
 use crate::html::summary::summary;
@@ -15,8 +14,7 @@ use crate::html::summary::summary;
 /// The same report gives the same page. Its markup has no user text: see the module.
 pub fn html(report: &HtmlReport<'_>) -> String {
     let script = format!("\"use strict\";\n{}", SCRIPT.join("\n"));
-    let slots = Slots::of(report.table, report.findings);
-    let before = data("summary", &summary(report, &slots)) + &data("runs", &runs(report, &slots));
+    let before = data("summary", &summary(report, &report.runs.slots)) + &data("runs", &report.runs.packed);
     let mut behind = data("forms", &report.replays.forms());
     for (name, text) in THREE {
         behind.push_str(&data(name, &packed(text.as_bytes())));

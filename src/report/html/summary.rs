@@ -1,14 +1,16 @@
 //! Packs the summary of all runs of a page.
 
-use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::collections::{BTreeMap, BTreeSet};
 
+use rustc_hash::FxHashMap;
 use serde_json::{Value, json};
 
 use crate::html::HtmlReport;
 use crate::html::columns::{Slot, Slots};
 use crate::html::pack::Pack;
-use crate::{findings_json, scene_rule};
-use actcheck_analysis::score_interval;
+use crate::json::findings_with;
+use crate::scene_rule;
+use actcheck_analysis::{FailureMode, score_interval};
 use actcheck_base::{Outcome, names};
 use actcheck_history::{CampaignRow, SkillRecord};
 use actcheck_verdict::{mean, wilson};
@@ -16,9 +18,8 @@ use actcheck_verdict::{mean, wilson};
 /// Packs findings, campaigns and properties. Runs are referred to by index.
 pub(super) fn summary(report: &HtmlReport<'_>, slots: &Slots) -> String {
     let runs = &report.table.text("run").texts;
-    let places: HashMap<&str, usize> = runs.iter().map(String::as_str).zip(0..).collect();
-    let mut findings = findings_json(report.findings);
-    modes(&mut findings, report, &places);
+    let places: FxHashMap<&str, usize> = runs.iter().map(String::as_str).zip(0..).collect();
+    let mut findings = findings_with(report.findings, modes(report, &places));
     number_runs(&mut findings, &places);
     let mut pack = Pack::default();
     pack.set("version", report.version);
@@ -38,20 +39,20 @@ pub(super) fn summary(report: &HtmlReport<'_>, slots: &Slots) -> String {
     pack.finish()
 }
 
-/// Replaces the runs of each failure mode by their number and an example, with a replay if there is one. The mode of each run is
-/// in the other part of the page.
-fn modes(findings: &mut Value, report: &HtmlReport<'_>, places: &HashMap<&str, usize>) {
+/// The failure modes, each with the number of its runs and an example, with a replay if there is one. The mode of each run is in
+/// the other part of the page.
+fn modes(report: &HtmlReport<'_>, places: &FxHashMap<&str, usize>) -> Vec<Value> {
     let replayed: BTreeSet<&str> = report.replays.runs().map(|(run, _)| run).collect();
-    let shown = findings["failure_modes"].as_array_mut().into_iter().flatten();
-    for (shown, mode) in shown.zip(&report.findings.modes) {
+    let shown = |mode: &FailureMode| {
         let example = mode.runs.iter().find(|run| replayed.contains(run.as_str())).or(mode.runs.first());
         let example = example.and_then(|run| places.get(run.as_str()));
-        *shown = json!({ "failed": mode.failed, "share": mode.share, "count": mode.runs.len(), "example": example });
-    }
+        json!({ "failed": mode.failed, "share": mode.share, "count": mode.runs.len(), "example": example })
+    };
+    report.findings.modes.iter().map(shown).collect()
 }
 
 /// Replaces run ids by indices, which take a tenth of the space.
-fn number_runs(findings: &mut Value, places: &HashMap<&str, usize>) {
+fn number_runs(findings: &mut Value, places: &FxHashMap<&str, usize>) {
     let number = |runs: &mut Value| {
         let known = runs.as_array().into_iter().flatten().filter_map(|run| places.get(run.as_str()?));
         *runs = known.copied().collect();

@@ -18,6 +18,7 @@ pub use campaign::campaign_json;
 pub use case::case_json;
 pub use compare::compare_json;
 pub use findings::findings_json;
+pub(crate) use findings::findings_with;
 pub use health::health_json;
 pub use oracles::oracles_json;
 pub use recheck::recheck_json;
