@@ -56,6 +56,17 @@ pub fn proposed_robot(
     Ok((proposal.profile, proposal.notes))
 }
 
+/// Finds what the robot's profile leaves out.
+///
+/// # Errors
+/// [`world::WorldError`] if that can't be found.
+pub(super) fn complete_robot(campaign: &mut Campaign) -> Result<(), world::WorldError> {
+    if world::is_incomplete(&campaign.robot) {
+        campaign.robot = Arc::new(world::complete(&campaign.robot)?.profile);
+    }
+    Ok(())
+}
+
 fn decompose_with(cache: &mut HullCache, robot: &mut RobotProfile, faults: &mut Diagnostics) {
     for (file, shapes) in &mut robot.meshes {
         let apart: Result<Vec<Vec<Shape>>, String> = shapes.iter().map(|shape| cache.solids_of_link(shape)).collect();

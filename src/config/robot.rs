@@ -17,9 +17,18 @@ const PACKAGE_LEVELS: usize = 4;
 /// Base joints that `base = "planar"` adds below the URDF's root: x, y, heading.
 const PLANAR_JOINTS: [&str; 3] = ["planar_x_joint", "planar_y_joint", "planar_heading_joint"];
 
-/// Required keys of a profile.
-const REQUIRED: [&str; 8] =
-    ["urdf", "arm_joints", "finger_joints", "finger_links", "grasp_link", "camera_link", "max_opening_m", "home"];
+/// Required keys of a profile. What else it leaves out is found on the model, when its meshes are known.
+const REQUIRED: [&str; 1] = ["urdf"];
+
+/// Keys that depend on another key.
+const DEPENDENT: [(&str, &str); 6] = [
+    ("grasp_turned_rad", "grasp_link"),
+    ("grasp_offset_m", "grasp_link"),
+    ("camera_turned_rad", "camera_link"),
+    ("camera_offset_m", "camera_link"),
+    ("home", "arm_joints"),
+    ("postures", "arm_joints"),
+];
 
 /// Friction of the fingertips if the profile has none: that of rubber pads.
 const FINGER_FRICTION: f64 = 0.8;
@@ -55,6 +64,12 @@ pub fn read_with(files: &Files, path: &Path, packages: &[PathBuf]) -> Result<Rob
     table.require(&REQUIRED);
     let mut found = Diagnostics::new();
     let (urdf, lookup) = find_urdf(files, path, packages, &mut table, &mut found);
+    for (key, of) in DEPENDENT {
+        if let (Some(span), false) = (table.key_span(key), table.has(of)) {
+            let help = format!("write `{of}` too, or leave out both: then they are found on the model");
+            table.fault("W011", span, format!("`{key}` depends on `{of}`, which is missing"), help);
+        }
+    }
     let mut roles = Roles::default();
     let profile = read_table(&mut table, urdf.as_ref().map(|(urdf, _)| urdf), &mut roles, &mut found);
     let mut read = None;
@@ -165,6 +180,7 @@ pub fn bare(
         arm_joints: Vec::new(),
         finger_joints: Vec::new(),
         head_joints: Vec::new(),
+        other_joints: Vec::new(),
         grasp_link: none(),
         grasp_turned_rad: [0.0; 3],
         grasp_offset_m: [0.0; 3],
@@ -259,6 +275,8 @@ fn read_table(
     let finger_links = names(table, "finger_links", roles);
     let head_joints = table.strings("head_joints").unwrap_or_default();
     roles.joints.push(("head_joints", head_joints.clone()));
+    let other_joints = table.strings("other_joints").unwrap_or_default();
+    roles.joints.push(("other_joints", other_joints.clone()));
     let (grasp_link, camera_link) = (table.string("grasp_link"), table.string("camera_link"));
     roles.links.push(grasp_link.iter().chain(&camera_link).cloned().collect());
     let grasp_turned_rad = table.numbers("grasp_turned_rad", ..).unwrap_or([0.0; 3]);
@@ -293,18 +311,19 @@ fn read_table(
         base_joints,
         planar_base,
         mount_height_m,
-        arm_joints: values(arm_joints?),
-        finger_joints: finger_joints?,
+        arm_joints: values(arm_joints.unwrap_or_default()),
+        finger_joints: finger_joints.unwrap_or_default(),
         head_joints: values(head_joints),
-        grasp_link: grasp_link?.value,
+        other_joints: values(other_joints),
+        grasp_link: grasp_link.map(|link| link.value).unwrap_or_default(),
         grasp_turned_rad,
         grasp_offset_m,
-        finger_links: finger_links?,
-        camera_link: camera_link?.value,
+        finger_links: finger_links.unwrap_or_default(),
+        camera_link: camera_link.map(|link| link.value).unwrap_or_default(),
         camera_turned_rad,
         camera_offset_m,
-        max_opening_m: max_opening_m?,
-        home: home?,
+        max_opening_m: max_opening_m.unwrap_or_default(),
+        home: home.unwrap_or_default(),
         postures,
         finger_friction,
         grip_force_n,

@@ -1,10 +1,13 @@
-//! Converts a URDF to the simulated tree: movable links, with fixed links merged into them.
+//! Converts a URDF to the simulated tree: movable links, with fixed links and those of joints without a role merged into
+//! them.
 
 use std::collections::BTreeMap;
 
 use nalgebra::{Isometry3, Matrix3, Translation3, Unit, UnitQuaternion, Vector3};
 
 use crate::WorldError;
+use crate::kinematics::motion;
+use crate::needed::Needed;
 use actcheck_base::did_you_mean;
 use actcheck_data::{LEAST_LINK_KG, Part, Pose, RobotProfile, Shape};
 
@@ -164,6 +167,7 @@ impl<'a> Folding<'a> {
         if let (true, Some(names)) = (profile.planar_base, &profile.base_joints) {
             self.add_planar_base(names);
         }
+        let needed = Needed::of(self.robot, profile);
         self.out.links.push(empty_link(root));
         // Links whose children are still to be visited, with the merged link that they belong to.
         let mut open = vec![(*root, self.out.links.len() - 1, Isometry3::identity())];
@@ -173,6 +177,9 @@ impl<'a> Folding<'a> {
                 let origin = at * isometry(&joint.origin);
                 if joint.joint_type == urdf_rs::JointType::Fixed {
                     open.push((&joint.child.link, into, origin));
+                } else if !needed.contains(joint) {
+                    let rigid = self.movable(joint, into, origin)?;
+                    open.push((&joint.child.link, into, origin * motion(&rigid, needed.rest(joint))));
                 } else {
                     self.out.joints.push(self.movable(joint, into, origin)?);
                     self.out.links.push(empty_link(&joint.child.link));
@@ -180,7 +187,7 @@ impl<'a> Folding<'a> {
                 }
             }
         }
-        self.resolve_mimics()?;
+        self.resolve_mimics(&needed)?;
         for link in &mut self.out.links {
             if link.mass < LEAST_LINK_KG {
                 link.mass = LEAST_LINK_KG;
@@ -288,8 +295,8 @@ impl<'a> Folding<'a> {
         })
     }
 
-    fn resolve_mimics(&mut self) -> Result<(), WorldError> {
-        for joint in &self.robot.joints {
+    fn resolve_mimics(&mut self, needed: &Needed<'_>) -> Result<(), WorldError> {
+        for joint in self.robot.joints.iter().filter(|joint| needed.contains(joint)) {
             let Some(mimic) = &joint.mimic else { continue };
             let (follower, leader) = (self.out.joint(&joint.name)?, self.out.joint(&mimic.joint)?);
             let (factor, offset) = (mimic.multiplier.unwrap_or(1.0), mimic.offset.unwrap_or(0.0));

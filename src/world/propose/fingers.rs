@@ -6,6 +6,7 @@ use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion};
 
 use super::body::chain;
 use super::frames::{Pair, likely};
+use super::stated::{NoHand, Stated};
 use crate::Gripper;
 use crate::description::{JointKind, RobotModel};
 use crate::gripper::Probe;
@@ -32,27 +33,36 @@ pub(super) struct Hand {
     pub(super) notes: BTreeMap<&'static str, String>,
 }
 
-/// Finds the best gripper.
+/// Finds the best gripper, and keeps what the profile states of it.
 ///
 /// # Errors
-/// A sentence if there is none.
-pub(super) fn find(bare: &RobotProfile, model: &RobotModel) -> Result<Hand, String> {
-    let groups = groups(model);
+/// [`NoHand`] if there is none.
+pub(super) fn find(partial: &RobotProfile, model: &RobotModel) -> Result<Hand, NoHand> {
+    let stated = Stated::of(partial, model)?;
+    if let (Some(links), [_, ..], Some(grasp)) = (stated.links, stated.joints.as_slice(), stated.grasp) {
+        let mut profile = partial.clone();
+        if profile.max_opening_m == 0.0 {
+            profile.max_opening_m = as_opening(Gripper::find(partial, model, links, grasp)?.widest_m());
+        }
+        return Ok(Hand { profile, palm: grasp.0, notes: BTreeMap::new() });
+    }
+    let groups = stated.groups(model).unwrap_or_else(|| groups(model));
     if groups.is_empty() {
-        return Err(
-            "no gripper was found: none of its movable joints or their links has a name with `finger`, `grip`, \
-                    `hand`, `jaw`, `knuckle` or `thumb`"
-                .to_owned(),
-        );
+        let what = "no gripper was found: none of its movable joints or their links has a name with `finger`, `grip`, \
+                    `hand`, `jaw`, `knuckle` or `thumb`";
+        return Err(NoHand::Gripper(what.to_owned()));
     }
     let mut rated: Vec<(usize, usize, &BTreeSet<usize>)> =
         groups.iter().map(|(palm, joints)| (rank(model, *palm), *palm, joints)).collect();
+    rated.retain(|(_, palm, _)| stated.grasp.is_none_or(|(link, _)| link == *palm));
     rated.sort_by_key(|(rank, palm, _)| (std::cmp::Reverse(*rank), *palm));
     // The meshes are in the model already.
-    let light = RobotProfile { meshes: BTreeMap::new(), ..bare.clone() };
-    let best = rated.iter().find_map(|(_, palm, joints)| measure(&light, model, *palm, joints));
-    let best = best.map(|hand| Hand { profile: RobotProfile { meshes: bare.meshes.clone(), ..hand.profile }, ..hand });
-    best.ok_or_else(|| "no two links of its gripper face each other and come closer".to_owned())
+    let light = RobotProfile { meshes: BTreeMap::new(), ..partial.clone() };
+    let best = rated.iter().find_map(|(_, palm, joints)| measure(&light, model, &stated, *palm, joints));
+    let best =
+        best.map(|hand| Hand { profile: RobotProfile { meshes: partial.meshes.clone(), ..hand.profile }, ..hand });
+    let none = "no two links of its gripper face each other and come closer";
+    best.ok_or_else(|| NoHand::Gripper(none.to_owned()))
 }
 
 /// Joints with a gripper's name, by the link that carries them.
@@ -89,12 +99,22 @@ struct Found {
     widest_m: f64,
 }
 
-fn measure(bare: &RobotProfile, model: &RobotModel, palm: usize, joints: &BTreeSet<usize>) -> Option<Hand> {
+fn measure(
+    bare: &RobotProfile,
+    model: &RobotModel,
+    stated: &Stated,
+    palm: usize,
+    joints: &BTreeSet<usize>,
+) -> Option<Hand> {
     let from = Point3::origin();
     let mut best: Option<Found> = None;
-    for (links, drives) in pairs(model, palm, joints).into_iter().take(MOST_PAIRS) {
+    for (links, drives) in pairs(model, palm, (joints, stated)).into_iter().take(MOST_PAIRS) {
         for named in drives {
-            for frame in frames(model, palm, links, &named, &from) {
+            let all = match stated.grasp {
+                Some((_, frame)) => vec![frame],
+                None => frames(model, palm, links, &named, &from),
+            };
+            for frame in all {
                 let Some(found) = rate(bare, model, palm, links, &named, frame) else { continue };
                 if best.as_ref().is_none_or(|best| found.score > best.score + 1e-9) {
                     best = Some(found);
@@ -103,28 +123,42 @@ fn measure(bare: &RobotProfile, model: &RobotModel, palm: usize, joints: &BTreeS
         }
     }
     let mut found = best?;
-    centre(bare, model, palm, &mut found);
-    found.frame = as_written(&found.frame);
+    if stated.grasp.is_none() {
+        centre(bare, model, palm, &mut found);
+        found.frame = as_written(&found.frame);
+    }
     if let Some(gripper) = gripper(bare, model, palm, (found.links, &found.named, found.frame)) {
         found.widest_m = gripper.widest_m();
     }
     let mut profile = bare.clone();
-    let named = alike(model, found.links).unwrap_or(found.named);
-    profile.finger_joints = named.iter().map(|idx| model.joints[*idx].name.clone()).collect();
-    profile.finger_links = found.links.map(|link| model.links[link].name.clone());
-    profile.grasp_link = model.links[palm].name.clone();
-    profile.grasp_offset_m = rounded(found.frame.translation.vector.into());
-    let (roll, pitch, yaw) = found.frame.rotation.euler_angles();
-    profile.grasp_turned_rad = rounded([roll, pitch, yaw]);
-    // Not wider than measured, up to the rounding of limits.
-    profile.max_opening_m = (found.widest_m.min(1.0) * 1000.0 + 0.1).floor() / 1000.0;
     let mut notes = BTreeMap::new();
-    notes.insert("finger_joints", "their names, and the links that they move".to_owned());
-    notes.insert("finger_links", "these two face each other and open widest".to_owned());
-    notes.insert("grasp_offset_m", "between the fingertips, 2.5 cm before their ends".to_owned());
-    notes.insert("grasp_turned_rad", "x along the fingers, y from the right to the left one".to_owned());
-    notes.insert("max_opening_m", "measured at that place".to_owned());
+    if stated.joints.is_empty() {
+        let named = alike(model, found.links).unwrap_or(found.named);
+        profile.finger_joints = named.iter().map(|idx| model.joints[*idx].name.clone()).collect();
+        notes.insert("finger_joints", "their names, and the links that they move".to_owned());
+    }
+    if stated.links.is_none() {
+        profile.finger_links = found.links.map(|link| model.links[link].name.clone());
+        notes.insert("finger_links", "these two face each other and open widest".to_owned());
+    }
+    if stated.grasp.is_none() {
+        profile.grasp_link = model.links[palm].name.clone();
+        profile.grasp_offset_m = rounded(found.frame.translation.vector.into());
+        let (roll, pitch, yaw) = found.frame.rotation.euler_angles();
+        profile.grasp_turned_rad = rounded([roll, pitch, yaw]);
+        notes.insert("grasp_offset_m", "between the fingertips, 2.5 cm before their ends".to_owned());
+        notes.insert("grasp_turned_rad", "x along the fingers, y from the right to the left one".to_owned());
+    }
+    if profile.max_opening_m == 0.0 {
+        profile.max_opening_m = as_opening(found.widest_m);
+        notes.insert("max_opening_m", "measured at that place".to_owned());
+    }
     Some(Hand { profile, palm, notes })
+}
+
+/// Not wider than measured, up to the rounding of limits. Unit: metres.
+fn as_opening(widest_m: f64) -> f64 {
+    (widest_m.min(1.0) * 1000.0 + 0.1).floor() / 1000.0
 }
 
 /// The joints of two fingers that slide alike, one of which mimics the other: each has a motor of its own then.
@@ -154,43 +188,47 @@ fn rounded(values: [f64; 3]) -> [f64; 3] {
 }
 
 /// Pairs of links that could be fingertips, each with the joints that could drive them.
-fn pairs(model: &RobotModel, palm: usize, joints: &BTreeSet<usize>) -> Vec<([usize; 2], Vec<Vec<usize>>)> {
-    let is_solid = |link: usize| !model.links[link].solids.is_empty();
-    let moved: Vec<usize> = joints.iter().map(|joint| joint + 1).filter(|link| is_solid(*link)).collect();
-    // The outermost first: fingertips rather than knuckles.
-    let mut moved = moved;
-    moved.sort_by_key(|link| std::cmp::Reverse(chain(model, *link).len()));
+fn pairs(
+    model: &RobotModel,
+    palm: usize,
+    (joints, stated): (&BTreeSet<usize>, &Stated),
+) -> Vec<([usize; 2], Vec<Vec<usize>>)> {
     let drivers = |link: usize| -> Vec<usize> {
         let own = chain(model, link).into_iter().filter(|joint| joints.contains(joint));
         let mut leaders: Vec<usize> = own.map(|joint| leader(model, joint)).collect();
         leaders.dedup();
         leaders
     };
-    let mut found = Vec::new();
-    for (place, left) in moved.iter().enumerate() {
-        for right in moved[place + 1..].iter().copied().chain(is_solid(palm).then_some(palm)) {
-            let mut ways: Vec<Vec<usize>> = Vec::new();
-            let of_right = if right == palm { Vec::new() } else { drivers(right) };
-            let of_both: Vec<usize> = drivers(*left).into_iter().filter(|joint| of_right.contains(joint)).collect();
-            if let Some(common) = of_both.first() {
-                found.push(([*left, right], vec![vec![*common]]));
-                continue;
-            }
-            for first in drivers(*left) {
-                match of_right.as_slice() {
-                    [] => ways.push(vec![first]),
-                    several => ways.extend(several.iter().map(|second| vec![first, *second])),
-                }
-            }
-            ways.dedup();
-            found.push(([*left, right], ways));
+    let ways = |[left, right]: [usize; 2]| -> Vec<Vec<usize>> {
+        if !stated.joints.is_empty() {
+            return vec![stated.joints.clone()];
         }
-    }
-    found
+        let (of_left, of_right) = (drivers(left), drivers(right));
+        if let Some(common) = of_left.iter().find(|joint| of_right.contains(joint)) {
+            return vec![vec![*common]];
+        }
+        match (of_left.as_slice(), of_right.as_slice()) {
+            (one, []) | ([], one) => one.iter().map(|joint| vec![*joint]).collect(),
+            (firsts, seconds) => {
+                firsts.iter().flat_map(|first| seconds.iter().map(move |second| vec![*first, *second])).collect()
+            }
+        }
+    };
+    let links = stated.links.map_or_else(|| facing(model, palm, joints), |links| vec![links]);
+    links.into_iter().map(|links| (links, ways(links))).collect()
+}
+
+/// Pairs of links that the joints move, and each with the palm; the outermost first: fingertips rather than knuckles.
+fn facing(model: &RobotModel, palm: usize, joints: &BTreeSet<usize>) -> Vec<[usize; 2]> {
+    let is_solid = |link: usize| !model.links[link].solids.is_empty();
+    let mut moved: Vec<usize> = joints.iter().map(|joint| joint + 1).filter(|link| is_solid(*link)).collect();
+    moved.sort_by_key(|link| std::cmp::Reverse(chain(model, *link).len()));
+    let others = |place: usize| moved[place + 1..].iter().copied().chain(is_solid(palm).then_some(palm));
+    moved.iter().enumerate().flat_map(|(place, left)| others(place).map(|right| [*left, right])).collect()
 }
 
 /// The joint that a joint follows, or itself.
-fn leader(model: &RobotModel, joint: usize) -> usize {
+pub(super) fn leader(model: &RobotModel, joint: usize) -> usize {
     let next = |joint: &usize| model.joints[*joint].mimic.map(|(leader, ..)| leader);
     std::iter::successors(Some(joint), next).take(model.joints.len()).last().unwrap_or(joint)
 }
