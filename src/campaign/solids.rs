@@ -56,13 +56,17 @@ pub fn proposed_robot(
     Ok((proposal.profile, proposal.notes))
 }
 
-/// Finds what the robot's profile leaves out.
+/// Finds what the robot's profile leaves out, and limits the force of its grip to that of its motors.
 ///
 /// # Errors
 /// [`world::WorldError`] if that can't be found.
 pub(super) fn complete_robot(campaign: &mut Campaign) -> Result<(), world::WorldError> {
     if world::is_incomplete(&campaign.robot) {
         campaign.robot = Arc::new(world::complete(&campaign.robot)?.profile);
+    }
+    let limit_n = world::grip_limit_n(&campaign.robot)?;
+    if limit_n < campaign.robot.grip_force_n {
+        Arc::make_mut(&mut campaign.robot).grip_force_n = limit_n;
     }
     Ok(())
 }

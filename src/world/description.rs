@@ -296,7 +296,8 @@ impl<'a> Folding<'a> {
     }
 
     fn resolve_mimics(&mut self, needed: &Needed<'_>) -> Result<(), WorldError> {
-        for joint in self.robot.joints.iter().filter(|joint| needed.contains(joint)) {
+        let moves = |joint: &&urdf_rs::Joint| joint.joint_type != urdf_rs::JointType::Fixed && needed.contains(joint);
+        for joint in self.robot.joints.iter().filter(moves) {
             let Some(mimic) = &joint.mimic else { continue };
             let (follower, leader) = (self.out.joint(&joint.name)?, self.out.joint(&mimic.joint)?);
             let (factor, offset) = (mimic.multiplier.unwrap_or(1.0), mimic.offset.unwrap_or(0.0));

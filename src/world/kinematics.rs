@@ -1,5 +1,6 @@
 //! Forward kinematics, the grasp Jacobian and gravity compensation.
 
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use nalgebra::{Isometry3, Matrix6xX, Point3, Translation3, UnitQuaternion, Vector3};
@@ -19,6 +20,8 @@ pub struct Kinematics {
     root: Isometry3<f64>,
     grasp: (usize, Isometry3<f64>),
     camera: (usize, Isometry3<f64>),
+    /// Pairs of links that pass through each other, with the smaller index first.
+    passing: BTreeSet<(usize, usize)>,
 }
 
 impl Kinematics {
@@ -30,7 +33,17 @@ impl Kinematics {
         grasp: (usize, Isometry3<f64>),
         camera: (usize, Isometry3<f64>),
     ) -> Self {
-        Self { model, root, grasp, camera }
+        Self { model, root, grasp, camera, passing: BTreeSet::new() }
+    }
+
+    /// The same geometry with pairs of links that pass through each other.
+    pub(crate) fn with_passing(self, passing: BTreeSet<(usize, usize)>) -> Self {
+        Self { passing, ..self }
+    }
+
+    /// Returns whether two links pass through each other.
+    pub(crate) fn pass(&self, first: usize, second: usize) -> bool {
+        self.passing.contains(&(first.min(second), first.max(second)))
     }
 
     /// The joints, in the order of positions.

@@ -44,7 +44,9 @@ pub fn geometry(start: &RobotStart) -> Result<(Kinematics, Layout, Vec<f64>), Wo
     let named = Named::find(&start.profile, &model)?;
     let positions = home(&start.profile, &model, &named, start.base);
     let root = root_of(start, &named.layout);
-    Ok((Kinematics::new(model, root, named.grasp, named.camera), named.layout, positions))
+    let passing = named.passing(&model);
+    let kinematics = Kinematics::new(model, root, named.grasp, named.camera).with_passing(passing);
+    Ok((kinematics, named.layout, positions))
 }
 
 /// Pose of the root link. Frame: world.
@@ -68,7 +70,8 @@ impl Robot {
         let named = Named::find(&profile, &model)?;
         let positions = home(&profile, &model, &named, start.base);
         let root = root_of(start, &named.layout);
-        let kinematics = Kinematics::new(model.clone(), root, named.grasp, named.camera);
+        let passing = named.passing(&model);
+        let kinematics = Kinematics::new(model.clone(), root, named.grasp, named.camera).with_passing(passing);
         let bodies = insert_links(engine, &model, &kinematics.links(&positions), &named, &profile);
         let motors = insert_joints(engine, &model, &bodies, &named, &profile)?;
         let off_floor = links_on_floor(&model, &named, &profile);

@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion};
 
 use super::body::chain;
-use super::frames::{Pair, likely};
+use super::frames::{Pair, Root, likely};
 use super::stated::{NoHand, Stated};
 use crate::Gripper;
 use crate::description::{JointKind, RobotModel};
@@ -22,6 +22,13 @@ const MOST_PAIRS: usize = 40;
 const CENTRED_AT_M: f64 = 0.06;
 /// Least change of the gap between two fingers. Unit: metres.
 const LEAST_CHANGE_M: f64 = 0.008;
+/// Weight of a link that carries another one of the gripper: a knuckle rather than a fingertip.
+const CARRIER: f64 = 0.3;
+/// Weight of two links whose volumes differ by more than the share [`UNLIKE`].
+const UNALIKE: f64 = 0.7;
+const UNLIKE: f64 = 0.1;
+/// Weight of a direction from the palm's origin: its frame may be anywhere.
+const FROM_PALM: f64 = 0.9;
 /// Openings wider than this are worth no more. Unit: metres.
 const WIDE_M: f64 = 0.12;
 
@@ -61,8 +68,25 @@ pub(super) fn find(partial: &RobotProfile, model: &RobotModel) -> Result<Hand, N
     let best = rated.iter().find_map(|(_, palm, joints)| measure(&light, model, &stated, *palm, joints));
     let best =
         best.map(|hand| Hand { profile: RobotProfile { meshes: partial.meshes.clone(), ..hand.profile }, ..hand });
-    let none = "no two links of its gripper face each other and come closer";
-    best.ok_or_else(|| NoHand::Gripper(none.to_owned()))
+    best.ok_or_else(|| NoHand::Gripper(why_none(model, &rated)))
+}
+
+/// Why none of these groups of joints is a gripper.
+fn why_none(model: &RobotModel, groups: &[(usize, usize, &BTreeSet<usize>)]) -> String {
+    let joints: Vec<usize> = groups.iter().flat_map(|(_, _, joints)| joints.iter().copied()).collect();
+    let is_stiff = |joint: &usize| model.joints[*joint].upper - model.joints[*joint].lower < 1e-6;
+    if let Some(joint) = joints.iter().copied().find(is_stiff).map(|joint| &model.joints[joint]) {
+        let (lower, upper) = (joint.lower, joint.upper);
+        return format!(
+            "no gripper was found: its joint `{}` can't move, its limits are {lower} and {upper}",
+            joint.name
+        );
+    }
+    if joints.iter().all(|joint| model.links[joint + 1].solids.is_empty()) {
+        let links: Vec<&str> = joints.iter().map(|joint| model.links[joint + 1].name.as_str()).collect();
+        return format!("no gripper was found: the links `{}` have no collision shapes", links.join("`, `"));
+    }
+    "no two links of its gripper face each other and come closer".to_owned()
 }
 
 /// Joints with a gripper's name, by the link that carries them.
@@ -106,16 +130,16 @@ fn measure(
     palm: usize,
     joints: &BTreeSet<usize>,
 ) -> Option<Hand> {
-    let from = Point3::origin();
     let mut best: Option<Found> = None;
     for (links, drives) in pairs(model, palm, (joints, stated)).into_iter().take(MOST_PAIRS) {
         for named in drives {
             let all = match stated.grasp {
-                Some((_, frame)) => vec![frame],
-                None => frames(model, palm, links, &named, &from),
+                Some((_, frame)) => vec![(1.0, frame)],
+                None => frames(model, palm, links, &named),
             };
-            for frame in all {
+            for (weight, frame) in all {
                 let Some(found) = rate(bare, model, palm, links, &named, frame) else { continue };
+                let found = Found { score: found.score * weight * tips(model, links, joints), ..found };
                 if best.as_ref().is_none_or(|best| found.score > best.score + 1e-9) {
                     best = Some(found);
                 }
@@ -233,26 +257,42 @@ pub(super) fn leader(model: &RobotModel, joint: usize) -> usize {
     std::iter::successors(Some(joint), next).take(model.joints.len()).last().unwrap_or(joint)
 }
 
-/// Likely grasp frames of a pair, in the palm's frame: those at which both fingers have surfaces at several openings.
-fn frames(
-    model: &RobotModel,
-    palm: usize,
-    links: [usize; 2],
-    named: &[usize],
-    from: &Point3<f64>,
-) -> Vec<Isometry3<f64>> {
+/// How much two links look like fingertips, from 0 to 1: they carry no other link of the gripper, and are alike.
+fn tips(model: &RobotModel, links: [usize; 2], joints: &BTreeSet<usize>) -> f64 {
+    let is_solid = |link: usize| !model.links[link].solids.is_empty();
+    let carries = |link: usize| joints.iter().any(|joint| model.joints[*joint].parent == link && is_solid(joint + 1));
+    let moved = links.map(|link| link.checked_sub(1).is_some_and(|joint| joints.contains(&joint)));
+    let n_carriers = (0..2).filter(|side| moved[*side] && carries(links[*side])).count();
+    let [left, right] = links.map(|link| model.links[link].solids.iter().map(|part| part.shape.volume()).sum::<f64>());
+    let are_alike = (left - right).abs() < UNLIKE * left.max(right);
+    CARRIER.powi(i32::try_from(n_carriers).unwrap_or(2)) * if are_alike { 1.0 } else { UNALIKE }
+}
+
+/// Likely grasp frames of a pair, in the palm's frame, with weights: those at which both fingers have surfaces at several
+/// openings. The fingers point away from their joints or, less likely, from the palm's origin.
+fn frames(model: &RobotModel, palm: usize, links: [usize; 2], named: &[usize]) -> Vec<(f64, Isometry3<f64>)> {
     let ways: &[[bool; 2]] = if named.len() == 1 { &[[true, true]] } else { &[[true, true], [true, false]] };
-    let mut found: Vec<Isometry3<f64>> = Vec::new();
+    let inner = chain(model, palm);
+    let joints = links.map(|link| chain(model, link).into_iter().find(|joint| !inner.contains(joint)));
+    let origins: Vec<Point3<f64>> =
+        joints.iter().flatten().map(|joint| Point3::from(model.joints[*joint].origin.translation.vector)).collect();
+    let middle = origins.iter().map(|at| at.coords).sum::<nalgebra::Vector3<f64>>() / origins.len().max(1) as f64;
+    let roots = [
+        (1.0, Root { from: Point3::from(middle), sides: joints.map(|joint| joint.is_some()) }),
+        (FROM_PALM, Root { from: Point3::origin(), sides: [true; 2] }),
+    ];
+    let mut found: Vec<(f64, Isometry3<f64>)> = Vec::new();
     for way in ways {
         let ends = [posture(model, named, *way, 1.0), posture(model, named, *way, 0.0)];
         let ends = ends.map(|positions| Pair::new(model, links, &poses(model, &positions), palm));
-        for frame in likely(&ends, from) {
-            let is_known = found.iter().any(|known| {
+        for (weight, frame) in roots.iter().flat_map(|(w, root)| likely(&ends, root).into_iter().map(move |f| (*w, f)))
+        {
+            let is_known = found.iter().any(|(_, known)| {
                 let off = (known.translation.vector - frame.translation.vector).norm();
                 off < 1e-3 && known.rotation.angle_to(&frame.rotation) < 1e-2
             });
             if !is_known && closes(model, palm, links, &frame, |share| posture(model, named, *way, share)) {
-                found.push(frame);
+                found.push((weight, frame));
             }
         }
     }

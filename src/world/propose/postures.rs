@@ -40,8 +40,8 @@ pub(super) fn find(
 ) -> Result<Postures, WorldError> {
     let camera = frame(model, &profile.camera_link, profile.camera_offset_m, profile.camera_turned_rad)?;
     let root = Pose::upright([0.0, 0.0, profile.mount_height_m], 0.0).to_isometry();
-    let kinematics = Kinematics::new(Arc::clone(model), root, grasp, camera);
     let named = Named::find(profile, model)?;
+    let kinematics = Kinematics::new(Arc::clone(model), root, grasp, camera).with_passing(named.passing(model));
     let arm = named.layout.arm.clone();
     let base: Vec<usize> = named.layout.base.iter().flatten().copied().collect();
     let mut start: Vec<f64> = model.joints.iter().map(|joint| 0.0_f64.clamp(joint.lower, joint.upper)).collect();
