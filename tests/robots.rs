@@ -56,8 +56,8 @@ fn uncommented(profile: &str) -> String {
     profile.lines().map(line).collect()
 }
 
-/// The proposed profile of a shipped robot names the joints of its own profile, and passes `check`; what it leaves to the
-/// program is in its comments.
+/// The proposed profile of a shipped robot names the joints of its own profile, and passes `check`; the keys that it
+/// leaves to the program are in its comments.
 #[test]
 fn a_proposed_profile_is_complete() {
     let folder = tempfile::tempdir().unwrap();

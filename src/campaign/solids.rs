@@ -56,10 +56,10 @@ pub fn proposed_robot(
     Ok((proposal.profile, proposal.notes))
 }
 
-/// Finds what the robot's profile leaves out, and limits the force of its grip to that of its motors.
+/// Finds the roles that the robot's profile leaves out, and limits the force of its grip to that of its motors.
 ///
 /// # Errors
-/// [`world::WorldError`] if that can't be found.
+/// [`world::WorldError`] if they can't be found.
 pub(super) fn complete_robot(campaign: &mut Campaign) -> Result<(), world::WorldError> {
     if world::is_incomplete(&campaign.robot) {
         campaign.robot = Arc::new(world::complete(&campaign.robot)?.profile);

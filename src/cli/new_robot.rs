@@ -56,8 +56,8 @@ pub fn robot(args: &NewRobotArgs) -> Result<(), Diagnostics> {
     Ok(())
 }
 
-/// The profile as TOML, with a comment for each guess. What the program finds on the model whenever it reads the profile
-/// is a comment too.
+/// The profile as TOML, with a comment for each guess. The keys that the program finds on the model whenever it reads the
+/// profile are comments too.
 fn text(profile: &RobotProfile, notes: &BTreeMap<&'static str, String>, args: &NewRobotArgs, folder: &Path) -> String {
     let title = format!("# Proposed by `actcheck new robot {}`: check each guess.\n", args.model.display());
     let stated = lines(&stated(profile, args, folder), notes);

@@ -17,8 +17,12 @@ const PACKAGE_LEVELS: usize = 4;
 /// Base joints that `base = "planar"` adds below the URDF's root: x, y, heading.
 const PLANAR_JOINTS: [&str; 3] = ["planar_x_joint", "planar_y_joint", "planar_heading_joint"];
 
-/// Required keys of a profile. What else it leaves out is found on the model, when its meshes are known.
+/// Required keys of a profile. The others are found on the model, when its meshes are known.
 const REQUIRED: [&str; 1] = ["urdf"];
+
+/// Keys that most profiles have.
+const USUAL: [&str; 7] =
+    ["arm_joints", "finger_joints", "finger_links", "grasp_link", "camera_link", "max_opening_m", "home"];
 
 /// Keys that depend on another key.
 const DEPENDENT: [(&str, &str); 6] = [
@@ -37,8 +41,9 @@ const FINGER_FRICTION: f64 = 0.8;
 /// convention, z points forwards and y down in the frame of such a link. Unit: radians.
 pub const OPTICAL_TURNED_RAD: [f64; 3] = [std::f64::consts::FRAC_PI_2, -std::f64::consts::FRAC_PI_2, 0.0];
 
-/// Force of a finger if the profile has none: enough to lift 1 kg with such pads. Unit: newtons.
-const GRIP_FORCE_N: f64 = 15.0;
+/// Force of a finger if the profile has none and its motors can give it: a usual setting of grippers that can give 40 N
+/// (HSR) to 235 N (Robotiq 2F-85). It holds a can while the arm stops from its full speed. Unit: newtons.
+const GRIP_FORCE_N: f64 = 30.0;
 
 /// Reads a profile with the meshes around its URDF: [`read_with`] without further folders.
 ///
@@ -62,6 +67,7 @@ pub fn read_with(files: &Files, path: &Path, packages: &[PathBuf]) -> Result<Rob
     })?;
     let mut table = Table::parse(&source)?;
     table.require(&REQUIRED);
+    table.expect(&USUAL);
     let mut found = Diagnostics::new();
     let (urdf, lookup) = find_urdf(files, path, packages, &mut table, &mut found);
     for (key, of) in DEPENDENT {

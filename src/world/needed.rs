@@ -1,6 +1,6 @@
 //! The joints of a URDF that the simulation moves: those with a role in the profile, and those coupled to them.
 //!
-//! All others are rigid, so that a humanoid that stands beside a table is as fast as its arm.
+//! All others are rigid, so that a humanoid beside a table is as fast as its arm.
 
 use std::collections::{BTreeMap, BTreeSet};
 

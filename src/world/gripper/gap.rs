@@ -1,7 +1,8 @@
 //! The gap between two fingers: the distance of their inner surfaces at the grasp frame.
 
 use nalgebra::{Isometry3, Point3, Vector3};
-use parry3d::query::Ray;
+use parry3d::bounding_volume::{Aabb, BoundingVolume as _};
+use parry3d::query::{Ray, RayCast as _};
 
 use crate::convert::{to_real, to_vector};
 use crate::description::RobotModel;
@@ -17,6 +18,9 @@ const ACROSS_M: [f64; 5] = [-0.008, -0.004, 0.0, 0.004, 0.008];
 const FLAT_M: f64 = 0.0015;
 /// Distance from which surfaces are measured: beyond any finger. Unit: metres.
 const AWAY_M: f64 = 0.5;
+
+/// Slack of the box around a solid, for rounding. Unit: metres.
+const BOX_SLACK_M: f32 = 1e-4;
 
 /// Where the inner surfaces of the fingers are, along the y axis of the grasp frame. Unit: metres.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -56,15 +60,16 @@ pub(crate) struct Probe<'a> {
     model: &'a RobotModel,
     links: [usize; 2],
     grasp: (usize, Isometry3<f64>),
-    /// Shapes of the left and the right finger, in the frames of their links.
-    solids: [Vec<Collider>; 2],
+    /// Shapes of the left and the right finger, in the frames of their links, each with the box around it.
+    solids: [Vec<(Aabb, Collider)>; 2],
 }
 
 impl<'a> Probe<'a> {
     pub(crate) fn new(model: &'a RobotModel, links: [usize; 2], grasp: (usize, Isometry3<f64>)) -> Self {
         let solids = links.map(|link| {
             let solids = model.links[link].solids.iter();
-            solids.filter_map(|solid| collider(solid, Owner::Link(link), 0.0, 0.0)).map(|built| built.build()).collect()
+            let built = solids.filter_map(|solid| collider(solid, Owner::Link(link), 0.0, 0.0)).map(|made| made.build());
+            built.map(|solid| (solid.compute_aabb().loosened(BOX_SLACK_M), solid)).collect()
         });
         Self { model, links, grasp, solids }
     }
@@ -123,9 +128,9 @@ impl<'a> Probe<'a> {
 
     /// Distance to a finger's surface along a ray in the frame of its link.
     fn hit(&self, side: usize, ray: &Ray) -> Option<f64> {
-        let hits = self.solids[side]
-            .iter()
-            .filter_map(|solid| solid.shape().cast_ray(solid.position(), ray, to_real(2.0 * AWAY_M), true));
+        let most = to_real(2.0 * AWAY_M);
+        let near = self.solids[side].iter().filter(|(around, _)| around.intersects_local_ray(ray, most));
+        let hits = near.filter_map(|(_, solid)| solid.shape().cast_ray(solid.position(), ray, most, true));
         hits.map(f64::from).min_by(f64::total_cmp)
     }
 

@@ -40,7 +40,7 @@ pub(super) struct Hand {
     pub(super) notes: BTreeMap<&'static str, String>,
 }
 
-/// Finds the best gripper, and keeps what the profile states of it.
+/// Finds the best gripper, and keeps the parts that the profile names.
 ///
 /// # Errors
 /// [`NoHand`] if there is none.
@@ -350,9 +350,13 @@ fn gripper(
     palm: usize,
     (links, named, frame): ([usize; 2], &[usize], Isometry3<f64>),
 ) -> Option<Gripper> {
-    let mut profile = bare.clone();
-    profile.finger_joints = named.iter().map(|idx| model.joints[*idx].name.clone()).collect();
-    Gripper::find(&profile, model, links, (palm, frame)).ok()
+    Gripper::find(&driven(bare, model, named), model, links, (palm, frame)).ok()
+}
+
+/// The profile with these joints as those of its fingers.
+fn driven(bare: &RobotProfile, model: &RobotModel, named: &[usize]) -> RobotProfile {
+    let finger_joints = named.iter().map(|idx| model.joints[*idx].name.clone()).collect();
+    RobotProfile { finger_joints, ..bare.clone() }
 }
 
 /// Rates a candidate: how far its fingers open and close, and how far it is from the palm.
@@ -364,7 +368,8 @@ fn rate(
     named: &[usize],
     frame: Isometry3<f64>,
 ) -> Option<Found> {
-    let gripper = gripper(bare, model, palm, (links, named, frame))?;
+    let profile = driven(bare, model, named);
+    let gripper = Gripper::find_coarse(&profile, model, links, (palm, frame)).ok()?;
     // Surfaces at the grasp frame must have been found for both fingers.
     let mut positions = vec![0.0; model.joints.len()];
     gripper.set(&mut positions, gripper.widest_m());

@@ -52,7 +52,7 @@ pub fn complete(partial: &RobotProfile) -> Result<Proposal, WorldError> {
     find(partial, false)
 }
 
-/// Finds what a profile leaves out; its base, mount and head too if `all`.
+/// Finds the roles that a profile leaves out; its base, mount and head too if `all`.
 fn find(partial: &RobotProfile, all: bool) -> Result<Proposal, WorldError> {
     let name = partial.urdf.name.to_string();
     // All joints move in the model of a profile without roles.

@@ -1,4 +1,4 @@
-//! What a profile states of its gripper, which the search for the rest keeps.
+//! The parts of the gripper that a profile names, which the search for the others keeps.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -15,7 +15,7 @@ use actcheck_data::RobotProfile;
 pub(super) enum NoHand {
     /// A sentence.
     Gripper(String),
-    /// The profile names what the model does not have.
+    /// The profile names a part that the model does not have.
     Model(WorldError),
 }
 
@@ -35,7 +35,7 @@ impl From<WorldError> for NoHand {
     }
 }
 
-/// What a profile states of the gripper.
+/// The parts of the gripper that a profile names.
 pub(super) struct Stated {
     pub(super) links: Option<[usize; 2]>,
     pub(super) joints: Vec<usize>,
@@ -58,7 +58,7 @@ impl Stated {
         Ok(Self { links, joints, grasp })
     }
 
-    /// The gripper's joints by its palm, if what is stated decides about them.
+    /// The gripper's joints by its palm, if the named parts decide about them.
     pub(super) fn groups(&self, model: &RobotModel) -> Option<BTreeMap<usize, BTreeSet<usize>>> {
         let links = match (self.links, self.joints.as_slice()) {
             (Some(links), _) => links.to_vec(),
