@@ -1,5 +1,7 @@
 //! The gap between two fingers: the distance of their inner surfaces at the grasp frame.
 
+use std::sync::Arc;
+
 use nalgebra::{Isometry3, Point3, Vector3};
 use parry3d::bounding_volume::{Aabb, BoundingVolume as _};
 use parry3d::query::{Ray, RayCast as _};
@@ -8,6 +10,7 @@ use crate::convert::{to_real, to_vector};
 use crate::description::RobotModel;
 use crate::engine::{Owner, collider};
 use crate::kinematics::motion;
+use actcheck_data::Part;
 use rapier3d::prelude::Collider;
 
 /// Distances from the grasp frame along the fingers at which their surfaces are measured. Unit: metres.
@@ -55,23 +58,30 @@ pub(crate) struct Moving {
     pub(crate) fingers: [Vec<usize>; 2],
 }
 
+/// The shapes of a link in its frame, each with the box around it.
+#[derive(Debug)]
+pub(crate) struct Surface {
+    solids: Vec<(Aabb, Collider)>,
+}
+
+impl Surface {
+    pub(crate) fn of(solids: &[Part]) -> Self {
+        let built = solids.iter().filter_map(|solid| collider(solid, Owner::Floor, 0.0, 0.0)).map(|made| made.build());
+        Self { solids: built.map(|solid| (solid.compute_aabb().loosened(BOX_SLACK_M), solid)).collect() }
+    }
+}
+
 /// Measures the gap between the fingers of a model.
 pub(crate) struct Probe<'a> {
     model: &'a RobotModel,
     links: [usize; 2],
     grasp: (usize, Isometry3<f64>),
-    /// Shapes of the left and the right finger, in the frames of their links, each with the box around it.
-    solids: [Vec<(Aabb, Collider)>; 2],
+    surfaces: [Arc<Surface>; 2],
 }
 
 impl<'a> Probe<'a> {
     pub(crate) fn new(model: &'a RobotModel, links: [usize; 2], grasp: (usize, Isometry3<f64>)) -> Self {
-        let solids = links.map(|link| {
-            let solids = model.links[link].solids.iter();
-            let built = solids.filter_map(|solid| collider(solid, Owner::Link(link), 0.0, 0.0)).map(|made| made.build());
-            built.map(|solid| (solid.compute_aabb().loosened(BOX_SLACK_M), solid)).collect()
-        });
-        Self { model, links, grasp, solids }
+        Self { model, links, grasp, surfaces: links.map(|link| model.links[link].surface()) }
     }
 
     /// Returns the parts that these joints move.
@@ -129,7 +139,7 @@ impl<'a> Probe<'a> {
     /// Distance to a finger's surface along a ray in the frame of its link.
     fn hit(&self, side: usize, ray: &Ray) -> Option<f64> {
         let most = to_real(2.0 * AWAY_M);
-        let near = self.solids[side].iter().filter(|(around, _)| around.intersects_local_ray(ray, most));
+        let near = self.surfaces[side].solids.iter().filter(|(around, _)| around.intersects_local_ray(ray, most));
         let hits = near.filter_map(|(_, solid)| solid.shape().cast_ray(solid.position(), ray, most, true));
         hits.map(f64::from).min_by(f64::total_cmp)
     }

@@ -75,12 +75,7 @@ impl Gripper {
 }
 
 /// Measures the opening on the model. The error is a sentence.
-fn measured(
-    named: &[usize],
-    model: &RobotModel,
-    probe: &Probe<'_>,
-    n_intervals: usize,
-) -> Result<Gripper, String> {
+fn measured(named: &[usize], model: &RobotModel, probe: &Probe<'_>, n_intervals: usize) -> Result<Gripper, String> {
     let drive = Drive::find(named, model, probe)?;
     let best = drive
         .ways()

@@ -8,7 +8,7 @@ use super::body::chain;
 use super::frames::{Pair, Root, likely};
 use super::stated::{NoHand, Stated};
 use crate::Gripper;
-use crate::description::{JointKind, RobotModel};
+use crate::description::{Joint, JointKind, RobotModel};
 use crate::gripper::Probe;
 use crate::kinematics::motion;
 use actcheck_data::RobotProfile;
@@ -97,7 +97,12 @@ fn groups(model: &RobotModel) -> BTreeMap<usize, BTreeSet<usize>> {
     let carries = |idx: usize| {
         (0..model.joints.len()).any(|other| other != idx && has_either(other) && chain(model, other + 1).contains(&idx))
     };
-    let named = |idx: usize| has_word(&model.joints[idx].name) || has_either(idx) && !carries(idx);
+    // A joint of a mechanism does not belong to the arm.
+    let is_coupled = |idx: usize| {
+        let follows = |joint: &Joint| joint.mimic.is_some_and(|(leader, ..)| leader == idx);
+        model.joints[idx].mimic.is_some() || model.joints.iter().any(follows)
+    };
+    let named = |idx: usize| has_word(&model.joints[idx].name) || has_either(idx) && (is_coupled(idx) || !carries(idx));
     let mut groups: BTreeMap<usize, BTreeSet<usize>> = BTreeMap::new();
     for idx in (0..model.joints.len()).filter(|idx| named(*idx)) {
         let path = chain(model, idx + 1);
