@@ -38,7 +38,26 @@ fn every_wrong_robot_is_reported_with_its_place() {
     assert!(said.contains("there is no robot `fixed_amr`") && said.contains("did you mean `fixed_arm`?"), "{said}");
 }
 
-/// The proposed profile of a shipped robot names the joints of its own profile, and passes `check`.
+/// A campaign with a profile in the same folder.
+fn campaign_with(profile: &str) -> String {
+    format!(
+        "tests = [[\"Pick\"]]\ntest_count = 4\nseed = 5\n[robot]\nprofile = \"{profile}\"\n\
+         [pickObject]\nmodel_list = [\"can\"]\n[objectSurface]\nobject_surfaces = [\"coffee_table\"]\n"
+    )
+}
+
+/// The lines of a proposed profile that are comments because the program finds the same, as lines.
+fn uncommented(profile: &str) -> String {
+    let line = |line: &str| match line.strip_prefix("# ") {
+        Some("]") => "]\n".to_owned(),
+        Some(found) if found.contains(" = ") => format!("{found}\n"),
+        _ => format!("{line}\n"),
+    };
+    profile.lines().map(line).collect()
+}
+
+/// The proposed profile of a shipped robot names the joints of its own profile, and passes `check`; the keys that it
+/// leaves to the program are in its comments.
 #[test]
 fn a_proposed_profile_is_complete() {
     let folder = tempfile::tempdir().unwrap();
@@ -46,23 +65,53 @@ fn a_proposed_profile_is_complete() {
         let urdf = root().join(format!("models/robots/{robot}.urdf"));
         let written = actcheck(folder.path(), &["new", "robot", urdf.to_str().unwrap()]);
         assert!(written.status.success(), "{}", stderr(&written));
-        let [proposed, shipped] = [folder.path().to_owned(), root().join("models/robots")].map(|place| {
-            let text = std::fs::read_to_string(place.join(format!("{robot}.toml"))).unwrap();
-            toml::from_str::<toml::Table>(&text).unwrap()
-        });
+        let name = format!("{robot}.toml");
+        let text = std::fs::read_to_string(folder.path().join(&name)).unwrap();
+        let parsed = |text: &str| toml::from_str::<toml::Table>(text).unwrap_or_else(|error| panic!("{error}: {text}"));
+        let shipped = parsed(&std::fs::read_to_string(root().join("models/robots").join(&name)).unwrap());
+        let (short, full) = (parsed(&text), parsed(&uncommented(&text)));
+        assert!((5..=10).contains(&short.len()), "{text}");
         for key in ["base_joints", "arm_joints", "head_joints"] {
-            assert_eq!(proposed.get(key), shipped.get(key), "{key} of {robot}");
+            assert_eq!(short.get(key), shipped.get(key), "{key} of {robot}");
         }
         let opening = |table: &toml::Table| table["max_opening_m"].as_float().unwrap();
-        assert!((opening(&proposed) - opening(&shipped)).abs() < 0.006, "{proposed}");
-        let text = format!(
-            "tests = [[\"Pick\"]]\ntest_count = 1\n[robot]\nprofile = \"{robot}.toml\"\n\
-             [pickObject]\nmodel_list = [\"can\"]\n[objectSurface]\nobject_surfaces = [\"coffee_table\"]\n"
-        );
-        std::fs::write(folder.path().join("c.toml"), text).unwrap();
-        let checked = actcheck(folder.path(), &["check", "c.toml"]);
-        assert!(checked.status.success(), "{}", stderr(&checked));
+        assert!((opening(&full) - opening(&shipped)).abs() < 0.006, "{full}");
+        std::fs::write(folder.path().join("full.toml"), uncommented(&text)).unwrap();
+        for profile in [&name, "full.toml"] {
+            std::fs::write(folder.path().join("c.toml"), campaign_with(profile)).unwrap();
+            let checked = actcheck(folder.path(), &["check", "c.toml"]);
+            assert!(checked.status.success(), "{}", stderr(&checked));
+        }
     }
+}
+
+/// A profile that only names the model of an arm is completed, and the arm picks. Joints without a role are rigid: a
+/// freely moving one would change how the arm falls short.
+#[test]
+fn a_profile_needs_only_its_model() {
+    let folder = tempfile::tempdir().unwrap();
+    let urdf = std::fs::read_to_string(root().join("models/robots/fixed_arm.urdf")).unwrap();
+    let (head, _) = urdf.rsplit_once("</robot>").unwrap();
+    let flag = "<link name=\"flag\"><inertial><mass value=\"2\"/>\
+        <inertia ixx=\"0.01\" ixy=\"0\" ixz=\"0\" iyy=\"0.01\" iyz=\"0\" izz=\"0.01\"/></inertial></link>\
+        <joint name=\"flag_joint\" type=\"revolute\"><parent link=\"pedestal_link\"/><child link=\"flag\"/>\
+        <axis xyz=\"0 1 0\"/><limit lower=\"-1\" upper=\"1\" effort=\"1\" velocity=\"1\"/></joint></robot>";
+    assert!(urdf.contains("\"pedestal_link\""), "{urdf}");
+    std::fs::write(folder.path().join("arm.urdf"), format!("{head}{flag}")).unwrap();
+    let run = |profile: &str| {
+        std::fs::write(folder.path().join("robot.toml"), profile).unwrap();
+        std::fs::write(folder.path().join("c.toml"), campaign_with("robot.toml")).unwrap();
+        let output = actcheck(folder.path(), &["run", "c.toml", "--history", "h", "--format", "json"]);
+        let json: Value = serde_json::from_str(&stdout(&output)).unwrap_or_else(|_| panic!("{}", stderr(&output)));
+        json["runs_passed"]["count"].as_u64().unwrap()
+    };
+    let passed = run("urdf = \"arm.urdf\"\n");
+    assert!(passed >= 3, "{passed} of 4 picks passed");
+    // A joint with the role of being moved by programs exists; one that the model lacks does not.
+    assert!(run("urdf = \"arm.urdf\"\nother_joints = [\"flag_joint\"]\n") >= 3);
+    std::fs::write(folder.path().join("robot.toml"), "urdf = \"arm.urdf\"\nother_joints = [\"flag_join\"]\n").unwrap();
+    let checked = actcheck(folder.path(), &["check", "c.toml"]);
+    assert!(stderr(&checked).contains("did you mean `flag_joint`?"), "{}", stderr(&checked));
 }
 
 /// `check --mend` writes a copy with the proposed moments beside the URDF, once, and the copy has none to mend.

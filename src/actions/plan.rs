@@ -56,6 +56,10 @@ const CHECK_M: f64 = 0.03;
 const QUARTER: f64 = std::f64::consts::FRAC_PI_2;
 /// Weight of the base's heading where the hand may turn relative to the base.
 const TURNED_MOBILITY: f64 = 0.1;
+/// Horizontal part of the direction of a hand that has a heading.
+const LEVEL: f64 = 0.3;
+/// A hand that points this far aside of the base turns the base instead. Unit: radians.
+const ASIDE_RAD: f64 = 0.5;
 /// Postures sampled if the arm can't unfold straight to any grasp.
 const MOST_SAMPLES: u32 = 4000;
 /// Reason reported if there is no plan.
@@ -122,7 +126,11 @@ fn best(planner: &Planner<'_>, grasps: &[Grasp], samples: &mut Samples, nearest:
     for grasp in grasps {
         for posture in &planner.postures {
             let seed = planner.seed(grasp, posture);
-            if planner.points_along(&seed, grasp) {
+            let seed = match planner.points_along(&seed, grasp) {
+                true => Some(seed),
+                false => planner.turned(&seed, grasp),
+            };
+            if let Some(seed) = seed {
                 seeds.push((planner.travel_cost(&seed) + grasp.penalty, grasp, seed));
             }
         }
@@ -257,6 +265,26 @@ impl<'a> Planner<'a> {
         }
         let forward = |pose: &Isometry3<f64>| pose.rotation * Vector3::x();
         forward(&self.kinematics.grasp(seed)).dot(&forward(&grasp.pose)) > std::f64::consts::FRAC_1_SQRT_2
+    }
+
+    /// The seed of a hand that points aside of the base, with the base turned so that the hand has the grasp's heading.
+    /// `None` if the hand points ahead, or steeply.
+    fn turned(&self, seed: &[f64], grasp: &Grasp) -> Option<Vec<f64>> {
+        let heading_of = |pose: &Isometry3<f64>| {
+            let forward = pose.rotation * Vector3::x();
+            (length(forward.x, forward.y) > LEVEL).then(|| libm::atan2(forward.y, forward.x))
+        };
+        let turn = wrapped(heading_of(&grasp.pose)? - heading_of(&self.kinematics.grasp(seed))?);
+        if turn.abs() < ASIDE_RAD {
+            return None;
+        }
+        let mut positions = seed.to_vec();
+        let [x, y, heading] = self.base;
+        positions[heading] = self.start[heading] + wrapped(positions[heading] + turn - self.start[heading]);
+        let miss = grasp.pose.translation.vector - self.kinematics.grasp(&positions).translation.vector;
+        positions[x] += miss.x;
+        positions[y] += miss.y;
+        Some(positions).filter(|turned| self.points_along(turned, grasp))
     }
 
     /// Cost of driving to a posture's base pose.

@@ -137,7 +137,7 @@ impl Env {
         solids::decompose_meshes(&mut campaign, &mut faults);
         check_search(&campaign, &mut faults);
         check_skills(&campaign, &ontology, &mut faults);
-        if let Err(error) = world::check_robot(&campaign.robot) {
+        if let Err(error) = solids::complete_robot(&mut campaign).and_then(|()| world::check_robot(&campaign.robot)) {
             faults.push(error.diagnostic());
         }
         let space = Space::new(&campaign, &ontology).map_err(|found| faults.extend(found)).ok();

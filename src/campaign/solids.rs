@@ -56,6 +56,21 @@ pub fn proposed_robot(
     Ok((proposal.profile, proposal.notes))
 }
 
+/// Finds the roles that the robot's profile leaves out, and limits the force of its grip to that of its motors.
+///
+/// # Errors
+/// [`world::WorldError`] if they can't be found.
+pub(super) fn complete_robot(campaign: &mut Campaign) -> Result<(), world::WorldError> {
+    if world::is_incomplete(&campaign.robot) {
+        campaign.robot = Arc::new(world::complete(&campaign.robot)?.profile);
+    }
+    let limit_n = world::grip_limit_n(&campaign.robot)?;
+    if limit_n < campaign.robot.grip_force_n {
+        Arc::make_mut(&mut campaign.robot).grip_force_n = limit_n;
+    }
+    Ok(())
+}
+
 fn decompose_with(cache: &mut HullCache, robot: &mut RobotProfile, faults: &mut Diagnostics) {
     for (file, shapes) in &mut robot.meshes {
         let apart: Result<Vec<Vec<Shape>>, String> = shapes.iter().map(|shape| cache.solids_of_link(shape)).collect();

@@ -56,50 +56,77 @@ pub fn robot(args: &NewRobotArgs) -> Result<(), Diagnostics> {
     Ok(())
 }
 
-/// The profile as TOML, with a comment for each guess.
+/// The profile as TOML, with a comment for each guess. The keys that the program finds on the model whenever it reads the
+/// profile are comments too.
 fn text(profile: &RobotProfile, notes: &BTreeMap<&'static str, String>, args: &NewRobotArgs, folder: &Path) -> String {
-    let mut lines =
-        vec![format!("# Proposed by `actcheck new robot {}`: check each guess.", args.model.display()), String::new()];
-    let mut add = |key: &str, value: String| {
-        if let Some(note) = notes.get(key) {
-            lines.push(format!("# Guessed: {note}."));
-        }
-        lines.push(format!("{key} = {value}"));
+    let title = format!("# Proposed by `actcheck new robot {}`: check each guess.\n", args.model.display());
+    let stated = lines(&stated(profile, args, folder), notes);
+    let found = lines(&found(profile), notes).lines().map(commented).collect::<String>();
+    format!(
+        "{title}\n{stated}\n# Found on the model whenever this profile is read. To change a line, remove its `# `, and those of \
+         all lines\n# about the same link.\n{found}"
+    )
+}
+
+fn commented(line: &str) -> String {
+    match line.starts_with('#') {
+        true => format!("{line}\n"),
+        false => format!("# {line}\n"),
+    }
+}
+
+/// Keys with their values, each after the basis of its guess.
+fn lines(keys: &[(&'static str, String)], notes: &BTreeMap<&'static str, String>) -> String {
+    let of = |(key, value): &(&'static str, String)| {
+        let note = notes.get(key).map(|note| format!("# Guessed: {note}.\n")).unwrap_or_default();
+        format!("{note}{key} = {value}\n")
     };
-    add("urdf", quoted(&seen_from(folder, &args.model)));
+    keys.iter().map(of).collect()
+}
+
+/// The keys that a profile needs, or that decide about the others.
+fn stated(profile: &RobotProfile, args: &NewRobotArgs, folder: &Path) -> Vec<(&'static str, String)> {
+    let mut keys = vec![("urdf", quoted(&seen_from(folder, &args.model)))];
     if !args.package_dirs.is_empty() {
         let folders: Vec<String> = args.package_dirs.iter().map(|packages| seen_from(folder, packages)).collect();
-        add("package_dirs", list(&folders));
+        keys.push(("package_dirs", list(&folders)));
     }
     if !args.xacro_args.is_empty() {
-        add("xacro_args", list(&args.xacro_args));
+        keys.push(("xacro_args", list(&args.xacro_args)));
     }
     match &profile.base_joints {
-        Some(_) if profile.planar_base => add("base", quoted("planar")),
-        Some(joints) => add("base_joints", list(joints)),
+        Some(_) if profile.planar_base => keys.push(("base", quoted("planar"))),
+        Some(joints) => keys.push(("base_joints", list(joints))),
         None => {}
     }
     if profile.mount_height_m != 0.0 {
-        add("mount_height_m", profile.mount_height_m.to_string());
+        keys.push(("mount_height_m", profile.mount_height_m.to_string()));
     }
-    add("arm_joints", list(&profile.arm_joints));
-    add("finger_joints", list(&profile.finger_joints));
-    add("finger_links", list(&profile.finger_links));
-    add("grasp_link", quoted(&profile.grasp_link));
-    add("grasp_offset_m", numbers(&profile.grasp_offset_m));
-    add("grasp_turned_rad", numbers(&profile.grasp_turned_rad));
-    add("max_opening_m", profile.max_opening_m.to_string());
-    add("camera_link", quoted(&profile.camera_link));
+    keys.push(("arm_joints", list(&profile.arm_joints)));
+    keys.push(("finger_joints", list(&profile.finger_joints)));
+    keys.push(("finger_links", list(&profile.finger_links)));
+    if !profile.head_joints.is_empty() {
+        keys.push(("head_joints", list(&profile.head_joints)));
+    }
+    keys
+}
+
+/// The keys that a profile may leave out.
+fn found(profile: &RobotProfile) -> Vec<(&'static str, String)> {
+    let mut keys = vec![
+        ("grasp_link", quoted(&profile.grasp_link)),
+        ("grasp_offset_m", numbers(&profile.grasp_offset_m)),
+        ("grasp_turned_rad", numbers(&profile.grasp_turned_rad)),
+        ("max_opening_m", profile.max_opening_m.to_string()),
+        ("camera_link", quoted(&profile.camera_link)),
+    ];
     let usual = if profile.camera_link.contains("optical") { robot::OPTICAL_TURNED_RAD } else { [0.0; 3] };
     if profile.camera_turned_rad != usual {
-        add("camera_turned_rad", numbers(&profile.camera_turned_rad));
+        keys.push(("camera_turned_rad", numbers(&profile.camera_turned_rad)));
     }
-    if !profile.head_joints.is_empty() {
-        add("head_joints", list(&profile.head_joints));
-    }
-    add("home", numbers(&profile.home));
-    add("postures", postures(profile));
-    lines.join("\n") + "\n"
+    keys.push(("home", numbers(&profile.home)));
+    keys.push(("postures", postures(profile)));
+    keys
 }
 
 fn postures(profile: &RobotProfile) -> String {

@@ -22,6 +22,8 @@ pub struct Table {
     entries: BTreeMap<String, Entry>,
     /// Keys that were requested, whether present or not.
     known: BTreeSet<String>,
+    /// Keys that are usual but missing.
+    unused: Vec<String>,
     /// Required keys that are missing, each with its fault.
     missing: Vec<(String, Diagnostic)>,
     found: Diagnostics,
@@ -43,6 +45,7 @@ impl Table {
             span,
             entries,
             known: BTreeSet::new(),
+            unused: Vec::new(),
             missing: Vec::new(),
             found: Diagnostics::new(),
         }
@@ -119,6 +122,12 @@ impl Table {
         }
     }
 
+    /// Names keys that most tables of this kind have: an unknown key resembles one of these rather than a rare one.
+    pub fn expect(&mut self, keys: &[&str]) {
+        let missing = keys.iter().filter(|key| !self.entries.contains_key(**key));
+        self.unused.extend(missing.map(|key| (*key).to_owned()));
+    }
+
     /// Takes keys without reading them, because another fault decides about them.
     pub(crate) fn ignore(&mut self, keys: &[&str]) {
         keys.iter().for_each(|key| drop(self.take(key)));
@@ -147,7 +156,10 @@ impl Table {
                     self.missing.retain(|(key, _)| *key != missing);
                     format!("did you mean `{missing}`?")
                 }
-                None => did_you_mean(&key, self.known.iter().map(String::as_str)),
+                None => match nearest(&key, self.unused.iter().map(String::as_str)) {
+                    Some(usual) => format!("did you mean `{usual}`?"),
+                    None => did_you_mean(&key, self.known.iter().map(String::as_str)),
+                },
             };
             self.fault("C003", entry.key_span, message, help);
         }

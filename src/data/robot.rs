@@ -29,6 +29,8 @@ pub struct RobotProfile {
     pub finger_joints: Vec<String>,
     /// Head joints, pan then tilt; empty if the head does not move.
     pub head_joints: Vec<String>,
+    /// Joints without another role that programs may move. All joints without a role are rigid.
+    pub other_joints: Vec<String>,
     /// Link between the fingertips; its x axis points along the fingers, its y axis across them.
     pub grasp_link: String,
     /// Rotation of the grasp frame relative to that link, if the link's axes differ: about its fixed x, y and z axes,

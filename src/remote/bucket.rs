@@ -13,6 +13,7 @@ use crate::Address;
 use crate::client::{Client, Content, Request};
 use crate::fault::Fault;
 use crate::place::BucketSettings;
+use crate::response::Response;
 use actcheck_base::{Diagnostic, Diagnostics};
 
 /// Time for which a signature is valid: longer than a request with all its tries.

@@ -99,6 +99,17 @@ pub fn simplified(shape: &Shape) -> Shape {
     frame.hull(&inside).unwrap_or_else(|| shape.clone())
 }
 
+/// The corners and the triangles of a convex hull, by the index of corners.
+pub(crate) type HullSurface = (Vec<[f64; 3]>, Vec<[u32; 3]>);
+
+/// Returns the surface of the convex hull of points, or `None` if they lie in a plane.
+pub(crate) fn hull_surface(points: &[[f64; 3]]) -> Option<HullSurface> {
+    let frame = Frame::around(&Mesh { vertices: points.to_vec(), triangles: Vec::new() });
+    let inside: Vec<Vector> = points.iter().map(|point| frame.inside(point)).collect();
+    let (corners, triangles) = catch_unwind(AssertUnwindSafe(|| try_convex_hull(&inside).ok())).ok().flatten()?;
+    Some((corners.iter().map(|corner| frame.outside(corner)).collect(), triangles))
+}
+
 /// Returns the points of the surface within each piece.
 fn pieces(points: &[Vector], triangles: &[[u32; 3]]) -> Vec<Vec<Vector>> {
     let parameters = VHACDParameters {

@@ -1,12 +1,17 @@
-//! Converts a URDF to the simulated tree: movable links, with fixed links merged into them.
+//! Converts a URDF to the simulated tree: movable links, with fixed links and those of joints without a role merged into
+//! them.
 
 use std::collections::BTreeMap;
+use std::sync::{Arc, OnceLock};
 
 use nalgebra::{Isometry3, Matrix3, Translation3, Unit, UnitQuaternion, Vector3};
 
 use crate::WorldError;
+use crate::gripper::Surface;
+use crate::kinematics::motion;
+use crate::needed::Needed;
 use actcheck_base::did_you_mean;
-use actcheck_data::{LEAST_LINK_KG, Part, Pose, RobotProfile, Shape};
+use actcheck_data::{LEAST_LINK_KG, Part, Pose, RobotProfile, Shape, bounds};
 
 /// The type of a joint.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -57,6 +62,15 @@ pub struct Link {
     pub inertia: Matrix3<f64>,
     /// Collision shapes in the link's frame.
     pub solids: Vec<Part>,
+    /// The same shapes for measurements, built when they are first needed.
+    surface: OnceLock<Arc<Surface>>,
+}
+
+impl Link {
+    /// Returns its shapes for measurements.
+    pub(crate) fn surface(&self) -> Arc<Surface> {
+        Arc::clone(self.surface.get_or_init(|| Arc::new(Surface::of(&self.solids))))
+    }
 }
 
 /// The robot's links and joints. Parents come before their children.
@@ -68,6 +82,8 @@ pub struct RobotModel {
     pub joints: Vec<Joint>,
     /// For every URDF link: the index of the link that it was merged into, and its pose in that link's frame.
     frames: BTreeMap<String, (usize, Isometry3<f64>)>,
+    /// Names of its movable joints that are rigid here, for messages.
+    rigid: Vec<String>,
     /// The URDF's name, for messages.
     name: String,
 }
@@ -100,7 +116,10 @@ impl RobotModel {
             name: self.name.clone(),
             kind: "movable joint",
             missing: joint.to_owned(),
-            help: did_you_mean(joint, self.joints.iter().map(|known| known.name.as_str())),
+            help: did_you_mean(
+                joint,
+                self.joints.iter().map(|known| &known.name).chain(&self.rigid).map(String::as_str),
+            ),
         })
     }
 
@@ -149,7 +168,8 @@ impl<'a> Folding<'a> {
             }
             children.entry(joint.parent.link.as_str()).or_default().push(joint);
         }
-        let out = RobotModel { links: Vec::new(), joints: Vec::new(), frames: BTreeMap::new(), name };
+        let out =
+            RobotModel { links: Vec::new(), joints: Vec::new(), frames: BTreeMap::new(), rigid: Vec::new(), name };
         Ok(Self { robot, links, children, meshes, out })
     }
 
@@ -164,6 +184,7 @@ impl<'a> Folding<'a> {
         if let (true, Some(names)) = (profile.planar_base, &profile.base_joints) {
             self.add_planar_base(names);
         }
+        let needed = Needed::of(self.robot, profile);
         self.out.links.push(empty_link(root));
         // Links whose children are still to be visited, with the merged link that they belong to.
         let mut open = vec![(*root, self.out.links.len() - 1, Isometry3::identity())];
@@ -173,6 +194,10 @@ impl<'a> Folding<'a> {
                 let origin = at * isometry(&joint.origin);
                 if joint.joint_type == urdf_rs::JointType::Fixed {
                     open.push((&joint.child.link, into, origin));
+                } else if !needed.contains(joint) {
+                    let rigid = self.movable(joint, into, origin)?;
+                    self.out.rigid.push(joint.name.clone());
+                    open.push((&joint.child.link, into, origin * motion(&rigid, needed.rest(joint))));
                 } else {
                     self.out.joints.push(self.movable(joint, into, origin)?);
                     self.out.links.push(empty_link(&joint.child.link));
@@ -180,8 +205,11 @@ impl<'a> Folding<'a> {
                 }
             }
         }
-        self.resolve_mimics()?;
+        self.resolve_mimics(&needed)?;
         for link in &mut self.out.links {
+            if link.mass == 0.0 {
+                link.weigh();
+            }
             if link.mass < LEAST_LINK_KG {
                 link.mass = LEAST_LINK_KG;
                 link.inertia = Matrix3::identity() * LEAST_INERTIA;
@@ -288,14 +316,33 @@ impl<'a> Folding<'a> {
         })
     }
 
-    fn resolve_mimics(&mut self) -> Result<(), WorldError> {
-        for joint in &self.robot.joints {
+    fn resolve_mimics(&mut self, needed: &Needed<'_>) -> Result<(), WorldError> {
+        let moves = |joint: &&urdf_rs::Joint| joint.joint_type != urdf_rs::JointType::Fixed && needed.contains(joint);
+        for joint in self.robot.joints.iter().filter(moves) {
             let Some(mimic) = &joint.mimic else { continue };
             let (follower, leader) = (self.out.joint(&joint.name)?, self.out.joint(&mimic.joint)?);
             let (factor, offset) = (mimic.multiplier.unwrap_or(1.0), mimic.offset.unwrap_or(0.0));
             self.out.joints[follower].mimic = Some((leader, factor, offset));
         }
         Ok(())
+    }
+}
+
+/// Density of links without `<inertial>`: that of water. Unit: kg/m³.
+const DENSITY: f64 = 1000.0;
+
+impl Link {
+    /// Gives the link the mass of water with the volume of its shapes, spread over the box around them.
+    fn weigh(&mut self) {
+        if self.solids.is_empty() {
+            return;
+        }
+        let (low, high) = bounds(&self.solids);
+        let sizes = (high - low).component_mul(&(high - low));
+        self.mass = DENSITY * self.solids.iter().map(|part| part.shape.volume()).sum::<f64>();
+        self.com = (low + high) / 2.0;
+        let spread = Vector3::new(sizes.y + sizes.z, sizes.x + sizes.z, sizes.x + sizes.y);
+        self.inertia = Matrix3::from_diagonal(&(spread * self.mass / 12.0));
     }
 }
 
@@ -323,7 +370,14 @@ impl Mass {
 }
 
 fn empty_link(name: &str) -> Link {
-    Link { name: name.to_owned(), mass: 0.0, com: Vector3::zeros(), inertia: Matrix3::zeros(), solids: Vec::new() }
+    Link {
+        name: name.to_owned(),
+        mass: 0.0,
+        com: Vector3::zeros(),
+        inertia: Matrix3::zeros(),
+        solids: Vec::new(),
+        surface: OnceLock::new(),
+    }
 }
 
 fn isometry(pose: &urdf_rs::Pose) -> Isometry3<f64> {

@@ -1,11 +1,13 @@
 //! Forward kinematics, the grasp Jacobian and gravity compensation.
 
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use nalgebra::{Isometry3, Matrix6xX, Point3, Translation3, UnitQuaternion, Vector3};
 
 use crate::description::{Joint, JointKind, RobotModel};
-use actcheck_data::{Part, Pose, Shape};
+use crate::surface::spread;
+use actcheck_data::{Part, Shape};
 
 /// Gravitational acceleration. Unit: m/s².
 pub const GRAVITY: f64 = 9.81;
@@ -18,6 +20,8 @@ pub struct Kinematics {
     root: Isometry3<f64>,
     grasp: (usize, Isometry3<f64>),
     camera: (usize, Isometry3<f64>),
+    /// Pairs of links that pass through each other, with the smaller index first.
+    passing: BTreeSet<(usize, usize)>,
 }
 
 impl Kinematics {
@@ -29,7 +33,17 @@ impl Kinematics {
         grasp: (usize, Isometry3<f64>),
         camera: (usize, Isometry3<f64>),
     ) -> Self {
-        Self { model, root, grasp, camera }
+        Self { model, root, grasp, camera, passing: BTreeSet::new() }
+    }
+
+    /// The same geometry with pairs of links that pass through each other.
+    pub(crate) fn with_passing(self, passing: BTreeSet<(usize, usize)>) -> Self {
+        Self { passing, ..self }
+    }
+
+    /// Returns whether two links pass through each other.
+    pub(crate) fn pass(&self, first: usize, second: usize) -> bool {
+        self.passing.contains(&(first.min(second), first.max(second)))
     }
 
     /// The joints, in the order of positions.
@@ -168,48 +182,4 @@ pub(super) fn motion(joint: &Joint, position: f64) -> Isometry3<f64> {
 pub(super) fn axis_in_world(joint: &Joint, poses: &[Isometry3<f64>]) -> (Vector3<f64>, Vector3<f64>) {
     let frame = poses[joint.parent] * joint.origin;
     (frame.rotation * joint.axis.into_inner(), frame.translation.vector)
-}
-
-/// Samples points on a shape in its own frame. Tubes have none: robots do not contain them.
-fn spread(shape: &Shape, spacing: f64) -> Vec<Point3<f64>> {
-    match *shape {
-        Shape::Box { size } => {
-            let [xs, ys, zs] = size.map(|extent| steps(extent, spacing));
-            let grid = |x: f64| ys.iter().flat_map(|y| zs.iter().map(|z| Point3::new(x, *y, *z))).collect::<Vec<_>>();
-            xs.iter().flat_map(|x| grid(*x)).collect()
-        }
-        Shape::Cylinder { radius, height } => {
-            let around = steps(std::f64::consts::TAU, spacing / radius.max(1e-6));
-            let rings = steps(height, spacing);
-            let ring =
-                |z: f64| around.iter().map(move |a| Point3::new(radius * libm::cos(*a), radius * libm::sin(*a), z));
-            rings.iter().flat_map(|z| ring(*z)).collect()
-        }
-        Shape::Sphere { radius } => {
-            let ends = [-radius, radius];
-            ends.iter()
-                .flat_map(|r| [Point3::new(*r, 0.0, 0.0), Point3::new(0.0, *r, 0.0), Point3::new(0.0, 0.0, *r)])
-                .collect()
-        }
-        Shape::Capsule { radius, height } => {
-            // Its bounding cylinder.
-            spread(&Shape::Cylinder { radius, height: height + 2.0 * radius }, spacing)
-        }
-        Shape::Hull { .. } | Shape::Mesh { .. } => {
-            // Its bounding box.
-            let (low, high) = Part { pose: Pose::IDENTITY, shape: shape.clone() }.bounds();
-            let (low, high) = (Vector3::from(low), Vector3::from(high));
-            let middle = (low + high) / 2.0;
-            let grid = spread(&Shape::Box { size: (high - low).into() }, spacing);
-            grid.into_iter().map(|point| point + middle).collect()
-        }
-        Shape::Tube { .. } => Vec::new(),
-    }
-}
-
-/// Returns numbers from −extent/2 to extent/2, both included, at most `spacing` apart.
-fn steps(extent: f64, spacing: f64) -> Vec<f64> {
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a few dozen steps")]
-    let n_steps = (extent / spacing).ceil().clamp(1.0, 200.0) as usize;
-    (0..=n_steps).map(|idx| extent * (idx as f64 / n_steps as f64 - 0.5)).collect()
 }

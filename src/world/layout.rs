@@ -1,5 +1,7 @@
 //! Resolves the joints and links of a profile in the URDF.
 
+use std::collections::BTreeSet;
+
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
 use crate::description::RobotModel;
@@ -49,6 +51,22 @@ impl Named {
         };
         Ok(Self { layout, finger_links, grasp, camera })
     }
+
+    /// Returns the pairs of links of the gripper that pass through each other, with the smaller index first: those of its
+    /// mechanism and the palm, but not the two fingertips. Their convex shapes overlap where the real ones do not.
+    pub(super) fn passing(&self, model: &RobotModel) -> BTreeSet<(usize, usize)> {
+        let gripper = &self.layout.gripper;
+        let mut of_gripper = vec![false; model.links.len()];
+        for (idx, joint) in model.joints.iter().enumerate() {
+            of_gripper[idx + 1] = gripper.contains(idx) || of_gripper[joint.parent];
+        }
+        let palms = gripper.joints().map(|joint| model.joints[joint].parent);
+        let moved = (0..of_gripper.len()).filter(|link| of_gripper[*link]);
+        let all: BTreeSet<usize> = moved.chain(palms).collect();
+        let [left, right] = self.finger_links;
+        let pairs = all.iter().flat_map(|first| all.range(first + 1..).map(|second| (*first, *second)));
+        pairs.filter(|pair| *pair != (left.min(right), left.max(right))).collect()
+    }
 }
 
 /// A frame in a link's frame, moved and turned: the merged link, and the pose in its frame.
@@ -61,6 +79,18 @@ pub(super) fn frame(
     let (link, at) = model.frame(link)?;
     let turned = UnitQuaternion::from_euler_angles(roll, pitch, yaw);
     Ok((link, at * Translation3::from(Vector3::from(offset_m)) * turned))
+}
+
+/// Returns the largest force of each finger that the motors of a robot's gripper can give. Unit: newtons; infinite if a
+/// motor's limit is 0, which is unknown.
+///
+/// # Errors
+/// As [`check_robot`].
+pub fn grip_limit_n(profile: &RobotProfile) -> Result<f64, WorldError> {
+    let model = RobotModel::read(profile)?;
+    let gripper = Named::find(profile, &model)?.layout.gripper;
+    let of = |(joint, lever_m): (usize, f64)| model.joints[joint].effort / lever_m;
+    Ok(gripper.motors().map(of).filter(|force_n| *force_n > 0.0).fold(f64::INFINITY, f64::min))
 }
 
 /// Checks that a profile matches its URDF, without simulating.

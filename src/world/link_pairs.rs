@@ -9,7 +9,8 @@ use crate::engine::Owner;
 use crate::robot_course::TOUCH_M;
 
 /// Pairs of links, each with the smaller index first. All other links pass through each other: neighbours, whose shapes
-/// overlap at their joint, and links that overlap in the initial posture, which is known to be valid.
+/// overlap at their joint, the links of a gripper's mechanism, and links that overlap in the initial posture, which is
+/// known to be valid.
 #[derive(Debug, Default)]
 pub(super) struct LinkPairs {
     pairs: BTreeSet<(usize, usize)>,
@@ -47,7 +48,8 @@ impl World {
         let pairs = solid
             .iter()
             .flat_map(|first| solid.iter().filter(move |second| *second > first).map(move |second| (*first, *second)));
-        let apart = |pair: &(usize, usize)| !neighbours.contains(pair) && self.depth_of(pair.0, pair.1) <= TOUCH_M;
+        let passes = |pair: &(usize, usize)| neighbours.contains(pair) || self.robot.kinematics.pass(pair.0, pair.1);
+        let apart = |pair: &(usize, usize)| !passes(pair) && self.depth_of(pair.0, pair.1) <= TOUCH_M;
         LinkPairs { pairs: pairs.filter(apart).collect(), pass: false }
     }
 }

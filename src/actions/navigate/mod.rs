@@ -12,4 +12,5 @@ mod shorten;
 mod skill;
 mod terrain;
 
+pub(super) use sense::Size;
 pub(super) use skill::{drive_to, move_to};

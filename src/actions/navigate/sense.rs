@@ -31,17 +31,22 @@ pub struct Size {
 impl Size {
     /// The size of the robot in its last commanded posture, including the held object.
     pub fn of(robot: &Operator<'_>) -> Self {
+        Self::at(robot, robot.commanded(), &robot.kinematics().surface_points(OWN_M))
+    }
+
+    /// The size of the robot in a posture, including the held object. `points` are on the surfaces of its links.
+    pub fn at(robot: &Operator<'_>, posture: &[f64], points: &[(usize, Point3<f64>)]) -> Self {
         let kinematics = robot.kinematics();
-        let links = kinematics.links(robot.commanded());
-        let base = robot.base_of(robot.commanded()).translation.vector;
+        let links = kinematics.links(posture);
+        let base = robot.base_of(posture).translation.vector;
         let mut size = Self { radius_m: 0.0, height_m: 0.0 };
-        for (link, point) in kinematics.surface_points(OWN_M) {
-            let point = links[link] * point;
+        for (link, point) in points {
+            let point = links[*link] * point;
             size.radius_m = size.radius_m.max(length(point.x - base.x, point.y - base.y));
             size.height_m = size.height_m.max(point.z);
         }
         if let Some(held) = &robot.memory().held {
-            let hand = kinematics.grasp(robot.commanded()).translation.vector;
+            let hand = kinematics.grasp(posture).translation.vector;
             let [width, depth, height] = held.size_m;
             size.radius_m = size.radius_m.max(length(hand.x - base.x, hand.y - base.y) + length(width, depth) / 2.0);
             size.height_m = size.height_m.max(hand.z + height);

@@ -1,8 +1,11 @@
 //! Carrying an object: brings the hand close to the base and drives the base around obstacles.
 
-use nalgebra::Vector3;
+use std::collections::BTreeSet;
+
+use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 
 use crate::memory::Held;
+use crate::navigate::Size;
 use crate::operator::{Interrupt, Operator};
 use crate::{navigate, plan};
 use actcheck_data::Pose;
@@ -21,6 +24,19 @@ const LOW_M: f64 = 0.45;
 const BACK_M: f64 = 0.2;
 /// Largest tilt of an object on the way to the driving posture, equal to its usual tilt in the hand. Unit: radians.
 const LEAN_RAD: f64 = 0.15;
+/// A robot with a smaller radius passes doors and stands at tables with its load as it is. Unit: metres.
+const SLIM_M: f64 = 0.45;
+/// A posture must make the robot slimmer by this much. Unit: metres.
+const SLIMMER_M: f64 = 0.03;
+/// Places of the hand around the base's centre that may make the robot slim: ahead, and to either side. Unit: metres.
+const AHEAD_M: [f64; 5] = [0.1, 0.18, 0.26, 0.32, 0.38];
+const ASIDE_M: [f64; 5] = [0.0, -0.15, 0.15, -0.3, 0.3];
+/// Heights of the hand there above that of the folded arm. Unit: metres.
+const HIGHER_M: [f64; 4] = [0.0, 0.15, 0.3, 0.45];
+/// Headings of the hand there.
+const N_HEADINGS: u32 = 8;
+/// Room between the load and the robot's links other than the hand. Unit: metres.
+const LOAD_ROOM_M: f64 = 0.04;
 /// Number of postures checked per leg.
 const N_CHECKS: u32 = 12;
 /// Distance between the base's centre and the edge of a surface it looks at. Unit: metres. A head at a height of one
@@ -34,7 +50,7 @@ pub fn fold(robot: &Operator<'_>) -> Vec<Vec<f64>> {
     let start = robot.commanded().to_vec();
     let base = robot.base();
     let grasp = robot.kinematics().grasp(&start).translation.vector;
-    let ahead = (base.inverse() * nalgebra::Point3::from(grasp)).x;
+    let ahead = (base.inverse() * Point3::from(grasp)).x;
     let back = base.rotation * Vector3::new(-(ahead - NEAR_M).max(0.0), 0.0, 0.0);
     let mut path = straight(robot, &start, &back);
     let mut near = path.last().cloned().unwrap_or(start);
@@ -48,8 +64,8 @@ pub fn fold(robot: &Operator<'_>) -> Vec<Vec<f64>> {
     path
 }
 
-/// Postures that move the arm to its driving posture, to make the base with its load slim. Empty if the load would tilt
-/// on the way or the arm would collide with itself.
+/// Postures that move the arm to its driving posture, to make the base with its load slim. If the load would tilt on the
+/// way or the arm would collide with itself, to the slimmest posture that keeps the load upright; empty if there is none.
 ///
 /// The arm moves there directly, or with one joint last: an arm whose upper part is vertical turns about it.
 pub fn tuck(robot: &Operator<'_>, held: &Held) -> Vec<Vec<f64>> {
@@ -62,7 +78,68 @@ pub fn tuck(robot: &Operator<'_>, held: &Held) -> Vec<Vec<f64>> {
     });
     let itself = SelfContact::new(robot.kinematics(), &[start.to_vec(), home.clone()]);
     let ways = std::iter::once(vec![home.clone()]).chain(last);
-    ways.into_iter().find(|way| stays_upright(robot, held, &itself, way)).unwrap_or_default()
+    let found = ways.into_iter().find(|way| stays_upright(robot, held, &itself, way));
+    found.or_else(|| slimmest(robot, held).map(|posture| vec![posture])).unwrap_or_default()
+}
+
+/// The posture with the load upright near the base that makes the robot slimmest. `None` if it is slim already, or for a
+/// fixed base.
+fn slimmest(robot: &Operator<'_>, held: &Held) -> Option<Vec<f64>> {
+    let (kinematics, layout, start) = (robot.kinematics(), robot.layout(), robot.commanded());
+    layout.base?;
+    let points = kinematics.surface_points(LOAD_ROOM_M);
+    let mut radius_m = Size::at(robot, start, &points).radius_m;
+    if radius_m < SLIM_M {
+        return None;
+    }
+    let base = robot.base_of(start);
+    let hand = base.inverse() * kinematics.grasp(start);
+    let itself = SelfContact::new(kinematics, &[start.to_vec()]);
+    let mut mobility = vec![0.0; start.len()];
+    layout.arm.iter().for_each(|joint| mobility[*joint] = 1.0);
+    let touching = links_at_load(robot, held, start, &points);
+    let mut best = None;
+    for ([ahead, aside], higher) in AHEAD_M
+        .into_iter()
+        .flat_map(|ahead| ASIDE_M.map(|aside| [ahead, aside]))
+        .flat_map(|place| HIGHER_M.map(|higher| (place, higher)))
+    {
+        let place = Translation3::new(ahead, aside, hand.translation.z + higher);
+        for turn in 0..N_HEADINGS {
+            let angle = std::f64::consts::TAU * f64::from(turn) / f64::from(N_HEADINGS);
+            let turned = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), angle) * hand.rotation;
+            let target = base * Isometry3::from_parts(place, turned);
+            let reach = ik::Reach { target, mobility: mobility.clone() };
+            let Some(posture) = ik::solve(kinematics, start, &reach) else { continue };
+            let size = Size::at(robot, &posture, &points);
+            if size.radius_m + SLIMMER_M < radius_m
+                && links_at_load(robot, held, &posture, &points).is_subset(&touching)
+                && stays_upright(robot, held, &itself, std::slice::from_ref(&posture))
+            {
+                (radius_m, best) = (size.radius_m, Some(posture));
+            }
+        }
+    }
+    best
+}
+
+/// The links with a point in the box around the load in a posture.
+fn links_at_load(
+    robot: &Operator<'_>,
+    held: &Held,
+    posture: &[f64],
+    points: &[(usize, Point3<f64>)],
+) -> BTreeSet<usize> {
+    let kinematics = robot.kinematics();
+    let links = kinematics.links(posture);
+    let foot = kinematics.grasp(posture) * held.grasp_from_foot.inverse();
+    let [width, depth, height] = held.size_m;
+    let is_near = |point: &Point3<f64>| {
+        let inside = foot.inverse() * point;
+        let [off_x, off_y] = [inside.x.abs() - width / 2.0, inside.y.abs() - depth / 2.0];
+        off_x.max(off_y).max(inside.z - height).max(-inside.z) < LOAD_ROOM_M
+    };
+    points.iter().filter(|(link, point)| is_near(&(links[*link] * point))).map(|(link, _)| *link).collect()
 }
 
 /// The way back from the driving posture to the posture before, with the base at its current pose.

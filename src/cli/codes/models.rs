@@ -33,8 +33,9 @@ const CODES_W: &[Code] = &[
     code(
         "W011",
         "a robot profile is inconsistent",
-        "an unknown kind of base, or lists of joints and positions of different lengths",
-        "give one position for each joint, and a base that the help names",
+        "an unknown kind of base, lists of joints and positions of different lengths, or a key such as `home` or \
+         `grasp_offset_m` without the one that it depends on",
+        "give one position for each joint, a base that the help names, and both keys or neither",
     ),
     code(
         "W012",

@@ -34,10 +34,20 @@ impl Lookup<'_> {
         places.into_iter().find(exists).or_else(|| self.find_in_package(path).filter(exists))
     }
 
-    /// The path in a folder that is the package itself, by its name.
+    /// The path in a folder that is the package itself, by its name or that in its `package.xml`.
     fn find_in_package(&self, path: &str) -> Option<PathBuf> {
         let (package, inside) = path.split_once('/')?;
-        let own = self.folders.iter().find(|folder| folder.file_name().is_some_and(|name| name == package))?;
+        let is_named = |folder: &&PathBuf| folder.file_name().is_some_and(|name| name == package);
+        let is_manifested = |folder: &&PathBuf| self.manifested(folder).is_some_and(|name| name == package);
+        let own = self.folders.iter().find(is_named).or_else(|| self.folders.iter().find(is_manifested))?;
         Some(own.join(inside))
+    }
+
+    /// The name in the `package.xml` of a folder.
+    fn manifested(&self, folder: &Path) -> Option<String> {
+        let manifest = self.files.read(&folder.join("package.xml")).ok()?;
+        let (_, rest) = manifest.text.split_once("<name>")?;
+        let (name, _) = rest.split_once("</name>")?;
+        Some(name.trim().to_owned())
     }
 }

@@ -160,7 +160,9 @@ fn end<'n>(joint: Node<'n>, which: &str, tree: &Tree, reader: &mut Reader) -> Op
 
 fn check_mimics(root: Node, tree: &Tree, reader: &mut Reader) {
     for joint in xml::children(root, "joint") {
-        let Some(mimic) = xml::child(joint, "mimic") else { continue };
+        let Some(mimic) = xml::child(joint, "mimic").filter(|_| joint.attribute("type") != Some("fixed")) else {
+            continue;
+        };
         let Some(leader) = reader.attribute(mimic, "joint") else { continue };
         let moves = tree.joints.get(leader).is_some_and(|joint| joint.motion != Motion::Fixed);
         if !moves {

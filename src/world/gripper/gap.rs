@@ -1,12 +1,16 @@
 //! The gap between two fingers: the distance of their inner surfaces at the grasp frame.
 
+use std::sync::Arc;
+
 use nalgebra::{Isometry3, Point3, Vector3};
-use parry3d::query::Ray;
+use parry3d::bounding_volume::{Aabb, BoundingVolume as _};
+use parry3d::query::{Ray, RayCast as _};
 
 use crate::convert::{to_real, to_vector};
 use crate::description::RobotModel;
 use crate::engine::{Owner, collider};
 use crate::kinematics::motion;
+use actcheck_data::Part;
 use rapier3d::prelude::Collider;
 
 /// Distances from the grasp frame along the fingers at which their surfaces are measured. Unit: metres.
@@ -17,6 +21,9 @@ const ACROSS_M: [f64; 5] = [-0.008, -0.004, 0.0, 0.004, 0.008];
 const FLAT_M: f64 = 0.0015;
 /// Distance from which surfaces are measured: beyond any finger. Unit: metres.
 const AWAY_M: f64 = 0.5;
+
+/// Slack of the box around a solid, for rounding. Unit: metres.
+const BOX_SLACK_M: f32 = 1e-4;
 
 /// Where the inner surfaces of the fingers are, along the y axis of the grasp frame. Unit: metres.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -51,22 +58,30 @@ pub(crate) struct Moving {
     pub(crate) fingers: [Vec<usize>; 2],
 }
 
+/// The shapes of a link in its frame, each with the box around it.
+#[derive(Debug)]
+pub(crate) struct Surface {
+    solids: Vec<(Aabb, Collider)>,
+}
+
+impl Surface {
+    pub(crate) fn of(solids: &[Part]) -> Self {
+        let built = solids.iter().filter_map(|solid| collider(solid, Owner::Floor, 0.0, 0.0)).map(|made| made.build());
+        Self { solids: built.map(|solid| (solid.compute_aabb().loosened(BOX_SLACK_M), solid)).collect() }
+    }
+}
+
 /// Measures the gap between the fingers of a model.
 pub(crate) struct Probe<'a> {
     model: &'a RobotModel,
     links: [usize; 2],
     grasp: (usize, Isometry3<f64>),
-    /// Shapes of the left and the right finger, in the frames of their links.
-    solids: [Vec<Collider>; 2],
+    surfaces: [Arc<Surface>; 2],
 }
 
 impl<'a> Probe<'a> {
     pub(crate) fn new(model: &'a RobotModel, links: [usize; 2], grasp: (usize, Isometry3<f64>)) -> Self {
-        let solids = links.map(|link| {
-            let solids = model.links[link].solids.iter();
-            solids.filter_map(|solid| collider(solid, Owner::Link(link), 0.0, 0.0)).map(|built| built.build()).collect()
-        });
-        Self { model, links, grasp, solids }
+        Self { model, links, grasp, surfaces: links.map(|link| model.links[link].surface()) }
     }
 
     /// Returns the parts that these joints move.
@@ -123,9 +138,9 @@ impl<'a> Probe<'a> {
 
     /// Distance to a finger's surface along a ray in the frame of its link.
     fn hit(&self, side: usize, ray: &Ray) -> Option<f64> {
-        let hits = self.solids[side]
-            .iter()
-            .filter_map(|solid| solid.shape().cast_ray(solid.position(), ray, to_real(2.0 * AWAY_M), true));
+        let most = to_real(2.0 * AWAY_M);
+        let near = self.surfaces[side].solids.iter().filter(|(around, _)| around.intersects_local_ray(ray, most));
+        let hits = near.filter_map(|(_, solid)| solid.shape().cast_ray(solid.position(), ray, most, true));
         hits.map(f64::from).min_by(f64::total_cmp)
     }
 

@@ -13,6 +13,8 @@ use actcheck_data::RobotProfile;
 
 /// Intervals of the table. At this number, the error between entries is about 0.01 mm for a finger of 10 cm.
 const INTERVALS: usize = 60;
+/// Intervals where candidates are compared.
+const FEW_INTERVALS: usize = 15;
 /// Least difference between the widest and the smallest opening. Unit: metres.
 const LEAST_TRAVEL_M: f64 = 0.005;
 /// Least lever of a motor: below it, its force would be a guess. Unit: metres per radian.
@@ -29,6 +31,26 @@ impl Gripper {
         links: [usize; 2],
         grasp: (usize, Isometry3<f64>),
     ) -> Result<Self, WorldError> {
+        Self::find_with(profile, model, links, grasp, INTERVALS)
+    }
+
+    /// As [`Gripper::find`], with a coarse table: to compare candidates.
+    pub(crate) fn find_coarse(
+        profile: &RobotProfile,
+        model: &RobotModel,
+        links: [usize; 2],
+        grasp: (usize, Isometry3<f64>),
+    ) -> Result<Self, WorldError> {
+        Self::find_with(profile, model, links, grasp, FEW_INTERVALS)
+    }
+
+    fn find_with(
+        profile: &RobotProfile,
+        model: &RobotModel,
+        links: [usize; 2],
+        grasp: (usize, Isometry3<f64>),
+        n_intervals: usize,
+    ) -> Result<Self, WorldError> {
         let named = profile.finger_joints.iter().map(|name| model.joint(name)).collect::<Result<Vec<_>, _>>()?;
         let [left, right] = links;
         // Some robots name their fingers as seen from the front.
@@ -36,7 +58,7 @@ impl Gripper {
         if let Some(sliding) = probes.iter().find_map(|probe| sliding(&named, model, probe)) {
             return Ok(sliding);
         }
-        let [usual, swapped] = probes.map(|probe| measured(&named, model, &probe));
+        let [usual, swapped] = probes.map(|probe| measured(&named, model, &probe, n_intervals));
         let found = match (usual, swapped) {
             (Ok(usual), Ok(swapped)) if swapped.widest_m > usual.widest_m => Ok(swapped.with_sides_swapped()),
             (Err(_), Ok(swapped)) => Ok(swapped.with_sides_swapped()),
@@ -53,14 +75,14 @@ impl Gripper {
 }
 
 /// Measures the opening on the model. The error is a sentence.
-fn measured(named: &[usize], model: &RobotModel, probe: &Probe<'_>) -> Result<Gripper, String> {
+fn measured(named: &[usize], model: &RobotModel, probe: &Probe<'_>, n_intervals: usize) -> Result<Gripper, String> {
     let drive = Drive::find(named, model, probe)?;
     let best = drive
         .ways()
         .into_iter()
         .filter_map(|ends| {
-            let gap = |idx: usize| probe.gap(&drive.posture(&ends, idx as f64 / INTERVALS as f64));
-            Some((longest_run(&(0..=INTERVALS).map(gap).collect::<Vec<_>>())?, ends))
+            let gap = |idx: usize| probe.gap(&drive.posture(&ends, idx as f64 / n_intervals as f64));
+            Some((longest_run(&(0..=n_intervals).map(gap).collect::<Vec<_>>())?, ends))
         })
         .max_by(|a, b| travel(&a.0).total_cmp(&travel(&b.0)));
     let Some((table, ends)) = best.filter(|(table, _)| travel(table) > LEAST_TRAVEL_M) else {

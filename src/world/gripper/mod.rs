@@ -15,5 +15,5 @@ mod table;
 #[cfg(test)]
 mod tests;
 
-pub(crate) use gap::Probe;
+pub(crate) use gap::{Probe, Surface};
 pub use opening::Gripper;

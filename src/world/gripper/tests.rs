@@ -2,7 +2,8 @@
 
 use std::path::Path;
 
-use crate::layout::check_robot;
+use crate::description::RobotModel;
+use crate::layout::{Named, check_robot, grip_limit_n};
 use crate::robot::tests::alone;
 use crate::{Joint, World};
 use actcheck_base::{Files, Source};
@@ -171,4 +172,56 @@ fn a_mimic_joint_outside_the_gripper_follows_its_leader() {
         let reached = at(&world, name).1;
         assert!((reached - wanted).abs() < 2e-3, "{name}: {reached} m instead of {wanted} m");
     }
+}
+
+/// Fingers cannot press harder than their motor: its effort by the way of the fingertips.
+#[test]
+fn the_grip_is_as_strong_as_its_motors() {
+    let (left, right) = (turning(0.0, 0.6), turning(-0.6, 0.0));
+    let of = |profile: &RobotProfile| grip_limit_n(profile).expect("it has a gripper");
+    // 20 Nm at a mean lever of the way of a fingertip by the turn of its hinge.
+    let lever_m = (turned(0.6) - turned(0.0)) / 0.6;
+    let own_motors = of(&hand(&left, &right, &["left", "right"]));
+    assert!((own_motors - 20.0 / lever_m).abs() < 0.5, "{own_motors} N");
+    // One motor moves both fingers, twice as far.
+    let coupled = of(&hand(&left, &format!("{right}{MIMIC}"), &["left"]));
+    assert!((coupled - 10.0 / lever_m).abs() < 0.5, "{coupled} N");
+    let unknown = turning(0.0, 0.6).replace("effort=\"20\"", "effort=\"0\"");
+    assert!(of(&hand(&unknown, FIXED, &["left"])).is_infinite());
+}
+
+/// The convex shapes of knuckles overlap where the real ones do not; those of fingertips meet.
+#[test]
+fn the_links_of_a_gripper_pass_through_each_other_but_its_fingertips_do_not() {
+    let (left, right) = (turning(0.0, 0.6), turning(-0.6, 0.0));
+    let profile = hand(&left, &right, &["left", "right"]);
+    let model = RobotModel::read(&profile).expect("it is valid");
+    let passing = Named::find(&profile, &model).expect("it is valid").passing(&model);
+    let links = |pair: &(usize, usize)| [pair.0, pair.1].map(|link| model.links[link].name.clone());
+    let mut found: Vec<[String; 2]> = passing.iter().map(links).collect();
+    found.sort();
+    assert_eq!(found, [["palm", "left_finger"], ["palm", "right_finger"]]);
+}
+
+/// A joint without a role is rigid at the position nearest to 0, also where it carries the hand; a programmed one moves.
+#[test]
+fn joints_without_a_role_are_rigid() {
+    let (left, right) = (turning(0.0, 0.6), turning(-0.6, 0.0));
+    let mut profile = hand(&left, &right, &["left", "right"]);
+    let mast = "<joint name=\"mast\" type=\"prismatic\"><parent link=\"foot\"/><child link=\"base\"/>\
+                <axis xyz=\"0 0 1\"/><limit lower=\"0.25\" upper=\"1\" effort=\"900\" velocity=\"0.2\"/></joint>\
+                <link name=\"foot\"/></robot>";
+    profile.urdf = Source::new("hand.urdf", profile.urdf.text.replace("</robot>", mast));
+    let names = |profile: &RobotProfile| -> Vec<String> {
+        let model = RobotModel::read(profile).expect("it is valid");
+        let mut names: Vec<String> = model.joints.iter().map(|joint| joint.name.clone()).collect();
+        names.sort();
+        names
+    };
+    assert_eq!(names(&profile), ["left", "lift", "right"]);
+    let world = alone(profile.clone());
+    let height = world.kinematics().grasp(&world.observe().positions).translation.z;
+    assert!((height - 0.85).abs() < 1e-6, "the mast is at 0.25 m, the lift at 0.6 m: {height} m");
+    profile.other_joints = vec!["mast".to_owned()];
+    assert_eq!(names(&profile), ["left", "lift", "mast", "right"]);
 }

@@ -5,9 +5,10 @@ use std::collections::{BTreeMap, BTreeSet};
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion};
 
 use super::body::chain;
-use super::frames::{Pair, likely};
+use super::frames::{Pair, Root, likely};
+use super::stated::{NoHand, Stated};
 use crate::Gripper;
-use crate::description::{JointKind, RobotModel};
+use crate::description::{Joint, JointKind, RobotModel};
 use crate::gripper::Probe;
 use crate::kinematics::motion;
 use actcheck_data::RobotProfile;
@@ -21,6 +22,13 @@ const MOST_PAIRS: usize = 40;
 const CENTRED_AT_M: f64 = 0.06;
 /// Least change of the gap between two fingers. Unit: metres.
 const LEAST_CHANGE_M: f64 = 0.008;
+/// Weight of a link that carries another one of the gripper: a knuckle rather than a fingertip.
+const CARRIER: f64 = 0.3;
+/// Weight of two links whose volumes differ by more than the share [`UNLIKE`].
+const UNALIKE: f64 = 0.7;
+const UNLIKE: f64 = 0.1;
+/// Weight of a direction from the palm's origin: its frame may be anywhere.
+const FROM_PALM: f64 = 0.9;
 /// Openings wider than this are worth no more. Unit: metres.
 const WIDE_M: f64 = 0.12;
 
@@ -32,27 +40,53 @@ pub(super) struct Hand {
     pub(super) notes: BTreeMap<&'static str, String>,
 }
 
-/// Finds the best gripper.
+/// Finds the best gripper, and keeps the parts that the profile names.
 ///
 /// # Errors
-/// A sentence if there is none.
-pub(super) fn find(bare: &RobotProfile, model: &RobotModel) -> Result<Hand, String> {
-    let groups = groups(model);
+/// [`NoHand`] if there is none.
+pub(super) fn find(partial: &RobotProfile, model: &RobotModel) -> Result<Hand, NoHand> {
+    let stated = Stated::of(partial, model)?;
+    if let (Some(links), [_, ..], Some(grasp)) = (stated.links, stated.joints.as_slice(), stated.grasp) {
+        let mut profile = partial.clone();
+        if profile.max_opening_m == 0.0 {
+            profile.max_opening_m = as_opening(Gripper::find(partial, model, links, grasp)?.widest_m());
+        }
+        return Ok(Hand { profile, palm: grasp.0, notes: BTreeMap::new() });
+    }
+    let groups = stated.groups(model).unwrap_or_else(|| groups(model));
     if groups.is_empty() {
-        return Err(
-            "no gripper was found: none of its movable joints or their links has a name with `finger`, `grip`, \
-                    `hand`, `jaw`, `knuckle` or `thumb`"
-                .to_owned(),
-        );
+        let what = "no gripper was found: none of its movable joints or their links has a name with `finger`, `grip`, \
+                    `hand`, `jaw`, `knuckle` or `thumb`";
+        return Err(NoHand::Gripper(what.to_owned()));
     }
     let mut rated: Vec<(usize, usize, &BTreeSet<usize>)> =
         groups.iter().map(|(palm, joints)| (rank(model, *palm), *palm, joints)).collect();
+    rated.retain(|(_, palm, _)| stated.grasp.is_none_or(|(link, _)| link == *palm));
     rated.sort_by_key(|(rank, palm, _)| (std::cmp::Reverse(*rank), *palm));
     // The meshes are in the model already.
-    let light = RobotProfile { meshes: BTreeMap::new(), ..bare.clone() };
-    let best = rated.iter().find_map(|(_, palm, joints)| measure(&light, model, *palm, joints));
-    let best = best.map(|hand| Hand { profile: RobotProfile { meshes: bare.meshes.clone(), ..hand.profile }, ..hand });
-    best.ok_or_else(|| "no two links of its gripper face each other and come closer".to_owned())
+    let light = RobotProfile { meshes: BTreeMap::new(), ..partial.clone() };
+    let best = rated.iter().find_map(|(_, palm, joints)| measure(&light, model, &stated, *palm, joints));
+    let best =
+        best.map(|hand| Hand { profile: RobotProfile { meshes: partial.meshes.clone(), ..hand.profile }, ..hand });
+    best.ok_or_else(|| NoHand::Gripper(why_none(model, &rated)))
+}
+
+/// Why none of these groups of joints is a gripper.
+fn why_none(model: &RobotModel, groups: &[(usize, usize, &BTreeSet<usize>)]) -> String {
+    let joints: Vec<usize> = groups.iter().flat_map(|(_, _, joints)| joints.iter().copied()).collect();
+    let is_stiff = |joint: &usize| model.joints[*joint].upper - model.joints[*joint].lower < 1e-6;
+    if let Some(joint) = joints.iter().copied().find(is_stiff).map(|joint| &model.joints[joint]) {
+        let (lower, upper) = (joint.lower, joint.upper);
+        return format!(
+            "no gripper was found: its joint `{}` can't move, its limits are {lower} and {upper}",
+            joint.name
+        );
+    }
+    if joints.iter().all(|joint| model.links[joint + 1].solids.is_empty()) {
+        let links: Vec<&str> = joints.iter().map(|joint| model.links[joint + 1].name.as_str()).collect();
+        return format!("no gripper was found: the links `{}` have no collision shapes", links.join("`, `"));
+    }
+    "no two links of its gripper face each other and come closer".to_owned()
 }
 
 /// Joints with a gripper's name, by the link that carries them.
@@ -63,7 +97,12 @@ fn groups(model: &RobotModel) -> BTreeMap<usize, BTreeSet<usize>> {
     let carries = |idx: usize| {
         (0..model.joints.len()).any(|other| other != idx && has_either(other) && chain(model, other + 1).contains(&idx))
     };
-    let named = |idx: usize| has_word(&model.joints[idx].name) || has_either(idx) && !carries(idx);
+    // A joint of a mechanism does not belong to the arm.
+    let is_coupled = |idx: usize| {
+        let follows = |joint: &Joint| joint.mimic.is_some_and(|(leader, ..)| leader == idx);
+        model.joints[idx].mimic.is_some() || model.joints.iter().any(follows)
+    };
+    let named = |idx: usize| has_word(&model.joints[idx].name) || has_either(idx) && (is_coupled(idx) || !carries(idx));
     let mut groups: BTreeMap<usize, BTreeSet<usize>> = BTreeMap::new();
     for idx in (0..model.joints.len()).filter(|idx| named(*idx)) {
         let path = chain(model, idx + 1);
@@ -89,13 +128,23 @@ struct Found {
     widest_m: f64,
 }
 
-fn measure(bare: &RobotProfile, model: &RobotModel, palm: usize, joints: &BTreeSet<usize>) -> Option<Hand> {
-    let from = Point3::origin();
+fn measure(
+    bare: &RobotProfile,
+    model: &RobotModel,
+    stated: &Stated,
+    palm: usize,
+    joints: &BTreeSet<usize>,
+) -> Option<Hand> {
     let mut best: Option<Found> = None;
-    for (links, drives) in pairs(model, palm, joints).into_iter().take(MOST_PAIRS) {
+    for (links, drives) in pairs(model, palm, (joints, stated)).into_iter().take(MOST_PAIRS) {
         for named in drives {
-            for frame in frames(model, palm, links, &named, &from) {
+            let all = match stated.grasp {
+                Some((_, frame)) => vec![(1.0, frame)],
+                None => frames(model, palm, links, &named),
+            };
+            for (weight, frame) in all {
                 let Some(found) = rate(bare, model, palm, links, &named, frame) else { continue };
+                let found = Found { score: found.score * weight * tips(model, links, joints), ..found };
                 if best.as_ref().is_none_or(|best| found.score > best.score + 1e-9) {
                     best = Some(found);
                 }
@@ -103,28 +152,42 @@ fn measure(bare: &RobotProfile, model: &RobotModel, palm: usize, joints: &BTreeS
         }
     }
     let mut found = best?;
-    centre(bare, model, palm, &mut found);
-    found.frame = as_written(&found.frame);
+    if stated.grasp.is_none() {
+        centre(bare, model, palm, &mut found);
+        found.frame = as_written(&found.frame);
+    }
     if let Some(gripper) = gripper(bare, model, palm, (found.links, &found.named, found.frame)) {
         found.widest_m = gripper.widest_m();
     }
     let mut profile = bare.clone();
-    let named = alike(model, found.links).unwrap_or(found.named);
-    profile.finger_joints = named.iter().map(|idx| model.joints[*idx].name.clone()).collect();
-    profile.finger_links = found.links.map(|link| model.links[link].name.clone());
-    profile.grasp_link = model.links[palm].name.clone();
-    profile.grasp_offset_m = rounded(found.frame.translation.vector.into());
-    let (roll, pitch, yaw) = found.frame.rotation.euler_angles();
-    profile.grasp_turned_rad = rounded([roll, pitch, yaw]);
-    // Not wider than measured, up to the rounding of limits.
-    profile.max_opening_m = (found.widest_m.min(1.0) * 1000.0 + 0.1).floor() / 1000.0;
     let mut notes = BTreeMap::new();
-    notes.insert("finger_joints", "their names, and the links that they move".to_owned());
-    notes.insert("finger_links", "these two face each other and open widest".to_owned());
-    notes.insert("grasp_offset_m", "between the fingertips, 2.5 cm before their ends".to_owned());
-    notes.insert("grasp_turned_rad", "x along the fingers, y from the right to the left one".to_owned());
-    notes.insert("max_opening_m", "measured at that place".to_owned());
+    if stated.joints.is_empty() {
+        let named = alike(model, found.links).unwrap_or(found.named);
+        profile.finger_joints = named.iter().map(|idx| model.joints[*idx].name.clone()).collect();
+        notes.insert("finger_joints", "their names, and the links that they move".to_owned());
+    }
+    if stated.links.is_none() {
+        profile.finger_links = found.links.map(|link| model.links[link].name.clone());
+        notes.insert("finger_links", "these two face each other and open widest".to_owned());
+    }
+    if stated.grasp.is_none() {
+        profile.grasp_link = model.links[palm].name.clone();
+        profile.grasp_offset_m = rounded(found.frame.translation.vector.into());
+        let (roll, pitch, yaw) = found.frame.rotation.euler_angles();
+        profile.grasp_turned_rad = rounded([roll, pitch, yaw]);
+        notes.insert("grasp_offset_m", "between the fingertips, 2.5 cm before their ends".to_owned());
+        notes.insert("grasp_turned_rad", "x along the fingers, y from the right to the left one".to_owned());
+    }
+    if profile.max_opening_m == 0.0 {
+        profile.max_opening_m = as_opening(found.widest_m);
+        notes.insert("max_opening_m", "measured at that place".to_owned());
+    }
     Some(Hand { profile, palm, notes })
+}
+
+/// Not wider than measured, up to the rounding of limits. Unit: metres.
+fn as_opening(widest_m: f64) -> f64 {
+    (widest_m.min(1.0) * 1000.0 + 0.1).floor() / 1000.0
 }
 
 /// The joints of two fingers that slide alike, one of which mimics the other: each has a motor of its own then.
@@ -154,67 +217,87 @@ fn rounded(values: [f64; 3]) -> [f64; 3] {
 }
 
 /// Pairs of links that could be fingertips, each with the joints that could drive them.
-fn pairs(model: &RobotModel, palm: usize, joints: &BTreeSet<usize>) -> Vec<([usize; 2], Vec<Vec<usize>>)> {
-    let is_solid = |link: usize| !model.links[link].solids.is_empty();
-    let moved: Vec<usize> = joints.iter().map(|joint| joint + 1).filter(|link| is_solid(*link)).collect();
-    // The outermost first: fingertips rather than knuckles.
-    let mut moved = moved;
-    moved.sort_by_key(|link| std::cmp::Reverse(chain(model, *link).len()));
+fn pairs(
+    model: &RobotModel,
+    palm: usize,
+    (joints, stated): (&BTreeSet<usize>, &Stated),
+) -> Vec<([usize; 2], Vec<Vec<usize>>)> {
     let drivers = |link: usize| -> Vec<usize> {
         let own = chain(model, link).into_iter().filter(|joint| joints.contains(joint));
         let mut leaders: Vec<usize> = own.map(|joint| leader(model, joint)).collect();
         leaders.dedup();
         leaders
     };
-    let mut found = Vec::new();
-    for (place, left) in moved.iter().enumerate() {
-        for right in moved[place + 1..].iter().copied().chain(is_solid(palm).then_some(palm)) {
-            let mut ways: Vec<Vec<usize>> = Vec::new();
-            let of_right = if right == palm { Vec::new() } else { drivers(right) };
-            let of_both: Vec<usize> = drivers(*left).into_iter().filter(|joint| of_right.contains(joint)).collect();
-            if let Some(common) = of_both.first() {
-                found.push(([*left, right], vec![vec![*common]]));
-                continue;
-            }
-            for first in drivers(*left) {
-                match of_right.as_slice() {
-                    [] => ways.push(vec![first]),
-                    several => ways.extend(several.iter().map(|second| vec![first, *second])),
-                }
-            }
-            ways.dedup();
-            found.push(([*left, right], ways));
+    let ways = |[left, right]: [usize; 2]| -> Vec<Vec<usize>> {
+        if !stated.joints.is_empty() {
+            return vec![stated.joints.clone()];
         }
-    }
-    found
+        let (of_left, of_right) = (drivers(left), drivers(right));
+        if let Some(common) = of_left.iter().find(|joint| of_right.contains(joint)) {
+            return vec![vec![*common]];
+        }
+        match (of_left.as_slice(), of_right.as_slice()) {
+            (one, []) | ([], one) => one.iter().map(|joint| vec![*joint]).collect(),
+            (firsts, seconds) => {
+                firsts.iter().flat_map(|first| seconds.iter().map(move |second| vec![*first, *second])).collect()
+            }
+        }
+    };
+    let links = stated.links.map_or_else(|| facing(model, palm, joints), |links| vec![links]);
+    links.into_iter().map(|links| (links, ways(links))).collect()
+}
+
+/// Pairs of links that the joints move, and each with the palm; the outermost first: fingertips rather than knuckles.
+fn facing(model: &RobotModel, palm: usize, joints: &BTreeSet<usize>) -> Vec<[usize; 2]> {
+    let is_solid = |link: usize| !model.links[link].solids.is_empty();
+    let mut moved: Vec<usize> = joints.iter().map(|joint| joint + 1).filter(|link| is_solid(*link)).collect();
+    moved.sort_by_key(|link| std::cmp::Reverse(chain(model, *link).len()));
+    let others = |place: usize| moved[place + 1..].iter().copied().chain(is_solid(palm).then_some(palm));
+    moved.iter().enumerate().flat_map(|(place, left)| others(place).map(|right| [*left, right])).collect()
 }
 
 /// The joint that a joint follows, or itself.
-fn leader(model: &RobotModel, joint: usize) -> usize {
+pub(super) fn leader(model: &RobotModel, joint: usize) -> usize {
     let next = |joint: &usize| model.joints[*joint].mimic.map(|(leader, ..)| leader);
     std::iter::successors(Some(joint), next).take(model.joints.len()).last().unwrap_or(joint)
 }
 
-/// Likely grasp frames of a pair, in the palm's frame: those at which both fingers have surfaces at several openings.
-fn frames(
-    model: &RobotModel,
-    palm: usize,
-    links: [usize; 2],
-    named: &[usize],
-    from: &Point3<f64>,
-) -> Vec<Isometry3<f64>> {
+/// How much two links look like fingertips, from 0 to 1: they carry no other link of the gripper, and are alike.
+fn tips(model: &RobotModel, links: [usize; 2], joints: &BTreeSet<usize>) -> f64 {
+    let is_solid = |link: usize| !model.links[link].solids.is_empty();
+    let carries = |link: usize| joints.iter().any(|joint| model.joints[*joint].parent == link && is_solid(joint + 1));
+    let moved = links.map(|link| link.checked_sub(1).is_some_and(|joint| joints.contains(&joint)));
+    let n_carriers = (0..2).filter(|side| moved[*side] && carries(links[*side])).count();
+    let [left, right] = links.map(|link| model.links[link].solids.iter().map(|part| part.shape.volume()).sum::<f64>());
+    let are_alike = (left - right).abs() < UNLIKE * left.max(right);
+    CARRIER.powi(i32::try_from(n_carriers).unwrap_or(2)) * if are_alike { 1.0 } else { UNALIKE }
+}
+
+/// Likely grasp frames of a pair, in the palm's frame, with weights: those at which both fingers have surfaces at several
+/// openings. The fingers point away from their joints or, less likely, from the palm's origin.
+fn frames(model: &RobotModel, palm: usize, links: [usize; 2], named: &[usize]) -> Vec<(f64, Isometry3<f64>)> {
     let ways: &[[bool; 2]] = if named.len() == 1 { &[[true, true]] } else { &[[true, true], [true, false]] };
-    let mut found: Vec<Isometry3<f64>> = Vec::new();
+    let inner = chain(model, palm);
+    let joints = links.map(|link| chain(model, link).into_iter().find(|joint| !inner.contains(joint)));
+    let origins: Vec<Point3<f64>> =
+        joints.iter().flatten().map(|joint| Point3::from(model.joints[*joint].origin.translation.vector)).collect();
+    let middle = origins.iter().map(|at| at.coords).sum::<nalgebra::Vector3<f64>>() / origins.len().max(1) as f64;
+    let roots = [
+        (1.0, Root { from: Point3::from(middle), sides: joints.map(|joint| joint.is_some()) }),
+        (FROM_PALM, Root { from: Point3::origin(), sides: [true; 2] }),
+    ];
+    let mut found: Vec<(f64, Isometry3<f64>)> = Vec::new();
     for way in ways {
         let ends = [posture(model, named, *way, 1.0), posture(model, named, *way, 0.0)];
         let ends = ends.map(|positions| Pair::new(model, links, &poses(model, &positions), palm));
-        for frame in likely(&ends, from) {
-            let is_known = found.iter().any(|known| {
+        for (weight, frame) in roots.iter().flat_map(|(w, root)| likely(&ends, root).into_iter().map(move |f| (*w, f)))
+        {
+            let is_known = found.iter().any(|(_, known)| {
                 let off = (known.translation.vector - frame.translation.vector).norm();
                 off < 1e-3 && known.rotation.angle_to(&frame.rotation) < 1e-2
             });
             if !is_known && closes(model, palm, links, &frame, |share| posture(model, named, *way, share)) {
-                found.push(frame);
+                found.push((weight, frame));
             }
         }
     }
@@ -272,9 +355,13 @@ fn gripper(
     palm: usize,
     (links, named, frame): ([usize; 2], &[usize], Isometry3<f64>),
 ) -> Option<Gripper> {
-    let mut profile = bare.clone();
-    profile.finger_joints = named.iter().map(|idx| model.joints[*idx].name.clone()).collect();
-    Gripper::find(&profile, model, links, (palm, frame)).ok()
+    Gripper::find(&driven(bare, model, named), model, links, (palm, frame)).ok()
+}
+
+/// The profile with these joints as those of its fingers.
+fn driven(bare: &RobotProfile, model: &RobotModel, named: &[usize]) -> RobotProfile {
+    let finger_joints = named.iter().map(|idx| model.joints[*idx].name.clone()).collect();
+    RobotProfile { finger_joints, ..bare.clone() }
 }
 
 /// Rates a candidate: how far its fingers open and close, and how far it is from the palm.
@@ -286,7 +373,8 @@ fn rate(
     named: &[usize],
     frame: Isometry3<f64>,
 ) -> Option<Found> {
-    let gripper = gripper(bare, model, palm, (links, named, frame))?;
+    let profile = driven(bare, model, named);
+    let gripper = Gripper::find_coarse(&profile, model, links, (palm, frame)).ok()?;
     // Surfaces at the grasp frame must have been found for both fingers.
     let mut positions = vec![0.0; model.joints.len()];
     gripper.set(&mut positions, gripper.widest_m());

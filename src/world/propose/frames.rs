@@ -57,8 +57,26 @@ fn middle(points: &[Point3<f64>]) -> Point3<f64> {
     Point3::from((low + high) / 2.0)
 }
 
+/// Where fingers begin, and which of them point away from there.
+pub(super) struct Root {
+    pub(super) from: Point3<f64>,
+    pub(super) sides: [bool; 2],
+}
+
+impl Root {
+    /// The direction of the fingers.
+    fn ahead(&self, pair: &Pair) -> Vector3<f64> {
+        let to = match self.sides {
+            [true, false] => middle(&pair.left),
+            [false, true] => middle(&pair.right),
+            _ => nalgebra::center(&middle(&pair.left), &middle(&pair.right)),
+        };
+        to - self.from
+    }
+}
+
 /// Returns likely grasp frames in the palm's frame. `ends` are the fingers at both ends of their way.
-pub(super) fn likely(ends: &[Pair; 2], from: &Point3<f64>) -> Vec<Isometry3<f64>> {
+pub(super) fn likely(ends: &[Pair; 2], from: &Root) -> Vec<Isometry3<f64>> {
     let mut found = Vec::new();
     let moved = ends[0].apart() - ends[1].apart();
     for across in [moved, ends[0].apart(), ends[1].apart()] {
@@ -70,11 +88,11 @@ pub(super) fn likely(ends: &[Pair; 2], from: &Point3<f64>) -> Vec<Isometry3<f64>
 }
 
 /// The frame with its y axis along `across`, and its x axis from a point towards the fingers.
-fn at(pair: &Pair, across: &Vector3<f64>, from: &Point3<f64>, depth_m: f64) -> Option<Isometry3<f64>> {
+fn at(pair: &Pair, across: &Vector3<f64>, from: &Root, depth_m: f64) -> Option<Isometry3<f64>> {
     let y = aligned(across.try_normalize(1e-4)?);
     // The axis points from the right finger to the left one.
     let y = if y.dot(&pair.apart()) < 0.0 { -y } else { y };
-    let ahead = nalgebra::center(&middle(&pair.left), &middle(&pair.right)) - from;
+    let ahead = from.ahead(pair);
     let x = aligned((ahead - y * ahead.dot(&y)).try_normalize(1e-3)?);
     let x = (x - y * x.dot(&y)).try_normalize(1e-3)?;
     let z = x.cross(&y);

