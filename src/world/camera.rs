@@ -62,7 +62,7 @@ impl World {
         let camera = &self.sensing.camera;
         let frame = choices.index(ChoiceName::CameraFrame, FRAMES);
         let noise = (frame > 0).then(|| Noise { camera, stream: Stream::new(frame as u64) });
-        let eye = self.robot.kinematics.camera(&self.robot.state(&self.engine).0);
+        let eye = self.robot.kinematics.camera(&self.robot.state().0);
         let solids = Solids::new(lens(camera), &eye, self.solids(&eye));
         let image = picture(camera, &solids, noise.as_ref());
         self.looked(began_secs);
@@ -76,7 +76,7 @@ impl World {
             time_secs: self.time_secs(),
             base_true,
             base_believed: self.believed(base_true),
-            camera: Pose::from_isometry(&self.robot.kinematics.camera(&self.robot.state(&self.engine).0)),
+            camera: Pose::from_isometry(&self.robot.kinematics.camera(&self.robot.state().0)),
         }
     }
 

@@ -12,6 +12,8 @@ pub(super) struct Inertias {
     pub(super) mass: Vec<f64>,
     /// Efforts that keep all joints at their velocities: against gravity, centrifugal and Coriolis forces.
     pub(super) bias: Vec<f64>,
+    /// Motion of each joint at unit velocity.
+    axes: Vec<Twist>,
 }
 
 impl Inertias {
@@ -19,6 +21,12 @@ impl Inertias {
     pub(super) fn times(&self, velocities: &[f64]) -> Vec<f64> {
         let rows = self.mass.chunks(velocities.len().max(1));
         rows.map(|row| row.iter().zip(velocities).map(|(a, b)| a * b).sum()).collect()
+    }
+
+    /// Returns the effort of a force, with its torque about the world's origin, on a joint that moves its point of
+    /// application.
+    pub(super) fn effort_of(&self, joint: usize, force: &Twist) -> f64 {
+        self.axes[joint].dot(force)
     }
 
     /// Returns the inertia of one joint while all others are free to move.
@@ -32,13 +40,13 @@ impl Inertias {
 
 /// Angular and linear part of a motion, a force or a momentum, about the world's origin.
 #[derive(Debug, Clone, Copy)]
-struct Twist {
-    turn: Vector3<f64>,
-    shift: Vector3<f64>,
+pub(super) struct Twist {
+    pub(super) turn: Vector3<f64>,
+    pub(super) shift: Vector3<f64>,
 }
 
 impl Twist {
-    const ZERO: Self = Self { turn: Vector3::new(0.0, 0.0, 0.0), shift: Vector3::new(0.0, 0.0, 0.0) };
+    pub(super) const ZERO: Self = Self { turn: Vector3::new(0.0, 0.0, 0.0), shift: Vector3::new(0.0, 0.0, 0.0) };
 
     fn plus(self, other: Self, times: f64) -> Self {
         Self { turn: self.turn + other.turn * times, shift: self.shift + other.shift * times }
@@ -141,5 +149,5 @@ pub(super) fn inertias(model: &RobotModel, poses: &[Isometry3<f64>], velocities:
         onto.about += bulk.about;
         forces[joint.parent] = forces[joint.parent].plus(force, 1.0);
     }
-    Inertias { mass, bias }
+    Inertias { mass, bias, axes }
 }

@@ -32,6 +32,11 @@ impl Kinematics {
         Self { model, root, grasp, camera }
     }
 
+    /// Returns the pose of the root. Frame: world.
+    pub(crate) fn root(&self) -> &Isometry3<f64> {
+        &self.root
+    }
+
     /// The joints, in the order of positions.
     pub fn joints(&self) -> &[Joint] {
         &self.model.joints
