@@ -37,10 +37,10 @@ impl Touch {
 
 impl World {
     /// Returns the force of all contacts on the robot's hand in the last step, with its torque about the world's
-    /// origin. Returns zero unless the engine moves the hand alone. Frame: world.
+    /// origin. Returns zero if the engine does not move the hand. Frame: world.
     pub(super) fn push_on_hand(&self) -> Twist {
         let mut push = Twist::ZERO;
-        let (Share::Hand, Some(hand)) = (self.robot.share, &self.robot.hand) else { return push };
+        let Some(hand) = self.robot.hand.as_ref().filter(|_| self.robot.share != Share::Nothing) else { return push };
         let engine = &self.engine;
         let per_second = 1.0 / f64::from(engine.integration_parameters.dt);
         let is_ours = |handle| {
@@ -61,8 +61,7 @@ impl World {
                 for point in manifold.points.iter().filter(|point| point.data.impulse > 0.0) {
                     let force = impulse_of(point, &normal) * sign;
                     let at = from_pose(one.position()) * Point3::from(from_vector(point.local_p1));
-                    push.shift += force;
-                    push.turn += at.coords.cross(&force);
+                    push = push.plus(Twist::by_force(&force, &at), 1.0);
                 }
             }
         }

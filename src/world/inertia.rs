@@ -1,6 +1,6 @@
 //! The robot's mass matrix, and the forces of gravity and of its own motion on the joints.
 
-use nalgebra::{Isometry3, Matrix3, Vector3};
+use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
 
 use crate::description::{JointKind, RobotModel};
 use crate::factor::Factor;
@@ -46,9 +46,14 @@ pub(super) struct Twist {
 }
 
 impl Twist {
+    /// Returns a force that acts at a point.
+    pub(super) fn by_force(force: &Vector3<f64>, point: &Point3<f64>) -> Self {
+        Self { turn: point.coords.cross(force), shift: *force }
+    }
+
     pub(super) const ZERO: Self = Self { turn: Vector3::new(0.0, 0.0, 0.0), shift: Vector3::new(0.0, 0.0, 0.0) };
 
-    fn plus(self, other: Self, times: f64) -> Self {
+    pub(super) fn plus(self, other: Self, times: f64) -> Self {
         Self { turn: self.turn + other.turn * times, shift: self.shift + other.shift * times }
     }
 
@@ -111,7 +116,7 @@ pub(super) fn inertias(model: &RobotModel, poses: &[Isometry3<f64>], velocities:
         .zip(poses)
         .map(|(link, pose)| {
             let turned = pose.rotation.to_rotation_matrix();
-            let com = (pose * nalgebra::Point3::from(link.com)).coords;
+            let com = (pose * Point3::from(link.com)).coords;
             let spread = Matrix3::identity() * com.norm_squared() - com * com.transpose();
             let about = turned * link.inertia * turned.transpose() + spread * link.mass;
             Bulk { mass: link.mass, moment: com * link.mass, about }

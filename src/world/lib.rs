@@ -59,6 +59,7 @@ pub use layout::{Layout, check_robot};
 pub use propose::{Proposal, propose};
 pub use recorder::{Contact, Course, Record, Tracks};
 pub use robot::geometry;
+pub use room::Shortcuts;
 pub use self_contact::SelfContact;
 pub use sense::Sighting;
 pub use settle::Settling;

@@ -75,8 +75,44 @@ pub(super) struct Room {
     pub(super) reach: Reach,
     /// Ticks for which the engine still moves the whole robot.
     whole_ticks: u32,
-    /// Whether all ticks are left to the engine, with the whole robot.
-    pub(super) engine_only: bool,
+    /// The shortcuts that may be taken.
+    shortcuts: Shortcuts,
+    /// Number of ticks so far with each reach.
+    ticks: [u64; 4],
+}
+
+/// The ticks in which less is simulated than the whole robot in the engine, because the rest has no effect.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Shortcuts {
+    /// No engine where the robot touches nothing and everything else is at rest.
+    pub free_motion: bool,
+    /// No robot in the engine where objects move out of its reach.
+    pub robot_apart: bool,
+    /// Only the hand in the engine where only the hand can touch something, and only movable objects.
+    pub hand_alone: bool,
+}
+
+impl Shortcuts {
+    /// All of them.
+    pub const ALL: Self = Self { free_motion: true, robot_apart: true, hand_alone: true };
+    /// None: the engine simulates everything in every tick.
+    pub const NONE: Self = Self { free_motion: false, robot_apart: false, hand_alone: false };
+
+    /// Returns what the engine must prepare for, given what the robot can touch.
+    fn limit(self, reach: Reach) -> Reach {
+        match reach {
+            Reach::Nothing if self.free_motion => Reach::Nothing,
+            Reach::Nothing | Reach::Apart if self.robot_apart => Reach::Apart,
+            Reach::Hand if self.hand_alone => Reach::Hand,
+            _ => Reach::All,
+        }
+    }
+}
+
+impl Default for Shortcuts {
+    fn default() -> Self {
+        Self::ALL
+    }
 }
 
 /// A distance, and where the link was when it was measured: in the world, or in the frame of the other link.
@@ -111,10 +147,21 @@ struct Moment {
 }
 
 impl World {
+    /// Takes only these shortcuts from now on: for comparisons.
+    pub fn take_shortcuts(&mut self, shortcuts: Shortcuts) {
+        self.room.shortcuts = shortcuts;
+    }
+
     /// Leaves all ticks to the engine, with the whole robot, also those in which the robot touches nothing: for
     /// comparisons.
     pub fn leave_to_engine(&mut self) {
-        self.room.engine_only = true;
+        self.take_shortcuts(Shortcuts::NONE);
+    }
+
+    /// Returns the number of ticks so far in which the robot could touch nothing, with everything else at rest; nothing,
+    /// with moving objects; movable objects with its hand; and everything.
+    pub fn ticks_by_reach(&self) -> [u64; 4] {
+        self.room.ticks
     }
 
     /// Returns whether the robot moved through free space in the last tick, without the engine.
@@ -130,7 +177,9 @@ impl World {
     /// Returns what the robot can touch in the next tick.
     pub(super) fn find_room(&mut self) -> Reach {
         let mut room = std::mem::take(&mut self.room);
-        room.reach = if room.engine_only { Reach::All } else { self.reach(&mut room) };
+        let reach = if room.shortcuts == Shortcuts::NONE { Reach::All } else { self.reach(&mut room) };
+        room.reach = room.shortcuts.limit(reach);
+        room.ticks[room.reach as usize] += 1;
         self.room = room;
         self.room.reach
     }

@@ -2,15 +2,16 @@
 //!
 //! The engine needs a multibody only for links that touch something. Its cost grows with the square of the number of
 //! joints. Links outside of it are kinematic bodies, which the robot's own solution places. A hand alone moves in the
-//! engine on a carrier: six coordinates with a large inertia, whose velocities lead it along the path of the arm.
+//! engine on a carrier: a joint with a large inertia, whose velocities lead it along the path of the arm. In each step the
+//! carrier's axes are laid along the motion of the hand, so that three of them are enough.
 
-use nalgebra::Isometry3;
+use nalgebra::{Isometry3, Matrix3, Rotation3, UnitQuaternion, Vector3};
 use rapier3d::prelude::{
     GenericJoint, JointAxesMask, MultibodyDofCoupling, MultibodyJointHandle, PhysicsWorld, RigidBodyType,
 };
 
 use crate::assemble::insert_joint;
-use crate::convert::{from_pose, to_pose, to_real, to_vector};
+use crate::convert::{from_pose, to_pose, to_real};
 use crate::description::RobotModel;
 use crate::gripper::Gripper;
 use crate::robot::Robot;
@@ -18,6 +19,9 @@ use crate::robot::Robot;
 /// Inertia of the carrier of a hand: contacts and motors of the fingers change its velocity by less than a millionth.
 /// Units: kilograms and kg·m².
 const CARRIER_INERTIA: f32 = 1e4;
+
+/// Number of the carrier's coordinates: along two axes and about the first of them.
+const CARRIER_AXES: usize = 3;
 
 /// The part of the robot that the engine moves.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -113,9 +117,9 @@ impl Robot {
     /// Inserts the joints of the engine's share.
     fn insert_share(&mut self, engine: &mut PhysicsWorld) {
         if let (Share::Hand, Some(hand)) = (self.share, &self.hand) {
-            let mut free = GenericJoint::new(JointAxesMask::empty());
-            free.set_local_frame1(to_pose(&self.kinematics.root().inverse()));
-            self.carrier = engine.multibody_joints.insert(self.bodies[0], self.bodies[hand.link], free, true);
+            let locked = JointAxesMask::LIN_Z | JointAxesMask::ANG_Y | JointAxesMask::ANG_Z;
+            let joint = GenericJoint::new(locked);
+            self.carrier = engine.multibody_joints.insert(self.bodies[0], self.bodies[hand.link], joint, true);
         }
         for idx in 0..self.motors.len() {
             if self.shares(idx)
@@ -134,8 +138,8 @@ impl Robot {
         // This determines whether the root is fixed, and with it the index of each joint's coordinate.
         multibody.forward_kinematics(&engine.bodies, true);
         if self.share == Share::Hand {
-            multibody.armature_mut().rows_mut(0, 6).fill(CARRIER_INERTIA);
-            multibody.damping_mut().rows_mut(0, 6).fill(0.0);
+            multibody.armature_mut().rows_mut(0, CARRIER_AXES).fill(CARRIER_INERTIA);
+            multibody.damping_mut().rows_mut(0, CARRIER_AXES).fill(0.0);
         }
         self.couple_mimics(engine);
     }
@@ -182,21 +186,35 @@ impl Robot {
                 Some((link.assembly_id(), f64::from(link.joint.coords()[self.motors[idx].axis as usize])))
             })
             .collect();
-        let Some((multibody, carrier)) = engine.multibody_joints.get_mut(first) else { return };
+        if let (Share::Hand, Some(hand)) = (self.share, &self.hand) {
+            self.turn_carrier(engine, &poses[hand.link], &UnitQuaternion::identity());
+        }
+        let Some((multibody, _)) = engine.multibody_joints.get_mut(first) else { return };
         let mut ways = vec![0.0_f32; multibody.ndofs()];
         for (idx, dof) in dofs.into_iter().enumerate() {
             let Some((dof, before)) = dof else { continue };
             ways[dof] = to_real(self.positions[idx] - before);
             multibody.generalized_velocity_mut()[dof] = to_real(self.velocities[idx]);
         }
-        if let (Share::Hand, Some(hand)) = (self.share, &self.hand) {
-            let before = multibody.link(carrier).map_or_else(Isometry3::identity, |link| from_pose(link.local_to_world()));
-            ways[..6].copy_from_slice(&way_to(&before, &poses[hand.link]));
-        }
         multibody.apply_displacements(&ways);
         multibody.forward_kinematics(&engine.bodies, false);
         multibody.update_rigid_bodies(&mut engine.bodies, true);
         self.place_colliders(engine);
+    }
+
+    /// Puts the hand at a pose, with the carrier's axes in this direction.
+    fn turn_carrier(&self, engine: &mut PhysicsWorld, at: &Isometry3<f64>, axes: &UnitQuaternion<f64>) {
+        let Some((multibody, carrier)) = self.carrier.and_then(|joint| engine.multibody_joints.get_mut(joint)) else {
+            return;
+        };
+        let Some(link) = multibody.link_mut(carrier) else { return };
+        let frame = Isometry3::from_parts(at.translation, *axes);
+        link.joint.data.set_local_frame1(to_pose(&(self.kinematics.root().inverse() * frame)));
+        link.joint.data.set_local_frame2(to_pose(&(at.inverse() * frame)));
+        let coords = link.joint.coords();
+        let mut back = vec![0.0_f32; multibody.ndofs()];
+        back[..CARRIER_AXES].copy_from_slice(&[-coords[0], -coords[1], -coords[3]]);
+        multibody.apply_displacements(&back);
     }
 
     /// Reads the state of the joints that the engine moves.
@@ -217,11 +235,16 @@ impl Robot {
     pub(super) fn lead_hand(&self, engine: &mut PhysicsWorld, secs: f64) {
         let (Some(hand), Some(carrier)) = (&self.hand, self.carrier) else { return };
         let to = self.kinematics.links(&self.positions)[hand.link];
-        let Some((multibody, link)) = engine.multibody_joints.get_mut(carrier) else { return };
+        let Some((multibody, link)) = engine.multibody_joints.get(carrier) else { return };
         let Some(from) = multibody.link(link).map(|link| from_pose(link.local_to_world())) else { return };
-        let way = way_to(&from, &to);
-        for (velocity, way) in multibody.generalized_velocity_mut().iter_mut().zip(way) {
-            *velocity = way / to_real(secs);
+        let shift = to.translation.vector - from.translation.vector;
+        let turn = (to.rotation * from.rotation.inverse()).scaled_axis();
+        let axes = axes_along(&turn, &shift);
+        self.turn_carrier(engine, &from, &axes);
+        let Some((multibody, _)) = engine.multibody_joints.get_mut(carrier) else { return };
+        let (shift, turn) = (axes.inverse() * shift / secs, axes.inverse() * turn / secs);
+        for (velocity, of) in multibody.generalized_velocity_mut().iter_mut().zip([shift.x, shift.y, turn.x]) {
+            *velocity = to_real(of);
         }
     }
 
@@ -273,9 +296,34 @@ impl Robot {
     }
 }
 
-/// Returns the displacement and the rotation vector from one pose to another. Frame: world.
-fn way_to(from: &Isometry3<f64>, to: &Isometry3<f64>) -> [f32; 6] {
-    let shift = to_vector(&(to.translation.vector - from.translation.vector)).to_array();
-    let turn = to_vector(&(to.rotation * from.rotation.inverse()).scaled_axis()).to_array();
-    [shift[0], shift[1], shift[2], turn[0], turn[1], turn[2]]
+/// Returns axes of which the first is along a rotation vector, and the second in the plane of this and a displacement.
+fn axes_along(turn: &Vector3<f64>, shift: &Vector3<f64>) -> UnitQuaternion<f64> {
+    let unit = |vector: Vector3<f64>| vector.try_normalize(1e-12);
+    let first = unit(*turn).or_else(|| unit(*shift)).unwrap_or_else(Vector3::x);
+    let across = |vector: Vector3<f64>| unit(vector - first * first.dot(&vector));
+    // At least one of two axes is far from the first.
+    let any = if first.x.abs() < 0.8 { Vector3::x() } else { Vector3::y() };
+    let second = across(*shift).or_else(|| across(any)).unwrap_or_else(Vector3::y);
+    let third = first.cross(&second);
+    UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(Matrix3::from_columns(&[
+        first, second, third,
+    ])))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_motion_is_along_the_first_two_axes_and_about_the_first() {
+        let vectors = [Vector3::zeros(), Vector3::x(), Vector3::new(0.3, -0.2, 0.9), Vector3::new(1e-7, 2e-7, 0.0)];
+        for turn in vectors {
+            for shift in vectors {
+                let axes = axes_along(&turn, &shift);
+                let (turn_there, shift_there) = (axes.inverse() * turn, axes.inverse() * shift);
+                assert!(turn_there.y.abs().max(turn_there.z.abs()) < 1e-12 + 1e-9 * turn.norm(), "{turn_there}");
+                assert!(shift_there.z.abs() < 1e-12 + 1e-9 * shift.norm(), "{shift_there}");
+            }
+        }
+    }
 }
