@@ -90,13 +90,16 @@ pub struct Shortcuts {
     pub robot_apart: bool,
     /// Only the hand in the engine where only the hand can touch something, and only movable objects.
     pub hand_alone: bool,
+    /// Half of the substeps where the engine moves the hand alone: it need not converge to the stiffness of the arm.
+    pub few_substeps: bool,
 }
 
 impl Shortcuts {
     /// All of them.
-    pub const ALL: Self = Self { free_motion: true, robot_apart: true, hand_alone: true };
+    pub const ALL: Self = Self { free_motion: true, robot_apart: true, hand_alone: true, few_substeps: true };
     /// None: the engine simulates everything in every tick.
-    pub const NONE: Self = Self { free_motion: false, robot_apart: false, hand_alone: false };
+    pub const NONE: Self =
+        Self { free_motion: false, robot_apart: false, hand_alone: false, few_substeps: false };
 
     /// Returns what the engine must prepare for, given what the robot can touch.
     fn limit(self, reach: Reach) -> Reach {
@@ -156,6 +159,13 @@ impl World {
     /// comparisons.
     pub fn leave_to_engine(&mut self) {
         self.take_shortcuts(Shortcuts::NONE);
+    }
+
+    /// Sets the engine's substeps for a tick.
+    pub(super) fn set_substeps(&mut self, reach: Reach) {
+        let few = self.room.shortcuts.few_substeps && reach == Reach::Hand;
+        let substeps = if few { self.substeps.div_ceil(2) } else { self.substeps };
+        self.engine.integration_parameters.num_solver_iterations = substeps;
     }
 
     /// Returns the number of ticks so far in which the robot could touch nothing, with everything else at rest; nothing,

@@ -313,6 +313,55 @@ fn axes_along(turn: &Vector3<f64>, shift: &Vector3<f64>) -> UnitQuaternion<f64> 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::robot::tests::lonely;
+    use crate::room::Reach;
+
+    #[test]
+    fn the_hand_is_the_link_that_carries_both_fingers() {
+        let world = lonely();
+        let robot = &world.robot;
+        let hand = robot.hand.as_ref().expect("the shipped robot has a hand");
+        let names = |links: &dyn Fn(usize) -> bool| -> Vec<&str> {
+            (0..robot.bodies.len()).filter(|idx| links(*idx)).map(|idx| robot.model.links[idx].name.as_str()).collect()
+        };
+        assert_eq!(robot.model.links[hand.link].name, "wrist_roll_link");
+        assert_eq!(
+            names(&|link| hand.has(link)),
+            ["wrist_roll_link", "finger_right_link", "finger_left_link"],
+            "the hand's links"
+        );
+        assert_eq!(names(&|link| link > 0 && hand.moves(link - 1)), ["finger_right_link", "finger_left_link"]);
+    }
+
+    /// The engine takes the whole robot, its hand, nothing and all again, tick by tick, while all joints move.
+    #[test]
+    fn a_motion_goes_on_while_the_engine_takes_and_returns_parts_of_the_robot() {
+        let (mut changing, mut whole) = (lonely(), lonely());
+        let mut command = whole.hold();
+        for (target, joint) in command.positions.iter_mut().zip(whole.kinematics().joints()) {
+            *target = (*target + 0.3).clamp(joint.lower, joint.upper);
+        }
+        command.gripper_opening_m = 0.02;
+        let order = [Reach::Hand, Reach::All, Reach::Apart, Reach::Hand, Reach::Nothing, Reach::Hand, Reach::All];
+        for tick in 0..140 {
+            // Joints that start at once differ by the errors of the engine's substeps, until they arrive.
+            let most = if tick < 100 { 1e-2 } else { 1e-3 };
+            for (world, reach) in [(&mut changing, order[tick / 2 % order.len()]), (&mut whole, Reach::All)] {
+                world.step_with(&command, reach);
+                assert_eq!(world.fault(), None);
+            }
+            let (one, other) = (changing.observe(), whole.observe());
+            for (idx, joint) in whole.kinematics().joints().iter().enumerate() {
+                let off = (one.positions[idx] - other.positions[idx]).abs();
+                assert!(off < most, "{} is {off} off in tick {tick}", joint.name);
+            }
+            let poses = changing.robot.kinematics.links(&changing.robot.positions);
+            for (body, pose) in changing.robot.bodies.iter().zip(&poses) {
+                let at = from_pose(changing.engine.bodies[*body].position());
+                assert!((at.translation.vector - pose.translation.vector).norm() < 1e-4, "tick {tick}");
+            }
+        }
+    }
 
     #[test]
     fn every_motion_is_along_the_first_two_axes_and_about_the_first() {

@@ -101,6 +101,8 @@ pub struct World {
     n_steps: u64,
     steps_per_tick: u32,
     steps_per_second: u32,
+    /// The engine's substeps in each step of the whole robot.
+    pub(super) substeps: usize,
     watch: Option<Watch>,
 }
 
@@ -145,6 +147,7 @@ pub fn build(scene: &Scene) -> Result<World, WorldError> {
         n_steps: 0,
         steps_per_tick,
         steps_per_second,
+        substeps: scene.physics.iterations as usize,
         watch: None,
     };
     world.link_pairs = world.find_link_pairs();
@@ -267,15 +270,21 @@ impl World {
         if self.fault.is_some() {
             return;
         }
+        let reach = self.find_room();
+        self.step_all(reach);
+    }
+
+    /// Performs the steps of a tick in which the robot can touch this, and records the state.
+    fn step_all(&mut self, mut reach: Reach) {
         let holding = self.robot.kinematics.holding_efforts(&self.robot.positions);
         let dt = 1.0 / f64::from(self.steps_per_second);
         self.robot.begin_tick();
-        let mut reach = self.find_room();
         for step in 0..self.steps_per_tick {
             if reach == Reach::Hand && self.is_pushed_hard() {
                 self.need_whole();
                 reach = Reach::All;
             }
+            self.set_substeps(reach);
             self.robot.hand_over(&mut self.engine, reach.share());
             self.robot.control(&mut self.engine, &holding, dt, self.steps_per_tick - step);
             self.step_robot(reach, dt, step + 1 == self.steps_per_tick);
@@ -287,6 +296,13 @@ impl World {
             }
         }
         self.record();
+    }
+
+    /// Performs a tick as if the robot could touch this, for tests.
+    #[cfg(test)]
+    pub(super) fn step_with(&mut self, command: &Command, reach: Reach) {
+        self.take(command);
+        self.step_all(reach);
     }
 
     /// Performs one step of physics; links that the engine does not move follow at the end of the tick.
