@@ -90,16 +90,16 @@ pub struct Shortcuts {
     pub robot_apart: bool,
     /// Only the hand in the engine where only the hand can touch something, and only movable objects.
     pub hand_alone: bool,
-    /// Half of the substeps where the engine moves the hand alone: it need not converge to the stiffness of the arm.
+    /// Half of the substeps where the engine moves the hand alone. Held objects then swing a little more, so that this is
+    /// not among [`Shortcuts::ALL`].
     pub few_substeps: bool,
 }
 
 impl Shortcuts {
-    /// All of them.
-    pub const ALL: Self = Self { free_motion: true, robot_apart: true, hand_alone: true, few_substeps: true };
+    /// All that keep the quality of a grasp.
+    pub const ALL: Self = Self { free_motion: true, robot_apart: true, hand_alone: true, few_substeps: false };
     /// None: the engine simulates everything in every tick.
-    pub const NONE: Self =
-        Self { free_motion: false, robot_apart: false, hand_alone: false, few_substeps: false };
+    pub const NONE: Self = Self { free_motion: false, robot_apart: false, hand_alone: false, few_substeps: false };
 
     /// Returns what the engine must prepare for, given what the robot can touch.
     fn limit(self, reach: Reach) -> Reach {
