@@ -4,11 +4,13 @@
 //! generator that changes scenes, margins and outcomes, and kept as outlines. Each command runs in a process of its own.
 //! Required for a million runs: at most 10 kB a run, and 10 s and 2 GB for each command that reads.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
-use actcheck::base::{Digest, Outcome};
+use actcheck::analysis::Mirror;
+use actcheck::base::{Digest, Outcome, Shard};
 use actcheck::campaign::{Clock, Env, RunContext, run_line};
 use actcheck::config::Overrides;
 use actcheck::data::Choices;
@@ -18,6 +20,13 @@ use actcheck::history::{CampaignEnd, History, RunRecord};
 const SIMULATED: u64 = 64;
 /// Required at a million runs.
 const MOST_BYTES: f64 = 10_000.0;
+/// Size of a shard, unless there would be too many.
+const RUNS_IN_A_SHARD: u64 = 1_000;
+const MOST_SHARDS: u64 = 1_000;
+/// Size of a file of outlines, as a shard writes it.
+const RUNS_IN_A_FILE: usize = 128;
+/// Number of shards that are made at the same time.
+const THREADS: usize = 2;
 
 fn main() {
     let numbers = || std::env::args().filter_map(|arg| arg.parse::<u64>().ok());
@@ -28,43 +37,58 @@ fn main() {
     println!("{} simulated runs, multiplied", made.len());
     for size in sizes {
         let folder = match std::env::var_os("ACTCHECK_SCALE") {
-            Some(folder) => std::path::PathBuf::from(folder).join(size.to_string()),
+            Some(folder) => PathBuf::from(folder).join(size.to_string()),
             None => tempfile::tempdir().expect("a temporary folder").keep(),
         };
-        println!("\n{size} runs in {}", folder.display());
-        if !folder.join("VERSION").exists() {
-            let start = Instant::now();
-            multiplied(&env, &made, size, &folder);
-            println!("{:40} {:8.1} s", "generating", start.elapsed().as_secs_f64());
-        }
-        let bytes = size_of(&folder);
-        let share = bytes / size as f64 / MOST_BYTES;
-        println!(
-            "{:40} {:8.0} MB {:8.0} bytes a run, {share:.2} of the limit",
-            "size",
-            bytes / 1e6,
-            bytes / size as f64
-        );
-        let report = folder.with_extension("html");
-        let report = report.display().to_string();
-        let commands: [(&str, &[&str]); 11] = [
-            ("list", &["list", "--format", "csv"]),
-            ("list, as text", &["list"]),
-            ("list --failed", &["list", "--failed", "--format", "csv"]),
-            ("show", &["show", "@last"]),
-            ("analyse, first time", &["analyse"]),
-            ("analyse", &["analyse"]),
-            ("compare", &["compare", "aaaa", "aaab"]),
-            ("health", &["health", "aaaa"]),
-            ("query --named failure-rates", &["query", "--named", "failure-rates"]),
-            ("query --named campaigns", &["query", "--named", "campaigns"]),
-            ("report", &["report", "--html", &report]),
-        ];
-        for (name, args) in commands {
-            let (secs, megabytes, code) = timed(&folder, args);
-            println!("{name:40} {secs:8.1} s  {megabytes:8.0} MB   exit code {code}");
-        }
+        measure(&env, &made, size, &folder);
     }
+}
+
+/// Makes a history in shards, merges them, and prints the size, time and memory of each command.
+fn measure(env: &Env, made: &[RunRecord], size: u64, folder: &Path) {
+    let count = (size / RUNS_IN_A_SHARD).clamp(1, MOST_SHARDS);
+    println!("\n{size} runs in {}", folder.display());
+    let shards = folder.with_extension("shards");
+    let start = Instant::now();
+    let complete = multiplied(env, made, size, count, &shards);
+    println!("{:40} {:8.1} s", format!("generating {complete} of {count} shards"), start.elapsed().as_secs_f64());
+    if !folder.join("VERSION").exists() {
+        let names: Vec<String> =
+            (1..=count).map(|number| shards.join(number.to_string()).display().to_string()).collect();
+        let into = folder.display().to_string();
+        let args: Vec<&str> =
+            ["merge"].into_iter().chain(names.iter().map(String::as_str)).chain(["--into", into.as_str()]).collect();
+        print_timed(&format!("merge of {count} shards"), timed(&args));
+    }
+    let bytes = size_of(folder);
+    let share = bytes / size as f64 / MOST_BYTES;
+    println!("{:40} {:8.0} MB {:8.0} bytes a run, {share:.2} of the limit", "size", bytes / 1e6, bytes / size as f64);
+    let report = folder.with_extension("html").display().to_string();
+    let commands: [(&str, &[&str]); 14] = [
+        ("list", &["list", "--format", "csv"]),
+        ("list, as text", &["list"]),
+        ("list --failed", &["list", "--failed", "--format", "csv"]),
+        ("show", &["show", "@last"]),
+        ("analyse", &["analyse"]),
+        ("analyse, again", &["analyse"]),
+        ("compare", &["compare", "aaaa", "aaab"]),
+        ("health", &["health", "aaaa"]),
+        ("query --named failure-rates", &["query", "--named", "failure-rates"]),
+        ("query --named campaigns", &["query", "--named", "campaigns"]),
+        ("query --named closest-calls", &["query", "--named", "closest-calls"]),
+        ("query --named targets-of-failures", &["query", "--named", "targets-of-failures"]),
+        ("query --named wrong-reports", &["query", "--named", "wrong-reports"]),
+        ("report", &["report", "--html", &report]),
+    ];
+    let history = folder.display().to_string();
+    for (name, args) in commands {
+        let args: Vec<&str> = args.iter().copied().chain(["--history", history.as_str()]).collect();
+        print_timed(name, timed(&args));
+    }
+}
+
+fn print_timed(name: &str, (secs, megabytes, code): (f64, f64, i32)) {
+    println!("{name:40} {secs:8.1} s  {megabytes:8.0} MB   exit code {code}");
 }
 
 fn simulated(env: &Env, index: u64) -> Option<RunRecord> {
@@ -78,20 +102,46 @@ fn simulated(env: &Env, index: u64) -> Option<RunRecord> {
     Some(run)
 }
 
-/// Two campaigns with the same scenes; in the second, runs fail more often.
-fn multiplied(env: &Env, made: &[RunRecord], size: u64, folder: &Path) {
-    let history = History::open(folder).expect("the folder is empty");
-    for (campaign, rate) in [("aaaa", 0.10), ("aaab", 0.12)] {
+/// Shards of two campaigns with the same scenes; in the second, runs fail more often. Complete shards are kept. Returns
+/// their number.
+fn multiplied(env: &Env, made: &[RunRecord], size: u64, count: u64, shards: &Path) -> u64 {
+    let next = AtomicU64::new(1);
+    std::thread::scope(|scope| {
+        for _ in 0..THREADS {
+            scope.spawn(|| {
+                loop {
+                    let Some(shard) = Shard::new(next.fetch_add(1, Ordering::Relaxed), count) else { return };
+                    let folder = shards.join(shard.number().to_string());
+                    if !folder.with_extension("done").exists() {
+                        // Of a process that was killed.
+                        let _ = std::fs::remove_dir_all(&folder);
+                        make_shard(env, made, size, shard, &folder);
+                        std::fs::write(folder.with_extension("done"), "").expect("the disk has room");
+                    }
+                }
+            });
+        }
+    });
+    count
+}
+
+fn make_shard(env: &Env, made: &[RunRecord], size: u64, shard: Shard, folder: &Path) {
+    let history = History::open(folder).expect("the folder is new");
+    for (campaign, seed, rate) in [("aaaa", 1, 0.10), ("aaab", 2, 0.12)] {
         let mut record = env.record(campaign.to_owned(), "pick".to_owned(), "2026-01-01T00:00:00.000Z".to_owned());
-        record.planned_runs = size / 2;
+        (record.planned_runs, record.seed, record.shards) = (size / 2, seed, vec![shard]);
         history.begin_campaign(&record).expect("the disk has room");
-        for index in 0..size / 2 {
-            let run = changed(&made[index as usize % made.len()], campaign, index, rate);
-            history.commit_outline(&run).expect("the disk has room");
+        let indices: Vec<u64> = (0..size / 2).filter(|index| shard.has(*index)).collect();
+        for indices in indices.chunks(RUNS_IN_A_FILE) {
+            let changed = |index: &u64| changed(&made[*index as usize % made.len()], campaign, *index, rate);
+            let runs: Vec<RunRecord> = indices.iter().map(changed).collect();
+            history.commit_outlines(campaign, &runs).expect("the disk has room");
         }
         let end = CampaignEnd { ended: "2026-01-02T00:00:00.000Z".to_owned(), ..CampaignEnd::default() };
         history.finish_campaign(campaign, &end).expect("the disk has room");
     }
+    // As the task of a launch does.
+    Mirror::update(&history).expect("the disk has room");
 }
 
 /// A run with another number, scene and outcome.
@@ -149,12 +199,10 @@ fn size_of(folder: &Path) -> f64 {
 }
 
 /// Wall time, the largest memory, and the exit code of a command. Units: seconds, megabytes.
-fn timed(history: &Path, args: &[&str]) -> (f64, f64, i32) {
+fn timed(args: &[&str]) -> (f64, f64, i32) {
     let start = Instant::now();
     let mut child = Command::new(env!("CARGO_BIN_EXE_actcheck"))
         .args(args)
-        .arg("--history")
-        .arg(history)
         .stdout(Stdio::null())
         .stderr(Stdio::null())
         .spawn()

@@ -37,6 +37,7 @@
 //! | [`analysis`] | history to tables and patterns: rates with intervals, failure modes, comparison of campaigns, failure conditions | polars, statrs |
 //! | [`report`] | verdicts and tables as text, JSON and HTML, and in the formats of other tools; runs as pictures and in 3D | rerun (feature `rerun`) |
 //! | [`serve`] | a history over HTTP: SPARQL endpoint, query page, report | hyper, tokio |
+//! | [`remote`] | HTTP client: sends statements to stores of others, asks there; copies files into object storage | ureq, rustls (feature `https`), rusty-s3 (feature `object-storage`) |
 //! | [`cli`] | arguments, exit codes, progress; the one place that prints errors | clap, clap_complete, clap_mangen |
 //!
 //! A crate depends only on crates above it in this table ([`campaign`] on many, [`cli`] on all), and on a listed library only if the
@@ -79,5 +80,7 @@ pub use actcheck_analysis as analysis;
 pub use actcheck_report as report;
 
 pub use actcheck_serve as serve;
+
+pub use actcheck_remote as remote;
 
 pub use actcheck_cli as cli;

@@ -19,7 +19,7 @@ fn outcome(failed: bool) -> Outcome {
 }
 
 /// Slipping bottles are not in the hand, and objects that are not in the hand can't be placed.
-fn runs(campaign: &str, count: u64, slippery: f64) -> Vec<RunDetail> {
+pub fn runs(campaign: &str, count: u64, slippery: f64) -> Vec<RunDetail> {
     let mut dice = Dice::new(campaign.len() as u64 * 1000 + count);
     (0..count)
         .map(|index| {
@@ -229,6 +229,7 @@ fn summary_of(table: &OutcomeTable, report: PropertyReport) -> FindingsSummary {
         options: String::new(),
         campaigns: vec!["k".to_owned()],
         runs: table.text("run").texts.len() as u64,
+        sampled_runs: None,
         twins: 0,
         counts: report.findings.counts,
         modes: Vec::new(),

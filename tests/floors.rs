@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 /// Each crate and the crates that it may depend on, in the order of the pipeline. `cli` may depend on all.
-const FLOORS: [(&str, &[&str]); 17] = [
+const FLOORS: [(&str, &[&str]); 18] = [
     ("base", &[]),
     ("data", &["base"]),
     ("search", &[]),
@@ -29,10 +29,11 @@ const FLOORS: [(&str, &[&str]); 17] = [
     ("analysis", &["base", "data", "history", "verdict"]),
     ("report", &["base", "data", "verdict", "history", "analysis"]),
     ("serve", &["base", "history"]),
+    ("remote", &["base"]),
 ];
 
 /// Libraries of the field and the crates that may depend on them.
-const FENCES: [(&str, &[&str]); 27] = [
+const FENCES: [(&str, &[&str]); 31] = [
     ("toml", &["config"]),
     ("roxmltree", &["config"]),
     ("mesh-loader", &["config"]),
@@ -55,6 +56,10 @@ const FENCES: [(&str, &[&str]); 27] = [
     ("hyper-util", &["serve"]),
     ("tokio", &["serve"]),
     ("spargebra", &["history"]),
+    ("ureq", &["remote"]),
+    ("rustls", &["remote"]),
+    ("rusty-s3", &["remote"]),
+    ("rustls-native-certs", &["remote"]),
     ("re_chunk", &["report"]),
     ("re_log_encoding", &["report"]),
     ("re_log_types", &["report"]),

@@ -33,7 +33,9 @@ fn health(config: &Path, runs: u32, context: RunContext) -> Health {
 fn examined(history: &History, campaign: &str) -> Health {
     let mut meter = HealthMeter::default();
     history.each_vitals(campaign, |run| meter.add(run)).unwrap();
-    meter.finish(&history.outcomes(&RunFilter::default()).unwrap())
+    let outcomes = history.outcomes(&RunFilter::default()).unwrap();
+    outcomes.iter().for_each(|row| meter.add_outcome(&row.property, row.outcome));
+    meter.finish()
 }
 
 #[test]

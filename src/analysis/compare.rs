@@ -1,11 +1,12 @@
 //! Compares two campaigns on the same scenes: which properties hold more or less often, and in which scenes outcomes
 //! differ.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::sync::Arc;
 
 use crate::{Difference, PairedTable, PairedTest, holm};
 use actcheck_base::Outcome;
-use actcheck_history::{OutcomeRow, RunRow, RunStatus, SceneDigest};
+use actcheck_history::{JudgedOutcome, JudgedRun, OutcomeRow, RunRow, RunStatus, SceneDigest};
 use actcheck_verdict::Counts;
 
 /// The subject of a comparison: whole runs, or one property of one action.
@@ -31,7 +32,8 @@ pub struct ComparedRun {
     pub place: (u64, u64),
     /// Digest of the scene.
     pub scene: SceneDigest,
-    outcomes: BTreeMap<Compared, Outcome>,
+    /// Most runs have the same outcomes as many others, and share them.
+    outcomes: Arc<BTreeMap<Compared, Outcome>>,
 }
 
 impl ComparedRun {
@@ -87,29 +89,96 @@ pub fn compared_runs(
     scenes: &BTreeMap<String, SceneDigest>,
     outcomes: &[OutcomeRow],
 ) -> Vec<ComparedRun> {
-    let mut of_run: BTreeMap<&str, BTreeMap<Compared, Outcome>> = BTreeMap::new();
+    let mut of_run: BTreeMap<&str, Vec<JudgedOutcome>> = BTreeMap::new();
     for row in outcomes {
-        let of = Compared::Property { action: row.action.clone(), property: row.property.clone() };
-        let known = of_run.entry(&row.run).or_default();
-        let both = known.get(&of).map_or(row.outcome, |before| together(*before, row.outcome));
-        known.insert(of, both);
+        of_run.entry(&row.run).or_default().push(JudgedOutcome {
+            step: row.step,
+            action: Arc::from(row.action.as_str()),
+            property: Arc::from(row.property.as_str()),
+            outcome: row.outcome,
+            margin: row.margin,
+        });
     }
-    let mut found: Vec<ComparedRun> = Vec::new();
+    let mut found = ComparedRuns::default();
     for row in runs {
-        let Some(scene) = scenes.get(&row.run) else { continue };
-        let mut outcomes = of_run.remove(row.run.as_str()).unwrap_or_default();
-        // A broken run is no evidence about the robot, regardless of earlier outcomes.
-        let whole = match row.status {
-            RunStatus::Broken => Outcome::Broken,
-            RunStatus::Completed | RunStatus::Timeout => {
-                outcomes.values().copied().reduce(together).unwrap_or(Outcome::Untested)
-            }
-        };
-        outcomes.insert(Compared::WholeRun, whole);
-        let place = row.repetition.map_or((row.index, 0), |repetition| (repetition.scene, repetition.number));
-        found.push(ComparedRun { run: row.run.clone(), place, scene: scene.clone(), outcomes });
+        let outcomes = of_run.remove(row.run.as_str()).unwrap_or_default();
+        found.add(JudgedRun { row: row.clone(), scene: scenes.get(&row.run).cloned(), outcomes });
     }
-    found.sort_by(|a, b| (a.place, &a.run).cmp(&(b.place, &b.run)));
+    found.sorted()
+}
+
+/// Status and outcomes of a run: the addresses of the texts of each action and property, and the outcome.
+type OutcomeKey = Vec<(usize, usize, u8)>;
+
+/// Collects the runs of a campaign for a comparison.
+#[derive(Debug, Default)]
+pub struct ComparedRuns {
+    runs: Vec<ComparedRun>,
+    len: usize,
+    /// The outcomes so far, by status and the outcomes of each action and property. The texts are kept, so that addresses
+    /// stay theirs.
+    known: HashMap<OutcomeKey, Arc<BTreeMap<Compared, Outcome>>>,
+    texts: HashMap<usize, Arc<str>>,
+}
+
+impl ComparedRuns {
+    /// Adds a run with its outcomes. One without a known scene only counts.
+    pub fn add(&mut self, run: JudgedRun) {
+        self.len += 1;
+        let JudgedRun { row, scene: Some(scene), outcomes } = run else { return };
+        let outcomes = self.shared(row.status, &outcomes);
+        let place = row.repetition.map_or((row.index, 0), |repetition| (repetition.scene, repetition.number));
+        self.runs.push(ComparedRun { run: row.run, place, scene, outcomes });
+    }
+
+    /// Number of added runs.
+    pub fn len(&self) -> usize {
+        self.len
+    }
+
+    /// Whether no run was added.
+    pub fn is_empty(&self) -> bool {
+        self.len == 0
+    }
+
+    /// The runs, sorted by place.
+    pub fn sorted(mut self) -> Vec<ComparedRun> {
+        self.runs.sort_by(|a, b| (a.place, &a.run).cmp(&(b.place, &b.run)));
+        self.runs
+    }
+
+    /// The outcomes by subject, shared with earlier runs that have the same ones.
+    fn shared(&mut self, status: RunStatus, outcomes: &[JudgedOutcome]) -> Arc<BTreeMap<Compared, Outcome>> {
+        let address = |text: &Arc<str>| Arc::as_ptr(text).cast::<u8>() as usize;
+        let mut key = vec![(0, 0, status as u8)];
+        key.extend(outcomes.iter().map(|own| (address(&own.action), address(&own.property), own.outcome as u8)));
+        if let Some(known) = self.known.get(&key) {
+            return Arc::clone(known);
+        }
+        for text in outcomes.iter().flat_map(|own| [&own.action, &own.property]) {
+            self.texts.insert(address(text), Arc::clone(text));
+        }
+        let new = Arc::new(by_subject(status, outcomes));
+        self.known.insert(key, Arc::clone(&new));
+        new
+    }
+}
+
+fn by_subject(status: RunStatus, outcomes: &[JudgedOutcome]) -> BTreeMap<Compared, Outcome> {
+    let mut found: BTreeMap<Compared, Outcome> = BTreeMap::new();
+    for own in outcomes {
+        let of = Compared::Property { action: own.action.to_string(), property: own.property.to_string() };
+        let both = found.get(&of).map_or(own.outcome, |before| together(*before, own.outcome));
+        found.insert(of, both);
+    }
+    // A broken run is no evidence about the robot, regardless of earlier outcomes.
+    let whole = match status {
+        RunStatus::Broken => Outcome::Broken,
+        RunStatus::Completed | RunStatus::Timeout => {
+            found.values().copied().reduce(together).unwrap_or(Outcome::Untested)
+        }
+    };
+    found.insert(Compared::WholeRun, whole);
     found
 }
 
@@ -154,7 +223,7 @@ pub fn compare(first: &[ComparedRun], second: &[ComparedRun]) -> Comparison {
 struct ScenePair {
     /// IDs of the scene's first run in each campaign.
     runs: (String, String),
-    outcomes: [BTreeMap<Compared, Outcome>; 2],
+    outcomes: [Arc<BTreeMap<Compared, Outcome>>; 2],
     other_physics: bool,
 }
 
@@ -165,7 +234,8 @@ fn scene_pairs(same: &[[&ComparedRun; 2]]) -> Vec<ScenePair> {
         match pairs.last_mut() {
             Some((scene, pair)) if *scene == first.place.0 => {
                 for (known, run) in pair.outcomes.iter_mut().zip([first, second]) {
-                    for (of, outcome) in &run.outcomes {
+                    let known = Arc::make_mut(known);
+                    for (of, outcome) in run.outcomes.iter() {
                         let before = known.get(of).copied();
                         known.insert(of.clone(), before.map_or(*outcome, |before| together(before, *outcome)));
                     }
@@ -175,7 +245,7 @@ fn scene_pairs(same: &[[&ComparedRun; 2]]) -> Vec<ScenePair> {
                 first.place.0,
                 ScenePair {
                     runs: (first.run.clone(), second.run.clone()),
-                    outcomes: [first.outcomes.clone(), second.outcomes.clone()],
+                    outcomes: [Arc::clone(&first.outcomes), Arc::clone(&second.outcomes)],
                     other_physics: first.scene.physics != second.scene.physics,
                 },
             )),

@@ -5,7 +5,7 @@ use std::collections::btree_map::Entry;
 
 use crate::{Coverage, PairCoverage, ParameterCoverage};
 use actcheck_base::{Digest, Outcome};
-use actcheck_history::{OutcomeRow, RunVitals};
+use actcheck_history::RunVitals;
 
 /// Maximum share of discarded scenes. A crowded table causes up to a tenth; a larger share biases the tested scenes.
 const MOST_DISCARDS: f64 = 0.1;
@@ -39,6 +39,8 @@ pub struct HealthMeter {
     wall: Vec<(f64, String)>,
     deepest: Option<(f64, String)>,
     energy: Option<(f64, String)>,
+    /// By property: the number of inapplicable outcomes, and of those that are inapplicable, passed or failed.
+    judged: BTreeMap<String, (u64, u64)>,
 }
 
 /// Health of a campaign.
@@ -91,7 +93,8 @@ impl HealthMeter {
     pub fn add(&mut self, run: &RunVitals) {
         self.runs += 1;
         self.discards += run.discards.len() as u64;
-        if let (None, Some(reason)) = (&self.first_discard, run.discards.first()) {
+        let is_first = self.first_discard.as_ref().is_none_or(|(first, _)| run.index + 1 < *first);
+        if let (true, Some(reason)) = (is_first, run.discards.first()) {
             self.first_discard = Some((run.index + 1, reason.clone()));
         }
         self.is_weighted |= run.is_weighted;
@@ -110,8 +113,19 @@ impl HealthMeter {
         larger(&mut self.energy, run.energy_gain_j, &run.run);
     }
 
-    /// Returns the health of the added runs, given their outcomes.
-    pub fn finish(mut self, outcomes: &[OutcomeRow]) -> Health {
+    /// Adds one outcome of a property (IRI).
+    pub fn add_outcome(&mut self, property: &str, outcome: Outcome) {
+        if !self.judged.contains_key(property) {
+            self.judged.insert(property.to_owned(), (0, 0));
+        }
+        if let Some((not, all)) = self.judged.get_mut(property) {
+            *not += u64::from(outcome == Outcome::Inapplicable);
+            *all += u64::from(matches!(outcome, Outcome::Inapplicable | Outcome::Passed | Outcome::Failed));
+        }
+    }
+
+    /// Returns the health of the added runs.
+    pub fn finish(mut self) -> Health {
         self.wall.sort_by(|a, b| a.0.total_cmp(&b.0));
         let median_secs = self.wall.get(self.wall.len() / 2).map(|(secs, _)| *secs);
         let mut health = Health {
@@ -127,7 +141,7 @@ impl HealthMeter {
         };
         let problems = [
             self.discarded(),
-            inapplicable(outcomes),
+            self.inapplicable(),
             self.neglected(&health),
             self.repeated(),
             slow(&health, self.wall.len()),
@@ -157,6 +171,13 @@ impl HealthMeter {
         singles.cloned().map(HealthProblem::Neglected).chain(pairs.cloned().map(HealthProblem::PairNeglected)).collect()
     }
 
+    /// The properties that were nearly always inapplicable, sorted by IRI.
+    fn inapplicable(&self) -> Vec<HealthProblem> {
+        let nearly_never = |(not, all): (u64, u64)| all >= LEAST_JUDGED && not as f64 >= MOST_INAPPLICABLE * all as f64;
+        let found = self.judged.iter().filter(|(_, counts)| nearly_never(**counts));
+        found.map(|(property, (not, all))| HealthProblem::Inapplicable(property.clone(), *not, *all)).collect()
+    }
+
     fn repeated(&self) -> Vec<HealthProblem> {
         let first = self.duplicates.first();
         let problem =
@@ -184,21 +205,6 @@ fn larger(largest: &mut Option<(f64, String)>, value: Option<f64>, run: &str) {
     }
 }
 
-/// Finds the properties that were nearly always inapplicable, sorted by IRI.
-fn inapplicable(outcomes: &[OutcomeRow]) -> Vec<HealthProblem> {
-    let mut counts: BTreeMap<&str, (u64, u64)> = BTreeMap::new();
-    for row in outcomes {
-        let (not, all) = counts.entry(&row.property).or_default();
-        *not += u64::from(row.outcome == Outcome::Inapplicable);
-        *all += u64::from(matches!(row.outcome, Outcome::Inapplicable | Outcome::Passed | Outcome::Failed));
-    }
-    counts
-        .into_iter()
-        .filter(|(_, (not, all))| *all >= LEAST_JUDGED && *not as f64 >= MOST_INAPPLICABLE * *all as f64)
-        .map(|(property, (not, all))| HealthProblem::Inapplicable(property.to_owned(), not, all))
-        .collect()
-}
-
 fn slow(health: &Health, runs: usize) -> Vec<HealthProblem> {
     match (&health.slowest, health.median_secs) {
         (Some((secs, run)), Some(median))
@@ -221,7 +227,6 @@ fn badly_simulated(health: &Health) -> Vec<HealthProblem> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::sample_rows::outcome_row;
     use actcheck_data::Choices;
 
     fn run(index: u64) -> RunVitals {
@@ -247,7 +252,7 @@ mod tests {
             change(&mut run);
             meter.add(&run);
         }
-        meter.finish(&[]).problems
+        meter.finish().problems
     }
 
     #[test]
@@ -274,12 +279,14 @@ mod tests {
 
     #[test]
     fn a_property_that_rarely_applies_is_reported() {
-        let row = |index: u64, outcome| outcome_row(index, "p", outcome);
-        let rows = |applies: u64, all: u64| -> Vec<OutcomeRow> {
-            (0..all).map(|i| row(i, if i < applies { Outcome::Passed } else { Outcome::Inapplicable })).collect()
+        let inapplicable = |applies: u64, all: u64| {
+            let mut meter = HealthMeter::default();
+            let outcome = |at| if at < applies { Outcome::Passed } else { Outcome::Inapplicable };
+            (0..all).for_each(|at| meter.add_outcome("p", outcome(at)));
+            meter.inapplicable()
         };
-        assert_eq!(inapplicable(&rows(1, 10)), [HealthProblem::Inapplicable("p".into(), 9, 10)]);
-        assert_eq!(inapplicable(&rows(2, 10)), []);
-        assert_eq!(inapplicable(&rows(0, 9)), []);
+        assert_eq!(inapplicable(1, 10), [HealthProblem::Inapplicable("p".into(), 9, 10)]);
+        assert_eq!(inapplicable(2, 10), []);
+        assert_eq!(inapplicable(0, 9), []);
     }
 }

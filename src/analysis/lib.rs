@@ -26,7 +26,7 @@ mod tables;
 
 pub use answer::Answer;
 pub use bisect::{Likeness, OutcomeFlip, like_by_outcomes, like_by_rates, outcome_flips};
-pub use compare::{Compared, ComparedLine, ComparedRun, Comparison, compare, compared_runs};
+pub use compare::{Compared, ComparedLine, ComparedRun, ComparedRuns, Comparison, compare, compared_runs};
 pub use consistency::{Consistency, PassPower, Repeated, SceneCounts, SceneRuns, Variance, consistency};
 pub use coverage::{Coverage, PairCoverage, ParameterCoverage};
 pub use dataset::{Dataset, DatasetRuns, export_dataset, export_facts};
@@ -38,8 +38,9 @@ pub use failure_modes::{FailureMode, failure_modes};
 pub use false_discovery::benjamini_hochberg;
 pub use findings::{
     Cascade, ChangePoint, Collisions, Example, FINDING_COLUMNS, FlakyScene, HitKind, Judged, JudgedProperty, Mined,
-    PlacedThing, PropertyFindings, Quantiles, Sector, Trend, TrendPoint, TwoWay, TwoWayCell, cascades, collisions,
-    finding_columns, flaky_scenes, judged, property_findings, quantiles, table_failure_modes, trend, two_way,
+    PlacedThing, PropertyFindings, Quantiles, RATE_COLUMNS, Sector, Trend, TrendPoint, TwoWay, TwoWayCell, cascades,
+    collisions, finding_columns, flaky_scenes, judged, property_findings, quantiles, table_failure_modes, trend,
+    two_way,
 };
 pub use fisher::{FisherTest, TwoByTwo};
 pub use health::{Health, HealthMeter, HealthProblem};

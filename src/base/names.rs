@@ -12,6 +12,8 @@ pub const OBJ: &str = "https://w3id.org/actcheck/object/";
 pub const RUN: &str = "https://w3id.org/actcheck/run/";
 /// Campaigns of a history.
 pub const CAMPAIGN: &str = "https://w3id.org/actcheck/campaign/";
+/// Nodes without an IRI of their own, in other stores (RDF 1.1 calls it a Skolem IRI).
+pub const NODE: &str = "https://w3id.org/.well-known/genid/actcheck/";
 /// RDF.
 pub const RDF: &str = "http://www.w3.org/1999/02/22-rdf-syntax-ns#";
 /// RDF Schema.

@@ -10,8 +10,8 @@ use crate::output;
 use crate::picture::Picture;
 use crate::work::all_cores;
 use actcheck_analysis::{
-    Column, Hierarchy, JudgedProperty, Mirror, OutcomeTable, PatternOptions, TableFilter, cascades, collisions,
-    columns, finding_columns, flaky_scenes, judged, property_findings, table_failure_modes, trend, two_way,
+    Column, Hierarchy, JudgedProperty, Mirror, OutcomeTable, PatternOptions, RATE_COLUMNS, TableFilter, cascades,
+    collisions, columns, finding_columns, flaky_scenes, judged, property_findings, table_failure_modes, trend, two_way,
 };
 use actcheck_base::{Diagnostic, Diagnostics, did_you_mean};
 use actcheck_history::History;
@@ -61,10 +61,19 @@ pub struct AnalyseArgs {
     pub format: Format,
 }
 
+/// Number of rows from which conditions are sought in a sample: a million runs would take minutes, and find the same.
+const MOST_ROWS: usize = 400_000;
+/// Number of rows of the sample.
+const SAMPLED_ROWS: usize = 100_000;
+/// Columns of a report that are read for all runs.
+const RUN_COLUMNS: [&str; 4] = ["index", "repetition", "test", "score"];
+
 /// The result of an analysis.
 pub(super) struct Analysed {
-    /// The rows of the chosen runs.
+    /// The rows of the chosen runs. Of very many, it has only the columns of rates.
     pub table: OutcomeTable,
+    /// A sample of the rows with all columns, if there are very many.
+    pub sample: Option<OutcomeTable>,
     /// The findings.
     pub summary: FindingsSummary,
     /// The ontology, with the names of properties.
@@ -147,12 +156,18 @@ pub(super) fn analysed(
     let ontology = asked.chosen.ontology()?;
     let hierarchy = chosen::hierarchy(&ontology);
     let (mirror, _) = Mirror::update(history)?;
-    let table = read(&mirror, &filter, further)?;
+    let (table, sample) = read(&mirror, &filter, further)?;
     if table.is_empty() {
         return Err(chosen::none_of(history).into());
     }
-    let wanted = wanted(judged(&table), asked.property)?;
-    let properties = reports(&wanted, |of| report(asked, &table, of, &hierarchy, &ontology));
+    let all = judged(&table);
+    let counts = all.iter().fold(Counts::default(), |mut sum, of| {
+        sum.add_all(of.counts);
+        sum
+    });
+    let wanted = wanted(all, asked.property)?;
+    let sampled = sample.as_ref().map(|sample| (sample, judged(sample)));
+    let properties = reports(&wanted, |of| report(asked, &table, of, sampled.as_ref(), &hierarchy, &ontology));
     let summary = FindingsSummary {
         history: history.dir().display().to_string(),
         program: std::env::args().next().unwrap_or_else(|| "actcheck".to_owned()),
@@ -160,17 +175,15 @@ pub(super) fn analysed(
         campaigns: table.text("campaign").texts.clone(),
         runs: table.text("run").texts.len() as u64,
         twins: table.counted_runs().iter().filter(|counts| !**counts).count() as u64,
-        counts: judged(&table).iter().fold(Counts::default(), |mut sum, of| {
-            sum.add_all(of.counts);
-            sum
-        }),
+        sampled_runs: sample.as_ref().map(|sample| sample.text("run").texts.len() as u64),
+        counts,
         modes: table_failure_modes(&table),
         cascades: cascades(&table, asked.level),
-        collisions: collisions(&table),
+        collisions: collisions(sample.as_ref().unwrap_or(&table)),
         properties,
         level: asked.level,
     };
-    Ok(Analysed { table, summary, ontology })
+    Ok(Analysed { table, sample, summary, ontology })
 }
 
 /// A report of each property, in order. Computes as many at once as there are cores, which limits the memory in use.
@@ -188,21 +201,42 @@ fn reports(
     properties.chunks(all_cores()).flat_map(at_once).collect()
 }
 
-fn read(mirror: &Mirror, filter: &TableFilter, further: &[&'static str]) -> Result<OutcomeTable, Diagnostics> {
+/// Reads the table, and a sample of its rows if there are very many.
+fn read(
+    mirror: &Mirror,
+    filter: &TableFilter,
+    further: &[&'static str],
+) -> Result<(OutcomeTable, Option<OutcomeTable>), Diagnostics> {
     let names: Vec<&str> = finding_columns().into_iter().chain(further.iter().copied()).collect();
-    OutcomeTable::read(mirror, filter, &names)
+    if mirror.rows(filter) <= MOST_ROWS {
+        return Ok((OutcomeTable::read(mirror, filter, &names)?, None));
+    }
+    let of_runs = further.iter().copied().filter(|name| RUN_COLUMNS.contains(name));
+    let rates: Vec<&str> = RATE_COLUMNS.into_iter().chain(of_runs).collect();
+    let sample = OutcomeTable::read_sample(mirror, filter, &names, SAMPLED_ROWS)?;
+    Ok((OutcomeTable::read(mirror, filter, &rates)?, Some(sample)))
 }
 
+/// The report of a property. `sampled`: a sample of the rows with its properties, in which patterns are sought.
 fn report(
     asked: &Question<'_>,
     table: &OutcomeTable,
     of: &JudgedProperty,
+    sampled: Option<&(&OutcomeTable, Vec<JudgedProperty>)>,
     hierarchy: &Hierarchy,
     ontology: &Ontology,
 ) -> PropertyReport {
     let options =
         PatternOptions { most_conditions: usize::from(asked.depth), level: asked.level, ..PatternOptions::default() };
-    let findings = property_findings(table, of, hierarchy, &options);
+    let findings = match sampled {
+        None => property_findings(table, of, hierarchy, &options),
+        Some((sample, judged)) => {
+            let is_same = |other: &&JudgedProperty| other.action == of.action && other.property == of.property;
+            let none = JudgedProperty { rows: Vec::new(), every_row: Vec::new(), ..of.clone() };
+            let of_sample = judged.iter().find(is_same).unwrap_or(&none);
+            property_findings(sample, of_sample, hierarchy, &options).with_rates_of(table, of)
+        }
+    };
     let (flaky, repeated_scenes) = flaky_scenes(table, of);
     let by: Vec<&str> = asked.by.iter().map(String::as_str).collect();
     let wanted: Vec<&[&str]> = match (by.is_empty(), asked.usual_maps) {

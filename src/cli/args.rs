@@ -165,7 +165,7 @@ pub enum Command {
     /// The prefixes act, w, obj, run, campaign, rdf, rdfs, owl, xsd, earl and prov are predefined. Facts about the
     /// world are in named graphs, one for each moment: `?execution act:before ?g . GRAPH ?g { … }`.
     #[command(
-        after_help = "Examples:\n  actcheck query 'SELECT (COUNT(?r) AS ?n) WHERE { ?r a act:Run }'\n  actcheck query --list-named\n  actcheck query --named failure-rates"
+        after_help = "Examples:\n  actcheck query 'SELECT (COUNT(?r) AS ?n) WHERE { ?r a act:Run }'\n  actcheck query --list-named\n  actcheck query --named failure-rates\n  actcheck query --named failure-rates --endpoint http://localhost:3030/history/query"
     )]
     Query(crate::query::QueryArgs),
     /// Serve a history over HTTP: a read-only SPARQL 1.1 endpoint, a query page, and the current report
@@ -217,7 +217,7 @@ pub enum Command {
     /// Run a standalone Datalog program, with its imports and exports
     #[command(after_help = "Example:\n  actcheck datalog program.rls -D results")]
     Datalog(crate::datalog::DatalogArgs),
-    /// Export a stored run as a configuration, or the history as tables or RDF
+    /// Export a stored run as a configuration, or the history as tables or RDF, or send it to a SPARQL store
     ///
     /// A run becomes one readable file (a case) that recreates its scene. `actcheck run` accepts the file like any
     /// configuration, and reports whether it still fails in the same way. You can edit its values; an invalid value is
@@ -228,7 +228,7 @@ pub enum Command {
     /// shrunk runs, no cases, and no runs of `run --last-failed`. Their column `counts` is false for runs that are
     /// bit-identical to a later one.
     #[command(
-        after_help = "Examples:\n  actcheck export k7f3-3 -o case.toml    (a run id from `actcheck list`; a prefix is enough)\n  actcheck export --parquet tables    (after `actcheck run configs/pick.toml`)\n  actcheck export --nquads history.nq --turtle history.ttl"
+        after_help = "Examples:\n  actcheck export k7f3-3 -o case.toml    (a run id from `actcheck list`; a prefix is enough)\n  actcheck export --parquet tables    (after `actcheck run configs/pick.toml`)\n  actcheck export --tables /tmp/columns    (or s3://BUCKET/PREFIX)\n  actcheck export --nquads history.nq --turtle history.ttl\n  actcheck export --sparql http://localhost:3030/history/update    (another store, such as Fuseki)"
     )]
     Export(crate::export::ExportArgs),
     /// Merge histories into one: parts of a campaign (`run --shard`) become one campaign, duplicates are kept once

@@ -7,10 +7,10 @@ use clap::Args;
 
 use crate::options::{Format, HistoryArgs, level};
 use crate::{history_dir, output};
-use actcheck_analysis::{Comparison, compare as compare_runs, compared_runs};
+use actcheck_analysis::{ComparedRun, ComparedRuns, Comparison, compare as compare_runs};
 use actcheck_base::{Diagnostic, Diagnostics};
 use actcheck_campaign::changes;
-use actcheck_history::{CampaignRecord, History, RunFilter, RunRow, SceneDigest};
+use actcheck_history::{CampaignRecord, History, Judgements, RunFilter, Wish};
 use actcheck_report::{CompareSummary, ComparedSide, SideChange, compare_json, compare_table, compare_text};
 
 /// Suffix of a campaign: use its newest judgements.
@@ -51,7 +51,7 @@ pub fn compare(args: &CompareArgs) -> Result<u8, Diagnostics> {
     let mut histories = Histories::default();
     let first = Side::read(&args.first, &args.history, &mut histories)?;
     let second = Side::read(&args.second, &args.history, &mut histories)?;
-    let comparison = compare_runs(&first.runs(), &second.runs());
+    let comparison = compare_runs(&first.runs, &second.runs);
     if comparison.pairs == 0 {
         return Err(nothing_shared(&first, &second, &comparison).into());
     }
@@ -129,9 +129,9 @@ impl<'a> Name<'a> {
 struct Side {
     name: String,
     record: CampaignRecord,
-    rows: Vec<RunRow>,
-    scenes: BTreeMap<String, SceneDigest>,
-    outcomes: Vec<actcheck_history::OutcomeRow>,
+    runs: Vec<ComparedRun>,
+    /// Number of runs, also of those without a known scene.
+    count: u64,
 }
 
 impl Side {
@@ -144,19 +144,14 @@ impl Side {
         };
         let mut record = history.campaign(&id)?;
         let filter = RunFilter { campaign: Some(id), ..RunFilter::default() };
-        let rows = history.runs(&filter)?;
-        let outcomes = if name.rechecked {
-            let newest = history.newest_outcomes(&filter)?;
-            judged_by(&mut record, &newest.rules);
-            newest.rows
-        } else {
-            history.outcomes(&filter)?
-        };
-        Ok(Self { name: text.to_owned(), record, scenes: history.scenes(&rows)?, rows, outcomes })
-    }
-
-    fn runs(&self) -> Vec<actcheck_analysis::ComparedRun> {
-        compared_runs(&self.rows, &self.scenes, &self.outcomes)
+        let judgements = if name.rechecked { Judgements::Newest } else { Judgements::Campaign };
+        let mut collected = ComparedRuns::default();
+        let later = history.each_judged(&filter, Wish { judgements, scenes: true }, &mut |run| collected.add(run))?;
+        if name.rechecked {
+            judged_by(&mut record, &later);
+        }
+        let count = collected.len() as u64;
+        Ok(Self { name: text.to_owned(), record, runs: collected.sorted(), count })
     }
 
     fn summary(&self) -> ComparedSide {
@@ -164,7 +159,7 @@ impl Side {
             name: self.name.clone(),
             campaign: self.record.id.clone(),
             config: self.record.name.clone(),
-            runs: self.rows.len() as u64,
+            runs: self.count,
             planned: self.record.planned_runs,
             started: self.record.started.clone(),
             config_text: self.record.config_text.clone(),
@@ -201,8 +196,8 @@ fn nothing_shared(first: &Side, second: &Side, comparison: &Comparison) -> Diagn
     let message = format!("`{}` and `{}` have no scene in common", first.name, second.name);
     let fault = Diagnostic::error("X071", message);
     let [a, b] = [&first.record, &second.record];
-    fault.help(if first.rows.is_empty() || second.rows.is_empty() {
-        let empty = if first.rows.is_empty() { first } else { second };
+    fault.help(if first.count == 0 || second.count == 0 {
+        let empty = if first.count == 0 { first } else { second };
         format!("`{}` has no runs", empty.name)
     } else if a.seed != b.seed {
         format!("their seeds differ: {} and {}; run both with the same `--seed`", a.seed, b.seed)

@@ -5,6 +5,8 @@ use std::path::{Path, PathBuf};
 use clap::{ArgGroup, Args};
 
 use crate::chosen::{self, ChosenRuns};
+use crate::export_sparql::{self, SparqlArgs};
+use crate::export_tables;
 use crate::{output, output_file};
 use actcheck_analysis::{Dataset, DatasetRuns, Mirror, export_csv, export_dataset, export_facts, export_parquet};
 use actcheck_base::{Diagnostic, Diagnostics};
@@ -14,14 +16,16 @@ use actcheck_history::History;
 
 /// `actcheck export`
 #[derive(Debug, Args)]
-#[command(group(ArgGroup::new("with_facts").args(["parquet", "nquads"]).multiple(true)))]
+#[command(group(ArgGroup::new("with_facts").args(["parquet", "nquads", "sparql"]).multiple(true)))]
 pub struct ExportArgs {
     /// Id of the run to write as a configuration, or a unique prefix
-    #[arg(required_unless_present_any = ["parquet", "csv", "dataset", "nquads", "turtle", "rebuild_mirror"])]
+    #[arg(required_unless_present_any = ["parquet", "csv", "dataset", "nquads", "turtle", "sparql", "tables", "rebuild_mirror"])]
     pub run: Option<String>,
     /// The file to write (TOML); `-` prints it
     #[arg(short, long, value_name = "FILE.toml", conflicts_with = "regression", requires = "run")]
-    #[arg(required_unless_present_any = ["regression", "parquet", "csv", "dataset", "nquads", "turtle", "rebuild_mirror"])]
+    #[arg(required_unless_present_any = [
+        "regression", "parquet", "csv", "dataset", "nquads", "turtle", "sparql", "tables", "rebuild_mirror",
+    ])]
     pub output: Option<PathBuf>,
     /// Write it into the project's folder `regressions`, named after the run; every campaign runs these files first
     #[arg(long, requires = "run")]
@@ -33,6 +37,13 @@ pub struct ExportArgs {
     /// drawn and the effects, into this folder: `outcomes.parquet`, and `schema.json`, which describes the columns
     #[arg(long, value_name = "DIR")]
     pub parquet: Option<PathBuf>,
+    /// Copy the table of all outcomes, in many files by campaign, into this folder, or into a bucket of an object storage with the
+    /// interface of S3 (s3://BUCKET/PREFIX, in builds with `--features object-storage`): `campaign=ID/….parquet`, and
+    /// `tables.json`, which lists them and describes the columns. Files that are there already are skipped, so the same
+    /// command continues an interrupted copy and brings an earlier one up to date. Each history needs a folder of its own.
+    /// Settings: AWS_ACCESS_KEY_ID, AWS_SECRET_ACCESS_KEY, AWS_SESSION_TOKEN, AWS_REGION, AWS_ENDPOINT_URL
+    #[arg(long, value_name = "DIR|URL")]
+    pub tables: Option<String>,
     /// Write the same table as CSV: `outcomes.csv` and `schema.json`
     #[arg(long, value_name = "DIR")]
     pub csv: Option<PathBuf>,
@@ -44,7 +55,10 @@ pub struct ExportArgs {
     /// Write the whole history as RDF, with facts in their named graphs (N-Quads)
     #[arg(long, value_name = "FILE.nq")]
     pub nquads: Option<PathBuf>,
-    /// With `--nquads`: all facts from the traces, not only those in the history. With `--parquet`: also the tables from
+    /// The store that the history is sent to.
+    #[command(flatten)]
+    pub sparql: SparqlArgs,
+    /// With `--nquads` and `--sparql`: all facts from the traces, not only those in the history. With `--parquet`: also the tables from
     /// which outcomes follow: `actions`, `percepts`, `planes`, `states`, `bodies`, `links`, `contacts`, `self_contacts`,
     /// `extremes`, `joint_extremes`, `shapes` and `places`
     #[arg(long, requires = "with_facts")]
@@ -60,8 +74,8 @@ pub struct ExportArgs {
     pub chosen: ChosenRuns,
 }
 
-/// Writes a stored run as a configuration, or the history as tables or RDF.
-pub fn export(args: &ExportArgs) -> Result<(), Diagnostics> {
+/// Writes a stored run as a configuration, or the history as tables or RDF, or sends it to a store. Returns the exit code.
+pub fn export(args: &ExportArgs) -> Result<u8, Diagnostics> {
     let history = args.chosen.open()?;
     if let Some(run) = &args.run {
         export_run(args, &history, run)?;
@@ -81,12 +95,21 @@ pub fn export(args: &ExportArgs) -> Result<(), Diagnostics> {
         output::print_prose(&format!("{} holds campaigns, runs, scenes and outcomes\n", file.display()));
     }
     if args.parquet.is_some() || args.csv.is_some() || args.dataset.is_some() || args.rebuild_mirror {
-        export_tables(args, &history)?;
+        write_tables(args, &history)?;
     }
-    Ok(())
+    if let Some(place) = &args.tables {
+        let code = export_tables::copy(place, &args.sparql.remote, &history)?;
+        if code != 0 {
+            return Ok(code);
+        }
+    }
+    match &args.sparql.sparql {
+        Some(url) => export_sparql::send(&args.sparql, url, args.complete, &history),
+        None => Ok(0),
+    }
 }
 
-fn export_tables(args: &ExportArgs, history: &History) -> Result<(), Diagnostics> {
+fn write_tables(args: &ExportArgs, history: &History) -> Result<(), Diagnostics> {
     let filter = args.chosen.filter(history)?;
     let hierarchy = chosen::hierarchy(&args.chosen.ontology()?);
     let (mirror, change) = if args.rebuild_mirror { Mirror::rebuild(history) } else { Mirror::update(history) }?;

@@ -6,7 +6,7 @@ use crate::options::{Format, HistoryArgs};
 use crate::{compare, history_dir, integrity, output};
 use actcheck_analysis::HealthMeter;
 use actcheck_base::{Diagnostic, Diagnostics};
-use actcheck_history::{History, RunFilter};
+use actcheck_history::{History, RunFilter, Wish};
 use actcheck_report::{HealthSummary, health_json, health_table, health_text};
 
 /// `actcheck health`
@@ -58,11 +58,14 @@ pub fn health(args: &HealthArgs) -> Result<u8, Diagnostics> {
 pub(super) fn examine(history: &History, campaign: &str) -> Result<HealthSummary, Diagnostics> {
     let mut meter = HealthMeter::default();
     history.each_vitals(campaign, |run| meter.add(run))?;
-    let outcomes = history.outcomes(&RunFilter { campaign: Some(campaign.to_owned()), ..RunFilter::default() })?;
+    let filter = RunFilter { campaign: Some(campaign.to_owned()), ..RunFilter::default() };
+    history.each_judged(&filter, Wish::default(), &mut |run| {
+        run.outcomes.iter().for_each(|own| meter.add_outcome(&own.property, own.outcome));
+    })?;
     Ok(HealthSummary {
         campaign: campaign.to_owned(),
         history: history.dir().display().to_string(),
         program: std::env::args().next().unwrap_or_else(|| "actcheck".to_owned()),
-        health: meter.finish(&outcomes),
+        health: meter.finish(),
     })
 }

@@ -1,6 +1,7 @@
 //! `actcheck list`
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
 
 use clap::Args;
 use serde_json::Value;
@@ -10,8 +11,11 @@ use crate::options::{Format, HistoryArgs};
 use crate::where_rows::{Condition, matching_runs};
 use crate::{history_dir, output};
 use actcheck_base::{Diagnostics, Outcome, did_you_mean, names};
-use actcheck_history::{History, OutcomeRow, RunFilter, RunRow};
+use actcheck_history::{History, JudgedOutcome, Judgements, RunFilter, RunRow, Wish};
 use actcheck_report::Table;
+
+/// Number of rows that are formatted and printed together.
+const ROWS_AT_A_TIME: usize = 10_000;
 
 /// `actcheck list`
 #[derive(Debug, Args)]
@@ -60,9 +64,7 @@ pub fn list(args: &ListArgs) -> Result<(), Diagnostics> {
         history.campaign(campaign)?;
     }
     let filter = RunFilter { campaign: args.campaign.clone(), ..RunFilter::default() };
-    let mut runs = history.runs(&filter)?;
-    let judged = Judged::read(args, &history, &filter)?;
-    runs.retain(|row| judged.as_ref().is_none_or(|judged| judged.has(&row.run)));
+    let (mut runs, words) = chosen_runs(args, &history, &filter)?;
     if !args.conditions.is_empty() {
         let campaign = args.campaign.as_ref();
         let found = matching_runs(&history, campaign, &args.property, args.wanted(), &args.conditions)?;
@@ -86,13 +88,41 @@ pub fn list(args: &ListArgs) -> Result<(), Diagnostics> {
     let mut table =
         Table::new(shown.iter().map(|(name, ..)| *name)).with_expendable(["trace_hash", "index", "weight", "test"]);
     table.columns.extend(args.property.iter().map(|name| names::local(name).to_owned()));
-    let row = |row: &RunRow| {
-        let outcomes =
-            args.property.iter().map(|name| judged.as_ref().map(|judged| judged.words(&row.run, name)).into());
-        shown.iter().map(|(.., cell)| cell(row)).chain(outcomes).collect()
+    let row = |row: &RunRow| -> Vec<Value> {
+        let words = words.get(&row.run).into_iter().flatten().map(|words| words.as_str().into());
+        shown.iter().map(|(.., cell)| cell(row)).chain(words).collect()
     };
-    table.rows = runs.iter().map(row).collect();
-    output::print(&table.render(args.format.into(), output::page()));
+    // The rows of all runs together would take a gigabyte for each million.
+    let chunks = runs.chunks(ROWS_AT_A_TIME);
+    match args.format {
+        _ if runs.len() <= ROWS_AT_A_TIME => {
+            table.rows = runs.iter().map(row).collect();
+            output::print(&table.render(args.format.into(), output::page()));
+        }
+        Format::Csv => {
+            output::print(&table.render(args.format.into(), output::page()));
+            for runs in chunks {
+                table.rows = runs.iter().map(row).collect();
+                output::print(&table.csv_rows());
+            }
+        }
+        Format::Text => {
+            for runs in chunks {
+                table.rows = runs.iter().map(row).collect();
+                output::print(&table.render(args.format.into(), output::page()));
+            }
+        }
+        Format::Json => {
+            for (place, runs) in chunks.enumerate() {
+                table.rows = runs.iter().map(row).collect();
+                // The array of each part without its brackets.
+                let part = table.render(args.format.into(), output::page());
+                let items = part.trim_end().trim_start_matches('[').trim_end_matches(']').trim_end();
+                output::print(&format!("{}{items}", if place == 0 { "[" } else { "," }));
+            }
+            output::print("\n]\n");
+        }
+    }
     if runs.is_empty() {
         output::print_none("no run matches; `actcheck list` without options lists all");
     }
@@ -103,40 +133,43 @@ fn outcome(word: &str) -> Result<Outcome, String> {
     Outcome::from_word(word).ok_or_else(|| did_you_mean(word, Outcome::ALL.map(Outcome::word)))
 }
 
-/// The outcomes by which runs are chosen.
-struct Judged {
-    /// The outcomes of the named properties, or of all, in each run.
-    outcomes: BTreeMap<String, Vec<OutcomeRow>>,
-    /// The outcome that a run must have.
-    wanted: Option<Outcome>,
-}
+/// The outcomes of the named properties by run: one text for each property.
+type OutcomeWords = BTreeMap<String, Vec<String>>;
 
-impl Judged {
-    /// Reads the outcomes that the options name. Returns `None` if no option chooses runs by outcome.
-    fn read(args: &ListArgs, history: &History, filter: &RunFilter) -> Result<Option<Self>, Diagnostics> {
-        let wanted = args.wanted();
-        if wanted.is_none() && args.property.is_empty() {
-            return Ok(None);
+/// The runs that the options choose, and the outcomes of the named properties in each: one text for each property, with the
+/// outcomes of all actions that have it.
+fn chosen_runs(
+    args: &ListArgs,
+    history: &History,
+    filter: &RunFilter,
+) -> Result<(Vec<RunRow>, OutcomeWords), Diagnostics> {
+    let wanted = args.wanted();
+    let by_outcome = wanted.is_some() || !args.property.is_empty();
+    let judgements = if by_outcome { Judgements::Newest } else { Judgements::None };
+    let (mut runs, mut words) = (Vec::new(), BTreeMap::new());
+    let mut judged: BTreeSet<Arc<str>> = BTreeSet::new();
+    history.each_judged(filter, Wish { judgements, ..Wish::default() }, &mut |run| {
+        for own in &run.outcomes {
+            if !judged.contains(&own.property) {
+                judged.insert(Arc::clone(&own.property));
+            }
         }
-        let rows = history.newest_outcomes(filter)?.rows;
-        chosen::all_judged(&args.property, rows.iter().map(|row| row.property.as_str()))?;
-        let is_named = |row: &OutcomeRow| args.property.iter().any(|name| is_meant(&row.property, name));
-        let mut outcomes: BTreeMap<String, Vec<OutcomeRow>> = BTreeMap::new();
-        for row in rows.into_iter().filter(|row| args.property.is_empty() || is_named(row)) {
-            outcomes.entry(row.run.clone()).or_default().push(row);
+        let is_named = |own: &&JudgedOutcome| args.property.iter().any(|name| is_meant(&own.property, name));
+        let mut named = run.outcomes.iter().filter(|own| args.property.is_empty() || is_named(own));
+        if by_outcome && !named.any(|own| wanted.is_none_or(|wanted| own.outcome == wanted)) {
+            return;
         }
-        Ok(Some(Self { outcomes, wanted }))
+        let outcomes = |name: &String| -> String {
+            let own = run.outcomes.iter().filter(|own| is_meant(&own.property, name));
+            own.map(|own| own.outcome.word()).collect::<Vec<_>>().join(", ")
+        };
+        if !args.property.is_empty() {
+            words.insert(run.row.run.clone(), args.property.iter().map(outcomes).collect());
+        }
+        runs.push(run.row);
+    })?;
+    if by_outcome {
+        chosen::all_judged(&args.property, judged.iter().map(|property| &**property))?;
     }
-
-    /// Whether a run is chosen.
-    fn has(&self, run: &str) -> bool {
-        let is_wanted = |row: &OutcomeRow| self.wanted.is_none_or(|wanted| row.outcome == wanted);
-        self.outcomes.get(run).is_some_and(|rows| rows.iter().any(is_wanted))
-    }
-
-    /// The outcomes of a property in a run, one for each action that has it.
-    fn words(&self, run: &str, property: &str) -> String {
-        let rows = self.outcomes.get(run).into_iter().flatten().filter(|row| is_meant(&row.property, property));
-        rows.map(|row| row.outcome.word()).collect::<Vec<_>>().join(", ")
-    }
+    Ok((runs, words))
 }

@@ -8,6 +8,7 @@ use serde_json::{Value, json};
 use crate::options::Format;
 use crate::progress::Progress;
 use crate::{output, stop};
+use actcheck_analysis::Mirror;
 use actcheck_base::{Diagnostic, Diagnostics};
 use actcheck_history::History;
 use actcheck_history::merge::{MergeOptions, MergePlan, PlannedMerge, carry_out, plan};
@@ -63,6 +64,10 @@ pub fn merge(args: &MergeArgs) -> Result<u8, Diagnostics> {
             Ok(stop::INTERRUPTED)
         });
     }
+    // Tables that are missing are made when they are needed.
+    if let Err(faults) = Mirror::adopt(&plan, &sources, &into) {
+        output::print_diagnostics(&faults);
+    }
     output::print(&printed(&plan, args.format));
     merged.warning().into_iter().for_each(|warning| warnings.push(warning));
     plan.campaigns.iter().filter_map(lacking).for_each(|warning| warnings.push(warning));
@@ -90,6 +95,7 @@ fn open_all(args: &MergeArgs) -> Result<(Vec<History>, Diagnostics), Diagnostics
         };
         match opened {
             Ok((history, lost)) => {
+                history.rest();
                 lost_runs(dir, &lost).into_iter().for_each(|warning| warnings.push(warning));
                 sources.push(history);
             }

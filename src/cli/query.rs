@@ -6,8 +6,9 @@ use std::path::PathBuf;
 use clap::Args;
 
 use crate::options::{HistoryArgs, QueryFormat};
+use crate::remote::RemoteArgs;
 use crate::why::ontology_file;
-use crate::{history_dir, named_queries, output, stop};
+use crate::{history_dir, named_queries, output, query_endpoint, stop};
 use actcheck_base::{Diagnostic, Diagnostics, Files, Source, Term, names};
 use actcheck_history::{Cancel, QueryAnswer};
 use actcheck_ontology::{Vocabulary, load_vocabulary};
@@ -33,22 +34,36 @@ pub struct QueryArgs {
     /// The folder of the history.
     #[command(flatten)]
     pub history: HistoryArgs,
+    /// Ask a SPARQL 1.1 endpoint, to which the history was sent with `actcheck export --sparql`, instead of the history here.
+    /// Credentials: as for `export --sparql`
+    #[arg(long, value_name = "URL", conflicts_with = "history")]
+    pub endpoint: Option<String>,
+    /// Time limit and credentials of the endpoint.
+    #[command(flatten)]
+    pub remote: RemoteArgs,
     /// How the answer is printed (turtle: for CONSTRUCT and DESCRIBE)
     #[arg(long, value_name = "FORMAT", value_enum, default_value_t)]
     pub format: QueryFormat,
 }
 
-/// Runs a query and prints its answer. Ctrl-C stops a long query.
-pub fn query(args: &QueryArgs) -> Result<(), Diagnostics> {
+/// Runs a query and prints its answer. Ctrl-C stops a long query. Returns the exit code.
+pub fn query(args: &QueryArgs) -> Result<u8, Diagnostics> {
     if args.list_named {
-        return list_named(args.format);
+        return list_named(args.format).map(|()| 0);
     }
     let text = text(args)?;
+    match &args.endpoint {
+        Some(url) => query_endpoint::query(args, url, &text),
+        None => ask_history(args, &text).map(|()| 0),
+    }
+}
+
+fn ask_history(args: &QueryArgs, text: &Source) -> Result<(), Diagnostics> {
     let history = history_dir::open_to_read(&args.history)?;
     let cancel = Cancel::new();
     let asked = cancel.clone();
     let _flag = stop::on_interrupt(move || asked.cancel());
-    let answer = history.query_from(&text, &cancel)?;
+    let answer = history.query_from(text, &cancel)?;
     let format = match (args.format, &answer) {
         (QueryFormat::Turtle, QueryAnswer::Graph(triples)) => {
             output::print(&turtle(triples));
@@ -65,10 +80,15 @@ pub fn query(args: &QueryArgs) -> Result<(), Diagnostics> {
     };
     output::print(&answer_table(&answer, format == TableFormat::Table).render(format, output::page()));
     if is_empty(&answer) {
-        output::print_diagnostics(&unknown_terms(&text, &vocabulary()));
-        output::print_none("the query has no answers");
+        unknown(text);
     }
     Ok(())
+}
+
+/// Reports that a query has no answers, and its unknown terms, which may be the reason.
+pub(super) fn unknown(text: &Source) {
+    output::print_diagnostics(&unknown_terms(text, &vocabulary()));
+    output::print_none("the query has no answers");
 }
 
 fn is_empty(answer: &QueryAnswer) -> bool {
@@ -141,14 +161,17 @@ fn text(args: &QueryArgs) -> Result<Source, Diagnostics> {
 
 /// Triples in Turtle, one per line.
 fn turtle(triples: &[[Term; 3]]) -> String {
-    let mut out = String::new();
-    for (prefix, namespace) in names::PREFIXES {
-        out.push_str(&format!("@prefix {prefix}: <{namespace}> .\n"));
-    }
-    for [s, p, o] in triples {
-        out.push_str(&format!("{} {} {} .\n", turtle_term(s), turtle_term(p), turtle_term(o)));
-    }
-    out
+    turtle_prefixes() + &triples.iter().map(turtle_line).collect::<String>()
+}
+
+/// The beginning of a graph in Turtle.
+pub(super) fn turtle_prefixes() -> String {
+    names::PREFIXES.iter().map(|(prefix, namespace)| format!("@prefix {prefix}: <{namespace}> .\n")).collect()
+}
+
+/// A triple in Turtle.
+pub(super) fn turtle_line([s, p, o]: &[Term; 3]) -> String {
+    format!("{} {} {} .\n", turtle_term(s), turtle_term(p), turtle_term(o))
 }
 
 /// A term in Turtle. Literals whose shorthand would have another type carry their datatype.

@@ -13,7 +13,7 @@ use actcheck_report::{Explained, ReplayedRun};
 use actcheck_rules::{Budget, RuleBook};
 
 /// Most runs of a report that are simulated again, because the history keeps only their outlines.
-pub(super) const MOST_RESTORED: usize = 20;
+pub(super) const MOST_RESTORED: usize = 10;
 /// Number of runs that a worker reads ahead.
 const RUNS_OF_A_WORKER: usize = 8;
 
@@ -42,7 +42,8 @@ pub(super) fn for_each_batch(
     for runs in order.chunks(all_cores() * RUNS_OF_A_WORKER) {
         let shares: Vec<Vec<Result<ReplayedRun, Diagnostics>>> = std::thread::scope(|scope| {
             let share = |runs: &'_ [String]| runs.iter().map(read).collect();
-            let started: Vec<_> = runs.chunks(RUNS_OF_A_WORKER).map(|runs| scope.spawn(move || share(runs))).collect();
+            let of_each = runs.len().div_ceil(all_cores()).max(1);
+            let started: Vec<_> = runs.chunks(of_each).map(|runs| scope.spawn(move || share(runs))).collect();
             started
                 .into_iter()
                 .map(|share| share.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)))
@@ -59,13 +60,15 @@ pub(super) fn for_each_batch(
 fn affordable(history: &History, order: &[String]) -> Result<Vec<String>, Diagnostics> {
     let outlines: HashSet<String> = history.outline_ids()?.into_iter().collect();
     let mut left = MOST_RESTORED;
-    let mut is_affordable = |id: &&String| {
-        let restored = outlines.contains(*id);
-        let affordable = !restored || left > 0;
-        left -= usize::from(restored && affordable);
-        affordable
-    };
-    Ok(order.iter().filter(|id| is_affordable(id)).cloned().collect())
+    let mut affordable = Vec::new();
+    for id in order {
+        let restored = outlines.contains(id);
+        if !restored || left > 0 {
+            affordable.push(id.clone());
+        }
+        left -= usize::from(restored && left > 0);
+    }
+    Ok(affordable)
 }
 
 /// Explains the failed properties of a run, given its trace. Omits those that the current rules can't explain.

@@ -16,13 +16,14 @@ use actcheck_report::{HtmlReport, PropertyWords, Replays, html, replay_order};
 /// # Errors
 /// The history can't be read.
 pub(super) fn page(found: &Analysed, history: &History, room: f64) -> Result<String, Diagnostics> {
-    let Analysed { table, summary, ontology } = found;
-    let replays = replays(history, ontology, &replay_order(summary, table), room)?;
+    let Analysed { table, sample, summary, ontology } = found;
+    let replays = replays(history, ontology, &replay_order(summary, sample.as_ref().unwrap_or(table)), room)?;
     Ok(html(&HtmlReport {
         version: env!("CARGO_PKG_VERSION"),
         made: &(clock::system().now)(),
         findings: summary,
         table,
+        sample: sample.as_ref(),
         campaigns: &history.campaigns()?,
         words: &words(ontology),
         replays: &replays,

@@ -47,7 +47,7 @@ pub(super) fn write(
 
 /// All runs: first those that the page replays, which show every failure, then the others.
 fn order(found: &Analysed) -> Vec<String> {
-    let mut order = replay_order(&found.summary, &found.table);
+    let mut order = replay_order(&found.summary, found.sample.as_ref().unwrap_or(&found.table));
     let known: BTreeSet<String> = order.iter().cloned().collect();
     order.extend(found.table.text("run").texts.iter().filter(|run| !known.contains(*run)).cloned());
     order

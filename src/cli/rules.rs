@@ -10,7 +10,7 @@ use crate::options::{Format, HistoryArgs};
 use crate::why::ontology_file;
 use crate::{history_dir, output};
 use actcheck_base::{Diagnostics, Outcome};
-use actcheck_history::RunFilter;
+use actcheck_history::{Judgements, RunFilter, Wish};
 use actcheck_ontology as ontology;
 use actcheck_ontology::{Action, Ontology, Property};
 use actcheck_report::{Proportion, Table};
@@ -37,10 +37,12 @@ pub fn rules(args: &RulesArgs) -> Result<(), Diagnostics> {
     let mut judged: BTreeMap<String, Counts> = BTreeMap::new();
     if let Some(history) = history_dir::open_if_any(&args.history)? {
         let counted = history.counted_runs()?;
-        let outcomes = history.newest_outcomes(&RunFilter::default())?.rows;
-        for row in outcomes.into_iter().filter(|row| counted.contains(&row.run)) {
-            judged.entry(row.property).or_default().add(row.outcome);
-        }
+        let wish = Wish { judgements: Judgements::Newest, ..Wish::default() };
+        history.each_judged(&RunFilter::default(), wish, &mut |run| {
+            for own in run.outcomes.iter().filter(|_| counted.contains(&run.row.run)) {
+                judged.entry(own.property.to_string()).or_default().add(own.outcome);
+            }
+        })?;
     }
     let counts = |property: &Property| judged.get(&property.iri).copied().unwrap_or_default();
     let properties = ontology.properties.values();

@@ -142,7 +142,10 @@ fn find(args: &RunArgs, id: &str) -> Result<(History, CampaignRecord), Diagnosti
 /// Runs of a campaign that are in the history.
 pub fn stored(history: &History, env: &Env, id: &str) -> Result<Vec<RunDetail>, Diagnostics> {
     let rows = history.runs(&RunFilter { campaign: Some(id.to_owned()), ..RunFilter::default() })?;
-    let mut kept: Vec<RunDetail> = rows.iter().map(|row| history.run(&row.run)).collect::<Result<_, _>>()?;
+    let mut ids: Vec<String> = rows.into_iter().map(|row| row.run).collect();
+    history.sort_as_stored(id, &mut ids)?;
+    let mut kept: Vec<RunDetail> = ids.iter().map(|run| history.run(run)).collect::<Result<_, _>>()?;
+    kept.sort_by_key(|run| run.row.index);
     kept.iter_mut().flat_map(|run| &mut run.actions).for_each(|action| order(action, env));
     Ok(kept)
 }

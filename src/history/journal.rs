@@ -231,7 +231,7 @@ fn encode(quads: &[Quad]) -> io::Result<Vec<u8>> {
     Ok(record)
 }
 
-fn written(term: TermRef<'_>) -> Written<'_> {
+pub(super) fn written(term: TermRef<'_>) -> Written<'_> {
     match term {
         TermRef::NamedNode(node) => Written::Iri(node.as_str()),
         TermRef::BlankNode(node) => Written::Blank(node.as_str()),
@@ -282,7 +282,7 @@ pub(super) fn collect(written: &[Written<'_>], rows: &[[u32; 4]], wanted: &Wante
     Some(())
 }
 
-fn read_term(written: Written<'_>) -> Term {
+pub(super) fn read_term(written: Written<'_>) -> Term {
     match written {
         Written::Iri(iri) => NamedNode::new_unchecked(iri).into(),
         Written::Blank(label) => BlankNode::new_unchecked(label).into(),

@@ -41,21 +41,8 @@ SELECT ?run ?campaign ?index ?test ?status ?step ?action ?property ?outcome ?mar
     OPTIONAL { ?result act:margin ?margin }
 }";
 
-/// Judgements made after the run that no later one supersedes.
-const RECHECKED: &str = "
-SELECT ?run ?campaign ?index ?test ?status ?step ?action ?property ?outcome ?margin ?rule WHERE {
-    GRAPH act:rechecked {
-        ?assertion earl:subject ?execution ; earl:test ?property ; earl:result ?result .
-        ?result act:outcome ?outcome ; act:ruleDigest ?rule .
-        OPTIONAL { ?result act:margin ?margin }
-    }
-    FILTER NOT EXISTS { GRAPH act:rechecked { ?later act:supersedes ?assertion } }
-    ?execution act:ofRun ?run ; act:step ?step ; act:action ?action .
-    ?run act:campaign ?campaign ; act:index ?index ; act:test ?test ; act:status ?status .
-}";
-
 /// Judgements made after the run that no later one supersedes, without the run, which the store may lack.
-const RECHECKED_ALONE: &str = "
+const RECHECKED: &str = "
 SELECT ?execution ?property ?outcome ?margin ?rule WHERE {
     GRAPH act:rechecked {
         ?assertion earl:subject ?execution ; earl:test ?property ; earl:result ?result .
@@ -76,13 +63,13 @@ SELECT ?execution ?property ?at ?outcome ?rule WHERE {
 
 /// Campaigns whose scenes were selected because they fail: shrunk runs, failed runs that ran again, and cases, which have
 /// the table `case` in their configuration. The prefix is [`FAILED_AGAIN`].
-const SELECTED: &str = r"
+pub(super) const SELECTED: &str = r"
 SELECT DISTINCT ?campaign WHERE {
-    { ?run act:shrunkFrom ?original ; act:campaign ?campaign }
+    { ?ac_run act:shrunkFrom ?ac_original ; act:campaign ?campaign }
     UNION
-    { ?campaign a act:Campaign ; rdfs:label ?name FILTER(STRSTARTS(?name, 'failed runs of ')) }
+    { ?campaign a act:Campaign ; rdfs:label ?ac_name FILTER(STRSTARTS(?ac_name, 'failed runs of ')) }
     UNION
-    { ?campaign a act:Campaign ; act:configText ?text FILTER(REGEX(?text, '^[ \\t]*(\\[[ \\t]*case[ \\t]*(\\]|\\.)|case[ \\t]*(\\.|=))', 'm')) }
+    { ?campaign a act:Campaign ; act:configText ?ac_text FILTER(REGEX(?ac_text, '^[ \\t]*(\\[[ \\t]*case[ \\t]*(\\]|\\.)|case[ \\t]*(\\.|=))', 'm')) }
 }";
 
 /// Name prefix of campaigns that ran the failed runs of another campaign again.
@@ -123,7 +110,7 @@ pub(super) fn of_outcomes() -> Wanted {
 
 /// The statements that [`rechecked`] reads.
 pub(super) fn of_rechecked() -> Wanted {
-    Wanted::queries(&[RECHECKED, RECHECKED_ALONE])
+    Wanted::queries(&[RECHECKED])
 }
 
 /// The statements that [`later_judgements`] reads.
@@ -134,6 +121,14 @@ pub(super) fn of_later_judgements() -> Wanted {
 /// The statements that [`selected_campaigns`] and [`campaign_ids`] read.
 pub(super) fn of_selected_campaigns() -> Wanted {
     Wanted::queries(&[SELECTED, STARTS])
+}
+
+/// A pattern on one line that matches if a campaign is one of [`selected_campaigns`]. `campaign` is a variable.
+pub(super) fn is_selected(campaign: &str) -> String {
+    let pattern =
+        SELECTED.split_once('{').and_then(|(_, rest)| rest.rsplit_once('}')).map_or("", |(pattern, _)| pattern);
+    let words: Vec<&str> = pattern.lines().map(str::trim).collect();
+    words.join(" ").replace("?campaign", campaign)
 }
 
 type Row = Vec<Option<Term>>;
@@ -260,22 +255,6 @@ fn sort_by_rank(ranks: &BTreeMap<String, usize>, rows: &mut [RunRow]) {
     rows.sort_by(|a, b| (ranks.get(&a.campaign), a.index, &a.run).cmp(&(ranks.get(&b.campaign), b.index, &b.run)));
 }
 
-/// Sorts runs by the start of their campaign, then by index; removes those of campaigns that the store does not have.
-pub(super) fn sort_runs(store: &Store, rows: &mut Vec<RunRow>) -> Result<(), QueryEvaluationError> {
-    let ranks = ranks(store)?;
-    rows.retain(|row| ranks.contains_key(&row.campaign));
-    sort_by_rank(&ranks, rows);
-    Ok(())
-}
-
-/// Sorts outcomes as [`outcomes`] does; removes those of campaigns that the store does not have.
-pub(super) fn sort_outcomes(store: &Store, rows: &mut Vec<OutcomeRow>) -> Result<(), QueryEvaluationError> {
-    let ranks = ranks(store)?;
-    rows.retain(|row| ranks.contains_key(&row.campaign));
-    sort_outcomes_by_rank(&ranks, rows);
-    Ok(())
-}
-
 /// Outcomes of the runs that match a filter, in the same order, then by step and property.
 pub(super) fn outcomes(store: &Store, filter: &RunFilter) -> Result<Vec<OutcomeRow>, QueryEvaluationError> {
     let ranks = ranks(store)?;
@@ -296,11 +275,6 @@ fn sort_outcomes_by_rank(ranks: &BTreeMap<String, usize>, rows: &mut [OutcomeRow
     });
 }
 
-/// The judgements made after the run that no other supersedes, each with the digest of its rule, unsorted.
-pub(super) fn rechecked(store: &Store, filter: &RunFilter) -> Result<Vec<(OutcomeRow, String)>, QueryEvaluationError> {
-    Ok(select(store, RECHECKED, given(filter))?.iter().map(|row| (outcome_row(row), text(row, 10))).collect())
-}
-
 /// A judgement made after the run, without its run's other values.
 pub(super) struct LaterOutcome {
     pub run: String,
@@ -312,8 +286,8 @@ pub(super) struct LaterOutcome {
     pub rule: String,
 }
 
-/// As [`rechecked`], also for runs that the store lacks.
-pub(super) fn rechecked_alone(store: &Store) -> Result<Vec<LaterOutcome>, QueryEvaluationError> {
+/// The judgements made after runs that no other supersedes, also those after runs that the store lacks; unsorted.
+pub(super) fn rechecked(store: &Store) -> Result<Vec<LaterOutcome>, QueryEvaluationError> {
     let of = |row: &Row| {
         let (run, step) = run_and_step(row)?;
         Some(LaterOutcome {
@@ -325,7 +299,7 @@ pub(super) fn rechecked_alone(store: &Store) -> Result<Vec<LaterOutcome>, QueryE
             rule: text(row, 4),
         })
     };
-    Ok(select(store, RECHECKED_ALONE, Vec::new())?.iter().filter_map(of).collect())
+    Ok(select(store, RECHECKED, Vec::new())?.iter().filter_map(of).collect())
 }
 
 /// The run and the step of an execution, from its IRI in the first column.
@@ -351,7 +325,7 @@ pub(super) fn later_judgements(store: &Store) -> Result<Vec<(String, String)>, Q
     Ok(select(store, LATER, Vec::new())?.iter().map(|row| (id(row, 0), judgement(row))).collect())
 }
 
-/// A row of [`OUTCOMES`] or of [`RECHECKED`].
+/// A row of [`OUTCOMES`].
 fn outcome_row(row: &Row) -> OutcomeRow {
     OutcomeRow {
         run: id(row, 0),

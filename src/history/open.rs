@@ -55,6 +55,8 @@ pub(super) struct Opened {
     snapshot: Option<Arc<Snapshot>>,
     /// The statements of the snapshot's journal that are in the store.
     loaded: Mutex<Wanted>,
+    /// Whether the store can be opened again from the snapshot: one that was salvaged is only in memory.
+    can_rest: bool,
 }
 
 impl Opened {
@@ -126,11 +128,11 @@ impl History {
         let folder = Folder::to_read(dir)?;
         let snapshot = Snapshot::salvage(&folder)?;
         let (journal, is_whole) = journal::statements(&snapshot.journal);
-        let opened = read_tables(&folder, snapshot)?;
+        let opened = read_tables(&folder, Arc::new(snapshot))?;
         let salvaged = salvage(&opened.store, journal, is_whole, &folder.traced())
             .map_err(|error| fault::store(dir, "reading it", &error))?;
         let store = OpenStore { store: salvaged.store, snapshot: opened.snapshot.clone() };
-        let opened = Opened { store, snapshot: opened.snapshot, loaded: Mutex::new(Wanted::all()) };
+        let opened = Opened { store, snapshot: opened.snapshot, loaded: Mutex::new(Wanted::all()), can_rest: false };
         Ok((Self::with(opened, folder), salvaged.lost))
     }
 
@@ -172,6 +174,7 @@ impl History {
         let journal = Mutex::new(Journal::new(folder.dir()));
         Self {
             opened: RwLock::new(Some(opened)),
+            resting: Mutex::default(),
             folder,
             journal,
             view: Mutex::default(),
@@ -190,6 +193,9 @@ impl History {
     /// journal.
     pub(super) fn store_with(&self, wanted: impl FnOnce() -> Wanted) -> Result<OpenStore, Diagnostics> {
         self.complete_store()?;
+        if self.is_resting() {
+            self.wake()?;
+        }
         let opened = self.opened.read().unwrap_or_else(PoisonError::into_inner);
         if let Some(opened) = opened.as_ref() {
             opened.load(self.dir(), wanted)?;
@@ -200,9 +206,36 @@ impl History {
 
     /// Returns a handle of the store, which lacks the statements in the journal.
     pub(super) fn bare_store(&self) -> Result<OpenStore, Diagnostics> {
+        if self.is_resting() {
+            self.wake()?;
+        }
         let opened = self.opened.read().unwrap_or_else(PoisonError::into_inner);
         let opened = opened.as_ref().ok_or_else(|| fault::damaged(self.dir(), "it could not be opened again"))?;
         Ok(opened.store.clone())
+    }
+
+    /// Closes the store of a reader until it is needed again, with the same state: each open store takes some megabytes.
+    pub fn rest(&self) {
+        let mut opened = self.opened.write().unwrap_or_else(PoisonError::into_inner);
+        let mut resting = self.resting.lock().unwrap_or_else(PoisonError::into_inner);
+        *self.view.lock().unwrap_or_else(PoisonError::into_inner) = None;
+        if opened.as_ref().is_some_and(|opened| opened.can_rest) {
+            *resting = opened.take().and_then(|opened| opened.snapshot);
+        }
+    }
+
+    /// Opens a store that rests.
+    fn wake(&self) -> Result<(), Diagnostics> {
+        let mut opened = self.opened.write().unwrap_or_else(PoisonError::into_inner);
+        let snapshot = self.resting.lock().unwrap_or_else(PoisonError::into_inner).take();
+        if let Some(snapshot) = snapshot {
+            *opened = Some(read(&self.folder, snapshot)?);
+        }
+        Ok(())
+    }
+
+    fn is_resting(&self) -> bool {
+        self.resting.lock().unwrap_or_else(PoisonError::into_inner).is_some()
     }
 
     /// Closes and reopens the store. Only then does it delete logs whose content is already in its tables; they are as
@@ -237,7 +270,7 @@ impl Drop for History {
 fn read_present(folder: &Folder, tries: usize) -> Result<Opened, Diagnostics> {
     let (mut left, mut was_locked) = (tries, true);
     loop {
-        let faults = match Snapshot::take(folder).and_then(|snapshot| read(folder, snapshot)) {
+        let faults = match Snapshot::take(folder).and_then(|snapshot| read(folder, Arc::new(snapshot))) {
             Ok(opened) => return Ok(opened),
             Err(faults) => faults,
         };
@@ -263,7 +296,7 @@ fn read_present(folder: &Folder, tries: usize) -> Result<Opened, Diagnostics> {
 }
 
 /// Opens a snapshot. The statements of its journal are added when they are asked for.
-fn read(folder: &Folder, snapshot: Snapshot) -> Result<Opened, Diagnostics> {
+fn read(folder: &Folder, snapshot: Arc<Snapshot>) -> Result<Opened, Diagnostics> {
     if !journal::is_whole(&snapshot.journal) {
         return Err(fault::damaged(folder.dir(), pending::DAMAGED));
     }
@@ -278,19 +311,19 @@ fn read(folder: &Folder, snapshot: Snapshot) -> Result<Opened, Diagnostics> {
 pub(super) fn read_with_outlines(folder: &Folder) -> Result<Opened, Diagnostics> {
     let snapshot = Snapshot::take(folder)?;
     let store = pending::open_for_outlines(&snapshot);
-    opened(folder, store, snapshot)
+    opened(folder, store, Arc::new(snapshot))
 }
 
-fn read_tables(folder: &Folder, snapshot: Snapshot) -> Result<Opened, Diagnostics> {
+fn read_tables(folder: &Folder, snapshot: Arc<Snapshot>) -> Result<Opened, Diagnostics> {
     let store = Store::open_read_only(snapshot.store());
     opened(folder, store, snapshot)
 }
 
-fn opened(folder: &Folder, store: Result<Store, StorageError>, snapshot: Snapshot) -> Result<Opened, Diagnostics> {
+fn opened(folder: &Folder, store: Result<Store, StorageError>, snapshot: Arc<Snapshot>) -> Result<Opened, Diagnostics> {
     let store = store.map_err(|error| fault::unread(folder.dir(), &error))?;
-    let snapshot = Some(Arc::new(snapshot));
+    let snapshot = Some(snapshot);
     let store = OpenStore { store, snapshot: snapshot.clone() };
-    Ok(Opened { store, snapshot, loaded: Mutex::default() })
+    Ok(Opened { store, snapshot, loaded: Mutex::default(), can_rest: true })
 }
 
 fn own(folder: &Folder) -> Result<Opened, Diagnostics> {
@@ -305,7 +338,8 @@ fn own(folder: &Folder) -> Result<Opened, Diagnostics> {
             let _ = std::fs::remove_file(entry.path());
         }
     }
-    Ok(Opened { store: OpenStore { store, snapshot: None }, snapshot: None, loaded: Mutex::default() })
+    let store = OpenStore { store, snapshot: None };
+    Ok(Opened { store, snapshot: None, loaded: Mutex::default(), can_rest: false })
 }
 
 #[cfg(test)]

@@ -1,8 +1,9 @@
 //! SPARQL queries of users: prefixes are predefined, faults have their place, updates are refused.
 
+use std::collections::BTreeMap;
 use std::ops::Range;
 use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::{Arc, OnceLock};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use oxigraph::model::{Literal, NamedNode, Term as StoreTerm};
 use oxigraph::sparql::{PreparedSparqlQuery, QueryEvaluationError, QueryResults, SparqlEvaluator, SparqlSyntaxError};
@@ -13,6 +14,7 @@ use crate::evaluation::{Unfinished, evaluate};
 use crate::fault;
 use crate::light::parser;
 use crate::open::OpenStore;
+use crate::outlined;
 use crate::syntax_fault::syntax_fault;
 use crate::terms::{from_store, to_store};
 use crate::wanted::Wanted;
@@ -30,32 +32,46 @@ const MOST_TEXT: usize = 512 << 20;
 /// Maximum length of one of these texts. Unit: bytes.
 const LONGEST_TEXT: usize = 32 << 20;
 
+/// Number of texts that are made once for equal arguments, and their longest length (unit: bytes): a pattern takes long to
+/// compile, and most queries apply it to the names of a few properties.
+const MOST_KNOWN: usize = 256;
+const LONGEST_KNOWN: usize = 512;
+
 /// Sizes of stores whose columns are joined. In smaller ones it does not matter; in larger ones the columns may not fit
 /// in memory. Unit: bytes.
-const COLUMNS: Range<u64> = 16 << 20..1 << 30;
+pub(super) const COLUMNS: Range<u64> = 16 << 20..1 << 30;
 
 /// Answers a query.
 pub(super) fn answer(history: &History, text: &Source, cancel: &Cancel) -> Result<QueryAnswer, Diagnostics> {
     refuse_update(text)?;
     refuse_excess(text)?;
+    if history.shelf().exists()
+        && let Some(answer) = outlined::answer(history, text, cancel)?
+    {
+        return Ok(answer);
+    }
     let store = history.store_for_query(|| Wanted::query(&text.text))?;
     let query = prepare(text, &store, cancel)?;
     let prepared = query.prepared.clone();
     let evaluated = evaluate(&store, cancel, move |store| prepared.on_store(store).execute().and_then(collect));
     query.check_texts(text)?;
-    evaluated.map_err(|fault| match fault {
+    evaluated.map_err(|fault| unfinished(history, text, fault))
+}
+
+pub(super) fn unfinished(history: &History, text: &Source, fault: Unfinished) -> Diagnostics {
+    match fault {
         Unfinished::Stopped => stopped(text).into(),
         Unfinished::Failed(error) => evaluation_fault(text, &error).into(),
         Unfinished::Crashed => Diagnostic::error("H012", "the query made the evaluator crash").in_source(text).into(),
         Unfinished::Damaged(error) => fault::damaged(history.dir(), &error.to_string()),
-    })
+    }
 }
 
 /// A query that can be evaluated, with limits on the texts that it makes.
 pub(super) struct Prepared {
     pub prepared: PreparedSparqlQuery,
     /// Length of the texts so far. Unit: bytes.
-    made: Arc<AtomicUsize>,
+    pub made: Arc<AtomicUsize>,
 }
 
 impl Prepared {
@@ -88,7 +104,11 @@ pub(super) fn prepare(text: &Source, store: &OpenStore, cancel: &Cancel) -> Resu
 
 /// Adds functions that make texts of limited length: the evaluator keeps them until the query ends. Beyond the limit, they
 /// stop the query. `made`: their length so far, in bytes.
-fn with_text_functions(evaluator: SparqlEvaluator, cancel: &Cancel, made: &Arc<AtomicUsize>) -> SparqlEvaluator {
+pub(super) fn with_text_functions(
+    evaluator: SparqlEvaluator,
+    cancel: &Cancel,
+    made: &Arc<AtomicUsize>,
+) -> SparqlEvaluator {
     let appended = (cancel.clone(), Arc::clone(made));
     let evaluator =
         evaluator.with_custom_function(NamedNode::new_unchecked(COUNTED_TEXT), move |args: &[StoreTerm]| {
@@ -103,14 +123,28 @@ fn with_text_functions(evaluator: SparqlEvaluator, cancel: &Cancel, made: &Arc<A
         });
     TEXT_FUNCTIONS.into_iter().fold(evaluator, |evaluator, (_, iri, function)| {
         let (cancel, made) = (cancel.clone(), Arc::clone(made));
+        let known: Mutex<BTreeMap<Vec<Term>, Option<Term>>> = Mutex::default();
         evaluator.with_custom_function(NamedNode::new_unchecked(iri), move |args: &[StoreTerm]| {
             let args: Vec<Term> = args.iter().map(from_store).collect();
             let left = LONGEST_TEXT.min(MOST_TEXT.saturating_sub(made.load(Ordering::Relaxed)));
-            let Ok(found) = function(&args, left) else {
+            let mut known = known.lock().unwrap_or_else(PoisonError::into_inner);
+            let result = match known.get(&args) {
+                Some(found) => Ok(found.clone()),
+                None => function(&args, left),
+            };
+            let Ok(found) = result else {
                 made.fetch_add(MOST_TEXT + 1, Ordering::Relaxed);
                 cancel.cancel();
                 return None;
             };
+            let is_short = |term: &Term| match term {
+                Term::String(text) | Term::LangString(text, _) => text.len() <= LONGEST_KNOWN,
+                _ => true,
+            };
+            if known.len() < MOST_KNOWN && args.iter().chain(&found).all(is_short) {
+                known.insert(args, found.clone());
+            }
+            drop(known);
             if let Some(Term::String(text) | Term::LangString(text, _)) = &found {
                 made.fetch_add(text.len(), Ordering::Relaxed);
             }
@@ -174,7 +208,7 @@ fn with_counts(evaluator: SparqlEvaluator, store: OpenStore) -> SparqlEvaluator 
     })
 }
 
-fn collect(results: QueryResults<'_>) -> Result<QueryAnswer, QueryEvaluationError> {
+pub(super) fn collect(results: QueryResults<'_>) -> Result<QueryAnswer, QueryEvaluationError> {
     Ok(match results {
         QueryResults::Boolean(value) => QueryAnswer::Boolean(value),
         QueryResults::Solutions(solutions) => {

@@ -54,6 +54,21 @@ impl Recheck {
 }
 
 impl History {
+    /// Whether any run was judged after it was made.
+    ///
+    /// # Errors
+    /// The store can't be read.
+    pub(crate) fn has_later_judgements(&self) -> Result<bool, Diagnostics> {
+        let graph = iri(GRAPH);
+        let store = self.store()?;
+        let mut quads = store.quads_for_pattern(None, None, None, Some(GraphNameRef::NamedNode(graph.as_ref())));
+        quads
+            .next()
+            .transpose()
+            .map(|quad| quad.is_some())
+            .map_err(|error| self.fault("reading later judgements", &error))
+    }
+
     /// Returns the newest judgements of properties (IRIs) in one action of a run, sorted by property. `step` counts
     /// from 1.
     ///

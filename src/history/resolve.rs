@@ -1,7 +1,7 @@
 //! Names of runs as people type them.
 
 use crate::read::short_id;
-use crate::{History, RunFilter};
+use crate::{History, Judgements, RunFilter, Wish};
 use actcheck_base::{Diagnostic, Diagnostics, Outcome, names, nearest};
 
 /// Name of the last run.
@@ -44,12 +44,13 @@ impl History {
 
     /// The last run of the newest campaign that has one, or the last run in which a property failed.
     fn last(&self, failed: bool) -> Result<String, Diagnostics> {
-        let last = if failed {
-            let outcomes = self.newest_outcomes(&RunFilter::default())?.rows;
-            outcomes.into_iter().rfind(|row| row.outcome == Outcome::Failed).map(|row| row.run)
-        } else {
-            self.runs(&RunFilter::default())?.pop().map(|row| row.run)
-        };
+        let judgements = if failed { Judgements::Newest } else { Judgements::None };
+        let mut last = None;
+        self.each_judged(&RunFilter::default(), Wish { judgements, ..Wish::default() }, &mut |run| {
+            if !failed || run.outcomes.iter().any(|own| own.outcome == Outcome::Failed) {
+                last = Some(run.row.run);
+            }
+        })?;
         let which = if failed { "run in which a property failed" } else { "run" };
         last.ok_or_else(|| {
             Diagnostic::error("H008", format!("the history `{}` has no {which}", self.dir().display()))

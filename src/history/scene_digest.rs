@@ -1,6 +1,6 @@
 //! Digests of scenes, which show whether two runs had the same scene.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use serde::{Deserialize, Serialize};
 
@@ -30,21 +30,28 @@ impl History {
     /// # Errors
     /// The store can't be read.
     pub fn scenes(&self, runs: &[RunRow]) -> Result<BTreeMap<String, SceneDigest>, Diagnostics> {
-        let store = self.store_with(Wanted::details)?;
         let mut outlines = BTreeMap::new();
         self.each_outlined(&RunFilter::default(), &mut |outlined| {
             outlines.insert(outlined.run(), outlined.row.scene.clone());
         })?;
-        runs.iter()
-            .map(|row| {
-                let node = run_node(&row.run);
-                let digest = match outlines.remove(&row.run) {
-                    Some(digest) => Ok(digest),
-                    None => read(&*store, &node),
-                };
-                Ok((row.run.clone(), digest.map_err(|error| self.fault("reading scenes", &error))?))
-            })
-            .collect()
+        let wanted: BTreeSet<&String> = runs.iter().map(|row| &row.run).collect();
+        outlines.retain(|run, _| wanted.contains(run));
+        let whole: Vec<RunRow> = runs.iter().filter(|row| !outlines.contains_key(&row.run)).cloned().collect();
+        outlines.extend(self.whole_scenes(&whole)?);
+        Ok(outlines)
+    }
+
+    /// Returns the scenes of runs that are kept whole, by run id.
+    ///
+    /// # Errors
+    /// The store can't be read.
+    pub(super) fn whole_scenes(&self, runs: &[RunRow]) -> Result<BTreeMap<String, SceneDigest>, Diagnostics> {
+        let store = self.store_with(Wanted::details)?;
+        let scene = |row: &RunRow| {
+            let digest = read(&*store, &run_node(&row.run)).map_err(|error| self.fault("reading scenes", &error))?;
+            Ok((row.run.clone(), digest))
+        };
+        runs.iter().map(scene).collect()
     }
 }
 

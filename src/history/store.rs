@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::{Mutex, OnceLock, RwLock};
+use std::sync::{Arc, Mutex, OnceLock, RwLock};
 
 use oxigraph::model::vocab::rdf;
 use oxigraph::model::{GraphNameRef, NamedNode, QuadRef};
@@ -15,13 +15,14 @@ use crate::journal::Journal;
 use crate::open::Opened;
 use crate::outlines::{LoadedFiles, Outline, Restore, Shelf, View};
 use crate::read::{short_id, subjects, text_of};
+use crate::snapshot::Snapshot;
 use crate::statements::iri;
 use crate::wanted::Wanted;
 use crate::write_campaign::{self, campaign_node};
 use crate::write_run::{self, run_node};
 use crate::{
-    CampaignEnd, CampaignRecord, CampaignRow, Cancel, OutcomeRow, QueryAnswer, RunDetail, RunFilter, RunRecord, RunRow,
-    RunVitals, detail, fault, query, trace_file, vitals,
+    CampaignEnd, CampaignRecord, CampaignRow, Cancel, Judgements, OutcomeRow, QueryAnswer, RunDetail, RunFilter,
+    RunRecord, RunRow, RunVitals, Wish, detail, fault, query, trace_file, vitals,
 };
 use crate::{lists, read_campaign};
 use actcheck_base::{Diagnostic, Diagnostics, Digest, Files, RunFacts, Source, names, nearest, write_atomic};
@@ -37,6 +38,8 @@ use actcheck_facts::extract;
 pub struct History {
     // Dropped before the folder, which releases the lock. `None` only if reopening failed.
     pub(super) opened: RwLock<Option<Opened>>,
+    /// The state of a reader whose store is closed until it is needed.
+    pub(super) resting: Mutex<Option<Arc<Snapshot>>>,
     pub(super) folder: Folder,
     /// The statements that are not in the store yet.
     pub(super) journal: Mutex<Journal>,
@@ -133,6 +136,19 @@ impl History {
         self.enter_outline(&record.campaign, record.index, &outline)
     }
 
+    /// Stores the outlines of several runs of a campaign in one file: all of them or, on an error, none.
+    ///
+    /// # Errors
+    /// As [`History::commit`].
+    pub fn commit_outlines(&self, campaign: &str, records: &[RunRecord]) -> Result<(), Diagnostics> {
+        self.check_ids("run", records.iter().map(|record| &record.id))?;
+        let doing = "writing outlines";
+        let outlines = records.iter().map(Outline::of).collect::<Result<Vec<_>, _>>();
+        let outlines = outlines.map_err(|error| Diagnostic::error("H006", format!("{doing} failed: {error}")))?;
+        self.folder.begin_outlines()?;
+        self.shelf().add_all(campaign, &outlines).map_err(|error| fault::io(self.dir(), doing, &error))
+    }
+
     /// Stores an outline.
     pub(super) fn enter_outline(&self, campaign: &str, index: u64, outline: &Outline) -> Result<(), Diagnostics> {
         let doing = format!("writing run {campaign}-{}", index + 1);
@@ -177,7 +193,7 @@ impl History {
         let mut campaigns =
             lists::campaigns(&*self.store_with(lists::of_campaigns)?).map_err(|error| self.query_fault(&error))?;
         for campaign in &mut campaigns {
-            campaign.runs += self.outlined_ids(Some(&campaign.id))?.len() as u64;
+            campaign.runs += self.count_outlined(&campaign.id)?;
         }
         self.check_ids("campaign", campaigns.iter().map(|campaign| &campaign.id))?;
         Ok(campaigns)
@@ -210,14 +226,9 @@ impl History {
     /// # Errors
     /// The store can't be read; `H026` an id is not an id.
     pub fn runs(&self, filter: &RunFilter) -> Result<Vec<RunRow>, Diagnostics> {
-        let store = self.store_with(lists::of_runs)?;
-        let mut runs = lists::runs(&store, filter).map_err(|error| self.query_fault(&error))?;
-        let whole = runs.len();
-        self.each_outlined(filter, &mut |outlined| runs.push(outlined.as_run()))?;
-        if runs.len() > whole {
-            lists::sort_runs(&store, &mut runs).map_err(|error| self.query_fault(&error))?;
-        }
-        self.check_ids("run", runs.iter().flat_map(|run| [&run.run, &run.campaign]))?;
+        let mut runs = Vec::new();
+        let wish = Wish { judgements: Judgements::None, ..Wish::default() };
+        self.each_judged(filter, wish, &mut |run| runs.push(run.row))?;
         Ok(runs)
     }
 
@@ -256,13 +267,8 @@ impl History {
     /// # Errors
     /// The store can't be read.
     pub fn outcomes(&self, filter: &RunFilter) -> Result<Vec<OutcomeRow>, Diagnostics> {
-        let store = self.store_with(lists::of_outcomes)?;
-        let mut outcomes = lists::outcomes(&store, filter).map_err(|error| self.query_fault(&error))?;
-        let whole = outcomes.len();
-        self.each_outlined(filter, &mut |outlined| outcomes.extend(outlined.as_outcomes()))?;
-        if outcomes.len() > whole {
-            lists::sort_outcomes(&store, &mut outcomes).map_err(|error| self.query_fault(&error))?;
-        }
+        let mut outcomes = Vec::new();
+        self.each_judged(filter, Wish::default(), &mut |run| outcomes.extend(run.outcome_rows()))?;
         Ok(outcomes)
     }
 
@@ -345,24 +351,21 @@ impl History {
         }
     }
 
-    /// Calls `each` with the health data of every run of a campaign, in the order of their indices.
+    /// Calls `each` with the health data of every run of a campaign: first those of outlines, file by file, then those of runs
+    /// that are kept whole, by index.
     ///
     /// # Errors
     /// `H014` there is no such campaign; otherwise as [`History::trace`].
     pub fn each_vitals(&self, campaign: &str, mut each: impl FnMut(&RunVitals)) -> Result<(), Diagnostics> {
         self.campaign(campaign)?;
+        self.each_outlined_vitals(campaign, &mut each)?;
         let filter = RunFilter { campaign: Some(campaign.to_owned()), ..RunFilter::default() };
-        let rows = self.runs(&filter)?;
-        let mut outlines: BTreeMap<String, RunVitals> =
-            self.outlined_vitals(campaign)?.into_iter().map(|vitals| (vitals.run.clone(), vitals)).collect();
+        let whole =
+            lists::runs(&*self.store_with(lists::of_runs)?, &filter).map_err(|error| self.query_fault(&error))?;
         let store = self.store_with(vitals::wanted)?;
         let fault = |error| self.fault("reading a run", &error);
         let columns = vitals::Columns::read(&store).map_err(fault)?;
-        for row in rows {
-            if let Some(vitals) = outlines.remove(&row.run) {
-                each(&vitals);
-                continue;
-            }
+        for row in whole {
             let choices = self.decoded(&row.run, trace_file::decode_choices)?;
             each(&columns.of(&store, &row, choices).map_err(fault)?);
         }
@@ -458,7 +461,11 @@ impl History {
     }
 
     /// Ids are parts of file names, so those of a foreign history must not lead out of its folder.
-    fn check_ids<'a>(&self, kind: &str, ids: impl IntoIterator<Item = &'a String>) -> Result<(), Diagnostics> {
+    pub(super) fn check_ids<'a>(
+        &self,
+        kind: &str,
+        ids: impl IntoIterator<Item = &'a String>,
+    ) -> Result<(), Diagnostics> {
         match ids.into_iter().find(|id| !names::is_id(id)) {
             Some(id) => Err(fault::foreign_id(self.dir(), kind, id)),
             None => Ok(()),

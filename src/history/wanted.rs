@@ -6,6 +6,7 @@
 use std::collections::BTreeSet;
 
 use oxigraph::model::vocab::xsd;
+use oxigraph::model::{NamedOrBlankNode, Quad, Term};
 use spargebra::Query;
 use spargebra::algebra::{
     AggregateExpression, Expression, Function, GraphPattern, OrderExpression, PropertyPathExpression,
@@ -127,6 +128,34 @@ impl Wanted {
         wanted
     }
 
+    /// The properties of all wanted statements; `None` if they may have any property.
+    pub(super) fn properties(&self) -> Option<Vec<&str>> {
+        let mut properties = Vec::new();
+        for pattern in &self.patterns {
+            let Some(Fixed::Iri(iri)) = &pattern.property else { return None };
+            properties.push(iri.as_str());
+        }
+        self.runs.is_empty().then_some(properties)
+    }
+
+    /// Whether a statement in the default graph about a run is wanted.
+    pub(super) fn has(&self, quad: &Quad) -> bool {
+        let is_below = |run: &String| match &quad.subject {
+            NamedOrBlankNode::NamedNode(node) => {
+                node.as_str().strip_prefix(run.as_str()).is_some_and(|rest| rest.is_empty() || rest.starts_with('/'))
+            }
+            // It is not known of which run.
+            NamedOrBlankNode::BlankNode(_) => true,
+        };
+        let fits = |pattern: &Pattern| {
+            matches!(pattern.graph, InGraph::Any | InGraph::Default)
+                && fits(&pattern.subject, &quad.subject.clone().into())
+                && fits(&pattern.property, &quad.predicate.clone().into())
+                && fits(&pattern.value, &quad.object)
+        };
+        self.patterns.iter().any(fits) || self.runs.iter().any(is_below)
+    }
+
     pub(super) fn add(&mut self, other: Self) {
         self.patterns.extend(other.patterns);
         self.runs.extend(other.runs);
@@ -244,6 +273,18 @@ fn of_triple(triple: &TriplePattern, graph: &InGraph) -> Pattern {
         NamedNodePattern::Variable(_) => None,
     };
     Pattern { subject: fixed(&triple.subject), value: fixed(&triple.object), ..pattern(property, graph.clone()) }
+}
+
+fn fits(fixed: &Option<Fixed>, term: &Term) -> bool {
+    match (fixed, term) {
+        (None, _) => true,
+        (Some(Fixed::Iri(wanted)), Term::NamedNode(node)) => node.as_str() == wanted,
+        (Some(Fixed::Below(wanted)), Term::NamedNode(node)) => node.as_str().starts_with(wanted.as_str()),
+        (Some(Fixed::Text(wanted)), Term::Literal(literal)) => {
+            literal.datatype() == xsd::STRING && literal.value() == wanted
+        }
+        _ => false,
+    }
 }
 
 /// A term that matches only itself. The store also takes numbers and times with the same value for the same.

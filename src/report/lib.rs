@@ -37,8 +37,8 @@ pub use summary::{
     SideChange, WeightedLine,
 };
 pub use table::{
-    Table, TableFormat, answer_table, campaign_table, compare_table, findings_table, health_table, maps_table,
-    oracles_table, recheck_table, with_shrunk,
+    Table, TableFormat, TableParts, answer_cells, answer_table, campaign_table, compare_table, findings_table,
+    health_table, maps_table, oracles_table, recheck_table, with_shrunk,
 };
 pub use text::{
     FailureLines, Page, campaign_result_text, campaign_text, case_text, compare_text, findings_text, health_lines,

@@ -12,6 +12,7 @@ pub mod nulls;
 pub mod paged;
 pub mod planted;
 pub mod server;
+pub mod triple_store;
 
 use std::collections::BTreeMap;
 use std::io::ErrorKind;

@@ -37,6 +37,7 @@ pub fn findings(table: &OutcomeTable, history: &str) -> FindingsSummary {
         options: String::new(),
         campaigns: table.text("campaign").texts.clone(),
         runs: table.text("run").texts.len() as u64,
+        sampled_runs: None,
         twins: 0,
         counts: all.iter().fold(Counts::default(), |mut sum, of| {
             sum.add_all(of.counts);
@@ -64,6 +65,7 @@ pub fn page(mirror: &Mirror, history: &str, words: &BTreeMap<String, PropertyWor
         made: "2026-01-01T00:00:00Z",
         findings: &findings(&table, history),
         table: &table,
+        sample: None,
         campaigns: &[],
         words,
         replays,

@@ -60,16 +60,26 @@ pub(super) fn outcomes(table: &OutcomeTable) -> Vec<Outcome> {
 /// Drops rows for which a later row has the same step and a bit-identical run.
 pub(super) fn newest_of_alike(table: &OutcomeTable, rows: &[u32]) -> Vec<u32> {
     let (hash, step) = (table.text("trace_hash"), table.number("step"));
-    let mut seen = BTreeSet::new();
+    // The steps in which a trace was seen, one bit for each; later ones are in the set.
+    let mut seen = vec![0u64; hash.texts.len()];
+    let mut seen_late = BTreeSet::new();
+    let mut is_new = |of: u32, step: f64| match step {
+        step if (0.0..64.0).contains(&step) && step.fract() == 0.0 => {
+            let (steps, bit) = (&mut seen[of as usize], 1 << step as u32);
+            let is_new = *steps & bit == 0;
+            *steps |= bit;
+            is_new
+        }
+        _ => seen_late.insert((of, step.to_bits())),
+    };
     let mut kept: Vec<u32> = rows
         .iter()
         .rev()
         .copied()
         .filter(|row| {
             let at = *row as usize;
-            // A run without a hash (broken before its first state) is never a duplicate.
             match (hash.of_row.get(at).copied().flatten(), step.get(at)) {
-                (Some(of), Some(step)) if !hash.texts[of as usize].is_empty() => seen.insert((of, step.to_bits())),
+                (Some(of), Some(step)) if !hash.texts[of as usize].is_empty() => is_new(of, *step),
                 _ => true,
             }
         })

@@ -52,3 +52,19 @@ pub fn finding_columns() -> Vec<&'static str> {
     let mined = columns().iter().filter(|column| column.is_condition() || column.is_effect());
     FINDING_COLUMNS.into_iter().chain(mined.map(|column| column.name)).collect()
 }
+
+/// Columns from which rates, failure modes and trends are computed: a tenth of the size of [`finding_columns`].
+pub const RATE_COLUMNS: [&str; 12] = [
+    "run",
+    "campaign",
+    "scene",
+    "weight",
+    "status",
+    "started",
+    "trace_hash",
+    "step",
+    "action",
+    "property",
+    "outcome",
+    "margin",
+];

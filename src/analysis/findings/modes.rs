@@ -1,6 +1,6 @@
 //! Failure modes from a table.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 use crate::findings::judged::{failed, outcomes};
 use crate::findings::scenes::Scenes;
@@ -13,22 +13,25 @@ use crate::{FailureMode, OutcomeTable, wilson};
 pub fn table_failure_modes(table: &OutcomeTable) -> Vec<FailureMode> {
     let (runs, properties) = (table.text("run"), table.text("property"));
     let counted = table.counted_runs();
-    let mut failed_in: BTreeMap<u32, (usize, BTreeSet<u32>)> = BTreeMap::new();
+    let mut sets = Sets::default();
+    // The first row and the set of failed properties of each run.
+    let mut failed_in: Vec<Option<(usize, u32)>> = vec![None; runs.texts.len()];
     for (row, outcome) in outcomes(table).into_iter().enumerate() {
         if let (Some(run), Some(property), Some(failed)) = (runs.of_row[row], properties.of_row[row], failed(outcome))
             && counted[run as usize]
         {
-            let (_, signature) = failed_in.entry(run).or_insert((row, BTreeSet::new()));
+            let (_, signature) = failed_in[run as usize].get_or_insert((row, Sets::EMPTY));
             if failed {
-                signature.insert(property);
+                *signature = sets.with(*signature, property);
             }
         }
     }
-    let total = failed_in.len() as u64;
-    let scenes = Scenes::of(table).runs(failed_in.values().map(|(row, _)| *row));
+    let tested = || (0u32..).zip(&failed_in).filter_map(|(run, found)| Some((run, (*found)?)));
+    let total = tested().count() as u64;
+    let scenes = Scenes::of(table).runs(tested().map(|(_, (row, _))| row));
     let mut modes: BTreeMap<&BTreeSet<u32>, Vec<(usize, u32)>> = BTreeMap::new();
-    for (place, (run, (_, signature))) in failed_in.iter().enumerate() {
-        modes.entry(signature).or_default().push((place, *run));
+    for (place, (run, (_, signature))) in tested().enumerate() {
+        modes.entry(sets.get(signature)).or_default().push((place, run));
     }
     let mut found: Vec<FailureMode> = modes
         .into_iter()
@@ -45,4 +48,41 @@ pub fn table_failure_modes(table: &OutcomeTable) -> Vec<FailureMode> {
         .collect();
     found.sort_by(|a, b| (b.runs.len(), &a.failed).cmp(&(a.runs.len(), &b.failed)));
     found
+}
+
+/// Sets of properties, each with a number: most runs have the same ones.
+struct Sets {
+    all: Vec<BTreeSet<u32>>,
+    number: HashMap<BTreeSet<u32>, u32>,
+    /// The set after a property is added to a set.
+    next: HashMap<(u32, u32), u32>,
+}
+
+impl Default for Sets {
+    fn default() -> Self {
+        let empty = BTreeSet::new();
+        Self { all: vec![empty.clone()], number: HashMap::from([(empty, Self::EMPTY)]), next: HashMap::new() }
+    }
+}
+
+impl Sets {
+    const EMPTY: u32 = 0;
+
+    fn get(&self, number: u32) -> &BTreeSet<u32> {
+        &self.all[number as usize]
+    }
+
+    fn with(&mut self, number: u32, property: u32) -> u32 {
+        if let Some(next) = self.next.get(&(number, property)) {
+            return *next;
+        }
+        let mut set = self.get(number).clone();
+        set.insert(property);
+        let next = *self.number.entry(set).or_insert_with_key(|set| {
+            self.all.push(set.clone());
+            (self.all.len() - 1) as u32
+        });
+        self.next.insert((number, property), next);
+        next
+    }
 }

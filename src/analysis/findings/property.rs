@@ -80,46 +80,81 @@ pub fn property_findings(
     hierarchy: &Hierarchy,
     options: &PatternOptions,
 ) -> PropertyFindings {
+    let rates = Rates::of(table, of);
     let outcomes = outcomes(table);
-    let is_decided = |row: &u32| failed(outcomes[*row as usize]).is_some();
-    let decided: Vec<u32> = of.rows.iter().copied().filter(is_decided).collect();
-    let scenes = Scenes::of(table);
-    let rows = scenes.first_rows(&decided);
-    let weight = table.number("weight");
+    let rows = &rates.scenes;
     let input = PatternInput {
         failed: rows.iter().map(|row| failed(outcomes[*row as usize]) == Some(true)).collect(),
         held_out: rows.iter().map(|row| is_held_out(table, *row as usize)).collect(),
-        parameters: conditions(table, &rows, hierarchy),
+        parameters: conditions(table, rows, hierarchy),
     };
-    let happened = PatternInput { parameters: effects(table, &rows, hierarchy), ..input.clone() };
-    // Effects often imply each other: combinations of three would say little more.
+    let happened = PatternInput { parameters: effects(table, rows, hierarchy), ..input.clone() };
     let simple = PatternOptions { most_conditions: options.most_conditions.min(MOST_EFFECTS), ..*options };
     let run = table.text("run");
-    let margin = table.number("margin");
     PropertyFindings {
         action: of.action.clone(),
         property: of.property.clone(),
         counts: of.counts,
-        failing: match scenes.runs(decided.iter().map(|row| *row as usize)) {
-            Some(runs) => {
-                runs.share((0..decided.len()).filter(|at| outcomes[decided[*at] as usize] == Outcome::Failed))
-            }
-            None => wilson(of.counts.failed, of.counts.decided()),
-        },
-        margins: quantiles(decided.iter().filter_map(|row| margin.get(*row as usize).copied())),
+        failing: rates.failing,
+        margins: rates.margins,
         examples: rows
             .iter()
             .map(|row| Example { run: run.get(*row as usize).unwrap_or_default().to_owned(), row: *row })
             .collect(),
-        twins: (of.every_row.iter().filter(|row| is_decided(row)).count() - decided.len()) as u64,
-        repeated: (decided.len() - rows.len()) as u64,
-        weighted_runs: rows
-            .iter()
-            .filter(|row| weight.get(**row as usize).is_some_and(|weight| !weight.is_nan()))
-            .count() as u64,
+        twins: rates.twins,
+        repeated: rates.repeated,
+        weighted_runs: rates.weighted_runs,
         patterns: mine(&input, options),
         effects: Mined { patterns: mine(&happened, &simple), input: happened },
         input,
+    }
+}
+
+impl PropertyFindings {
+    /// Replaces the counts, rates and margins, which come from a sample, by those of all rows. Patterns remain those of the
+    /// sample.
+    #[must_use]
+    pub fn with_rates_of(self, table: &OutcomeTable, of: &JudgedProperty) -> Self {
+        let Rates { failing, margins, twins, repeated, weighted_runs, .. } = Rates::of(table, of);
+        Self { counts: of.counts, failing, margins, twins, repeated, weighted_runs, ..self }
+    }
+}
+
+/// Rates and margins over all rows of a property.
+struct Rates {
+    failing: Option<Interval>,
+    margins: Option<Quantiles>,
+    twins: u64,
+    repeated: u64,
+    weighted_runs: u64,
+    /// The decided rows, one for each scene.
+    scenes: Vec<u32>,
+}
+
+impl Rates {
+    fn of(table: &OutcomeTable, of: &JudgedProperty) -> Self {
+        let outcomes = outcomes(table);
+        let is_decided = |row: &u32| failed(outcomes[*row as usize]).is_some();
+        let decided: Vec<u32> = of.rows.iter().copied().filter(is_decided).collect();
+        let scenes = Scenes::of(table);
+        let rows = scenes.first_rows(&decided);
+        let (weight, margin) = (table.number("weight"), table.number("margin"));
+        Self {
+            failing: match scenes.runs(decided.iter().map(|row| *row as usize)) {
+                Some(runs) => {
+                    runs.share((0..decided.len()).filter(|at| outcomes[decided[*at] as usize] == Outcome::Failed))
+                }
+                None => wilson(of.counts.failed, of.counts.decided()),
+            },
+            margins: quantiles(decided.iter().filter_map(|row| margin.get(*row as usize).copied())),
+            twins: (of.every_row.iter().filter(|row| is_decided(row)).count() - decided.len()) as u64,
+            repeated: (decided.len() - rows.len()) as u64,
+            weighted_runs: rows
+                .iter()
+                .filter(|row| weight.get(**row as usize).is_some_and(|weight| !weight.is_nan()))
+                .count() as u64,
+            scenes: rows,
+        }
     }
 }
 

@@ -1,7 +1,5 @@
 //! Failure rate of a property over campaigns, with change points.
 
-use std::collections::BTreeMap;
-
 use crate::findings::judged::{JudgedProperty, failed, outcomes};
 use crate::findings::scenes::Scenes;
 use crate::{Interval, OutcomeTable, TwoByTwo, wilson};
@@ -50,11 +48,11 @@ type Runs = (u64, u64);
 type Decided = (Trace, bool);
 
 /// Identifies the trace of a row.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Trace {
     Hash(u32),
     /// A trace without a hash equals no other.
-    Row(u32),
+    Alone,
 }
 
 /// The order of campaigns.
@@ -84,7 +82,7 @@ pub fn trend(table: &OutcomeTable, of: &JudgedProperty, level: f64) -> Trend {
         }
         if let Some(runs) = runs.last_mut() {
             let known = hash.of_row.get(row).copied().flatten().filter(|of| !hash.texts[*of as usize].is_empty());
-            runs.push((known.map_or(Trace::Row(number), Trace::Hash), failed));
+            runs.push((known.map_or(Trace::Alone, Trace::Hash), failed));
         }
     }
     for (point, runs) in points.iter_mut().zip(&runs) {
@@ -114,18 +112,30 @@ pub fn trend(table: &OutcomeTable, of: &JudgedProperty, level: f64) -> Trend {
 /// Counts the runs with different traces in the first campaigns, for each number of campaigns from 1. The newest of
 /// bit-identical runs decides: their outcomes differ if the rule has changed.
 fn distinct<'a>(campaigns: impl IntoIterator<Item = &'a Vec<Decided>>, order: Order) -> Vec<Runs> {
-    let mut newest: BTreeMap<Trace, bool> = BTreeMap::new();
-    let (mut failures, mut counts) = (0, Vec::new());
+    // By the number of the hash: whether the newest run with it failed.
+    let mut newest: Vec<Option<bool>> = Vec::new();
+    let (mut failures, mut known, mut counts) = (0, 0, Vec::new());
     for runs in campaigns {
         for (trace, failed) in runs {
-            if order == Order::NewestFirst && newest.contains_key(trace) {
-                continue;
-            }
-            let before = newest.insert(*trace, *failed);
+            let before = match trace {
+                // A run without a hash is never a duplicate.
+                Trace::Alone => None,
+                Trace::Hash(hash) => {
+                    let hash = *hash as usize;
+                    if hash >= newest.len() {
+                        newest.resize(hash + 1, None);
+                    }
+                    if order == Order::NewestFirst && newest[hash].is_some() {
+                        continue;
+                    }
+                    newest[hash].replace(*failed)
+                }
+            };
             failures += u64::from(*failed);
             failures -= u64::from(before == Some(true));
+            known += u64::from(before.is_none());
         }
-        counts.push((failures, newest.len() as u64 - failures));
+        counts.push((failures, known - failures));
     }
     counts
 }
@@ -159,7 +169,7 @@ mod tests {
         let counts = distinct(&vec![same.clone(); 10], Order::OldestFirst);
         assert_eq!(counts, [(1, 2); 10]);
         // The rule changed: in the newest campaign, the first run passes.
-        let changed = vec![(Trace::Hash(0), false), (Trace::Row(9), true), (Trace::Row(10), true)];
+        let changed = vec![(Trace::Hash(0), false), (Trace::Alone, true), (Trace::Alone, true)];
         let both = [same, changed];
         assert_eq!(distinct(&both, Order::OldestFirst), [(1, 2), (2, 3)]);
         assert_eq!(distinct(both.iter().rev(), Order::NewestFirst), [(2, 1), (2, 3)]);

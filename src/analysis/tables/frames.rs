@@ -43,6 +43,11 @@ impl Rows {
         }
     }
 
+    /// Number of rows.
+    pub fn height(&self) -> usize {
+        self.height
+    }
+
     /// Converts the rows to a data frame.
     ///
     /// # Errors

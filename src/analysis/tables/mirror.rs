@@ -1,6 +1,6 @@
 //! The table beside a history, stored as several Parquet files. The name of each has its digest, so that damage is noticed.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::{BTreeMap, BTreeSet, HashSet};
 use std::fs::{self, File};
 use std::io::Cursor;
 use std::path::{Path, PathBuf};
@@ -8,8 +8,10 @@ use std::path::{Path, PathBuf};
 use polars::prelude::{DataFrame, ParquetReader, ParquetWriter, PolarsError, SerReader as _};
 
 use crate::TableRun;
+use crate::tables::checked::{Checked, FileRuns};
 use crate::tables::columns::{ColumnKind, columns};
 use crate::tables::frames::Rows;
+use crate::tables::outcomes::TableFilter;
 use actcheck_base::{Diagnostic, Diagnostics, Digest, NewFile, ScratchFolder, digest_of, write_atomic};
 use actcheck_history::History;
 
@@ -18,7 +20,7 @@ const RUNS_IN_A_FILE: usize = 2_000;
 /// Number of files of a campaign from which they are written anew as one: each look at a running campaign adds a file.
 const MOST_PARTS: usize = 16;
 /// File with the digest of the columns.
-const SCHEMA: &str = "SCHEMA";
+pub(super) const SCHEMA: &str = "SCHEMA";
 /// File with the number of judgements that `recheck` had added to each campaign when its files were written.
 const RECHECKED: &str = "RECHECKED";
 
@@ -28,9 +30,22 @@ pub struct Mirror {
     /// Where new files are written.
     folder: PathBuf,
     /// Its files, sorted by the start of the campaign, then by the time of writing.
-    files: Vec<(String, PathBuf)>,
+    files: Vec<TableFile>,
+    /// The runs of known files.
+    checked: Checked,
     /// The lock of the folder, or the folder of new files if that of the history can't be written.
     _place: Place,
+}
+
+/// A file of a mirror.
+#[derive(Debug)]
+pub(super) struct TableFile {
+    /// Id of its campaign.
+    pub campaign: String,
+    /// Its path.
+    pub path: PathBuf,
+    /// Number of its rows.
+    pub rows: usize,
 }
 
 /// The place of a mirror's new files.
@@ -129,7 +144,7 @@ impl Mirror {
             clear(tables)?;
             write_atomic(&tables.join(SCHEMA), digest.as_bytes()).map_err(|error| unwritten(tables, &error))?;
         }
-        let mut mirror = Self { folder, files: Vec::new(), _place: place };
+        let mut mirror = Self { folder, files: Vec::new(), checked: Checked::read(tables), _place: place };
         let mut change = MirrorChange::default();
         let mut present = if anew || !is_current { BTreeMap::new() } else { present(tables, is_beside) };
         let (known, later) = (rechecked(tables), history.later_counts()?);
@@ -146,6 +161,11 @@ impl Mirror {
             let file = tables.join(RECHECKED);
             write_atomic(&file, lines.as_bytes()).map_err(|error| unwritten(&file, &error))?;
         }
+        if is_beside {
+            let present: Vec<PathBuf> = mirror.files.iter().map(|file| file.path.clone()).collect();
+            // Without the list, the files are read again.
+            let _ = mirror.checked.write(tables, &present);
+        }
         Ok((mirror, change))
     }
 
@@ -159,13 +179,13 @@ impl Mirror {
         runs: impl IntoIterator<Item = impl Into<TableRun>>,
     ) -> Result<Self, Diagnostics> {
         fs::create_dir_all(folder).map_err(|error| unwritten(folder, &error))?;
-        let mut mirror = Self { folder: folder.to_path_buf(), files: Vec::new(), _place: Place::Given };
+        let mut mirror =
+            Self { folder: folder.to_path_buf(), files: Vec::new(), checked: Checked::default(), _place: Place::Given };
         let mut runs = runs.into_iter().peekable();
         while runs.peek().is_some() {
             let mut rows = Rows::default();
             runs.by_ref().take(RUNS_IN_A_FILE).for_each(|run| rows.add(&run.into()));
-            let file = mirror.write(campaign, rows)?;
-            mirror.files.push((campaign.to_owned(), file));
+            mirror.write(campaign, rows)?;
         }
         Ok(mirror)
     }
@@ -175,9 +195,19 @@ impl Mirror {
         &self.folder
     }
 
+    /// Number of rows of the campaigns that a filter selects.
+    pub fn rows(&self, filter: &TableFilter) -> usize {
+        self.files.iter().filter(|file| filter.takes_campaign(&file.campaign)).map(|file| file.rows).sum()
+    }
+
     /// Iterates over its files with their campaigns.
-    pub(super) fn files(&self) -> impl Iterator<Item = (&str, &Path)> {
-        self.files.iter().map(|(campaign, file)| (campaign.as_str(), file.as_path()))
+    pub fn paths(&self) -> impl Iterator<Item = (&str, &Path)> {
+        self.files.iter().map(|file| (file.campaign.as_str(), file.path.as_path()))
+    }
+
+    /// Its files, by campaign.
+    pub(super) fn files(&self) -> &[TableFile] {
+        &self.files
     }
 
     fn update_campaign(
@@ -188,35 +218,48 @@ impl Mirror {
         files: Vec<PathBuf>,
         change: &mut MirrorChange,
     ) -> Result<(), Diagnostics> {
-        let known: BTreeSet<&String> = runs.iter().collect();
-        let (mut there, mut kept, mut outdated) = (BTreeSet::new(), Vec::new(), Vec::new());
-        for file in files {
-            let whole = is_whole(&file);
-            change.damaged += usize::from(!whole);
-            match runs_of(&file) {
-                Ok(runs) if whole && runs.iter().all(|run| known.contains(run)) && there.is_disjoint(&runs) => {
-                    there.extend(runs);
-                    kept.push(file);
+        let known: HashSet<u64> = runs.iter().map(|run| index_of(run)).collect();
+        let (mut there, mut kept, mut outdated) = (HashSet::new(), Vec::new(), Vec::new());
+        for path in files {
+            if self.checked.get(&path).is_none() {
+                let whole = is_whole(&path);
+                change.damaged += usize::from(!whole);
+                match runs_of(&path) {
+                    Ok(runs) if whole => self.checked.set(&path, runs),
+                    _ => {
+                        outdated.push(path);
+                        continue;
+                    }
                 }
-                // From another history, duplicate, or damaged: rewrite it from the store.
-                _ => outdated.push(file),
+            }
+            let Some(FileRuns { rows, indices }) = self.checked.get(&path) else { continue };
+            if indices.iter().all(|index| known.contains(index) && !there.contains(index)) {
+                there.extend(indices.iter().copied());
+                kept.push(TableFile { campaign: campaign.to_owned(), rows: *rows, path });
+            } else {
+                // From another history, or duplicate: rewrite it from the store.
+                outdated.push(path);
             }
         }
-        if kept.len() >= MOST_PARTS && there.len() < runs.len() {
-            outdated.append(&mut kept);
+        let is_fragmented = kept.len() >= MOST_PARTS && there.len() / kept.len() < RUNS_IN_A_FILE / 4;
+        if is_fragmented && there.len() < known.len() {
+            outdated.extend(kept.drain(..).map(|file| file.path));
             there.clear();
         }
         outdated.iter().try_for_each(|file| self.remove(file))?;
-        self.files.extend(kept.into_iter().map(|file| (campaign.to_owned(), file)));
+        self.files.append(&mut kept);
         change.kept += there.len();
-        let missing: Vec<&String> = runs.iter().filter(|run| !there.contains(*run)).collect();
+        let mut missing: Vec<&String> = runs.iter().filter(|run| !there.contains(&index_of(run))).collect();
+        history.sort_as_stored(campaign, &mut missing)?;
         for runs in missing.chunks(RUNS_IN_A_FILE) {
             let mut rows = Rows::default();
             for run in table_runs(history, runs) {
                 rows.add(&run?);
             }
-            let file = self.write(campaign, rows)?;
-            self.files.push((campaign.to_owned(), file));
+            let height = rows.height();
+            let path = self.write(campaign, rows)?;
+            let indices = runs.iter().map(|run| index_of(run)).collect();
+            self.checked.set(&path, FileRuns { rows: height, indices });
             change.added += runs.len();
         }
         Ok(())
@@ -230,11 +273,12 @@ impl Mirror {
         fs::remove_file(file).map_err(|error| unwritten(file, &error))
     }
 
-    /// Writes rows to a new file atomically.
-    fn write(&self, campaign: &str, rows: Rows) -> Result<PathBuf, Diagnostics> {
-        let number_of = |file: &Path| named(file).map(|name| name.number);
-        let last = self.files.iter().filter(|(of, _)| of == campaign).filter_map(|(_, file)| number_of(file)).max();
+    /// Writes the rows of some runs to a new file atomically, and adds it.
+    fn write(&mut self, campaign: &str, rows: Rows) -> Result<PathBuf, Diagnostics> {
+        let number_of = |file: &TableFile| named(&file.path).map(|name| name.number);
+        let last = self.files.iter().filter(|file| file.campaign == campaign).filter_map(number_of).max();
         let number = last.map_or(0, |last| last + 1);
+        let height = rows.height();
         let written = || -> Result<PathBuf, PolarsError> {
             let (mut frame, mut bytes) = (rows.frame()?, Cursor::new(Vec::new()));
             ParquetWriter::new(&mut bytes).finish(&mut frame)?;
@@ -243,19 +287,30 @@ impl Mirror {
             write_atomic(&file, &bytes)?;
             Ok(file)
         };
-        written().map_err(|error| unwritten(&self.folder, &error))
+        let path = written().map_err(|error| unwritten(&self.folder, &error))?;
+        self.files.push(TableFile { campaign: campaign.to_owned(), path: path.clone(), rows: height });
+        Ok(path)
     }
 }
 
-/// The parts of a file's name.
-struct TableName {
-    campaign: String,
-    number: usize,
-    /// `None` in names of earlier versions.
-    digest: Option<String>,
+/// The position of a run in its campaign, from its id. Ids of another form get a number that no position has.
+fn index_of(run: &str) -> u64 {
+    let number = run.rsplit_once('-').and_then(|(_, number)| number.parse::<u64>().ok()?.checked_sub(1));
+    number.unwrap_or_else(|| {
+        let digest = digest_of(run);
+        u64::from_str_radix(digest.get(..15).unwrap_or_default(), 16).unwrap_or_default() | (1 << 63)
+    })
 }
 
-fn named(file: &Path) -> Option<TableName> {
+/// The parts of a file's name.
+pub(super) struct TableName {
+    pub campaign: String,
+    pub number: usize,
+    /// `None` in names of earlier versions.
+    pub digest: Option<String>,
+}
+
+pub(super) fn named(file: &Path) -> Option<TableName> {
     let stem = file.file_name()?.to_str()?.strip_suffix(".parquet")?;
     let (rest, last) = stem.rsplit_once('.')?;
     let of_today = rest.rsplit_once('.').and_then(|(campaign, number)| {
@@ -265,7 +320,7 @@ fn named(file: &Path) -> Option<TableName> {
 }
 
 /// Whether a file has the digest that its name says.
-fn is_whole(file: &Path) -> bool {
+pub(super) fn is_whole(file: &Path) -> bool {
     let digest = named(file).and_then(|name| name.digest);
     digest.is_some_and(|digest| fs::read(file).is_ok_and(|bytes| digest_of_bytes(&bytes) == digest))
 }
@@ -278,7 +333,7 @@ fn digest_of_bytes(bytes: &[u8]) -> String {
 
 /// Whether a whole file has the rows that its runs have now.
 fn is_as_stored(history: &History, file: &Path, known: &BTreeSet<String>) -> Result<bool, Diagnostics> {
-    let Ok(runs) = runs_of(file) else { return Ok(false) };
+    let Ok(runs) = ids_of(file) else { return Ok(false) };
     if !runs.is_subset(known) {
         return Ok(true);
     }
@@ -292,7 +347,7 @@ fn is_as_stored(history: &History, file: &Path, known: &BTreeSet<String>) -> Res
 }
 
 /// The folder of a history's mirror.
-fn tables_of(history: &History) -> PathBuf {
+pub(super) fn tables_of(history: &History) -> PathBuf {
     history.dir().join("tables")
 }
 
@@ -303,11 +358,11 @@ fn rechecked(tables: &Path) -> BTreeMap<String, u64> {
     text.lines().filter_map(line).collect()
 }
 
-fn entries(folder: &Path) -> Vec<PathBuf> {
+pub(super) fn entries(folder: &Path) -> Vec<PathBuf> {
     fs::read_dir(folder).into_iter().flatten().filter_map(|entry| Some(entry.ok()?.path())).collect()
 }
 
-fn is_table(file: &Path) -> bool {
+pub(super) fn is_table(file: &Path) -> bool {
     file.extension().is_some_and(|ending| ending == "parquet")
 }
 
@@ -376,7 +431,22 @@ fn plain(error: &impl ToString) -> String {
     error.to_string().to_lowercase()
 }
 
-fn runs_of(file: &Path) -> Result<BTreeSet<String>, PolarsError> {
+/// The runs of a file, in its order.
+pub(super) fn runs_of(file: &Path) -> Result<FileRuns, PolarsError> {
+    let frame = read(file, Some(&["run"]))?;
+    let mut indices: Vec<u64> = Vec::new();
+    for run in frame.column("run")?.str()?.iter().flatten() {
+        let index = index_of(run);
+        // The rows of a run are adjacent.
+        if indices.last() != Some(&index) {
+            indices.push(index);
+        }
+    }
+    Ok(FileRuns { rows: frame.height(), indices })
+}
+
+/// The ids of the runs of a file.
+fn ids_of(file: &Path) -> Result<BTreeSet<String>, PolarsError> {
     let frame = read(file, Some(&["run"]))?;
     let runs = frame.column("run")?.str()?.iter().flatten().map(str::to_owned).collect();
     Ok(runs)
@@ -393,7 +463,7 @@ fn kind(kind: ColumnKind) -> &'static str {
 }
 
 /// Digest of the columns, to detect tables written by versions with different columns.
-fn schema_digest() -> String {
+pub(super) fn schema_digest() -> String {
     let definitions: Vec<String> = columns()
         .iter()
         .map(|column| format!("{} {} {}", column.name, kind(column.kind), column.description))

@@ -6,7 +6,9 @@
 //! Never: changes the store, holds data that the store and the traces lack, or reads a mirror that lacks runs of the
 //! store.
 
+mod adopt;
 mod cell;
+mod checked;
 mod columns;
 mod effect_columns;
 mod frames;

@@ -1,12 +1,19 @@
 //! The table in memory, with interned texts, as the analyses read it.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashMap};
+use std::sync::mpsc::sync_channel;
+use std::thread::available_parallelism;
 
 use polars::prelude::{BooleanChunked, DataFrame, DataType, NewChunkedArray as _, PolarsError};
 
 use crate::tables::columns::{ColumnKind, columns};
-use crate::tables::mirror::{Mirror, read, unread};
+use crate::tables::mirror::{Mirror, TableFile, read, unread};
 use actcheck_base::Diagnostics;
+
+/// Number of files from which threads read them: starting them takes as long as reading a few.
+const MANY: usize = 8;
+/// Number of files that each thread reads ahead.
+const AHEAD: usize = 4;
 
 /// Selects rows of the table. The default is all rows.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
@@ -66,6 +73,34 @@ impl OutcomeTable {
     /// # Errors
     /// `A002` if a file can't be read.
     pub fn read(mirror: &Mirror, filter: &TableFilter, wanted: &[&str]) -> Result<Self, Diagnostics> {
+        let files = mirror.files().iter().filter(|file| filter.takes_campaign(&file.campaign));
+        Self::read_files(&files.collect::<Vec<_>>(), filter, wanted)
+    }
+
+    /// Reads some columns of a sample: of files at equal distances, so that all times and campaigns have their share of the
+    /// rows. The sample has about `most_rows` rows, and is the same each time.
+    ///
+    /// # Errors
+    /// `A002` if a file can't be read.
+    pub fn read_sample(
+        mirror: &Mirror,
+        filter: &TableFilter,
+        wanted: &[&str],
+        most_rows: usize,
+    ) -> Result<Self, Diagnostics> {
+        let all = mirror.rows(filter);
+        let mut before = 0;
+        let files = mirror.files().iter().filter(|file| filter.takes_campaign(&file.campaign)).filter(|file| {
+            // Files have different sizes: one is taken whenever the rows before its end reach the next part of all rows.
+            let part = |rows: usize| rows as u128 * most_rows as u128 / (all.max(1) as u128 * file.rows.max(1) as u128);
+            let taken = part(before + file.rows) > part(before);
+            before += file.rows;
+            taken
+        });
+        Self::read_files(&files.collect::<Vec<_>>(), filter, wanted)
+    }
+
+    fn read_files(files: &[&TableFile], filter: &TableFilter, wanted: &[&str]) -> Result<Self, Diagnostics> {
         let mut table = Self::default();
         let mut names: Vec<&str> = wanted.to_vec();
         if filter.since.is_some() && !names.contains(&"started") {
@@ -77,12 +112,37 @@ impl OutcomeTable {
                 _ => drop(table.numbers.insert(column.name, Vec::new())),
             }
         }
-        let mut known: BTreeMap<&'static str, BTreeMap<String, u32>> = BTreeMap::new();
-        for (_, file) in mirror.files().filter(|(campaign, _)| filter.takes_campaign(campaign)) {
-            let rows = read(file, Some(&names)).and_then(|frame| filter.rows_of(frame));
-            rows.and_then(|frame| table.append(&frame, &mut known)).map_err(|error| unread(file, &error))?;
+        let mut known: BTreeMap<&'static str, HashMap<String, u32>> = BTreeMap::new();
+        let frame = |file: &TableFile| read(&file.path, Some(&names)).and_then(|frame| filter.rows_of(frame));
+        let threads = available_parallelism().map_or(1, usize::from);
+        if files.len() < MANY || threads == 1 {
+            for file in files {
+                frame(file)
+                    .and_then(|frame| table.append(&frame, &mut known))
+                    .map_err(|error| unread(&file.path, &error))?;
+            }
+            return Ok(table);
         }
-        Ok(table)
+        // Each thread reads every n-th file, ahead of the rows that are added here.
+        std::thread::scope(|scope| {
+            let frame = &frame;
+            let frames = (0..threads).map(|thread| {
+                let (sender, receiver) = sync_channel(AHEAD);
+                scope.spawn(move || {
+                    let own = files.iter().skip(thread).step_by(threads);
+                    // Without a receiver, no further file is needed.
+                    own.map(|file| frame(file)).try_for_each(|frame| sender.send(frame).map_err(drop))
+                });
+                receiver
+            });
+            let frames: Vec<_> = frames.collect();
+            for (at, file) in files.iter().enumerate() {
+                // A thread without a further frame has panicked, which the scope reports.
+                let Ok(frame) = frames[at % threads].recv() else { break };
+                frame.and_then(|frame| table.append(&frame, &mut known)).map_err(|error| unread(&file.path, &error))?;
+            }
+            Ok(table)
+        })
     }
 
     /// Number of rows.
@@ -111,17 +171,18 @@ impl OutcomeTable {
     /// `trace_hash`.
     pub fn counted_runs(&self) -> Vec<bool> {
         let (runs, hashes) = (self.text("run"), self.text("trace_hash"));
-        let mut newest = BTreeMap::new();
+        let mut newest: Vec<Option<u32>> = vec![None; hashes.texts.len()];
         for (run, hash) in runs.of_row.iter().zip(&hashes.of_row) {
             if let (Some(run), Some(hash)) = (run, hash) {
-                newest.insert(*hash, *run);
+                newest[*hash as usize] = Some(*run);
             }
         }
         let mut counted = vec![true; runs.texts.len()];
         for (run, hash) in runs.of_row.iter().zip(&hashes.of_row) {
             if let (Some(run), Some(hash)) = (run, hash) {
                 // A run without a hash (broken before its first state) is never a duplicate.
-                counted[*run as usize] = hashes.texts[*hash as usize].is_empty() || newest.get(hash) == Some(run);
+                let hash = *hash as usize;
+                counted[*run as usize] = hashes.texts[hash].is_empty() || newest[hash] == Some(*run);
             }
         }
         counted
@@ -130,7 +191,7 @@ impl OutcomeTable {
     fn append(
         &mut self,
         frame: &DataFrame,
-        known: &mut BTreeMap<&'static str, BTreeMap<String, u32>>,
+        known: &mut BTreeMap<&'static str, HashMap<String, u32>>,
     ) -> Result<(), PolarsError> {
         for (name, column) in &mut self.texts {
             let known = known.entry(name).or_default();
@@ -158,7 +219,7 @@ impl OutcomeTable {
 }
 
 /// Returns the index of a text, adding it if it is new.
-fn place_of(text: &str, known: &mut BTreeMap<String, u32>, texts: &mut Vec<String>) -> u32 {
+fn place_of(text: &str, known: &mut HashMap<String, u32>, texts: &mut Vec<String>) -> u32 {
     if let Some(place) = known.get(text) {
         return *place;
     }

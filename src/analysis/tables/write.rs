@@ -171,7 +171,8 @@ fn each(
 ) -> Result<usize, Diagnostics> {
     let mut rows = 0;
     let counted = counted_runs(mirror, filter)?;
-    for (_, file) in mirror.files().filter(|(campaign, _)| filter.takes_campaign(campaign)) {
+    for file in mirror.files().iter().filter(|file| filter.takes_campaign(&file.campaign)) {
+        let file = &file.path;
         let read = || -> Result<DataFrame, PolarsError> {
             let mut frame = filter.rows_of(read(file, None)?)?;
             with_kinds(&mut frame, hierarchy)?;

@@ -338,4 +338,46 @@ const CODES_X: &[Code] = &[
         "a node or an image has another version of actcheck, which could give other results",
         "use the same program everywhere, or remove the folder of the launch and launch again",
     ),
+    code(
+        "X090",
+        "an address can't be used",
+        "it is not a URL with http, contains a password, or begins with https, which this build lacks",
+        "correct the address; for https, build with `--features https`",
+    ),
+    code(
+        "X091",
+        "a server can't be reached",
+        "it doesn't run, is busy, or the address or the network is wrong",
+        "check the address, and give the same command again: `export --sparql` continues where it was",
+    ),
+    code(
+        "X092",
+        "a server refused a request",
+        "its first lines are in the message: often missing credentials, the address of another service, or a limit",
+        "follow the help; stores often have one address for queries, one for updates and one for graphs",
+    ),
+    code(
+        "X093",
+        "a server redirects to another server",
+        "it moved, or a login page is in front of it",
+        "name the new address if you trust it",
+    ),
+    code(
+        "X095",
+        "an upload can't be recorded",
+        "the folder of the history can't be written",
+        "nothing, if the upload ends: the record only spares sending statements again",
+    ),
+    code(
+        "X096",
+        "credentials can't be used",
+        "an environment variable is missing or malformed, or the netrc file can't be read",
+        "set ACTCHECK_SPARQL_USER and ACTCHECK_SPARQL_PASSWORD, or ACTCHECK_SPARQL_TOKEN alone, or use `--netrc`",
+    ),
+    code(
+        "X097",
+        "files can't be copied to or from a folder or an object storage",
+        "credentials, region, address or rights are wrong, or the disk is full; the message has the first lines of the answer",
+        "set AWS_ACCESS_KEY_ID, AWS_SECRET_ACCESS_KEY, AWS_REGION and, for storages of others, AWS_ENDPOINT_URL; then give the same command again",
+    ),
 ];

@@ -144,13 +144,19 @@ const CODES_H: &[Code] = &[
     code(
         "H030",
         "a query needs too many statements about runs that are kept as outlines",
-        "outlines are stored outside of the RDF store, and their statements are added to it for each query",
-        "`actcheck list`, `analyse` and `compare` read columns; or ask for fewer properties",
+        "most queries read columns of outlines; facts, any property, paths and blank nodes as values need their statements in the store",
+        "leave that part out, ask a smaller history, or export tables (`actcheck export --parquet`)",
     ),
     code(
         "H031",
         "a run that is kept as an outline can't be simulated again",
         "a model, a rule of the scene or the program changed since, so that another run would result",
         "`actcheck replay` names the changes; the run's outcomes and states are intact",
+    ),
+    code(
+        "H040",
+        "the answer of another store can't be read",
+        "the address is that of another service, or the server or the connection ended the answer early",
+        "check the address; ask for less, or give the server more time with `--timeout`",
     ),
 ];

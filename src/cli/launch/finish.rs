@@ -8,6 +8,7 @@ use crate::launch::plan::Plan;
 use crate::session::{self, Session};
 use crate::work::all_cores;
 use crate::{clock, regressions, run, stop};
+use actcheck_analysis::Mirror;
 use actcheck_base::{Diagnostic, Diagnostics};
 use actcheck_campaign::Env;
 use actcheck_history::History;
@@ -46,12 +47,16 @@ pub(super) fn finish(
 fn merged(plan: &Plan, history: &History, stop: &AtomicBool) -> Result<Option<String>, Diagnostics> {
     let mut sources = Vec::new();
     for number in 1..=plan.shards {
-        sources.push(History::open_to_read(&plan.shard_dir(number))?);
+        let source = History::open_to_read(&plan.shard_dir(number))?;
+        source.rest();
+        sources.push(source);
     }
     let planned = plan_merge(&sources, Some(history), &MergeOptions::default())?;
     if carry_out(&planned, &sources, history, stop, || ())?.interrupted {
         return Ok(None);
     }
+    // Tables that are missing are made when they are needed.
+    let _ = Mirror::adopt(&planned, &sources, history);
     let first = format!("{}#{}", plan.shard_dir(1).display(), plan.done(1).unwrap_or_default());
     let whole = planned.campaigns.into_iter().find(|campaign| campaign.from.contains(&first));
     let whole = whole.ok_or_else(|| {

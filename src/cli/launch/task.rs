@@ -8,6 +8,7 @@ use std::time::{Duration, Instant};
 use crate::launch::LaunchTaskArgs;
 use crate::launch::plan::Plan;
 use crate::{output, run, stop};
+use actcheck_analysis::Mirror;
 use actcheck_base::{Diagnostic, Diagnostics, Shard, program_digest, write_atomic};
 use actcheck_history::History;
 
@@ -77,6 +78,8 @@ fn alone(plan: &Plan, shard: Shard) -> Result<u8, Diagnostics> {
     }
     match state(&dir)? {
         State::Done(id) => {
+            // The merge takes them over. Tables that are missing are made when they are needed.
+            let _ = History::open_to_read(&dir).and_then(|history| Mirror::update(&history).map(drop));
             write_atomic(&plan.done_file(number), id.as_bytes()).map_err(|error| plan.unwritable(&error))?;
             Ok(0)
         }

@@ -1,5 +1,6 @@
 //! Carries out a plan: writes each campaign's statements, then its runs, each in one transaction, then its end.
 
+use std::collections::BTreeSet;
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -51,7 +52,14 @@ pub fn carry_out(
     let mut writer = Writer { sources, renames, into, merged: Merged::default() };
     for campaign in &plan.campaigns {
         writer.begin(campaign)?;
-        for (index, (source, run)) in &campaign.work.runs {
+        let copied = match writer.copy_files(campaign, stop, &mut on_run)? {
+            Some(copied) => copied,
+            None => {
+                into.flush()?;
+                return Ok(writer.merged);
+            }
+        };
+        for (index, (source, run)) in campaign.work.runs.iter().filter(|(index, _)| !copied.contains(index)) {
             if stop.load(Ordering::Relaxed) {
                 writer.merged.interrupted = true;
                 into.flush()?;
@@ -114,6 +122,47 @@ impl Writer<'_> {
             quads.extend(statements.quads);
         }
         Ok(quads)
+    }
+
+    /// Copies the files of outlines whose runs are all wanted and keep their ids. Returns the indices of these runs, or `None`
+    /// if the merge was stopped.
+    fn copy_files(
+        &mut self,
+        campaign: &PlannedMerge,
+        stop: &AtomicBool,
+        on_run: &mut impl FnMut(),
+    ) -> Result<Option<BTreeSet<u64>>, Diagnostics> {
+        let (mut copied, mut files) = (BTreeSet::new(), Vec::new());
+        let sources: BTreeSet<usize> = campaign.work.runs.values().map(|(source, _)| *source).collect();
+        for source in sources {
+            let history = &self.sources[source];
+            let is_simple = history.shelf().exists() && !history.has_later_judgements()?;
+            history.rest();
+            if !is_simple {
+                continue;
+            }
+            let is_wanted = |index: u64| {
+                let run = format!("{}-{}", campaign.id, index + 1);
+                campaign.work.runs.get(&index).is_some_and(|(of, known)| *of == source && *known == run)
+            };
+            for (file, indices) in history.outline_files(&campaign.id)? {
+                if stop.load(Ordering::Relaxed) {
+                    self.merged.interrupted = true;
+                    return Ok(None);
+                }
+                if indices.iter().any(|index| !is_wanted(*index) || copied.contains(index)) {
+                    continue;
+                }
+                if let Some(new) = self.into.copy_outlines(&file)? {
+                    files.push(new);
+                    self.merged.runs += indices.len() as u64;
+                    indices.iter().for_each(|_| on_run());
+                    copied.extend(indices);
+                }
+            }
+        }
+        self.into.sync_outlines(&files)?;
+        Ok(Some(copied))
     }
 
     fn run(&mut self, source: usize, run: &str, new: &str) -> Result<(), Diagnostics> {

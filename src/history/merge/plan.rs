@@ -28,6 +28,14 @@ pub struct MergePlan {
     pub(super) ids: BTreeMap<(usize, String), String>,
 }
 
+impl MergePlan {
+    /// The campaigns of a history, given by its position among the sources, that keep their ids.
+    pub fn kept_ids(&self, source: usize) -> impl Iterator<Item = &str> {
+        let is_kept = move |((of, old), new): &(&(usize, String), &String)| *of == source && old == *new;
+        self.ids.iter().filter(is_kept).map(|(_, new)| new.as_str())
+    }
+}
+
 /// One campaign of the destination.
 #[derive(Debug, Clone)]
 pub struct PlannedMerge {
@@ -86,6 +94,7 @@ pub fn plan(sources: &[History], into: Option<&History>, options: &MergeOptions)
     let mut found = Vec::new();
     for (number, source) in sources.iter().enumerate() {
         found.extend(survey(source, Some(number))?);
+        source.rest();
     }
     let found = without(found, &options.leave_out)?;
     let own = into.map(|history| survey(history, None)).transpose()?.unwrap_or_default();

@@ -1,7 +1,9 @@
 //! A file of outlines: the indices of its runs, their values in lists, their statements, and their states.
 //!
 //! After the magic bytes, a table has the compressed size and the checksum of each part, and then its own checksum: four
-//! bytes each, the lowest first. Each part is compressed on its own, because most readers need only one.
+//! bytes each, the lowest first. Each part is compressed on its own, because most readers need only one. The statements are
+//! stored by property ([`crate::vertical`]), which has parts and checksums of its own. In files of the first format, they are
+//! one compressed part.
 
 use oxigraph::model::Quad;
 
@@ -9,12 +11,17 @@ use crate::journal::{self, Content, Part};
 use crate::outlines::row::Rows;
 use crate::quad_source::RunQuads;
 use crate::trace_file;
+use crate::vertical::{self, CHANGED, Sheet};
 use crate::wanted::Wanted;
 use crate::{RunRecord, scene_digest, write_run};
 use actcheck_base::{ByteReader, put_varint};
 
 /// Magic bytes at the start of each file. The last one is the format version.
-const MAGIC: &[u8; 8] = b"acoutln1";
+const MAGIC: &[u8; 8] = b"acoutln2";
+/// Magic bytes of files whose statements are not stored by property.
+const AS_ROWS: &[u8; 8] = b"acoutln1";
+/// Position of the statements among the parts.
+const STATEMENTS: usize = 2;
 /// Number of parts.
 const PARTS: usize = 4;
 /// Size of the magic bytes and the table. Unit: bytes.
@@ -59,18 +66,26 @@ pub(super) fn encode(outlines: &[Outline]) -> Result<Vec<u8>, String> {
     let mut indices = Vec::new();
     put_varint(&mut indices, rows.rows.len() as u64);
     rows.rows.iter().for_each(|row| put_varint(&mut indices, row.index));
-    let statements = journal::numbered(outlines.iter().flat_map(|outline| &outline.quads));
-    let counts: Vec<u32> = outlines.iter().map(|outline| outline.quads.len() as u32).collect();
+    let quads: Vec<&[Quad]> = outlines.iter().map(|outline| outline.quads.as_slice()).collect();
+    let by_property = vertical::encode(&quads)?;
+    let as_rows = || {
+        let statements = journal::numbered(quads.iter().copied().flatten());
+        let counts: Vec<u32> = quads.iter().map(|quads| quads.len() as u32).collect();
+        postcard::to_stdvec(&(statements, counts)).map_err(fault)
+    };
     let heads: Vec<&[u8]> = outlines.iter().map(|outline| outline.head.as_slice()).collect();
     let parts = [
         indices,
         postcard::to_stdvec(&rows).map_err(fault)?,
-        postcard::to_stdvec(&(statements, counts)).map_err(fault)?,
+        if by_property.is_some() { Vec::new() } else { as_rows()? },
         postcard::to_stdvec(&heads).map_err(fault)?,
     ];
-    let (mut bytes, mut body) = (MAGIC.to_vec(), Vec::new());
-    for part in parts {
-        let part = zstd::bulk::compress(&part, LEVEL).map_err(|error| error.to_string())?;
+    let (mut bytes, mut body) = (if by_property.is_some() { MAGIC } else { AS_ROWS }.to_vec(), Vec::new());
+    for (at, part) in parts.into_iter().enumerate() {
+        let part = match &by_property {
+            Some(statements) if at == STATEMENTS => statements.clone(),
+            _ => zstd::bulk::compress(&part, LEVEL).map_err(|error| error.to_string())?,
+        };
         let size = u32::try_from(part.len()).map_err(|_| "it is larger than 4 GB".to_owned())?;
         bytes.extend(size.to_le_bytes());
         bytes.extend(journal::sum_of(&part).to_le_bytes());
@@ -85,6 +100,8 @@ pub(super) fn encode(outlines: &[Outline]) -> Result<Vec<u8>, String> {
 pub(super) struct Opened<'a> {
     parts: [&'a [u8]; PARTS],
     sums: [u32; PARTS],
+    /// Whether the statements are not stored by property.
+    as_rows: bool,
 }
 
 impl<'a> Opened<'a> {
@@ -95,7 +112,7 @@ impl<'a> Opened<'a> {
     pub(super) fn new(bytes: &'a [u8]) -> Result<Self, String> {
         let (header, mut rest) = bytes.split_at_checked(HEADER).ok_or("it ends too early")?;
         let (magic, table) = header.split_at(MAGIC.len());
-        if magic != MAGIC {
+        if magic != MAGIC && magic != AS_ROWS {
             return Err("it has no outlines of this format".to_owned());
         }
         let number = |at: usize| u32::from_le_bytes([table[at], table[at + 1], table[at + 2], table[at + 3]]);
@@ -109,13 +126,16 @@ impl<'a> Opened<'a> {
             (part, rest) = rest.split_at_checked(number(8 * at) as usize).unwrap_or((&[], &[]));
             parts[at] = part;
         }
-        Ok(Self { parts, sums })
+        Ok(Self { parts, sums, as_rows: magic == AS_ROWS })
     }
 
-    /// Size of the file up to the end of the first part. Unit: bytes.
-    pub(super) fn size_of_start(header: &[u8]) -> Option<usize> {
-        let size = header.get(MAGIC.len()..MAGIC.len() + 4)?;
-        Some(HEADER + u32::from_le_bytes([size[0], size[1], size[2], size[3]]) as usize)
+    /// Size of the file up to the end of its first `parts` parts. Unit: bytes.
+    pub(super) fn size_of_start(header: &[u8], parts: usize) -> Option<usize> {
+        let sizes = (0..parts).map(|part| {
+            let size = header.get(MAGIC.len() + 8 * part..MAGIC.len() + 8 * part + 4)?;
+            Some(u32::from_le_bytes([size[0], size[1], size[2], size[3]]) as usize)
+        });
+        sizes.sum::<Option<usize>>().map(|size| HEADER + size)
     }
 
     fn part(&self, at: usize) -> Result<Vec<u8>, String> {
@@ -123,6 +143,15 @@ impl<'a> Opened<'a> {
             return Err(CHANGED.to_owned());
         }
         zstd::stream::decode_all(self.parts[at]).map_err(|error| error.to_string())
+    }
+
+    /// Compares all parts with their checksums.
+    ///
+    /// # Errors
+    /// A message, if a part differs.
+    pub(super) fn check(&self) -> Result<(), String> {
+        let is_same = |(part, sum): (&&[u8], &u32)| journal::sum_of(part) == *sum;
+        if self.parts.iter().zip(&self.sums).all(is_same) { Ok(()) } else { Err(CHANGED.to_owned()) }
     }
 
     /// The indices of its runs, in the order of the file.
@@ -144,19 +173,40 @@ impl<'a> Opened<'a> {
 
     /// Adds the wanted statements of its runs.
     pub(super) fn add_statements(&self, wanted: &Wanted, part: &mut Part) -> Result<(), String> {
-        let bytes = self.part(2)?;
+        if !self.as_rows {
+            let properties = wanted.properties();
+            let quads = self.by_property()?.statements(properties.as_deref())?;
+            part.quads.extend(quads.into_iter().flatten().filter(|quad| wanted.has(quad)));
+            return Ok(());
+        }
+        let bytes = self.part(STATEMENTS)?;
         let ((terms, rows), _): (Content<'_>, Vec<u32>) = postcard::from_bytes(&bytes).map_err(unread)?;
         journal::collect(&terms, &rows, wanted, part).ok_or_else(|| CHANGED.to_owned())
     }
 
     /// The statements about each run.
     pub(super) fn statements(&self) -> Result<Vec<Vec<Quad>>, String> {
-        let bytes = self.part(2)?;
+        if !self.as_rows {
+            return self.by_property()?.statements(None);
+        }
+        let bytes = self.part(STATEMENTS)?;
         let ((terms, rows), counts): (Content<'_>, Vec<u32>) = postcard::from_bytes(&bytes).map_err(unread)?;
         let mut part = Part::default();
         journal::collect(&terms, &rows, &Wanted::all(), &mut part).ok_or(CHANGED)?;
         let mut quads = part.quads.into_iter();
         Ok(counts.into_iter().map(|count| quads.by_ref().take(count as usize).collect()).collect())
+    }
+
+    fn by_property(&self) -> Result<Sheet<&'a [u8]>, String> {
+        let bytes = self.parts[STATEMENTS];
+        Sheet::open(bytes, bytes.len())
+    }
+
+    /// Whether the statements are stored by property, and where they are in the file. `header`: its first bytes.
+    pub(super) fn statements_at(header: &[u8]) -> Result<(bool, std::ops::Range<usize>), String> {
+        let opened = Opened::new(header)?;
+        let end = |parts: usize| Self::size_of_start(header, parts).ok_or(CHANGED);
+        Ok((!opened.as_rows, end(STATEMENTS)?..end(STATEMENTS + 1)?))
     }
 
     /// The choices and states of all runs, encoded.
@@ -171,8 +221,6 @@ impl<'a> Opened<'a> {
         Ok(self.heads()?.into_iter().zip(statements).enumerate().map(of).collect())
     }
 }
-
-const CHANGED: &str = "it has changed since it was written";
 
 fn unread(error: postcard::Error) -> String {
     error.to_string().to_lowercase()

@@ -9,16 +9,21 @@
 //!
 //! Never: has a run that the store has too.
 
+mod copy;
 mod file;
 mod loaded;
 mod read;
 mod restore;
 mod row;
+mod sheets;
 mod shelf;
+mod stream;
 mod view;
 
 pub(super) use file::Outline;
 pub(super) use loaded::LoadedFiles;
 pub use restore::Restore;
+pub(super) use row::Outlined;
+pub(super) use sheets::SheetFile;
 pub(super) use shelf::Shelf;
-pub(super) use view::View;
+pub(super) use view::{MOST_STATEMENTS, View, too_many};

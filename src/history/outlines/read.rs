@@ -1,14 +1,14 @@
 //! Reads outlines as runs.
 
-use std::collections::{BTreeSet, HashSet};
+use std::collections::{BTreeSet, HashMap, HashSet};
 
 use oxigraph::model::Quad;
 use oxigraph::store::Store;
 
 use crate::outlines::file::{Opened, Outline};
 use crate::outlines::loaded::Loaded;
-use crate::outlines::row::{Outlined, Rows};
-use crate::outlines::shelf::{Shelf, Unread, unread, without};
+use crate::outlines::row::Outlined;
+use crate::outlines::shelf::{IndexSet, Needed, Shelf, Unread, are_apart, unread};
 use crate::quad_source::RunQuads;
 use crate::{History, RunDetail, RunFilter, RunRow, RunVitals, detail, trace_file};
 use crate::{graphs, merge, write_run};
@@ -28,7 +28,7 @@ impl History {
         Shelf::new(self.folder.outlines())
     }
 
-    /// Calls `each` with the outlines that match a filter, by campaign.
+    /// Calls `each` with the outlines that match a filter, by campaign, then by index.
     ///
     /// # Errors
     /// `H007` a file is damaged.
@@ -40,19 +40,38 @@ impl History {
         if !self.shelf().exists() {
             return Ok(());
         }
-        // Read before the first call: a reader may have to begin anew.
-        let all = self.of_outlines(|shelf| {
-            let mut all: Vec<(String, Rows)> = Vec::new();
-            shelf.each_file(filter.campaign.as_deref(), false, &mut |file, opened, there| {
-                all.push((file.campaign.clone(), without(opened.rows()?, there)));
-                Ok(())
-            })?;
-            Ok(all)
-        })?;
-        for (campaign, rows) in &all {
-            rows.of_campaign(campaign).filter(|outlined| outlined.matches(filter)).for_each(&mut *each);
+        let campaigns = match &filter.campaign {
+            Some(campaign) => BTreeSet::from([campaign.clone()]),
+            None => self.shelf().files(None).into_iter().map(|file| file.campaign).collect(),
+        };
+        let mut each = |outlined: Outlined<'_>| {
+            if outlined.matches(filter) {
+                each(outlined);
+            }
+        };
+        for campaign in &campaigns {
+            let mut done = IndexSet::default();
+            self.of_outlines(&mut |shelf| shelf.each_row(campaign, &mut done, &mut each))?;
         }
         Ok(())
+    }
+
+    /// Number of runs of a campaign that have only an outline.
+    ///
+    /// # Errors
+    /// `H007` a file is damaged.
+    pub(crate) fn count_outlined(&self, campaign: &str) -> Result<u64, Diagnostics> {
+        if !self.shelf().exists() {
+            return Ok(0);
+        }
+        self.of_outlines(&mut |shelf| {
+            let mut count = 0;
+            shelf.each_file(Some(campaign), Needed::Indices, &mut |_, opened, there| {
+                count += opened.indices()?.len() as u64 - there.len() as u64;
+                Ok(())
+            })?;
+            Ok(count)
+        })
     }
 
     /// The ids of all runs that have only an outline, unsorted.
@@ -71,14 +90,62 @@ impl History {
         if !self.shelf().exists() {
             return Ok(Vec::new());
         }
-        self.of_outlines(|shelf| {
+        self.of_outlines(&mut |shelf| {
             let mut ids = Vec::new();
-            shelf.each_file(campaign, true, &mut |file, opened, there| {
+            shelf.each_file(campaign, Needed::Indices, &mut |file, opened, there| {
                 let own = opened.indices()?.into_iter().filter(|index| !there.contains(index));
                 ids.extend(own.map(|index| format!("{}-{}", file.campaign, index + 1)));
                 Ok(())
             })?;
             Ok(ids)
+        })
+    }
+
+    /// Sorts ids of runs of a campaign by their place in the files of outlines, so that reading them in this order reads each
+    /// file once: files of shards have every n-th run. Runs that are kept whole come last.
+    ///
+    /// # Errors
+    /// `H007` a file is damaged.
+    pub fn sort_as_stored<S: AsRef<str>>(&self, campaign: &str, runs: &mut [S]) -> Result<(), Diagnostics> {
+        if !self.shelf().exists() {
+            return Ok(());
+        }
+        let places = self.places(campaign)?;
+        runs.sort_by_key(|run| {
+            let index = place_of(run.as_ref()).map_or(u64::MAX, |(_, index)| index);
+            (places.get(&index).copied().unwrap_or(usize::MAX), index)
+        });
+        Ok(())
+    }
+
+    /// Sorts the runs of each campaign whose files of outlines overlap as [`History::sort_as_stored`] does. The runs of other
+    /// campaigns remain sorted by index. The argument must be sorted by campaign.
+    ///
+    /// # Errors
+    /// `H007` a file is damaged.
+    pub fn sort_interleaved(&self, runs: &mut [RunRow]) -> Result<(), Diagnostics> {
+        for runs in runs.chunk_by_mut(|one, next| one.campaign == next.campaign) {
+            let Some(campaign) = runs.first().map(|run| run.campaign.clone()) else { continue };
+            if !are_apart(&self.shelf().files(Some(&campaign))) {
+                let places = self.places(&campaign)?;
+                runs.sort_by_key(|run| (places.get(&run.index).copied().unwrap_or(usize::MAX), run.index));
+            }
+        }
+        Ok(())
+    }
+
+    /// The place of each outline of a campaign in its files, by index.
+    fn places(&self, campaign: &str) -> Result<HashMap<u64, usize>, Diagnostics> {
+        self.of_outlines(&mut |shelf| {
+            let mut places: HashMap<u64, usize> = HashMap::new();
+            shelf.each_file(Some(campaign), Needed::Indices, &mut |_, opened, _| {
+                for index in opened.indices()? {
+                    let next = places.len();
+                    places.entry(index).or_insert(next);
+                }
+                Ok(())
+            })?;
+            Ok(places)
         })
     }
 
@@ -90,7 +157,7 @@ impl History {
         read: impl Fn(&Loaded, usize) -> Result<T, String>,
     ) -> Result<Option<T>, Diagnostics> {
         let Some((campaign, index)) = place_of(run).filter(|_| self.shelf().exists()) else { return Ok(None) };
-        self.of_outlines(|shelf| {
+        self.of_outlines(&mut |shelf| {
             let known = self.loaded.with(campaign, index);
             for file in known.is_none().then(|| shelf.files_with(campaign, index)).into_iter().flatten() {
                 let damaged = |why| Unread::Damaged(file.clone(), why);
@@ -178,23 +245,30 @@ impl History {
         Ok((count, secs))
     }
 
-    /// The health data of the outlines of a campaign, by index.
-    pub(crate) fn outlined_vitals(&self, campaign: &str) -> Result<Vec<RunVitals>, Diagnostics> {
+    /// Calls `each` with the health data of the outlines of a campaign, file by file.
+    ///
+    /// # Errors
+    /// `H007` a file is damaged.
+    pub(crate) fn each_outlined_vitals(
+        &self,
+        campaign: &str,
+        each: &mut dyn FnMut(&RunVitals),
+    ) -> Result<(), Diagnostics> {
         if !self.shelf().exists() {
-            return Ok(Vec::new());
+            return Ok(());
         }
-        self.of_outlines(|shelf| {
-            let mut vitals = Vec::new();
-            shelf.each_file(Some(campaign), false, &mut |_, opened, there| {
+        // If a file was removed meanwhile, the others are read again.
+        let mut done = IndexSet::default();
+        self.of_outlines(&mut |shelf| {
+            shelf.each_file(Some(campaign), Needed::All, &mut |_, opened, _| {
                 let (rows, heads) = (opened.rows()?, opened.heads()?);
                 for (outlined, head) in rows.of_campaign(campaign).zip(heads) {
-                    if !there.contains(&outlined.row.index) {
-                        vitals.push(outlined.as_vitals(trace_file::head_choices(&head)?));
+                    if done.insert(outlined.row.index) {
+                        each(&outlined.as_vitals(trace_file::head_choices(&head)?));
                     }
                 }
                 Ok(())
-            })?;
-            Ok(vitals)
+            })
         })
     }
 

@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use serde::{Deserialize, Serialize};
 
 use crate::detail::{outcome, status};
-use crate::{OutcomeRow, Repetition, RunFilter, RunRecord, RunRow, RunVitals, SceneDigest};
+use crate::{Repetition, RunFilter, RunRecord, RunRow, RunVitals, SceneDigest};
 use actcheck_base::Outcome;
 use actcheck_data::Choice;
 
@@ -116,6 +116,11 @@ impl Rows {
         Self { texts: self.texts.clone(), rows: self.rows.get(at).cloned().into_iter().collect() }
     }
 
+    /// One of the runs, with its campaign.
+    pub(super) fn at<'a>(&'a self, campaign: &'a str, place: usize) -> Outlined<'a> {
+        Outlined { campaign, texts: &self.texts, row: &self.rows[place] }
+    }
+
     /// The runs with their campaign.
     pub(crate) fn of_campaign<'a>(&'a self, campaign: &'a str) -> impl Iterator<Item = Outlined<'a>> {
         self.rows.iter().map(move |row| Outlined { campaign, texts: &self.texts, row })
@@ -156,22 +161,12 @@ impl Outlined<'_> {
         }
     }
 
-    /// Its outcomes, sorted by step and property.
-    pub(crate) fn as_outcomes(&self) -> Vec<OutcomeRow> {
-        let of = |judged: &Judged| OutcomeRow {
-            run: self.run(),
-            campaign: self.campaign.to_owned(),
-            index: self.row.index,
-            test: self.text(self.row.test).to_owned(),
-            step: judged.step,
-            action: self.text(judged.action).to_owned(),
-            property: self.text(judged.property).to_owned(),
-            outcome: self.outcome(judged),
-            margin: judged.margin,
-        };
-        let mut rows: Vec<OutcomeRow> = self.row.outcomes.iter().map(of).collect();
-        rows.sort_by(|a, b| (a.step, &a.property).cmp(&(b.step, &b.property)));
-        rows
+    /// Its outcomes, unsorted: step, action and property, outcome, and margin.
+    pub(crate) fn outcomes(&self) -> impl Iterator<Item = (u32, [&str; 2], Outcome, Option<f64>)> {
+        self.row.outcomes.iter().map(|judged| {
+            let names = [self.text(judged.action), self.text(judged.property)];
+            (judged.step, names, self.outcome(judged), judged.margin)
+        })
     }
 
     fn outcome(&self, judged: &Judged) -> Outcome {

@@ -10,21 +10,20 @@ use std::path::{Path, PathBuf};
 
 use crate::folder::Folder;
 use crate::outlines::file::{HEADER, Opened, Outline, encode};
-use crate::outlines::row::Rows;
 use crate::{History, fault};
 use actcheck_base::{Diagnostics, write_atomic, write_quickly};
 
 /// Number of times that a reader looks again if the owner has put a file together with others meanwhile.
-const TRIES: usize = 100;
+pub(super) const TRIES: usize = 100;
 
 /// A file of outlines.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct OutlineFile {
     pub campaign: String,
     /// The lowest and the highest index of its runs.
-    first: u64,
+    pub(super) first: u64,
     last: u64,
-    is_single: bool,
+    pub(super) is_single: bool,
     pub path: PathBuf,
 }
 
@@ -36,6 +35,17 @@ pub(crate) struct Shelf {
 
 /// Receives a file, its parts, and the indices that earlier files have already.
 pub(super) type EachFile<'e> = dyn FnMut(&OutlineFile, &Opened<'_>, &BTreeSet<u64>) -> Result<(), String> + 'e;
+
+/// The parts of a file that a reader needs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Needed {
+    /// The indices of its runs.
+    Indices,
+    /// These, and the values in lists.
+    Rows,
+    /// All parts.
+    All,
+}
 
 /// The reason why a file can't be used.
 pub(super) enum Unread {
@@ -83,6 +93,13 @@ impl Shelf {
         if synced { write_atomic(&path, &bytes) } else { write_quickly(&path, &bytes) }
     }
 
+    /// Writes outlines, sorted by index, in one file.
+    pub(crate) fn add_all(&self, campaign: &str, outlines: &[Outline]) -> io::Result<()> {
+        let (Some(first), Some(last)) = (index_of(outlines.first()), index_of(outlines.last())) else { return Ok(()) };
+        let bytes = encode(outlines).map_err(io::Error::other)?;
+        write_atomic(&self.dir.join(format!("{campaign}.{first:09}-{last:09}.outlines")), &bytes)
+    }
+
     /// Puts the single files of a campaign together.
     pub(crate) fn pack(&self, campaign: &str) -> io::Result<()> {
         let files = self.files(Some(campaign));
@@ -101,10 +118,7 @@ impl Shelf {
                 let read = Opened::new(&bytes).and_then(|opened| opened.outlines()).map_err(io::Error::other)?;
                 outlines.extend(read);
             }
-            if let (Some(first), Some(last)) = (index_of(outlines.first()), index_of(outlines.last())) {
-                let bytes = encode(&outlines).map_err(io::Error::other)?;
-                write_atomic(&self.dir.join(format!("{campaign}.{first:09}-{last:09}.outlines")), &bytes)?;
-            }
+            self.add_all(campaign, &outlines)?;
             for single in singles {
                 fs::remove_file(&single.path)?;
             }
@@ -112,18 +126,17 @@ impl Shelf {
         Ok(())
     }
 
-    /// Calls `each` with every file and its bytes up to the end of the first part (`only_indices`), or with all of them. If a
-    /// file was removed meanwhile, begins anew.
+    /// Calls `each` with every file, of which parts that are not `needed` may be missing. If a file was removed meanwhile,
+    /// begins anew.
     pub(super) fn each_file(
         &self,
         campaign: Option<&str>,
-        only_indices: bool,
+        needed: Needed,
         each: &mut EachFile<'_>,
     ) -> Result<(), Unread> {
         for file in self.chosen(campaign)? {
             let (file, wanted) = file;
-            let bytes = if only_indices { start(&file.path) } else { fs::read(&file.path) };
-            let bytes = bytes.map_err(|error| unread(&file.path, &error))?;
+            let bytes = read_parts(&file.path, needed).map_err(|error| unread(&file.path, &error))?;
             let read = Opened::new(&bytes).and_then(|opened| each(&file, &opened, &wanted));
             read.map_err(|why| Unread::Damaged(file.path.clone(), why))?;
         }
@@ -131,34 +144,62 @@ impl Shelf {
     }
 
     /// The files that are needed for all runs of a campaign, or of all campaigns, each with the indices that earlier files
-    /// have already.
-    fn chosen(&self, campaign: Option<&str>) -> Result<Vec<(OutlineFile, BTreeSet<u64>)>, Unread> {
-        let files = self.files(campaign);
-        let mut chosen: Vec<(OutlineFile, BTreeSet<u64>)> = Vec::new();
-        let mut larger: BTreeMap<String, Vec<OutlineFile>> = BTreeMap::new();
-        for file in files.iter().filter(|file| !file.is_single) {
-            larger.entry(file.campaign.clone()).or_default().push(file.clone());
+    /// have already. Sorted by campaign, then by the lowest index.
+    pub(super) fn chosen(&self, campaign: Option<&str>) -> Result<Vec<(OutlineFile, BTreeSet<u64>)>, Unread> {
+        let mut by_campaign: BTreeMap<String, Vec<OutlineFile>> = BTreeMap::new();
+        for file in self.files(campaign) {
+            by_campaign.entry(file.campaign.clone()).or_default().push(file);
         }
-        // The highest index so far: files are sorted by their lowest one, and few overlap.
-        let mut highest: BTreeMap<String, u64> = BTreeMap::new();
-        for file in files {
-            let mut there = BTreeSet::new();
-            let highest = highest.entry(file.campaign.clone()).or_default();
-            let may_overlap = file.is_single || file.first <= *highest;
-            *highest = file.last.max(*highest);
-            let others = larger.get(&file.campaign).filter(|_| may_overlap).into_iter().flatten();
-            for other in others.filter(|other| **other < file || file.is_single) {
-                if other.path != file.path && other.first <= file.last && file.first <= other.last {
-                    let bytes = start(&other.path).map_err(|error| unread(&other.path, &error))?;
-                    let read = Opened::new(&bytes).and_then(|opened| opened.indices());
-                    there.extend(read.map_err(|why| Unread::Damaged(other.path.clone(), why))?);
-                }
+        let mut chosen = Vec::new();
+        for files in by_campaign.into_values() {
+            if are_apart(&files) {
+                chosen.extend(files.into_iter().map(|file| (file, BTreeSet::new())));
+                continue;
             }
-            if !(file.is_single && there.contains(&file.first)) {
-                chosen.push((file, there));
+            // Shards and killed processes leave files whose ranges overlap. Their runs do not, except after a kill.
+            let mut seen = IndexSet::default();
+            let mut duplicates = BTreeMap::new();
+            let (singles, larger): (Vec<&OutlineFile>, Vec<&OutlineFile>) =
+                files.iter().partition(|file| file.is_single);
+            for file in larger {
+                let bytes = read_parts(&file.path, Needed::Indices).map_err(|error| unread(&file.path, &error))?;
+                let indices = Opened::new(&bytes).and_then(|opened| opened.indices());
+                let indices = indices.map_err(|why| Unread::Damaged(file.path.clone(), why))?;
+                let there: BTreeSet<u64> = indices.into_iter().filter(|index| !seen.insert(*index)).collect();
+                duplicates.insert(file.path.clone(), there);
             }
+            let in_both: BTreeSet<PathBuf> =
+                singles.into_iter().filter(|file| !seen.insert(file.first)).map(|file| file.path.clone()).collect();
+            chosen.extend(files.into_iter().filter(|file| !in_both.contains(&file.path)).map(|file| {
+                let there = duplicates.remove(&file.path).unwrap_or_default();
+                (file, there)
+            }));
         }
         Ok(chosen)
+    }
+}
+
+/// Whether no range of indices begins before the end of an earlier one. The files are sorted.
+pub(super) fn are_apart(files: &[OutlineFile]) -> bool {
+    let mut highest: Option<u64> = None;
+    files.iter().all(|file| {
+        let is_apart = highest.is_none_or(|highest| file.first > highest);
+        highest = highest.max(Some(file.last));
+        is_apart
+    })
+}
+
+/// A set of indices of runs, one bit for each.
+#[derive(Debug, Default)]
+pub(super) struct IndexSet(BTreeMap<u64, u64>);
+
+impl IndexSet {
+    /// Adds an index. Returns whether it was new.
+    pub(super) fn insert(&mut self, index: u64) -> bool {
+        let (word, bit) = (self.0.entry(index / 64).or_default(), 1 << (index % 64));
+        let is_new = *word & bit == 0;
+        *word |= bit;
+        is_new
     }
 }
 
@@ -167,7 +208,7 @@ impl History {
     pub fn count_outlines(dir: &Path) -> u64 {
         let mut count = 0;
         // A file that can't be read is reported when the history is opened.
-        let _ = Shelf::new(Folder::outlines_in(dir)).each_file(None, true, &mut |_, opened, there| {
+        let _ = Shelf::new(Folder::outlines_in(dir)).each_file(None, Needed::Indices, &mut |_, opened, there| {
             count += opened.indices()?.iter().filter(|index| !there.contains(index)).count() as u64;
             Ok(())
         });
@@ -186,7 +227,7 @@ impl History {
     ///
     /// # Errors
     /// `H007` a file is damaged.
-    pub(super) fn of_outlines<T>(&self, read: impl Fn(&Shelf) -> Result<T, Unread>) -> Result<T, Diagnostics> {
+    pub(super) fn of_outlines<T>(&self, read: &mut dyn FnMut(&Shelf) -> Result<T, Unread>) -> Result<T, Diagnostics> {
         let shelf = self.shelf();
         for _ in 0..TRIES {
             match read(&shelf) {
@@ -208,19 +249,30 @@ pub(super) fn unread(path: &Path, error: &io::Error) -> Unread {
     }
 }
 
-/// The bytes of a file up to the end of its first part.
-fn start(path: &Path) -> io::Result<Vec<u8>> {
+/// The bytes of a file up to the end of the needed parts, or more.
+pub(super) fn read_parts(path: &Path, needed: Needed) -> io::Result<Vec<u8>> {
+    let parts = match needed {
+        Needed::Indices => 1,
+        Needed::Rows => 2,
+        Needed::All => return fs::read(path),
+    };
     let mut file = File::open(path)?;
     let mut bytes = vec![0; HEADER];
     file.read_exact(&mut bytes)?;
-    let size = Opened::size_of_start(&bytes).unwrap_or(HEADER).max(HEADER) - HEADER;
+    let size = Opened::size_of_start(&bytes, parts).unwrap_or(HEADER).max(HEADER) - HEADER;
     io::Read::take(&mut file, size as u64).read_to_end(&mut bytes)?;
     Ok(bytes)
 }
 
 fn indices(path: &Path) -> Vec<u64> {
-    let read = start(path).ok().and_then(|bytes| Opened::new(&bytes).ok()?.indices().ok());
+    let read = read_parts(path, Needed::Indices).ok().and_then(|bytes| Opened::new(&bytes).ok()?.indices().ok());
     read.unwrap_or_default()
+}
+
+/// Whether a file has a run, or is damaged.
+fn may_have(path: &Path, index: u64) -> bool {
+    let read = read_parts(path, Needed::Indices).ok().and_then(|bytes| Opened::new(&bytes).ok()?.indices().ok());
+    read.is_none_or(|indices| indices.contains(&index))
 }
 
 fn index_of(outline: Option<&Outline>) -> Option<u64> {
@@ -241,14 +293,6 @@ fn named(path: PathBuf) -> Option<OutlineFile> {
     Some(OutlineFile { campaign: campaign.to_owned(), first, last, is_single: false, path })
 }
 
-/// Removes the rows of runs that earlier files have.
-pub(super) fn without(mut rows: Rows, there: &BTreeSet<u64>) -> Rows {
-    if !there.is_empty() {
-        rows.rows.retain(|row| !there.contains(&row.index));
-    }
-    rows
-}
-
 impl Shelf {
     /// The files that may have a run, single ones first.
     pub(crate) fn files_with(&self, campaign: &str, index: u64) -> Vec<PathBuf> {
@@ -256,7 +300,8 @@ impl Shelf {
         if single.exists() {
             return vec![single];
         }
-        let files = self.files(Some(campaign)).into_iter();
-        files.filter(|file| !file.is_single && file.has(index)).map(|file| file.path).collect()
+        // Ranges of files from shards overlap.
+        let files = self.files(Some(campaign)).into_iter().filter(|file| !file.is_single && file.has(index));
+        files.map(|file| file.path).filter(|path| may_have(path, index)).collect()
     }
 }

@@ -6,7 +6,7 @@ use crate::folder::Folder;
 use crate::graphs;
 use crate::journal::{self, Part};
 use crate::open::{OpenStore, Opened, read_with_outlines};
-use crate::outlines::shelf::Unread;
+use crate::outlines::shelf::{Needed, Unread};
 use crate::trace_file;
 use crate::wanted::{InGraph, Wanted};
 use crate::write_run::run_node;
@@ -15,7 +15,7 @@ use actcheck_base::{Diagnostic, Diagnostics};
 use actcheck_facts::extract;
 
 /// Largest number of statements that a query may need from outlines: they take half a minute and two gigabytes of memory.
-const MOST_STATEMENTS: usize = 5_000_000;
+pub(crate) const MOST_STATEMENTS: usize = 5_000_000;
 
 /// The store of a reader, with the statements of outlines that queries have asked for so far.
 pub(crate) struct View {
@@ -59,9 +59,9 @@ impl History {
     /// The wanted statements of all outlines, with facts, as if the runs were kept whole.
     pub(crate) fn outlined_statements(&self, wanted: &Wanted) -> Result<Part, Diagnostics> {
         let with_facts = wanted.graphs || wanted.patterns.iter().any(|pattern| pattern.graph != InGraph::Default);
-        let found = self.of_outlines(|shelf| {
+        let found = self.of_outlines(&mut |shelf| {
             let mut part = Part::default();
-            shelf.each_file(None, false, &mut |file, opened, there| {
+            shelf.each_file(None, Needed::All, &mut |file, opened, there| {
                 if part.quads.len() > MOST_STATEMENTS {
                     return Ok(());
                 }
@@ -88,19 +88,29 @@ impl History {
             Ok::<Part, Unread>(part)
         })?;
         if found.quads.len() > MOST_STATEMENTS {
-            return Err(too_many(self));
+            return Err(too_many(self, "the query", found.quads.len() as u64));
         }
         Ok(found)
     }
 }
 
-fn too_many(history: &History) -> Diagnostics {
+/// Time in which the store takes in a statement. Unit: seconds.
+const SECS_A_STATEMENT: f64 = 6e-6;
+/// Memory of a statement in the store. Unit: gigabytes.
+const GIGABYTES_A_STATEMENT: f64 = 4e-7;
+
+/// The error of a query that needs the statements of too many outlines. `part`: the part of it that does.
+pub(crate) fn too_many(history: &History, part: &str, statements: u64) -> Diagnostics {
+    let number = statements as f64;
     let message = format!(
-        "the query needs over {} million statements about runs of `{}` that are kept as outlines",
-        MOST_STATEMENTS / 1_000_000,
-        history.dir().display()
+        "{part} needs the store: over {} million statements about runs of `{}` that are kept as outlines, about {:.0} minutes \
+         and {:.0} GB",
+        statements / 1_000_000,
+        history.dir().display(),
+        (number * SECS_A_STATEMENT / 60.0).max(1.0),
+        (number * GIGABYTES_A_STATEMENT).max(1.0),
     );
     Diagnostic::error("H030", message)
-        .help("`actcheck list`, `analyse` and `compare` read columns instead; or ask for fewer properties, or export the campaign's tables (`actcheck export --parquet DIR`)")
+        .help("ask for one campaign's runs in a history of its own, without that part, or export the campaign's tables (`actcheck export --parquet DIR`)")
         .into()
 }

@@ -1,10 +1,11 @@
 //! Packs all runs as columns: their outcomes, their conditions and effects.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 use serde_json::{Value, json};
 
 use crate::FindingsSummary;
+use crate::html::HtmlReport;
 use crate::html::pack::Pack;
 use actcheck_analysis::{ColumnKind, OutcomeTable, columns};
 use actcheck_base::{Outcome, names};
@@ -47,46 +48,67 @@ impl Slots {
             .iter()
             .map(|report| (report.findings.action.as_str(), report.findings.property.as_str()))
             .collect();
-        let slot = |row: usize| {
-            let (action, property) = (table.text("action").get(row)?, table.text("property").get(row)?);
-            let step = table.number("step").get(row).filter(|step| !step.is_nan())?;
-            shown.contains(&(action, property)).then_some((*step as u32, action, property))
+        let (actions, properties, steps) = (table.text("action"), table.text("property"), table.number("step"));
+        let key = |row: usize| -> Option<(u32, u32, u32)> {
+            let step = steps.get(row).filter(|step| !step.is_nan())?;
+            Some((*step as u32, actions.of_row[row]?, properties.of_row[row]?))
         };
-        let all: BTreeSet<(u32, &str, &str)> = (0..table.len()).filter_map(slot).collect();
-        let places: BTreeMap<_, usize> = all.iter().copied().zip(0..).collect();
+        let mut keys: HashMap<(u32, u32, u32), Option<usize>> = HashMap::new();
+        keys.extend((0..table.len()).filter_map(key).map(|key| (key, None)));
+        let mut slots: Vec<(Slot, (u32, u32, u32))> = Vec::new();
+        for key @ (step, action, property) in keys.keys().copied() {
+            let (action, property) = (&actions.texts[action as usize], &properties.texts[property as usize]);
+            if shown.contains(&(action.as_str(), property.as_str())) {
+                slots.push((Slot { step, action: action.clone(), property: property.clone() }, key));
+            }
+        }
+        slots.sort();
+        keys.extend(slots.iter().enumerate().map(|(place, (_, key))| (*key, Some(place))));
         Self {
-            of_row: (0..table.len()).map(|row| places.get(&slot(row)?).copied()).collect(),
-            slots: all
-                .into_iter()
-                .map(|(step, action, property)| Slot { step, action: action.to_owned(), property: property.to_owned() })
-                .collect(),
+            of_row: (0..table.len()).map(|row| keys.get(&key(row)?).copied().flatten()).collect(),
+            slots: slots.into_iter().map(|(slot, _)| slot).collect(),
         }
     }
 }
 
-/// Packs all runs.
-pub(super) fn runs(table: &OutcomeTable, slots: &Slots) -> String {
+/// Packs all runs: their outcomes, and the parameters, messages and explanations of all or of a sample.
+pub(super) fn runs(report: &HtmlReport<'_>, slots: &Slots) -> String {
+    let table = report.table;
     let mut pack = Pack::default();
-    let runs = table.text("run");
-    let first_rows = first_rows(table);
-    pack.set("runs", runs.texts.clone());
-    for name in ["campaign", "test", "status", "started"] {
-        let column = kinds(table, name, &first_rows, &mut pack);
+    let rows = first_rows(table);
+    ids(table, &rows, &mut pack);
+    for name in ["campaign", "test", "status"] {
+        let column = kinds(table, name, &rows, &mut pack);
         pack.set(name, column);
     }
-    for name in ["index", "score", "scene", "repetition"] {
-        let column = pack.numbers(&of_rows(table, name, &first_rows));
+    for name in ["index", "scene", "repetition"] {
+        let column = pack.counts(&of_rows(table, name, &rows));
         pack.set(name, column);
     }
+    let score = pack.numbers(&of_rows(table, "score", &rows));
+    pack.set("score", score);
+    modes(report, &mut pack);
     outcomes(table, slots, &mut pack);
-    steps(table, &mut pack);
+    let (detailed, rows) = match report.sample {
+        None => (table, rows),
+        Some(sample) => (sample, first_rows(sample)),
+    };
+    let places = report.sample.map(|sample| places_in(table, sample));
+    if let Some(places) = &places {
+        let places = pack.places(places);
+        pack.set("detailed", places);
+    }
+    witnesses(table, slots, detailed, places.as_deref(), &mut pack);
+    let started = kinds(detailed, "started", &rows, &mut pack);
+    pack.set("started", started);
+    steps(detailed, &mut pack);
     let parameters: Vec<Value> = columns()
         .iter()
         .filter(|column| column.is_condition() || column.is_effect() || column.name.ends_with("_displacement_m"))
         .filter_map(|column| {
             let values = match column.kind {
-                ColumnKind::Text => Some(kinds(table, column.name, &first_rows, &mut pack)),
-                _ => pack.numbers(&of_rows(table, column.name, &first_rows)),
+                ColumnKind::Text => Some(kinds(detailed, column.name, &rows, &mut pack)),
+                _ => pack.numbers(&of_rows(detailed, column.name, &rows)),
             };
             Some(json!({
                 "name": column.name, "unit": column.unit, "told": column.description, "role": column.role,
@@ -95,9 +117,48 @@ pub(super) fn runs(table: &OutcomeTable, slots: &Slots) -> String {
         })
         .collect();
     pack.set("parameters", parameters);
-    let acted = kinds(table, "action", &first_rows, &mut pack);
+    let acted = kinds(detailed, "action", &rows, &mut pack);
     pack.set("action", acted);
     pack.finish()
+}
+
+/// Packs the ids of runs, unless each consists of its campaign and its number.
+fn ids(table: &OutcomeTable, rows: &[usize], pack: &mut Pack) {
+    let (runs, campaigns, index) = (table.text("run"), table.text("campaign"), table.number("index"));
+    let is_numbered = |(run, row): (&String, &usize)| {
+        let number = index.get(*row).map(|index| index + 1.0);
+        run.rsplit_once('-').is_some_and(|(campaign, of_run)| {
+            campaigns.get(*row) == Some(campaign) && number.is_some_and(|number| of_run == number.to_string())
+        })
+    };
+    pack.set("count", runs.texts.len());
+    if !runs.texts.iter().zip(rows).all(is_numbered) {
+        pack.set("ids", runs.texts.clone());
+    }
+}
+
+/// Packs the failure mode of each run: its number from 1, or 0.
+fn modes(report: &HtmlReport<'_>, pack: &mut Pack) {
+    let runs = &report.table.text("run").texts;
+    let place_of: HashMap<&str, u32> = (1..)
+        .zip(&report.findings.modes)
+        .flat_map(|(mode, of)| of.runs.iter().map(move |run| (run.as_str(), mode)))
+        .collect();
+    let modes: Vec<u32> = runs.iter().map(|run| place_of.get(run.as_str()).copied().unwrap_or(0)).collect();
+    let modes = pack.places(&modes);
+    pack.set("mode", modes);
+}
+
+/// For each run of a sample, its place among all runs.
+fn places_in(table: &OutcomeTable, sample: &OutcomeTable) -> Vec<u32> {
+    let wanted = &sample.text("run").texts;
+    let mut places: HashMap<&str, u32> = wanted.iter().map(|run| (run.as_str(), 0)).collect();
+    for (place, run) in (0..).zip(&table.text("run").texts) {
+        if let Some(of) = places.get_mut(run.as_str()) {
+            *of = place;
+        }
+    }
+    wanted.iter().map(|run| places.get(run.as_str()).copied().unwrap_or(0)).collect()
 }
 
 /// For each run, the row that describes its scene and effects: the one whose surface is nearest to the target. Actions at another
@@ -146,36 +207,66 @@ fn kinds(table: &OutcomeTable, name: &str, rows: &[usize], pack: &mut Pack) -> V
     json!({ "kind": "texts", "texts": texts, "of": of_run })
 }
 
-/// Packs outcomes and margins for each property, and the witnesses of outcomes that did not pass.
+/// Packs outcomes and margins for each property.
 fn outcomes(table: &OutcomeTable, slots: &Slots, pack: &mut Pack) {
     let runs = table.text("run");
     let count = runs.texts.len();
+    let codes = codes(table);
     let words = table.text("outcome");
-    let codes: Vec<u8> = words
-        .texts
-        .iter()
-        .map(|word| Outcome::ALL.iter().position(|outcome| outcome.word() == word).map_or(NO_OUTCOME, |at| at as u8))
-        .collect();
+    let margin = table.number("margin");
     let mut outcomes = vec![NO_OUTCOME; count * slots.slots.len()];
     let mut margins = vec![vec![f64::NAN; count]; slots.slots.len()];
-    let mut shown_by: BTreeMap<usize, &str> = BTreeMap::new();
     for row in 0..table.len() {
         let (Some(run), Some(slot)) = (runs.of_row[row], slots.of_row[row]) else { continue };
-        let code = words.of_row[row].map_or(NO_OUTCOME, |of| codes[of as usize]);
-        let at = slot * count + run as usize;
-        outcomes[at] = code;
-        margins[slot][run as usize] = table.number("margin").get(row).copied().unwrap_or(f64::NAN);
-        if let Some(witness) = table.text("witness").get(row).filter(|text| code != 0 && !text.is_empty()) {
-            shown_by.insert(at, witness);
-        }
+        outcomes[slot * count + run as usize] = words.of_row[row].map_or(NO_OUTCOME, |of| codes[of as usize]);
+        margins[slot][run as usize] = margin.get(row).copied().unwrap_or(f64::NAN);
     }
     let outcomes = pack.bytes(&outcomes);
     pack.set("outcomes", outcomes);
     let margins: Vec<Value> = margins.iter().map(|margins| pack.numbers(margins).into()).collect();
     pack.set("margins", margins);
+}
+
+/// The code of each text of the column of outcomes.
+fn codes(table: &OutcomeTable) -> Vec<u8> {
+    let code = |word: &String| {
+        let place = Outcome::ALL.iter().position(|outcome| outcome.word() == word);
+        place.map_or(NO_OUTCOME, |at| at as u8)
+    };
+    table.text("outcome").texts.iter().map(code).collect()
+}
+
+/// Packs the explanations of outcomes that did not pass, of the rows in `detailed`. `places`: the places of its runs among all
+/// runs, if it is a sample.
+fn witnesses(table: &OutcomeTable, slots: &Slots, detailed: &OutcomeTable, places: Option<&[u32]>, pack: &mut Pack) {
+    let count = table.text("run").texts.len();
+    let place_of: BTreeMap<&Slot, usize> = slots.slots.iter().zip(0..).collect();
+    let (runs, words) = (detailed.text("run"), detailed.text("outcome"));
+    let codes = codes(detailed);
+    let mut shown_by: BTreeMap<usize, &str> = BTreeMap::new();
+    for row in 0..detailed.len() {
+        let code = words.of_row[row].map_or(NO_OUTCOME, |of| codes[of as usize]);
+        let Some(witness) = detailed.text("witness").get(row).filter(|text| code != 0 && !text.is_empty()) else {
+            continue;
+        };
+        let slot = match places {
+            None => slots.of_row[row],
+            Some(_) => slot_of(detailed, row).and_then(|slot| place_of.get(&slot).copied()),
+        };
+        if let (Some(run), Some(slot)) = (runs.of_row[row], slot) {
+            let run = places.map_or(run, |places| places[run as usize]);
+            shown_by.insert(slot * count + run as usize, witness);
+        }
+    }
     let places: Vec<u32> = shown_by.keys().map(|at| *at as u32).collect();
     let places = pack.places(&places);
     pack.set("witnesses", json!({ "at": places, "texts": shown_by.values().collect::<Vec<_>>() }));
+}
+
+fn slot_of(table: &OutcomeTable, row: usize) -> Option<Slot> {
+    let step = table.number("step").get(row).filter(|step| !step.is_nan())?;
+    let (action, property) = (table.text("action").get(row)?, table.text("property").get(row)?);
+    Some(Slot { step: *step as u32, action: action.to_owned(), property: property.to_owned() })
 }
 
 /// Packs the message and duration of each action, step by step.

@@ -19,6 +19,9 @@ pub struct HtmlReport<'a> {
     pub findings: &'a FindingsSummary,
     /// The outcomes, with [`HTML_COLUMNS`](crate::HTML_COLUMNS) and the columns of the findings.
     pub table: &'a OutcomeTable,
+    /// A sample of the rows, if there are so many that `table` has only the columns of rates: the parameters, messages and
+    /// explanations of its runs are in the page.
+    pub sample: Option<&'a OutcomeTable>,
     /// All campaigns of the history, in order of start.
     pub campaigns: &'a [CampaignRow],
     /// Names of properties, by IRI.

@@ -6,6 +6,9 @@ use crate::FindingsSummary;
 use actcheck_analysis::OutcomeTable;
 use actcheck_base::Outcome;
 
+/// Largest number of failed runs in the order. A page of the usual size has room for a hundred.
+const MOST: usize = 2_000;
+
 /// Returns run ids in the order in which they should be included as replays. Failed runs come first, taken in turn from
 /// each failure mode and each property, so that the first few cover all of them. Then come runs that did not complete,
 /// then one run of each test in which nothing failed, for comparison.
@@ -34,7 +37,7 @@ pub fn replay_order(findings: &FindingsSummary, table: &OutcomeTable) -> Vec<Str
     order.into_iter().filter(|run| seen.insert(*run)).map(str::to_owned).collect()
 }
 
-/// Takes the next unseen run of each queue in turn, until all are empty.
+/// Takes the next unseen run of each queue in turn, until all are empty or there are more than a page has room for.
 fn in_turn<'a>(queues: &[Vec<&'a str>]) -> Vec<&'a str> {
     let mut seen = BTreeSet::new();
     let mut order = Vec::new();
@@ -44,7 +47,7 @@ fn in_turn<'a>(queues: &[Vec<&'a str>]) -> Vec<&'a str> {
         for queue in &mut rest {
             order.extend(queue.find(|run| seen.insert(**run)));
         }
-        if order.len() == before {
+        if order.len() == before || order.len() >= MOST {
             return order;
         }
     }

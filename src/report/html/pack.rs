@@ -11,6 +11,10 @@ use serde_json::{Map, Value, json};
 
 /// Code for a missing number.
 const NONE: u16 = u16::MAX;
+/// Code for a missing whole number.
+const NO_COUNT: u32 = u32::MAX;
+/// Size from which data are compressed faster: a tenth larger in a quarter of the time. Unit: bytes.
+const LARGE: usize = 16 << 20;
 /// Number of quantisation steps between the smallest and the largest value of a column.
 const STEPS: f64 = 65_534.0;
 /// Alignment of arrays, required by the browser's typed arrays. Unit: bytes.
@@ -42,6 +46,14 @@ impl Pack {
         };
         let kind = if bytes.len() == 2 * values.len() { "u16" } else { "u32" };
         self.array(kind, values.len(), &bytes)
+    }
+
+    /// Adds a column of whole numbers and returns its descriptor. Returns `None` if it has no numbers.
+    pub fn counts(&mut self, values: &[f64]) -> Option<Value> {
+        values.iter().find(|value| value.is_finite())?;
+        let code = |value: &f64| if value.is_finite() { value.round() as u32 } else { NO_COUNT };
+        let bytes: Vec<u8> = values.iter().flat_map(|value| code(value).to_le_bytes()).collect();
+        Some(self.array("count", values.len(), &bytes))
     }
 
     /// Adds a column of numbers, quantised to 1/65534 of their range, and returns its descriptor. Returns `None` if it
@@ -101,7 +113,8 @@ impl Pack {
 
 /// Compresses bytes and encodes them in Base64, which is safe inside markup.
 pub(super) fn packed(bytes: &[u8]) -> String {
-    let mut encoder = ZlibEncoder::new(Vec::with_capacity(bytes.len() / 3), Compression::new(7));
+    let level = if bytes.len() < LARGE { 7 } else { 2 };
+    let mut encoder = ZlibEncoder::new(Vec::with_capacity(bytes.len() / 3), Compression::new(level));
     // Writing to memory does not fail. If it did, the page would report that it can't read this part.
     let deflated = encoder.write_all(bytes).and_then(|()| encoder.finish()).unwrap_or_default();
     STANDARD.encode(deflated)

@@ -16,7 +16,7 @@ use crate::html::summary::summary;
 pub fn html(report: &HtmlReport<'_>) -> String {
     let script = format!("\"use strict\";\n{}", SCRIPT.join("\n"));
     let slots = Slots::of(report.table, report.findings);
-    let before = data("summary", &summary(report, &slots)) + &data("runs", &runs(report.table, &slots));
+    let before = data("summary", &summary(report, &slots)) + &data("runs", &runs(report, &slots));
     let mut behind = data("forms", &report.replays.forms());
     for (name, text) in THREE {
         behind.push_str(&data(name, &packed(text.as_bytes())));

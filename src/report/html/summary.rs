@@ -1,6 +1,6 @@
 //! Packs the summary of all runs of a page.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 use serde_json::{Value, json};
 
@@ -16,8 +16,9 @@ use actcheck_verdict::{mean, wilson};
 /// Packs findings, campaigns and properties. Runs are referred to by index.
 pub(super) fn summary(report: &HtmlReport<'_>, slots: &Slots) -> String {
     let runs = &report.table.text("run").texts;
-    let places: BTreeMap<&str, usize> = runs.iter().map(String::as_str).zip(0..).collect();
+    let places: HashMap<&str, usize> = runs.iter().map(String::as_str).zip(0..).collect();
     let mut findings = findings_json(report.findings);
+    modes(&mut findings, report, &places);
     number_runs(&mut findings, &places);
     let mut pack = Pack::default();
     pack.set("version", report.version);
@@ -37,14 +38,24 @@ pub(super) fn summary(report: &HtmlReport<'_>, slots: &Slots) -> String {
     pack.finish()
 }
 
+/// Replaces the runs of each failure mode by their number and an example, with a replay if there is one. The mode of each run is
+/// in the other part of the page.
+fn modes(findings: &mut Value, report: &HtmlReport<'_>, places: &HashMap<&str, usize>) {
+    let replayed: BTreeSet<&str> = report.replays.runs().map(|(run, _)| run).collect();
+    let shown = findings["failure_modes"].as_array_mut().into_iter().flatten();
+    for (shown, mode) in shown.zip(&report.findings.modes) {
+        let example = mode.runs.iter().find(|run| replayed.contains(run.as_str())).or(mode.runs.first());
+        let example = example.and_then(|run| places.get(run.as_str()));
+        *shown = json!({ "failed": mode.failed, "share": mode.share, "count": mode.runs.len(), "example": example });
+    }
+}
+
 /// Replaces run ids by indices, which take a tenth of the space.
-fn number_runs(findings: &mut Value, places: &BTreeMap<&str, usize>) {
+fn number_runs(findings: &mut Value, places: &HashMap<&str, usize>) {
     let number = |runs: &mut Value| {
         let known = runs.as_array().into_iter().flatten().filter_map(|run| places.get(run.as_str()?));
         *runs = known.copied().collect();
     };
-    let modes = findings["failure_modes"].as_array_mut().into_iter().flatten();
-    modes.for_each(|mode| number(&mut mode["runs"]));
     for property in findings["properties"].as_array_mut().into_iter().flatten() {
         for causes in ["patterns", "effects"] {
             let patterns = property[causes]["found"].as_array_mut().into_iter().flatten();
@@ -85,24 +96,25 @@ fn sentences(findings: &mut Value, report: &HtmlReport<'_>) {
 fn scores(report: &HtmlReport<'_>) -> Value {
     let table = report.table;
     let (runs, status, score) = (table.text("run"), table.text("status"), table.number("score"));
-    let mut first: BTreeMap<u32, usize> = BTreeMap::new();
     let counted = table.counted_runs();
+    let mut rows: Vec<Option<usize>> = vec![None; runs.texts.len()];
     for (row, run) in runs.of_row.iter().enumerate() {
         if let Some(run) = run
             && counted[*run as usize]
         {
-            first.entry(*run).or_insert(row);
+            rows[*run as usize].get_or_insert(row);
         }
     }
+    let first: Vec<usize> = rows.into_iter().flatten().collect();
     let of = |row: &usize| score.get(*row).copied().filter(|score| score.is_finite());
-    let whole = first.values().filter(|row| status.get(**row) != Some("broken"));
+    let whole = first.iter().filter(|row| status.get(**row) != Some("broken"));
     let modes = &report.findings.modes;
     let passed: u64 = modes.iter().filter(|mode| mode.failed.is_empty()).map(|mode| mode.runs.len() as u64).sum();
     let tested: u64 = modes.iter().map(|mode| mode.runs.len() as u64).sum();
     let mut statuses: BTreeMap<&str, u64> = BTreeMap::new();
-    first.values().filter_map(|row| status.get(*row)).for_each(|word| *statuses.entry(word).or_default() += 1);
+    first.iter().filter_map(|row| status.get(*row)).for_each(|word| *statuses.entry(word).or_default() += 1);
     json!({
-        "T": mean(first.values().filter_map(of)), "T_interval": score_interval(first.values().filter_map(of)),
+        "T": mean(first.iter().filter_map(of)), "T_interval": score_interval(first.iter().filter_map(of)),
         "without_broken": mean(whole.clone().filter_map(of)), "without_broken_interval": score_interval(whole.filter_map(of)),
         "runs": first.len(), "all_passed": wilson(passed, tested), "passed": passed, "tested": tested,
         "statuses": statuses, "twins": report.findings.twins,

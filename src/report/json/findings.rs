@@ -17,7 +17,7 @@ pub fn findings_json(summary: &FindingsSummary) -> Value {
         .collect();
     json!({
         "campaigns": summary.campaigns,
-        "runs": summary.runs, "twins": summary.twins,
+        "runs": summary.runs, "twins": summary.twins, "sampled_runs": summary.sampled_runs,
         "outcomes": summary.counts,
         "level": summary.level,
         "failure_modes": modes,

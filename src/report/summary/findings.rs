@@ -20,7 +20,9 @@ pub struct FindingsSummary {
     pub campaigns: Vec<String>,
     /// Number of runs in the table.
     pub runs: u64,
-    /// Number of those that don't count because a later run is bit-identical.
+    /// Number of runs of the sample in which conditions and collisions were sought; `None` if that was all.
+    pub sampled_runs: Option<u64>,
+    /// Number of the runs that don't count because a later run is bit-identical.
     pub twins: u64,
     /// Outcome counts of the runs that count.
     pub counts: Counts,

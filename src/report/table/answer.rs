@@ -14,19 +14,19 @@ pub fn answer_table(answer: &QueryAnswer, short: bool) -> Table {
     match answer {
         QueryAnswer::Boolean(value) => Table { rows: vec![vec![Value::Bool(*value)]], ..Table::new(["answer"]) },
         QueryAnswer::Table { columns, rows } => Table {
-            rows: rows
-                .iter()
-                .map(|row| {
-                    row.iter().map(|cell| cell.as_ref().map_or(Value::Null, |term| value(term, short))).collect()
-                })
-                .collect(),
+            rows: rows.iter().map(|row| answer_cells(row.iter().map(Option::as_ref), short)).collect(),
             ..Table::new(columns)
         },
         QueryAnswer::Graph(triples) => Table {
-            rows: triples.iter().map(|triple| triple.iter().map(|term| value(term, short)).collect()).collect(),
+            rows: triples.iter().map(|triple| answer_cells(triple.iter().map(Some), short)).collect(),
             ..Table::new(["subject", "predicate", "object"])
         },
     }
+}
+
+/// The cells of one row of an answer, as in [`answer_table`].
+pub fn answer_cells<'a>(row: impl Iterator<Item = Option<&'a Term>>, short: bool) -> Vec<Value> {
+    row.map(|cell| cell.map_or(Value::Null, |term| value(term, short))).collect()
 }
 
 fn value(term: &Term, short: bool) -> Value {

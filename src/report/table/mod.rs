@@ -12,12 +12,12 @@ mod recheck;
 mod render;
 mod shrunk;
 
-pub use answer::answer_table;
+pub use answer::{answer_cells, answer_table};
 pub use campaign::campaign_table;
 pub use compare::compare_table;
 pub use findings::{findings_table, maps_table};
 pub use health::health_table;
 pub use oracles::oracles_table;
 pub use recheck::recheck_table;
-pub use render::{Table, TableFormat};
+pub use render::{Table, TableFormat, TableParts};
 pub use shrunk::with_shrunk;

@@ -74,14 +74,12 @@ impl Table {
     }
 
     fn csv(&self) -> String {
-        let mut writer = csv::WriterBuilder::new().from_writer(Vec::new());
-        let rows =
-            std::iter::once(self.columns.clone()).chain(self.rows.iter().map(|row| row.iter().map(plain).collect()));
-        for row in rows {
-            writer.write_record(&row).expect("writing to memory does not fail, and every row has all columns");
-        }
-        let bytes = writer.into_inner().expect("writing to memory does not fail");
-        String::from_utf8(bytes).expect("only text was written")
+        csv_lines(std::iter::once(self.columns.clone())) + &self.csv_rows()
+    }
+
+    /// The rows as comma-separated values, without the header line.
+    pub fn csv_rows(&self) -> String {
+        csv_lines(self.rows.iter().map(|row| row.iter().map(plain).collect()))
     }
 
     fn json(&self) -> String {
@@ -96,6 +94,61 @@ impl Table {
         };
         Value::Array(self.rows.iter().map(object).collect())
     }
+}
+
+/// A table that is written in parts, so that only one part is in memory. As text, each part is a table of its own.
+#[derive(Debug)]
+pub struct TableParts {
+    columns: Vec<String>,
+    format: TableFormat,
+    page: Page,
+    /// Whether a part was written.
+    has_begun: bool,
+}
+
+impl TableParts {
+    /// Begins a table.
+    pub fn new<S: Into<String>>(columns: impl IntoIterator<Item = S>, format: TableFormat, page: Page) -> Self {
+        Self { columns: columns.into_iter().map(Into::into).collect(), format, page, has_begun: false }
+    }
+
+    /// Renders the next rows. The parts and the end together are [`Table::render`] of all rows, except for text.
+    pub fn part(&mut self, rows: Vec<Vec<Value>>) -> String {
+        if rows.is_empty() && self.format == TableFormat::Json {
+            return String::new();
+        }
+        let is_first = !std::mem::replace(&mut self.has_begun, true);
+        let table = Table { rows, ..Table::new(&self.columns) };
+        let text = table.render(self.format, self.page);
+        match self.format {
+            TableFormat::Table => text,
+            TableFormat::Csv if is_first => text,
+            TableFormat::Csv => table.csv_rows(),
+            TableFormat::Json => {
+                let objects = text.strip_prefix("[\n").and_then(|text| text.strip_suffix("\n]\n")).unwrap_or_default();
+                format!("{}{objects}", if is_first { "[\n" } else { ",\n" })
+            }
+        }
+    }
+
+    /// Renders the end.
+    pub fn end(&mut self) -> String {
+        match (self.format, self.has_begun) {
+            (TableFormat::Json, true) => "\n]\n".to_owned(),
+            (_, true) => String::new(),
+            (TableFormat::Json, false) => "[]\n".to_owned(),
+            (_, false) => self.part(Vec::new()),
+        }
+    }
+}
+
+fn csv_lines(rows: impl Iterator<Item = Vec<String>>) -> String {
+    let mut writer = csv::WriterBuilder::new().from_writer(Vec::new());
+    for row in rows {
+        writer.write_record(&row).expect("writing to memory does not fail, and every row has all columns");
+    }
+    let bytes = writer.into_inner().expect("writing to memory does not fail");
+    String::from_utf8(bytes).expect("only text was written")
 }
 
 /// Formats a cell as text: strings without quotes, `null` as an empty string.
@@ -122,6 +175,22 @@ mod tests {
         );
         assert!(table.render(TableFormat::Json, Page::default()).contains("\"note\": null"));
         assert!(table.render(TableFormat::Table, Page::default()).contains("k-1"));
+    }
+
+    #[test]
+    fn parts_are_together_the_whole_table() {
+        let rows: Vec<Vec<Value>> = (0..5).map(|row| vec![row.into(), format!("a\n{row}").into()]).collect();
+        for format in [TableFormat::Csv, TableFormat::Json] {
+            for count in [0, 1, 2, 5] {
+                let table = Table { rows: rows[..count].to_vec(), ..Table::new(["n", "text"]) };
+                for size in [1, 2, 3, 5] {
+                    let mut parts = TableParts::new(["n", "text"], format, Page::default());
+                    let mut text: String = table.rows.chunks(size).map(|rows| parts.part(rows.to_vec())).collect();
+                    text += &parts.end();
+                    assert_eq!(text, table.render(format, Page::default()), "{count} rows in parts of {size}");
+                }
+            }
+        }
     }
 
     #[test]

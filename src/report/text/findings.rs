@@ -25,6 +25,12 @@ pub fn findings_text(summary: &FindingsSummary, page: Page) -> String {
         let _ = writeln!(out, "{}", twins_line(summary.twins));
     }
     let _ = writeln!(out, "{} outcomes: {}", summary.counts.total(), counts(summary.counts));
+    if let Some(sampled) = summary.sampled_runs {
+        let _ = writeln!(
+            out,
+            "counts, rates, margins and failure modes are of all runs; patterns and collisions of a sample of {sampled}"
+        );
+    }
     modes(&mut out, summary, page);
     cascades(&mut out, summary);
     collisions(&mut out, &summary.collisions, page);

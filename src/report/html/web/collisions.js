@@ -67,7 +67,7 @@ function topView(runs, action, colour, open) {
   const within = (thing) => Math.max(Math.abs(thing.beyond_m), Math.abs(thing.left_m)) * scale < half;
   const cross = (thing) => {
     const [x, y] = at(thing), size = 3.5 + 1.5 * Math.log10(Math.max(1, thing.force_n));
-    const told = `${thing.object}, ${number(thing.force_n, "N")}, run ${runs.runs[thing.run] ?? ""}`;
+    const told = `${thing.object}, ${number(thing.force_n, "N")}, run ${thing.run === null ? "" : runs.id(thing.run)}`;
     return make("path", { class: "hit", d: `M${x - size} ${y - size}L${x + size} ${y + size}M${x - size} ${y + size}L${x + size} ${y - size}`,
       style: { stroke: colour(thing.category) }, onclick: () => thing.run !== null && open(thing.run) }, make("title", { svg: true }, told));
   };

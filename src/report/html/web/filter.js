@@ -71,23 +71,23 @@ class Filter {
   chosen() {
     const { runs } = this;
     const words = this.text.toLowerCase().split(/\s+/).filter(Boolean);
-    const letters = words.length ? runs.letters() : null;
+    const matches = words.length ? runs.matcher(words) : null;
     const outcome = OUTCOMES.indexOf(this.outcome), slot = this.slot === "" ? -1 : Number(this.slot);
     const mode = this.mode === "" ? -1 : Number(this.mode);
     const campaign = this.campaign === "" ? -1 : runs.campaign.texts.indexOf(this.campaign) + 1;
+    const replayed = this.replay && new Set([...runs.replayed.keys()].map((id) => runs.find(id)));
     const pattern = this.pattern && new Set(this.sets.get(this.pattern).runs);
     const found = [];
-    for (const run of runs.order) {
+    for (const run of this.sort === "score" ? runs.byScore() : runs.order) {
       if (outcome >= 0 && (slot >= 0 ? runs.outcome(run, slot) : runs.worst[run]) !== outcome) continue;
       if (slot >= 0 && runs.outcome(run, slot) === NO_OUTCOME) continue;
-      if (mode >= 0 && runs.modeOf[run] !== mode) continue;
+      if (mode >= 0 && runs.mode[run] !== mode + 1) continue;
       if (campaign >= 0 && runs.campaign.of[run] !== campaign) continue;
-      if (this.replay && !runs.replayed.has(runs.runs[run])) continue;
+      if (this.replay && !replayed.has(run)) continue;
       if (pattern && !pattern.has(run)) continue;
-      if (letters && !words.every((word) => letters[run].includes(word))) continue;
+      if (matches && !matches(run)) continue;
       found.push(run);
     }
-    if (this.sort === "score") found.sort((a, b) => runs.score[a] - runs.score[b] || a - b);
     if (this.sort === "newest") found.reverse();
     return found;
   }

@@ -2,6 +2,8 @@
 
 const ROW = 32;
 const MORE = 12;
+/** Largest height of an element that all browsers draw, in pixels. */
+const TALLEST = 15000000;
 
 function runList({ runs, filter, to }) {
   const body = make("div", { class: "rows", role: "rowgroup" });
@@ -16,10 +18,10 @@ function runList({ runs, filter, to }) {
   const shownRows = new Map();
 
   const row = (at) => {
-    const run = filter.shown[at], id = runs.runs[run];
+    const run = filter.shown[at], id = runs.id(run);
     const told = runs.failures(run).map((slot) => runs.why(run, slot)).find(Boolean)
-      ?? runs.steps.map((step) => runs.text(step.message, run)).filter(Boolean).at(-1) ?? "";
-    return make("div", { class: "row", role: "row", id: `row-${at}`, "aria-rowindex": at + 1, style: { top: `${at * ROW}px` },
+      ?? runs.steps.map((step) => runs.told(step.message, run)).filter(Boolean).at(-1) ?? "";
+    return make("div", { class: "row", role: "row", id: `row-${at}`, "aria-rowindex": at + 1,
       onclick: (event) => event.target.closest("a") || event.ctrlKey || event.metaKey || (location.hash = to(run)) },
       make("span", { class: "id", role: "rowheader" }, make("a", { href: to(run), tabindex: "-1" }, id), runs.replayed.has(id) && make("span", { class: "can", role: "img", "aria-label": "can be played back", title: "can be played back" }, "▶")),
       make("span", { class: "score", role: "gridcell" }, Number.isNaN(runs.score[run]) ? "–" : runs.score[run].toFixed(2)),
@@ -30,10 +32,17 @@ function runList({ runs, filter, to }) {
       }),
       make("span", { class: "words", role: "gridcell" }, told));
   };
+  // Browsers limit the height of elements: of very many rows, a step of the scroll bar passes more than its own height.
+  const height = () => Math.min(filter.shown.length * ROW, TALLEST);
+  const speed = () => {
+    const room = height() - list.clientHeight;
+    return room > 0 ? (filter.shown.length * ROW - list.clientHeight) / room : 1;
+  };
   const draw = (more) => {
-    body.style.height = `${filter.shown.length * ROW}px`;
-    const first = Math.max(0, Math.floor(list.scrollTop / ROW) - more);
-    const last = Math.min(filter.shown.length, Math.ceil((list.scrollTop + list.clientHeight) / ROW) + more);
+    body.style.height = `${height()}px`;
+    const top = list.scrollTop * speed();
+    const first = Math.max(0, Math.floor(top / ROW) - more);
+    const last = Math.min(filter.shown.length, Math.ceil((top + list.clientHeight) / ROW) + more);
     for (const [at, element] of shownRows) {
       if (at < first || at >= last) {
         element.remove();
@@ -45,6 +54,7 @@ function runList({ runs, filter, to }) {
         shownRows.set(at, row(at));
         body.append(shownRows.get(at));
       }
+      shownRows.get(at).style.top = `${at * ROW - top + list.scrollTop}px`;
       shownRows.get(at).classList.toggle("active", at === active);
     }
   };
@@ -66,9 +76,9 @@ function runList({ runs, filter, to }) {
     const step = { ArrowDown: 1, ArrowUp: -1, PageDown: page, PageUp: -page, Home: -Infinity, End: Infinity }[event.key];
     if (step !== undefined) {
       active = Math.min(filter.shown.length - 1, Math.max(0, active + step));
-      const top = active * ROW;
-      if (top < list.scrollTop) list.scrollTop = top;
-      if (top + 3 * ROW > list.scrollTop + list.clientHeight) list.scrollTop = top + 3 * ROW - list.clientHeight;
+      const top = active * ROW, seen = list.scrollTop * speed();
+      if (top < seen) list.scrollTop = top / speed();
+      if (top + 3 * ROW > seen + list.clientHeight) list.scrollTop = (top + 3 * ROW - list.clientHeight) / speed();
       list.setAttribute("aria-activedescendant", `row-${active}`);
       drawMore();
       event.preventDefault();

@@ -51,7 +51,7 @@ async function main() {
     const address = new Address(filter);
     const report = {
       runs, summary, filter, address,
-      to: (run) => address.of("run", runs.runs[run]),
+      to: (run) => address.of("run", runs.id(run)),
       open: (run) => { location.hash = report.to(run); },
       list: (change) => addressOf(["runs"], filter.query({ ...ANY, ...change })),
     };

@@ -5,11 +5,15 @@ function tableMap({ runs, filter, open, address }) {
   if (!known.length) return { parts: [make("h1", {}, "From above"), make("p", {}, "These scenes have no target whose place varies."), make("p", {}, make("a", { href: address.of("runs") }, "See all runs"))] };
   let plane = known[0], by = "", outlines = [];
   const [element, draw] = scatter(runs, { height: Math.max(360, Math.min(620, innerHeight - 320)), open, label: "Target positions, by outcome" });
-  const shown = () => new Set(filter.shown);
+  const shown = () => {
+    const chosen = new Uint8Array(runs.count);
+    for (const run of filter.shown) chosen[run] = 1;
+    return chosen;
+  };
   const again = () => {
     const chosen = shown();
     draw(plane[1], plane[2], plane[3], (run) => {
-      if (!chosen.has(run)) return null;
+      if (!chosen[run]) return null;
       const outcome = by === "" ? runs.worst[run] : runs.outcome(run, Number(by));
       return outcome === NO_OUTCOME ? null : OUTCOMES[outcome];
     }, outlines.flatMap((outline) => outline[plane[1]] ?? []));
@@ -31,7 +35,7 @@ function tableMap({ runs, filter, open, address }) {
   requestAnimationFrame(() => arrive(wayOf(location.hash).query));
   outlinesOf(runs).then((found) => { outlines = found; if (element.isConnected) again(); }, () => {});
   return {
-    parts: [make("h1", {}, "From above"), make("p", { class: "lead" }, "The target position of every run, on the outline of its table. Click a dot to open its run."), bar, none,
+    parts: [make("h1", {}, "From above"), make("p", { class: "lead" }, `The target position of ${runs.sampled ? `each of ${counted(runs.detailed.length, "sampled run")}` : "every run"}, on the outline of its table. Click a dot to open its run.`), bar, none,
       make("p", { class: "filter" }, planeChoice, colour), element,
       make("p", { class: "legend" }, OUTCOMES.map((word) => badge(word)))],
     follow: () => { follow(); without(); again(); }, arrive,

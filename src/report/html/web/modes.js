@@ -7,7 +7,7 @@ function modeBars({ summary, list }, shown = Infinity) {
     make("a", { href: list({ mode: String(number) }) },
       make("span", { class: "name" }, mode.failed.length ? mode.failed.map((iri, i) => [i > 0 && make("i", {}, " + "), breakable(local(iri))]) : make("em", {}, "nothing failed")),
       rateBar(mode.share, mode.failed.length ? "failed" : "passed", most),
-      make("span", { class: "faint" }, `${interval(mode.share)} · ${counted(mode.runs.length, "run")}`)))));
+      make("span", { class: "faint" }, `${interval(mode.share)} · ${counted(mode.count, "run")}`)))));
 }
 
 function modes(report) {
@@ -19,9 +19,9 @@ function modes(report) {
     make("section", {}, modeBars(report)),
     make("section", {}, make("h2", {}, "See one of each"), make("ul", { class: "examples" },
       summary.findings.failure_modes.filter((mode) => mode.failed.length).map((mode) => {
-        const run = mode.runs.find((run) => runs.replayed.has(runs.runs[run])) ?? mode.runs[0];
+        const run = mode.example;
         const slot = runs.failures(run)[0];
-        return make("li", {}, make("a", { href: to(run) }, runs.runs[run]),
+        return make("li", {}, make("a", { href: to(run) }, runs.id(run)),
           " ", slot !== undefined && runs.why(run, slot));
       }))),
     cascades.length > 0 && make("section", {}, make("h2", {}, "Cascades"),

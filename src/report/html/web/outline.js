@@ -14,7 +14,7 @@ function outlinesOf(runs) {
 async function findOutlines(runs) {
   const byModel = new Map();
   for (const [id, number] of runs.replayed) {
-    const model = runs.value("surface_model", runs.place.get(id));
+    const model = runs.value("surface_model", runs.find(id));
     if (model && !byModel.has(model) && byModel.size < MOST_OUTLINES) byModel.set(model, number);
   }
   const forms = await formsOf(), found = [];

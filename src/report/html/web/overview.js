@@ -17,6 +17,7 @@ function overview(report) {
       make("p", { class: "lead" }, `Every property of every action of every run has one of six outcomes. Runs: ${statuses}.${scores.twins ? ` ${counted(scores.twins, "more run")} ${scores.twins === 1 ? "is" : "are"} bit-identical to a later one: each counts once.` : ""}`),
       make("div", { class: "tiles" }, OUTCOMES.map(tile)),
       shares(counts, "Outcomes"),
+      runs.sampled && make("p", {}, `Counts, rates, margins and failure modes are of all runs. Patterns, collisions, and the parameters and explanations of single runs are of a sample of ${counted(runs.detailed.length, "run")}.`),
       summary.campaigns.filter((row) => row.privileged).map((row) => make("p", {}, `In ${row.id} ${summary.privileged}.`))),
     make("section", { class: "scores" },
       score("T", scores.T === null ? "–" : scores.T.toFixed(4), `${between(scores.T_interval)} mean score of ${counted(scores.runs, "run")}`, ofScore(scores.T, scores.T_interval)),

@@ -4,7 +4,7 @@ function properties({ runs, summary, list }, chosen) {
   const cards = summary.findings.properties.map((property, i) => {
     const slots = runs.slots.map((slot, at) => [slot, at]).filter(([slot]) => slot.of === i);
     const words = slots[0]?.[0] ?? {};
-    const margins = slots.flatMap(([, at]) => Array.from(runs.margins[at] ?? []));
+    const margins = thinned(slots.map(([, at]) => runs.margins[at] ?? []));
     const unit = property.margin.unit ?? "";
     const to = (outcome) => list({ slot: String(slots[0]?.[1] ?? ""), outcome });
     const card = make("section", { class: "card", id: `property-${i}` },
@@ -28,4 +28,10 @@ function properties({ runs, summary, list }, chosen) {
   });
   queueMicrotask(() => chosen !== undefined && document.getElementById(`property-${chosen}`)?.scrollIntoView());
   return [make("h1", {}, "Properties"), cards];
+}
+
+/** The numbers of some columns; of very many, as many as a histogram shows. */
+function thinned(columns) {
+  const every = Math.max(1, Math.floor(columns.reduce((sum, column) => sum + column.length, 0) / 100000));
+  return columns.flatMap((column) => every === 1 ? Array.from(column) : Array.from({ length: Math.floor(column.length / every) }, (_, i) => column[i * every]));
 }

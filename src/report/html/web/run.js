@@ -1,7 +1,7 @@
 // The view of one run: failures with explanations, timeline, scene and 3D replay.
 
 function runView({ runs, summary, filter, address, to }, id) {
-  const run = runs.place.get(id);
+  const run = runs.find(id);
   if (run === undefined) return { parts: [make("h1", {}, "No such run"), make("p", {}, `This report has no run ${id}. `, make("a", { href: address.of("runs") }, "See all runs"))] };
   const at = filter.shown.indexOf(run);
   const step = (by, words) => {
@@ -16,7 +16,7 @@ function runView({ runs, summary, filter, address, to }, id) {
     make("header", { class: "runhead" },
       make("h1", {}, id, " ", badge(worst, worst === "passed" ? "nothing failed" : worst)),
       make("nav", { "aria-label": "Other runs" }, step(-1, "← previous"), step(1, "next →"), make("a", { class: "button", href: address.of("runs") }, filter.isAny ? "all runs" : "these runs"))),
-    make("p", { class: "lead" }, `${runs.text(runs.test, run)} · S = ${Number.isNaN(runs.score[run]) ? "–" : runs.score[run].toFixed(2)} · campaign ${runs.text(runs.campaign, run)} · ${moment(runs.text(runs.started, run))} · ${runs.text(runs.status, run)}`),
+    make("p", { class: "lead" }, `${runs.text(runs.test, run)} · S = ${Number.isNaN(runs.score[run]) ? "–" : runs.score[run].toFixed(2)} · campaign ${runs.text(runs.campaign, run)} · ${moment(runs.told(runs.started, run))} · ${runs.text(runs.status, run)}`),
     make("div", { class: "run" }, place, details),
     parameterTable(runs, run),
   ];
@@ -132,7 +132,7 @@ function discards(replay) {
 
 function parameterTable(runs, run) {
   const known = runs.parameters.map((parameter) => [parameter, runs.value(parameter.name, run)]).filter(([, value]) => value !== "" && !Number.isNaN(value));
-  const lists = [["Parameters of the scene", ["scene"]], ["Errors drawn", ["noise"]], [`Effects during ${local(runs.text(runs.action, run))}`, ["effect", "record"]]];
+  const lists = [["Parameters of the scene", ["scene"]], ["Errors drawn", ["noise"]], [`Effects during ${local(runs.told(runs.action, run))}`, ["effect", "record"]]];
   return lists.map(([title, roles]) => {
     const listed = known.filter(([parameter]) => roles.includes(parameter.role));
     return listed.length > 0 && make("section", {}, make("h2", {}, title), make("dl", { class: "parameters" }, listed.map(([parameter, value]) => make("div", { title: parameter.told },

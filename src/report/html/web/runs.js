@@ -1,38 +1,104 @@
 // All runs as columns, with queries on single runs.
 
+/** Number of runs from which their texts are not collected for the search. */
+const MANY_RUNS = 50000;
+
 class Runs {
   constructor(columns, summary) {
     Object.assign(this, columns);
     this.summary = summary;
-    this.count = columns.runs.length;
     this.searched = [];
+    this.gathered = 0;
     this.slots = summary.slots;
-    this.place = new Map(columns.runs.map((id, run) => [id, run]));
     this.replayed = new Map(summary.replays.map((id, number) => [id, number]));
     this.parameter = new Map(columns.parameters.map((parameter) => [parameter.name, parameter]));
     this.witness = new Map();
     columns.witnesses.at.forEach((at, i) => this.witness.set(at, columns.witnesses.texts[i]));
-    this.modeOf = new Int32Array(this.count).fill(-1);
-    summary.findings.failure_modes.forEach((mode, number) => mode.runs.forEach((run) => { this.modeOf[run] = number; }));
-    const none = new Float64Array(this.count).fill(NaN);
-    this.score ??= none;
-    this.index ??= none;
-    // By campaign, then by index. Alphabetical order of ids would be neither.
-    this.order = Array.from({ length: this.count }, (_, run) => run)
-      .sort((a, b) => this.campaign.of[a] - this.campaign.of[b] || this.index[a] - this.index[b] || a - b);
-    this.worst = Uint8Array.from({ length: this.count }, (_, run) => this.worstOf(run));
+    // Place of each run in the sample whose parameters and texts are in the page; without one, the page has those of all runs.
+    this.sampled = columns.detailed ? new Int32Array(this.count).fill(-1) : null;
+    columns.detailed?.forEach((run, place) => { this.sampled[run] = place; });
+    const none = () => new Float64Array(this.count).fill(NaN);
+    this.score ??= none();
+    this.index ??= none();
+    this.order = this.ordered();
+    this.judge();
+  }
+
+  /** Runs by campaign, then by index. Alphabetical order of ids would be neither. */
+  ordered() {
+    const { index, campaign } = this, order = Uint32Array.from({ length: this.count }, (_, run) => run);
+    const compare = (a, b) => campaign.of[a] - campaign.of[b] || index[a] - index[b] || a - b;
+    for (let run = 1; run < order.length; run++) if (compare(run - 1, run) > 0) return order.sort(compare);
+    return order;
+  }
+
+  /** Runs by score, the worst first, those without a score last. */
+  byScore() {
+    if (!this.worstFirst) {
+      const groups = new Map();
+      for (let run = 0; run < this.count; run++) {
+        const score = this.score[run], group = groups.get(score);
+        if (group) group.push(run);
+        else groups.set(score, [run]);
+      }
+      const scores = [...groups.keys()].sort((a, b) => (Number.isNaN(a) ? 2 : a) - (Number.isNaN(b) ? 2 : b));
+      this.worstFirst = scores.flatMap((score) => groups.get(score));
+    }
+    return this.worstFirst;
+  }
+
+  /** The outcome of each whole run: failed if any property failed, else the outcome that kept it from being judged, else passed. And the
+   * set of its failed properties, as a number. */
+  judge() {
+    const rank = [3, 0, 4, 1, 2, 5], strongest = [FAILED, BROKEN, TIMEOUT, PASSED, 2, 5];
+    const least = new Uint8Array(this.count).fill(5);
+    this.failed = new Float64Array(this.count);
+    for (let slot = 0; slot < this.slots.length; slot++) {
+      const base = slot * this.count, bit = 2 ** (slot % 50);
+      for (let run = 0; run < this.count; run++) {
+        const outcome = this.outcomes[base + run];
+        if (outcome === NO_OUTCOME) continue;
+        if (rank[outcome] < least[run]) least[run] = rank[outcome];
+        if (outcome === FAILED) this.failed[run] += bit;
+      }
+    }
+    this.worst = least.map((place) => strongest[place]);
   }
 
   outcome(run, slot) {
     return this.outcomes[slot * this.count + run];
   }
 
-  /** Outcome of a whole run: failed if any property failed, else the outcome that kept it from being judged, else passed. */
-  worstOf(run) {
-    const seen = new Set();
-    for (let slot = 0; slot < this.slots.length; slot++) seen.add(this.outcome(run, slot));
-    for (const outcome of [FAILED, BROKEN, TIMEOUT, PASSED, 2, 5]) if (seen.has(outcome)) return outcome;
-    return 5;
+  id(run) {
+    return this.ids ? this.ids[run] : `${this.text(this.campaign, run)}-${this.index[run] + 1}`;
+  }
+
+  /** The run with an id; `undefined` if there is none. */
+  find(id) {
+    if (this.ids) {
+      this.place ??= new Map(this.ids.map((one, run) => [one, run]));
+      return this.place.get(id);
+    }
+    const [, name, number] = /^(.*)-(\d+)$/.exec(id) ?? [];
+    const campaign = this.campaign.texts.indexOf(name) + 1, index = Number(number) - 1;
+    let low = 0, high = this.count;
+    while (low < high) {
+      const middle = (low + high) >> 1, run = this.order[middle];
+      if (this.campaign.of[run] - campaign < 0 || (this.campaign.of[run] === campaign && this.index[run] < index)) low = middle + 1;
+      else high = middle;
+    }
+    const run = this.order[low];
+    return run !== undefined && this.id(run) === id ? run : undefined;
+  }
+
+  /** Place of a run in columns of parameters and texts; -1 if the page has none of it. */
+  detail(run) {
+    return this.sampled ? this.sampled[run] : run;
+  }
+
+  /** The runs with parameters and texts. */
+  get details() {
+    return this.detailed ?? this.order;
   }
 
   text(column, run) {
@@ -40,11 +106,17 @@ class Runs {
     return place ? column.texts[place - 1] : "";
   }
 
+  /** A text of a run in a column that only has those of the sample; empty if the page lacks it. */
+  told(column, run) {
+    const at = this.detail(run);
+    return at < 0 ? "" : this.text(column, at);
+  }
+
   /** A parameter of a run: a string or a number. */
   value(name, run) {
-    const parameter = this.parameter.get(name);
-    if (!parameter) return NaN;
-    return parameter.values.kind === "texts" ? this.text(parameter.values, run) : parameter.values[run];
+    const parameter = this.parameter.get(name), at = this.detail(run);
+    if (!parameter || at < 0) return NaN;
+    return parameter.values.kind === "texts" ? this.text(parameter.values, at) : parameter.values[at];
   }
 
   failures(run) {
@@ -66,27 +138,56 @@ class Runs {
     return Object.fromEntries(OUTCOMES.map((word, i) => [word, sums[i]]));
   }
 
-  /** Searchable text of all runs, in lower case. Builds missing entries. */
-  letters() {
-    this.gather(this.count);
-    return this.searched;
+  /** A test of whether a run has all of some words, which are in lower case. */
+  matcher(words) {
+    if (this.count <= MANY_RUNS) {
+      this.gather(this.count);
+      return (run) => words.every((word) => this.searched[run].includes(word));
+    }
+    // Runs with the same test, status, campaign and failed properties have the same words, except for their ids and details.
+    const alike = new Map(), { test, status, campaign, failed } = this;
+    const lacking = (run) => {
+      const kind = (campaign.of[run] * (test.texts.length + 1) + test.of[run]) * (status.texts.length + 1) + status.of[run];
+      let sets = alike.get(kind);
+      if (!sets) alike.set(kind, sets = new Map());
+      let found = sets.get(failed[run]);
+      if (!found) {
+        const text = [...this.words(run), ...this.failures(run).map((slot) => this.slots[slot].property)].join(" ").toLowerCase();
+        sets.set(failed[run], found = words.filter((word) => !text.includes(word)));
+      }
+      return found;
+    };
+    return (run) => {
+      const rest = lacking(run);
+      if (!rest.length) return true;
+      const id = this.id(run).toLowerCase(), more = this.detail(run) >= 0 ? this.searched[run] ??= this.lettersOf(run) : "";
+      return rest.every((word) => id.includes(word) || more.includes(word));
+    };
   }
 
   /** Builds the searchable text of some more runs. Returns whether all are done. */
   gather(some) {
+    if (this.count > MANY_RUNS) {
+      const runs = this.detailed ?? [], end = Math.min(runs.length, this.gathered + some);
+      for (; this.gathered < end; this.gathered++) this.searched[runs[this.gathered]] ??= this.lettersOf(runs[this.gathered]);
+      return this.gathered >= runs.length;
+    }
     const end = Math.min(this.count, this.searched.length + some);
     for (let run = this.searched.length; run < end; run++) this.searched.push(this.lettersOf(run));
     return end === this.count;
   }
 
+  words(run) {
+    return [this.text(this.test, run), this.text(this.status, run), this.text(this.campaign, run)];
+  }
+
   lettersOf(run) {
-    const words = [this.runs[run], this.text(this.test, run), this.text(this.status, run), this.text(this.campaign, run)];
-    for (const parameter of this.parameters) if (parameter.values.kind === "texts") words.push(this.text(parameter.values, run));
-    for (const step of this.steps) words.push(this.text(step.message, run));
-    for (let slot = 0; slot < this.slots.length; slot++) {
-      const outcome = this.outcome(run, slot);
-      if (outcome === FAILED) words.push(this.slots[slot].property, this.why(run, slot));
+    const words = [this.id(run), ...this.words(run)], at = this.detail(run);
+    if (at >= 0) {
+      for (const parameter of this.parameters) if (parameter.values.kind === "texts") words.push(this.text(parameter.values, at));
+      for (const step of this.steps) words.push(this.text(step.message, at));
     }
+    for (const slot of this.failures(run)) words.push(this.slots[slot].property, this.why(run, slot));
     return words.join(" ").toLowerCase();
   }
 }

@@ -41,7 +41,7 @@ function scatter(runs, { height = 420, open, box = {}, label }) {
     const order = ["inapplicable", "untested", "passed", "broken", "timeout", "failed"];
     const colours = Object.fromEntries(OUTCOMES.map((name) => [name, colourOf(name)]));
     const groups = Object.fromEntries(order.map((name) => [name, []]));
-    for (let run = 0; run < runs.count; run++) {
+    for (const run of runs.details) {
       const outcome = dots(run);
       if (outcome && frame.has(run)) groups[outcome].push(run);
     }
@@ -75,7 +75,7 @@ function scatter(runs, { height = 420, open, box = {}, label }) {
     canvas.style.cursor = dot ? "pointer" : "";
     if (!dot) return;
     const failed = runs.failures(dot[2]).map((slot) => runs.slots[slot].property);
-    fill(tip, make("b", {}, runs.runs[dot[2]]), ` ${runs.value("target_model", dot[2]) || ""}`, make("br"), failed.join(", ") || "nothing failed");
+    fill(tip, make("b", {}, runs.id(dot[2])), ` ${runs.value("target_model", dot[2]) || ""}`, make("br"), failed.join(", ") || "nothing failed");
     tip.style.left = `${Math.min(dot[0] + 12, canvas.clientWidth - 190)}px`;
     tip.style.top = `${dot[1] + 12}px`;
   });
@@ -173,8 +173,8 @@ function axes(pen, runs, x, y, equal, width, height, box, outlines) {
   pen.fillText(`${named(ys)} →`, 0, 0);
   pen.restore();
   return {
-    has: (run) => !Number.isNaN(xs.values[run]) && !Number.isNaN(ys.values[run]),
-    at: (run) => [px(xs.values[run]), py(ys.values[run])],
+    has: (run) => !Number.isNaN(runs.value(x, run)) && !Number.isNaN(runs.value(y, run)),
+    at: (run) => [px(runs.value(x, run)), py(runs.value(y, run))],
   };
 }
 

@@ -1,6 +1,7 @@
 // Unpacks data to arrays. The counterpart of `pack.rs`.
 
 const NO_NUMBER = 65535;
+const NO_COUNT = 2 ** 32 - 1;
 
 async function inflated(id) {
   // Replays are at the end of the file, which may still be loading.
@@ -43,6 +44,7 @@ function array(told, buffer, body) {
     case "u8": return new Uint8Array(buffer, at, told.length);
     case "u16": return new Uint16Array(buffer, at, told.length);
     case "u32": return new Uint32Array(buffer, at, told.length);
+    case "count": return Float64Array.from(new Uint32Array(buffer, at, told.length), (value) => value === NO_COUNT ? NaN : value);
     case "number": return numbers(new Uint16Array(buffer, at, told.length), told);
     case "courses": return { bytes: new Uint8Array(buffer, at), frames: told.length };
     default: throw new Error(`unknown array kind ${told.kind}`);
