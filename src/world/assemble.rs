@@ -24,6 +24,10 @@ const SATURATION_RAD: f64 = 0.02;
 const DAMPING_SECS: f64 = 0.02;
 /// As [`DAMPING_SECS`], for fingers, which close with their full force up to nearly their largest speed.
 const FINGER_DAMPING_SECS: f64 = 0.1;
+/// Inertia of the motor of a finger, as the finger feels it. Unit: kilograms. Fingers of hobby grippers have gears of 1:50
+/// and more on rotors of some 1e-7 kg·m²; the number is an illustration. Without it, light fingers on a heavy hand swing
+/// sideways with a heavy object between them, and their grip alternates.
+const ROTOR_KG: f64 = 0.05;
 /// Friction of the robot's links other than the fingers: painted metal and plastic.
 const LINK_FRICTION: f64 = 0.4;
 /// Natural frequency of the joint limits. Unit: hertz. The engine's default limits make a loaded joint bounce back.
@@ -141,6 +145,7 @@ pub(super) fn insert_joints(
         })?;
         let gripper = &named.layout.gripper;
         let saturation = if joint.kind == JointKind::Prismatic { SATURATION_M } else { SATURATION_RAD };
+        let armature = gripper.lever_m(idx).map_or(0.0, |lever_m| ROTOR_KG * lever_m * lever_m);
         let (saturation, max_effort, damping_secs) = match gripper.lever_m(idx) {
             Some(lever_m) => {
                 let force_n = profile.grip_force_n * lever_m;
@@ -164,6 +169,7 @@ pub(super) fn insert_joints(
             setpoint_velocity: 0.0,
             push: None,
             law: Law::default(),
+            armature,
             began: 0.0,
             effort: 0.0,
             strength: 1.0,

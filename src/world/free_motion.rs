@@ -21,16 +21,20 @@ const GIVEN_GAIN: f64 = 1e6;
 /// Most changes of the set of saturated motors in a substep.
 const MOST_CHANGES: usize = 8;
 
-/// The equations of motion in one step: those terms that its substeps have in common.
-struct Step {
+/// The equations of motion in one control tick: those terms that its substeps have in common. They are those at its
+/// beginning.
+pub(super) struct Equations {
     inertias: Inertias,
+    /// Length of a substep. Unit: seconds.
     secs: f64,
     /// Mass matrix with damping, couplings and given velocities, row by row.
     matrix: Vec<f64>,
-    /// Momenta that gravity, contacts and given velocities add in a substep.
+    /// Inertias of single joints that are past a stop, while all others are free to move.
+    apparent: Vec<Option<f64>>,
+    /// Momenta that gravity, contacts and given velocities add in a substep of this step.
     added: Vec<f64>,
-    /// The factor of the equations, with the drives that were at a bound.
-    factor: Option<(Vec<(usize, bool)>, Factor)>,
+    /// The factor of the equations, with the joint of each drive and its gain, unless it is at a bound.
+    factor: Option<(Vec<(usize, Option<f64>)>, Factor)>,
 }
 
 impl Robot {
@@ -39,10 +43,12 @@ impl Robot {
     pub(super) fn move_freely(&mut self, engine: &PhysicsWorld) {
         let parameters = &engine.integration_parameters;
         let n_substeps = parameters.num_solver_iterations;
-        let mut step = self.begin_step(f64::from(parameters.dt) / n_substeps as f64);
+        let secs = f64::from(parameters.dt) / n_substeps as f64;
+        let mut step = self.equations.take().unwrap_or_else(|| self.equations(secs));
+        self.begin_step(&mut step);
         let mut saturated: Vec<Option<usize>> = vec![None; self.motors.len()];
         for _ in 0..n_substeps {
-            let mut drives = self.drives(&step);
+            let mut drives = self.drives(&mut step);
             for (drive, at) in drives.iter_mut().zip(&saturated) {
                 drive.at = *at;
             }
@@ -54,24 +60,20 @@ impl Robot {
                 *position += velocity * step.secs;
             }
         }
+        self.equations = Some(step);
     }
 
-    fn begin_step(&self, secs: f64) -> Step {
+    /// Returns the equations for the present state, with substeps of this length.
+    fn equations(&self, secs: f64) -> Box<Equations> {
         let poses: Vec<Isometry3<f64>> = self.kinematics.links(&self.positions);
-        let inertias = inertias(&self.model, &poses, &self.velocities);
+        let armatures = self.motors.iter().map(|motor| motor.armature);
+        let inertias = inertias(&self.model, &poses, &self.velocities).with_rotors(armatures);
         let n_joints = self.motors.len();
         let mut matrix = inertias.mass.clone();
-        let mut added: Vec<f64> = inertias.bias.iter().map(|bias| -secs * bias).collect();
-        if let Some((hand, push)) = self.load() {
-            for joint in self.joints_to(hand.link) {
-                added[joint] += secs * inertias.effort_of(joint, push);
-            }
-        }
         for (idx, joint) in self.model.joints.iter().enumerate() {
             matrix[idx * n_joints + idx] += secs * joint.damping;
             if self.is_given(idx) {
                 matrix[idx * n_joints + idx] += GIVEN_GAIN;
-                added[idx] += GIVEN_GAIN * self.velocities[idx];
             } else if let Some((leader, factor, _)) = joint.mimic {
                 for (row, share) in [(idx, 1.0), (leader, -factor)] {
                     for (column, other) in [(idx, 1.0), (leader, -factor)] {
@@ -80,7 +82,22 @@ impl Robot {
                 }
             }
         }
-        Step { inertias, secs, matrix, added, factor: None }
+        Box::new(Equations { inertias, secs, matrix, apparent: vec![None; n_joints], added: Vec::new(), factor: None })
+    }
+
+    /// Sets what gravity, contacts and given velocities add in the substeps of the next step.
+    fn begin_step(&self, step: &mut Equations) {
+        let secs = step.secs;
+        step.added.clear();
+        step.added.extend(step.inertias.bias.iter().map(|bias| -secs * bias));
+        if let Some((hand, push)) = self.load() {
+            for joint in self.joints_to(hand.link) {
+                step.added[joint] += secs * step.inertias.effort_of(joint, push);
+            }
+        }
+        for idx in (0..self.motors.len()).filter(|idx| self.is_given(*idx)) {
+            step.added[idx] += GIVEN_GAIN * self.velocities[idx];
+        }
     }
 
     /// Returns the hand and the push of contacts on it, if the engine moves it.
@@ -95,7 +112,7 @@ impl Robot {
 
     /// Returns the drives of all motors, followed by those of the stops that are passed. Motors in the engine have no
     /// drive here, but their place.
-    fn drives(&self, step: &Step) -> Vec<Drive> {
+    fn drives(&self, step: &mut Equations) -> Vec<Drive> {
         let limits = |idx: usize| match &self.model.joints[idx] {
             joint if joint.upper - joint.lower < WIDEST_RANGE => [joint.lower, joint.upper],
             _ => [f64::NEG_INFINITY, f64::INFINITY],
@@ -117,7 +134,8 @@ impl Robot {
             let past = (position - upper).max(0.0) - (lower - position).max(0.0);
             if past != 0.0 {
                 let bounds = if past > 0.0 { [f64::NEG_INFINITY, 0.0] } else { [0.0, f64::INFINITY] };
-                let gain = step.inertias.apparent(idx) / softness;
+                let apparent = *step.apparent[idx].get_or_insert_with(|| step.inertias.apparent(idx));
+                let gain = apparent / softness;
                 drives.push(Drive { joint: idx, gain, wanted: -past * recovery, bounds, at: None });
             }
         }
@@ -125,7 +143,7 @@ impl Robot {
     }
 
     /// Returns the velocities after a substep. Finds the drives that are at a bound by trial.
-    fn solve(&self, step: &mut Step, drives: &mut [Drive]) -> Vec<f64> {
+    fn solve(&self, step: &mut Equations, drives: &mut [Drive]) -> Vec<f64> {
         let n_joints = self.motors.len();
         let mut momenta = step.inertias.times(&self.velocities);
         momenta.iter_mut().zip(&step.added).for_each(|(momentum, added)| *momentum += added);
@@ -146,8 +164,8 @@ impl Robot {
                     None => drive.gain * drive.wanted,
                 };
             }
-            let free: Vec<(usize, bool)> = drives.iter().map(|drive| (drive.joint, drive.at.is_none())).collect();
-            // The gain of a stop varies with the posture alone, which is that of the whole step.
+            let gain = |drive: &Drive| drive.at.is_none().then_some(drive.gain);
+            let free: Vec<(usize, Option<f64>)> = drives.iter().map(|drive| (drive.joint, gain(drive))).collect();
             if step.factor.as_ref().is_none_or(|(known, _)| *known != free) {
                 let mut matrix = step.matrix.clone();
                 for drive in drives.iter().filter(|drive| drive.at.is_none()) {
@@ -180,7 +198,8 @@ mod tests {
     fn dynamics(world: &World) -> (Vec<f64>, Inertias) {
         let (positions, velocities) = world.robot.state();
         let poses = world.robot.kinematics.links(&positions);
-        (positions, inertias(&world.robot.model, &poses, &velocities))
+        let armatures = world.robot.motors.iter().map(|motor| motor.armature);
+        (positions, inertias(&world.robot.model, &poses, &velocities).with_rotors(armatures))
     }
 
     /// Gives every joint a new target, within the limits, and steps for half a second.

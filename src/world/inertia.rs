@@ -23,6 +23,15 @@ impl Inertias {
         rows.map(|row| row.iter().zip(velocities).map(|(a, b)| a * b).sum()).collect()
     }
 
+    /// Adds the inertia of each joint's motor.
+    pub(super) fn with_rotors(mut self, armatures: impl Iterator<Item = f64>) -> Self {
+        let n_joints = self.bias.len();
+        for (idx, armature) in armatures.enumerate() {
+            self.mass[idx * n_joints + idx] += armature;
+        }
+        self
+    }
+
     /// Returns the effort of a force, with its torque about the world's origin, on a joint that moves its point of
     /// application.
     pub(super) fn effort_of(&self, joint: usize, force: &Twist) -> f64 {

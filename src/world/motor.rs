@@ -28,6 +28,8 @@ pub(super) struct Motor {
     pub(super) began: f64,
     /// Mean effort in the last control tick, without gravity compensation.
     pub(super) effort: f64,
+    /// Inertia of its rotor, as the joint feels it. Unit: kilograms or kg·m².
+    pub(super) armature: f64,
     /// Largest speed of its setpoint.
     pub(super) fastest: f64,
     /// Largest commanded effort as a multiple of the joint's limit: 1 unless the motor is overdriven.

@@ -8,6 +8,7 @@ use rapier3d::prelude::{MultibodyJointHandle, PhysicsWorld, RigidBodyHandle};
 use crate::assemble::{home, insert_joints, insert_links, links_on_floor};
 use crate::description::{Joint, RobotModel};
 use crate::drive::Law;
+use crate::free_motion::Equations;
 use crate::inertia::Twist;
 use crate::layout::{Layout, Named};
 use crate::motor::Motor;
@@ -47,6 +48,8 @@ pub struct Robot {
     pub(super) hand: Option<Hand>,
     /// The force of contacts on the hand in the last step, if the engine moves the hand alone. Frame: world.
     pub(super) push_on_hand: Twist,
+    /// The equations of its free motion in this control tick, once they are known.
+    pub(super) equations: Option<Box<Equations>>,
 }
 
 /// Returns a robot's geometry, layout and home posture, without a simulation.
@@ -104,6 +107,7 @@ impl Robot {
             carrier: None,
             hand,
             push_on_hand: Twist::ZERO,
+            equations: None,
         };
         for (motor, position) in robot.motors.iter_mut().zip(&robot.positions) {
             motor.target = *position;
@@ -157,8 +161,9 @@ impl Robot {
         motors.map(|(motor, joint)| if joint.effort > 0.0 { motor.effort.abs() / joint.effort } else { 0.0 }).collect()
     }
 
-    /// Starts measuring the efforts of a control tick.
+    /// Starts a control tick: measures its efforts, and finds its equations of motion anew.
     pub fn begin_tick(&mut self) {
+        self.equations = None;
         self.motors.iter_mut().for_each(|motor| motor.effort = 0.0);
     }
 

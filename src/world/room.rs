@@ -29,8 +29,7 @@ const LEFT_OF_LINKS_M: f64 = 1e-3;
 /// Factor on the present and the commanded speeds of joints, because joints overshoot.
 const OVERSHOOT: f64 = 1.25;
 
-/// Largest force and torque of contacts on a hand that the engine moves alone: a loaded arm gives way. Units: newtons
-/// and newton metres.
+/// Largest force of contacts on a hand that the engine moves alone: a loaded arm gives way. Unit: newtons.
 const MOST_PUSH: f64 = 20.0;
 /// Ticks for which the engine moves the whole robot after a larger push.
 const WHOLE_TICKS: u32 = 30;
@@ -71,6 +70,8 @@ pub(super) struct Room {
     rest: Vec<bool>,
     /// Distances between the pairs of links that can collide, in their order.
     pairs: Vec<Option<Measured>>,
+    /// The joints that move only the first of each pair, and those that move only the second.
+    between: Vec<[Vec<usize>; 2]>,
     /// What the robot could touch in the last tick.
     pub(super) reach: Reach,
     /// Ticks for which the engine still moves the whole robot.
@@ -145,6 +146,8 @@ pub(super) struct Ball {
 /// The robot at the beginning of a tick.
 struct Moment {
     poses: Vec<Isometry3<f64>>,
+    /// The axis of each joint: its direction and a point on it. Frame: world.
+    axes: Vec<(Vector3<f64>, Vector3<f64>)>,
     /// How far each joint can move in the tick. Units: metres or radians.
     spans: Vec<f64>,
 }
@@ -184,10 +187,10 @@ impl World {
         self.room.reach == Reach::Hand
     }
 
-    /// Returns what the robot can touch in the next tick.
-    pub(super) fn find_room(&mut self) -> Reach {
+    /// Returns what the robot, with its links at these poses, can touch in the next tick.
+    pub(super) fn find_room(&mut self, poses: Vec<Isometry3<f64>>) -> Reach {
         let mut room = std::mem::take(&mut self.room);
-        let reach = if room.shortcuts == Shortcuts::NONE { Reach::All } else { self.reach(&mut room) };
+        let reach = if room.shortcuts == Shortcuts::NONE { Reach::All } else { self.reach(&mut room, poses) };
         room.reach = room.shortcuts.limit(reach);
         room.ticks[room.reach as usize] += 1;
         self.room = room;
@@ -205,7 +208,7 @@ impl World {
         self.room.whole_ticks = WHOLE_TICKS;
     }
 
-    fn reach(&self, room: &mut Room) -> Reach {
+    fn reach(&self, room: &mut Room, poses: Vec<Isometry3<f64>>) -> Reach {
         if !self.sliding.is_empty() {
             return Reach::All;
         }
@@ -219,7 +222,8 @@ impl World {
         room.pairs.resize(self.link_pairs.iter().count(), None);
         let (positions, velocities) = (&self.robot.positions, &self.robot.velocities);
         let spans = self.robot.spans(positions, velocities, self.tick_secs(), OVERSHOOT);
-        let now = Moment { poses: self.robot.kinematics.links(positions), spans };
+        let axes = self.robot.model.joints.iter().map(|joint| axis_in_world(joint, &poses)).collect();
+        let now = Moment { poses, axes, spans };
         let mut reach = if rest.iter().all(|rests| *rests) { Reach::Nothing } else { Reach::Apart };
         room.rest = rest;
         for link in 0..n_links {
@@ -228,7 +232,10 @@ impl World {
                 return reach;
             }
         }
-        reach = reach.max(self.reach_between_links(&mut room.pairs, &now));
+        if room.between.is_empty() {
+            room.between = self.link_pairs.iter().map(|(first, second)| self.joints_between(first, second)).collect();
+        }
+        reach = reach.max(self.reach_between_links(&mut room.pairs, &room.between, &now));
         if reach == Reach::Hand && room.whole_ticks > 0 {
             room.whole_ticks -= 1;
             return Reach::All;
@@ -285,20 +292,25 @@ impl World {
         self.objects.iter().zip(marked).any(|(other, marked)| *marked && std::ptr::eq(other, object))
     }
 
-    fn reach_between_links(&self, known: &mut [Option<Measured>], now: &Moment) -> Reach {
+    /// Returns the joints that move only the first of two links, and those that move only the second.
+    fn joints_between(&self, first: usize, second: usize) -> [Vec<usize>; 2] {
+        [(first, second), (second, first)].map(|(one, other)| {
+            let joints = self.robot.joints_to(one).filter(|joint| !self.robot.moves(*joint, other));
+            joints.collect()
+        })
+    }
+
+    fn reach_between_links(&self, known: &mut [Option<Measured>], between: &[[Vec<usize>; 2]], now: &Moment) -> Reach {
         if self.link_pairs.pass {
             return Reach::Nothing;
         }
         let mut reach = Reach::Nothing;
-        for ((first, second), known) in self.link_pairs.iter().zip(known) {
+        for (((first, second), known), joints) in self.link_pairs.iter().zip(known).zip(between) {
             let (Some(one), Some(other)) = (self.robot.balls[first], self.robot.balls[second]) else { continue };
             let pose = now.poses[first].inverse() * now.poses[second];
             let mut ahead = 0.0;
-            for joint in self.robot.joints_to(first).filter(|joint| !self.robot.moves(*joint, second)) {
-                ahead += self.way(joint, first, &one, now);
-            }
-            for joint in self.robot.joints_to(second).filter(|joint| !self.robot.moves(*joint, first)) {
-                ahead += self.way(joint, second, &other, now);
+            for (link, ball, joints) in [(first, &one, &joints[0]), (second, &other, &joints[1])] {
+                ahead += joints.iter().map(|joint| self.way(*joint, link, ball, now)).sum::<f64>();
             }
             if known.is_none_or(|known| known.left(&pose, &other) - ahead < LEFT_OF_LINKS_M) {
                 *known = Some(Measured { gap_m: self.gap_of_links(first, second), pose });
@@ -314,7 +326,7 @@ impl World {
 
     /// Returns how far one joint can move any point of a link in the tick. Unit: metres.
     fn way(&self, joint: usize, link: usize, ball: &Ball, now: &Moment) -> f64 {
-        let (axis, point) = axis_in_world(&self.robot.model.joints[joint], &now.poses);
+        let (axis, point) = now.axes[joint];
         match self.robot.model.joints[joint].kind {
             JointKind::Prismatic => now.spans[joint],
             JointKind::Revolute => {

@@ -141,6 +141,12 @@ impl Robot {
             multibody.armature_mut().rows_mut(0, CARRIER_AXES).fill(CARRIER_INERTIA);
             multibody.damping_mut().rows_mut(0, CARRIER_AXES).fill(0.0);
         }
+        for motor in self.motors.iter().enumerate().filter(|(idx, _)| self.shares(*idx)).map(|(_, motor)| motor) {
+            let Some((multibody, link)) = engine.multibody_joints.get_mut(motor.joint) else { continue };
+            if let Some(dof) = multibody.link(link).map(rapier3d::prelude::MultibodyLink::assembly_id) {
+                multibody.armature_mut()[dof] = to_real(motor.armature);
+            }
+        }
         self.couple_mimics(engine);
     }
 
