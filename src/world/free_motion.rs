@@ -273,6 +273,8 @@ mod tests {
     fn joints_move_through_free_space_as_in_the_engine() {
         let (mut free, mut engine) = (lonely(), lonely());
         engine.leave_to_engine();
+        // As many substeps as in campaigns: the engine solves motors and couplings only by iteration.
+        (free.substeps, engine.substeps) = (4, 4);
         let [mut ones, mut others] = [Choices::random(8, 0), Choices::random(8, 0)];
         for _ in 0..6 {
             wander(&mut free, &mut ones);

@@ -344,8 +344,14 @@ mod tests {
     fn a_motion_goes_on_while_the_engine_takes_and_returns_parts_of_the_robot() {
         let (mut changing, mut whole) = (lonely(), lonely());
         let mut command = whole.hold();
-        for (target, joint) in command.positions.iter_mut().zip(whole.kinematics().joints()) {
-            *target = (*target + 0.3).clamp(joint.lower, joint.upper);
+        // The arm moves away from the body.
+        let base = whole.layout().base.expect("it drives");
+        let ways = base
+            .map(|joint| (joint, 0.3))
+            .into_iter()
+            .chain([(whole.layout().arm[0], 0.2), (whole.layout().arm[1], -0.3)]);
+        for (joint, way) in ways {
+            command.positions[joint] += way;
         }
         command.gripper_opening_m = 0.02;
         let order = [Reach::Hand, Reach::All, Reach::Apart, Reach::Hand, Reach::Nothing, Reach::Hand, Reach::All];
