@@ -1,4 +1,4 @@
-//! What each shortcut of the simulation saves, alone and together, and what it does to physics.
+//! What does each shortcut of the simulation save, alone and together, and how does it change physics?
 //!
 //! ```text
 //! cargo bench --bench shortcuts [-- CONFIG [RUNS [ROUNDS]]]

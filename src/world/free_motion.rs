@@ -85,7 +85,7 @@ impl Robot {
         Box::new(Equations { inertias, secs, matrix, apparent: vec![None; n_joints], added: Vec::new(), factor: None })
     }
 
-    /// Sets what gravity, contacts and given velocities add in the substeps of the next step.
+    /// Sets the momenta that gravity, contacts and given velocities add in the substeps of the next step.
     fn begin_step(&self, step: &mut Equations) {
         let secs = step.secs;
         step.added.clear();

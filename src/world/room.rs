@@ -1,4 +1,4 @@
-//! Decides what the robot can touch in the next control tick.
+//! Decides which things the robot can touch in the next control tick.
 //!
 //! A tick in which the robot can touch nothing needs no contacts; one in which only its hand can touch objects needs no
 //! contacts of the other links. For each link of the robot, the last measured distance from everything at rest is kept,
@@ -34,7 +34,7 @@ const MOST_PUSH: f64 = 20.0;
 /// Ticks for which the engine moves the whole robot after a larger push.
 const WHOLE_TICKS: u32 = 30;
 
-/// What the robot can touch in a tick.
+/// The things that the robot can touch in a tick.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]
 pub(super) enum Reach {
     /// Nothing, and everything else is at rest.
@@ -72,7 +72,7 @@ pub(super) struct Room {
     pairs: Vec<Option<Measured>>,
     /// The joints that move only the first of each pair, and those that move only the second.
     between: Vec<[Vec<usize>; 2]>,
-    /// What the robot could touch in the last tick.
+    /// The things that the robot could touch in the last tick.
     pub(super) reach: Reach,
     /// Ticks for which the engine still moves the whole robot.
     whole_ticks: u32,
@@ -102,7 +102,7 @@ impl Shortcuts {
     /// None: the engine simulates everything in every tick.
     pub const NONE: Self = Self { free_motion: false, robot_apart: false, hand_alone: false, few_substeps: false };
 
-    /// Returns what the engine must prepare for, given what the robot can touch.
+    /// Returns the reach for which the engine must prepare, given that of the robot.
     fn limit(self, reach: Reach) -> Reach {
         match reach {
             Reach::Nothing if self.free_motion => Reach::Nothing,
@@ -187,7 +187,7 @@ impl World {
         self.room.reach == Reach::Hand
     }
 
-    /// Returns what the robot, with its links at these poses, can touch in the next tick.
+    /// Returns the reach of the robot, with its links at these poses, in the next tick.
     pub(super) fn find_room(&mut self, poses: Vec<Isometry3<f64>>) -> Reach {
         let mut room = std::mem::take(&mut self.room);
         let reach = if room.shortcuts == Shortcuts::NONE { Reach::All } else { self.reach(&mut room, poses) };
