@@ -204,8 +204,13 @@ impl<'a> Operator<'a> {
 
     /// Takes a picture with the camera.
     pub fn look(&mut self) -> DepthImage {
+        self.look_at_every(1)
+    }
+
+    /// As [`Operator::look`], with only every n-th pixel of every n-th row measured, from the first on.
+    pub fn look_at_every(&mut self, stride: usize) -> DepthImage {
         self.last_look = Some(self.world.current_look());
-        self.world.look(self.choices)
+        self.world.look_at_every(stride, self.choices)
     }
 
     /// Selects the sequence of postures that an arm planner samples: a number from 0 to 1, recorded like every choice.

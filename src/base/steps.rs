@@ -71,10 +71,12 @@ impl Steps {
     }
 
     fn vec_mut(&mut self) -> &mut Vec<i32> {
-        let values = std::mem::take(&mut self.values).into_inner();
-        let values = values.or_else(|| Some(self.encoded.take()?.decoded())).unwrap_or_default();
-        *self = Self::from(values);
-        self.values.get_mut().expect("it was just set")
+        if self.encoded.is_some() || self.values.get().is_none() {
+            let values = std::mem::take(&mut self.values).into_inner();
+            let values = values.or_else(|| Some(self.encoded.take()?.decoded())).unwrap_or_default();
+            *self = Self::from(values);
+        }
+        self.values.get_mut().expect("it has values")
     }
 }
 

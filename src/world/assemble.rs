@@ -2,13 +2,14 @@
 
 use nalgebra::{Isometry3, Rotation3, Translation3, UnitQuaternion, Vector3};
 use rapier3d::prelude::{
-    ActiveHooks, GenericJoint, InteractionGroups, JointAxesMask, JointAxis, MassProperties, MotorModel, PhysicsWorld,
-    RigidBodyBuilder, RigidBodyHandle, SpringCoefficients,
+    ActiveHooks, GenericJoint, InteractionGroups, JointAxesMask, JointAxis, MassProperties, MotorModel,
+    MultibodyJointHandle, PhysicsWorld, RigidBodyBuilder, RigidBodyHandle, SpringCoefficients,
 };
 
 use crate::WorldError;
 use crate::convert::{to_pose, to_real, to_vector};
 use crate::description::{Joint, JointKind, RobotModel};
+use crate::drive::Law;
 use crate::engine::{Owner, collider, off_floor};
 use crate::layout::{Layout, Named};
 use crate::motor::Motor;
@@ -23,6 +24,10 @@ const SATURATION_RAD: f64 = 0.02;
 const DAMPING_SECS: f64 = 0.02;
 /// As [`DAMPING_SECS`], for fingers, which close with their full force up to nearly their largest speed.
 const FINGER_DAMPING_SECS: f64 = 0.1;
+/// Inertia of the motor of a finger, as the finger feels it. Unit: kilograms. Fingers of hobby grippers have gears of 1:50
+/// and more on rotors of some 1e-7 kg·m²; the number is an illustration. Without it, light fingers on a heavy hand swing
+/// sideways with a heavy object between them, and their grip alternates.
+const ROTOR_KG: f64 = 0.05;
 /// Friction of the robot's links other than the fingers: painted metal and plastic.
 const LINK_FRICTION: f64 = 0.4;
 /// Natural frequency of the joint limits. Unit: hertz. The engine's default limits make a loaded joint bounce back.
@@ -104,6 +109,27 @@ pub(super) fn links_on_floor(model: &RobotModel, named: &Named, profile: &RobotP
     on_floor
 }
 
+/// Inserts a joint between its links. Returns `None` if it would close a loop.
+pub(super) fn insert_joint(
+    engine: &mut PhysicsWorld,
+    joint: &Joint,
+    idx: usize,
+    bodies: &[RigidBodyHandle],
+) -> Option<MultibodyJointHandle> {
+    let data = engine_joint(joint);
+    let handle = engine.multibody_joints.insert(bodies[joint.parent], bodies[idx + 1], data, true)?;
+    if let Some((multibody, link)) = engine.multibody_joints.get_mut(handle) {
+        // `LinkPairs` decides which links collide.
+        multibody.set_self_contacts_enabled(true);
+        let dof = multibody.link(link).map(rapier3d::prelude::MultibodyLink::assembly_id);
+        if let Some(dof) = dof {
+            multibody.damping_mut()[dof] = to_real(joint.damping);
+        }
+    }
+    Some(handle)
+}
+
+/// Returns the motors of all joints, and inserts the joints.
 pub(super) fn insert_joints(
     engine: &mut PhysicsWorld,
     model: &RobotModel,
@@ -113,24 +139,13 @@ pub(super) fn insert_joints(
 ) -> Result<Vec<Motor>, WorldError> {
     let mut motors = Vec::with_capacity(model.joints.len());
     for (idx, joint) in model.joints.iter().enumerate() {
-        let (data, axis) = engine_joint(joint);
-        let handle =
-            engine.multibody_joints.insert(bodies[joint.parent], bodies[idx + 1], data, true).ok_or_else(|| {
-                WorldError::Urdf {
-                    name: profile.urdf.name.to_string(),
-                    reason: format!("joint `{}` closes a loop", joint.name),
-                }
-            })?;
-        if let Some((multibody, link)) = engine.multibody_joints.get_mut(handle) {
-            // `LinkPairs` decides which links collide.
-            multibody.set_self_contacts_enabled(true);
-            let dof = multibody.link(link).map(rapier3d::prelude::MultibodyLink::assembly_id);
-            if let Some(dof) = dof {
-                multibody.damping_mut()[dof] = to_real(joint.damping);
-            }
-        }
+        let handle = insert_joint(engine, joint, idx, bodies).ok_or_else(|| WorldError::Urdf {
+            name: profile.urdf.name.to_string(),
+            reason: format!("joint `{}` closes a loop", joint.name),
+        })?;
         let gripper = &named.layout.gripper;
         let saturation = if joint.kind == JointKind::Prismatic { SATURATION_M } else { SATURATION_RAD };
+        let armature = gripper.lever_m(idx).map_or(0.0, |lever_m| ROTOR_KG * lever_m * lever_m);
         let (saturation, max_effort, damping_secs) = match gripper.lever_m(idx) {
             Some(lever_m) => {
                 let force_n = profile.grip_force_n * lever_m;
@@ -142,6 +157,7 @@ pub(super) fn insert_joints(
         };
         let stiffness = (max_effort / saturation).max(1.0);
         let damping = stiffness * damping_secs;
+        let axis = engine_axis(joint);
         motors.push(Motor {
             joint: handle,
             axis,
@@ -152,6 +168,8 @@ pub(super) fn insert_joints(
             setpoint: 0.0,
             setpoint_velocity: 0.0,
             push: None,
+            law: Law::default(),
+            armature,
             began: 0.0,
             effort: 0.0,
             strength: 1.0,
@@ -161,12 +179,21 @@ pub(super) fn insert_joints(
     Ok(motors)
 }
 
-/// Converts a joint for the engine, whose joints move along or about the x axis of a local frame.
-fn engine_joint(joint: &Joint) -> (GenericJoint, JointAxis) {
-    let (locked, axis) = match joint.kind {
-        JointKind::Prismatic => (JointAxesMask::LOCKED_PRISMATIC_AXES, JointAxis::LinX),
-        JointKind::Revolute => (JointAxesMask::LOCKED_REVOLUTE_AXES, JointAxis::AngX),
+/// Returns the engine's axis of a joint, whose joints move along or about the x axis of a local frame.
+fn engine_axis(joint: &Joint) -> JointAxis {
+    match joint.kind {
+        JointKind::Prismatic => JointAxis::LinX,
+        JointKind::Revolute => JointAxis::AngX,
+    }
+}
+
+/// Converts a joint for the engine.
+fn engine_joint(joint: &Joint) -> GenericJoint {
+    let locked = match joint.kind {
+        JointKind::Prismatic => JointAxesMask::LOCKED_PRISMATIC_AXES,
+        JointKind::Revolute => JointAxesMask::LOCKED_REVOLUTE_AXES,
     };
+    let axis = engine_axis(joint);
     let turned = x_onto(&joint.axis);
     let frame = Isometry3::from_parts(Translation3::identity(), turned);
     let mut data = GenericJoint::new(locked);
@@ -177,7 +204,7 @@ fn engine_joint(joint: &Joint) -> (GenericJoint, JointAxis) {
         data.softness = SpringCoefficients { natural_frequency: STOP_FREQUENCY_HZ, damping_ratio: STOP_DAMPING };
         data.set_limits(axis, [to_real(joint.lower), to_real(joint.upper)]);
     }
-    (data, axis)
+    data
 }
 
 /// Returns a rotation that maps the x axis to `axis`.

@@ -58,13 +58,18 @@ impl DepthImage {
 impl World {
     /// Takes an image from the camera's current true pose.
     pub fn look(&self, choices: &mut Choices) -> DepthImage {
+        self.look_at_every(1, choices)
+    }
+
+    /// Takes an image of which only every n-th pixel of every n-th row is measured, from the first on: the others are 0.
+    pub fn look_at_every(&self, stride: usize, choices: &mut Choices) -> DepthImage {
         let began_secs = self.watch_secs();
         let camera = &self.sensing.camera;
         let frame = choices.index(ChoiceName::CameraFrame, FRAMES);
         let noise = (frame > 0).then(|| Noise { camera, stream: Stream::new(frame as u64) });
-        let eye = self.robot.kinematics.camera(&self.robot.state(&self.engine).0);
+        let eye = self.robot.kinematics.camera(&self.robot.state().0);
         let solids = Solids::new(lens(camera), &eye, self.solids(&eye));
-        let image = picture(camera, &solids, noise.as_ref());
+        let image = picture(camera, &solids, noise.as_ref(), stride);
         self.looked(began_secs);
         image
     }
@@ -76,7 +81,7 @@ impl World {
             time_secs: self.time_secs(),
             base_true,
             base_believed: self.believed(base_true),
-            camera: Pose::from_isometry(&self.robot.kinematics.camera(&self.robot.state(&self.engine).0)),
+            camera: Pose::from_isometry(&self.robot.kinematics.camera(&self.robot.state().0)),
         }
     }
 
@@ -109,12 +114,12 @@ fn lens(camera: &Camera) -> Lens {
     Lens { width, height, focal_px: f64::from(camera.width) / 2.0 / libm::tan(camera.field_of_view_rad / 2.0) }
 }
 
-fn picture(camera: &Camera, solids: &Solids<'_>, noise: Option<&Noise<'_>>) -> DepthImage {
+fn picture(camera: &Camera, solids: &Solids<'_>, noise: Option<&Noise<'_>>, stride: usize) -> DepthImage {
     let lens = lens(camera);
     let Lens { width, height, focal_px } = lens;
-    let mut depths = Vec::with_capacity(width * height);
-    for row in 0..height {
-        for column in 0..width {
+    let mut depths = vec![0.0; width * height];
+    for row in (0..height).step_by(stride) {
+        for column in (0..width).step_by(stride) {
             let [left, up] = solids.slopes(column, row);
             let stretch = (1.0 + left * left + up * up).sqrt();
             let depth = solids.first(column, row, camera.max_range_m / stretch).and_then(|hit| {
@@ -122,11 +127,11 @@ fn picture(camera: &Camera, solids: &Solids<'_>, noise: Option<&Noise<'_>>) -> D
                 let pixel = (row * width + column) as u64;
                 let measured = match noise {
                     None => range,
-                    Some(noise) => noise.measure(pixel, range, || solids.sine(column, row, hit))?,
+                    Some(noise) => noise.measure(pixel, range, || solids.sine(column, row, hit, stretch))?,
                 };
                 (range >= camera.min_range_m && measured > 0.0).then_some(to_real(measured / stretch))
             });
-            depths.push(depth.unwrap_or(0.0));
+            depths[row * width + column] = depth.unwrap_or(0.0);
         }
     }
     DepthImage { width, height, focal_px, depths }
@@ -167,7 +172,7 @@ mod tests {
 
     fn look(shapes: &[(f64, &dyn Shape)]) -> DepthImage {
         let placed = shapes.iter().map(|(ahead, shape)| (Isometry3::translation(*ahead, 0.0, 0.0), *shape));
-        picture(&SMALL, &Solids::new(lens(&SMALL), &Isometry3::identity(), placed), None)
+        picture(&SMALL, &Solids::new(lens(&SMALL), &Isometry3::identity(), placed), None, 1)
     }
 
     fn middle(image: &DepthImage) -> f64 {
@@ -187,6 +192,16 @@ mod tests {
         let image = open.look(&mut Choices::random(1, 0));
         assert!(image.depths.iter().any(|depth| *depth > 0.0), "it sees the floor");
         assert_eq!(housed.look(&mut Choices::random(1, 0)), image);
+    }
+
+    #[test]
+    fn a_sparse_image_has_the_same_pixels() {
+        let world = lonely();
+        let [image, sparse] = [1, 3].map(|stride| world.look_at_every(stride, &mut Choices::random(2, 0)));
+        for (idx, (depth, of_sparse)) in image.depths.iter().zip(&sparse.depths).enumerate() {
+            let taken = (idx / image.width).is_multiple_of(3) && (idx % image.width).is_multiple_of(3);
+            assert_eq!(*of_sparse, if taken { *depth } else { 0.0 }, "pixel {idx}");
+        }
     }
 
     #[test]

@@ -3,10 +3,14 @@
 use std::collections::BTreeMap;
 
 use nalgebra::{Point3, Vector3};
-use rapier3d::prelude::PhysicsWorld;
+use parry3d::query::TrackedContact;
+use rapier3d::prelude::{Collider, ContactData, PhysicsWorld};
 
+use crate::World;
 use crate::convert::{from_pose, from_vector};
 use crate::engine::Owner;
+use crate::inertia::Twist;
+use crate::share::Share;
 
 /// Contact forces below this are solver noise: a tenth of the weight of the lightest shipped model. Unit: newtons.
 pub const CONTACT_FLOOR_NEWTONS: f64 = 0.05;
@@ -31,6 +35,49 @@ impl Touch {
         Self { normal_n: 0.0, depth_m: 0.0, force_n: Vector3::new(0.0, 0.0, 0.0), point_m: [0.0; 3], strongest_n: 0.0 };
 }
 
+impl World {
+    /// Returns the force of all contacts on the robot's hand in the last step, with its torque about the world's
+    /// origin. Returns zero if the engine does not move the hand. Frame: world.
+    pub(super) fn push_on_hand(&self) -> Twist {
+        let mut push = Twist::ZERO;
+        let Some(hand) = self.robot.hand.as_ref().filter(|_| self.robot.share != Share::Nothing) else { return push };
+        let engine = &self.engine;
+        let per_second = 1.0 / f64::from(engine.integration_parameters.dt);
+        let is_ours = |handle| {
+            let collider: Option<&Collider> = engine.colliders.get(handle);
+            let owner = collider.map(|collider| Owner::from_tag(collider.user_data));
+            matches!(owner, Some(Owner::Link(link)) if hand.has(link))
+        };
+        for pair in engine.narrow_phase.contact_pairs() {
+            // Links of the hand push each other with opposite forces.
+            let sign = match (is_ours(pair.collider1), is_ours(pair.collider2)) {
+                (true, false) => -per_second,
+                (false, true) => per_second,
+                _ => continue,
+            };
+            let Some(one) = engine.colliders.get(pair.collider1) else { continue };
+            for manifold in pair.solver_manifolds() {
+                let normal = from_vector(manifold.data.normal);
+                for point in manifold.points.iter().filter(|point| point.data.impulse > 0.0) {
+                    let force = impulse_of(point, &normal) * sign;
+                    let at = from_pose(one.position()) * Point3::from(from_vector(point.local_p1));
+                    push = push.plus(Twist::by_force(&force, &at), 1.0);
+                }
+            }
+        }
+        push
+    }
+}
+
+/// Returns the impulse of normal force and friction on the second of a pair in the last step. Unit: N·s.
+fn impulse_of(point: &TrackedContact<ContactData>, normal: &Vector3<f64>) -> Vector3<f64> {
+    let impulse = f64::from(point.data.impulse);
+    // The engine keeps friction only for the last substep, and as it acts on the first of the pair.
+    let last = f64::from(point.data.warmstart_impulse);
+    let share = if last > 0.0 { impulse / last } else { 0.0 };
+    normal * impulse - from_vector(point.data.warmstart_tangent_world) * share
+}
+
 /// Returns all contacts above [`CONTACT_FLOOR_NEWTONS`], by ordered pair of owners.
 pub fn touches(engine: &PhysicsWorld) -> BTreeMap<(Owner, Owner), Touch> {
     let mut found: BTreeMap<(Owner, Owner), Touch> = BTreeMap::new();
@@ -47,10 +94,6 @@ pub fn touches(engine: &PhysicsWorld) -> BTreeMap<(Owner, Owner), Touch> {
                 if impulse <= 0.0 {
                     continue;
                 }
-                // The engine keeps friction only for the last substep, and as it acts on the first of the pair.
-                let last = f64::from(point.data.warmstart_impulse);
-                let share = if last > 0.0 { impulse / last } else { 0.0 };
-                let friction = from_vector(point.data.warmstart_tangent_world) * -share;
                 let touch = found.entry(key).or_insert(Touch::NONE);
                 touch.depth_m = touch.depth_m.max(-f64::from(point.dist));
                 touch.normal_n += impulse * per_second;
@@ -59,7 +102,7 @@ pub fn touches(engine: &PhysicsWorld) -> BTreeMap<(Owner, Owner), Touch> {
                     touch.point_m =
                         (from_pose(one.position()) * Point3::from(from_vector(point.local_p1))).coords.into();
                 }
-                touch.force_n += (normal * impulse + friction) * (sign * per_second);
+                touch.force_n += impulse_of(point, &normal) * (sign * per_second);
             }
         }
     }

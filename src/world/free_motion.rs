@@ -8,131 +8,134 @@ use nalgebra::Isometry3;
 use rapier3d::prelude::PhysicsWorld;
 
 use crate::assemble::{STOP_DAMPING, STOP_FREQUENCY_HZ, WIDEST_RANGE};
-use crate::convert::to_real;
+use crate::drive::Drive;
 use crate::factor::Factor;
-use crate::inertia::{Inertias, inertias};
+use crate::inertia::{Inertias, Twist, inertias};
 use crate::robot::Robot;
+use crate::share::{Hand, Share};
 
 /// Impulse per error of velocity of a coupling between two joints: nearly rigid. Unit: kilograms or kg·m².
 const COUPLING_GAIN: f64 = 1e4;
+/// As [`COUPLING_GAIN`], for a joint whose velocity is given.
+const GIVEN_GAIN: f64 = 1e6;
 /// Most changes of the set of saturated motors in a substep.
 const MOST_CHANGES: usize = 8;
 
-/// A soft constraint on the velocity of one joint: its impulse is `gain · (wanted − velocity)`, within bounds.
-#[derive(Debug, Clone, Copy)]
-struct Drive {
-    joint: usize,
-    gain: f64,
-    wanted: f64,
-    /// Smallest and largest impulse.
-    bounds: [f64; 2],
-    /// The bound that it has reached, if any.
-    at: Option<usize>,
-}
-
-impl Drive {
-    /// Updates whether the drive has reached a bound at this velocity. Returns whether that has changed.
-    fn update(&mut self, velocity: f64) -> bool {
-        let impulse = self.gain * (self.wanted - velocity);
-        let at = if impulse < self.bounds[0] {
-            Some(0)
-        } else if impulse > self.bounds[1] {
-            Some(1)
-        } else {
-            None
-        };
-        std::mem::replace(&mut self.at, at) != at
-    }
-}
-
-/// The law of a joint's motor in this step, as the engine has it.
-#[derive(Debug, Clone, Copy)]
-struct Law {
-    target: f64,
-    velocity: f64,
-    stiffness: f64,
-    damping: f64,
-    most: f64,
-}
-
-impl Law {
-    /// Returns the motor's drive for a substep of `secs`.
-    fn drive(self, joint: usize, position: f64, limits: [f64; 2], secs: f64) -> Drive {
-        let resistance = secs * self.stiffness + self.damping;
-        let pull = if resistance > 0.0 { self.stiffness / resistance } else { 0.0 };
-        let [slowest, fastest] = limits.map(|limit| (limit - position) / secs);
-        let velocity = self.velocity.max(slowest).min(fastest);
-        let most = self.most * secs;
-        let wanted = velocity - (position - self.target) * pull;
-        Drive { joint, gain: secs * resistance, wanted, bounds: [-most, most], at: None }
-    }
+/// The equations of motion in one control tick: those terms that its substeps have in common. They are those at its
+/// beginning.
+pub(super) struct Equations {
+    inertias: Inertias,
+    /// Length of a substep. Unit: seconds.
+    secs: f64,
+    /// Mass matrix with damping, couplings and given velocities, row by row.
+    matrix: Vec<f64>,
+    /// Inertias of single joints that are past a stop, while all others are free to move.
+    apparent: Vec<Option<f64>>,
+    /// Momenta that gravity, contacts and given velocities add in a substep of this step.
+    added: Vec<f64>,
+    /// The factor of the equations, with the joint of each drive and its gain, unless it is at a bound.
+    factor: Option<(Vec<(usize, Option<f64>)>, Factor)>,
 }
 
 impl Robot {
-    /// Moves the joints by a step of the engine's length, with the engine's substeps. The links stay where they are:
-    /// see [`Robot::place_links`].
-    pub(super) fn move_freely(&self, engine: &mut PhysicsWorld) {
+    /// Moves the joints by a step of the engine's length, with the engine's substeps, without moving the links. Joints
+    /// that the engine moves keep their velocities.
+    pub(super) fn move_freely(&mut self, engine: &PhysicsWorld) {
         let parameters = &engine.integration_parameters;
         let n_substeps = parameters.num_solver_iterations;
         let secs = f64::from(parameters.dt) / n_substeps as f64;
-        let (mut positions, mut velocities) = self.state(engine);
-        let laws = self.laws(engine);
-        if laws.len() != positions.len() {
-            return;
-        }
-        let began = positions.clone();
-        let poses: Vec<Isometry3<f64>> = self.kinematics.links(&positions);
-        let inertias = inertias(&self.model, &poses, &velocities);
-        let mut saturated: Vec<Option<usize>> = Vec::new();
+        let mut step = self.equations.take().unwrap_or_else(|| self.equations(secs));
+        self.begin_step(&mut step);
+        let mut saturated: Vec<Option<usize>> = vec![None; self.motors.len()];
         for _ in 0..n_substeps {
-            let mut drives = self.drives(&laws, &positions, &inertias, secs);
+            let mut drives = self.drives(&mut step);
             for (drive, at) in drives.iter_mut().zip(&saturated) {
                 drive.at = *at;
             }
-            velocities = self.solve(&inertias, &mut drives, &positions, &velocities, secs);
-            saturated = drives.iter().take(laws.len()).map(|drive| drive.at).collect();
-            for (position, velocity) in positions.iter_mut().zip(&velocities) {
-                *position += velocity * secs;
+            self.velocities = self.solve(&mut step, &mut drives);
+            for (at, drive) in saturated.iter_mut().zip(&drives) {
+                *at = drive.at;
+            }
+            for (position, velocity) in self.positions.iter_mut().zip(&self.velocities) {
+                *position += velocity * step.secs;
             }
         }
-        self.set_state(engine, &began, &positions, &velocities);
+        self.equations = Some(step);
     }
 
-    /// Returns the motors' laws as they are set in the engine.
-    fn laws(&self, engine: &PhysicsWorld) -> Vec<Law> {
-        let motors = self.motors.iter().filter_map(|motor| {
-            let (multibody, link) = engine.multibody_joints.get(motor.joint)?;
-            let of = &multibody.link(link)?.joint.data.motors[motor.axis as usize];
-            Some(Law {
-                target: f64::from(of.target_pos),
-                velocity: f64::from(of.target_vel),
-                stiffness: f64::from(of.stiffness),
-                damping: f64::from(of.damping),
-                most: f64::from(of.max_force),
-            })
-        });
-        motors.collect()
+    /// Returns the equations for the present state, with substeps of this length.
+    fn equations(&self, secs: f64) -> Box<Equations> {
+        let poses: Vec<Isometry3<f64>> = self.kinematics.links(&self.positions);
+        let armatures = self.motors.iter().map(|motor| motor.armature);
+        let inertias = inertias(&self.model, &poses, &self.velocities).with_rotors(armatures);
+        let n_joints = self.motors.len();
+        let mut matrix = inertias.mass.clone();
+        for (idx, joint) in self.model.joints.iter().enumerate() {
+            matrix[idx * n_joints + idx] += secs * joint.damping;
+            if self.is_given(idx) {
+                matrix[idx * n_joints + idx] += GIVEN_GAIN;
+            } else if let Some((leader, factor, _)) = joint.mimic {
+                for (row, share) in [(idx, 1.0), (leader, -factor)] {
+                    for (column, other) in [(idx, 1.0), (leader, -factor)] {
+                        matrix[row * n_joints + column] += share * other * COUPLING_GAIN;
+                    }
+                }
+            }
+        }
+        Box::new(Equations { inertias, secs, matrix, apparent: vec![None; n_joints], added: Vec::new(), factor: None })
     }
 
-    /// Returns the drives of all motors, followed by those of the stops that are passed.
-    fn drives(&self, laws: &[Law], positions: &[f64], inertias: &Inertias, secs: f64) -> Vec<Drive> {
+    /// Sets the momenta that gravity, contacts and given velocities add in the substeps of the next step.
+    fn begin_step(&self, step: &mut Equations) {
+        let secs = step.secs;
+        step.added.clear();
+        step.added.extend(step.inertias.bias.iter().map(|bias| -secs * bias));
+        if let Some((hand, push)) = self.load() {
+            for joint in self.joints_to(hand.link) {
+                step.added[joint] += secs * step.inertias.effort_of(joint, push);
+            }
+        }
+        for idx in (0..self.motors.len()).filter(|idx| self.is_given(*idx)) {
+            step.added[idx] += GIVEN_GAIN * self.velocities[idx];
+        }
+    }
+
+    /// Returns the hand and the push of contacts on it, if the engine moves it.
+    fn load(&self) -> Option<(&Hand, &Twist)> {
+        self.hand.as_ref().filter(|_| self.share == Share::Hand).map(|hand| (hand, &self.push_on_hand))
+    }
+
+    /// Returns whether the engine gives the velocity of a joint.
+    fn is_given(&self, joint: usize) -> bool {
+        self.share == Share::Hand && self.shares(joint)
+    }
+
+    /// Returns the drives of all motors, followed by those of the stops that are passed. Motors in the engine have no
+    /// drive here, but their place.
+    fn drives(&self, step: &mut Equations) -> Vec<Drive> {
         let limits = |idx: usize| match &self.model.joints[idx] {
             joint if joint.upper - joint.lower < WIDEST_RANGE => [joint.lower, joint.upper],
             _ => [f64::NEG_INFINITY, f64::INFINITY],
         };
-        let of_motors = laws.iter().zip(positions).enumerate();
-        let mut drives: Vec<Drive> =
-            of_motors.map(|(idx, (law, position))| law.drive(idx, *position, limits(idx), secs)).collect();
+        let of_motors = self.motors.iter().zip(&self.positions).enumerate();
+        let mut drives: Vec<Drive> = of_motors
+            .map(|(idx, (motor, position))| match self.is_given(idx) {
+                true => Drive::none(idx),
+                false => motor.law.drive(idx, *position, limits(idx), step.secs),
+            })
+            .collect();
+        let secs = step.secs;
         let turn = std::f64::consts::TAU * f64::from(STOP_FREQUENCY_HZ);
         let recovery = turn / (secs * turn + 2.0 * f64::from(STOP_DAMPING));
         let rest = 1.0 / (secs * recovery) - 1.0;
         let softness = rest * rest / ((1.0 + rest) * 4.0 * f64::from(STOP_DAMPING * STOP_DAMPING));
-        for (idx, position) in positions.iter().enumerate() {
+        for (idx, position) in self.positions.iter().enumerate().filter(|(idx, _)| !self.is_given(*idx)) {
             let [lower, upper] = limits(idx);
             let past = (position - upper).max(0.0) - (lower - position).max(0.0);
             if past != 0.0 {
                 let bounds = if past > 0.0 { [f64::NEG_INFINITY, 0.0] } else { [0.0, f64::INFINITY] };
-                let gain = inertias.apparent(idx) / softness;
+                let apparent = *step.apparent[idx].get_or_insert_with(|| step.inertias.apparent(idx));
+                let gain = apparent / softness;
                 drives.push(Drive { joint: idx, gain, wanted: -past * recovery, bounds, at: None });
             }
         }
@@ -140,45 +143,39 @@ impl Robot {
     }
 
     /// Returns the velocities after a substep. Finds the drives that are at a bound by trial.
-    fn solve(
-        &self,
-        inertias: &Inertias,
-        drives: &mut [Drive],
-        positions: &[f64],
-        velocities: &[f64],
-        secs: f64,
-    ) -> Vec<f64> {
-        let joints = &self.model.joints;
-        let mut momenta = inertias.times(velocities);
-        let mut matrix = inertias.mass.clone();
-        let n_joints = joints.len();
-        for (idx, joint) in joints.iter().enumerate() {
-            momenta[idx] -= secs * inertias.bias[idx];
-            matrix[idx * n_joints + idx] += secs * joint.damping;
+    fn solve(&self, step: &mut Equations, drives: &mut [Drive]) -> Vec<f64> {
+        let n_joints = self.motors.len();
+        let mut momenta = step.inertias.times(&self.velocities);
+        momenta.iter_mut().zip(&step.added).for_each(|(momentum, added)| *momentum += added);
+        for (idx, joint) in self.model.joints.iter().enumerate().filter(|(idx, _)| !self.is_given(*idx)) {
             if let Some((leader, factor, offset)) = joint.mimic {
-                let wanted = -(positions[idx] - factor * positions[leader] - offset) / secs;
+                let off = self.positions[idx] - factor * self.positions[leader] - offset;
                 for (row, share) in [(idx, 1.0), (leader, -factor)] {
-                    momenta[row] += share * COUPLING_GAIN * wanted;
-                    for (column, other) in [(idx, 1.0), (leader, -factor)] {
-                        matrix[row * n_joints + column] += share * other * COUPLING_GAIN;
-                    }
+                    momenta[row] -= share * COUPLING_GAIN * off / step.secs;
                 }
             }
         }
-        let mut found = velocities.to_vec();
+        let mut found = self.velocities.clone();
         for _ in 0..MOST_CHANGES {
-            let mut matrix = matrix.clone();
             found.copy_from_slice(&momenta);
             for drive in drives.iter() {
-                match drive.at {
-                    Some(bound) => found[drive.joint] += drive.bounds[bound],
-                    None => {
-                        found[drive.joint] += drive.gain * drive.wanted;
-                        matrix[drive.joint * n_joints + drive.joint] += drive.gain;
-                    }
-                }
+                found[drive.joint] += match drive.at {
+                    Some(bound) => drive.bounds[bound],
+                    None => drive.gain * drive.wanted,
+                };
             }
-            Factor::new(matrix, n_joints).solve(&mut found);
+            let gain = |drive: &Drive| drive.at.is_none().then_some(drive.gain);
+            let free: Vec<(usize, Option<f64>)> = drives.iter().map(|drive| (drive.joint, gain(drive))).collect();
+            if step.factor.as_ref().is_none_or(|(known, _)| *known != free) {
+                let mut matrix = step.matrix.clone();
+                for drive in drives.iter().filter(|drive| drive.at.is_none()) {
+                    matrix[drive.joint * n_joints + drive.joint] += drive.gain;
+                }
+                step.factor = Some((free, Factor::new(matrix, n_joints)));
+            }
+            if let Some((_, factor)) = &step.factor {
+                factor.solve(&mut found);
+            }
             let mut changed = false;
             for drive in drives.iter_mut() {
                 changed |= drive.update(found[drive.joint]);
@@ -188,41 +185,6 @@ impl Robot {
             }
         }
         found
-    }
-
-    /// Moves the engine's joints from their positions to others, with new velocities.
-    fn set_state(&self, engine: &mut PhysicsWorld, began: &[f64], positions: &[f64], velocities: &[f64]) {
-        let Some(first) = self.motors.first().map(|motor| motor.joint) else { return };
-        let of = |motor: &crate::motor::Motor| {
-            let (multibody, link) = engine.multibody_joints.get(motor.joint)?;
-            Some(multibody.link(link)?.assembly_id())
-        };
-        let dofs: Vec<Option<usize>> = self.motors.iter().map(of).collect();
-        let Some((multibody, _)) = engine.multibody_joints.get_mut(first) else { return };
-        let mut ways = vec![0.0_f32; multibody.ndofs()];
-        for (idx, dof) in dofs.into_iter().enumerate() {
-            let Some(dof) = dof else { continue };
-            ways[dof] = to_real(positions[idx] - began[idx]);
-            multibody.generalized_velocity_mut()[dof] = to_real(velocities[idx]);
-        }
-        multibody.apply_displacements(&ways);
-    }
-
-    /// Moves links and their colliders to where the joints are.
-    pub(super) fn place_links(&self, engine: &mut PhysicsWorld) {
-        let Some(first) = self.motors.first().map(|motor| motor.joint) else { return };
-        let Some((multibody, _)) = engine.multibody_joints.get_mut(first) else { return };
-        multibody.forward_kinematics(&engine.bodies, false);
-        multibody.update_rigid_bodies(&mut engine.bodies, true);
-        for body in self.bodies.iter().filter_map(|body| engine.bodies.get(*body)) {
-            for handle in body.colliders() {
-                if let Some(collider) = engine.colliders.get_mut(*handle)
-                    && let Some(on_body) = collider.position_wrt_parent().copied()
-                {
-                    collider.set_position(*body.position() * on_body);
-                }
-            }
-        }
     }
 }
 
@@ -234,9 +196,10 @@ mod tests {
     use actcheck_data::Choices;
 
     fn dynamics(world: &World) -> (Vec<f64>, Inertias) {
-        let (positions, velocities) = world.robot.state(&world.engine);
+        let (positions, velocities) = world.robot.state();
         let poses = world.robot.kinematics.links(&positions);
-        (positions, inertias(&world.robot.model, &poses, &velocities))
+        let armatures = world.robot.motors.iter().map(|motor| motor.armature);
+        (positions, inertias(&world.robot.model, &poses, &velocities).with_rotors(armatures))
     }
 
     /// Gives every joint a new target, within the limits, and steps for half a second.
@@ -310,6 +273,8 @@ mod tests {
     fn joints_move_through_free_space_as_in_the_engine() {
         let (mut free, mut engine) = (lonely(), lonely());
         engine.leave_to_engine();
+        // As many substeps as in campaigns: the engine solves motors and couplings only by iteration.
+        (free.substeps, engine.substeps) = (4, 4);
         let [mut ones, mut others] = [Choices::random(8, 0), Choices::random(8, 0)];
         for _ in 0..6 {
             wander(&mut free, &mut ones);

@@ -1,6 +1,6 @@
 //! The robot's mass matrix, and the forces of gravity and of its own motion on the joints.
 
-use nalgebra::{Isometry3, Matrix3, Vector3};
+use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
 
 use crate::description::{JointKind, RobotModel};
 use crate::factor::Factor;
@@ -12,6 +12,8 @@ pub(super) struct Inertias {
     pub(super) mass: Vec<f64>,
     /// Efforts that keep all joints at their velocities: against gravity, centrifugal and Coriolis forces.
     pub(super) bias: Vec<f64>,
+    /// Motion of each joint at unit velocity.
+    axes: Vec<Twist>,
 }
 
 impl Inertias {
@@ -19,6 +21,21 @@ impl Inertias {
     pub(super) fn times(&self, velocities: &[f64]) -> Vec<f64> {
         let rows = self.mass.chunks(velocities.len().max(1));
         rows.map(|row| row.iter().zip(velocities).map(|(a, b)| a * b).sum()).collect()
+    }
+
+    /// Adds the inertia of each joint's motor.
+    pub(super) fn with_rotors(mut self, armatures: impl Iterator<Item = f64>) -> Self {
+        let n_joints = self.bias.len();
+        for (idx, armature) in armatures.enumerate() {
+            self.mass[idx * n_joints + idx] += armature;
+        }
+        self
+    }
+
+    /// Returns the effort of a force, with its torque about the world's origin, on a joint that moves its point of
+    /// application.
+    pub(super) fn effort_of(&self, joint: usize, force: &Twist) -> f64 {
+        self.axes[joint].dot(force)
     }
 
     /// Returns the inertia of one joint while all others are free to move.
@@ -32,15 +49,20 @@ impl Inertias {
 
 /// Angular and linear part of a motion, a force or a momentum, about the world's origin.
 #[derive(Debug, Clone, Copy)]
-struct Twist {
-    turn: Vector3<f64>,
-    shift: Vector3<f64>,
+pub(super) struct Twist {
+    pub(super) turn: Vector3<f64>,
+    pub(super) shift: Vector3<f64>,
 }
 
 impl Twist {
-    const ZERO: Self = Self { turn: Vector3::new(0.0, 0.0, 0.0), shift: Vector3::new(0.0, 0.0, 0.0) };
+    /// Returns a force that acts at a point.
+    pub(super) fn by_force(force: &Vector3<f64>, point: &Point3<f64>) -> Self {
+        Self { turn: point.coords.cross(force), shift: *force }
+    }
 
-    fn plus(self, other: Self, times: f64) -> Self {
+    pub(super) const ZERO: Self = Self { turn: Vector3::new(0.0, 0.0, 0.0), shift: Vector3::new(0.0, 0.0, 0.0) };
+
+    pub(super) fn plus(self, other: Self, times: f64) -> Self {
         Self { turn: self.turn + other.turn * times, shift: self.shift + other.shift * times }
     }
 
@@ -103,7 +125,7 @@ pub(super) fn inertias(model: &RobotModel, poses: &[Isometry3<f64>], velocities:
         .zip(poses)
         .map(|(link, pose)| {
             let turned = pose.rotation.to_rotation_matrix();
-            let com = (pose * nalgebra::Point3::from(link.com)).coords;
+            let com = (pose * Point3::from(link.com)).coords;
             let spread = Matrix3::identity() * com.norm_squared() - com * com.transpose();
             let about = turned * link.inertia * turned.transpose() + spread * link.mass;
             Bulk { mass: link.mass, moment: com * link.mass, about }
@@ -141,5 +163,5 @@ pub(super) fn inertias(model: &RobotModel, poses: &[Isometry3<f64>], velocities:
         onto.about += bulk.about;
         forces[joint.parent] = forces[joint.parent].plus(force, 1.0);
     }
-    Inertias { mass, bias }
+    Inertias { mass, bias, axes }
 }

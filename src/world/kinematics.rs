@@ -46,6 +46,11 @@ impl Kinematics {
         self.passing.contains(&(first.min(second), first.max(second)))
     }
 
+    /// Returns the pose of the root. Frame: world.
+    pub(crate) fn root(&self) -> &Isometry3<f64> {
+        &self.root
+    }
+
     /// The joints, in the order of positions.
     pub fn joints(&self) -> &[Joint] {
         &self.model.joints
@@ -142,19 +147,23 @@ impl Kinematics {
 
     /// Returns the forces and torques that compensate gravity. Units: newtons or newton metres. Shape: one per joint.
     pub fn holding_efforts(&self, positions: &[f64]) -> Vec<f64> {
-        let poses = self.links(positions);
+        self.holding_efforts_at(&self.links(positions))
+    }
+
+    /// As [`Kinematics::holding_efforts`], with the links at these poses.
+    pub(crate) fn holding_efforts_at(&self, poses: &[Isometry3<f64>]) -> Vec<f64> {
         // Mass and first moment of each subtree, accumulated from the leaves: children come after their parents.
         let mut weights: Vec<(f64, Vector3<f64>)> = self
             .model
             .links
             .iter()
-            .zip(&poses)
+            .zip(poses)
             .map(|(link, pose)| (link.mass, (pose * Point3::from(link.com)).coords * link.mass))
             .collect();
         let mut efforts = vec![0.0; self.model.joints.len()];
         for (idx, joint) in self.model.joints.iter().enumerate().rev() {
             let (mass, moment) = weights[idx + 1];
-            let (axis, point) = axis_in_world(joint, &poses);
+            let (axis, point) = axis_in_world(joint, poses);
             let up = Vector3::z() * GRAVITY;
             efforts[idx] = match joint.kind {
                 JointKind::Prismatic => axis.dot(&up) * mass,

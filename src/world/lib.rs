@@ -10,6 +10,7 @@ mod contacts;
 mod convert;
 mod decompose;
 mod description;
+mod drive;
 mod engine;
 mod error;
 mod factor;
@@ -42,6 +43,7 @@ mod samples;
 mod self_contact;
 mod sense;
 mod settle;
+mod share;
 mod silhouette;
 mod simulation;
 mod surface;
@@ -59,6 +61,7 @@ pub use layout::{Layout, check_robot, grip_limit_n};
 pub use propose::{Proposal, complete, is_incomplete, propose};
 pub use recorder::{Contact, Course, Record, Tracks};
 pub use robot::geometry;
+pub use room::Shortcuts;
 pub use self_contact::SelfContact;
 pub use sense::Sighting;
 pub use settle::Settling;
@@ -67,4 +70,4 @@ pub use views::robot_views;
 
 /// Version of the physics: the same scene and commands give the same bits only with the same version. It rises with each
 /// change of these bits.
-pub const PHYSICS_VERSION: u32 = 2;
+pub const PHYSICS_VERSION: u32 = 3;

@@ -5,6 +5,7 @@ use rapier3d::prelude::{GenericJoint, JointAxis, MultibodyJointHandle, PhysicsWo
 use crate::assemble::WIDEST_RANGE;
 use crate::convert::to_real;
 use crate::description::Joint;
+use crate::drive::Law;
 
 /// The motor of one joint.
 #[derive(Debug, Clone)]
@@ -21,10 +22,14 @@ pub(super) struct Motor {
     pub(super) setpoint_velocity: f64,
     /// Commanded effort, instead of a position.
     pub(super) push: Option<f64>,
+    /// Its law in this step.
+    pub(super) law: Law,
     /// Position at the start of the step.
     pub(super) began: f64,
     /// Mean effort in the last control tick, without gravity compensation.
     pub(super) effort: f64,
+    /// Inertia of its rotor, as the joint feels it. Unit: kilograms or kg·m².
+    pub(super) armature: f64,
     /// Largest speed of its setpoint.
     pub(super) fastest: f64,
     /// Largest commanded effort as a multiple of the joint's limit: 1 unless the motor is overdriven.
@@ -68,23 +73,30 @@ impl Motor {
     /// Applies an effort for a step: a velocity motor with the target speed `top` and `effort` as its limit gives this
     /// effort until it reaches that speed. Also resets the setpoint, so that position control later resumes at the
     /// current position.
-    pub(super) fn give(&mut self, engine: &mut PhysicsWorld, effort: f64, top: f64) {
-        let Some((multibody, link)) = engine.multibody_joints.get_mut(self.joint) else { return };
-        let Some(is) = multibody.link(link) else { return };
-        self.setpoint = f64::from(is.joint.coords()[self.axis as usize]);
-        self.setpoint_velocity = f64::from(multibody.joint_velocity(is)[0]);
-        self.target = self.setpoint;
-        let Some(link) = multibody.link_mut(link) else { return };
+    pub(super) fn give(&mut self, position: f64, velocity: f64, effort: f64, top: f64) {
+        self.setpoint = position;
+        self.setpoint_velocity = velocity;
+        self.target = position;
         let damping = effort.abs() / (SLACK * top).max(1e-6);
-        let data = &mut link.joint.data;
-        data.set_motor(self.axis, 0.0, to_real(top.copysign(effort)), 0.0, to_real(damping));
-        data.set_motor_max_force(self.axis, to_real(effort.abs()));
+        self.law = Law { target: 0.0, velocity: top.copysign(effort), stiffness: 0.0, damping, most: effort.abs() };
+    }
+
+    /// Gives the engine the law of this step, and the joint's stops if it can reach them.
+    pub(super) fn tell(&self, engine: &mut PhysicsWorld, joint: &Joint, position: f64, largest: f64) {
+        let Some((multibody, link)) = engine.multibody_joints.get_mut(self.joint) else { return };
+        let Some(link) = multibody.link_mut(link) else { return };
+        let (data, law) = (&mut link.joint.data, &self.law);
+        limit_if_near(data, self.axis, joint, position, largest);
+        let [target, velocity, stiffness, damping] =
+            [law.target, law.velocity, law.stiffness, law.damping].map(to_real);
+        data.set_motor(self.axis, target, velocity, stiffness, damping);
+        data.set_motor_max_force(self.axis, to_real(law.most));
     }
 }
 
 /// Gives a joint its stops only where it can reach them in a step of `largest` way: far from them they do nothing, but
 /// the engine would solve them.
-pub(super) fn limit_if_near(data: &mut GenericJoint, axis: JointAxis, joint: &Joint, position: f64, largest: f64) {
+fn limit_if_near(data: &mut GenericJoint, axis: JointAxis, joint: &Joint, position: f64, largest: f64) {
     if joint.upper - joint.lower >= WIDEST_RANGE {
         return;
     }

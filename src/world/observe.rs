@@ -97,7 +97,7 @@ impl World {
     }
 
     fn robot_state(&self, pairs: &[Pair]) -> RobotState {
-        let joints = self.robot.joint_states(&self.engine);
+        let joints = self.robot.joint_states();
         let positions: Vec<f64> = joints.iter().map(|joint| joint.position).collect();
         let touched_by = |link: usize| -> Vec<String> {
             let objects = pairs.iter().filter_map(|pair| match (pair.first, pair.second) {

@@ -121,12 +121,15 @@ impl<'a> Solids<'a> {
         best
     }
 
-    /// Returns the sine of the angle between a pixel's ray and the surface at the hit.
-    pub(super) fn sine(&self, column: usize, row: usize, hit: Hit) -> f64 {
+    /// Returns the sine of the angle between a pixel's ray, with a direction of this length, and the surface at the hit.
+    pub(super) fn sine(&self, column: usize, row: usize, hit: Hit, length: f64) -> f64 {
         let solid = &self.solids[hit.solid];
         let ray = solid.direction(self.slopes(column, row));
+        if let Form::Box { half } = solid.form {
+            return (ray[side_at(&(solid.eye + ray * hit.along), &half)] / length).abs().min(1.0);
+        }
         let normal = solid.normal(&ray, hit.along);
-        (normal.dot(&ray) / (normal.norm() * ray.norm())).abs().min(1.0)
+        (normal.dot(&ray) / (normal.norm() * length)).abs().min(1.0)
     }
 }
 
@@ -238,12 +241,7 @@ impl<'a> Solid<'a> {
     fn normal(&self, ray: &Vector3<f64>, along: f64) -> Vector3<f64> {
         let point = self.eye + ray * along;
         match self.form {
-            Form::Box { half } => {
-                // The axis of the side that the point is nearest to.
-                let depth = point.coords.abs() - half;
-                let axis = depth.imax();
-                Vector3::ith(axis, 1.0)
-            }
+            Form::Box { half } => Vector3::ith(side_at(&point, &half), 1.0),
             Form::Cylinder { radius, half_height } => {
                 let side = (point.x * point.x + point.z * point.z).sqrt() - radius;
                 if point.y.abs() - half_height > side { Vector3::y() } else { Vector3::new(point.x, 0.0, point.z) }
@@ -257,6 +255,12 @@ impl<'a> Solid<'a> {
             }
         }
     }
+}
+
+/// Returns the axis of the side of a box about the origin that a point is nearest to.
+fn side_at(point: &Point3<f64>, half: &Vector3<f64>) -> usize {
+    let [x, y, z] = [0, 1, 2].map(|axis| point[axis].abs() - half[axis]);
+    if z > x.max(y) { 2 } else { usize::from(y > x) }
 }
 
 /// Returns the distances at which a ray enters and leaves a box about the origin.
@@ -365,7 +369,7 @@ mod tests {
             let ray = Ray::new(to_vector(&Vector3::zeros()), to_vector(&direction));
             let met = shape.cast_ray_and_get_normal(&to_pose(&pose), &ray, 9.0, true).expect("the ray hits the shape");
             let sine = (from_vector(met.normal).dot(&direction) / direction.norm()).abs();
-            assert!((solids.sine(column, row, hit) - sine).abs() < 2e-2, "{number}");
+            assert!((solids.sine(column, row, hit, direction.norm()) - sine).abs() < 2e-2, "{number}");
             n_met += 1;
         }
         assert!(n_met > 30, "{n_met}");

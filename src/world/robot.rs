@@ -3,14 +3,17 @@
 use std::sync::Arc;
 
 use nalgebra::Isometry3;
-use rapier3d::prelude::{MultibodyDofCoupling, MultibodyJointHandle, PhysicsWorld, RigidBodyHandle};
+use rapier3d::prelude::{MultibodyJointHandle, PhysicsWorld, RigidBodyHandle};
 
 use crate::assemble::{home, insert_joints, insert_links, links_on_floor};
-use crate::convert::to_real;
 use crate::description::{Joint, RobotModel};
+use crate::drive::Law;
+use crate::free_motion::Equations;
+use crate::inertia::Twist;
 use crate::layout::{Layout, Named};
-use crate::motor::{Motor, limit_if_near};
+use crate::motor::Motor;
 use crate::room::Ball;
+use crate::share::{Hand, Share};
 use crate::{Kinematics, WorldError};
 use actcheck_data::{JointState, Pose, RobotProfile, RobotStart};
 
@@ -33,6 +36,20 @@ pub struct Robot {
     pub(super) off_floor: Vec<bool>,
     /// The bounding ball of each link's shapes, in its frame; `None` for links without shapes.
     pub(super) balls: Vec<Option<Ball>>,
+    /// Positions of the joints.
+    pub(super) positions: Vec<f64>,
+    /// Velocities of the joints.
+    pub(super) velocities: Vec<f64>,
+    /// The part of the robot that the engine moves.
+    pub(super) share: Share,
+    /// The engine's joint that carries the hand, if it moves the hand alone.
+    pub(super) carrier: Option<MultibodyJointHandle>,
+    /// The hand; `None` if it can't be moved alone.
+    pub(super) hand: Option<Hand>,
+    /// The force of contacts on the hand in the last step, if the engine moves the hand alone. Frame: world.
+    pub(super) push_on_hand: Twist,
+    /// The equations of its free motion in this control tick, once they are known.
+    pub(super) equations: Option<Box<Equations>>,
 }
 
 /// Returns a robot's geometry, layout and home posture, without a simulation.
@@ -59,10 +76,6 @@ fn root_of(start: &RobotStart, layout: &Layout) -> Isometry3<f64> {
     }
 }
 
-/// Passes of the solver in each substep for grippers with coupled joints. In a single pass, the motor's force does not
-/// arrive at the fingertips: with 15 N commanded, a finger that turns with five couplings presses with 5 N.
-const COUPLED_ITERATIONS: usize = 8;
-
 impl Robot {
     /// Inserts the robot into the engine, in its home posture.
     ///
@@ -80,6 +93,7 @@ impl Robot {
         let motors = insert_joints(engine, &model, &bodies, &named, &profile)?;
         let off_floor = links_on_floor(&model, &named, &profile);
         let balls = model.links.iter().map(|link| Ball::around(&link.solids)).collect();
+        let hand = Hand::of(&model, &named.layout.gripper);
         let mut robot = Self {
             profile,
             model,
@@ -90,34 +104,36 @@ impl Robot {
             motors,
             off_floor,
             balls,
+            velocities: vec![0.0; positions.len()],
+            positions,
+            share: Share::Whole,
+            carrier: None,
+            hand,
+            push_on_hand: Twist::ZERO,
+            equations: None,
         };
-        robot.couple_mimics(engine);
-        robot.move_to(engine, &positions);
+        for (motor, position) in robot.motors.iter_mut().zip(&robot.positions) {
+            motor.target = *position;
+            motor.setpoint = *position;
+        }
+        robot.finish_share(engine);
+        robot.put_state(engine);
         Ok(robot)
     }
 
     /// Returns the measured joint positions and velocities.
-    pub fn state(&self, engine: &PhysicsWorld) -> (Vec<f64>, Vec<f64>) {
-        let mut positions = Vec::with_capacity(self.motors.len());
-        let mut velocities = Vec::with_capacity(self.motors.len());
-        for motor in &self.motors {
-            let Some((multibody, link)) = engine.multibody_joints.get(motor.joint) else { continue };
-            let Some(link) = multibody.link(link) else { continue };
-            positions.push(f64::from(link.joint.coords()[motor.axis as usize]));
-            velocities.push(f64::from(multibody.joint_velocity(link)[0]));
-        }
-        (positions, velocities)
+    pub fn state(&self) -> (Vec<f64>, Vec<f64>) {
+        (self.positions.clone(), self.velocities.clone())
     }
 
     /// Returns the state of all joints, with their limits.
-    pub fn joint_states(&self, engine: &PhysicsWorld) -> Vec<JointState> {
-        let (positions, velocities) = self.state(engine);
-        let states = self.model.joints.iter().zip(positions.into_iter().zip(velocities));
+    pub fn joint_states(&self) -> Vec<JointState> {
+        let states = self.model.joints.iter().zip(self.positions.iter().zip(&self.velocities));
         states
             .map(|(joint, (position, velocity))| JointState {
                 name: joint.name.clone(),
-                position,
-                velocity,
+                position: *position,
+                velocity: *velocity,
                 lower: joint.lower,
                 upper: joint.upper,
                 max_velocity: joint.velocity,
@@ -127,12 +143,11 @@ impl Robot {
     }
 
     /// Returns the force of each finger's motor by its control law; positive closes. Unit: newtons.
-    pub fn finger_efforts(&self, engine: &PhysicsWorld) -> [f64; 2] {
-        let (positions, velocities) = self.state(engine);
+    pub fn finger_efforts(&self) -> [f64; 2] {
         self.layout.gripper.sides().map(|(idx, sign, lever_m)| {
-            let (motor, position) = (&self.motors[idx], positions[idx]);
+            let (motor, position) = (&self.motors[idx], self.positions[idx]);
             let effort = motor.stiffness * (position - motor.setpoint)
-                + motor.damping * (velocities[idx] - motor.setpoint_velocity);
+                + motor.damping * (self.velocities[idx] - motor.setpoint_velocity);
             effort.clamp(-motor.max_effort, motor.max_effort) * sign / lever_m
         })
     }
@@ -149,8 +164,9 @@ impl Robot {
         motors.map(|(motor, joint)| if joint.effort > 0.0 { motor.effort.abs() / joint.effort } else { 0.0 }).collect()
     }
 
-    /// Starts measuring the efforts of a control tick.
+    /// Starts a control tick: measures its efforts, and finds its equations of motion anew.
     pub fn begin_tick(&mut self) {
+        self.equations = None;
         self.motors.iter_mut().for_each(|motor| motor.effort = 0.0);
     }
 
@@ -158,10 +174,9 @@ impl Robot {
     pub fn measure(&mut self, engine: &PhysicsWorld, holding: &[f64], share: f64) {
         let parameters = &engine.integration_parameters;
         let (dt, n_substeps) = (f64::from(parameters.dt), parameters.num_solver_iterations as f64);
-        let (positions, _) = self.state(engine);
-        for (idx, (motor, position)) in self.motors.iter_mut().zip(positions).enumerate() {
+        for (idx, (motor, position)) in self.motors.iter_mut().zip(&self.positions).enumerate() {
             let held = holding.get(idx).copied().unwrap_or(0.0);
-            motor.effort += share * motor.effort_of_step(position, held, dt, n_substeps);
+            motor.effort += share * motor.effort_of_step(*position, held, dt, n_substeps);
         }
     }
 
@@ -222,12 +237,9 @@ impl Robot {
         for (idx, motor) in self.motors.iter_mut().enumerate() {
             let held = holding.get(idx).copied().unwrap_or(0.0);
             let largest = motor.fastest * dt;
-            let Some((multibody, link)) = engine.multibody_joints.get_mut(motor.joint) else { continue };
-            let Some(link) = multibody.link_mut(link) else { continue };
-            let position = f64::from(link.joint.coords()[motor.axis as usize]);
-            limit_if_near(&mut link.joint.data, motor.axis, &self.model.joints[idx], position, largest);
+            let position = self.positions[idx];
             if let Some(effort) = motor.push {
-                motor.give(engine, effort + held, self.model.joints[idx].velocity);
+                motor.give(position, self.velocities[idx], effort + held, self.model.joints[idx].velocity);
                 continue;
             }
             let change = ((motor.target - motor.setpoint) / f64::from(steps_left)).clamp(-largest, largest);
@@ -235,16 +247,16 @@ impl Robot {
             motor.setpoint_velocity = change / dt;
             motor.began = position;
             motor.keep_near(position, motor.fastest, substep_secs);
-            let position = motor.setpoint + held / motor.stiffness;
-            let data = &mut link.joint.data;
-            data.set_motor(
-                motor.axis,
-                to_real(position),
-                to_real(motor.setpoint_velocity),
-                to_real(motor.stiffness),
-                to_real(motor.damping),
-            );
-            data.set_motor_max_force(motor.axis, to_real(motor.max_effort));
+            motor.law = Law {
+                target: motor.setpoint + held / motor.stiffness,
+                velocity: motor.setpoint_velocity,
+                stiffness: motor.stiffness,
+                damping: motor.damping,
+                most: motor.max_effort,
+            };
+        }
+        for (idx, motor) in self.motors.iter().enumerate().filter(|(idx, _)| self.shares(*idx)) {
+            motor.tell(engine, &self.model.joints[idx], self.positions[idx], motor.fastest * dt);
         }
     }
 
@@ -278,76 +290,17 @@ impl Robot {
         self.joints_to(link).any(|moving| moving == joint)
     }
 
-    /// Moves all joints to the positions at once, and holds them there.
-    fn move_to(&mut self, engine: &mut PhysicsWorld, positions: &[f64]) {
-        let Some(first) = self.motors.first().map(|motor| motor.joint) else { return };
-        for (motor, position) in self.motors.iter_mut().zip(positions) {
-            motor.target = *position;
-            motor.setpoint = *position;
-        }
-        let order: Vec<(MultibodyJointHandle, f64)> =
-            self.motors.iter().map(|motor| motor.joint).zip(positions.iter().copied()).collect();
-        // This determines whether the root is fixed, and with it the index of each joint's coordinate.
-        let Some((multibody, _)) = engine.multibody_joints.get_mut(first) else { return };
-        multibody.forward_kinematics(&engine.bodies, true);
-        let mut displacements = vec![0.0_f32; multibody.ndofs()];
-        for (handle, position) in order {
-            let Some((multibody, link)) = engine.multibody_joints.get(handle) else { continue };
-            let Some(link) = multibody.link(link) else { continue };
-            displacements[link.assembly_id()] = to_real(position);
-        }
-        if let Some((multibody, _)) = engine.multibody_joints.get_mut(first) {
-            multibody.apply_displacements(&displacements);
-            multibody.forward_kinematics(&engine.bodies, true);
-            multibody.update_rigid_bodies(&mut engine.bodies, true);
-        }
-        engine.bodies.propagate_modified_body_positions_to_colliders(&mut engine.colliders);
-    }
-
     /// Moves the base at once, with everything attached to it; the other joints keep their positions. Units: metres,
     /// metres, radians.
     pub fn shift_base(&mut self, engine: &mut PhysicsWorld, by: [f64; 3]) {
         let Some(base) = self.layout.base else { return };
-        let Some((multibody, _)) = engine.multibody_joints.get(self.motors[base[0]].joint) else { return };
-        let mut displacements = vec![0.0_f32; multibody.ndofs()];
         for (idx, shift) in base.into_iter().zip(by) {
             let motor = &mut self.motors[idx];
             motor.target += shift;
             motor.setpoint += shift;
-            let link = engine.multibody_joints.get(motor.joint).and_then(|(multibody, link)| multibody.link(link));
-            if let Some(link) = link {
-                displacements[link.assembly_id()] = to_real(shift);
-            }
-        }
-        if let Some((multibody, _)) = engine.multibody_joints.get_mut(self.motors[base[0]].joint) {
-            multibody.apply_displacements(&displacements);
+            self.positions[idx] += shift;
         }
         self.place_links(engine);
-    }
-
-    /// Couples mimic joints to their leaders, as a mechanism does.
-    fn couple_mimics(&self, engine: &mut PhysicsWorld) {
-        if self.model.joints.iter().enumerate().any(|(idx, _)| self.layout.gripper.follows(idx)) {
-            engine.integration_parameters.num_internal_pgs_iterations = COUPLED_ITERATIONS;
-        }
-        for (follower, joint) in self.model.joints.iter().enumerate() {
-            let Some((leader, factor, offset)) = joint.mimic else { continue };
-            let link_of = |idx: usize| engine.multibody_joints.get(self.motors[idx].joint).map(|(_, link)| link);
-            let (Some(link1), Some(link2)) = (link_of(leader), link_of(follower)) else { continue };
-            let coupling = MultibodyDofCoupling {
-                link1,
-                dof1: 0,
-                axis1: self.motors[leader].axis as usize,
-                link2,
-                dof2: 0,
-                axis2: self.motors[follower].axis as usize,
-                coeff: to_real(factor),
-                offset: to_real(offset),
-            };
-            if let Some((multibody, _)) = engine.multibody_joints.get_mut(self.motors[leader].joint) {
-                multibody.add_dof_coupling(coupling);
-            }
-        }
     }
 }
 
@@ -414,11 +367,10 @@ pub(super) mod tests {
         for _ in 0..20 {
             let positions = posture(&world, &mut choices);
             let robot = &mut world.robot;
-            let (now, _) = robot.state(&world.engine);
-            let change: Vec<f64> = positions.iter().zip(&now).map(|(to, from)| to - from).collect();
-            robot.move_to(&mut world.engine, &change);
-            let (reached, _) = robot.state(&world.engine);
-            let poses = robot.kinematics.links(&reached);
+            robot.positions = positions;
+            robot.put_state(&mut world.engine);
+            robot.take_state(&world.engine);
+            let poses = robot.kinematics.links(&robot.positions);
             for (body, pose) in robot.bodies.iter().zip(&poses) {
                 let simulated = from_pose(world.engine.bodies[*body].position());
                 assert!((simulated.translation.vector - pose.translation.vector).norm() < 1e-5);

@@ -14,6 +14,7 @@ use crate::World;
 use crate::contacts::Touch;
 use crate::convert::{from_pose, from_vector};
 use crate::engine::Owner;
+use crate::room::Reach;
 
 /// Control ticks between two self-collision checks. At 60 ticks per second, that is 20 checks per second: a link at 1
 /// m/s moves 5 cm between them.
@@ -91,7 +92,7 @@ impl World {
     }
 
     fn record_joints(&mut self) {
-        let (positions, velocities) = self.robot.state(&self.engine);
+        let (positions, velocities) = self.robot.state();
         let efforts = self.robot.effort_shares();
         let joints = self.robot.model.joints.iter().zip(&mut self.recorder.robot.joints);
         for (idx, (joint, course)) in joints.enumerate() {
@@ -122,7 +123,7 @@ impl World {
     }
 
     fn record_self_contacts(&mut self) {
-        if self.room.free && !self.link_pairs.pass {
+        if self.room.reach <= Reach::Apart && !self.link_pairs.pass {
             // They are known to be apart.
             return;
         }

@@ -1,6 +1,7 @@
-//! Decides whether the robot can touch anything in the next control tick.
+//! Decides which things the robot can touch in the next control tick.
 //!
-//! A free tick needs no contacts. For each link of the robot, the last measured distance from everything else is kept,
+//! A tick in which the robot can touch nothing needs no contacts; one in which only its hand can touch objects needs no
+//! contacts of the other links. For each link of the robot, the last measured distance from everything at rest is kept,
 //! with the pose of the link at that time. The way that it has moved since, and the longest way in the next tick, are
 //! subtracted; the distance is measured again only when too little is left. All of this depends on the state of the
 //! simulation alone.
@@ -12,8 +13,11 @@ use rapier3d::prelude::Collider;
 
 use crate::World;
 use crate::clearance::gap;
+use crate::convert::from_vector;
 use crate::description::JointKind;
-use crate::kinematics::axis_in_world;
+use crate::kinematics::{GRAVITY, axis_in_world};
+use crate::share::Share;
+use crate::simulation::Object;
 
 /// Distances are measured up to this. Unit: metres.
 const RANGE_M: f64 = 0.25;
@@ -25,17 +29,94 @@ const LEFT_OF_LINKS_M: f64 = 1e-3;
 /// Factor on the present and the commanded speeds of joints, because joints overshoot.
 const OVERSHOOT: f64 = 1.25;
 
+/// Largest force of contacts on a hand that the engine moves alone: a loaded arm gives way. Unit: newtons.
+const MOST_PUSH: f64 = 20.0;
+/// Ticks for which the engine moves the whole robot after a larger push.
+const WHOLE_TICKS: u32 = 30;
+
+/// The things that the robot can touch in a tick.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]
+pub(super) enum Reach {
+    /// Nothing, and everything else is at rest.
+    Nothing,
+    /// Nothing, but objects move.
+    Apart,
+    /// Its hand can touch movable objects.
+    Hand,
+    /// Everything.
+    #[default]
+    All,
+}
+
+impl Reach {
+    /// Returns the part of the robot that the engine moves.
+    pub(super) fn share(self) -> Share {
+        match self {
+            Self::Nothing | Self::Apart => Share::Nothing,
+            Self::Hand => Share::Hand,
+            Self::All => Share::Whole,
+        }
+    }
+}
+
 /// The distances of the robot's links from everything.
 #[derive(Default)]
 pub(super) struct Room {
-    /// Distances of links from the floor and all objects, by the link's index.
-    links: Vec<Option<Measured>>,
+    /// Distances of links from the floor and all static objects, by the link's index.
+    fixed: Vec<Option<Measured>>,
+    /// Distances of links from all other objects at rest.
+    resting: Vec<Option<Measured>>,
+    /// The objects at rest when these distances were measured.
+    rest: Vec<bool>,
     /// Distances between the pairs of links that can collide, in their order.
     pairs: Vec<Option<Measured>>,
-    /// Whether the last tick was free.
-    pub(super) free: bool,
-    /// Whether all ticks are left to the engine.
-    pub(super) engine_only: bool,
+    /// The joints that move only the first of each pair, and those that move only the second.
+    between: Vec<[Vec<usize>; 2]>,
+    /// The things that the robot could touch in the last tick.
+    pub(super) reach: Reach,
+    /// Ticks for which the engine still moves the whole robot.
+    whole_ticks: u32,
+    /// The shortcuts that may be taken.
+    shortcuts: Shortcuts,
+    /// Number of ticks so far with each reach.
+    ticks: [u64; 4],
+}
+
+/// The ticks in which less is simulated than the whole robot in the engine, because the rest has no effect.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Shortcuts {
+    /// No engine where the robot touches nothing and everything else is at rest.
+    pub free_motion: bool,
+    /// No robot in the engine where objects move out of its reach.
+    pub robot_apart: bool,
+    /// Only the hand in the engine where only the hand can touch something, and only movable objects.
+    pub hand_alone: bool,
+    /// Half of the substeps where the engine moves the hand alone. Held objects then swing a little more, so that this is
+    /// not among [`Shortcuts::ALL`].
+    pub few_substeps: bool,
+}
+
+impl Shortcuts {
+    /// All that keep the quality of a grasp.
+    pub const ALL: Self = Self { free_motion: true, robot_apart: true, hand_alone: true, few_substeps: false };
+    /// None: the engine simulates everything in every tick.
+    pub const NONE: Self = Self { free_motion: false, robot_apart: false, hand_alone: false, few_substeps: false };
+
+    /// Returns the reach for which the engine must prepare, given that of the robot.
+    fn limit(self, reach: Reach) -> Reach {
+        match reach {
+            Reach::Nothing if self.free_motion => Reach::Nothing,
+            Reach::Nothing | Reach::Apart if self.robot_apart => Reach::Apart,
+            Reach::Hand if self.hand_alone => Reach::Hand,
+            _ => Reach::All,
+        }
+    }
+}
+
+impl Default for Shortcuts {
+    fn default() -> Self {
+        Self::ALL
+    }
 }
 
 /// A distance, and where the link was when it was measured: in the world, or in the frame of the other link.
@@ -65,84 +146,187 @@ pub(super) struct Ball {
 /// The robot at the beginning of a tick.
 struct Moment {
     poses: Vec<Isometry3<f64>>,
+    /// The axis of each joint: its direction and a point on it. Frame: world.
+    axes: Vec<(Vector3<f64>, Vector3<f64>)>,
     /// How far each joint can move in the tick. Units: metres or radians.
     spans: Vec<f64>,
 }
 
 impl World {
-    /// Leaves all ticks to the engine, also those in which the robot touches nothing: for comparisons.
+    /// Takes only these shortcuts from now on: for comparisons.
+    pub fn take_shortcuts(&mut self, shortcuts: Shortcuts) {
+        self.room.shortcuts = shortcuts;
+    }
+
+    /// Leaves all ticks to the engine, with the whole robot, also those in which the robot touches nothing: for
+    /// comparisons.
     pub fn leave_to_engine(&mut self) {
-        self.room.engine_only = true;
+        self.take_shortcuts(Shortcuts::NONE);
+    }
+
+    /// Sets the engine's substeps for a tick.
+    pub(super) fn set_substeps(&mut self, reach: Reach) {
+        let few = self.room.shortcuts.few_substeps && reach == Reach::Hand;
+        let substeps = if few { self.substeps.div_ceil(2) } else { self.substeps };
+        self.engine.integration_parameters.num_solver_iterations = substeps;
+    }
+
+    /// Returns the number of ticks so far in which the robot could touch nothing, with everything else at rest; nothing,
+    /// with moving objects; movable objects with its hand; and everything.
+    pub fn ticks_by_reach(&self) -> [u64; 4] {
+        self.room.ticks
     }
 
     /// Returns whether the robot moved through free space in the last tick, without the engine.
     pub fn moved_freely(&self) -> bool {
-        self.room.free
+        self.room.reach == Reach::Nothing
     }
 
-    /// Returns whether the robot touches nothing in the next tick and everything else is at rest, so that the robot
-    /// moves as in free space.
-    pub(super) fn find_room(&mut self) -> bool {
+    /// Returns whether the engine moved only the robot's hand in the last tick.
+    pub fn moved_hand_alone(&self) -> bool {
+        self.room.reach == Reach::Hand
+    }
+
+    /// Returns the reach of the robot, with its links at these poses, in the next tick.
+    pub(super) fn find_room(&mut self, poses: Vec<Isometry3<f64>>) -> Reach {
         let mut room = std::mem::take(&mut self.room);
-        room.free = !room.engine_only && self.is_free(&mut room);
+        let reach = if room.shortcuts == Shortcuts::NONE { Reach::All } else { self.reach(&mut room, poses) };
+        room.reach = room.shortcuts.limit(reach);
+        room.ticks[room.reach as usize] += 1;
         self.room = room;
-        self.room.free
+        self.room.reach
     }
 
-    fn is_free(&self, room: &mut Room) -> bool {
-        let rests = |object: &crate::simulation::Object| {
-            self.engine.bodies.get(object.body).is_none_or(|body| body.is_fixed() || body.is_sleeping())
-        };
-        let n_pairs = self.link_pairs.iter().count();
-        if !self.sliding.is_empty() || !self.objects.iter().all(rests) {
-            room.links.clear();
-            room.pairs.clear();
-            return false;
+    /// Returns whether contacts push a hand that moves alone harder than its arm would hold unmoved.
+    pub(super) fn is_pushed_hard(&self) -> bool {
+        let push = &self.robot.push_on_hand;
+        push.shift.norm() > MOST_PUSH
+    }
+
+    /// Lets the engine move the whole robot for a while.
+    pub(super) fn need_whole(&mut self) {
+        self.room.whole_ticks = WHOLE_TICKS;
+    }
+
+    fn reach(&self, room: &mut Room, poses: Vec<Isometry3<f64>>) -> Reach {
+        if !self.sliding.is_empty() {
+            return Reach::All;
         }
-        room.links.resize(self.robot.bodies.len(), None);
-        room.pairs.resize(n_pairs, None);
-        let (positions, velocities) = self.robot.state(&self.engine);
-        let spans = self.robot.spans(&positions, &velocities, self.tick_secs(), OVERSHOOT);
-        let now = Moment { poses: self.robot.kinematics.links(&positions), spans };
-        self.has_room_for_links(&mut room.links, &now) && self.has_room_between_links(&mut room.pairs, &now)
+        let rest: Vec<bool> = self.objects.iter().map(|object| self.rests(object)).collect();
+        let n_links = self.robot.bodies.len();
+        if rest != room.rest {
+            room.resting.clear();
+        }
+        room.fixed.resize(n_links, None);
+        room.resting.resize(n_links, None);
+        room.pairs.resize(self.link_pairs.iter().count(), None);
+        let (positions, velocities) = (&self.robot.positions, &self.robot.velocities);
+        let spans = self.robot.spans(positions, velocities, self.tick_secs(), OVERSHOOT);
+        let axes = self.robot.model.joints.iter().map(|joint| axis_in_world(joint, &poses)).collect();
+        let now = Moment { poses, axes, spans };
+        let mut reach = if rest.iter().all(|rests| *rests) { Reach::Nothing } else { Reach::Apart };
+        room.rest = rest;
+        for link in 0..n_links {
+            reach = reach.max(self.reach_of_link(room, link, &now));
+            if reach == Reach::All {
+                return reach;
+            }
+        }
+        if room.between.is_empty() {
+            room.between = self.link_pairs.iter().map(|(first, second)| self.joints_between(first, second)).collect();
+        }
+        reach = reach.max(self.reach_between_links(&mut room.pairs, &room.between, &now));
+        if reach == Reach::Hand && room.whole_ticks > 0 {
+            room.whole_ticks -= 1;
+            return Reach::All;
+        }
+        reach
     }
 
-    fn has_room_for_links(&self, known: &mut [Option<Measured>], now: &Moment) -> bool {
-        (0..known.len()).all(|link| {
-            let Some(ball) = self.robot.balls[link] else { return true };
-            let pose = now.poses[link];
-            let ahead = self.robot.joints_to(link).map(|joint| self.way(joint, link, &ball, now)).sum::<f64>();
-            if known[link].is_none_or(|known| known.left(&pose, &ball) - ahead < LEFT_M) {
-                known[link] = Some(Measured { gap_m: self.gap_of_link(link), pose });
+    fn rests(&self, object: &Object) -> bool {
+        self.engine.bodies.get(object.body).is_none_or(|body| body.is_fixed() || body.is_sleeping())
+    }
+
+    fn reach_of_link(&self, room: &mut Room, link: usize, now: &Moment) -> Reach {
+        let Some(ball) = self.robot.balls[link] else { return Reach::Nothing };
+        let pose = now.poses[link];
+        let ahead = self.robot.joints_to(link).map(|joint| self.way(joint, link, &ball, now)).sum::<f64>();
+        let has_room = |known: &mut Option<Measured>, measure: &dyn Fn() -> f64| {
+            if known.is_none_or(|known| known.left(&pose, &ball) - ahead < LEFT_M) {
+                *known = Some(Measured { gap_m: measure(), pose });
             }
-            known[link].is_some_and(|known| known.left(&pose, &ball) - ahead >= LEFT_M)
+            known.is_some_and(|known| known.left(&pose, &ball) - ahead >= LEFT_M)
+        };
+        if !has_room(&mut room.fixed[link], &|| self.gap_of_link(link, &|object| object.fixed, true)) {
+            return Reach::All;
+        }
+        let rest = &room.rest;
+        let rests = |object: &Object| !object.fixed && self.is_in(object, rest);
+        let clear = has_room(&mut room.resting[link], &|| self.gap_of_link(link, &rests, false))
+            && self.is_clear_of_moving(link, rest, ahead);
+        match (clear, &self.robot.hand) {
+            (true, _) => Reach::Nothing,
+            (false, Some(hand)) if hand.has(link) => Reach::Hand,
+            _ => Reach::All,
+        }
+    }
+
+    /// Returns whether a link that moves this far can't meet any moving object in the tick.
+    fn is_clear_of_moving(&self, link: usize, rest: &[bool], ahead: f64) -> bool {
+        let secs = self.tick_secs();
+        let moving = self.objects.iter().zip(rest).filter(|(_, rests)| !**rests);
+        moving.filter_map(|(object, _)| Some((object, self.engine.bodies.get(object.body)?))).all(|(object, body)| {
+            let size = Vector3::from(object.model.size_m).norm();
+            let speed = from_vector(body.linvel()).norm() + from_vector(body.angvel()).norm() * size;
+            let falls = GRAVITY * secs * secs;
+            let needed = ahead + OVERSHOOT * speed * secs + falls + LEFT_M;
+            self.colliders_of(self.robot.bodies[link]).all(|solid| {
+                let its_box = solid.compute_aabb();
+                self.colliders_of(object.body).all(|other| apart(solid, &its_box, other, needed) >= needed)
+            })
         })
     }
 
-    fn has_room_between_links(&self, known: &mut [Option<Measured>], now: &Moment) -> bool {
+    /// Returns whether an object is among those that this list, in scene order, marks.
+    fn is_in(&self, object: &Object, marked: &[bool]) -> bool {
+        self.objects.iter().zip(marked).any(|(other, marked)| *marked && std::ptr::eq(other, object))
+    }
+
+    /// Returns the joints that move only the first of two links, and those that move only the second.
+    fn joints_between(&self, first: usize, second: usize) -> [Vec<usize>; 2] {
+        [(first, second), (second, first)].map(|(one, other)| {
+            let joints = self.robot.joints_to(one).filter(|joint| !self.robot.moves(*joint, other));
+            joints.collect()
+        })
+    }
+
+    fn reach_between_links(&self, known: &mut [Option<Measured>], between: &[[Vec<usize>; 2]], now: &Moment) -> Reach {
         if self.link_pairs.pass {
-            return true;
+            return Reach::Nothing;
         }
-        self.link_pairs.iter().zip(known).all(|((first, second), known)| {
-            let (Some(one), Some(other)) = (self.robot.balls[first], self.robot.balls[second]) else { return true };
+        let mut reach = Reach::Nothing;
+        for (((first, second), known), joints) in self.link_pairs.iter().zip(known).zip(between) {
+            let (Some(one), Some(other)) = (self.robot.balls[first], self.robot.balls[second]) else { continue };
             let pose = now.poses[first].inverse() * now.poses[second];
             let mut ahead = 0.0;
-            for joint in self.robot.joints_to(first).filter(|joint| !self.robot.moves(*joint, second)) {
-                ahead += self.way(joint, first, &one, now);
-            }
-            for joint in self.robot.joints_to(second).filter(|joint| !self.robot.moves(*joint, first)) {
-                ahead += self.way(joint, second, &other, now);
+            for (link, ball, joints) in [(first, &one, &joints[0]), (second, &other, &joints[1])] {
+                ahead += joints.iter().map(|joint| self.way(*joint, link, ball, now)).sum::<f64>();
             }
             if known.is_none_or(|known| known.left(&pose, &other) - ahead < LEFT_OF_LINKS_M) {
                 *known = Some(Measured { gap_m: self.gap_of_links(first, second), pose });
             }
-            known.is_some_and(|known| known.left(&pose, &other) - ahead >= LEFT_OF_LINKS_M)
-        })
+            if known.is_some_and(|known| known.left(&pose, &other) - ahead >= LEFT_OF_LINKS_M) {
+                continue;
+            }
+            let in_hand = self.robot.hand.as_ref().is_some_and(|hand| hand.has(first) && hand.has(second));
+            reach = reach.max(if in_hand { Reach::Hand } else { Reach::All });
+        }
+        reach
     }
 
     /// Returns how far one joint can move any point of a link in the tick. Unit: metres.
     fn way(&self, joint: usize, link: usize, ball: &Ball, now: &Moment) -> f64 {
-        let (axis, point) = axis_in_world(&self.robot.model.joints[joint], &now.poses);
+        let (axis, point) = now.axes[joint];
         match self.robot.model.joints[joint].kind {
             JointKind::Prismatic => now.spans[joint],
             JointKind::Revolute => {
@@ -152,16 +336,16 @@ impl World {
         }
     }
 
-    /// Measures the distance of a link from the floor and all objects. Unit: metres.
-    fn gap_of_link(&self, link: usize) -> f64 {
+    /// Measures the distance of a link from these objects, and from the floor. Unit: metres.
+    fn gap_of_link(&self, link: usize, these: &dyn Fn(&Object) -> bool, floor: bool) -> f64 {
         let mut nearest = RANGE_M;
         for solid in self.colliders_of(self.robot.bodies[link]) {
             let its_box = solid.compute_aabb();
-            if !self.robot.off_floor[link] {
+            if floor && !self.robot.off_floor[link] {
                 // The distance from the top of so large a slab would be inexact.
                 nearest = nearest.min(f64::from(its_box.mins.z));
             }
-            for object in &self.objects {
+            for object in self.objects.iter().filter(|object| these(object)) {
                 for other in self.colliders_of(object.body) {
                     nearest = nearest.min(apart(solid, &its_box, other, nearest));
                 }

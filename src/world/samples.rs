@@ -69,7 +69,7 @@ impl World {
             let by = |link| touches.contains_key(&(Owner::Object(idx), Owner::Link(link)));
             put(f64::from(u8::from(by(left) && by(right))));
         }
-        let (positions, velocities) = self.robot.state(&self.engine);
+        let (positions, velocities) = self.robot.state();
         let hand = Pose::from_isometry(&self.robot.kinematics.grasp(&positions));
         hand.position.into_iter().chain(hand.rotation).for_each(&mut put);
         put(self.robot.layout.gripper.opening_m(&positions));

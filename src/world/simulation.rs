@@ -14,7 +14,7 @@ use crate::link_pairs::LinkPairs;
 use crate::odometry::Tracker;
 use crate::recorder::Recorder;
 use crate::robot::Robot;
-use crate::room::Room;
+use crate::room::{Reach, Room};
 use crate::{Fault, Kinematics, Layout, Poison, WorldError, fault};
 use actcheck_data::{
     CONTROL_HZ, Camera, Inertia, KnownKind, ObjectModel, Pose, RobotProfile, Role, Scene, SceneObject, Sensing,
@@ -101,6 +101,8 @@ pub struct World {
     n_steps: u64,
     steps_per_tick: u32,
     steps_per_second: u32,
+    /// The engine's substeps in each step of the whole robot.
+    pub(super) substeps: usize,
     watch: Option<Watch>,
 }
 
@@ -145,6 +147,7 @@ pub fn build(scene: &Scene) -> Result<World, WorldError> {
         n_steps: 0,
         steps_per_tick,
         steps_per_second,
+        substeps: scene.physics.iterations as usize,
         watch: None,
     };
     world.link_pairs = world.find_link_pairs();
@@ -267,28 +270,66 @@ impl World {
         if self.fault.is_some() {
             return;
         }
-        let holding = self.robot.kinematics.holding_efforts(&self.robot.state(&self.engine).0);
+        let poses = self.robot.kinematics.links(&self.robot.positions);
+        let holding = self.robot.kinematics.holding_efforts_at(&poses);
+        let reach = self.find_room(poses);
+        self.step_all(reach, &holding);
+    }
+
+    /// Performs the steps of a tick in which the robot can touch this, and records the state.
+    fn step_all(&mut self, mut reach: Reach, holding: &[f64]) {
         let dt = 1.0 / f64::from(self.steps_per_second);
         self.robot.begin_tick();
-        let free = self.find_room();
         for step in 0..self.steps_per_tick {
-            self.robot.control(&mut self.engine, &holding, dt, self.steps_per_tick - step);
-            if free {
-                self.robot.move_freely(&mut self.engine);
-            } else {
-                self.step_engine();
+            if reach == Reach::Hand && self.is_pushed_hard() {
+                self.need_whole();
+                reach = Reach::All;
             }
-            self.robot.measure(&self.engine, &holding, 1.0 / f64::from(self.steps_per_tick));
+            self.set_substeps(reach);
+            self.robot.hand_over(&mut self.engine, reach.share());
+            self.robot.control(&mut self.engine, holding, dt, self.steps_per_tick - step);
+            let ends_tick = step + 1 == self.steps_per_tick;
+            self.step_robot(reach, dt, ends_tick);
+            self.robot.measure(&self.engine, holding, 1.0 / f64::from(self.steps_per_tick));
             self.n_steps += 1;
-            if free && step + 1 == self.steps_per_tick {
-                self.robot.place_links(&mut self.engine);
+            // Without the engine, no body moves before the end of the tick.
+            if ends_tick || reach != Reach::Nothing {
+                self.fault = self.find_fault();
             }
-            self.fault = self.find_fault();
             if self.fault.is_some() {
                 return;
             }
         }
         self.record();
+    }
+
+    /// Performs a tick as if the robot could touch this, for tests.
+    #[cfg(test)]
+    pub(super) fn step_with(&mut self, command: &Command, reach: Reach) {
+        self.take(command);
+        let holding = self.robot.kinematics.holding_efforts(&self.robot.positions);
+        self.step_all(reach, &holding);
+    }
+
+    /// Performs one step of physics; links that the engine does not move follow at the end of the tick.
+    fn step_robot(&mut self, reach: Reach, dt: f64, ends_tick: bool) {
+        if reach != Reach::All {
+            self.robot.move_freely(&self.engine);
+        }
+        match reach {
+            Reach::Nothing if ends_tick => self.robot.place_links(&mut self.engine),
+            Reach::Nothing => {}
+            Reach::Apart | Reach::Hand => {
+                self.robot.lead_hand(&mut self.engine, dt);
+                if ends_tick {
+                    self.robot.lead_links(&mut self.engine);
+                }
+                self.step_engine();
+            }
+            Reach::All => self.step_engine(),
+        }
+        self.robot.take_state(&self.engine);
+        self.robot.push_on_hand = self.push_on_hand();
     }
 
     fn step_engine(&mut self) {
@@ -328,7 +369,7 @@ impl World {
 
     /// Returns the robot's current measurements.
     pub fn observe(&self) -> Observation {
-        let (mut positions, velocities) = self.robot.state(&self.engine);
+        let (mut positions, velocities) = self.robot.state();
         let gripper_opening_m = self.robot.layout.gripper.opening_m(&positions);
         let loads = self.robot.loads();
         if let Some(base) = self.robot.layout.base {
@@ -342,7 +383,7 @@ impl World {
             positions,
             velocities,
             gripper_opening_m,
-            finger_efforts_n: self.robot.finger_efforts(&self.engine),
+            finger_efforts_n: self.robot.finger_efforts(),
             loads,
         }
     }
@@ -424,7 +465,7 @@ impl World {
     pub(super) fn base_true(&self) -> [f64; 3] {
         match self.robot.layout.base {
             Some(base) => {
-                let positions = self.robot.state(&self.engine).0;
+                let positions = self.robot.state().0;
                 base.map(|idx| positions[idx])
             }
             None => {

@@ -61,7 +61,7 @@ pub fn look(robot: &mut Operator<'_>, size: Size, grid: &mut Grid) {
     let camera = robot.kinematics().camera(&positions);
     let own = RobotBody::new(robot.kinematics(), &positions);
     let base = robot.base_of(&positions).translation.vector;
-    let image = robot.look();
+    let image = robot.look_at_every(STRIDE);
     let mut evidence = Evidence::default();
     for row in (0..image.height).step_by(STRIDE) {
         for column in (0..image.width).step_by(STRIDE) {
