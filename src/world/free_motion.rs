@@ -21,6 +21,9 @@ const GIVEN_GAIN: f64 = 1e6;
 /// Most changes of the set of saturated motors in a substep.
 const MOST_CHANGES: usize = 8;
 
+/// The joint of each drive with its gain, unless it is at a bound, and the factor of the equations with these gains.
+type Factored = (Vec<(usize, Option<f64>)>, Factor);
+
 /// The equations of motion in one control tick: those terms that its substeps have in common. They are those at its
 /// beginning.
 pub(super) struct Equations {
@@ -33,8 +36,7 @@ pub(super) struct Equations {
     apparent: Vec<Option<f64>>,
     /// Momenta that gravity, contacts and given velocities add in a substep of this step.
     added: Vec<f64>,
-    /// The factor of the equations, with the joint of each drive and its gain, unless it is at a bound.
-    factor: Option<(Vec<(usize, Option<f64>)>, Factor)>,
+    factor: Option<Factored>,
 }
 
 impl Robot {
