@@ -1,7 +1,6 @@
 //! Runs to be replayed in a report, read in order, a batch at a time. Reading and explaining them takes most of a report's
 //! time, so all cores share the work.
 
-use std::collections::HashSet;
 use std::ops::ControlFlow;
 
 use crate::work::all_cores;
@@ -58,11 +57,10 @@ pub(super) fn for_each_batch(
 
 /// Leaves out runs that are kept as outlines, except the first ones: each must be simulated again.
 fn affordable(history: &History, order: &[String]) -> Result<Vec<String>, Diagnostics> {
-    let outlines: HashSet<String> = history.outline_ids()?.into_iter().collect();
     let mut left = MOST_RESTORED;
     let mut affordable = Vec::new();
     for id in order {
-        let restored = outlines.contains(id);
+        let restored = !history.is_whole(id)?;
         if !restored || left > 0 {
             affordable.push(id.clone());
         }

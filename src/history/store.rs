@@ -436,9 +436,14 @@ impl History {
     }
 
     pub(super) fn has_run(&self, id: &str) -> Result<bool, Diagnostics> {
-        if self.is_outline(id)? {
-            return Ok(true);
-        }
+        Ok(self.is_outline(id)? || self.is_whole(id)?)
+    }
+
+    /// Whether a run is kept whole, by its id.
+    ///
+    /// # Errors
+    /// The store can't be read.
+    pub fn is_whole(&self, id: &str) -> Result<bool, Diagnostics> {
         let (run, class) = (run_node(id), iri("act:Run"));
         // A question about one run is often followed by questions about others.
         self.store_with(|| Wanted::individuals("act:Run"))?
