@@ -219,8 +219,11 @@ fn read(
     }
     let of_runs = further.iter().copied().filter(|name| RUN_COLUMNS.contains(name));
     let rates: Vec<&str> = RATE_COLUMNS.into_iter().chain(of_runs).collect();
-    let sample = OutcomeTable::read_sample(mirror, filter, &names, SAMPLED_ROWS)?;
-    Ok((OutcomeTable::read(mirror, filter, &rates)?, Some(sample)))
+    let (sample, table) = both(
+        || OutcomeTable::read_sample(mirror, filter, &names, SAMPLED_ROWS),
+        || OutcomeTable::read(mirror, filter, &rates),
+    );
+    Ok((table?, Some(sample?)))
 }
 
 /// The report of a property. `sampled`: a sample of the rows with its properties, in which patterns are sought.

@@ -1,5 +1,7 @@
 //! The values of one property in a file of outlines: nodes of the run itself, or a list of distinct values with codes.
 
+use std::cmp::Ordering;
+
 use oxigraph::model::vocab::xsd;
 use oxigraph::model::{Literal, Term};
 
@@ -43,6 +45,22 @@ impl Value {
             }
         }
         Self::Term(term.clone())
+    }
+
+    /// An order of IRIs, integers and doubles; all others are equal.
+    pub(super) fn rough_order(&self, other: &Self) -> Ordering {
+        let rank = |value: &Self| match value {
+            Self::Term(Term::NamedNode(_)) => 0,
+            Self::Integer(_) => 1,
+            Self::Double(_) => 2,
+            Self::Boolean(_) | Self::Term(_) => 3,
+        };
+        match (self, other) {
+            (Self::Term(Term::NamedNode(one)), Self::Term(Term::NamedNode(other))) => one.as_str().cmp(other.as_str()),
+            (Self::Integer(one), Self::Integer(other)) => one.cmp(other),
+            (Self::Double(one), Self::Double(other)) => f64::from_bits(*one).total_cmp(&f64::from_bits(*other)),
+            _ => rank(self).cmp(&rank(other)),
+        }
     }
 
     /// Its term.

@@ -1,5 +1,6 @@
 //! Joins: which patterns become tables, and in which order, so that the values of small ones limit large ones.
 
+use std::cmp::Ordering;
 use std::collections::{BTreeMap, BTreeSet, HashSet};
 use std::sync::Arc;
 
@@ -375,6 +376,7 @@ impl Rewriter<'_> {
             is_distinct &= stored.is_empty() || rows.is_empty();
             rows.extend(stored);
         }
+        self.sort(&mut rows, &names);
         if rows.len() <= MOST_KNOWN {
             let values: Vec<Vec<Option<Value>>> = rows.iter().map(|row| row[..keys.len()].to_vec()).collect();
             limits(&keys, &values, known);
@@ -388,6 +390,21 @@ impl Rewriter<'_> {
         let counts = count.into_iter().collect();
         let distinct = is_distinct.then_some(keys);
         Ok((Rewritten { pattern: table(names, bindings), counts, taken, distinct }, none))
+    }
+
+    /// Sorts the rows of a table as the answer, as far as it has the variables. Any order is right, but the evaluator looks up the
+    /// texts of both terms for each comparison; sorted rows need few.
+    fn sort(&self, rows: &mut [Vec<Option<Value>>], names: &[Variable]) {
+        let place = |variable: &Variable| names.iter().position(|name| name == variable);
+        let keys: Vec<usize> = self.order.iter().map_while(place).collect();
+        let compared =
+            |one: &Vec<Option<Value>>, other: &Vec<Option<Value>>, key: &usize| match (&one[*key], &other[*key]) {
+                (Some(one), Some(other)) => one.rough_order(other),
+                (one, other) => one.is_some().cmp(&other.is_some()),
+            };
+        rows.sort_by(|one, other| {
+            keys.iter().map(|key| compared(one, other, key)).find(|order| order.is_ne()).unwrap_or(Ordering::Equal)
+        });
     }
 
     /// The rows of the runs that the store has.

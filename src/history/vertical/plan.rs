@@ -42,7 +42,8 @@ pub(crate) fn plan(
         while text.contains(&format!("?{prefix}")) {
             prefix.push('_');
         }
-        let mut rewriter = Rewriter { store, files: &files, counts: None, evaluator, cancel, prefix, new: 0 };
+        let mut rewriter =
+            Rewriter { store, files: &files, counts: None, evaluator, cancel, prefix, order: Vec::new(), new: 0 };
         if uses_counts(&query) {
             rewriter.counts = Some(Arc::new(counts(&mut rewriter)?));
         }

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use oxigraph::model::{NamedOrBlankNodeRef, Term, Variable};
 use oxigraph::sparql::SparqlEvaluator;
 use spargebra::Query;
-use spargebra::algebra::{GraphPattern, OrderExpression};
+use spargebra::algebra::{Expression, GraphPattern, OrderExpression};
 use spargebra::term::{NamedNodePattern, TermPattern};
 
 use crate::Cancel;
@@ -18,6 +18,14 @@ use crate::vertical::need::{Mode, Need, Rewritten};
 use crate::vertical::scan::Files;
 use crate::vertical::stop::{Stop, unfit};
 use crate::vertical::walk::{bound, used, walk, walk_expression};
+
+/// The variable of an ascending order.
+fn ascending(key: &OrderExpression) -> Option<Variable> {
+    match key {
+        OrderExpression::Asc(Expression::Variable(variable)) => Some(variable.clone()),
+        _ => None,
+    }
+}
 
 /// Makes the evaluator of parts of a query.
 pub(crate) type MakeEvaluator<'a> = dyn Fn(Option<Arc<Counts>>) -> SparqlEvaluator + 'a;
@@ -31,6 +39,8 @@ pub(super) struct Rewriter<'a> {
     pub cancel: &'a Cancel,
     /// The beginning of names of new variables, which the query does not have.
     pub prefix: String,
+    /// The variables by which the answer is sorted.
+    pub order: Vec<Variable>,
     /// Number of new variables so far.
     pub new: usize,
 }
@@ -89,6 +99,7 @@ impl Rewriter<'_> {
                 let keys = expression.iter().map(|(OrderExpression::Asc(key) | OrderExpression::Desc(key))| key);
                 let mut inner_need = need.and(keys.flat_map(used));
                 inner_need.first = need.any.map(|any| (expression.clone(), any));
+                self.order = expression.iter().map_while(ascending).collect();
                 Ok(self.rewrite(*inner, &inner_need)?.map(|inner| G::OrderBy { inner, expression }))
             }
             G::Extend { inner, variable, expression } => {
