@@ -24,7 +24,7 @@ const LOW_M: f64 = 0.45;
 const BACK_M: f64 = 0.2;
 /// Largest tilt of an object on the way to the driving posture, equal to its usual tilt in the hand. Unit: radians.
 const LEAN_RAD: f64 = 0.15;
-/// A robot with a smaller radius passes doors and stands at tables with its load as it is. Unit: metres.
+/// A robot with a smaller radius can pass doors and approach tables without moving its load. Unit: metres.
 const SLIM_M: f64 = 0.45;
 /// A posture must make the robot slimmer by this much. Unit: metres.
 const SLIMMER_M: f64 = 0.03;
