@@ -316,7 +316,12 @@ fn a_second_process_can_use_the_history_beside_the_server() {
         &["run", "configs/quick.toml", "--runs", "1", "--jobs", "1", "--history", &name],
     );
     assert!(ran.status.code().is_some_and(|code| code < 2), "{}", stderr(&ran));
-    assert_eq!(runs(&server), before + 1, "the new run is visible at once");
+    // On a busy machine, the server looks for changes less often.
+    let is_visible = (0..200).any(|_| {
+        std::thread::sleep(std::time::Duration::from_millis(50));
+        runs(&server) == before + 1
+    });
+    assert!(is_visible, "the new run is visible soon");
 
     // While another process writes, the answers come from a snapshot.
     let _owner = actcheck::history::History::open_existing(&history).unwrap();

@@ -3,11 +3,12 @@
 //! Every choice falls into a bin; all bins of a parameter are equally probable. Parameters that differ only in their
 //! object are pooled: `other.3.x` and `other.5.x` are `other.*.x`.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashMap};
+use std::sync::Arc;
 
 use statrs::distribution::{Binomial, DiscreteCDF};
 
-use actcheck_data::{Choice, ChoiceKind};
+use actcheck_data::{Choice, ChoiceKind, ChoiceName};
 
 /// Number of bins of a numeric parameter. Fifths show gaps in the middle and at both ends, and a hundred draws fill
 /// them.
@@ -24,8 +25,27 @@ const PAIR_SIGMAS: f64 = 5.0;
 /// Counts the choices of a campaign's runs.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Coverage {
-    parameters: BTreeMap<(String, usize), Vec<u64>>,
-    pairs: BTreeMap<[(String, usize); 2], Vec<u64>>,
+    /// The names of choices: a campaign has millions of choices, but few names.
+    names: BTreeMap<ChoiceName, Name>,
+    /// Names of parameters and of objects.
+    texts: Vec<Arc<str>>,
+    parameters: HashMap<Parameter, Vec<u64>>,
+    pairs: HashMap<[Parameter; 2], Vec<u64>>,
+}
+
+/// A parameter: the position of its name among the texts, and its number of bins.
+type Parameter = (usize, usize);
+
+/// The name of a choice.
+#[derive(Debug, Clone, PartialEq)]
+struct Name {
+    /// Its written form.
+    text: Arc<str>,
+    /// Position of the name of its parameter among the texts.
+    pooled: usize,
+    /// Position of its object among the texts, if it belongs to one of several.
+    owner: Option<usize>,
+    noise: bool,
 }
 
 /// Coverage of one parameter.
@@ -68,54 +88,87 @@ impl ParameterCoverage {
 }
 
 /// A choice with its bin.
-struct Binned {
-    /// Its object, if it belongs to one of several.
-    owner: Option<String>,
-    name: String,
-    noise: bool,
+struct Binned<'n> {
+    name: &'n Name,
     bins: usize,
     bin: usize,
+}
+
+impl Binned<'_> {
+    fn parameter(&self) -> Parameter {
+        (self.name.pooled, self.bins)
+    }
 }
 
 impl Coverage {
     /// Counts the choices of one run. Of repeated choices only the last one counts, because the scene uses it.
     pub fn add(&mut self, choices: &[Choice]) {
-        let mut last: BTreeMap<String, &Choice> = BTreeMap::new();
         for choice in choices {
-            last.insert(choice.name.to_string(), choice);
+            self.text_of(&choice.name);
         }
-        let binned: Vec<Binned> = last.values().filter_map(|choice| binned(choice)).collect();
+        let mut last: Vec<(&Name, &Choice)> =
+            choices.iter().filter_map(|choice| Some((self.names.get(&choice.name)?, choice))).collect();
+        // Stable, so that the last one of a name is the last one made.
+        last.sort_by(|one, other| one.0.text.cmp(&other.0.text));
+        let binned: Vec<Binned<'_>> = last
+            .chunk_by(|one, next| one.0.text == next.0.text)
+            .filter_map(|same| same.last())
+            .filter_map(|(name, choice)| {
+                let (bins, bin) = binned(choice)?;
+                Some(Binned { name, bins, bin })
+            })
+            .collect();
         for one in &binned {
-            let counts = self.parameters.entry((one.name.clone(), one.bins)).or_insert_with(|| vec![0; one.bins]);
+            let counts = self.parameters.entry(one.parameter()).or_insert_with(|| vec![0; one.bins]);
             counts[one.bin] += 1;
         }
         for (idx, first) in binned.iter().enumerate() {
             for second in &binned[idx + 1..] {
-                self.add_pair(first, second);
+                // Noise choices are independent errors of the robot and its sensors, so that their pairs are not counted.
+                let is_noise = first.name.noise || second.name.noise;
+                if !is_noise && first.name.owner == second.name.owner {
+                    let key = [first.parameter(), second.parameter()];
+                    let counts = self.pairs.entry(key).or_insert_with(|| vec![0; first.bins * second.bins]);
+                    counts[first.bin * second.bins + second.bin] += 1;
+                }
             }
         }
     }
 
-    /// Counts a pair of choices if both are about the whole scene or about the same object. Noise choices are independent
-    /// errors of the robot and its sensors, so that their pairs are not counted.
-    fn add_pair(&mut self, first: &Binned, second: &Binned) {
-        if first.noise || second.noise || first.owner != second.owner {
-            return;
+    /// The written form of a name.
+    pub(crate) fn text_of(&mut self, name: &ChoiceName) -> &str {
+        if !self.names.contains_key(name) {
+            let (owner, pooled) = name.pooled();
+            let known = Name {
+                text: name.to_string().into(),
+                pooled: self.position(&pooled),
+                owner: owner.map(|owner| self.position(&owner)),
+                noise: name.is_noise(),
+            };
+            self.names.insert(name.clone(), known);
         }
-        let key = [(first.name.clone(), first.bins), (second.name.clone(), second.bins)];
-        let counts = self.pairs.entry(key).or_insert_with(|| vec![0; first.bins * second.bins]);
-        counts[first.bin * second.bins + second.bin] += 1;
+        self.names.get(name).map_or("", |name| &*name.text)
+    }
+
+    /// Position of a text, which is added if it is new.
+    fn position(&mut self, text: &str) -> usize {
+        self.texts.iter().position(|known| **known == *text).unwrap_or_else(|| {
+            self.texts.push(text.into());
+            self.texts.len() - 1
+        })
     }
 
     /// Returns the coverage of every parameter that can vary, sorted by name.
     pub fn parameters(&self) -> Vec<ParameterCoverage> {
         let bins: usize = self.parameters.values().map(Vec::len).sum();
-        self.parameters
-            .iter()
+        let named = |parameter: &Parameter| (&*self.texts[parameter.0], parameter.1);
+        let parameters: BTreeMap<_, _> = self.parameters.iter().map(|(key, counts)| (named(key), counts)).collect();
+        parameters
+            .into_iter()
             .map(|((name, _), counts)| {
                 let draws = counts.iter().sum();
                 ParameterCoverage {
-                    name: name.clone(),
+                    name: name.to_owned(),
                     draws,
                     counts: counts.clone(),
                     expected_hits: occupied(counts.len(), draws).0,
@@ -127,15 +180,18 @@ impl Coverage {
 
     /// Returns the coverage of every pair of parameters of the scene or of one object, sorted by name.
     pub fn pairs(&self) -> Vec<PairCoverage> {
-        self.pairs
-            .iter()
+        let named = |parameter: &Parameter| (&*self.texts[parameter.0], parameter.1);
+        let pairs: BTreeMap<_, _> =
+            self.pairs.iter().map(|(key, counts)| (key.each_ref().map(named), counts)).collect();
+        pairs
+            .into_iter()
             .map(|([(first, _), (second, _)], counts)| {
                 let draws = counts.iter().sum();
                 let hits = counts.iter().filter(|count| **count > 0).count();
                 let (expected_hits, variance) = occupied(counts.len(), draws);
                 let short = expected_hits - hits as f64;
                 PairCoverage {
-                    names: [first.clone(), second.clone()],
+                    names: [first.to_owned(), second.to_owned()],
                     draws,
                     cells: counts.len(),
                     hits,
@@ -165,11 +221,11 @@ fn occupied(cells: usize, draws: u64) -> (f64, f64) {
     (cells * (1.0 - empty), cells * empty * (1.0 - empty))
 }
 
-/// Returns a choice with its bin, or `None` if it had only one option.
-fn binned(choice: &Choice) -> Option<Binned> {
+/// Returns the number of bins of a choice and its bin, or `None` if it had only one option.
+fn binned(choice: &Choice) -> Option<(usize, usize)> {
     let share = |share: f64| (BINS, ((share * BINS as f64).max(0.0) as usize).min(BINS - 1));
     let option = |of: usize| (of, (choice.value.max(0.0) as usize).min(of - 1));
-    let (bins, bin) = match &choice.kind {
+    Some(match &choice.kind {
         &ChoiceKind::Index { of } if of > MOST_BINS => share(choice.value / of as f64),
         &ChoiceKind::Index { of } if of > 1 => option(of),
         ChoiceKind::Candidate { names } if names.len() > 1 => option(names.len()),
@@ -178,9 +234,7 @@ fn binned(choice: &Choice) -> Option<Binned> {
             share(0.5 * libm::erfc(-choice.value / sigma / std::f64::consts::SQRT_2))
         }
         _ => return None,
-    };
-    let (owner, name) = choice.name.pooled();
-    Some(Binned { owner, name, noise: choice.name.is_noise(), bins, bin })
+    })
 }
 
 #[cfg(test)]

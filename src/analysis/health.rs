@@ -1,7 +1,7 @@
 //! Health checks of a campaign: discarded scenes, duplicate runs, coverage gaps, slow runs and simulation artefacts.
 
-use std::collections::BTreeMap;
-use std::collections::btree_map::Entry;
+use std::collections::hash_map::Entry;
+use std::collections::{BTreeMap, HashMap};
 
 use crate::{Coverage, PairCoverage, ParameterCoverage};
 use actcheck_base::{Digest, Outcome};
@@ -34,7 +34,7 @@ pub struct HealthMeter {
     discards: u64,
     first_discard: Option<(u64, String)>,
     /// Digest of all choices, with the first run that made them.
-    seen: BTreeMap<String, String>,
+    seen: HashMap<u128, String>,
     duplicates: Vec<(String, String)>,
     wall: Vec<(f64, String)>,
     deepest: Option<(f64, String)>,
@@ -102,7 +102,8 @@ impl HealthMeter {
         if run.repetition == 0 {
             self.coverage.add(&run.choices);
         }
-        match self.seen.entry(digest(run)) {
+        let digest = self.digest(run);
+        match self.seen.entry(digest) {
             Entry::Occupied(first) => self.duplicates.push((run.run.clone(), first.get().clone())),
             Entry::Vacant(place) => {
                 place.insert(run.run.clone());
@@ -111,6 +112,18 @@ impl HealthMeter {
         self.wall.push((run.wall_secs, run.run.clone()));
         larger(&mut self.deepest, run.deepest_penetration_m, &run.run);
         larger(&mut self.energy, run.energy_gain_j, &run.run);
+    }
+
+    /// Digest of all choices of a run.
+    fn digest(&mut self, run: &RunVitals) -> u128 {
+        let mut digest = Digest::new();
+        for choice in &run.choices {
+            digest.update(self.coverage.text_of(&choice.name).as_bytes());
+            digest.update(&[0]);
+            digest.update(&choice.value.to_bits().to_le_bytes());
+        }
+        // A digest is 32 hexadecimal digits.
+        u128::from_str_radix(&digest.finish(), 16).unwrap_or_default()
     }
 
     /// Adds one outcome of a property (IRI).
@@ -184,17 +197,6 @@ impl HealthMeter {
             first.map(|(run, of)| HealthProblem::Duplicates(self.duplicates.len() as u64, run.clone(), of.clone()));
         problem.into_iter().collect()
     }
-}
-
-/// Computes the digest of a run's choices.
-fn digest(run: &RunVitals) -> String {
-    let mut digest = Digest::new();
-    for choice in &run.choices {
-        digest.update(choice.name.to_string().as_bytes());
-        digest.update(&[0]);
-        digest.update(&choice.value.to_bits().to_le_bytes());
-    }
-    digest.finish()
 }
 
 fn larger(largest: &mut Option<(f64, String)>, value: Option<f64>, run: &str) {

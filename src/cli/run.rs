@@ -29,7 +29,7 @@ use actcheck_report::{
 use actcheck_rules::Budget;
 use actcheck_verdict::{Counts, mean};
 
-/// The tables beside the history are updated each time this many runs were stored.
+/// The tables beside the history are updated each time this many runs were stored, or soon after.
 const MIRROR_EVERY: usize = 1_000;
 
 /// Runs a campaign and prints its results. Returns the exit code.
@@ -74,6 +74,7 @@ pub(super) fn campaign(
     let mut runs: Vec<RunSummary> = session.kept.iter().map(RunSummary::from_history).collect();
     runs.iter().for_each(|run| progress.run(run));
     let mut failures = LiveFailures::new(&session.env, &session.id, verbosity);
+    let mut mirrored = runs.len();
     let (end, faults) = make_runs(&session, &options, stop, |record| {
         let summary = RunSummary::of(record);
         if let Some(text) = failures.text(&summary) {
@@ -81,8 +82,9 @@ pub(super) fn campaign(
         }
         progress.run(&summary);
         runs.push(summary);
-        if runs.len().is_multiple_of(MIRROR_EVERY) {
+        if runs.len() >= mirrored + MIRROR_EVERY && !session.history.has_waiting() {
             mirror(&session.history);
+            mirrored = runs.len();
         }
     });
     progress.finish();

@@ -51,7 +51,7 @@ impl SceneObject {
 }
 
 /// The role of an object in a scene.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, serde::Serialize, serde::Deserialize)]
 pub enum Role {
     /// Carries other objects and never moves.
     Platform,

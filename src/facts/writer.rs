@@ -5,6 +5,7 @@ use std::fmt::Write as _;
 
 use actcheck_base::names::escaped;
 use actcheck_base::{Term, TermId, Terms, Triple, names};
+use foldhash::fast::RandomState;
 
 /// Returns the IRI of an object with this ID in the simulation: `w:robot`, `w:floor`, `w:link/NAME` for `robot/NAME`,
 /// and `obj:ID` for the rest.
@@ -66,7 +67,9 @@ pub(super) struct Writer {
     triples: Vec<Triple>,
     iri: String,
     /// IDs of numbers, by the bits of their f32: most are the same before and after an action.
-    numbers: HashMap<u32, TermId>,
+    numbers: HashMap<u32, TermId, RandomState>,
+    /// IDs of properties, by the place and the length of their texts.
+    properties: HashMap<(usize, usize), TermId, RandomState>,
 }
 
 impl Writer {
@@ -91,19 +94,31 @@ impl Writer {
         self.terms.intern(Term::iri(&self.iri))
     }
 
+    /// Interns a property of the world vocabulary.
+    fn property(&mut self, local: &'static str) -> TermId {
+        // A text of the program has one place in memory, which is compared faster than the text.
+        let place = (local.as_ptr() as usize, local.len());
+        if let Some(id) = self.properties.get(&place) {
+            return *id;
+        }
+        let id = self.w(local);
+        self.properties.insert(place, id);
+        id
+    }
+
     /// Interns a term of the world vocabulary with a heading, such as `w:joint/NAME`.
     pub(super) fn named(&mut self, heading: &str, name: &str) -> TermId {
         self.w(&format!("{heading}/{}", escaped(name)))
     }
 
     /// Adds a triple with a property of the world vocabulary.
-    pub(super) fn state(&mut self, subject: TermId, property: &str, value: TermId) {
-        let property = self.w(property);
+    pub(super) fn state(&mut self, subject: TermId, property: &'static str, value: TermId) {
+        let property = self.property(property);
         self.triples.push([subject, property, value]);
     }
 
     /// Adds a number.
-    pub(super) fn number(&mut self, subject: TermId, property: &str, value: f64) {
+    pub(super) fn number(&mut self, subject: TermId, property: &'static str, value: f64) {
         let value = self.number_term(value);
         self.state(subject, property, value);
     }
@@ -115,32 +130,32 @@ impl Writer {
     }
 
     /// Adds several numbers, one for each property.
-    pub(super) fn numbers<const N: usize>(&mut self, subject: TermId, properties: [&str; N], values: [f64; N]) {
+    pub(super) fn numbers<const N: usize>(&mut self, subject: TermId, properties: [&'static str; N], values: [f64; N]) {
         for (property, value) in properties.into_iter().zip(values) {
             self.number(subject, property, value);
         }
     }
 
     /// Adds a Boolean.
-    pub(super) fn boolean(&mut self, subject: TermId, property: &str, value: bool) {
+    pub(super) fn boolean(&mut self, subject: TermId, property: &'static str, value: bool) {
         let value = self.terms.intern(Term::Boolean(value));
         self.state(subject, property, value);
     }
 
     /// Adds a string.
-    pub(super) fn text(&mut self, subject: TermId, property: &str, value: &str) {
+    pub(super) fn text(&mut self, subject: TermId, property: &'static str, value: &str) {
         let value = self.terms.intern(Term::string(value));
         self.state(subject, property, value);
     }
 
     /// Adds a relation to an IRI.
-    pub(super) fn iri(&mut self, subject: TermId, property: &str, iri: &str) {
+    pub(super) fn iri(&mut self, subject: TermId, property: &'static str, iri: &str) {
         let value = self.terms.intern(Term::iri(iri));
         self.state(subject, property, value);
     }
 
     /// Adds a relation to each of several objects.
-    pub(super) fn things(&mut self, subject: TermId, property: &str, ids: &[String]) {
+    pub(super) fn things(&mut self, subject: TermId, property: &'static str, ids: &[String]) {
         for id in ids {
             let thing = self.thing(id);
             self.state(subject, property, thing);

@@ -13,8 +13,25 @@ use crate::{ActionDetail, ObjectDetail, Repetition, RunDetail, RunRow, RunStatus
 use actcheck_base::{Judgement, Outcome, names};
 use actcheck_data::Role;
 
+/// The objects of a run's scene and its actions with their outcomes. None of these depends on the time that the run took.
+pub(super) type Parts = (Vec<ObjectDetail>, Vec<ActionDetail>);
+
 /// Reads an existing run.
 pub(super) fn read(store: &impl QuadSource, run: &NamedNode) -> Result<RunDetail, StorageError> {
+    read_with(store, run, parts(store, run)?)
+}
+
+/// Reads the objects and the actions of a run.
+pub(super) fn parts(store: &impl QuadSource, run: &NamedNode) -> Result<Parts, StorageError> {
+    Ok((objects(store, run)?, actions(store, run)?))
+}
+
+/// Reads an existing run, whose objects and actions are known.
+pub(super) fn read_with(
+    store: &impl QuadSource,
+    run: &NamedNode,
+    (objects, actions): Parts,
+) -> Result<RunDetail, StorageError> {
     let node = Node::read(store, run)?;
     Ok(RunDetail {
         row: row(run, &node),
@@ -29,8 +46,8 @@ pub(super) fn read(store: &impl QuadSource, run: &NamedNode) -> Result<RunDetail
         robot_base: ["w:baseX", "w:baseY", "w:baseYaw"].map(|property| node.number(property).unwrap_or_default()),
         noise: noise(&node),
         designators: designators(&node),
-        objects: objects(store, run)?,
-        actions: actions(store, run)?,
+        objects,
+        actions,
     })
 }
 

@@ -6,7 +6,8 @@ use std::path::{Path, PathBuf};
 use crate::folder::Folder;
 use crate::salvage::scan;
 use crate::seal::{Found, Seal};
-use crate::{History, RunFilter, fault, journal, pending, trace_file};
+use crate::write_run::run_node;
+use crate::{History, RunFilter, detail, fault, journal, pending, trace_file, trace_parts};
 use actcheck_base::Diagnostics;
 
 /// A damaged or missing part of a history.
@@ -86,12 +87,22 @@ impl History {
         let outlines: BTreeSet<String> = self.outlined_ids(None).unwrap_or_default().into_iter().collect();
         runs.retain(|run| !outlines.contains(&run.run));
         found.runs = runs.len();
+        let store = self.store()?;
+        let is_as_stored =
+            |id: &str, file: &Path| match (trace_parts::read(file), detail::parts(&*store, &run_node(id))) {
+                (Some(copied), Ok(stored)) => copied == stored,
+                // It is read from the store.
+                (None, _) => true,
+                // The damage of the store is listed.
+                (_, Err(_)) => true,
+            };
         let mut known = BTreeSet::new();
         for run in &runs {
             let file = self.trace_path(&run.run);
             let reason = match std::fs::read(&file) {
                 Ok(bytes) => match trace_file::decode(&bytes) {
-                    Ok((_, trace)) if trace.hash == run.trace_hash => None,
+                    Ok((_, trace)) if trace.hash == run.trace_hash => (!is_as_stored(&run.run, &file))
+                        .then(|| "its copy of the outcomes differs from the store".to_owned()),
                     Ok((_, trace)) => Some(format!("it is the trace {}, not {}", trace.hash, run.trace_hash)),
                     Err(why) => Some(why),
                 },

@@ -157,6 +157,15 @@ impl History {
         snapshot.is_some_and(|snapshot| snapshot.is_stale(&self.folder))
     }
 
+    /// Identifies the state of a reader's history: two that are equal have the same runs and judgements. `None` for the
+    /// owner's, which changes.
+    pub fn state(&self) -> Option<String> {
+        let opened = self.opened.read().unwrap_or_else(PoisonError::into_inner);
+        let resting = self.resting.lock().unwrap_or_else(PoisonError::into_inner);
+        let snapshot = opened.as_ref().map_or(resting.as_ref(), |opened| opened.snapshot.as_ref());
+        snapshot.map(|snapshot| snapshot.state())
+    }
+
     fn open_folder(folder: Folder) -> Result<Self, Diagnostics> {
         // The library would drop unreadable parts.
         if let Found::Whole(seal) = Seal::read(&folder)

@@ -14,10 +14,13 @@ use actcheck_base::Diagnostics;
 /// Number of statements in the journal at which they are written to tables: about 600 runs. From the second part on, the
 /// store merges tables and no longer compresses them; but readers take longer with a long journal, up to some tenths of a
 /// second.
-const MOST: usize = 400_000;
+const MOST: usize = 450_000;
 /// Number of statements from which they are written to tables directly. A few are cheaper as a transaction, because
 /// tables are a dozen files.
 const FEWEST_LOADED: usize = 4_000;
+/// Number of statements from which they are written to tables directly although the owner only wants to read them. Fewer
+/// make small tables, which the store soon merges.
+const FEWEST_READ: usize = 100_000;
 /// Number of statements in a transaction.
 const TRANSACTION: usize = 20_000;
 /// Largest store that may have no statements. Unit: bytes.
@@ -75,8 +78,13 @@ impl History {
         })
     }
 
-    /// Adds the statements of the journal to the store by transactions, which also survive a kill, so that the owner can
-    /// read them.
+    /// Whether many statements wait in the journal for others, to be written to tables together. A read by the owner writes
+    /// them at once, which makes the store larger.
+    pub fn has_waiting(&self) -> bool {
+        self.journal().statements >= FEWEST_LOADED
+    }
+
+    /// Adds the statements of the journal to the store, so that the owner can read them.
     pub(super) fn complete_store(&self) -> Result<(), Diagnostics> {
         let mut journal = self.journal();
         if journal.statements == 0 {
@@ -84,6 +92,10 @@ impl History {
         }
         let synced = journal.synced;
         self.take_over(&mut journal, |store, quads| {
+            if quads.len() >= FEWEST_READ {
+                return load(store, quads);
+            }
+            // Transactions survive a kill, too.
             extend(store, quads)?;
             if synced { store.flush() } else { Ok(()) }
         })

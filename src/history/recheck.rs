@@ -15,8 +15,8 @@ use crate::quad_source::QuadSource;
 use crate::read::{Node, id_of, subjects_in};
 use crate::statements::{Statements, iri, time};
 use crate::wanted::Wanted;
-use crate::write_run::{run_node, unique, write_assertion};
-use crate::{History, RunDetail};
+use crate::write_run::{assertion_of, run_node, unique, write_assertion};
+use crate::{History, RunDetail, trace_parts};
 use actcheck_base::{Diagnostics, Judgement};
 use actcheck_verdict::{action_score, run_score};
 
@@ -79,9 +79,32 @@ impl History {
         let store = self.store_with(|| Wanted::run(run_node(run).as_str()))?;
         let newest = match self.outlined_quads(run)? {
             Some(outline) => newest(&outline, &store, &execution, properties),
-            None => newest(&*store, &store, &execution, properties),
+            None => match self.own_judgements(run, step, properties, &store) {
+                Some(own) => with_later(own, &store, &execution, properties),
+                None => newest(&*store, &store, &execution, properties),
+            },
         };
         newest.map_err(|error| self.fault("reading a run's outcomes", &error))
+    }
+
+    /// The campaign's own judgements of an action, from the copy in the run's trace file. Returns `None` if they must be
+    /// read from the store.
+    fn own_judgements(&self, run: &str, step: u32, wanted: &[String], store: &Store) -> Option<Vec<StoredJudgement>> {
+        let (_, actions) = trace_parts::read(&self.trace_path(run))?;
+        let (action, execution) = (actions.into_iter().find(|action| action.step == step)?, execution(run, step));
+        let judgements = action.judgements.into_iter().filter(|judgement| wanted.contains(&judgement.property));
+        let own: Vec<StoredJudgement> = judgements
+            .map(|judgement| StoredJudgement {
+                assertion: assertion_of(&execution, &judgement.property).into(),
+                judgement,
+            })
+            .collect();
+        // A merge that changed the run's id has kept the nodes.
+        let subject = iri("earl:subject");
+        let is_there = |stored: &StoredJudgement| {
+            store.contains(QuadRef::new(&stored.assertion, &subject, &execution, GraphNameRef::DefaultGraph))
+        };
+        own.first().is_none_or(|first| is_there(first).unwrap_or(false)).then_some(own)
     }
 
     /// Returns all details of a run as [`History::run`] does, with its newest judgements: later ones replace those of the
@@ -162,9 +185,20 @@ fn newest(
     execution: &NamedNode,
     properties: &[String],
 ) -> Result<Vec<StoredJudgement>, StorageError> {
+    // Those of the campaign supersede nothing.
+    let own = stored(own, GraphNameRef::DefaultGraph, execution, properties, &mut BTreeSet::new())?;
+    with_later(own, later, execution, properties)
+}
+
+/// Adds the judgements made after the run, and removes those that they supersede.
+fn with_later(
+    mut found: Vec<StoredJudgement>,
+    later: &Store,
+    execution: &NamedNode,
+    properties: &[String],
+) -> Result<Vec<StoredJudgement>, StorageError> {
     let graph = iri(GRAPH);
     let mut superseded = BTreeSet::new();
-    let mut found = stored(own, GraphNameRef::DefaultGraph, execution, properties, &mut superseded)?;
     found.extend(stored(later, GraphNameRef::NamedNode(graph.as_ref()), execution, properties, &mut superseded)?);
     found.retain(|stored| !superseded.contains(&stored.assertion.to_string()));
     found.sort_by(|a, b| a.judgement.property.cmp(&b.judgement.property));

@@ -2,6 +2,8 @@
 
 use std::collections::BTreeMap;
 
+use serde::{Deserialize, Serialize};
+
 use crate::{Repetition, RunStatus, SkillRecord};
 use actcheck_base::{Judgement, Outcome};
 use actcheck_data::Role;
@@ -136,7 +138,7 @@ pub struct RunDetail {
 }
 
 /// One object of a run's scene: its initial pose, its physics, and its later displacement.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ObjectDetail {
     /// Id in the scene.
     pub id: String,
@@ -173,7 +175,7 @@ pub struct ObjectDetail {
 }
 
 /// One action of a run.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ActionDetail {
     /// Position in the test, from 1.
     pub step: u32,

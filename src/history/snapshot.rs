@@ -15,7 +15,7 @@ use crate::fault;
 use crate::folder::Folder;
 use crate::journal;
 use crate::seal::{CURRENT, Found, Seal, manifest_of};
-use actcheck_base::{Diagnostics, ScratchFolder};
+use actcheck_base::{Diagnostics, ScratchFolder, digest_of};
 
 /// Number of times that a snapshot is tried. The manifest changes a few times a second at most, and a try takes some
 /// milliseconds.
@@ -91,6 +91,11 @@ impl Snapshot {
     /// Folder of the store.
     pub(super) fn store(&self) -> &Path {
         self.scratch.path()
+    }
+
+    /// A text that identifies the state.
+    pub(super) fn state(&self) -> String {
+        digest_of(&format!("{:?}", self.stamp))
     }
 
     /// Whether a folder's store has changed since the snapshot was taken.

@@ -1,7 +1,7 @@
 //! An open history: its folder, and the RDF store in it.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, OnceLock, RwLock};
 
@@ -14,6 +14,7 @@ use crate::folder::Folder;
 use crate::journal::Journal;
 use crate::open::Opened;
 use crate::outlines::{LoadedFiles, Outline, Restore, Shelf, View};
+use crate::quad_source::RunQuads;
 use crate::read::{short_id, subjects, text_of};
 use crate::snapshot::Snapshot;
 use crate::statements::iri;
@@ -22,12 +23,10 @@ use crate::write_campaign::{self, campaign_node};
 use crate::write_run::{self, run_node};
 use crate::{
     CampaignEnd, CampaignRecord, CampaignRow, Cancel, Judgements, OutcomeRow, QueryAnswer, RunDetail, RunFilter,
-    RunRecord, RunRow, RunVitals, Wish, detail, fault, query, trace_file, vitals,
+    RunRecord, RunRow, RunVitals, Wish, detail, fault, graphs, query, trace_file, trace_parts, vitals,
 };
 use crate::{lists, read_campaign};
-use actcheck_base::{Diagnostic, Diagnostics, Digest, Files, RunFacts, Source, names, nearest, write_atomic};
-use actcheck_data::{Choice, Trace};
-use actcheck_facts::extract;
+use actcheck_base::{Diagnostic, Diagnostics, Digest, Source, names, nearest, write_atomic};
 
 /// A history that only this process may write, or that it only reads (after [`History::open_to_read`]).
 ///
@@ -112,11 +111,16 @@ impl History {
     pub fn commit(&self, record: &RunRecord) -> Result<(), Diagnostics> {
         self.check_ids("run", [&record.id])?;
         let doing = format!("writing run {}", record.id);
+        let (run, in_memory) = (run_node(&record.id), RunQuads::new(write_run::quads_without_facts(record)));
+        let parts = detail::parts(&in_memory, &run).map_err(|error| self.fault(&doing, &error))?;
         let bytes = trace_file::encode(&record.choices, &record.trace)
+            .and_then(|trace| trace_parts::appended(trace, &parts))
             .map_err(|error| Diagnostic::error("H006", format!("{doing} failed: {error}")))?;
+        let mut quads = in_memory.into_quads();
+        graphs::write(&record.facts, &run, &mut quads);
         let file = self.folder.trace(&record.id);
         write_atomic(&file, &bytes).map_err(|error| fault::io(self.dir(), &doing, &error))?;
-        self.enter(&write_run::quads(record), &doing).inspect_err(|_| {
+        self.enter(&quads, &doing).inspect_err(|_| {
             // A trace without a run is harmless; if it can't be removed now, the next campaign removes it.
             let _ = std::fs::remove_file(&file);
         })?;
@@ -237,22 +241,31 @@ impl History {
         lists::runs(&*self.store_with(lists::of_runs)?, &RunFilter::default()).map_err(|error| self.query_fault(&error))
     }
 
-    /// Returns the ids of all campaigns except those of [`History::selected_campaigns`], sorted by start, each with its
-    /// run ids, sorted as strings.
+    /// Returns the ids of all campaigns except those of [`History::selected_campaigns`], sorted by start.
     ///
     /// # Errors
-    /// The store can't be read.
+    /// The store can't be read; `H026` an id is not an id.
+    pub fn unselected_campaigns(&self) -> Result<Vec<String>, Diagnostics> {
+        let selected = self.selected_campaigns()?;
+        let store = self.store_with(lists::of_campaigns)?;
+        let mut campaigns = lists::campaign_ids(&store).map_err(|error| self.query_fault(&error))?;
+        campaigns.retain(|id| !selected.contains(id));
+        self.check_ids("campaign", &campaigns)?;
+        Ok(campaigns)
+    }
+
+    /// Returns the campaigns of [`History::unselected_campaigns`], each with its run ids, sorted as strings.
+    ///
+    /// # Errors
+    /// The store can't be read; `H026` an id is not an id.
     pub fn run_ids(&self) -> Result<Vec<(String, Vec<String>)>, Diagnostics> {
-        let shrunk = self.selected_campaigns()?;
-        let store = self.store_with(|| Wanted::values(&["act:campaign"]))?;
-        let campaigns = lists::campaign_ids(&store).map_err(|error| self.query_fault(&error))?;
         let mut found = Vec::new();
-        for id in campaigns.into_iter().filter(|id| !shrunk.contains(id)) {
+        for id in self.unselected_campaigns()? {
+            let store = self.store_with(|| Wanted::values(&["act:campaign"]))?;
             let runs = subjects(&*store, "act:campaign", &campaign_node(&id));
             let runs = runs.map_err(|error| self.fault("reading", &error))?;
             let mut runs: Vec<String> =
                 runs.into_iter().map(|run| short_id(&text_of(&run.into())).to_owned()).collect();
-            self.check_ids("campaign", [&id])?;
             self.check_ids("run", &runs)?;
             runs.extend(self.outlined_ids(Some(&id))?);
             runs.sort();
@@ -283,72 +296,11 @@ impl History {
         }
         let node = run_node(&id);
         let store = self.store_with(|| Wanted::run(node.as_str()))?;
-        detail::read(&*store, &node).map_err(|error| self.fault("reading a run", &error))
-    }
-
-    /// Returns the trace of a run, named as in [`History::resolve`].
-    ///
-    /// # Errors
-    /// `H008` there is no such run, `H009` its trace is missing, `H007` its trace is damaged.
-    pub fn trace(&self, name: &str) -> Result<Trace, Diagnostics> {
-        let id = self.resolve(name)?;
-        if self.is_outline(&id)? {
-            // With the precision of a stored trace.
-            let (choices, trace) = self.restored(&id)?;
-            return Ok(self.encoded_again(&id, &choices, &trace, trace_file::decode)?.1);
-        }
-        Ok(self.decoded(&id, trace_file::decode)?.1)
-    }
-
-    /// Returns the trace of a run, named as in [`History::resolve`], with the samples of its actions but without the
-    /// motion of bodies and joints: everything from which facts and quantities over time are extracted.
-    ///
-    /// # Errors
-    /// As [`History::trace`].
-    pub fn sampled(&self, name: &str) -> Result<Trace, Diagnostics> {
-        let id = self.resolve(name)?;
-        if self.is_outline(&id)? {
-            let (choices, trace) = self.restored(&id)?;
-            return Ok(self.encoded_again(&id, &choices, &trace, trace_file::decode_sampled)?.1);
-        }
-        Ok(self.decoded(&id, trace_file::decode_sampled)?.1)
-    }
-
-    /// Returns the trace of a run, named as in [`History::resolve`], without the motion of its bodies: everything from
-    /// which facts are extracted, in a tenth of the time.
-    ///
-    /// # Errors
-    /// As [`History::trace`].
-    pub fn states(&self, name: &str) -> Result<Trace, Diagnostics> {
-        let id = self.resolve(name)?;
-        match self.outlined_states(&id)? {
-            Some((_, trace)) => Ok(trace),
-            None => Ok(self.decoded(&id, trace_file::decode_states)?.1),
-        }
-    }
-
-    /// Returns every choice of a run, named as in [`History::resolve`].
-    ///
-    /// # Errors
-    /// As [`History::trace`].
-    pub fn choices(&self, name: &str) -> Result<Vec<Choice>, Diagnostics> {
-        let id = self.resolve(name)?;
-        if let Some((choices, _)) = self.outlined_states(&id)? {
-            return Ok(choices);
-        }
-        self.decoded(&id, trace_file::decode_choices)
-    }
-
-    /// Returns every choice of a run, named as in [`History::resolve`], and its trace as in [`History::states`].
-    ///
-    /// # Errors
-    /// As [`History::trace`].
-    pub fn recorded(&self, name: &str) -> Result<(Vec<Choice>, Trace), Diagnostics> {
-        let id = self.resolve(name)?;
-        match self.outlined_states(&id)? {
-            Some(recorded) => Ok(recorded),
-            None => self.decoded(&id, trace_file::decode_states),
-        }
+        let read = match trace_parts::read(&self.folder.trace(&id)) {
+            Some(parts) => detail::read_with(&*store, &node, parts),
+            None => detail::read(&*store, &node),
+        };
+        read.map_err(|error| self.fault("reading a run", &error))
     }
 
     /// Calls `each` with the health data of every run of a campaign: first those of outlines, file by file, then those of runs
@@ -372,23 +324,6 @@ impl History {
         Ok(())
     }
 
-    /// Returns the facts of a run, named as in [`History::resolve`]: extracted from its trace, the same as during the
-    /// run.
-    ///
-    /// The store holds facts only for queries; reading them from there would take many times as long. `course`: whether
-    /// to read the quantities over time too, which takes ten times as long.
-    ///
-    /// # Errors
-    /// As [`History::trace`].
-    pub fn facts(&self, name: &str, course: bool) -> Result<RunFacts, Diagnostics> {
-        Ok(Self::facts_of(&if course { self.sampled(name)? } else { self.states(name)? }))
-    }
-
-    /// Returns the facts of a trace: the same as during the run.
-    pub fn facts_of(trace: &Trace) -> RunFacts {
-        extract(trace)
-    }
-
     /// Answers a SPARQL query. The prefixes of [`actcheck_base::names::PREFIXES`] need no declaration.
     ///
     /// The default graph holds campaigns, runs, executions, scenes and outcomes; facts are in the graphs that
@@ -406,33 +341,6 @@ impl History {
     /// As [`History::query`]; `H013` the query was stopped.
     pub fn query_from(&self, text: &Source, cancel: &Cancel) -> Result<QueryAnswer, Diagnostics> {
         query::answer(self, text, cancel)
-    }
-
-    /// Path of a run's trace file, which need not exist.
-    pub(super) fn trace_path(&self, run: &str) -> PathBuf {
-        self.folder.trace(run)
-    }
-
-    fn decoded<T>(&self, id: &str, decode: impl FnOnce(&[u8]) -> Result<T, String>) -> Result<T, Diagnostics> {
-        let file = self.folder.trace(id);
-        let bytes = Files::Disk.read_bytes(&file).map_err(|error| {
-            Diagnostic::error("H009", format!("the trace of run {id} can't be read from `{}`: {error}", file.display()))
-                .help("restore the file from a backup; the store's data on the run is intact")
-        })?;
-        decode(&bytes).map_err(|why| fault::damaged(self.dir(), &format!("the trace of run {id}: {why}")))
-    }
-
-    /// Writes a trace as a trace file, and reads it.
-    fn encoded_again<T>(
-        &self,
-        id: &str,
-        choices: &[Choice],
-        trace: &Trace,
-        decode: impl FnOnce(&[u8]) -> Result<T, String>,
-    ) -> Result<T, Diagnostics> {
-        trace_file::encode(choices, trace)
-            .and_then(|bytes| decode(&bytes))
-            .map_err(|why| fault::damaged(self.dir(), &format!("the trace of run {id}: {why}")))
     }
 
     pub(super) fn has_run(&self, id: &str) -> Result<bool, Diagnostics> {

@@ -219,12 +219,12 @@ fn parts(bytes: &[u8]) -> Result<(&[u8], &[u8]), String> {
     rest.split_at_checked(u32::from_le_bytes(*length) as usize).ok_or_else(|| "it ends too early".to_owned())
 }
 
-fn compressed(bytes: &[u8]) -> Result<Vec<u8>, String> {
+pub(super) fn compressed(bytes: &[u8]) -> Result<Vec<u8>, String> {
     let mut encoder = GzEncoder::new(Vec::new(), Compression::default());
     encoder.write_all(bytes).and_then(|()| encoder.finish()).map_err(|error| error.to_string())
 }
 
-fn expanded(bytes: &[u8]) -> Result<Vec<u8>, String> {
+pub(super) fn expanded(bytes: &[u8]) -> Result<Vec<u8>, String> {
     let mut out = Vec::new();
     GzDecoder::new(bytes).read_to_end(&mut out).map_err(|error| error.to_string())?;
     Ok(out)

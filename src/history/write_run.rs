@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use oxigraph::model::{BlankNode, Literal, NamedNode, Quad};
 
 use crate::RunRecord;
-use crate::graphs::{self, below, during_graph, state_graph};
+use crate::graphs::{below, during_graph, state_graph};
 use crate::statements::{About, Statements, count, iri, time};
 use crate::write_campaign::{campaign_node, program};
 use crate::write_scene;
@@ -16,13 +16,6 @@ use actcheck_facts::thing_iri;
 /// A run's node.
 pub(super) fn run_node(id: &str) -> NamedNode {
     NamedNode::new_unchecked(format!("{}{id}", names::RUN))
-}
-
-/// All quads of a run.
-pub(super) fn quads(record: &RunRecord) -> Vec<Quad> {
-    let mut quads = quads_without_facts(record);
-    graphs::write(&record.facts, &run_node(&record.id), &mut quads);
-    quads
 }
 
 /// The quads of a run in the default graph.
@@ -118,9 +111,14 @@ fn write_execution(record: &RunRecord, step: usize, run: &NamedNode, statements:
         about.has("act:during", during_graph(run, step));
     }
     for judgement in record.judgements.get(step).into_iter().flatten() {
-        let of = |part| unique(&[node.as_str(), &judgement.property, part]);
-        write_assertion(judgement, &node, [of("assertion"), of("result")], statements);
+        let result = unique(&[node.as_str(), &judgement.property, "result"]);
+        write_assertion(judgement, &node, [assertion_of(&node, &judgement.property), result], statements);
     }
+}
+
+/// The node of the campaign's own judgement of a property in an execution.
+pub(super) fn assertion_of(execution: &NamedNode, property: &str) -> BlankNode {
+    unique(&[execution.as_str(), property, "assertion"])
 }
 
 /// The word for how an action ended.

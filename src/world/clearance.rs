@@ -12,7 +12,7 @@ use crate::World;
 use crate::contacts::Touch;
 use crate::convert::to_vector;
 use crate::engine::Owner;
-use crate::simulation::Object;
+use crate::object::Object;
 use actcheck_data::Clearance;
 
 /// Objects farther away than this are not measured. Unit: metres. An arm's reach.

@@ -15,7 +15,7 @@ use crate::contacts::Touch;
 use crate::convert::{from_vector, to_pose, to_real};
 use crate::engine::{Owner, off_floor};
 use crate::kinematics::GRAVITY;
-use crate::simulation::Object;
+use crate::object::Object;
 use actcheck_data::Role;
 
 /// Furniture slower than this has stopped. Unit: m/s and rad/s.

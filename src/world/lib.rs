@@ -29,6 +29,7 @@ mod link_pairs;
 mod motion;
 mod motor;
 mod needed;
+mod object;
 mod observe;
 mod odometry;
 mod perturbation;

@@ -8,7 +8,7 @@ use crate::World;
 use crate::contacts::touches;
 use crate::convert::from_vector;
 use crate::engine::Owner;
-use crate::simulation::Object;
+use crate::object::Object;
 use actcheck_data::{BodyState, LinkState, Pose, RobotState, Snapshot};
 
 /// Share of a body's weight that a contact must carry for the body to rest on it. Low enough for several supports.

@@ -16,8 +16,8 @@ use crate::clearance::gap;
 use crate::convert::from_vector;
 use crate::description::JointKind;
 use crate::kinematics::{GRAVITY, axis_in_world};
+use crate::object::Object;
 use crate::share::Share;
-use crate::simulation::Object;
 
 /// Distances are measured up to this. Unit: metres.
 const RANGE_M: f64 = 0.25;

@@ -6,7 +6,7 @@ use crate::World;
 use crate::contacts::{Touch, touches};
 use crate::convert::{from_pose, from_vector};
 use crate::engine::Owner;
-use crate::simulation::Object;
+use crate::object::Object;
 use actcheck_data::{Pose, Samples, Series};
 
 /// Steps of positions, angles and components of quaternions in a metre, a radian, or one.

@@ -5,7 +5,7 @@
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
 use crate::World;
-use crate::simulation::Object;
+use crate::object::Object;
 use actcheck_data::{ChoiceName, Choices, PlanarAxis, Pose, SightingAxis};
 
 /// Tilt beyond which an object counts as lying: it is then seen as its upright bounding box. Unit: radians.

@@ -46,7 +46,7 @@ impl World {
     }
 
     fn moving(&self) -> Vec<String> {
-        let moves = |object: &&super::simulation::Object| {
+        let moves = |object: &&super::object::Object| {
             self.engine.bodies.get(object.body).is_some_and(|body| {
                 !body.is_sleeping()
                     && (from_vector(body.linvel()).norm() > REST_SPEED
@@ -57,7 +57,7 @@ impl World {
     }
 
     fn left(&self) -> Vec<String> {
-        let gone = |object: &&super::simulation::Object| {
+        let gone = |object: &&super::object::Object| {
             let way = (self.pose_of(object).translation.vector - object.placed.translation.vector).norm();
             way.is_nan() || way > LEFT_M
         };

@@ -5,26 +5,20 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use nalgebra::{Isometry3, Vector3};
-use rapier3d::prelude::{CoefficientCombineRule, MassProperties, PhysicsWorld, RigidBodyBuilder, RigidBodyHandle};
+use rapier3d::prelude::{PhysicsWorld, RigidBodyHandle};
 
-use crate::convert::{from_pose, from_vector, to_pose, to_real, to_vector};
-use crate::engine::{Owner, add_floor, collider, engine};
-use crate::furniture::{Sliding, slides};
+use crate::convert::{from_pose, from_vector, to_vector};
+use crate::engine::{add_floor, engine};
+use crate::furniture::Sliding;
 use crate::link_pairs::LinkPairs;
+use crate::object::{self, Object};
 use crate::odometry::Tracker;
 use crate::recorder::Recorder;
 use crate::robot::Robot;
 use crate::room::{Reach, Room};
 use crate::{Fault, Kinematics, Layout, Poison, WorldError, fault};
-use actcheck_data::{
-    CONTROL_HZ, Camera, Inertia, KnownKind, ObjectModel, Pose, RobotProfile, Role, Scene, SceneObject, Sensing,
-};
+use actcheck_data::{CONTROL_HZ, Camera, KnownKind, Pose, RobotProfile, Scene, Sensing};
 use actcheck_scenario::FloorPlan;
-
-/// A body slower than this may fall asleep. Unit: m/s of its farthest point.
-const SLEEP_SPEED: f32 = 0.02;
-/// Time below that speed until it falls asleep. Unit: seconds.
-const SLEEP_AFTER_SECS: f32 = 0.3;
 
 /// A command to the robot's controllers. Positions are clamped to the joint limits; the controllers limit speeds.
 #[derive(Debug, Clone, PartialEq)]
@@ -56,24 +50,6 @@ pub struct Observation {
     pub finger_efforts_n: [f64; 2],
     /// Effort of each joint's motor, without gravity compensation. Units: newtons or newton metres.
     pub loads: Vec<f64>,
-}
-
-/// One object of the scene in the engine.
-pub(super) struct Object {
-    pub(super) id: String,
-    pub(super) model: Arc<ObjectModel>,
-    /// Whether it is static.
-    pub(super) fixed: bool,
-    /// Whether it slides when it is pushed hard, although it is static otherwise.
-    pub(super) slides: bool,
-    /// Whether it is on the robot's floor plan, like furniture and unlike other objects.
-    pub(super) on_map: bool,
-    pub(super) body: RigidBodyHandle,
-    pub(super) mass_kg: f64,
-    pub(super) friction: f64,
-    pub(super) restitution: f64,
-    /// Its initial pose in the scene.
-    pub(super) placed: Isometry3<f64>,
 }
 
 /// A simulation of one scene. Each worker has its own.
@@ -123,7 +99,7 @@ pub fn build(scene: &Scene) -> Result<World, WorldError> {
     add_floor(&mut engine);
     let robot = Robot::insert(&mut engine, &scene.robot)?;
     let objects: Vec<Object> =
-        scene.objects.iter().enumerate().map(|(idx, object)| insert(&mut engine, idx, object)).collect();
+        scene.objects.iter().enumerate().map(|(idx, object)| object::insert(&mut engine, idx, object)).collect();
     let steps_per_second = scene.physics.steps_per_second;
     let steps_per_tick = (steps_per_second / CONTROL_HZ).max(1);
     let tick_secs = f64::from(steps_per_tick) / f64::from(steps_per_second);
@@ -152,53 +128,6 @@ pub fn build(scene: &Scene) -> Result<World, WorldError> {
     };
     world.link_pairs = world.find_link_pairs();
     Ok(world)
-}
-
-/// Adds one object with the shapes of its model.
-fn insert(engine: &mut PhysicsWorld, idx: usize, object: &SceneObject) -> Object {
-    let placed = object.pose.to_isometry();
-    let fixed = object.is_fixed();
-    let builder = if fixed { RigidBodyBuilder::fixed() } else { RigidBodyBuilder::dynamic() };
-    let spread = object.model.inertia.map(|inertia| mass_properties(&inertia, object));
-    let builder = match spread {
-        Some(properties) => builder.additional_mass_properties(properties),
-        None => builder,
-    };
-    let body = engine.insert_body(builder.pose(to_pose(&placed)));
-    if let Some(body) = engine.bodies.get_mut(body) {
-        let activation = body.activation_mut();
-        activation.normalized_linear_threshold = SLEEP_SPEED;
-        activation.time_until_sleep = SLEEP_AFTER_SECS;
-    }
-    // If the model states its inertia, the shapes have no mass of their own.
-    let density = if spread.is_some() { 0.0 } else { object.mass_kg / object.model.volume().max(1e-9) };
-    for solid in object.model.solids() {
-        if let Some(collider) = collider(&solid, Owner::Object(idx), object.friction, object.restitution) {
-            let collider = collider.density(to_real(density)).restitution_combine_rule(CoefficientCombineRule::Average);
-            engine.insert_collider(collider, Some(body));
-        }
-    }
-    Object {
-        id: object.id.clone(),
-        model: object.model.clone(),
-        fixed,
-        slides: slides(object.role, object.model.fixed),
-        on_map: object.role == Role::Platform,
-        body,
-        mass_kg: object.mass_kg,
-        friction: object.friction,
-        restitution: object.restitution,
-        placed,
-    }
-}
-
-/// Returns the mass properties that a model states, scaled to the mass in the scene.
-fn mass_properties(inertia: &Inertia, object: &SceneObject) -> MassProperties {
-    let scale = object.mass_kg / object.model.mass_kg;
-    // The engine takes columns, which equal the rows of a symmetric matrix.
-    let [x, y, z] = inertia.about_com.map(|row| to_vector(&(Vector3::from(row) * scale)));
-    let about_com = rapier3d::math::Matrix::from_cols(x, y, z);
-    MassProperties::with_inertia_matrix(to_vector(&Vector3::from(inertia.com_m)), to_real(object.mass_kg), about_com)
 }
 
 /// Returns the bodies that can move with their names in traces: objects, then links with shapes.

@@ -1,7 +1,7 @@
 //! The runs of each file of a mirror, so that files that have not changed since need not be read to know them.
 //!
 //! The file `FILES` has a line for each: name, size, time of the last change, number of rows, and the indices of its runs as
-//! `first+step*count`, joined by commas.
+//! `first+step*count`, joined by commas. A line `state` has the state of the history whose runs the files have.
 
 use std::collections::{BTreeMap, HashSet};
 use std::fs;
@@ -12,6 +12,8 @@ use std::time::UNIX_EPOCH;
 use actcheck_base::write_quickly;
 
 const NAME: &str = "FILES";
+/// Begins the line with the state of the history.
+const STATE: &str = "state ";
 
 /// The runs of one file.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -26,6 +28,8 @@ pub(super) struct FileRuns {
 #[derive(Debug, Default, PartialEq, Eq)]
 pub(super) struct Checked {
     files: BTreeMap<String, (Stamp, FileRuns)>,
+    /// The state of the history of which the files have all runs.
+    state: Option<String>,
     changed: bool,
 }
 
@@ -36,7 +40,24 @@ impl Checked {
     /// Reads the list of a folder. It is empty if it is missing or damaged.
     pub fn read(folder: &Path) -> Self {
         let text = fs::read_to_string(folder.join(NAME)).unwrap_or_default();
-        Self { files: text.lines().filter_map(line).collect(), changed: false }
+        let state = text.lines().find_map(|line| line.strip_prefix(STATE)).map(str::to_owned);
+        Self { files: text.lines().filter_map(line).collect(), state, changed: false }
+    }
+
+    /// Whether the files have all runs that a history has in this state.
+    pub fn is_of(&self, state: &str) -> bool {
+        self.state.as_deref() == Some(state)
+    }
+
+    /// Sets the state of the history of which the files have all runs.
+    pub fn set_state(&mut self, state: Option<String>) {
+        self.changed |= self.state != state;
+        self.state = state;
+    }
+
+    /// Number of the known files.
+    pub fn len(&self) -> usize {
+        self.files.len()
     }
 
     /// The runs of a file. Returns `None` if it is unknown or has changed.
@@ -64,7 +85,10 @@ impl Checked {
         if !self.changed && self.files.len() == before {
             return Ok(());
         }
-        let text: String = self.files.iter().map(|(name, (stamp, runs))| text_of(name, *stamp, runs)).collect();
+        let mut text: String = self.files.iter().map(|(name, (stamp, runs))| text_of(name, *stamp, runs)).collect();
+        if let Some(state) = &self.state {
+            text.push_str(&format!("{STATE}{state}\n"));
+        }
         self.changed = false;
         write_quickly(&folder.join(NAME), text.as_bytes())
     }
@@ -153,6 +177,11 @@ mod tests {
         checked.set(&file, runs.clone());
         checked.write(folder.path(), std::slice::from_ref(&file)).expect("it can be written");
         assert_eq!(Checked::read(folder.path()).get(&file), Some(&runs));
+        checked.set_state(Some("f00".to_owned()));
+        checked.write(folder.path(), std::slice::from_ref(&file)).expect("it can be written");
+        let read = Checked::read(folder.path());
+        assert!(read.is_of("f00") && !read.is_of("f0"));
+        assert_eq!(read.get(&file), Some(&runs));
         fs::write(&file, "changed").expect("it can be written");
         assert_eq!(Checked::read(folder.path()).get(&file), None);
     }

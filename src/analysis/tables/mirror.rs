@@ -145,6 +145,12 @@ impl Mirror {
             write_atomic(&tables.join(SCHEMA), digest.as_bytes()).map_err(|error| unwritten(tables, &error))?;
         }
         let mut mirror = Self { folder, files: Vec::new(), checked: Checked::read(tables), _place: place };
+        let state = history.state();
+        let is_same = state.as_deref().is_some_and(|state| mirror.checked.is_of(state));
+        if is_same && is_current && !anew && mirror.has_all(tables, &history.unselected_campaigns()?) {
+            let kept = mirror.files.iter().filter_map(|file| Some(mirror.checked.get(&file.path)?.indices.len())).sum();
+            return Ok((mirror, MirrorChange { kept, ..MirrorChange::default() }));
+        }
         let mut change = MirrorChange::default();
         let mut present = if anew || !is_current { BTreeMap::new() } else { present(tables, is_beside) };
         let (known, later) = (rechecked(tables), history.later_counts()?);
@@ -163,10 +169,30 @@ impl Mirror {
         }
         if is_beside {
             let present: Vec<PathBuf> = mirror.files.iter().map(|file| file.path.clone()).collect();
+            mirror.checked.set_state(state);
             // Without the list, the files are read again.
             let _ = mirror.checked.write(tables, &present);
         }
         Ok((mirror, change))
+    }
+
+    /// Adds the files of a folder, unless one has changed since it was checked, was added or removed. `campaigns`: in the
+    /// order of the files.
+    fn has_all(&mut self, tables: &Path, campaigns: &[String]) -> bool {
+        let mut there = present(tables, false);
+        let files = campaigns.iter().flat_map(|campaign| {
+            let files = there.remove(campaign).unwrap_or_default();
+            files.into_iter().map(|path| {
+                let rows = self.checked.get(&path)?.rows;
+                Some(TableFile { campaign: campaign.clone(), path, rows })
+            })
+        });
+        let files: Option<Vec<TableFile>> = files.collect();
+        let has_all = there.is_empty() && files.as_ref().is_some_and(|files| files.len() == self.checked.len());
+        if has_all {
+            self.files = files.unwrap_or_default();
+        }
+        has_all
     }
 
     /// Creates a mirror of runs from a source other than a history, in its own folder.

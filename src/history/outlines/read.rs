@@ -1,6 +1,7 @@
 //! Reads outlines as runs.
 
 use std::collections::{BTreeSet, HashMap, HashSet};
+use std::sync::mpsc::{SyncSender, sync_channel};
 
 use oxigraph::model::Quad;
 use oxigraph::store::Store;
@@ -15,6 +16,9 @@ use crate::{graphs, merge, write_run};
 use actcheck_base::Diagnostics;
 use actcheck_data::{Choice, Trace};
 use actcheck_facts::extract;
+
+/// Number of files that a thread reads ahead of the one that uses them.
+const FILES_AHEAD: usize = 2;
 
 /// The campaign and the index of a run, from its id.
 fn place_of(run: &str) -> Option<(&str, u64)> {
@@ -257,16 +261,32 @@ impl History {
         if !self.shelf().exists() {
             return Ok(());
         }
+        // One thread reads while the caller's counts.
+        std::thread::scope(|scope| {
+            let (send, receive) = sync_channel(FILES_AHEAD);
+            let reader = scope.spawn(move || self.send_vitals(campaign, &send));
+            for runs in receive {
+                runs.iter().for_each(&mut *each);
+            }
+            reader.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))
+        })
+    }
+
+    /// Sends the health data of the outlines of a campaign, file by file.
+    fn send_vitals(&self, campaign: &str, send: &SyncSender<Vec<RunVitals>>) -> Result<(), Diagnostics> {
         // If a file was removed meanwhile, the others are read again.
         let mut done = IndexSet::default();
         self.of_outlines(&mut |shelf| {
             shelf.each_file(Some(campaign), Needed::All, &mut |_, opened, _| {
                 let (rows, heads) = (opened.rows()?, opened.heads()?);
+                let mut runs = Vec::new();
                 for (outlined, head) in rows.of_campaign(campaign).zip(heads) {
                     if done.insert(outlined.row.index) {
-                        each(&outlined.as_vitals(trace_file::head_choices(&head)?));
+                        runs.push(outlined.as_vitals(trace_file::head_choices(&head)?));
                     }
                 }
+                // The receiver stops only if it panics.
+                let _ = send.send(runs);
                 Ok(())
             })
         })

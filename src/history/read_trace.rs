@@ -1,0 +1,123 @@
+//! Reads the traces of runs, and their facts.
+
+use std::path::PathBuf;
+
+use crate::{History, fault, trace_file};
+use actcheck_base::{Diagnostic, Diagnostics, Files, RunFacts};
+use actcheck_data::{Choice, Trace};
+use actcheck_facts::extract;
+
+impl History {
+    /// Returns the trace of a run, named as in [`History::resolve`].
+    ///
+    /// # Errors
+    /// `H008` there is no such run, `H009` its trace is missing, `H007` its trace is damaged.
+    pub fn trace(&self, name: &str) -> Result<Trace, Diagnostics> {
+        let id = self.resolve(name)?;
+        if self.is_outline(&id)? {
+            // With the precision of a stored trace.
+            let (choices, trace) = self.restored(&id)?;
+            return Ok(self.encoded_again(&id, &choices, &trace, trace_file::decode)?.1);
+        }
+        Ok(self.decoded(&id, trace_file::decode)?.1)
+    }
+
+    /// Returns the trace of a run, named as in [`History::resolve`], with the samples of its actions but without the
+    /// motion of bodies and joints: everything from which facts and quantities over time are extracted.
+    ///
+    /// # Errors
+    /// As [`History::trace`].
+    pub fn sampled(&self, name: &str) -> Result<Trace, Diagnostics> {
+        let id = self.resolve(name)?;
+        if self.is_outline(&id)? {
+            let (choices, trace) = self.restored(&id)?;
+            return Ok(self.encoded_again(&id, &choices, &trace, trace_file::decode_sampled)?.1);
+        }
+        Ok(self.decoded(&id, trace_file::decode_sampled)?.1)
+    }
+
+    /// Returns the trace of a run, named as in [`History::resolve`], without the motion of its bodies: everything from
+    /// which facts are extracted, in a tenth of the time.
+    ///
+    /// # Errors
+    /// As [`History::trace`].
+    pub fn states(&self, name: &str) -> Result<Trace, Diagnostics> {
+        let id = self.resolve(name)?;
+        match self.outlined_states(&id)? {
+            Some((_, trace)) => Ok(trace),
+            None => Ok(self.decoded(&id, trace_file::decode_states)?.1),
+        }
+    }
+
+    /// Returns every choice of a run, named as in [`History::resolve`].
+    ///
+    /// # Errors
+    /// As [`History::trace`].
+    pub fn choices(&self, name: &str) -> Result<Vec<Choice>, Diagnostics> {
+        let id = self.resolve(name)?;
+        if let Some((choices, _)) = self.outlined_states(&id)? {
+            return Ok(choices);
+        }
+        self.decoded(&id, trace_file::decode_choices)
+    }
+
+    /// Returns every choice of a run, named as in [`History::resolve`], and its trace as in [`History::states`].
+    ///
+    /// # Errors
+    /// As [`History::trace`].
+    pub fn recorded(&self, name: &str) -> Result<(Vec<Choice>, Trace), Diagnostics> {
+        let id = self.resolve(name)?;
+        match self.outlined_states(&id)? {
+            Some(recorded) => Ok(recorded),
+            None => self.decoded(&id, trace_file::decode_states),
+        }
+    }
+
+    /// Returns the facts of a run, named as in [`History::resolve`]: extracted from its trace, the same as during the
+    /// run.
+    ///
+    /// The store holds facts only for queries; reading them from there would take many times as long. `course`: whether
+    /// to read the quantities over time too, which takes ten times as long.
+    ///
+    /// # Errors
+    /// As [`History::trace`].
+    pub fn facts(&self, name: &str, course: bool) -> Result<RunFacts, Diagnostics> {
+        Ok(Self::facts_of(&if course { self.sampled(name)? } else { self.states(name)? }))
+    }
+
+    /// Returns the facts of a trace: the same as during the run.
+    pub fn facts_of(trace: &Trace) -> RunFacts {
+        extract(trace)
+    }
+
+    /// Path of a run's trace file, which need not exist.
+    pub(super) fn trace_path(&self, run: &str) -> PathBuf {
+        self.folder.trace(run)
+    }
+
+    pub(super) fn decoded<T>(
+        &self,
+        id: &str,
+        decode: impl FnOnce(&[u8]) -> Result<T, String>,
+    ) -> Result<T, Diagnostics> {
+        let file = self.folder.trace(id);
+        let bytes = Files::Disk.read_bytes(&file).map_err(|error| {
+            Diagnostic::error("H009", format!("the trace of run {id} can't be read from `{}`: {error}", file.display()))
+                .help("restore the file from a backup; the store's data on the run is intact")
+        })?;
+        decode(&bytes).map_err(|why| fault::damaged(self.dir(), &format!("the trace of run {id}: {why}")))
+    }
+
+    /// Writes a trace as a trace file, and reads it.
+    fn encoded_again<T>(
+        &self,
+        id: &str,
+        choices: &[Choice],
+        trace: &Trace,
+        decode: impl FnOnce(&[u8]) -> Result<T, String>,
+    ) -> Result<T, Diagnostics> {
+        trace_file::encode(choices, trace)
+            .and_then(|bytes| decode(&bytes))
+            .map_err(|why| fault::damaged(self.dir(), &format!("the trace of run {id}: {why}")))
+    }
+}

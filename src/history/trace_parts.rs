@@ -1,0 +1,117 @@
+//! A copy of a run's objects, actions and outcomes at the end of its trace file.
+//!
+//! They are read in a tenth of the time that the store takes, where each is many statements. Programs that know nothing of
+//! the copy do not read it; files without it, and damaged ones, are read from the store.
+
+use std::fs::File;
+use std::io::{Read as _, Seek as _, SeekFrom};
+use std::path::Path;
+
+use crate::detail::Parts;
+use crate::trace_file::{compressed, expanded};
+
+/// Last bytes of a file that has a copy. The last one is its version; it increases whenever a type of [`Parts`] changes.
+const MAGIC: &[u8; 8] = b"actpart1";
+/// Size of the length and the magic bytes after the copy. Unit: bytes.
+const TRAILER: u64 = 12;
+
+/// Appends the copy to the content of a trace file.
+///
+/// # Errors
+/// A message, if it can't be encoded. (The current types never cause this.)
+pub(super) fn appended(mut trace: Vec<u8>, parts: &Parts) -> Result<Vec<u8>, String> {
+    let parts = compressed(&postcard::to_stdvec(parts).map_err(|error| error.to_string())?)?;
+    let length = u32::try_from(parts.len()).map_err(|_| "it has more than 4 GB of outcomes".to_owned())?;
+    trace.extend([parts.as_slice(), &length.to_le_bytes(), MAGIC].concat());
+    Ok(trace)
+}
+
+/// Reads the copy. Returns `None` if the file has none that this program can read; its checksum shows damage.
+pub(super) fn read(file: &Path) -> Option<Parts> {
+    let mut file = File::open(file).ok()?;
+    let size = file.metadata().ok()?.len();
+    file.seek(SeekFrom::Start(size.checked_sub(TRAILER)?)).ok()?;
+    let mut trailer = [0; TRAILER as usize];
+    file.read_exact(&mut trailer).ok()?;
+    let (length, magic) = trailer.split_first_chunk::<4>()?;
+    let length = u64::from(u32::from_le_bytes(*length));
+    if magic != MAGIC {
+        return None;
+    }
+    file.seek(SeekFrom::Start(size.checked_sub(TRAILER)?.checked_sub(length)?)).ok()?;
+    let mut parts = Vec::new();
+    file.take(length).read_to_end(&mut parts).ok()?;
+    postcard::from_bytes(&expanded(&parts).ok()?).ok()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{ActionDetail, ObjectDetail};
+    use actcheck_base::{Judgement, Outcome, ScratchFolder};
+    use actcheck_data::Role;
+
+    fn sample() -> Parts {
+        let object = ObjectDetail {
+            id: "glass_1".to_owned(),
+            model: "glass".to_owned(),
+            category: "http://actions#Glass".to_owned(),
+            role: Role::Target,
+            x: 0.1,
+            y: -0.2,
+            z: 0.3,
+            yaw: f64::MIN_POSITIVE,
+            mass_kg: 0.2,
+            friction: 0.5,
+            restitution: 0.0,
+            robot_distance_m: 0.7,
+            neighbour_distance_m: None,
+            target_distance_m: Some(0.25),
+            displacement_m: Some(0.0),
+            max_tilt_rad: None,
+        };
+        let judgement = Judgement {
+            property: "http://actions#ObjectGrasped".to_owned(),
+            outcome: Outcome::Failed,
+            margin: Some(-0.01),
+            witness: "no success was derived".to_owned(),
+            rule_digest: "ab".to_owned(),
+            held_before: Some(false),
+        };
+        let action = ActionDetail {
+            step: 1,
+            action: "http://actions#Pick".to_owned(),
+            score: 0.5,
+            reported: Some(true),
+            message: None,
+            duration_secs: 12.5,
+            end: "completed".to_owned(),
+            parameters: [("pickObject".to_owned(), vec!["glass_1".to_owned()])].into(),
+            judgements: vec![judgement],
+        };
+        (vec![object], vec![action])
+    }
+
+    #[test]
+    fn a_copy_is_read_as_it_was_written_and_damage_is_noticed() {
+        let folder = ScratchFolder::create().expect("it can be created");
+        let file = folder.path().join("run.trace");
+        let written = appended(b"trace".to_vec(), &sample()).expect("it can be encoded");
+        assert!(written.starts_with(b"trace"));
+        std::fs::write(&file, &written).expect("it can be written");
+        assert_eq!(read(&file), Some(sample()));
+        // The bytes of the compressed part's header that hold no content may differ.
+        let after_header = b"trace".len() + 10;
+        for at in after_header..written.len() {
+            let mut damaged = written.clone();
+            damaged[at] ^= 1;
+            std::fs::write(&file, &damaged).expect("it can be written");
+            assert_eq!(read(&file), None, "byte {at}");
+        }
+        for length in 0..written.len() {
+            std::fs::write(&file, &written[..length]).expect("it can be written");
+            assert_eq!(read(&file), None, "length {length}");
+        }
+        assert_eq!(read(&folder.path().join("other")), None);
+    }
+}
