@@ -117,6 +117,11 @@ pub fn plan(operator: &mut Operator<'_>, wanted: PlanRequest<'_>, others: &[Sigh
             found = straight(&slants).or_else(|| straight(&rolled(&slants)));
         }
     }
+    if found.is_none() && wanted.taken.is_none() {
+        // An arm that took the object aside of the base also sets it down there.
+        planner.postures = vec![planner.layout.arm.iter().map(|joint| planner.start[*joint]).collect()];
+        found = best(&planner, &all, &mut samples, &mut nearest);
+    }
     found.ok_or_else(|| nearest.reason(wanted.taken, &planner.surroundings()))
 }
 

@@ -22,6 +22,8 @@ const SATURATION_M: f64 = 1e-3;
 const SATURATION_RAD: f64 = 0.02;
 /// Ratio of a motor's damping to its stiffness. Unit: seconds.
 const DAMPING_SECS: f64 = 0.02;
+/// A joint's viscous friction is strong from this share of its motor's damping on: the motor then makes up for it.
+const STRONG_FRICTION: f64 = 0.1;
 /// As [`DAMPING_SECS`], for fingers, which close with their full force up to nearly their largest speed.
 const FINGER_DAMPING_SECS: f64 = 0.1;
 /// Inertia of the motor of a finger, as the finger feels it. Unit: kilograms. Fingers of hobby grippers have gears of 1:50
@@ -174,6 +176,7 @@ pub(super) fn insert_joints(
             effort: 0.0,
             strength: 1.0,
             fastest: gripper.fastest(idx, joint.velocity),
+            friction: if joint.damping > STRONG_FRICTION * damping { joint.damping } else { 0.0 },
         });
     }
     Ok(motors)

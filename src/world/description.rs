@@ -41,7 +41,7 @@ pub struct Joint {
     pub upper: f64,
     /// Largest force or torque.
     pub effort: f64,
-    /// Largest velocity.
+    /// Largest velocity: the joint's limit, or less if its motor can't reach that against its viscous friction.
     pub velocity: f64,
     /// Viscous friction.
     pub damping: f64,
@@ -299,6 +299,7 @@ impl<'a> Folding<'a> {
             }
         };
         let limited = joint.joint_type != urdf_rs::JointType::Continuous;
+        let damping = joint.dynamics.as_ref().map_or(0.0, |dynamics| dynamics.damping);
         let (lower, upper) =
             if limited { (joint.limit.lower, joint.limit.upper) } else { (f64::NEG_INFINITY, f64::INFINITY) };
         Ok(Joint {
@@ -310,8 +311,8 @@ impl<'a> Folding<'a> {
             lower,
             upper,
             effort: joint.limit.effort,
-            velocity: joint.limit.velocity,
-            damping: joint.dynamics.as_ref().map_or(0.0, |dynamics| dynamics.damping),
+            velocity: reachable(joint.limit.velocity, joint.limit.effort, damping),
+            damping,
             mimic: None,
         })
     }
@@ -394,4 +395,13 @@ fn matrix(i: &urdf_rs::Inertia) -> Matrix3<f64> {
 
 fn one_line(text: &str) -> String {
     text.split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
+/// Share of a motor's largest effort with which it moves steadily; the rest accelerates and carries.
+const STEADY_SHARE: f64 = 0.75;
+
+/// The largest velocity that a motor can reach against viscous friction. Many published models have a friction with which
+/// their velocity limit can't be reached.
+fn reachable(limit: f64, effort: f64, damping: f64) -> f64 {
+    if damping > 0.0 && effort > 0.0 { limit.min(STEADY_SHARE * effort / damping) } else { limit }
 }

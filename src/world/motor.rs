@@ -32,6 +32,8 @@ pub(super) struct Motor {
     pub(super) armature: f64,
     /// Largest speed of its setpoint.
     pub(super) fastest: f64,
+    /// Viscous friction of the joint, if it is strong compared with the motor's damping; otherwise 0.
+    pub(super) friction: f64,
     /// Largest commanded effort as a multiple of the joint's limit: 1 unless the motor is overdriven.
     pub(super) strength: f64,
 }
@@ -62,7 +64,9 @@ impl Motor {
     /// Keeps the setpoint near the joint's position: a setpoint that ran ahead of a blocked joint would make it shoot
     /// off, once it is free. The joint catches up at a speed at which damping balances stiffness, in the engine's
     /// implicit steps of `substep_secs`; together with the setpoint's velocity this must not exceed its largest speed.
+    /// Against viscous friction, the setpoint must be faster than the joint.
     pub(super) fn keep_near(&mut self, position: f64, fastest: f64, substep_secs: f64) {
+        let fastest = fastest * (1.0 + self.friction / self.damping.max(f64::MIN_POSITIVE));
         let damping = self.damping + self.stiffness * substep_secs;
         let most = (damping * fastest).max(self.max_effort) / self.stiffness;
         self.setpoint = self.setpoint.clamp(position - most, position + most);

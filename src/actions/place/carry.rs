@@ -7,6 +7,7 @@ use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use crate::memory::Held;
 use crate::navigate::Size;
 use crate::operator::{Interrupt, Operator};
+use crate::place::slim::Load;
 use crate::{navigate, plan};
 use actcheck_data::Pose;
 use actcheck_world::{SelfContact, Sighting, ik};
@@ -79,12 +80,12 @@ pub fn tuck(robot: &Operator<'_>, held: &Held) -> Vec<Vec<f64>> {
     let itself = SelfContact::new(robot.kinematics(), &[start.to_vec(), home.clone()]);
     let ways = std::iter::once(vec![home.clone()]).chain(last);
     let found = ways.into_iter().find(|way| stays_upright(robot, held, &itself, way));
-    found.or_else(|| slimmest(robot, held).map(|posture| vec![posture])).unwrap_or_default()
+    found.or_else(|| slimmest(robot, held)).unwrap_or_default()
 }
 
-/// The posture with the load upright near the base that makes the robot slimmest. `None` if it is slim already, or for a
-/// fixed base.
-fn slimmest(robot: &Operator<'_>, held: &Held) -> Option<Vec<f64>> {
+/// The way to the posture with the load upright near the base that makes the robot slimmest. `None` if it is slim already,
+/// or for a fixed base.
+fn slimmest(robot: &Operator<'_>, held: &Held) -> Option<Vec<Vec<f64>>> {
     let (kinematics, layout, start) = (robot.kinematics(), robot.layout(), robot.commanded());
     layout.base?;
     let points = kinematics.surface_points(LOAD_ROOM_M);
@@ -98,7 +99,7 @@ fn slimmest(robot: &Operator<'_>, held: &Held) -> Option<Vec<f64>> {
     let mut mobility = vec![0.0; start.len()];
     layout.arm.iter().for_each(|joint| mobility[*joint] = 1.0);
     let touching = links_at_load(robot, held, start, &points);
-    let mut best = None;
+    let (mut best, mut hands) = (None, Vec::new());
     for ([ahead, aside], higher) in AHEAD_M
         .into_iter()
         .flat_map(|ahead| ASIDE_M.map(|aside| [ahead, aside]))
@@ -109,6 +110,7 @@ fn slimmest(robot: &Operator<'_>, held: &Held) -> Option<Vec<f64>> {
             let angle = std::f64::consts::TAU * f64::from(turn) / f64::from(N_HEADINGS);
             let turned = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), angle) * hand.rotation;
             let target = base * Isometry3::from_parts(place, turned);
+            hands.push(target);
             let reach = ik::Reach { target, mobility: mobility.clone() };
             let Some(posture) = ik::solve(kinematics, start, &reach) else { continue };
             let size = Size::at(robot, &posture, &points);
@@ -120,7 +122,21 @@ fn slimmest(robot: &Operator<'_>, held: &Held) -> Option<Vec<f64>> {
             }
         }
     }
-    best
+    if radius_m >= SLIM_M {
+        // In one move, the load would tilt or the arm would collide with the robot.
+        let load = Load {
+            kinematics,
+            arm: &layout.arm,
+            start,
+            itself: &itself,
+            is_clear: &|posture| links_at_load(robot, held, posture, &points).is_subset(&touching),
+            is_slim: &|posture| Size::at(robot, posture, &points).radius_m < SLIM_M,
+        };
+        if let Some(way) = load.way(&hands) {
+            return Some(way);
+        }
+    }
+    best.map(|posture| vec![posture])
 }
 
 /// The links with a point in the box around the load in a posture.

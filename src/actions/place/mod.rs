@@ -7,6 +7,7 @@
 
 mod carry;
 mod skill;
+mod slim;
 mod spot;
 mod touch;
 
