@@ -41,12 +41,40 @@ pub fn safely_towards(robot: &Operator<'_>, point: &Point3<f64>) -> Vec<f64> {
     let (kinematics, start) = (robot.kinematics(), robot.commanded());
     let turned = towards(kinematics, robot.layout(), start, point);
     let itself = SelfContact::new(kinematics, &[start.to_vec()]);
-    let at = |step: u32| -> Vec<f64> {
+    let free = legs(start, &turned).take_while(|posture| !itself.touches(&kinematics.links(posture)));
+    free.last().unwrap_or_else(|| start.to_vec())
+}
+
+/// Postures that turn the head towards a point. Where the arm is in the way of the straight turn, one joint of the head
+/// turns before the others, or the head looks ahead first; if that does not help, it turns as [`safely_towards`] does.
+pub fn way_towards(robot: &Operator<'_>, point: &Point3<f64>) -> Vec<Vec<f64>> {
+    let (kinematics, layout, start) = (robot.kinematics(), robot.layout(), robot.commanded());
+    let turned = towards(kinematics, layout, start, point);
+    let itself = SelfContact::new(kinematics, &[start.to_vec()]);
+    let is_free = |from: &[f64], to: &[f64]| legs(from, to).all(|posture| !itself.touches(&kinematics.links(&posture)));
+    if is_free(start, &turned) {
+        return vec![turned];
+    }
+    let one_first = layout.head.iter().map(|joint| {
+        let mut first = start.to_vec();
+        first[*joint] = turned[*joint];
+        first
+    });
+    let ahead = layout.head.iter().fold(start.to_vec(), |mut ahead, joint| {
+        let limits = &kinematics.joints()[*joint];
+        ahead[*joint] = 0.0_f64.clamp(limits.lower, limits.upper);
+        ahead
+    });
+    let first = one_first.chain([ahead]).find(|first| is_free(start, first) && is_free(first, &turned));
+    first.map_or_else(|| vec![safely_towards(robot, point)], |first| vec![first, turned])
+}
+
+/// Postures on the straight way from one to another.
+fn legs(from: &[f64], to: &[f64]) -> impl Iterator<Item = Vec<f64>> {
+    (1..=N_CHECKS).map(move |step| {
         let share = f64::from(step) / f64::from(N_CHECKS);
-        start.iter().zip(&turned).map(|(from, to)| from + (to - from) * share).collect()
-    };
-    let free = (1..=N_CHECKS).take_while(|step| !itself.touches(&kinematics.links(&at(*step))));
-    free.last().map_or_else(|| start.to_vec(), at)
+        from.iter().zip(to).map(|(from, to)| from + (to - from) * share).collect()
+    })
 }
 
 /// The result of turning the head towards a point from a given posture.

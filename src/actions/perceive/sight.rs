@@ -4,7 +4,7 @@ use nalgebra::{Isometry3, Point3};
 
 use crate::operator::{Interrupt, Operator};
 use crate::perceive::cloud::{points, thinned};
-use crate::perceive::gaze::safely_towards;
+use crate::perceive::gaze::way_towards;
 use crate::perceive::interpret::{GRID_M, Surface};
 use actcheck_world::{DepthImage, RobotBody};
 
@@ -34,8 +34,8 @@ struct View {
 impl Sight {
     /// Turns the head to a point and takes a picture.
     pub(super) fn add_look_at(&mut self, point: &Point3<f64>, robot: &mut Operator<'_>) -> Result<(), Interrupt> {
-        let posture = safely_towards(robot, point);
-        robot.follow(&[posture], 0.0)?;
+        let way = way_towards(robot, point);
+        robot.follow(&way, 0.0)?;
         robot.wait(REST_SECS)?;
         let positions = robot.observe().positions;
         let camera = robot.kinematics().camera(&positions);
