@@ -432,6 +432,36 @@ pub(super) mod tests {
         assert!(world.observe().velocities[base].abs() < 1e-2);
     }
 
+    /// Published models have joints whose viscous friction is as strong as their motors.
+    #[test]
+    fn joints_with_strong_friction_keep_up_with_their_targets() {
+        let with_friction = |damping: f64| {
+            let mut profile = lonely().robot.profile.as_ref().clone();
+            let limit = r#"effort="50" velocity="1.5"/>"#;
+            let (before, after) = profile.urdf.text.split_once(limit).expect("the shipped robot has such a joint");
+            let after = after.replacen(r#"damping="0.5""#, &format!("damping=\"{damping}\""), 1);
+            profile.urdf.text = format!("{before}{limit}{after}").into();
+            alone(profile)
+        };
+        let find = |world: &World| {
+            let joints = world.kinematics().joints();
+            let joint = joints.iter().position(|joint| joint.name == "wrist_flex_joint").expect("it is shipped");
+            (joint, joints[joint].velocity)
+        };
+        for (damping, fastest) in [(0.5, 1.5), (20.0, 1.5), (100.0, 0.75 * 50.0 / 100.0)] {
+            let mut world = with_friction(damping);
+            let (joint, velocity) = find(&world);
+            assert!((velocity - fastest).abs() < 1e-9, "{velocity} rad/s with {damping} N·m·s");
+            let mut command = world.hold();
+            for _ in 0..40 {
+                command.positions[joint] += 0.9 * fastest * world.tick_secs();
+                world.step(&command);
+            }
+            let lag = (world.observe().positions[joint] - command.positions[joint]).abs();
+            assert!(lag < 0.05, "{lag} rad behind with {damping} N·m·s");
+        }
+    }
+
     #[test]
     fn a_profile_that_names_a_missing_joint_is_refused_with_help() {
         let mut profile = lonely().robot.profile.as_ref().clone();
