@@ -88,21 +88,25 @@ impl History {
         runs.retain(|run| !outlines.contains(&run.run));
         found.runs = runs.len();
         let store = self.store()?;
-        let is_as_stored =
-            |id: &str, file: &Path| match (trace_parts::read(file), detail::parts(&*store, &run_node(id))) {
-                (Some(copied), Ok(stored)) => copied == stored,
-                // It is read from the store.
-                (None, _) => true,
+        // The fault of the copy of a run's outcomes in its trace file. (Files of earlier versions have none.)
+        let fault_of_copy = |id: &str, bytes: &[u8]| match trace_file::after_trace(bytes) {
+            Ok([]) => None,
+            Ok(after) => match (trace_parts::of_bytes(after), detail::parts(&*store, &run_node(id))) {
+                (Ok(copied), Ok(stored)) if copied != stored => {
+                    Some("its copy of the outcomes differs from the store".to_owned())
+                }
+                (Err(why), _) => Some(why),
                 // The damage of the store is listed.
-                (_, Err(_)) => true,
-            };
+                _ => None,
+            },
+            Err(why) => Some(why),
+        };
         let mut known = BTreeSet::new();
         for run in &runs {
             let file = self.trace_path(&run.run);
             let reason = match std::fs::read(&file) {
                 Ok(bytes) => match trace_file::decode(&bytes) {
-                    Ok((_, trace)) if trace.hash == run.trace_hash => (!is_as_stored(&run.run, &file))
-                        .then(|| "its copy of the outcomes differs from the store".to_owned()),
+                    Ok((_, trace)) if trace.hash == run.trace_hash => fault_of_copy(&run.run, &bytes),
                     Ok((_, trace)) => Some(format!("it is the trace {}, not {}", trace.hash, run.trace_hash)),
                     Err(why) => Some(why),
                 },

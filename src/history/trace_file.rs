@@ -219,6 +219,16 @@ fn parts(bytes: &[u8]) -> Result<(&[u8], &[u8]), String> {
     rest.split_at_checked(u32::from_le_bytes(*length) as usize).ok_or_else(|| "it ends too early".to_owned())
 }
 
+/// The bytes after the trace: the copy of its outcomes, or nothing.
+///
+/// # Errors
+/// A message that names the damaged part.
+pub(super) fn after_trace(bytes: &[u8]) -> Result<&[u8], String> {
+    let mut decoder = flate2::bufread::GzDecoder::new(parts(bytes)?.1);
+    std::io::copy(&mut decoder, &mut std::io::sink()).map_err(|error| error.to_string())?;
+    Ok(decoder.into_inner())
+}
+
 pub(super) fn compressed(bytes: &[u8]) -> Result<Vec<u8>, String> {
     let mut encoder = GzEncoder::new(Vec::new(), Compression::default());
     encoder.write_all(bytes).and_then(|()| encoder.finish()).map_err(|error| error.to_string())

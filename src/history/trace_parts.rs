@@ -44,6 +44,20 @@ pub(super) fn read(file: &Path) -> Option<Parts> {
     postcard::from_bytes(&expanded(&parts).ok()?).ok()
 }
 
+/// Reads the copy in the bytes after a trace.
+///
+/// # Errors
+/// A message, if it is damaged.
+pub(super) fn of_bytes(after: &[u8]) -> Result<Parts, String> {
+    let is_whole = || {
+        let (parts, trailer) = after.split_at_checked(after.len().checked_sub(TRAILER as usize)?)?;
+        let (length, magic) = trailer.split_first_chunk::<4>()?;
+        (magic == MAGIC && u32::from_le_bytes(*length) as usize == parts.len()).then_some(parts)
+    };
+    let parts = is_whole().ok_or("the copy of its outcomes ends wrongly")?;
+    postcard::from_bytes(&expanded(parts)?).map_err(|error| error.to_string().to_lowercase())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -100,6 +114,7 @@ mod tests {
         assert!(written.starts_with(b"trace"));
         std::fs::write(&file, &written).expect("it can be written");
         assert_eq!(read(&file), Some(sample()));
+        assert_eq!(of_bytes(&written["trace".len()..]), Ok(sample()));
         // The bytes of the compressed part's header that hold no content may differ.
         let after_header = b"trace".len() + 10;
         for at in after_header..written.len() {
@@ -107,6 +122,7 @@ mod tests {
             damaged[at] ^= 1;
             std::fs::write(&file, &damaged).expect("it can be written");
             assert_eq!(read(&file), None, "byte {at}");
+            assert!(of_bytes(&damaged["trace".len()..]).is_err(), "byte {at}");
         }
         for length in 0..written.len() {
             std::fs::write(&file, &written[..length]).expect("it can be written");
