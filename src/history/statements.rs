@@ -13,9 +13,14 @@ pub(super) fn iri(name: &str) -> NamedNode {
     NamedNode::new_unchecked(expanded.unwrap_or_else(|| name.to_owned()))
 }
 
-/// A literal for a point in time.
+/// A literal for a point in time, in the canonical form of XML Schema, which has no zeros at the end of its seconds: stores
+/// return it in this form.
 pub(super) fn time(rfc3339: &str) -> Literal {
-    Literal::new_typed_literal(rfc3339, iri("xsd:dateTime"))
+    let canonical = match rfc3339.strip_suffix('Z') {
+        Some(seconds) if seconds.contains('.') => format!("{}Z", seconds.trim_end_matches('0').trim_end_matches('.')),
+        _ => rfc3339.to_owned(),
+    };
+    Literal::new_typed_literal(canonical, iri("xsd:dateTime"))
 }
 
 /// A literal for a count. (For a seed above `i64::MAX` the store keeps its digits.)
@@ -66,5 +71,31 @@ impl About<'_> {
     /// Adds a class.
     pub(super) fn is_a(&mut self, class: &str) -> &mut Self {
         self.has("rdf:type", iri(class))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Outlines are exported as they are written, but another store returned `22.43Z` for `22.430Z`.
+    #[test]
+    fn times_are_written_as_stores_return_them() {
+        for (written, canonical) in [
+            ("2026-11-25T05:15:22.430Z", "2026-11-25T05:15:22.43Z"),
+            ("2026-11-25T05:15:20.000Z", "2026-11-25T05:15:20Z"),
+            ("2026-11-25T05:15:20Z", "2026-11-25T05:15:20Z"),
+            ("2026-11-25T05:15:20.125Z", "2026-11-25T05:15:20.125Z"),
+        ] {
+            assert_eq!(time(written).value(), canonical);
+            let stored = oxigraph::store::Store::new().and_then(|store| {
+                let node = iri("act:Run");
+                let quad = Quad::new(node.clone(), node, time(written), oxigraph::model::GraphName::DefaultGraph);
+                store.insert(&quad)?;
+                store.iter().next().unwrap_or(Ok(quad))
+            });
+            let stored = stored.expect("it is in memory").object.to_string();
+            assert!(stored.starts_with(&format!("\"{canonical}\"")), "{stored}");
+        }
     }
 }
