@@ -174,6 +174,21 @@ fn a_flipped_bit_in_any_file_is_found_or_harmless() {
     }
 }
 
+/// A trace file has a copy of its run's outcomes. Restored from a backup under a wrong name, it showed those of another run.
+#[test]
+fn a_trace_file_of_another_run_does_not_change_outcomes() {
+    let folder = copied();
+    let show = |run: &str| stdout(&actcheck(folder.path(), &["show", run, "--history", "h", "--format", "json"]));
+    let traces: Vec<PathBuf> = files(&folder.path().join("h/traces"));
+    let names: Vec<String> =
+        traces.iter().map(|file| file.file_stem().unwrap().to_string_lossy().into_owned()).collect();
+    let before: Vec<String> = names.iter().map(|run| show(run)).collect();
+    let other = (1..traces.len()).find(|at| std::fs::read(&traces[*at]).unwrap() != std::fs::read(&traces[0]).unwrap());
+    std::fs::copy(&traces[other.expect("two runs differ")], &traces[0]).unwrap();
+    let after: Vec<String> = names.iter().map(|run| show(run)).collect();
+    assert_eq!(after, before);
+}
+
 #[test]
 fn a_damaged_mirror_is_written_anew_and_the_numbers_are_the_same() {
     let folder = copied();

@@ -92,7 +92,7 @@ impl History {
         let fault_of_copy = |id: &str, bytes: &[u8]| match trace_file::after_trace(bytes) {
             Ok([]) => None,
             Ok(after) => match (trace_parts::of_bytes(after), detail::parts(&*store, &run_node(id))) {
-                (Ok(copied), Ok(stored)) if copied != stored => {
+                (Ok((_, copied)), Ok(stored)) if copied != stored => {
                     Some("its copy of the outcomes differs from the store".to_owned())
                 }
                 (Err(why), _) => Some(why),

@@ -2,7 +2,13 @@
 
 use std::path::PathBuf;
 
-use crate::{History, fault, trace_file};
+use oxigraph::model::{GraphNameRef, Literal, QuadRef};
+use oxigraph::store::Store;
+
+use crate::detail::Parts;
+use crate::statements::iri;
+use crate::write_run::run_node;
+use crate::{History, fault, trace_file, trace_parts};
 use actcheck_base::{Diagnostic, Diagnostics, Files, RunFacts};
 use actcheck_data::{Choice, Trace};
 use actcheck_facts::extract;
@@ -11,7 +17,7 @@ impl History {
     /// Returns the trace of a run, named as in [`History::resolve`].
     ///
     /// # Errors
-    /// `H008` there is no such run, `H009` its trace is missing, `H007` its trace is damaged.
+    /// `H008` if there is no such run, `H009` if its trace is missing, `H007` if it is damaged.
     pub fn trace(&self, name: &str) -> Result<Trace, Diagnostics> {
         let id = self.resolve(name)?;
         if self.is_outline(&id)? {
@@ -93,6 +99,15 @@ impl History {
     /// Path of a run's trace file, which need not exist.
     pub(super) fn trace_path(&self, run: &str) -> PathBuf {
         self.folder.trace(run)
+    }
+
+    /// The copy of a run's objects, actions and outcomes in its trace file. `None` if they must be read from the store:
+    /// the copy is missing, or the file is of another run.
+    pub(super) fn copied_parts(&self, id: &str, store: &Store) -> Option<Parts> {
+        let (hash, parts) = trace_parts::read(&self.trace_path(id))?;
+        let (run, property, hash) = (run_node(id), iri("act:traceHash"), Literal::new_simple_literal(hash));
+        let is_of_run = store.contains(QuadRef::new(&run, &property, &hash, GraphNameRef::DefaultGraph));
+        is_of_run.unwrap_or(false).then_some(parts)
     }
 
     pub(super) fn decoded<T>(

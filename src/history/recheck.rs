@@ -16,7 +16,7 @@ use crate::read::{Node, id_of, subjects_in};
 use crate::statements::{Statements, iri, time};
 use crate::wanted::Wanted;
 use crate::write_run::{assertion_of, run_node, unique, write_assertion};
-use crate::{History, RunDetail, trace_parts};
+use crate::{History, RunDetail};
 use actcheck_base::{Diagnostics, Judgement};
 use actcheck_verdict::{action_score, run_score};
 
@@ -90,7 +90,7 @@ impl History {
     /// The campaign's own judgements of an action, from the copy in the run's trace file. Returns `None` if they must be
     /// read from the store.
     fn own_judgements(&self, run: &str, step: u32, wanted: &[String], store: &Store) -> Option<Vec<StoredJudgement>> {
-        let (_, actions) = trace_parts::read(&self.trace_path(run))?;
+        let (_, actions) = self.copied_parts(run, store)?;
         let (action, execution) = (actions.into_iter().find(|action| action.step == step)?, execution(run, step));
         let judgements = action.judgements.into_iter().filter(|judgement| wanted.contains(&judgement.property));
         let own: Vec<StoredJudgement> = judgements

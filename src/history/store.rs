@@ -114,7 +114,7 @@ impl History {
         let (run, in_memory) = (run_node(&record.id), RunQuads::new(write_run::quads_without_facts(record)));
         let parts = detail::parts(&in_memory, &run).map_err(|error| self.fault(&doing, &error))?;
         let bytes = trace_file::encode(&record.choices, &record.trace)
-            .and_then(|trace| trace_parts::appended(trace, &parts))
+            .and_then(|trace| trace_parts::appended(trace, &record.trace.hash, &parts))
             .map_err(|error| Diagnostic::error("H006", format!("{doing} failed: {error}")))?;
         let mut quads = in_memory.into_quads();
         graphs::write(&record.facts, &run, &mut quads);
@@ -296,7 +296,7 @@ impl History {
         }
         let node = run_node(&id);
         let store = self.store_with(|| Wanted::run(node.as_str()))?;
-        let read = match trace_parts::read(&self.folder.trace(&id)) {
+        let read = match self.copied_parts(&id, &store) {
             Some(parts) => detail::read_with(&*store, &node, parts),
             None => detail::read(&*store, &node),
         };

@@ -15,40 +15,35 @@ const MAGIC: &[u8; 8] = b"actpart1";
 /// Size of the length and the magic bytes after the copy. Unit: bytes.
 const TRAILER: u64 = 12;
 
-/// Appends the copy to the content of a trace file.
+/// Appends the copy to the content of a trace file. `hash`: of the trace, so that a copy of another run is noticed.
 ///
 /// # Errors
 /// A message, if it can't be encoded. (The current types never cause this.)
-pub(super) fn appended(mut trace: Vec<u8>, parts: &Parts) -> Result<Vec<u8>, String> {
-    let parts = compressed(&postcard::to_stdvec(parts).map_err(|error| error.to_string())?)?;
+pub(super) fn appended(mut trace: Vec<u8>, hash: &str, parts: &Parts) -> Result<Vec<u8>, String> {
+    let parts = compressed(&postcard::to_stdvec(&(hash, parts)).map_err(|error| error.to_string())?)?;
     let length = u32::try_from(parts.len()).map_err(|_| "it has more than 4 GB of outcomes".to_owned())?;
     trace.extend([parts.as_slice(), &length.to_le_bytes(), MAGIC].concat());
     Ok(trace)
 }
 
-/// Reads the copy. Returns `None` if the file has none that this program can read; its checksum shows damage.
-pub(super) fn read(file: &Path) -> Option<Parts> {
+/// Reads the copy and the hash of its trace. Returns `None` if the file has none that this program can read; its checksum shows damage.
+pub(super) fn read(file: &Path) -> Option<(String, Parts)> {
     let mut file = File::open(file).ok()?;
-    let size = file.metadata().ok()?.len();
-    file.seek(SeekFrom::Start(size.checked_sub(TRAILER)?)).ok()?;
-    let mut trailer = [0; TRAILER as usize];
-    file.read_exact(&mut trailer).ok()?;
-    let (length, magic) = trailer.split_first_chunk::<4>()?;
-    let length = u64::from(u32::from_le_bytes(*length));
-    if magic != MAGIC {
-        return None;
-    }
-    file.seek(SeekFrom::Start(size.checked_sub(TRAILER)?.checked_sub(length)?)).ok()?;
-    let mut parts = Vec::new();
-    file.take(length).read_to_end(&mut parts).ok()?;
-    postcard::from_bytes(&expanded(&parts).ok()?).ok()
+    let end = file.metadata().ok()?.len().checked_sub(TRAILER)?;
+    file.seek(SeekFrom::Start(end)).ok()?;
+    let mut length = [0; 4];
+    file.read_exact(&mut length).ok()?;
+    file.seek(SeekFrom::Start(end.checked_sub(u32::from_le_bytes(length).into())?)).ok()?;
+    let mut after = Vec::new();
+    file.read_to_end(&mut after).ok()?;
+    of_bytes(&after).ok()
 }
 
-/// Reads the copy in the bytes after a trace.
+/// Reads the copy in the bytes after a trace, and the hash of its trace.
 ///
 /// # Errors
 /// A message, if it is damaged.
-pub(super) fn of_bytes(after: &[u8]) -> Result<Parts, String> {
+pub(super) fn of_bytes(after: &[u8]) -> Result<(String, Parts), String> {
     let is_whole = || {
         let (parts, trailer) = after.split_at_checked(after.len().checked_sub(TRAILER as usize)?)?;
         let (length, magic) = trailer.split_first_chunk::<4>()?;
@@ -110,11 +105,11 @@ mod tests {
     fn a_copy_is_read_as_it_was_written_and_damage_is_noticed() {
         let folder = ScratchFolder::create().expect("it can be created");
         let file = folder.path().join("run.trace");
-        let written = appended(b"trace".to_vec(), &sample()).expect("it can be encoded");
+        let written = appended(b"trace".to_vec(), "ab", &sample()).expect("it can be encoded");
         assert!(written.starts_with(b"trace"));
         std::fs::write(&file, &written).expect("it can be written");
-        assert_eq!(read(&file), Some(sample()));
-        assert_eq!(of_bytes(&written["trace".len()..]), Ok(sample()));
+        assert_eq!(read(&file), Some(("ab".to_owned(), sample())));
+        assert_eq!(of_bytes(&written["trace".len()..]), Ok(("ab".to_owned(), sample())));
         // The bytes of the compressed part's header that hold no content may differ.
         let after_header = b"trace".len() + 10;
         for at in after_header..written.len() {

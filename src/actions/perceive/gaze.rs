@@ -25,12 +25,7 @@ pub fn towards(kinematics: &Kinematics, layout: &Layout, positions: &[f64], poin
         return turned;
     }
     // If the short way round hits a joint limit, the long way may not.
-    let mut ahead = positions.to_vec();
-    for joint in &layout.head {
-        let limits = &kinematics.joints()[*joint];
-        ahead[*joint] = 0.0_f64.clamp(limits.lower, limits.upper);
-    }
-    let other = self::turned(kinematics, layout, ahead, point);
+    let other = self::turned(kinematics, layout, ahead(kinematics, layout, positions), point);
     let miss = |posture: &[f64]| off(kinematics, posture, point).norm();
     if miss(&other) < miss(&turned) { other } else { turned }
 }
@@ -60,13 +55,19 @@ pub fn way_towards(robot: &Operator<'_>, point: &Point3<f64>) -> Vec<Vec<f64>> {
         first[*joint] = turned[*joint];
         first
     });
-    let ahead = layout.head.iter().fold(start.to_vec(), |mut ahead, joint| {
-        let limits = &kinematics.joints()[*joint];
-        ahead[*joint] = 0.0_f64.clamp(limits.lower, limits.upper);
-        ahead
-    });
+    let ahead = ahead(kinematics, layout, start);
     let first = one_first.chain([ahead]).find(|first| is_free(start, first) && is_free(first, &turned));
     first.map_or_else(|| vec![safely_towards(robot, point)], |first| vec![first, turned])
+}
+
+/// A posture with the head turned ahead, as far as its joints allow.
+fn ahead(kinematics: &Kinematics, layout: &Layout, positions: &[f64]) -> Vec<f64> {
+    let mut ahead = positions.to_vec();
+    for joint in &layout.head {
+        let limits = &kinematics.joints()[*joint];
+        ahead[*joint] = 0.0_f64.clamp(limits.lower, limits.upper);
+    }
+    ahead
 }
 
 /// Postures on the straight way from one to another.
