@@ -1,8 +1,12 @@
 //! Flat tables that are printed as text, CSV or JSON.
 
+use rayon::prelude::*;
 use serde_json::{Map, Value};
 
-use crate::text::{Page, fit, ruled, stacked};
+use crate::text::{Page, align, fit, ruled, stacked};
+
+/// Rows of a long table that are formatted together.
+const BLOCK: usize = 8192;
 
 /// Output format of a table.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -50,6 +54,9 @@ impl Table {
 
     /// Aligned columns, or one line for each value if they are too wide for the terminal.
     fn text(&self, page: Page) -> String {
+        if page.width.is_none() && self.rows.len() > BLOCK {
+            return page.set(&self.long_text());
+        }
         let mut table = ruled();
         table.set_header(&self.columns);
         for row in &self.rows {
@@ -63,6 +70,26 @@ impl Table {
             }
             None => stacked(&self.texts()),
         })
+    }
+
+    /// Aligned columns of a table that has many rows, and needs to fit no terminal. All processors format it.
+    fn long_text(&self) -> String {
+        let mut tables: Vec<_> = self
+            .rows
+            .par_chunks(BLOCK)
+            .map(|rows| {
+                let mut table = ruled();
+                for row in rows {
+                    table.add_row(row.iter().map(plain));
+                }
+                table
+            })
+            .collect();
+        if let Some(first) = tables.first_mut() {
+            first.set_header(&self.columns);
+        }
+        align(&mut tables);
+        tables.into_par_iter().map(|table| format!("{table}\n")).collect::<Vec<_>>().concat()
     }
 
     /// The texts of each column, the header first.
@@ -191,6 +218,16 @@ mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn a_long_table_is_aligned_as_a_whole() {
+        let mut table = Table::new(["n", "a wide title"]);
+        table.rows.extend((0..3 * BLOCK / 2).map(|row| vec![row.into(), "é".repeat(row % 7 + row / BLOCK * 9).into()]));
+        let mut whole = ruled();
+        whole.set_header(&table.columns);
+        whole.add_rows(table.rows.iter().map(|row| row.iter().map(plain)));
+        assert_eq!(table.text(Page::default()), format!("{whole}\n"));
     }
 
     #[test]

@@ -31,7 +31,7 @@ pub use oracles::oracles_text;
 pub use page::Page;
 pub(crate) use page::command;
 pub use recheck::recheck_text;
-pub(crate) use ruled::{fit, fitted, ruled, stacked};
+pub(crate) use ruled::{align, fit, fitted, ruled, stacked};
 pub use run::run_text;
 pub use scene_rule::scene_rule;
 pub use shrunk::shrunk_text;

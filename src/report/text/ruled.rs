@@ -6,6 +6,8 @@ use crate::text::Page;
 
 /// Width between the contents of two columns: one space of padding each, and one between.
 const GAP: usize = 3;
+/// Width of the padding of a column.
+const PADDING: u16 = 2;
 /// Padding left of the first column and right of the last one.
 const EDGES: usize = 2;
 /// Longest cell that stays in one line if columns can be hidden instead: a pass rate with its interval and counts. Unit:
@@ -32,6 +34,20 @@ pub(crate) fn fitted(mut table: Table, page: Page, expendable: &[&str]) -> Strin
     }
 }
 
+/// Gives the columns of tables that are printed below each other the same widths.
+pub(crate) fn align(tables: &mut [Table]) {
+    let mut widths: Vec<u16> = Vec::new();
+    for content in tables.iter().map(Table::column_max_content_widths) {
+        widths.resize(widths.len().max(content.len()), 0);
+        widths.iter_mut().zip(content).for_each(|(width, content)| *width = content.max(*width));
+    }
+    for table in tables {
+        for (column, width) in table.column_iter_mut().zip(&widths) {
+            column.set_constraint(ColumnConstraint::LowerBoundary(Width::Fixed(width.saturating_add(PADDING))));
+        }
+    }
+}
+
 /// Fits a table into a page without breaking a word or a number: hides the columns in `expendable`, the first one first,
 /// until the others fit. Returns the names of the hidden columns, or `None` if the table is too wide without them, too.
 ///
@@ -49,7 +65,9 @@ pub(crate) fn fit(table: &mut Table, page: Page, expendable: &[&str]) -> Option<
     })?;
     for (column, least) in table.column_iter_mut().zip(least) {
         column.set_constraint(if shown.contains(&column.index) {
-            ColumnConstraint::LowerBoundary(Width::Fixed(u16::try_from(least + 2).unwrap_or(u16::MAX)))
+            ColumnConstraint::LowerBoundary(Width::Fixed(
+                u16::try_from(least).unwrap_or(u16::MAX).saturating_add(PADDING),
+            ))
         } else {
             ColumnConstraint::Hidden
         });
