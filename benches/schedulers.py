@@ -192,12 +192,21 @@ PartitionName=all Nodes=ALL Default=YES MaxTime=INFINITE State=UP
         output("scontrol", "requeue", tasks[0])
         return "a task requeued"
 
+    def release(self):
+        """Lets the node and the tasks that are held run again, as an administrator does after a loss."""
+        subprocess.run(["scontrol", "update", f"nodename={os.uname().nodename}", "state=resume"], capture_output=True)
+        for task in set(output("squeue", "-h", "-t", "PD", "-o", "%A").split()):
+            subprocess.run(["scontrol", "release", task], capture_output=True)
+
     def lose_the_controller(self, process, folder):
         begun(folder)
         self.programs["slurmctld"].kill()
         self.programs["slurmctld"].wait()
         time.sleep(4)
         self.start("slurmctld", "-D")
+        # It has forgotten the last seconds, and may drain a node with tasks that it does not know.
+        time.sleep(15)
+        self.release()
         return "slurmctld killed and started again"
 
     def lose_the_node(self, process, folder):
@@ -210,7 +219,7 @@ PartitionName=all Nodes=ALL Default=YES MaxTime=INFINITE State=UP
         output("scontrol", "update", f"nodename={os.uname().nodename}", "state=down", "reason=lost")
         time.sleep(4)
         self.start("slurmd", "-D")
-        output("scontrol", "update", f"nodename={os.uname().nodename}", "state=resume")
+        self.release()
         return f"the node lost with {len(lost)} processes, and started again"
 
     def end(self):

@@ -90,6 +90,7 @@ mod second_judge;
 mod serve;
 mod serve_load;
 mod set_up;
+mod shells;
 mod shortcuts;
 mod shrink;
 mod shrunk;

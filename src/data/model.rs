@@ -53,22 +53,20 @@ pub struct Surface {
     pub size_m: [f64; 2],
 }
 
+impl Part {
+    /// Returns the convex solids of the part: the boxes of a tube, or the part itself. Frame: the model's.
+    pub fn solids(&self) -> Vec<Self> {
+        let Shape::Tube { .. } = self.shape else { return vec![self.clone()] };
+        let outer = self.pose.to_isometry();
+        let placed = |pose: &Pose| Pose::from_isometry(&(outer * pose.to_isometry()));
+        self.shape.staves().into_iter().map(|stave| Self { pose: placed(&stave.pose), shape: stave.shape }).collect()
+    }
+}
+
 impl ObjectModel {
-    /// Returns the convex solids of the model: its parts, with each tube split into boxes. Frame: the model's.
+    /// Returns the convex solids of the model. Frame: the model's.
     pub fn solids(&self) -> Vec<Part> {
-        let mut solids = Vec::new();
-        for part in &self.parts {
-            if let Shape::Tube { .. } = part.shape {
-                let outer = part.pose.to_isometry();
-                solids.extend(part.shape.staves().into_iter().map(|stave| Part {
-                    pose: Pose::from_isometry(&(outer * stave.pose.to_isometry())),
-                    shape: stave.shape,
-                }));
-            } else {
-                solids.push(part.clone());
-            }
-        }
-        solids
+        self.parts.iter().flat_map(Part::solids).collect()
     }
 
     /// Scales the model uniformly; the mass stays the same.

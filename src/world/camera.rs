@@ -11,7 +11,7 @@ use rapier3d::prelude::Collider;
 
 use crate::World;
 use crate::convert::{from_pose, to_real, to_vector};
-use crate::engine::Owner;
+use crate::engine::{Owner, SHELL};
 use crate::rays::{Lens, Solids};
 use actcheck_data::{Camera, ChoiceName, Choices, Look, Pose, Stream};
 
@@ -90,7 +90,7 @@ impl World {
         let lens = to_vector(&eye.translation.vector);
         let own = self.robot.kinematics.camera_link();
         let visible = self.engine.colliders.iter().map(|(_, collider)| collider).filter(move |collider| {
-            let Owner::Link(link) = Owner::from_tag(collider.user_data) else { return true };
+            let Owner::Link(link) = Owner::from_tag(collider.user_data) else { return collider.user_data & SHELL == 0 };
             let away = f64::from(collider.shape().distance_to_point(collider.position(), lens, true));
             away > if link == own { HOUSING_M } else { 0.0 }
         });

@@ -45,6 +45,7 @@ mod self_contact;
 mod sense;
 mod settle;
 mod share;
+mod shell;
 mod silhouette;
 mod simulation;
 mod surface;
@@ -71,4 +72,4 @@ pub use views::robot_views;
 
 /// Version of the physics: the same scene and commands give the same bits only with the same version. It rises with each
 /// change of these bits.
-pub const PHYSICS_VERSION: u32 = 3;
+pub const PHYSICS_VERSION: u32 = 4;

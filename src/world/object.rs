@@ -3,12 +3,15 @@
 use std::sync::Arc;
 
 use nalgebra::{Isometry3, Vector3};
-use rapier3d::prelude::{CoefficientCombineRule, MassProperties, PhysicsWorld, RigidBodyBuilder, RigidBodyHandle};
+use rapier3d::prelude::{
+    CoefficientCombineRule, ColliderBuilder, MassProperties, PhysicsWorld, RigidBodyBuilder, RigidBodyHandle,
+};
 
 use crate::convert::{to_pose, to_real, to_vector};
 use crate::engine::{Owner, collider};
 use crate::furniture::slides;
-use actcheck_data::{Inertia, ObjectModel, Role, SceneObject};
+use crate::shell::{Hollow, hollows_of};
+use actcheck_data::{Inertia, ObjectModel, Part, Role, SceneObject};
 
 /// A body slower than this may fall asleep. Unit: m/s of its farthest point.
 const SLEEP_SPEED: f32 = 0.02;
@@ -31,6 +34,27 @@ pub(super) struct Object {
     pub(super) restitution: f64,
     /// Its initial pose in the scene.
     pub(super) placed: Isometry3<f64>,
+    /// Its tubes, if it can move.
+    pub(super) hollows: Vec<Hollow>,
+}
+
+/// Gives the mass of a body's colliders to the body, so that it does not depend on which of them are enabled.
+fn weigh(engine: &mut PhysicsWorld, handle: RigidBodyHandle) {
+    let Some(body) = engine.bodies.get_mut(handle) else { return };
+    body.recompute_mass_properties_from_colliders(&engine.colliders);
+    let whole = body.mass_properties().local_mprops;
+    for collider in body.colliders() {
+        if let Some(collider) = engine.colliders.get_mut(*collider) {
+            collider.set_density(0.0);
+        }
+    }
+    body.set_additional_mass_properties(whole, false);
+}
+
+/// Returns the collider of a convex solid of an object in the scene. Returns `None` if it has no volume.
+fn of_object(solid: &Part, idx: usize, object: &SceneObject) -> Option<ColliderBuilder> {
+    let collider = collider(solid, Owner::Object(idx), object.friction, object.restitution)?;
+    Some(collider.restitution_combine_rule(CoefficientCombineRule::Average))
 }
 
 /// Adds one object with the shapes of its model.
@@ -51,11 +75,18 @@ pub(super) fn insert(engine: &mut PhysicsWorld, idx: usize, object: &SceneObject
     }
     // If the model states its inertia, the shapes have no mass of their own.
     let density = if spread.is_some() { 0.0 } else { object.mass_kg / object.model.volume().max(1e-9) };
-    for solid in object.model.solids() {
-        if let Some(collider) = collider(&solid, Owner::Object(idx), object.friction, object.restitution) {
-            let collider = collider.density(to_real(density)).restitution_combine_rule(CoefficientCombineRule::Average);
-            engine.insert_collider(collider, Some(body));
-        }
+    let mut parts = Vec::new();
+    for part in &object.model.parts {
+        let colliders = part.solids().iter().filter_map(|solid| of_object(solid, idx, object)).collect::<Vec<_>>();
+        let insert = |collider: ColliderBuilder| engine.insert_collider(collider.density(to_real(density)), Some(body));
+        parts.push(colliders.into_iter().map(insert).collect::<Vec<_>>());
+    }
+    let mut hollows = Vec::new();
+    if !fixed {
+        hollows = hollows_of(&object.model.parts, &parts, |solid| of_object(solid, idx, object));
+    }
+    if !hollows.is_empty() {
+        weigh(engine, body);
     }
     Object {
         id: object.id.clone(),
@@ -68,6 +99,7 @@ pub(super) fn insert(engine: &mut PhysicsWorld, idx: usize, object: &SceneObject
         friction: object.friction,
         restitution: object.restitution,
         placed,
+        hollows,
     }
 }
 

@@ -13,7 +13,7 @@ use rapier3d::prelude::{Collider, RigidBodyHandle};
 use crate::World;
 use crate::contacts::Touch;
 use crate::convert::{from_pose, from_vector};
-use crate::engine::Owner;
+use crate::engine::{Owner, SHELL};
 use crate::room::Reach;
 
 /// Control ticks between two self-collision checks. At 60 ticks per second, that is 20 checks per second: a link at 1
@@ -153,10 +153,11 @@ impl World {
         deepest
     }
 
-    /// Returns the colliders of a body.
+    /// Returns the colliders of a body, without shells.
     pub(super) fn colliders_of(&self, body: RigidBodyHandle) -> impl Iterator<Item = &Collider> {
         let handles = self.engine.bodies.get(body).map(rapier3d::prelude::RigidBody::colliders).unwrap_or_default();
-        handles.iter().filter_map(|handle| self.engine.colliders.get(*handle))
+        let colliders = handles.iter().filter_map(|handle| self.engine.colliders.get(*handle));
+        colliders.filter(|collider| collider.user_data & SHELL == 0)
     }
 }
 

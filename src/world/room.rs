@@ -77,7 +77,7 @@ pub(super) struct Room {
     /// Ticks for which the engine still moves the whole robot.
     whole_ticks: u32,
     /// The shortcuts that may be taken.
-    shortcuts: Shortcuts,
+    pub(super) shortcuts: Shortcuts,
     /// Number of ticks so far with each reach.
     ticks: [u64; 4],
 }
@@ -91,16 +91,19 @@ pub struct Shortcuts {
     pub robot_apart: bool,
     /// Only the hand in the engine where only the hand can touch something, and only movable objects.
     pub hand_alone: bool,
-    /// Half of the substeps where the engine moves the hand alone. Held objects then swing a little more, so that this is
-    /// not among [`Shortcuts::ALL`].
+    /// A closed surface instead of the staves of a hollow object while nothing is at its mouth.
+    pub shells: bool,
+    /// Half of the substeps where the engine moves the hand alone.
     pub few_substeps: bool,
 }
 
 impl Shortcuts {
     /// All that keep the quality of a grasp.
-    pub const ALL: Self = Self { free_motion: true, robot_apart: true, hand_alone: true, few_substeps: false };
+    pub const ALL: Self =
+        Self { free_motion: true, robot_apart: true, hand_alone: true, shells: true, few_substeps: true };
     /// None: the engine simulates everything in every tick.
-    pub const NONE: Self = Self { free_motion: false, robot_apart: false, hand_alone: false, few_substeps: false };
+    pub const NONE: Self =
+        Self { free_motion: false, robot_apart: false, hand_alone: false, shells: false, few_substeps: false };
 
     /// Returns the reach for which the engine must prepare, given that of the robot.
     fn limit(self, reach: Reach) -> Reach {

@@ -202,6 +202,7 @@ impl World {
         let poses = self.robot.kinematics.links(&self.robot.positions);
         let holding = self.robot.kinematics.holding_efforts_at(&poses);
         let reach = self.find_room(poses);
+        self.close_hollows(reach);
         self.step_all(reach, &holding);
     }
 

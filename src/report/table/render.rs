@@ -1,12 +1,14 @@
 //! Flat tables that are printed as text, CSV or JSON.
 
-use rayon::prelude::*;
+use std::num::NonZero;
+use std::thread;
+
 use serde_json::{Map, Value};
 
 use crate::text::{Page, align, fit, ruled, stacked};
 
-/// Rows of a long table that are formatted together.
-const BLOCK: usize = 8192;
+/// Tables with more rows are long.
+const LONG: usize = 8192;
 
 /// Output format of a table.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -54,7 +56,7 @@ impl Table {
 
     /// Aligned columns, or one line for each value if they are too wide for the terminal.
     fn text(&self, page: Page) -> String {
-        if page.width.is_none() && self.rows.len() > BLOCK {
+        if page.width.is_none() && self.rows.len() > LONG {
             return page.set(&self.long_text());
         }
         let mut table = ruled();
@@ -74,22 +76,18 @@ impl Table {
 
     /// Aligned columns of a table that has many rows, and needs to fit no terminal. All processors format it.
     fn long_text(&self) -> String {
-        let mut tables: Vec<_> = self
-            .rows
-            .par_chunks(BLOCK)
-            .map(|rows| {
-                let mut table = ruled();
-                for row in rows {
-                    table.add_row(row.iter().map(plain));
-                }
-                table
-            })
-            .collect();
+        let threads = thread::available_parallelism().map_or(1, NonZero::get);
+        let blocks = self.rows.chunks(self.rows.len().div_ceil(threads).max(1));
+        let mut tables = in_threads(blocks, |rows| {
+            let mut table = ruled();
+            table.add_rows(rows.iter().map(|row| row.iter().map(plain)));
+            table
+        });
         if let Some(first) = tables.first_mut() {
             first.set_header(&self.columns);
         }
         align(&mut tables);
-        tables.into_par_iter().map(|table| format!("{table}\n")).collect::<Vec<_>>().concat()
+        in_threads(tables.iter(), |table| format!("{table}\n")).concat()
     }
 
     /// The texts of each column, the header first.
@@ -169,6 +167,15 @@ impl TableParts {
     }
 }
 
+/// Converts items, each in a thread of its own, in order.
+fn in_threads<T: Send, U: Send>(items: impl Iterator<Item = T>, convert: impl Fn(T) -> U + Sync) -> Vec<U> {
+    let convert = &convert;
+    thread::scope(|scope| {
+        let begun: Vec<_> = items.map(|item| scope.spawn(move || convert(item))).collect();
+        begun.into_iter().map(|thread| thread.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))).collect()
+    })
+}
+
 fn csv_lines(rows: impl Iterator<Item = Vec<String>>) -> String {
     let mut writer = csv::WriterBuilder::new().from_writer(Vec::new());
     for row in rows {
@@ -223,7 +230,7 @@ mod tests {
     #[test]
     fn a_long_table_is_aligned_as_a_whole() {
         let mut table = Table::new(["n", "a wide title"]);
-        table.rows.extend((0..3 * BLOCK / 2).map(|row| vec![row.into(), "é".repeat(row % 7 + row / BLOCK * 9).into()]));
+        table.rows.extend((0..3 * LONG / 2).map(|row| vec![row.into(), "é".repeat(row % 7 + row / LONG * 9).into()]));
         let mut whole = ruled();
         whole.set_header(&table.columns);
         whole.add_rows(table.rows.iter().map(|row| row.iter().map(plain)));
