@@ -1,10 +1,13 @@
 //! Hollow objects: closed while nothing is at their mouth, and open for things that fall in.
 
-use actcheck::data::{Pose, Role};
+use std::sync::Arc;
+
+use actcheck::actions::perform;
+use actcheck::data::{Budget, Choices, Pose, Role};
 use actcheck::world::{GRAVITY, Poison, Shortcuts, World, build};
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
-use crate::physics::{block, body, object, scene, shipped};
+use crate::physics::{block, body, call, object, on_table, scene, shipped};
 
 const BOTH: [Shortcuts; 2] = [Shortcuts::NONE, Shortcuts::ALL];
 /// Friction of the floor.
@@ -128,4 +131,34 @@ fn a_lying_glass_rolls_like_an_open_one() {
         found.push(body(&world, "thing_1").pose.position[2]);
     }
     assert!((found[0] - found[1]).abs() < 1e-3, "{found:?}");
+}
+
+/// The engine keeps the impulses of points that it no longer solves.
+#[test]
+fn fingers_press_a_thing_with_the_force_of_their_motors() {
+    for name in ["can", "glass", "bottle"] {
+        let model = shipped(name);
+        let mut world = build(&on_table(Arc::clone(&model), model.mass_kg, 0.9)).expect("the scene is right");
+        assert!(world.settle().settled);
+        let trace = perform(&[call("Pick")], &mut world, &mut Choices::random(1, 0), &Budget { action_secs: 60.0 });
+        let report = trace.actions[0].report.as_ref().expect("the skill reports");
+        assert!(report.succeeded, "{name}: {}", report.message);
+        let mut hold = world.hold();
+        hold.gripper_opening_m = 0.0;
+        (0..120).for_each(|_| world.step(&hold));
+        world.begin_record();
+        (0..120).for_each(|_| world.step(&hold));
+        let record = world.end_record();
+        let grip = world.observe().finger_efforts_n.iter().fold(0.0_f64, |most, effort| most.max(effort.abs()));
+        let of_fingers: Vec<f64> = record
+            .contacts
+            .iter()
+            .filter(|contact| contact.pair.iter().any(|name| name.starts_with("robot/finger")))
+            .map(|contact| contact.max_force_n)
+            .collect();
+        assert_eq!(of_fingers.len(), 2, "{name}");
+        for force in of_fingers {
+            assert!((0.9..1.5).contains(&(force / grip)), "{name}: {force} N with {grip} N of the motor");
+        }
+    }
 }

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use nalgebra::{Point3, Vector3};
 use parry3d::query::TrackedContact;
-use rapier3d::prelude::{Collider, ContactData, PhysicsWorld};
+use rapier3d::prelude::{Collider, ContactData, ContactManifold, PhysicsWorld, SolverContact};
 
 use crate::World;
 use crate::convert::{from_pose, from_vector};
@@ -58,7 +58,7 @@ impl World {
             let Some(one) = engine.colliders.get(pair.collider1) else { continue };
             for manifold in pair.solver_manifolds() {
                 let normal = from_vector(manifold.data.normal);
-                for point in manifold.points.iter().filter(|point| point.data.impulse > 0.0) {
+                for point in solved(manifold).filter(|point| point.data.impulse > 0.0) {
                     let force = impulse_of(point, &normal) * sign;
                     let at = from_pose(one.position()) * Point3::from(from_vector(point.local_p1));
                     push = push.plus(Twist::by_force(&force, &at), 1.0);
@@ -67,6 +67,13 @@ impl World {
         }
         push
     }
+}
+
+/// Returns the points of a contact that the engine solved in the last step. It leaves out some of those that it found: they
+/// keep the impulse of an earlier step.
+fn solved(manifold: &ContactManifold) -> impl Iterator<Item = &TrackedContact<ContactData>> {
+    let indices = manifold.data.solver_contacts.iter().flat_map(SolverContact::contact_indices);
+    indices.filter_map(|index| manifold.points.get(usize::try_from(index).ok()?))
 }
 
 /// Returns the impulse of normal force and friction on the second of a pair in the last step. Unit: N·s.
@@ -89,7 +96,7 @@ pub fn touches(engine: &PhysicsWorld) -> BTreeMap<(Owner, Owner), Touch> {
         let (key, sign) = if first <= second { ((first, second), 1.0) } else { ((second, first), -1.0) };
         for manifold in pair.solver_manifolds() {
             let normal = from_vector(manifold.data.normal);
-            for point in &manifold.points {
+            for point in solved(manifold) {
                 let impulse = f64::from(point.data.impulse);
                 if impulse <= 0.0 {
                     continue;
