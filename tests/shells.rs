@@ -103,10 +103,11 @@ fn a_closed_glass_tips_over_at_the_tilt_of_an_open_one() {
 
 #[test]
 fn things_fall_into_a_closed_glass_and_it_opens_before() {
-    for height in [0.2, 0.6] {
-        let dropped = object("cube_1", block([0.02; 3]), Role::Other, Pose::upright([0.0, 0.0, 5.0], 0.0), 0.01, 0.5);
+    // After a second, the glass is asleep.
+    for (height, secs) in [(0.2, 0.2), (0.6, 0.2), (0.2, 1.0), (0.8, 1.0)] {
+        let dropped = object("cube_1", block([0.02; 3]), Role::Other, Pose::upright([0.5, 0.0, 0.0], 0.0), 0.01, 0.5);
         let mut world = with_thing("glass", Pose::upright([0.0, 0.0, 0.0], 0.0), vec![dropped], Shortcuts::ALL);
-        wait(&mut world, 0.2);
+        wait(&mut world, secs);
         assert!(world.is_closed("thing_1"));
         world.poison("cube_1", Poison::Teleport([0.005, 0.0, 0.146 + height]));
         world.poison("cube_1", Poison::Velocity([0.0; 3]));

@@ -246,7 +246,8 @@ impl World {
         reach
     }
 
-    fn rests(&self, object: &Object) -> bool {
+    /// Returns whether an object is fixed or asleep.
+    pub(super) fn rests(&self, object: &Object) -> bool {
         self.engine.bodies.get(object.body).is_none_or(|body| body.is_fixed() || body.is_sleeping())
     }
 

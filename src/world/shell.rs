@@ -152,8 +152,10 @@ impl World {
         let lid_at = mouth * turned;
         let around = lid.aabb(&lid_at);
         let links = self.robot.bodies.iter().copied();
-        let others = self.objects.iter().enumerate().filter(|(idx, _)| *idx != object && !asleep);
-        let bodies = links.chain(others.map(|(_, other)| other.body));
+        let others = self.objects.iter().enumerate().filter(|(idx, _)| *idx != object).map(|(_, other)| other);
+        // Between things at rest, nothing changes.
+        let others = others.filter(|other| !asleep || !self.rests(other));
+        let bodies = links.chain(others.map(|other| other.body));
         for (body_near, handle) in bodies.filter_map(|handle| Some((self.engine.bodies.get(handle)?, handle))) {
             let margin = to_real(MOUTH_M + self.way_between(body, body_near));
             // A body with an impossible state is a fault, which is found after the step.
