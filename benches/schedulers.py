@@ -299,6 +299,9 @@ def for_kubernetes(folder):
 
 
 def main():
+    missing = [name for name in ["munged", "slurmctld", "slurmd"] if not shutil.which(name, path="/usr/sbin:/usr/bin")]
+    if missing or os.geteuid() != 0:
+        sys.exit("run this as root, after: apt-get install slurm-wlm munge")
     random.seed(1)
     with tempfile.TemporaryDirectory() as name:
         folder = pathlib.Path(name)

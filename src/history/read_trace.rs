@@ -17,7 +17,7 @@ impl History {
     /// Returns the trace of a run, named as in [`History::resolve`].
     ///
     /// # Errors
-    /// `H008` if there is no such run, `H009` if its trace is missing, `H007` if it is damaged.
+    /// `H008`: no run has this name. `H009`: the trace file of the run is missing. `H007`: the trace file is damaged.
     pub fn trace(&self, name: &str) -> Result<Trace, Diagnostics> {
         let id = self.resolve(name)?;
         if self.is_outline(&id)? {

@@ -26,7 +26,8 @@ pub(super) fn appended(mut trace: Vec<u8>, hash: &str, parts: &Parts) -> Result<
     Ok(trace)
 }
 
-/// Reads the copy and the hash of its trace. Returns `None` if the file has none that this program can read; its checksum shows damage.
+/// Reads the copy and the hash of its trace. Returns `None` if the file has none that this program can read; its checksum
+/// shows damage.
 pub(super) fn read(file: &Path) -> Option<(String, Parts)> {
     let mut file = File::open(file).ok()?;
     let end = file.metadata().ok()?.len().checked_sub(TRAILER)?;

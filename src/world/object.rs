@@ -38,25 +38,6 @@ pub(super) struct Object {
     pub(super) hollows: Vec<Hollow>,
 }
 
-/// Gives the mass of a body's colliders to the body, so that it does not depend on which of them are enabled.
-fn weigh(engine: &mut PhysicsWorld, handle: RigidBodyHandle) {
-    let Some(body) = engine.bodies.get_mut(handle) else { return };
-    body.recompute_mass_properties_from_colliders(&engine.colliders);
-    let whole = body.mass_properties().local_mprops;
-    for collider in body.colliders() {
-        if let Some(collider) = engine.colliders.get_mut(*collider) {
-            collider.set_density(0.0);
-        }
-    }
-    body.set_additional_mass_properties(whole, false);
-}
-
-/// Returns the collider of a convex solid of an object in the scene. Returns `None` if it has no volume.
-fn of_object(solid: &Part, idx: usize, object: &SceneObject) -> Option<ColliderBuilder> {
-    let collider = collider(solid, Owner::Object(idx), object.friction, object.restitution)?;
-    Some(collider.restitution_combine_rule(CoefficientCombineRule::Average))
-}
-
 /// Adds one object with the shapes of its model.
 pub(super) fn insert(engine: &mut PhysicsWorld, idx: usize, object: &SceneObject) -> Object {
     let placed = object.pose.to_isometry();
@@ -81,10 +62,10 @@ pub(super) fn insert(engine: &mut PhysicsWorld, idx: usize, object: &SceneObject
         let insert = |collider: ColliderBuilder| engine.insert_collider(collider.density(to_real(density)), Some(body));
         parts.push(colliders.into_iter().map(insert).collect::<Vec<_>>());
     }
-    let mut hollows = Vec::new();
-    if !fixed {
-        hollows = hollows_of(&object.model.parts, &parts, |solid| of_object(solid, idx, object));
-    }
+    let hollows = match fixed {
+        true => Vec::new(),
+        false => hollows_of(&object.model.parts, &parts, |solid| of_object(solid, idx, object)),
+    };
     if !hollows.is_empty() {
         weigh(engine, body);
     }
@@ -101,6 +82,25 @@ pub(super) fn insert(engine: &mut PhysicsWorld, idx: usize, object: &SceneObject
         placed,
         hollows,
     }
+}
+
+/// Gives the mass of a body's colliders to the body, so that it does not depend on which of them are enabled.
+fn weigh(engine: &mut PhysicsWorld, handle: RigidBodyHandle) {
+    let Some(body) = engine.bodies.get_mut(handle) else { return };
+    body.recompute_mass_properties_from_colliders(&engine.colliders);
+    let whole = body.mass_properties().local_mprops;
+    for collider in body.colliders() {
+        if let Some(collider) = engine.colliders.get_mut(*collider) {
+            collider.set_density(0.0);
+        }
+    }
+    body.set_additional_mass_properties(whole, false);
+}
+
+/// Returns the collider of a convex solid of an object in the scene. Returns `None` if it has no volume.
+fn of_object(solid: &Part, idx: usize, object: &SceneObject) -> Option<ColliderBuilder> {
+    let collider = collider(solid, Owner::Object(idx), object.friction, object.restitution)?;
+    Some(collider.restitution_combine_rule(CoefficientCombineRule::Average))
 }
 
 /// Returns the mass properties that a model states, scaled to the mass in the scene.

@@ -183,7 +183,7 @@ impl World {
     /// Returns whether a solid is in the shell of a tube, of which the object is here.
     fn is_in_shell(&self, hollow: &Hollow, at: &Pose, solid: &Collider) -> bool {
         let its_box: Aabb = solid.compute_aabb();
-        hollow.closed.iter().take(1).any(|shell| {
+        hollow.closed.first().is_some_and(|shell| {
             let pose = *at * shell.position;
             shell.shape.compute_aabb(&pose).intersects(&its_box)
                 && contact(&pose, shell.shape.as_ref(), solid.position(), solid.shape(), 0.0)
