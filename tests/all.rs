@@ -68,6 +68,7 @@ mod pictures;
 mod place;
 mod proofs;
 mod protocol;
+mod published_robots;
 mod python_client;
 mod rates;
 mod readers;

@@ -39,7 +39,7 @@ pub(crate) const TOP_DEPTH_M: f64 = 0.03;
 /// Lowest position of the grasp link from above: the fingers reach 2.5 cm further. Unit: metres.
 const TOP_LOWEST_M: f64 = 0.0275;
 /// Total room that the widest opening must leave beside an object, both sides together. Unit: metres.
-pub(crate) const LEAST_ROOM_M: f64 = 0.012;
+pub(crate) const LEAST_ROOM_M: f64 = 0.01;
 /// Objects whose sides differ by less are treated as round. Unit: metres. Perceived sizes are off by some millimetres.
 const ROUND_M: f64 = 0.015;
 /// Downward pitch of a slanted hand, used where a hand that points straight down is out of reach. Unit: radians. Steep

@@ -18,8 +18,8 @@ pub enum Hindrance {
     OutOfReach,
     /// The arm can't move the hand straight to the object or up from it.
     NoLift,
-    /// The arm would collide with the robot.
-    Itself,
+    /// The arm would collide with the robot. `links` are the two that come too close, if the postures were found.
+    Itself { links: Option<(usize, usize)> },
     /// The base has no free path to its place.
     NoRoute,
     /// The arm has no free path to its posture.
@@ -35,7 +35,7 @@ impl Hindrance {
             Self::Dearer => (0, 0.0),
             Self::OutOfReach => (1, 0.0),
             Self::NoLift => (2, 0.0),
-            Self::Itself => (3, 0.0),
+            Self::Itself { links } => (3, if links.is_some() { 1.0 } else { 0.0 }),
             Self::NoRoute => (4, 0.0),
             Self::Blocked { lack_m, .. } => (5, -lack_m),
             Self::NoPath => (6, 0.0),
@@ -67,7 +67,11 @@ impl Nearest {
             None | Some(Hindrance::Dearer) => return NO_WAY.to_owned(),
             Some(Hindrance::OutOfReach) => out_of_reach(thing, around.furniture),
             Some(Hindrance::NoLift) => "the arm reaches it but can't lift it straight up".to_owned(),
-            Some(Hindrance::Itself) => "the arm would collide with the robot".to_owned(),
+            Some(Hindrance::Itself { links: None }) => "the arm would collide with the robot".to_owned(),
+            Some(Hindrance::Itself { links: Some((first, second)) }) => {
+                let [first, second] = [first, second].map(|link| around.kinematics.link_name(*link));
+                format!("the arm would collide with the robot, {second} with {first}")
+            }
             Some(Hindrance::NoRoute) => "the base has no free path to where the arm reaches it".to_owned(),
             Some(Hindrance::NoPath) => "the arm found no free path to where it reaches it".to_owned(),
             Some(Hindrance::Blocked { posture, .. }) => around.in_the_way(posture),

@@ -360,12 +360,16 @@ impl<'a> Planner<'a> {
     fn lifted(&self, at_thing: Vec<f64>) -> Result<(Vec<f64>, Vec<Vec<f64>>), Hindrance> {
         let mut hindrance = Hindrance::NoLift;
         let found = LIFTS_M.iter().filter_map(|height| self.vertically(&at_thing, *height)).find_map(|lift| {
-            hindrance = Hindrance::Itself;
+            let touching = |posture: &Vec<f64>| self.itself.touching(&self.kinematics.links(posture));
+            hindrance = Hindrance::Itself { links: None };
             self.heads.iter().find_map(|head| {
                 let at_thing = self.with_head(&at_thing, head);
                 let lift: Vec<Vec<f64>> = lift.iter().map(|posture| self.with_head(posture, head)).collect();
-                let is_free = std::iter::once(&at_thing).chain(&lift).all(|posture| !self.touches_itself(posture));
-                is_free.then_some((at_thing, lift))
+                let links = std::iter::once(&at_thing).chain(&lift).find_map(touching);
+                if links.is_some() {
+                    hindrance = Hindrance::Itself { links };
+                }
+                links.is_none().then_some((at_thing, lift))
             })
         });
         found.ok_or(hindrance)

@@ -36,7 +36,7 @@ impl Planner<'_> {
         }
         let hindrance = match self.leg_cost(stand, unfolded, travel) {
             Ok(leg) if self.keeps_off_itself(stand, unfolded) => return below_bound(cost.max(leg)),
-            Ok(_) => Hindrance::Itself,
+            Ok(_) => Hindrance::Itself { links: None },
             Err(hindrance) => hindrance,
         };
         let mut samples = samples.share(SAMPLES_A_GRASP);

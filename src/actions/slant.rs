@@ -85,6 +85,8 @@ pub(crate) fn aside(thing: &Sighting, hand: &Hand, robot: &Operator<'_>) -> Vec<
 
 fn all(thing: &Sighting, hand: &Hand, robot: &Operator<'_>, (pitches, turns): (&[f64], &[f64])) -> Vec<Grasp> {
     let along = thing.pose.yaw();
+    let only = robot.kinematics().only_pitch(&robot.layout().arm, robot.commanded());
+    let pitches = only.as_ref().map_or(pitches, std::slice::from_ref);
     let mut found = Vec::new();
     for idx in 0..N_HEADINGS {
         let heading = along + TAU * f64::from(idx) / f64::from(N_HEADINGS);

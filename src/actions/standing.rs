@@ -180,7 +180,7 @@ impl<'a> Arm<'a> {
         for posture in legs {
             let (room, clear_of_itself) = self.meanwhile.room(&posture);
             if !clear_of_itself {
-                return Err(Hindrance::Itself);
+                return Err(Hindrance::Itself { links: None });
             }
             let lack_m = (FURNITURE_CLEAR_M - room.furniture_m).max(LEAST_CLEAR_M - room.things_m);
             let is_free = room.furniture_m >= FURNITURE_CLEAR_M && room.things_m >= LEAST_CLEAR_M;

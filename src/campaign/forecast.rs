@@ -23,13 +23,15 @@ const IN_VIEW: f64 = 0.5;
 
 impl Env {
     /// Predicts which objects and surfaces the robot can't handle, as warnings with numbers: the gripper is too narrow
-    /// (S070), objects are out of reach (S071) or too heavy (S072), or the camera does not see a surface (S073).
+    /// (S070), objects are out of reach (S071) or too heavy (S072), the camera does not see a surface (S073), or the
+    /// arm's motors can't hold its own weight (S074).
     pub fn forecast(&self) -> Diagnostics {
         let mut found = Diagnostics::new();
         let campaign = &self.campaign;
         if !matches!(campaign.launcher, Launcher::Reference) || campaign.case.is_some() {
             return found;
         }
+        found.extend(self.too_weak().into_iter().collect());
         let scenes = self.nominal_scenes();
         if let Some(test) = self.test_with("PerceivePlane") {
             self.foresee_views(&scenes, test, &mut found);
@@ -82,6 +84,22 @@ impl Env {
 
     fn draw(&self, values: &BTreeMap<ChoiceName, Vec<ChoiceValue>>, test: usize) -> Option<Scene> {
         scenario::draw(&self.space, test, &mut Choices::named(values)).ok()
+    }
+
+    /// S074 for each joint of the arm that can't hold the arm by its motor alone.
+    fn too_weak(&self) -> Vec<Diagnostic> {
+        let robot = &self.campaign.robot;
+        let warning = |joint: world::BalancedJoint| {
+            let message = format!(
+                "the joint `{}` of {} can't hold the arm: its `effort` is {:.1}, and the weight of the links beyond it \
+                 needs up to {:.1}; it is simulated as balanced by a spring",
+                joint.name, robot.name, joint.effort, joint.weight,
+            );
+            let help = "nothing, if the robot has springs or counterweights; otherwise correct the joint's `effort`, or \
+                        the masses of the links, in the URDF";
+            self.campaign.warning("S074", "robot.profile", message).help(help)
+        };
+        world::balanced_joints(robot).unwrap_or_default().into_iter().map(warning).collect()
     }
 
     /// S070 if the gripper opens too little for the narrower side.

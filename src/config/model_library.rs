@@ -287,7 +287,16 @@ impl ModelLibrary {
         found: &mut Diagnostics,
     ) -> Option<Arc<RobotProfile>> {
         let (files, path, packages) = self.locate_robot(root, folder, found)?;
-        robot::read_with(&files, &path, &packages).map(Arc::new).map_err(|faults| found.extend(faults)).ok()
+        match robot::read_telling(&files, &path, &packages) {
+            Ok((profile, warnings)) => {
+                found.extend(warnings);
+                Some(Arc::new(profile))
+            }
+            Err(faults) => {
+                found.extend(faults);
+                None
+            }
+        }
     }
 
     /// Returns the profile of the robot, where it is, and the folders of `package_dirs`. Reports the faults of the

@@ -4,6 +4,7 @@ use actcheck_base::{Diagnostic, Diagnostics, Digest, Files, Source, did_you_mean
 use actcheck_data::RobotProfile;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use crate::foreign::{self, Lookup};
 use crate::paths::resolve_path;
@@ -61,6 +62,18 @@ pub fn read(files: &Files, path: &Path) -> Result<RobotProfile, Diagnostics> {
 /// (W011), a failed xacro expansion (W012), faults of the URDF and its meshes (W031 to W037, W051), and roles that the
 /// URDF's joints and links can't fill (W050 to W054).
 pub fn read_with(files: &Files, path: &Path, packages: &[PathBuf]) -> Result<RobotProfile, Diagnostics> {
+    read_telling(files, path, packages).map(|(profile, _)| profile)
+}
+
+/// As [`read_with`], with the warnings of the URDF (W036).
+///
+/// # Errors
+/// As [`read_with`].
+pub(crate) fn read_telling(
+    files: &Files,
+    path: &Path,
+    packages: &[PathBuf],
+) -> Result<(RobotProfile, Diagnostics), Diagnostics> {
     let source = files.read(path).map_err(|reason| {
         Diagnostic::error("W010", format!("cannot read the robot profile {}: {reason}", path.display()))
             .help("a profile is a TOML file that names a URDF and its joints")
@@ -87,10 +100,11 @@ pub fn read_with(files: &Files, path: &Path, packages: &[PathBuf]) -> Result<Rob
         read = Some(text);
     }
     table.finish(&mut found);
+    let warnings = found.clone();
     found.or(())?;
     // Every missing or wrong key was reported above, so this error only occurs together with another.
     let incomplete = || Diagnostic::error("W010", "the robot profile is incomplete").in_source(&source).into();
-    profile.zip(read).map(|(profile, read)| with_meshes(profile, read)).ok_or_else(incomplete)
+    profile.zip(read).map(|(profile, read)| (with_meshes(profile, read), warnings)).ok_or_else(incomplete)
 }
 
 /// A URDF with moments of inertia that a body can have, where its own are impossible (W034, W036).
@@ -241,6 +255,10 @@ fn with_meshes(mut profile: RobotProfile, read: foreign::robot::RobotText) -> Ro
     if !read.meshes.is_empty() {
         profile.digest = digest_of(&format!("{}{}", profile.digest, read.digest));
         profile.meshes = read.meshes;
+    }
+    if !read.added.is_empty() {
+        let text = foreign::robot_shapes::with(&profile.urdf.text, read.added);
+        profile.urdf = Source::new(Arc::clone(&profile.urdf.name), text);
     }
     profile
 }

@@ -7,6 +7,7 @@ use std::sync::{Arc, OnceLock};
 use nalgebra::{Isometry3, Matrix3, Translation3, Unit, UnitQuaternion, Vector3};
 
 use crate::WorldError;
+use crate::counterweight::{BalancedJoint, balance};
 use crate::gripper::Surface;
 use crate::kinematics::motion;
 use crate::needed::Needed;
@@ -84,6 +85,8 @@ pub struct RobotModel {
     frames: BTreeMap<String, (usize, Isometry3<f64>)>,
     /// Names of its movable joints that are rigid here, for messages.
     rigid: Vec<String>,
+    /// Joints that can't hold the arm's weight by their motors alone.
+    pub(crate) balanced: Vec<BalancedJoint>,
     /// The URDF's name, for messages.
     name: String,
 }
@@ -168,8 +171,14 @@ impl<'a> Folding<'a> {
             }
             children.entry(joint.parent.link.as_str()).or_default().push(joint);
         }
-        let out =
-            RobotModel { links: Vec::new(), joints: Vec::new(), frames: BTreeMap::new(), rigid: Vec::new(), name };
+        let out = RobotModel {
+            links: Vec::new(),
+            joints: Vec::new(),
+            frames: BTreeMap::new(),
+            rigid: Vec::new(),
+            balanced: Vec::new(),
+            name,
+        };
         Ok(Self { robot, links, children, meshes, out })
     }
 
@@ -192,7 +201,7 @@ impl<'a> Folding<'a> {
             self.merge(name, into, &at)?;
             for joint in self.children.get(name).cloned().unwrap_or_default().into_iter().rev() {
                 let origin = at * isometry(&joint.origin);
-                if joint.joint_type == urdf_rs::JointType::Fixed {
+                if is_rigid(joint) {
                     open.push((&joint.child.link, into, origin));
                 } else if !needed.contains(joint) {
                     let rigid = self.movable(joint, into, origin)?;
@@ -215,6 +224,7 @@ impl<'a> Folding<'a> {
                 link.inertia = Matrix3::identity() * LEAST_INERTIA;
             }
         }
+        balance(&mut self.out, &profile.arm_joints);
         Ok(self.out)
     }
 
@@ -318,7 +328,7 @@ impl<'a> Folding<'a> {
     }
 
     fn resolve_mimics(&mut self, needed: &Needed<'_>) -> Result<(), WorldError> {
-        let moves = |joint: &&urdf_rs::Joint| joint.joint_type != urdf_rs::JointType::Fixed && needed.contains(joint);
+        let moves = |joint: &&urdf_rs::Joint| !is_rigid(joint) && needed.contains(joint);
         for joint in self.robot.joints.iter().filter(moves) {
             let Some(mimic) = &joint.mimic else { continue };
             let (follower, leader) = (self.out.joint(&joint.name)?, self.out.joint(&mimic.joint)?);
@@ -395,6 +405,11 @@ fn matrix(i: &urdf_rs::Inertia) -> Matrix3<f64> {
 
 fn one_line(text: &str) -> String {
     text.split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
+/// Whether a joint does not move: it is fixed, or moves the whole robot over the floor, which a profile's `base` does.
+fn is_rigid(joint: &urdf_rs::Joint) -> bool {
+    matches!(joint.joint_type, urdf_rs::JointType::Fixed | urdf_rs::JointType::Planar | urdf_rs::JointType::Floating)
 }
 
 /// Share of a motor's largest effort with which it moves steadily; the rest accelerates and carries.

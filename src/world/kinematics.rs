@@ -12,6 +12,9 @@ use actcheck_data::{Part, Shape};
 /// Gravitational acceleration. Unit: m/s².
 pub const GRAVITY: f64 = 9.81;
 
+/// Least cosine between a vertical axis and the vertical.
+const VERTICAL: f64 = 0.999;
+
 /// A robot's geometry for skills, without physics or ground truth.
 #[derive(Debug, Clone)]
 pub struct Kinematics {
@@ -145,6 +148,19 @@ impl Kinematics {
         (grasp, jacobian)
     }
 
+    /// Returns the downward pitch of the hand if no joint of the arm changes it, because all that turn are vertical. Unit:
+    /// radians.
+    pub fn only_pitch(&self, arm: &[usize], positions: &[f64]) -> Option<f64> {
+        let links = self.links(positions);
+        let keeps_pitch = |idx: &usize| {
+            let joint = &self.model.joints[*idx];
+            let axis = links[joint.parent].rotation * (joint.origin.rotation * joint.axis.into_inner());
+            joint.kind == JointKind::Prismatic || axis.z.abs() > VERTICAL
+        };
+        let ahead = self.grasp(positions).rotation * Vector3::x();
+        arm.iter().all(keeps_pitch).then(|| libm::asin((-ahead.z).clamp(-1.0, 1.0)))
+    }
+
     /// Returns the forces and torques that compensate gravity. Units: newtons or newton metres. Shape: one per joint.
     pub fn holding_efforts(&self, positions: &[f64]) -> Vec<f64> {
         self.holding_efforts_at(&self.links(positions))
@@ -152,28 +168,33 @@ impl Kinematics {
 
     /// As [`Kinematics::holding_efforts`], with the links at these poses.
     pub(crate) fn holding_efforts_at(&self, poses: &[Isometry3<f64>]) -> Vec<f64> {
-        // Mass and first moment of each subtree, accumulated from the leaves: children come after their parents.
-        let mut weights: Vec<(f64, Vector3<f64>)> = self
-            .model
-            .links
-            .iter()
-            .zip(poses)
-            .map(|(link, pose)| (link.mass, (pose * Point3::from(link.com)).coords * link.mass))
-            .collect();
-        let mut efforts = vec![0.0; self.model.joints.len()];
-        for (idx, joint) in self.model.joints.iter().enumerate().rev() {
-            let (mass, moment) = weights[idx + 1];
-            let (axis, point) = axis_in_world(joint, poses);
-            let up = Vector3::z() * GRAVITY;
-            efforts[idx] = match joint.kind {
-                JointKind::Prismatic => axis.dot(&up) * mass,
-                JointKind::Revolute => axis.dot(&(moment - point * mass).cross(&up)),
-            };
-            weights[joint.parent].0 += mass;
-            weights[joint.parent].1 += moment;
-        }
-        efforts
+        holding_efforts(&self.model, poses)
     }
+}
+
+/// Returns the forces and torques that compensate gravity, with the links at these poses. Units: newtons or newton metres.
+/// Shape: one per joint.
+pub(crate) fn holding_efforts(model: &RobotModel, poses: &[Isometry3<f64>]) -> Vec<f64> {
+    // Mass and first moment of each subtree, accumulated from the leaves: children come after their parents.
+    let mut weights: Vec<(f64, Vector3<f64>)> = model
+        .links
+        .iter()
+        .zip(poses)
+        .map(|(link, pose)| (link.mass, (pose * Point3::from(link.com)).coords * link.mass))
+        .collect();
+    let mut efforts = vec![0.0; model.joints.len()];
+    for (idx, joint) in model.joints.iter().enumerate().rev() {
+        let (mass, moment) = weights[idx + 1];
+        let (axis, point) = axis_in_world(joint, poses);
+        let up = Vector3::z() * GRAVITY;
+        efforts[idx] = match joint.kind {
+            JointKind::Prismatic => axis.dot(&up) * mass,
+            JointKind::Revolute => axis.dot(&(moment - point * mass).cross(&up)),
+        };
+        weights[joint.parent].0 += mass;
+        weights[joint.parent].1 += moment;
+    }
+    efforts
 }
 
 pub(super) fn motion(joint: &Joint, position: f64) -> Isometry3<f64> {

@@ -5,7 +5,8 @@ use std::collections::BTreeSet;
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
 use crate::description::RobotModel;
-use crate::{Gripper, WorldError};
+use crate::wrist;
+use crate::{BalancedJoint, Gripper, WorldError};
 use actcheck_data::RobotProfile;
 
 /// Indices of the robot's joints by their role.
@@ -52,8 +53,9 @@ impl Named {
         Ok(Self { layout, finger_links, grasp, camera })
     }
 
-    /// Returns the pairs of links of the gripper that pass through each other, with the smaller index first: those of its
-    /// mechanism and the palm, but not the two fingertips. Their convex shapes overlap where the real ones do not.
+    /// Returns the pairs of links that pass through each other, with the smaller index first: those of the gripper's
+    /// mechanism and the palm, but not the two fingertips; and those of a wrist. Their convex shapes overlap where the real
+    /// ones do not.
     pub(super) fn passing(&self, model: &RobotModel) -> BTreeSet<(usize, usize)> {
         let gripper = &self.layout.gripper;
         let mut of_gripper = vec![false; model.links.len()];
@@ -65,7 +67,8 @@ impl Named {
         let all: BTreeSet<usize> = moved.chain(palms).collect();
         let [left, right] = self.finger_links;
         let pairs = all.iter().flat_map(|first| all.range(first + 1..).map(|second| (*first, *second)));
-        pairs.filter(|pair| *pair != (left.min(right), left.max(right))).collect()
+        let of_gripper = pairs.filter(|pair| *pair != (left.min(right), left.max(right)));
+        of_gripper.chain(wrist::passing(model)).collect()
     }
 }
 
@@ -91,6 +94,14 @@ pub fn grip_limit_n(profile: &RobotProfile) -> Result<f64, WorldError> {
     let gripper = Named::find(profile, &model)?.layout.gripper;
     let of = |(joint, lever_m): (usize, f64)| model.joints[joint].effort / lever_m;
     Ok(gripper.motors().map(of).filter(|force_n| *force_n > 0.0).fold(f64::INFINITY, f64::min))
+}
+
+/// Returns the joints of a robot's arm that can't hold its weight by their motors alone. They are simulated as balanced.
+///
+/// # Errors
+/// [`WorldError`] if the URDF can't be read.
+pub fn balanced_joints(profile: &RobotProfile) -> Result<Vec<BalancedJoint>, WorldError> {
+    RobotModel::read(profile).map(|model| model.balanced)
 }
 
 /// Checks that a profile matches its URDF, without simulating.

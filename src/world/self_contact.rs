@@ -9,6 +9,7 @@ use crate::Kinematics;
 use crate::convert::to_pose;
 use crate::engine::{Owner, collider};
 use crate::room::Ball;
+use actcheck_data::Part;
 
 /// Distance that links keep from each other. Unit: metres. The tracking error of a moving arm.
 const CLEAR_M: f64 = 0.01;
@@ -89,7 +90,26 @@ impl SelfContact {
 
     /// Whether any two links collide, or nearly so, at these link poses (see [`Kinematics::links`]).
     pub fn touches(&self, poses: &[Isometry3<f64>]) -> bool {
-        self.pairs.iter().any(|pair| gap(&self.links, *pair, poses) < pair.clear_m)
+        self.touching(poses).is_some()
+    }
+
+    /// The first two links that collide, or nearly so, at these link poses.
+    pub fn touching(&self, poses: &[Isometry3<f64>]) -> Option<(usize, usize)> {
+        self.pairs.iter().find(|pair| gap(&self.links, **pair, poses) < pair.clear_m).map(|pair| pair.links)
+    }
+}
+
+/// Two links alone, for measurements at many poses.
+pub(crate) struct TwoLinks([Form; 2]);
+
+impl TwoLinks {
+    pub(crate) fn new(solids: [&[Part]; 2]) -> Self {
+        Self(solids.map(Form::new))
+    }
+
+    /// Whether they overlap with the first one at the origin and the second one at a pose.
+    pub(crate) fn overlap(&self, pose: Isometry3<f64>) -> bool {
+        gap(&self.0, Pair { links: (0, 1), clear_m: CLEAR_M }, &[Isometry3::identity(), pose]) <= 0.0
     }
 }
 

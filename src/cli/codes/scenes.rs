@@ -167,7 +167,7 @@ const CODES_S: &[Code] = &[
     code(
         "S070",
         "an object is too wide for the gripper",
-        "its narrower side and a room of 1.2 cm are wider than `max_opening_m`",
+        "its narrower side and a room of 1.0 cm are wider than `max_opening_m`",
         "name a narrower object, or a robot whose gripper opens wider",
     ),
     code(
@@ -187,5 +187,11 @@ const CODES_S: &[Code] = &[
         "the camera does not see a surface",
         "the camera is too low, or the surface is out of its range or of the head's",
         "change `camera_link` or `home` in the robot's profile, `[camera]`, or the surface",
+    ),
+    code(
+        "S074",
+        "the motors of an arm can't hold its own weight",
+        "the joint's `effort` is too small, or springs that the URDF does not describe balance the arm",
+        "nothing, if the robot has springs or counterweights: its arm is simulated as balanced",
     ),
 ];

@@ -18,7 +18,12 @@ impl Lookup<'_> {
     pub(crate) fn resolve(&self, uri: &str, file: &Path) -> Result<PathBuf, String> {
         let beside = file.parent().unwrap_or(Path::new(""));
         match uri.split_once("://") {
-            None => Ok(beside.join(uri)),
+            None => {
+                // PyBullet's models write paths from the folder of the file as if they were absolute.
+                let inside = beside.join(uri.trim_start_matches('/'));
+                let is_elsewhere = uri.starts_with('/') && !self.exists(Path::new(uri)) && self.exists(&inside);
+                Ok(if is_elsewhere { inside } else { beside.join(uri) })
+            }
             Some(("file", path)) => Ok(PathBuf::from(path)),
             Some(("model" | "package", path)) => self.find(path).ok_or_else(|| {
                 let folders: Vec<String> = self.folders.iter().map(|folder| folder.display().to_string()).collect();
@@ -30,8 +35,14 @@ impl Lookup<'_> {
 
     fn find(&self, path: &str) -> Option<PathBuf> {
         let places = self.folders.iter().map(|folder| folder.join(path));
-        let exists = |place: &PathBuf| self.files.list(place.parent().unwrap_or(place)).contains(place);
-        places.into_iter().find(exists).or_else(|| self.find_in_package(path).filter(exists))
+        places
+            .into_iter()
+            .find(|place| self.exists(place))
+            .or_else(|| self.find_in_package(path).filter(|place| self.exists(place)))
+    }
+
+    fn exists(&self, place: &Path) -> bool {
+        self.files.list(place.parent().unwrap_or(place)).iter().any(|known| known == place)
     }
 
     /// The path in a folder that is the package itself, by its name or that in its `package.xml`.

@@ -15,6 +15,7 @@ mod mjcf_compiler;
 mod nested;
 pub(crate) mod robot;
 pub(crate) mod robot_inertia;
+pub(crate) mod robot_shapes;
 pub(crate) mod robot_tree;
 mod sdf;
 pub(crate) mod sdf_robot;

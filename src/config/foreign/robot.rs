@@ -6,6 +6,7 @@ use std::path::Path;
 use crate::foreign::geometry::Shapes;
 use crate::foreign::lookup::Lookup;
 use crate::foreign::robot_inertia::{self, Mend};
+use crate::foreign::robot_shapes::{self, Added};
 use crate::foreign::robot_tree::{self, Tree};
 use crate::foreign::xml::{self, Node, Reader};
 use actcheck_base::{Diagnostics, Source};
@@ -21,6 +22,8 @@ pub(crate) struct RobotText {
     pub(crate) tree: Option<Tree>,
     /// Proposed changes of impossible moments of inertia.
     pub(crate) mends: Vec<Mend>,
+    /// Collision shapes for the links of the gripper, if they have none.
+    pub(crate) added: Vec<Added>,
 }
 
 /// Reads the links, joints and collision meshes, and reports every fault with its span.
@@ -31,7 +34,13 @@ pub(crate) fn read(source: &Source, path: &Path, lookup: &Lookup, found: &mut Di
         Ok(document) => document,
         Err(faults) => {
             found.extend(faults);
-            return RobotText { meshes, digest: shapes.digest.finish(), tree: None, mends: Vec::new() };
+            return RobotText {
+                meshes,
+                digest: shapes.digest.finish(),
+                tree: None,
+                mends: Vec::new(),
+                added: Vec::new(),
+            };
         }
     };
     let mut reader = Reader::new(source);
@@ -48,9 +57,14 @@ pub(crate) fn read(source: &Source, path: &Path, lookup: &Lookup, found: &mut Di
             read_collision(collision, &mut shapes, &mut meshes, &mut reader);
         }
     }
+    let added = robot_shapes::of_gripper(root, &mut reader);
+    for visual in &added {
+        read_collision(visual.shape, &mut shapes, &mut meshes, &mut reader);
+    }
+    let added = added.into_iter().map(|visual| visual.added).collect();
     let mends = robot_inertia::check(root, &meshes, &mut reader);
     found.extend(reader.found);
-    RobotText { meshes, digest: shapes.digest.finish(), tree, mends }
+    RobotText { meshes, digest: shapes.digest.finish(), tree, mends, added }
 }
 
 fn read_collision(

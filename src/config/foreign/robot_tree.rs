@@ -55,7 +55,7 @@ pub(crate) fn read(root: Node, reader: &mut Reader) -> Tree {
     for joint in xml::children(root, "joint") {
         let Some(name) = reader.attribute(joint, "name") else { continue };
         let unknown = TreeJoint { motion: Motion::Unknown, lower: f64::NEG_INFINITY, upper: f64::INFINITY };
-        let read = read_joint(joint, name, reader).unwrap_or(unknown);
+        let read = read_joint(root, joint, name, reader).unwrap_or(unknown);
         if tree.joints.insert(name.to_owned(), read).is_some() {
             reader.error("W051", joint, format!("there are two joints `{name}`"), "give one of them another name");
         }
@@ -100,12 +100,17 @@ fn weigh(root: Node, joint: Node, child: &str, reader: &mut Reader) {
     }
 }
 
-fn read_joint(joint: Node, name: &str, reader: &mut Reader) -> Option<TreeJoint> {
+fn read_joint(root: Node, joint: Node, name: &str, reader: &mut Reader) -> Option<TreeJoint> {
     let kind = reader.attribute(joint, "type")?;
     let motion = match kind {
         "fixed" => Motion::Fixed,
         "prismatic" => Motion::Slides,
         "revolute" | "continuous" => Motion::Turns,
+        "planar" | "floating" if is_at_root(root, joint) => {
+            let message = format!("the joint `{name}` is of the type {kind}, and is taken as fixed");
+            reader.warning("W036", joint, message, "`base = \"planar\"` in the profile moves the whole robot");
+            Motion::Fixed
+        }
         _ => {
             let message = format!("the joint `{name}` is of the type {kind}, which can't be simulated");
             reader.error("W035", joint, message, did_you_mean(kind, KINDS));
@@ -144,6 +149,13 @@ fn read_joint(joint: Node, name: &str, reader: &mut Reader) -> Option<TreeJoint>
         return None;
     }
     Some(TreeJoint { motion, lower, upper })
+}
+
+/// Whether a joint's parent is the root link.
+fn is_at_root(root: Node, joint: Node) -> bool {
+    let named = |joint: Node, which| xml::child(joint, which).and_then(|end| end.attribute("link").map(str::to_owned));
+    let parent = named(joint, "parent");
+    parent.is_some() && xml::children(root, "joint").all(|other| named(other, "child") != parent)
 }
 
 /// Returns the link at one end of a joint.

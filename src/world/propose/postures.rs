@@ -146,13 +146,18 @@ impl Search<'_> {
         let heights =
             if self.base.is_empty() { ABOVE_M.map(|above| root + above.min(0.5 * length)) } else { HEIGHTS_M };
         let mut targets = Vec::new();
-        for pitch in PITCHES_RAD {
+        for pitch in self.pitches() {
             for (share, height) in SHARES.into_iter().zip(heights).chain(SHARES.into_iter().rev().zip(heights)) {
                 let place = Point3::new(shoulder.x + share * length, shoulder.y, height);
                 targets.push(hand(&place, 0.0, pitch));
             }
         }
         targets
+    }
+
+    /// Downward pitches of the hand that the arm could have: that at the start if no joint changes it.
+    fn pitches(&self) -> Vec<f64> {
+        self.kinematics.only_pitch(&self.arm, &self.start).map_or(PITCHES_RAD.to_vec(), |pitch| vec![pitch])
     }
 
     /// A free posture that reaches a target; with a base, one that does not turn it if there is any.
@@ -232,7 +237,7 @@ impl Search<'_> {
     fn aside(&mut self) -> Option<Vec<f64>> {
         let (shoulder, length) = self.arm_reach();
         let root = self.kinematics.links(&self.start)[0].translation.vector.z;
-        for pitch in PITCHES_RAD.into_iter().rev() {
+        for pitch in self.pitches().into_iter().rev() {
             for share in [0.55, 0.4, 0.7] {
                 let (sin, cos) = (libm::sin(ASIDE_RAD), libm::cos(ASIDE_RAD));
                 let away = share * length;

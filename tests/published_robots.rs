@@ -1,0 +1,152 @@
+//! Robots as others publish them: weak motors, fingers without collision shapes, joints of the whole robot, paths of
+//! meshes without their folder, and hands that can't be tilted. Each is a shipped or a small robot changed so.
+
+use std::path::Path;
+
+use serde_json::Value;
+
+use crate::support::{actcheck, root, stderr, stdout};
+
+/// Four picks of a lone can.
+const PICKS: &str = "tests = [[\"Pick\"]]\ntest_count = 4\nseed = 5\n[robot]\nprofile = \"robot.toml\"\n\
+    [pickObject]\nmodel_list = [\"can\"]\n[objectSurface]\nobject_surfaces = [\"coffee_table\"]\n";
+
+/// The words that `check` prints, and the number of picks that pass.
+fn check_and_run(folder: &Path, urdf: &str, profile: &str) -> (String, u64) {
+    std::fs::write(folder.join("robot.urdf"), urdf).unwrap();
+    std::fs::write(folder.join("robot.toml"), format!("urdf = \"robot.urdf\"\n{profile}")).unwrap();
+    std::fs::write(folder.join("c.toml"), PICKS).unwrap();
+    let checked = actcheck(folder, &["check", "c.toml"]);
+    let said = format!("{}{}", stdout(&checked), stderr(&checked)).replace('│', " ");
+    let output = actcheck(folder, &["run", "c.toml", "--history", "h", "--format", "json"]);
+    let json: Value = serde_json::from_str(&stdout(&output)).unwrap_or_else(|_| panic!("{}", stderr(&output)));
+    let words = said.split_whitespace().collect::<Vec<_>>().join(" ");
+    (words, json["runs_passed"]["count"].as_u64().unwrap())
+}
+
+fn fixed_arm() -> String {
+    std::fs::read_to_string(root().join("models/robots/fixed_arm.urdf")).unwrap()
+}
+
+/// The PR2's shoulder has a spring that its URDF does not describe: the motor alone can't raise the arm.
+#[test]
+fn an_arm_that_is_too_heavy_for_its_motors_is_balanced_and_check_says_so() {
+    let folder = tempfile::tempdir().unwrap();
+    let (strong, weak) = ("upper=\"2.09\" effort=\"120\"", "upper=\"2.09\" effort=\"15\"");
+    assert!(fixed_arm().contains(strong));
+    let (said, passed) = check_and_run(folder.path(), &fixed_arm().replacen(strong, weak, 1), "");
+    assert!(said.contains("S074") && said.contains("`shoulder_pitch_joint` of robot can't hold the arm"), "{said}");
+    assert!(said.contains("its `effort` is 15.0"), "{said}");
+    assert!(passed >= 3, "{passed} of 4 picks passed");
+    let folder = tempfile::tempdir().unwrap();
+    let (said, _) = check_and_run(folder.path(), &fixed_arm(), "");
+    assert!(!said.contains("S074"), "{said}");
+}
+
+/// The SO-100 of a public package has shapes of its jaws only to be seen.
+#[test]
+fn fingers_without_collision_shapes_have_those_to_be_seen() {
+    let folder = tempfile::tempdir().unwrap();
+    let (mut urdf, mut in_finger) = (String::new(), false);
+    for line in fixed_arm().lines() {
+        in_finger = if line.contains("<link name=") { line.contains("\"finger_") } else { in_finger };
+        if !(in_finger && line.contains("<collision>")) {
+            urdf.push_str(line);
+            urdf.push('\n');
+        }
+    }
+    assert!(urdf.len() + 200 < fixed_arm().len());
+    let (said, passed) = check_and_run(folder.path(), &urdf, "");
+    for finger in ["finger_left_link", "finger_right_link"] {
+        assert!(said.contains(&format!("the link `{finger}` of the gripper has no `<collision>`")), "{said}");
+    }
+    assert!(passed >= 3, "{passed} of 4 picks passed");
+}
+
+/// A joint that moves the whole robot over the floor or through the air; elsewhere it is a fault.
+#[test]
+fn a_floating_joint_at_the_root_is_fixed() {
+    let folder = tempfile::tempdir().unwrap();
+    let floating = "<link name=\"world\"/><joint name=\"free\" type=\"floating\"><parent link=\"world\"/>\
+        <child link=\"pedestal_link\"/></joint></robot>";
+    let urdf = fixed_arm().replace("</robot>", floating);
+    let (said, passed) = check_and_run(folder.path(), &urdf, "");
+    assert!(said.contains("W036") && said.contains("`free` is of the type floating, and is taken as fixed"), "{said}");
+    assert!(passed >= 3, "{passed} of 4 picks passed");
+    let inside = urdf.replacen("name=\"palm_joint\" type=\"fixed\"", "name=\"palm_joint\" type=\"floating\"", 1);
+    std::fs::write(folder.path().join("robot.urdf"), inside).unwrap();
+    let refused = actcheck(folder.path(), &["check", "c.toml"]);
+    assert!(stderr(&refused).contains("W035") && stderr(&refused).contains("`palm_joint`"), "{}", stderr(&refused));
+}
+
+/// PyBullet's models write `/meshes/FILE` for a file beside the model.
+#[test]
+fn meshes_with_an_absolute_path_are_found_beside_the_model() {
+    let folder = tempfile::tempdir().unwrap();
+    let meshes = folder.path().join("meshes");
+    std::fs::create_dir(&meshes).unwrap();
+    std::fs::copy(root().join("tests/models/gazebo/cafe_table/meshes/top.stl"), meshes.join("top.stl")).unwrap();
+    let (solid, mesh) =
+        ("<box size=\"0.12 0.48 0.02\"/>", "<mesh filename=\"/meshes/top.stl\" scale=\"0.1 0.1 0.1\"/>");
+    std::fs::write(folder.path().join("robot.urdf"), fixed_arm().replace(solid, mesh)).unwrap();
+    std::fs::write(folder.path().join("robot.toml"), "urdf = \"robot.urdf\"\n").unwrap();
+    std::fs::write(folder.path().join("c.toml"), PICKS).unwrap();
+    let checked = actcheck(folder.path(), &["check", "c.toml"]);
+    assert!(checked.status.success(), "{}", stderr(&checked));
+    std::fs::remove_file(meshes.join("top.stl")).unwrap();
+    let refused = actcheck(folder.path(), &["check", "c.toml"]);
+    assert!(stderr(&refused).contains("cannot read the mesh /meshes/top.stl"), "{}", stderr(&refused));
+}
+
+/// The hand of Stretch RE1 points down by 30 degrees, and its arm only rises, extends and turns: level hands and hands
+/// that point straight down are out of the question.
+#[test]
+fn a_hand_that_cannot_be_tilted_grasps_at_its_own_slant() {
+    let inertial = |kg: f64| {
+        let moment = kg * 0.01;
+        format!(
+            "<inertial><mass value=\"{kg}\"/><inertia ixx=\"{moment}\" ixy=\"0\" ixz=\"0\" iyy=\"{moment}\" iyz=\"0\" \
+             izz=\"{moment}\"/></inertial>"
+        )
+    };
+    let link = |name: &str, kg: f64, xyz: &str, size: &str| {
+        format!(
+            "<link name=\"{name}\">{}<collision><origin xyz=\"{xyz}\"/><geometry><box size=\"{size}\"/></geometry>\
+             </collision></link>",
+            inertial(kg)
+        )
+    };
+    let joint = |name: &str, kind: &str, ends: [&str; 2], at: &str, rest: &str| {
+        let [parent, child] = ends;
+        format!(
+            "<joint name=\"{name}\" type=\"{kind}\"><parent link=\"{parent}\"/><child link=\"{child}\"/>\
+             <origin {at}/>{rest}</joint>"
+        )
+    };
+    let slide = |axis: &str, upper: &str| {
+        format!("<axis xyz=\"{axis}\"/><limit lower=\"0\" upper=\"{upper}\" effort=\"200\" velocity=\"0.2\"/>")
+    };
+    let turn = "<axis xyz=\"0 0 1\"/><limit lower=\"-1.7\" upper=\"1.7\" effort=\"20\" velocity=\"1\"/>";
+    let urdf = [
+        "<robot name=\"lifter\">".to_owned(),
+        link("wheeled_base", 30.0, "0 0 0.1", "0.3 0.3 0.16"),
+        link("lift", 3.0, "0.1 0 0", "0.04 0.04 0.04"),
+        link("boom", 2.0, "0.1 0 0", "0.2 0.04 0.04"),
+        link("wrist", 0.5, "0 0 -0.05", "0.04 0.04 0.04"),
+        link("hand", 0.3, "0.02 0 0", "0.04 0.16 0.04"),
+        link("left_finger", 0.1, "0.05 0.006 0", "0.1 0.012 0.024"),
+        link("right_finger", 0.1, "0.05 -0.006 0", "0.1 0.012 0.024"),
+        joint("rise", "prismatic", ["wheeled_base", "lift"], "xyz=\"0.1 0 0.2\"", &slide("0 0 1", "1.0")),
+        joint("extend", "prismatic", ["lift", "boom"], "xyz=\"0.03 0 0\"", &slide("1 0 0", "0.5")),
+        joint("yaw", "revolute", ["boom", "wrist"], "xyz=\"0.25 0 0\"", turn),
+        joint("mount", "fixed", ["wrist", "hand"], "xyz=\"0.04 0 -0.08\" rpy=\"0 0.5236 0\"", ""),
+        joint("left", "prismatic", ["hand", "left_finger"], "xyz=\"0.04 0 0\"", &slide("0 1 0", "0.06")),
+        joint("right", "prismatic", ["hand", "right_finger"], "xyz=\"0.04 0 0\"", &slide("0 -1 0", "0.06")),
+        "</robot>".to_owned(),
+    ]
+    .concat();
+    let folder = tempfile::tempdir().unwrap();
+    let (said, passed) = check_and_run(folder.path(), &urdf, "base = \"planar\"\n");
+    assert!(!said.contains("S071"), "{said}");
+    assert!(passed >= 3, "{passed} of 4 picks passed: {said}");
+}
