@@ -133,12 +133,12 @@ impl Env {
             return None;
         }
         let message = format!(
-            "`{}` slips out of the gripper: it has at least {lightest_kg:.2} kg, and two fingers that press with {} N carry \
+            "`{}` slips out of the gripper: it has at least {lightest_kg:.2} kg, and two fingers that press with {:.1} N carry \
              {carried_kg:.2} kg at a friction coefficient of {friction:.2}",
             model.name, robot.grip_force_n,
         );
-        let help =
-            "every pick of it will fail: reduce the object's mass, or raise `grip_force_n` in the robot's profile";
+        let help = "every pick of it will fail: reduce the object's mass, or raise `grip_force_n` in the robot's profile, or \
+             the `effort` of the finger joints in the URDF if that limits it";
         Some(self.campaign.warning("S072", key, message).help(help))
     }
 

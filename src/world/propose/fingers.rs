@@ -186,7 +186,7 @@ fn measure(
 }
 
 /// Not wider than measured, up to the rounding of limits. Unit: metres.
-fn as_opening(widest_m: f64) -> f64 {
+pub(super) fn as_opening(widest_m: f64) -> f64 {
     (widest_m.min(1.0) * 1000.0 + 0.1).floor() / 1000.0
 }
 

@@ -15,7 +15,7 @@ use std::sync::Arc;
 
 use crate::WorldError;
 use crate::description::RobotModel;
-use crate::layout::frame;
+use crate::layout::{Named, frame};
 use actcheck_data::RobotProfile;
 
 /// A profile with all roles assigned, and the basis of its guesses.
@@ -26,6 +26,9 @@ pub struct Proposal {
     /// The basis of guesses, by the profile's key: lower-case sentences without a full stop.
     pub notes: BTreeMap<&'static str, String>,
 }
+
+/// Openings narrower than this are measured between other parts than fingertips. Unit: metres.
+const LEAST_OPENING_M: f64 = 0.02;
 
 /// Proposes a profile for a robot without roles, whose meshes are convex.
 ///
@@ -85,6 +88,11 @@ fn find(partial: &RobotProfile, all: bool) -> Result<Proposal, WorldError> {
         let model = Arc::new(RobotModel::read(&profile)?);
         let grasp = frame(&model, &profile.grasp_link, profile.grasp_offset_m, profile.grasp_turned_rad)?;
         (profile.home, profile.postures) = postures::find(&profile, &model, grasp, &mut notes)?;
+    }
+    // Joints without a role are rigid from now on, which may move the fingers.
+    let narrower = Named::find(&profile, &RobotModel::read(&profile)?)?.layout.gripper.widest_m();
+    if partial.max_opening_m == 0.0 && narrower > LEAST_OPENING_M {
+        profile.max_opening_m = profile.max_opening_m.min(fingers::as_opening(narrower));
     }
     Ok(Proposal { profile, notes })
 }
