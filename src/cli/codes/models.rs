@@ -112,9 +112,9 @@ const CODES_W: &[Code] = &[
     ),
     code(
         "W036",
-        "a part of a model file is ignored, or is that of no real body",
-        "the simulation has no counterpart for it, such as plugins and air drag; or one moment of inertia exceeds the sum \
-         of the others",
+        "a part of a model file is ignored or replaced, or is that of no real body",
+        "the simulation has no counterpart for it, such as plugins and air drag; one moment of inertia exceeds the sum of \
+         the others; a gripper has no `<collision>`; or a joint moves the whole robot",
         "nothing, if the model works without it; otherwise follow the help",
     ),
     code(

@@ -89,7 +89,7 @@ fn find(partial: &RobotProfile, all: bool) -> Result<Proposal, WorldError> {
         let grasp = frame(&model, &profile.grasp_link, profile.grasp_offset_m, profile.grasp_turned_rad)?;
         (profile.home, profile.postures) = postures::find(&profile, &model, grasp, &mut notes)?;
     }
-    // Joints without a role are rigid from now on, which may move the fingers.
+    // Joints without a role are rigid from now on: a finger that no named joint moves may narrow the opening.
     let narrower = Named::find(&profile, &RobotModel::read(&profile)?)?.layout.gripper.widest_m();
     if partial.max_opening_m == 0.0 && narrower > LEAST_OPENING_M {
         profile.max_opening_m = profile.max_opening_m.min(fingers::as_opening(narrower));
