@@ -67,9 +67,10 @@ impl<'a> ByteReader<'a> {
 
     /// Skips variable-length integers: each ends with a byte below 128.
     pub fn skip_varints(&mut self, mut count: usize) -> Option<()> {
-        // Whole blocks first: counting their ends takes a few instructions.
+        // Whole blocks first: counting their ends takes a few instructions, if the compiler need not look for overflows.
         while let Some((block, rest)) = self.bytes.split_first_chunk::<64>() {
-            let ends: usize = block.iter().map(|byte| usize::from(*byte < 0x80)).sum();
+            let ends = block.iter().fold(0u8, |ends, byte| ends.wrapping_add(u8::from(*byte < 0x80)));
+            let ends = usize::from(ends);
             if ends >= count {
                 break;
             }

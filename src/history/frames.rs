@@ -95,7 +95,8 @@ fn read(rest: &mut ByteReader<'_>) -> Option<Vec<Vec<f32>>> {
     if height.checked_mul(width)? > MOST_VALUES || height > MOST_VALUES {
         return None;
     }
-    let mut rows = vec![Vec::with_capacity(width); height];
+    // Not `vec![…; height]`: copies of a vector have no room.
+    let mut rows: Vec<Vec<f32>> = (0..height).map(|_| Vec::with_capacity(width)).collect();
     for _ in 0..width {
         for (row, value) in rows.iter_mut().zip(decode_column(height, rest)?) {
             row.push(value);
@@ -152,13 +153,14 @@ fn decode_column(height: usize, rest: &mut ByteReader<'_>) -> Option<Vec<f32>> {
 
 fn decode_counts(grain: f64, height: usize, rest: &mut ByteReader<'_>) -> Option<Vec<f32>> {
     let (mut last, mut step) = (0i64, 0i64);
-    (0..height)
-        .map(|_| {
-            let count = last.checked_add(step)?.checked_add(unzigzag(rest.varint()?))?;
-            (last, step) = (count, count.checked_sub(last)?);
-            i32::try_from(count).ok().map(|count| of_grains(count, grain))
-        })
-        .collect()
+    // A value takes at least one byte: a damaged file can't ask for much more memory than it has bytes.
+    let mut values = Vec::with_capacity(height.min(rest.bytes.len()));
+    for _ in 0..height {
+        let count = last.checked_add(step)?.checked_add(unzigzag(rest.varint()?))?;
+        (last, step) = (count, count.checked_sub(last)?);
+        values.push(of_grains(i32::try_from(count).ok()?, grain));
+    }
+    Some(values)
 }
 
 fn decode_bits(height: usize, rest: &mut ByteReader<'_>) -> Option<Vec<f32>> {

@@ -235,7 +235,8 @@ pub(super) fn compressed(bytes: &[u8]) -> Result<Vec<u8>, String> {
 }
 
 pub(super) fn expanded(bytes: &[u8]) -> Result<Vec<u8>, String> {
-    let mut out = Vec::new();
+    // The motion of bodies expands three to five times.
+    let mut out = Vec::with_capacity(4 * bytes.len());
     GzDecoder::new(bytes).read_to_end(&mut out).map_err(|error| error.to_string())?;
     Ok(out)
 }

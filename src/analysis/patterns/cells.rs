@@ -66,6 +66,7 @@ impl Axis {
     /// each condition.
     pub fn expand(&self, cells: &[Count], width: usize, out: &mut Vec<Count>) {
         out.clear();
+        out.reserve(self.len() * width);
         let row = |cell: usize| &cells[cell * width..(cell + 1) * width];
         let mut sum = vec![0; width];
         // Does not overflow: there are fewer than 2^32 runs.

@@ -23,10 +23,13 @@ pub(super) fn parts(count: Count) -> (usize, usize) {
 /// Source: M. Kulldorff, "A spatial scan statistic", Communications in Statistics – Theory and Methods 26 (1997)
 /// 1481–1496.
 pub(super) struct Likelihood {
-    runs: usize,
-    failed: usize,
-    /// x ln x for every integer from 0 to the number of runs.
-    x_ln_x: Vec<f64>,
+    runs: u64,
+    failed: u64,
+    /// For each number of failures, of passes and of runs within a pattern: the sum of x ln x of this number and of
+    /// those outside. Scores are asked for millions of times, and three sums take half the time of six logarithms.
+    of_failed: Vec<f64>,
+    of_passed: Vec<f64>,
+    of_runs: Vec<f64>,
     /// Log-likelihood of a common rate.
     alike: f64,
 }
@@ -37,21 +40,25 @@ impl Likelihood {
         let (runs, failed) = parts(all);
         let x_ln_x: Vec<f64> = (0..=runs).map(|x| if x == 0 { 0.0 } else { x as f64 * libm::log(x as f64) }).collect();
         let alike = x_ln_x[failed] + x_ln_x[runs - failed] - x_ln_x[runs];
-        Self { runs, failed, x_ln_x, alike }
+        let of = |all: usize| (0..=all).map(|within| x_ln_x[within] + x_ln_x[all - within]).collect();
+        Self {
+            runs: runs as u64,
+            failed: failed as u64,
+            of_failed: of(failed),
+            of_passed: of(runs - failed),
+            of_runs: of(runs),
+            alike,
+        }
     }
 
     /// Returns the score of a pattern, or 0 if its runs fail no more often than the others.
     pub fn gain(&self, within: Count) -> f64 {
         let (runs, failed) = parts(within);
         // No overflow: all counts are below 2^32.
-        if failed as u64 * self.runs as u64 <= runs as u64 * self.failed as u64 {
+        if (failed as u64).wrapping_mul(self.runs) <= (runs as u64).wrapping_mul(self.failed) {
             return 0.0;
         }
-        let of = |x: usize| self.x_ln_x[x];
-        let (outside, failed_outside) = (self.runs - runs, self.failed - failed);
-        of(failed) + of(runs - failed) - of(runs) + of(failed_outside) + of(outside - failed_outside)
-            - of(outside)
-            - self.alike
+        self.of_failed[failed] + self.of_passed[runs.wrapping_sub(failed)] - self.of_runs[runs] - self.alike
     }
 
     /// Returns an upper bound of the score of any part of a pattern: that of all its failures without its passes.

@@ -202,31 +202,43 @@ fn role_name(role: Role) -> &'static str {
 /// Quantises seven columns for each track (position, quaternion). Returns the columns, the lowest corner and the
 /// position step. Values that are not finite repeat the previous one.
 fn columns(rows: &[Vec<f32>], slots: &[usize]) -> (Vec<Vec<i16>>, [f64; 3], f64) {
-    let value =
-        |row: &Vec<f32>, column: usize| row.get(column).copied().filter(|value| value.is_finite()).map(f64::from);
-    let along =
-        |axis: usize| rows.iter().flat_map(move |row| slots.iter().filter_map(move |slot| value(row, 7 * slot + axis)));
-    let low = [0, 1, 2].map(|axis| along(axis).min_by(f64::total_cmp).unwrap_or_default());
-    let extent = low.iter().enumerate().map(|(axis, low)| along(axis).map(|value| value - low).fold(0.0, f64::max));
-    let grain = GRAIN_M.max(extent.fold(0.0, f64::max) / f64::from(u16::MAX));
-    // Positions are relative to the lowest corner; quaternion components are absolute.
-    let quantised = |part: usize, value: f64| match low.get(part) {
-        Some(low) => (value - low) / grain,
-        None => value / GRAIN_TURN,
-    };
-    let mut columns = Vec::with_capacity(7 * slots.len());
-    for (slot, part) in slots.iter().flat_map(|slot| (0..7).map(move |part| (slot, part))) {
-        let mut last = 0i16;
-        let column = rows.iter().map(|row| {
-            if let Some(value) = value(row, 7 * slot + part) {
+    let (low, grain) = corner(rows, slots);
+    let mut columns: Vec<Vec<i16>> = (0..7 * slots.len()).map(|_| Vec::with_capacity(rows.len())).collect();
+    let mut last = vec![0i16; columns.len()];
+    // Row by row, as they lie in memory.
+    for row in rows {
+        for ((slot, columns), last) in slots.iter().zip(columns.chunks_mut(7)).zip(last.chunks_mut(7)) {
+            let values = row.get(7 * slot..7 * slot + 7).unwrap_or_default();
+            for (part, value) in values.iter().enumerate().filter(|(_, value)| value.is_finite()) {
+                // Positions are relative to the lowest corner; quaternion components are absolute.
+                let steps = match low.get(part) {
+                    Some(low) => (f64::from(*value) - low) / grain,
+                    None => f64::from(*value) / GRAIN_TURN,
+                };
                 // Positions use all 16 bits as unsigned integers; quaternion components are within ±5000.
-                last = (quantised(part, value).round().clamp(-32_768.0, 65_535.0) as i32) as i16;
+                last[part] = (steps.round().clamp(-32_768.0, 65_535.0) as i32) as i16;
             }
-            last
-        });
-        columns.push(column.collect());
+            for (column, last) in columns.iter_mut().zip(last) {
+                column.push(*last);
+            }
+        }
     }
     (columns, low, grain)
+}
+
+/// Returns the lowest corner of all positions of some tracks, and the position step.
+fn corner(rows: &[Vec<f32>], slots: &[usize]) -> ([f64; 3], f64) {
+    let (mut low, mut high) = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
+    for (row, slot) in rows.iter().flat_map(|row| slots.iter().map(move |slot| (row, slot))) {
+        let position = row.get(7 * slot..7 * slot + 3).unwrap_or_default();
+        for (axis, value) in position.iter().enumerate().filter(|(_, value)| value.is_finite()) {
+            low[axis] = low[axis].min(*value);
+            high[axis] = high[axis].max(*value);
+        }
+    }
+    let low = low.map(|low| if low.is_finite() { f64::from(low) } else { 0.0 });
+    let extent = low.iter().zip(high).map(|(low, high)| f64::from(high) - low).fold(0.0, f64::max);
+    (low, GRAIN_M.max(extent / f64::from(u16::MAX)))
 }
 
 #[cfg(test)]
