@@ -95,6 +95,7 @@ mod shells;
 mod shortcuts;
 mod shrink;
 mod shrunk;
+mod static_cameras;
 mod statistics;
 mod stops;
 mod strangers;

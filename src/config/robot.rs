@@ -302,14 +302,18 @@ fn read_table(
     let other_joints = table.strings("other_joints").unwrap_or_default();
     roles.joints.push(("other_joints", other_joints.clone()));
     let (grasp_link, camera_link) = (table.string("grasp_link"), table.string("camera_link"));
-    roles.links.push(grasp_link.iter().chain(&camera_link).cloned().collect());
+    // A camera that is fixed in the world is on no link.
+    let in_world = camera_link.as_ref().is_some_and(|link| link.value == RobotProfile::MAP);
+    let of_robot = camera_link.iter().filter(|_| !in_world);
+    roles.links.push(grasp_link.iter().chain(of_robot).cloned().collect());
     let grasp_turned_rad = table.numbers("grasp_turned_rad", ..).unwrap_or([0.0; 3]);
     let grasp_offset_m = table.numbers("grasp_offset_m", -1.0..=1.0).unwrap_or([0.0; 3]);
     let camera_turned_rad = table.numbers("camera_turned_rad", ..).unwrap_or_else(|| {
         let is_optical = camera_link.as_ref().is_some_and(|link| link.value.contains("optical"));
         if is_optical { OPTICAL_TURNED_RAD } else { [0.0; 3] }
     });
-    let camera_offset_m = table.numbers("camera_offset_m", -1.0..=1.0).unwrap_or([0.0; 3]);
+    let farthest_m = if in_world { 100.0 } else { 1.0 };
+    let camera_offset_m = table.numbers("camera_offset_m", -farthest_m..=farthest_m).unwrap_or([0.0; 3]);
     let mount_height_m = table.number("mount_height_m", 0.0..=3.0).unwrap_or(0.0);
     let opening_span = table.key_span("max_opening_m");
     let max_opening_m = table.number("max_opening_m", 0.001..=1.0);

@@ -40,12 +40,14 @@ pub struct RobotProfile {
     pub grasp_offset_m: [f64; 3],
     /// Links of the fingertips, left then right; one of them may be fixed.
     pub finger_links: [String; 2],
-    /// Link of the depth camera: its x axis points forwards, its z axis up in the image.
+    /// Link of the depth camera, whose x axis points forwards and whose z axis up in the image; or
+    /// [`RobotProfile::MAP`], if the camera is fixed beside the robot.
     pub camera_link: String,
     /// Rotation of the camera's frame relative to that link, if the link's axes differ: about its fixed x, y and z axes,
     /// in this order. Unit: radians.
     pub camera_turned_rad: [f64; 3],
-    /// Position of the lens in that link's frame, if it differs from the link's origin. Unit: metres.
+    /// Position of the lens in that link's frame, if it differs from the link's origin; in the world's, if the camera
+    /// is fixed there. Unit: metres.
     pub camera_offset_m: [f64; 3],
     /// Widest gap between the fingers. Unit: metres.
     pub max_opening_m: f64,
@@ -61,6 +63,12 @@ pub struct RobotProfile {
     pub meshes: BTreeMap<String, Vec<Shape>>,
     /// Digest of profile, URDF and meshes.
     pub digest: String,
+}
+
+impl RobotProfile {
+    /// The `camera_link` of a camera that is fixed beside the robot: its pose is in the frame of the map, whose z axis
+    /// points up from the floor.
+    pub const MAP: &'static str = "map";
 }
 
 /// A robot in one posture, for a picture.

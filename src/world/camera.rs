@@ -1,4 +1,4 @@
-//! A depth camera on the robot's camera link: casts one ray per pixel against all colliders, including the robot's own
+//! A depth camera on the robot's camera link, or fixed in the world: casts one ray per pixel against all colliders, including the robot's own
 //! links.
 //!
 //! An image's noise is one recorded choice, `sense.camera.frame`: a seed from which the noise of each pixel is derived.
@@ -92,7 +92,7 @@ impl World {
         let visible = self.engine.colliders.iter().map(|(_, collider)| collider).filter(move |collider| {
             let Owner::Link(link) = Owner::from_tag(collider.user_data) else { return collider.user_data & SHELL == 0 };
             let away = f64::from(collider.shape().distance_to_point(collider.position(), lens, true));
-            away > if link == own { HOUSING_M } else { 0.0 }
+            away > if Some(link) == own { HOUSING_M } else { 0.0 }
         });
         visible.map(|collider| (self.shown_at(collider), collider.shape()))
     }

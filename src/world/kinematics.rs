@@ -15,6 +15,15 @@ pub const GRAVITY: f64 = 9.81;
 /// Least cosine between a vertical axis and the vertical.
 const VERTICAL: f64 = 0.999;
 
+/// Place of a camera.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Mount {
+    /// On a merged link, with the pose in its frame.
+    Link(usize, Isometry3<f64>),
+    /// Beside the robot, with the pose in the world.
+    World(Isometry3<f64>),
+}
+
 /// A robot's geometry for skills, without physics or ground truth.
 #[derive(Debug, Clone)]
 pub struct Kinematics {
@@ -22,19 +31,19 @@ pub struct Kinematics {
     /// Pose of the root. Frame: world.
     root: Isometry3<f64>,
     grasp: (usize, Isometry3<f64>),
-    camera: (usize, Isometry3<f64>),
+    camera: Mount,
     /// Pairs of links that pass through each other, with the smaller index first.
     passing: BTreeSet<(usize, usize)>,
 }
 
 impl Kinematics {
-    /// Creates the geometry of a robot with its root at `root`. `grasp` and `camera` are the merged link and the pose
-    /// in its frame.
+    /// Creates the geometry of a robot with its root at `root`. `grasp` is the merged link and the pose in its
+    /// frame.
     pub(crate) fn new(
         model: Arc<RobotModel>,
         root: Isometry3<f64>,
         grasp: (usize, Isometry3<f64>),
-        camera: (usize, Isometry3<f64>),
+        camera: Mount,
     ) -> Self {
         Self { model, root, grasp, camera, passing: BTreeSet::new() }
     }
@@ -94,12 +103,18 @@ impl Kinematics {
 
     /// Returns the pose of the camera: x forwards, z up in the image.
     pub fn camera(&self, positions: &[f64]) -> Isometry3<f64> {
-        self.links(positions)[self.camera.0] * self.camera.1
+        match self.camera {
+            Mount::Link(link, pose) => self.links(positions)[link] * pose,
+            Mount::World(pose) => pose,
+        }
     }
 
-    /// Returns the link that the camera is on.
-    pub(crate) fn camera_link(&self) -> usize {
-        self.camera.0
+    /// Returns the link that the camera is on, unless it is beside the robot.
+    pub(crate) fn camera_link(&self) -> Option<usize> {
+        match self.camera {
+            Mount::Link(link, _) => Some(link),
+            Mount::World(_) => None,
+        }
     }
 
     /// Returns the nearest ancestor link with shapes. (Stages of a mobile base have none.)

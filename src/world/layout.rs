@@ -5,6 +5,7 @@ use std::collections::BTreeSet;
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
 use crate::description::RobotModel;
+use crate::kinematics::Mount;
 use crate::wrist;
 use crate::{BalancedJoint, Gripper, WorldError};
 use actcheck_data::RobotProfile;
@@ -30,7 +31,7 @@ pub(super) struct Named {
     pub(super) layout: Layout,
     pub(super) finger_links: [usize; 2],
     pub(super) grasp: (usize, Isometry3<f64>),
-    pub(super) camera: (usize, Isometry3<f64>),
+    pub(super) camera: Mount,
 }
 
 impl Named {
@@ -42,7 +43,7 @@ impl Named {
         };
         let [left_link, right_link] = &profile.finger_links;
         let grasp = frame(model, &profile.grasp_link, profile.grasp_offset_m, profile.grasp_turned_rad)?;
-        let camera = frame(model, &profile.camera_link, profile.camera_offset_m, profile.camera_turned_rad)?;
+        let camera = camera(model, profile)?;
         let finger_links = [model.frame(left_link)?.0, model.frame(right_link)?.0];
         let layout = Layout {
             base,
@@ -77,11 +78,25 @@ pub(super) fn frame(
     model: &RobotModel,
     link: &str,
     offset_m: [f64; 3],
-    [roll, pitch, yaw]: [f64; 3],
+    turned_rad: [f64; 3],
 ) -> Result<(usize, Isometry3<f64>), WorldError> {
     let (link, at) = model.frame(link)?;
-    let turned = UnitQuaternion::from_euler_angles(roll, pitch, yaw);
-    Ok((link, at * Translation3::from(Vector3::from(offset_m)) * turned))
+    Ok((link, at * moved(offset_m, turned_rad)))
+}
+
+/// The place of the profile's camera: on a link, or fixed in the world.
+pub(super) fn camera(model: &RobotModel, profile: &RobotProfile) -> Result<Mount, WorldError> {
+    let (link, offset_m) = (&profile.camera_link, profile.camera_offset_m);
+    match frame(model, link, offset_m, profile.camera_turned_rad) {
+        Ok((link, pose)) => Ok(Mount::Link(link, pose)),
+        // A link of this name takes precedence: it is where the URDF says.
+        Err(_) if link == RobotProfile::MAP => Ok(Mount::World(moved(offset_m, profile.camera_turned_rad))),
+        Err(error) => Err(error),
+    }
+}
+
+fn moved(offset_m: [f64; 3], [roll, pitch, yaw]: [f64; 3]) -> Isometry3<f64> {
+    Translation3::from(Vector3::from(offset_m)) * UnitQuaternion::from_euler_angles(roll, pitch, yaw)
 }
 
 /// Returns the largest force of each finger that the motors of a robot's gripper can give. Unit: newtons; infinite if a

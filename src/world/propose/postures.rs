@@ -8,7 +8,7 @@ use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaterni
 
 use crate::description::{JointKind, RobotModel};
 use crate::ik::{self, Reach};
-use crate::layout::{Named, frame};
+use crate::layout::Named;
 use crate::{Kinematics, SelfContact, WorldError};
 use actcheck_data::{Pose, RobotProfile, Stream};
 
@@ -38,10 +38,9 @@ pub(super) fn find(
     grasp: (usize, Isometry3<f64>),
     notes: &mut BTreeMap<&'static str, String>,
 ) -> Result<Postures, WorldError> {
-    let camera = frame(model, &profile.camera_link, profile.camera_offset_m, profile.camera_turned_rad)?;
     let root = Pose::upright([0.0, 0.0, profile.mount_height_m], 0.0).to_isometry();
     let named = Named::find(profile, model)?;
-    let kinematics = Kinematics::new(Arc::clone(model), root, grasp, camera).with_passing(named.passing(model));
+    let kinematics = Kinematics::new(Arc::clone(model), root, grasp, named.camera).with_passing(named.passing(model));
     let arm = named.layout.arm.clone();
     let base: Vec<usize> = named.layout.base.iter().flatten().copied().collect();
     let mut start: Vec<f64> = model.joints.iter().map(|joint| 0.0_f64.clamp(joint.lower, joint.upper)).collect();
