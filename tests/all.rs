@@ -48,6 +48,7 @@ mod many_runs;
 mod margins;
 mod merge;
 mod mistakes;
+mod model_folders;
 mod models;
 mod more_scenes;
 mod move_to;

@@ -7,7 +7,7 @@ use crate::shrink::drop_rejected_tries;
 use crate::{Env, StoredCampaign};
 use actcheck_base::{Diagnostics, Outcome, Source, names};
 use actcheck_config as config;
-use actcheck_config::{CaseText, Launcher, Overrides};
+use actcheck_config::{CaseText, Launcher, Overrides, WrittenPaths};
 use actcheck_data::{Choice, ChoiceKind, ChoiceName, Choices};
 use actcheck_history::{CampaignRecord, History, RunDetail};
 use actcheck_scenario as scenario;
@@ -45,7 +45,7 @@ pub fn export(
         failed: &failed,
         trace: &trace.hash,
         choices: &choices,
-        paths: [None, None, None],
+        paths: WrittenPaths::default(),
         skill: skill_seen_from(&folder, &env.campaign.launcher),
     };
     let source = &env.campaign.source;
@@ -57,7 +57,7 @@ pub fn export(
             return Ok(bare);
         }
     }
-    case.paths = written.map(|path| path.map(|path| seen_from(&folder, &absolute(&home.join(path)))));
+    case.paths = written.map(|path| seen_from(&folder, &absolute(&home.join(path))));
     config::case_text(&env.campaign, &case)
 }
 
@@ -109,8 +109,8 @@ fn home(source: &Source) -> PathBuf {
 }
 
 /// The smallest folder that holds a configuration and all files that it names.
-fn project(home: &Path, written: &[Option<String>; 3]) -> PathBuf {
-    let named = written.iter().flatten().map(|path| absolute(&home.join(path)));
+fn project(home: &Path, written: &WrittenPaths) -> PathBuf {
+    let named = written.all().map(|path| absolute(&home.join(path)));
     named.fold(home.to_path_buf(), |common, path| common_folder(&common, &path))
 }
 

@@ -28,23 +28,54 @@ pub struct CaseText<'a> {
     pub trace: &'a str,
     /// Every choice of the run.
     pub choices: &'a [Choice],
-    /// Values of the keys `ontology`, `model_dir` and the robot's `profile`; `None` omits a key.
-    pub paths: [Option<String>; 3],
+    /// Paths to write; missing ones omit their key.
+    pub paths: WrittenPaths,
     /// Values to write for `test_launcher` and `[skill] dir`, if an external program performs actions.
     pub skill: Option<(Option<String>, String)>,
 }
 
-/// Returns the paths in a configuration's text as written: of the ontology, of the models, and of the robot's profile
-/// if it is a file.
+/// The paths in a configuration's text, as written.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct WrittenPaths {
+    /// The ontology (`ontology`).
+    pub ontology: Option<String>,
+    /// The folders of models (`model_dir`).
+    pub models: Vec<String>,
+    /// The robot's profile (`profile`), if it is a file.
+    pub profile: Option<String>,
+}
+
+impl WrittenPaths {
+    /// Returns all paths.
+    pub fn all(&self) -> impl Iterator<Item = &str> {
+        self.ontology.iter().chain(&self.models).chain(&self.profile).map(String::as_str)
+    }
+
+    /// Changes each path.
+    #[must_use]
+    pub fn map(self, change: impl Fn(String) -> String) -> Self {
+        Self {
+            ontology: self.ontology.map(&change),
+            models: self.models.into_iter().map(&change).collect(),
+            profile: self.profile.map(&change),
+        }
+    }
+}
+
+/// Returns the paths in a configuration's text.
 ///
 /// # Errors
 /// C002 if the text is not TOML.
-pub fn written_paths(source: &Source) -> Result<[Option<String>; 3], Diagnostics> {
+pub fn written_paths(source: &Source) -> Result<WrittenPaths, Diagnostics> {
     let table = parse(source)?;
     let text = |value: Option<&Value>| value.and_then(Value::as_str).map(str::to_owned);
     let profile = text(table.get("robot").and_then(|robot| robot.get("profile")));
     let profile = profile.filter(|profile| profile.ends_with(".toml"));
-    Ok([text(table.get("ontology")), text(table.get("model_dir")), profile])
+    let models = match table.get("model_dir") {
+        Some(Value::Array(folders)) => folders.iter().filter_map(|folder| text(Some(folder))).collect(),
+        folder => text(folder).into_iter().collect(),
+    };
+    Ok(WrittenPaths { ontology: text(table.get("ontology")), models, profile })
 }
 
 fn parse(source: &Source) -> Result<toml::Table, Diagnostics> {
@@ -65,10 +96,12 @@ pub fn case_text(campaign: &Campaign, case: &CaseText<'_>) -> Result<String, Dia
     }
     table.insert("tests".to_owned(), Value::Array(vec![names(case.test)]));
     table.insert("test_count".to_owned(), Value::Integer(1));
-    let [ontology, model_dir, profile] = case.paths.clone();
-    for (key, path) in [("ontology", ontology), ("model_dir", model_dir)] {
-        match path {
-            Some(path) => table.insert(key.to_owned(), Value::String(path)),
+    let WrittenPaths { ontology, models, profile } = case.paths.clone();
+    let mut models: Vec<Value> = models.into_iter().map(Value::String).collect();
+    let model_dir = if models.len() > 1 { Some(Value::Array(models)) } else { models.pop() };
+    for (key, value) in [("ontology", ontology.map(Value::String)), ("model_dir", model_dir)] {
+        match value {
+            Some(value) => table.insert(key.to_owned(), value),
             None => table.remove(key),
         };
     }

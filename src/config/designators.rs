@@ -162,7 +162,7 @@ fn read_nav(root: &mut Table, found: &mut Diagnostics) -> bool {
     may_block
 }
 
-fn read_obstacles(root: &mut Table, library: &ModelLibrary) -> (Vec<String>, u32) {
+fn read_obstacles(root: &mut Table, library: &mut ModelLibrary) -> (Vec<String>, u32) {
     let names = root.strings("nav_obstacle_list").unwrap_or_default();
     names.iter().for_each(|name| library.check_name(root, name));
     let place = root.key_span("nav_obstacle_count");

@@ -1,4 +1,4 @@
-//! The contents of `model_dir`: objects, worlds and robots by name.
+//! The contents of the folders of `model_dir`, and the shipped models: objects, worlds and robots by name.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -18,7 +18,8 @@ const DEFAULT_ROBOT: &str = "mobile_manipulator";
 /// The models that a configuration can name.
 pub(crate) struct ModelLibrary {
     files: Files,
-    folder: PathBuf,
+    /// Folders of models. The first one with a name has it.
+    folders: Vec<PathBuf>,
     /// Objects by name.
     pub(crate) models: BTreeMap<String, Arc<ObjectModel>>,
     /// Names of object files, including invalid ones, so that an invalid model is not also reported as missing.
@@ -37,20 +38,23 @@ pub(crate) struct ModelLibrary {
     warnings: Diagnostics,
 }
 
+/// Most models with faults that the configuration does not name and that get a warning each.
+const MOST_UNUSABLE: usize = 3;
+
 /// The world with only a floor, which needs no file.
 const FLOOR_ALONE: &str = "empty";
 
 /// Reads all models of `model_dir`, or of the shipped folder. Faults of models are reported by
-/// [`ModelLibrary::report`].
+/// [`ModelLibrary::report`]. Shipped models that the folders lack are read when they are named.
 pub(crate) fn read(table: &mut Table, folder: &Path, found: &mut Diagnostics) -> ModelLibrary {
-    let written = table.string("model_dir");
-    let (files, dir) = match &written {
-        Some(written) => (Files::Disk, resolve_path(folder, &written.value)),
-        None => (Files::Shipped, PathBuf::from(SHIPPED_MODELS)),
+    let written = table.string_or_strings("model_dir");
+    let (files, folders) = match written.is_empty() {
+        true => (Files::Shipped, vec![PathBuf::from(SHIPPED_MODELS)]),
+        false => (Files::Disk, written.iter().map(|written| resolve_path(folder, &written.value)).collect()),
     };
     let mut library = ModelLibrary {
         files,
-        folder: dir,
+        folders,
         models: BTreeMap::new(),
         names: Vec::new(),
         diagnostics: BTreeMap::new(),
@@ -61,6 +65,10 @@ pub(crate) fn read(table: &mut Table, folder: &Path, found: &mut Diagnostics) ->
         warnings: Diagnostics::new(),
     };
     for path in library.toml_files("objects") {
+        if library.names.contains(&stem(&path)) {
+            library.ignore_second(&stem(&path), &path);
+            continue;
+        }
         library.names.push(stem(&path));
         match library.files.read(&path) {
             Ok(source) => match model::read(&source) {
@@ -74,11 +82,13 @@ pub(crate) fn read(table: &mut Table, folder: &Path, found: &mut Diagnostics) ->
         }
     }
     library.read_foreign();
-    if let (Some(written), true) = (written, library.names.is_empty()) {
-        let message = format!("the model folder {} contains no models", library.folder.display());
-        let help = "it needs a folder `objects` with one TOML file for each model, or a folder with `model.config` and \
-            `model.sdf` for each; without `model_dir`, the shipped models are used";
-        table.fault("C010", written.span, message, help);
+    let help = "it needs a folder `objects` with one TOML file for each model, or a folder with `model.config` and \
+        `model.sdf` for each; without `model_dir`, the shipped models are used";
+    for (written, folder) in written.into_iter().zip(library.folders.clone()) {
+        if library.is_bare(&folder) {
+            let message = format!("the model folder {} contains no models", folder.display());
+            table.fault("C010", written.span, message, help);
+        }
     }
     library.read_categories(table, found);
     library
@@ -87,12 +97,11 @@ pub(crate) fn read(table: &mut Table, folder: &Path, found: &mut Diagnostics) ->
 impl ModelLibrary {
     /// Reads the SDF and URDF models.
     fn read_foreign(&mut self) {
-        let lookup = Lookup { files: &self.files, folders: self.folders() };
-        for model in self.folders().iter().flat_map(|folder| foreign::find(&self.files, folder)) {
+        let files = self.files.clone();
+        let lookup = Lookup { files: &files, folders: self.foreign_folders() };
+        for model in self.foreign_folders().iter().flat_map(|folder| foreign::find(&files, folder)) {
             if self.names.contains(&model.name) {
-                let message = format!("there are two models `{0}`: {1} is ignored", model.name, model.path.display());
-                let fault = Diagnostic::warning("W036", message).help("give one of them another name");
-                self.diagnostics.entry(model.name).or_default().push(fault);
+                self.ignore_second(&model.name, &model.path);
                 continue;
             }
             match foreign::read(&model, &lookup) {
@@ -110,9 +119,23 @@ impl ModelLibrary {
         }
     }
 
+    /// Warns about a second model of a name.
+    fn ignore_second(&mut self, name: &str, path: &Path) {
+        let message = format!("there are two models `{name}`: {} is ignored", path.display());
+        let fault = Diagnostic::warning("W036", message).help("give one of them another name");
+        self.diagnostics.entry(name.to_owned()).or_default().push(fault);
+    }
+
     /// The folders with SDF and URDF models.
-    fn folders(&self) -> Vec<PathBuf> {
-        vec![self.folder.clone(), self.folder.join("objects")]
+    fn foreign_folders(&self) -> Vec<PathBuf> {
+        self.folders.iter().flat_map(|folder| [folder.clone(), folder.join("objects")]).collect()
+    }
+
+    /// Whether a folder of models has none.
+    fn is_bare(&self, folder: &Path) -> bool {
+        let objects = folder.join("objects");
+        let has_toml = self.files.list(&objects).iter().any(|path| is_toml(path));
+        !has_toml && [folder, &objects].iter().all(|place| foreign::find(&self.files, place).is_empty())
     }
 
     /// Reads `[categories]`: categories by model name, which override those in the models' files.
@@ -139,29 +162,47 @@ impl ModelLibrary {
     }
 
     /// Returns the faults of models: all of them for a model that the configuration names, and only the
-    /// errors, as warnings, for the others.
+    /// first error, as a warning, for each of the others. Many are one warning with a line for each (W045).
     pub(crate) fn report(&self, named: &BTreeSet<&str>) -> Diagnostics {
-        let mut report = self.warnings.clone();
+        let (mut report, mut unusable) = (self.warnings.clone(), Vec::new());
         for (name, diagnostics) in &self.diagnostics {
             if named.contains(name.as_str()) {
                 report.extend(diagnostics.clone());
-            } else if diagnostics.has_errors() {
-                let errors = diagnostics.iter().filter(|fault| fault.severity == Severity::Error);
-                errors.for_each(|fault| {
-                    report.push(Diagnostic { severity: Severity::Warning, ..fault.clone() });
-                });
+            } else if let Some(fault) = diagnostics.iter().find(|fault| fault.severity == Severity::Error) {
+                unusable.push((name, fault));
             }
+        }
+        if unusable.len() <= MOST_UNUSABLE {
+            let as_warning =
+                |(_, fault): &(_, &Diagnostic)| Diagnostic { severity: Severity::Warning, ..(*fault).clone() };
+            report.extend(unusable.iter().map(as_warning).collect());
+        } else {
+            let reasons = unusable.iter().map(|(name, fault)| format!("{name}: {}", fault.message));
+            let message = format!("{} models in {} can't be used", unusable.len(), self.told_folders());
+            let help = format!(
+                "`[pickObject] model_list = [\"NAME\"]` shows all faults of a model\n{}",
+                reasons.collect::<Vec<_>>().join("\n")
+            );
+            report.push(Diagnostic::warning("W045", message).help(help));
         }
         report
     }
 
-    /// Reports an unknown model name (C008).
-    pub(crate) fn check_name(&self, table: &mut Table, name: &Located<String>) {
-        // An empty model folder has already been reported.
-        if !self.names.is_empty() && !self.names.contains(&name.value) {
-            let message = format!("there is no model `{}` in {}", name.value, self.objects_folder().display());
-            table.fault("C008", name.span.clone(), message, choose(&name.value, &self.names));
+    /// Takes a model by name: one of the model folders', or else a shipped one. Reports an unknown name (C008).
+    pub(crate) fn check_name(&mut self, table: &mut Table, name: &Located<String>) {
+        if self.names.contains(&name.value) {
+            return;
         }
+        let shipped = shipped_models().into_iter().find(|path| stem(path) == name.value);
+        if let Some(model) = shipped.and_then(|path| read_shipped(&path)) {
+            self.names.push(model.name.clone());
+            self.models.insert(model.name.clone(), Arc::new(model));
+            return;
+        }
+        let message = format!("there is no model `{}` in {}", name.value, self.told_folders());
+        let known: Vec<String> =
+            self.names.iter().cloned().chain(shipped_models().iter().map(|path| stem(path))).collect();
+        table.fault("C008", name.span.clone(), message, choose(&name.value, &known));
     }
 
     /// Reads a world by name from the model folder, or else from the shipped one.
@@ -200,7 +241,7 @@ impl ModelLibrary {
                 Err(faults) => (None, faults),
             }
         } else {
-            let lookup = Lookup { files: &files, folders: self.folders() };
+            let lookup = Lookup { files: &files, folders: self.foreign_folders() };
             let included = foreign::world::Included { models: &self.models, posed: &self.posed, lookup: &lookup };
             let (world, diagnostics) = foreign::world::read(&name.value, &source, &path, &included);
             (world.map(|world| self.add_models_of(world)), diagnostics)
@@ -226,16 +267,16 @@ impl ModelLibrary {
     /// The worlds of the model folder, then the shipped ones.
     fn world_files(&self) -> Vec<(Files, PathBuf)> {
         let is_world = |path: &PathBuf| is_toml(path) || path.extension().is_some_and(|e| e == "world" || e == "sdf");
-        let own = self.files.list(&self.folder.join("worlds")).into_iter().map(|path| (self.files.clone(), path));
+        let own = self.folders.iter().flat_map(|folder| self.files.list(&folder.join("worlds")));
+        let own = own.map(|path| (self.files.clone(), path));
         let shipped = Files::Shipped.list(&Path::new(SHIPPED_MODELS).join("worlds"));
         own.chain(shipped.into_iter().map(|path| (Files::Shipped, path))).filter(|(_, path)| is_world(path)).collect()
     }
 
     /// Adds the shipped models, which shipped worlds use as furniture.
     fn add_shipped_models(&mut self) {
-        for path in Files::Shipped.list(&Path::new(SHIPPED_MODELS).join("objects")) {
-            let model = Files::Shipped.read(&path).ok().and_then(|source| model::read(&source).ok());
-            if let Some(model) = model.filter(|model| !self.names.contains(&model.name)) {
+        for path in shipped_models() {
+            if let Some(model) = read_shipped(&path).filter(|model| !self.names.contains(&model.name)) {
                 self.models.entry(model.name.clone()).or_insert_with(|| Arc::new(model));
             }
         }
@@ -254,7 +295,7 @@ impl ModelLibrary {
 
     /// Reports a surface that is not furniture of a named world (C021). If a world has no surfaces, models are accepted
     /// too (else C008).
-    pub(crate) fn check_surface(&self, table: &mut Table, name: &Located<String>) {
+    pub(crate) fn check_surface(&mut self, table: &mut Table, name: &Located<String>) {
         let surfaces = |world: &WorldMap| -> Vec<String> {
             let carries =
                 |piece: &&Furniture| self.models.get(&piece.model).is_some_and(|model| model.surface.is_some());
@@ -273,10 +314,17 @@ impl ModelLibrary {
         }
     }
 
-    /// Returns the folder of objects for messages: `objects` if it has files, else the model folder.
-    fn objects_folder(&self) -> PathBuf {
-        let objects = self.folder.join("objects");
-        if self.files.list(&objects).is_empty() { self.folder.clone() } else { objects }
+    /// Returns the folders of objects for messages: `objects` of each model folder if it has files, else that folder.
+    fn told_folders(&self) -> String {
+        let told = self.folders.iter().map(|folder| {
+            let objects = folder.join("objects");
+            if self.files.list(&objects).is_empty() {
+                folder.display().to_string()
+            } else {
+                objects.display().to_string()
+            }
+        });
+        told.collect::<Vec<_>>().join(" or ")
     }
 
     /// Reads the robot of `[robot] profile`: a path to a TOML file, or a name in the model folder or the shipped one.
@@ -358,8 +406,19 @@ impl ModelLibrary {
     }
 
     fn toml_files(&self, kind: &str) -> Vec<PathBuf> {
-        self.files.list(&self.folder.join(kind)).into_iter().filter(|path| is_toml(path)).collect()
+        let all = self.folders.iter().flat_map(|folder| self.files.list(&folder.join(kind)));
+        all.filter(|path| is_toml(path)).collect()
     }
+}
+
+/// The files of the shipped objects.
+fn shipped_models() -> Vec<PathBuf> {
+    let all = Files::Shipped.list(&Path::new(SHIPPED_MODELS).join("objects")).into_iter();
+    all.filter(|path| is_toml(path)).collect()
+}
+
+fn read_shipped(path: &Path) -> Option<ObjectModel> {
+    Files::Shipped.read(path).ok().and_then(|source| model::read(&source).ok())
 }
 
 /// Reads `start_x_m`, `start_y_m` and `start_heading_rad`, which must be given together.

@@ -179,6 +179,14 @@ impl Table {
         Some(list.into_iter().filter_map(|value| self.text_of(key, "a list of strings", value)).collect())
     }
 
+    /// Takes a string, or a list of at least one string. Empty if the key is missing or wrong.
+    pub fn string_or_strings(&mut self, key: &str) -> Vec<Located<String>> {
+        match self.entries.get(key).map(|entry| &entry.value.value) {
+            Some(Value::Array(_)) => self.non_empty_strings(key).unwrap_or_default(),
+            _ => self.string(key).into_iter().collect(),
+        }
+    }
+
     /// Takes a list of at least one string.
     pub fn non_empty_strings(&mut self, key: &str) -> Option<Vec<Located<String>>> {
         let span = self.entries.get(key).map(|entry| entry.value.span.clone());

@@ -161,6 +161,12 @@ const CODES_W: &[Code] = &[
         "correct the coordinates",
     ),
     code(
+        "W045",
+        "models that the configuration does not name can't be used",
+        "their files have faults; the message has the first of each",
+        "mend those that you need: a model that the configuration names gets all its faults",
+    ),
+    code(
         "W050",
         "the URDF has no such link or joint",
         "a name in the robot profile is misspelt",
