@@ -6,7 +6,8 @@ use std::path::{Path, PathBuf};
 
 use crate::Mirror;
 use crate::tables::checked::Checked;
-use crate::tables::mirror::{SCHEMA, entries, is_table, is_whole, named, runs_of, schema_digest, tables_of, unwritten};
+use crate::tables::mirror::{SCHEMA, runs_of, schema_digest, unwritten};
+use crate::tables::table_files::{entries, is_table, is_whole, named, tables_of};
 use actcheck_base::{Diagnostics, write_atomic};
 use actcheck_history::History;
 use actcheck_history::merge::MergePlan;

@@ -12,7 +12,8 @@ use crate::tables::checked::{Checked, FileRuns};
 use crate::tables::columns::{ColumnKind, columns};
 use crate::tables::frames::Rows;
 use crate::tables::outcomes::TableFilter;
-use actcheck_base::{Diagnostic, Diagnostics, Digest, NewFile, ScratchFolder, digest_of, write_atomic};
+use crate::tables::table_files::{digest_of_bytes, entries, is_table, is_whole, named, present, tables_of};
+use actcheck_base::{Diagnostic, Diagnostics, NewFile, ScratchFolder, digest_of, write_atomic};
 use actcheck_history::History;
 
 /// Maximum number of runs in a file, and so in memory at once.
@@ -328,35 +329,6 @@ fn index_of(run: &str) -> u64 {
     })
 }
 
-/// The parts of a file's name.
-pub(super) struct TableName {
-    pub campaign: String,
-    pub number: usize,
-    /// `None` in names of earlier versions.
-    pub digest: Option<String>,
-}
-
-pub(super) fn named(file: &Path) -> Option<TableName> {
-    let stem = file.file_name()?.to_str()?.strip_suffix(".parquet")?;
-    let (rest, last) = stem.rsplit_once('.')?;
-    let of_today = rest.rsplit_once('.').and_then(|(campaign, number)| {
-        Some(TableName { campaign: campaign.to_owned(), number: number.parse().ok()?, digest: Some(last.to_owned()) })
-    });
-    of_today.or_else(|| Some(TableName { campaign: rest.to_owned(), number: last.parse().ok()?, digest: None }))
-}
-
-/// Whether a file has the digest that its name says.
-pub(super) fn is_whole(file: &Path) -> bool {
-    let digest = named(file).and_then(|name| name.digest);
-    digest.is_some_and(|digest| fs::read(file).is_ok_and(|bytes| digest_of_bytes(&bytes) == digest))
-}
-
-fn digest_of_bytes(bytes: &[u8]) -> String {
-    let mut digest = Digest::new();
-    digest.update(bytes);
-    digest.finish()
-}
-
 /// Whether a whole file has the rows that its runs have now.
 fn is_as_stored(history: &History, file: &Path, known: &BTreeSet<String>) -> Result<bool, Diagnostics> {
     let Ok(runs) = ids_of(file) else { return Ok(false) };
@@ -372,43 +344,11 @@ fn is_as_stored(history: &History, file: &Path, known: &BTreeSet<String>) -> Res
     Ok(rows.frame().is_ok_and(|frame| read(file, None).is_ok_and(|there| there.equals_missing(&frame))))
 }
 
-/// The folder of a history's mirror.
-pub(super) fn tables_of(history: &History) -> PathBuf {
-    history.dir().join("tables")
-}
-
 /// Reads the number of later judgements of each campaign from the time when the files were written.
 fn rechecked(tables: &Path) -> BTreeMap<String, u64> {
     let text = fs::read_to_string(tables.join(RECHECKED)).unwrap_or_default();
     let line = |line: &str| line.split_once(' ').and_then(|(id, count)| Some((id.to_owned(), count.parse().ok()?)));
     text.lines().filter_map(line).collect()
-}
-
-pub(super) fn entries(folder: &Path) -> Vec<PathBuf> {
-    fs::read_dir(folder).into_iter().flatten().filter_map(|entry| Some(entry.ok()?.path())).collect()
-}
-
-pub(super) fn is_table(file: &Path) -> bool {
-    file.extension().is_some_and(|ending| ending == "parquet")
-}
-
-/// Returns the files by campaign, in the order of writing. Removes partial files of killed processes, if this process
-/// may change the folder.
-fn present(tables: &Path, may_change: bool) -> BTreeMap<String, Vec<PathBuf>> {
-    let mut found: BTreeMap<String, Vec<PathBuf>> = BTreeMap::new();
-    for path in entries(tables) {
-        if let Some(name) = named(&path) {
-            found.entry(name.campaign).or_default().push(path);
-        } else if is_table(&path) {
-            // Its name is damaged.
-            found.entry(String::new()).or_default().push(path);
-        } else if may_change && path.extension().is_some_and(|ending| ending == "tmp") {
-            // A failure is harmless.
-            let _ = fs::remove_file(&path);
-        }
-    }
-    found.values_mut().for_each(|files| files.sort());
-    found
 }
 
 /// Reads runs on all cores.

@@ -15,6 +15,7 @@ mod frames;
 mod mirror;
 mod outcomes;
 mod row_source;
+mod table_files;
 mod write;
 
 pub(super) use cell::Cell;
