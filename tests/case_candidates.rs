@@ -5,7 +5,7 @@ use std::path::Path;
 use actcheck::base::{Diagnostics, Source};
 use actcheck::campaign::shrink::{ShrinkOptions, shrink};
 use actcheck::campaign::{Clock, Env, RunContext};
-use actcheck::config::{self, CaseText, Overrides};
+use actcheck::config::{self, CaseText, Overrides, WrittenPaths};
 use actcheck::data::{Choices, Scene};
 use actcheck::scenario;
 
@@ -123,7 +123,7 @@ impl Named {
             failed: &[],
             trace: "00",
             choices: choices.made(),
-            paths: [None, None, None],
+            paths: WrittenPaths::default(),
             skill: None,
         };
         (config::case_text(&env.campaign, &case).unwrap(), shown(&scene))
