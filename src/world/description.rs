@@ -7,6 +7,7 @@ use std::sync::{Arc, OnceLock};
 use nalgebra::{Isometry3, Matrix3, Translation3, Unit, UnitQuaternion, Vector3};
 
 use crate::WorldError;
+use crate::assumed::{assume_efforts, widen_followers};
 use crate::counterweight::{BalancedJoint, balance};
 use crate::gripper::Surface;
 use crate::kinematics::motion;
@@ -93,9 +94,6 @@ pub struct RobotModel {
     name: String,
 }
 
-/// Largest effort of joints for which it is unknown, as for those of MJCF and SDF. Units: newtons or newton metres.
-pub(crate) const UNKNOWN_EFFORT: f64 = 100.0;
-
 /// Moment of inertia of links lighter than [`LEAST_LINK_KG`]: that of a ball of this mass with a radius of 1 cm. Unit:
 /// kg·m².
 const LEAST_INERTIA: f64 = 4e-7;
@@ -129,37 +127,6 @@ impl RobotModel {
                 self.joints.iter().map(|known| &known.name).chain(&self.rigid).map(String::as_str),
             ),
         })
-    }
-
-    /// Widens the limits of joints that mimic others to the range of their couplings. A mechanism moves its links together:
-    /// limits that contradict the coupling, such as those of a mirrored joint that are not mirrored, would block the
-    /// leader.
-    fn widen_followers(&mut self) {
-        // Each round widens the followers of those widened before; a chain that is longer than this is a circle.
-        for _ in 0..self.joints.len() {
-            let mut is_changed = false;
-            for idx in 0..self.joints.len() {
-                let Some((leader, factor, offset)) = self.joints[idx].mimic else { continue };
-                let ends = [self.joints[leader].lower, self.joints[leader].upper].map(|end| factor * end + offset);
-                let joint = &mut self.joints[idx];
-                let (lower, upper) = (joint.lower.min(ends[0]).min(ends[1]), joint.upper.max(ends[0]).max(ends[1]));
-                is_changed |= lower < joint.lower || upper > joint.upper;
-                (joint.lower, joint.upper) = (lower, upper);
-            }
-            if !is_changed {
-                break;
-            }
-        }
-    }
-
-    /// Gives joints whose largest effort is 0 one that moves them: it is unknown, because a role needs a motor.
-    fn assume_efforts(&mut self) {
-        for joint in self.joints.iter_mut().filter(|joint| joint.effort == 0.0) {
-            joint.effort = UNKNOWN_EFFORT;
-            if joint.mimic.is_none() {
-                self.assumed.push(joint.name.clone());
-            }
-        }
     }
 
     /// All URDF links, each with the link that it was merged into and its pose in that link's frame, by name.
@@ -262,7 +229,7 @@ impl<'a> Folding<'a> {
             }
         }
         if needed.is_chosen() {
-            self.out.assume_efforts();
+            self.out.assumed = assume_efforts(&mut self.out.joints);
         }
         balance(&mut self.out, &profile.arm_joints);
         Ok(self.out)
@@ -375,7 +342,7 @@ impl<'a> Folding<'a> {
             let (factor, offset) = (mimic.multiplier.unwrap_or(1.0), mimic.offset.unwrap_or(0.0));
             self.out.joints[follower].mimic = Some((leader, factor, offset));
         }
-        self.out.widen_followers();
+        widen_followers(&mut self.out.joints);
         Ok(())
     }
 }

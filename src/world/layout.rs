@@ -4,7 +4,8 @@ use std::collections::BTreeSet;
 
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
-use crate::description::{RobotModel, UNKNOWN_EFFORT};
+use crate::assumed::UNKNOWN_EFFORT;
+use crate::description::RobotModel;
 use crate::wrist;
 use crate::{BalancedJoint, Gripper, WorldError};
 use actcheck_data::RobotProfile;

@@ -3,6 +3,7 @@
 //! Never: decides the robot's actions, judges success, or attaches an object to the hand by a constraint.
 
 mod assemble;
+mod assumed;
 mod body;
 mod camera;
 mod clearance;
