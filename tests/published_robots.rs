@@ -118,7 +118,9 @@ fn a_wrist_that_is_named_after_the_gripper_belongs_to_the_arm() {
     let urdf = fixed_arm().replace("wrist_roll_joint", "gripper_turn_joint");
     let (said, passed) = check_and_run(folder.path(), &urdf, "");
     assert!(passed >= 3, "{passed} of 4 picks passed: {said}");
-    let proposed = stdout(&actcheck(folder.path(), &["new", "robot", "robot.urdf"]));
+    let made = actcheck(folder.path(), &["new", "robot", "robot.urdf", "--out", "proposed.toml"]);
+    assert!(made.status.success(), "{}", stderr(&made));
+    let proposed = std::fs::read_to_string(folder.path().join("proposed.toml")).unwrap();
     let line = |key: &str| proposed.lines().find(|line| line.starts_with(key)).unwrap_or_default().to_owned();
     assert!(line("arm_joints").contains("gripper_turn_joint"), "{proposed}");
     assert!(line("finger_links").contains("finger_left_link") && line("finger_links").contains("finger_right_link"));

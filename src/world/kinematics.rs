@@ -28,7 +28,7 @@ pub struct Kinematics {
     passing: BTreeSet<(usize, usize)>,
     /// Links of the hand: only its own joints move them against each other.
     hand: BTreeSet<usize>,
-    /// Joints outside of the gripper that mimic others, as those of a telescope: the joint, its leader, factor and offset.
+    /// Joints that carry the hand and mimic others, as those of a telescope: the joint, its leader, factor and offset.
     followers: Vec<(usize, usize, f64, f64)>,
 }
 
@@ -44,16 +44,18 @@ impl Kinematics {
         Self { model, root, grasp, camera, passing: BTreeSet::new(), hand: BTreeSet::new(), followers: Vec::new() }
     }
 
-    /// The same geometry with joints that follow others unless they belong to the gripper.
+    /// The same geometry with joints that follow others, if they carry the hand.
     pub(crate) fn with_followers(self, gripper: &Gripper) -> Self {
-        let mimics = self.model.joints.iter().enumerate().filter(|(idx, _)| !gripper.contains(*idx));
+        let joints = &self.model.joints;
+        let parent = |joint: &usize| joints[*joint].parent.checked_sub(1);
+        let path = std::iter::successors(self.grasp.0.checked_sub(1), parent).filter(|idx| !gripper.contains(*idx));
         let followers =
-            mimics.filter_map(|(idx, joint)| joint.mimic.map(|(leader, factor, offset)| (idx, leader, factor, offset)));
+            path.filter_map(|idx| joints[idx].mimic.map(|(leader, factor, offset)| (idx, leader, factor, offset)));
         let followers = followers.collect();
         Self { followers, ..self }
     }
 
-    /// Sets joints that follow others to the positions of these. Those of the gripper stay.
+    /// Sets joints that carry the hand and follow others to the positions of these.
     pub fn follow(&self, positions: &mut [f64]) {
         for (joint, leader, factor, offset) in &self.followers {
             if let Some(at) = positions.get(*leader).map(|at| factor * at + offset)
@@ -64,7 +66,7 @@ impl Kinematics {
         }
     }
 
-    /// Returns the joints that follow a joint, with their factors.
+    /// Returns the joints that carry the hand and follow a joint, with their factors.
     pub fn followers_of(&self, joint: usize) -> impl Iterator<Item = (usize, f64)> + '_ {
         let of = move |follower: &&(usize, usize, f64, f64)| follower.1 == joint;
         self.followers.iter().filter(of).map(|(follower, _, factor, _)| (*follower, *factor))
