@@ -91,7 +91,7 @@ fn a_linkage_with_limits_against_its_coupling_does_not_block_the_fingers() {
 
 /// The Panda of another public package has fingers without shapes, and a hand whose shapes for planning contain them.
 #[test]
-fn a_hand_does_not_stand_for_its_fingers() {
+fn the_shape_of_a_hand_does_not_replace_those_of_its_fingers() {
     let folder = tempfile::tempdir().unwrap();
     let (mut urdf, mut link) = (String::new(), "");
     let named = fixed_arm().replace("palm_link", "hand_link");
@@ -111,7 +111,7 @@ fn a_hand_does_not_stand_for_its_fingers() {
     assert!(passed >= 3, "{passed} of 4 picks passed");
 }
 
-/// The last joint of an arm can have the name of the gripper on it; it is no finger.
+/// The last joint of an arm can have the name of the gripper on it, and is not a finger.
 #[test]
 fn a_wrist_that_is_named_after_the_gripper_belongs_to_the_arm() {
     let folder = tempfile::tempdir().unwrap();

@@ -14,7 +14,7 @@ pub(crate) struct Change<'n> {
 }
 
 /// Gives the links of a gripper the shapes to be seen, if none of its moving links has a collision shape. That of the hand
-/// is replaced too, because it may stand for the fingers and fill the gap between them. Reports each such link (W036).
+/// is replaced too, because it may include the fingers and fill the gap between them. Reports each such link (W036).
 pub(crate) fn of_gripper<'n>(root: Node<'n>, reader: &mut Reader) -> Vec<Change<'n>> {
     let has_word = |name: &str| WORDS.iter().any(|word| name.to_lowercase().contains(word));
     let named = |node: Node, key: &str| node.attribute(key).map(str::to_owned);
