@@ -1,5 +1,5 @@
-//! Robots as others publish them: weak motors, fingers without collision shapes, joints of the whole robot, paths of
-//! meshes without their folder, and hands that can't be tilted. Each is a shipped or a small robot changed so.
+//! Robots as others publish them: weak or unknown motors, fingers without collision shapes, hands and linkages in the way
+//! of their fingers, joints of the whole robot, paths of meshes without their folder, and hands that can't be tilted. Each is a shipped or a small robot changed so.
 
 use std::path::Path;
 
@@ -60,6 +60,82 @@ fn fingers_without_collision_shapes_have_those_to_be_seen() {
     for finger in ["finger_left_link", "finger_right_link"] {
         assert!(said.contains(&format!("the link `{finger}` of the gripper has no `<collision>`")), "{said}");
     }
+    assert!(passed >= 3, "{passed} of 4 picks passed");
+}
+
+/// Stretch 4's URDF has a colour of five numbers.
+#[test]
+fn a_colour_that_is_not_four_numbers_is_ignored() {
+    let folder = tempfile::tempdir().unwrap();
+    let seen = "<visual><geometry><sphere radius=\"0.01\"/></geometry>\
+        <material name=\"grey\"><color rgba=\"0.5 0.5 0.5 0 1\"/></material></visual>";
+    let urdf = fixed_arm().replacen("<collision>", &format!("{seen}<collision>"), 1);
+    assert!(urdf.contains(seen));
+    let (said, passed) = check_and_run(folder.path(), &urdf, "");
+    assert!(said.contains("W036") && said.contains("`rgba` must be four numbers, but is `0.5 0.5 0.5 0 1`"), "{said}");
+    assert!(passed >= 3, "{passed} of 4 picks passed");
+}
+
+/// The PR2 of a public package has a linkage whose coupling turns it backwards, although its limits only allow the other
+/// direction: its fingers could not open.
+#[test]
+fn a_linkage_with_limits_against_its_coupling_does_not_block_the_fingers() {
+    let folder = tempfile::tempdir().unwrap();
+    let linkage = "<joint name=\"linkage_joint\" type=\"prismatic\"><parent link=\"palm_link\"/><child link=\"linkage\"/>\
+        <axis xyz=\"0 1 0\"/><limit lower=\"0\" upper=\"0.07\" effort=\"60\" velocity=\"0.15\"/>\
+        <mimic joint=\"finger_left_joint\" multiplier=\"-1\"/></joint><link name=\"linkage\"><inertial>\
+        <mass value=\"0.05\"/><inertia ixx=\"1e-5\" ixy=\"0\" ixz=\"0\" iyy=\"1e-5\" iyz=\"0\" izz=\"1e-5\"/></inertial></link></robot>";
+    let (said, passed) = check_and_run(folder.path(), &fixed_arm().replace("</robot>", linkage), "");
+    assert!(passed >= 3, "{passed} of 4 picks passed: {said}");
+}
+
+/// The Panda of another public package has fingers without shapes, and a hand whose shapes for planning contain them.
+#[test]
+fn the_shape_of_a_hand_does_not_replace_those_of_its_fingers() {
+    let folder = tempfile::tempdir().unwrap();
+    let (mut urdf, mut link) = (String::new(), "");
+    let named = fixed_arm().replace("palm_link", "hand_link");
+    for line in named.lines() {
+        link = if line.contains("<link name=") { line } else { link };
+        let is_collision = line.contains("<collision>");
+        if is_collision && link.contains("\"hand_link\"") {
+            urdf.push_str(&line.replace("0 0 0.03", "0 0 0.08").replace("0.06 0.17 0.06", "0.06 0.17 0.16"));
+        } else if !(is_collision && link.contains("\"finger_")) {
+            urdf.push_str(line);
+        }
+        urdf.push('\n');
+    }
+    assert!(urdf.contains("0.06 0.17 0.16"));
+    let (said, passed) = check_and_run(folder.path(), &urdf, "");
+    assert!(said.contains("the fingers on the link `hand_link` have no `<collision>`"), "{said}");
+    assert!(passed >= 3, "{passed} of 4 picks passed");
+}
+
+/// The last joint of an arm can have the name of the gripper on it, and is not a finger.
+#[test]
+fn a_wrist_that_is_named_after_the_gripper_belongs_to_the_arm() {
+    let folder = tempfile::tempdir().unwrap();
+    let urdf = fixed_arm().replace("wrist_roll_joint", "gripper_turn_joint");
+    let (said, passed) = check_and_run(folder.path(), &urdf, "");
+    assert!(passed >= 3, "{passed} of 4 picks passed: {said}");
+    let made = actcheck(folder.path(), &["new", "robot", "robot.urdf", "--out", "proposed.toml"]);
+    assert!(made.status.success(), "{}", stderr(&made));
+    let proposed = std::fs::read_to_string(folder.path().join("proposed.toml")).unwrap();
+    let line = |key: &str| proposed.lines().find(|line| line.starts_with(key)).unwrap_or_default().to_owned();
+    assert!(line("arm_joints").contains("gripper_turn_joint"), "{proposed}");
+    assert!(line("finger_links").contains("finger_left_link") && line("finger_links").contains("finger_right_link"));
+}
+
+/// Stretch 4's URDF has no efforts.
+#[test]
+fn joints_without_an_effort_get_one_and_check_says_so() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut urdf = fixed_arm();
+    for effort in ["120", "80", "60", "40", "30"] {
+        urdf = urdf.replace(&format!("effort=\"{effort}\""), "effort=\"0\"");
+    }
+    let (said, passed) = check_and_run(folder.path(), &urdf, "");
+    assert!(said.contains("S075") && said.contains("`shoulder_pitch_joint`"), "{said}");
     assert!(passed >= 3, "{passed} of 4 picks passed");
 }
 

@@ -23,15 +23,15 @@ const IN_VIEW: f64 = 0.5;
 
 impl Env {
     /// Predicts which objects and surfaces the robot can't handle, as warnings with numbers: the gripper is too narrow
-    /// (S070), objects are out of reach (S071) or too heavy (S072), the camera does not see a surface (S073), or the
-    /// arm's motors can't hold its own weight (S074).
+    /// (S070), objects are out of reach (S071) or too heavy (S072), the camera does not see a surface (S073), the
+    /// arm's motors can't hold its own weight (S074), or efforts are unknown (S075).
     pub fn forecast(&self) -> Diagnostics {
         let mut found = Diagnostics::new();
         let campaign = &self.campaign;
         if !matches!(campaign.launcher, Launcher::Reference) || campaign.case.is_some() {
             return found;
         }
-        found.extend(self.too_weak().into_iter().collect());
+        found.extend(self.unknown_efforts().into_iter().chain(self.too_weak()).collect());
         let scenes = self.nominal_scenes();
         if let Some(test) = self.test_with("PerceivePlane") {
             self.foresee_views(&scenes, test, &mut found);
@@ -84,6 +84,19 @@ impl Env {
 
     fn draw(&self, values: &BTreeMap<ChoiceName, Vec<ChoiceValue>>, test: usize) -> Option<Scene> {
         scenario::draw(&self.space, test, &mut Choices::named(values)).ok()
+    }
+
+    /// S075 if joints with a role have no known effort.
+    fn unknown_efforts(&self) -> Option<Diagnostic> {
+        let robot = &self.campaign.robot;
+        let (joints, effort) = world::assumed_efforts(robot).ok().filter(|(joints, _)| !joints.is_empty())?;
+        let message = format!(
+            "the `effort` of `{}` of {} is 0, and so unknown: {effort} N or N·m is used",
+            joints.join("`, `"),
+            robot.name,
+        );
+        let help = "write the largest force or torque of each joint into `<limit effort=\"…\">` of the URDF";
+        Some(self.campaign.warning("S075", "robot.profile", message).help(help))
     }
 
     /// S074 for each joint of the arm that can't hold the arm by its motor alone.

@@ -161,28 +161,28 @@ impl ModelLibrary {
         table.finish(found);
     }
 
-    /// Returns the faults of models: all of them for a model that the configuration names, and only the
-    /// first error, as a warning, for each of the others. Many are one warning with a line for each (W045).
+    /// Returns the faults of models: all of them for a model that the configuration names, and only the errors, as
+    /// warnings, for the others. Of more than three others, one warning has the first error of each (W045).
     pub(crate) fn report(&self, named: &BTreeSet<&str>) -> Diagnostics {
         let (mut report, mut unusable) = (self.warnings.clone(), Vec::new());
         for (name, diagnostics) in &self.diagnostics {
             if named.contains(name.as_str()) {
                 report.extend(diagnostics.clone());
-            } else if let Some(fault) = diagnostics.iter().find(|fault| fault.severity == Severity::Error) {
-                unusable.push((name, fault));
+            } else if diagnostics.has_errors() {
+                unusable.push((name, diagnostics.iter().filter(|fault| fault.severity == Severity::Error)));
             }
         }
         if unusable.len() <= MOST_UNUSABLE {
-            let as_warning =
-                |(_, fault): &(_, &Diagnostic)| Diagnostic { severity: Severity::Warning, ..(*fault).clone() };
-            report.extend(unusable.iter().map(as_warning).collect());
+            let errors = unusable.into_iter().flat_map(|(_, errors)| errors);
+            let as_warning = |fault: &Diagnostic| Diagnostic { severity: Severity::Warning, ..fault.clone() };
+            report.extend(errors.map(as_warning).collect());
         } else {
-            let reasons = unusable.iter().map(|(name, fault)| format!("{name}: {}", fault.message));
             let message = format!("{} models in {} can't be used", unusable.len(), self.told_folders());
-            let help = format!(
-                "`[pickObject] model_list = [\"NAME\"]` shows all faults of a model\n{}",
-                reasons.collect::<Vec<_>>().join("\n")
-            );
+            let reasons = unusable.into_iter().filter_map(|(name, mut errors)| {
+                errors.next().map(|fault| format!("\n{name}: {}", fault.message))
+            });
+            let help = "`[pickObject] model_list = [\"NAME\"]` shows all faults of a model";
+            let help = format!("{help}{}", reasons.collect::<String>());
             report.push(Diagnostic::warning("W045", message).help(help));
         }
         report

@@ -256,8 +256,8 @@ fn with_meshes(mut profile: RobotProfile, read: foreign::robot::RobotText) -> Ro
         profile.digest = digest_of(&format!("{}{}", profile.digest, read.digest));
         profile.meshes = read.meshes;
     }
-    if !read.added.is_empty() {
-        let text = foreign::robot_shapes::with(&profile.urdf.text, read.added);
+    if !read.edits.is_empty() {
+        let text = foreign::robot_text::with(&profile.urdf.text, read.edits);
         profile.urdf = Source::new(Arc::clone(&profile.urdf.name), text);
     }
     profile

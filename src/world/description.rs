@@ -7,6 +7,7 @@ use std::sync::{Arc, OnceLock};
 use nalgebra::{Isometry3, Matrix3, Translation3, Unit, UnitQuaternion, Vector3};
 
 use crate::WorldError;
+use crate::assumed::{assume_efforts, widen_followers};
 use crate::counterweight::{BalancedJoint, balance};
 use crate::gripper::Surface;
 use crate::kinematics::motion;
@@ -87,6 +88,8 @@ pub struct RobotModel {
     rigid: Vec<String>,
     /// Joints that can't hold the arm's weight by their motors alone.
     pub(crate) balanced: Vec<BalancedJoint>,
+    /// Names of joints with a role whose largest effort is unknown.
+    pub(crate) assumed: Vec<String>,
     /// The URDF's name, for messages.
     name: String,
 }
@@ -177,6 +180,7 @@ impl<'a> Folding<'a> {
             frames: BTreeMap::new(),
             rigid: Vec::new(),
             balanced: Vec::new(),
+            assumed: Vec::new(),
             name,
         };
         Ok(Self { robot, links, children, meshes, out })
@@ -223,6 +227,9 @@ impl<'a> Folding<'a> {
                 link.mass = LEAST_LINK_KG;
                 link.inertia = Matrix3::identity() * LEAST_INERTIA;
             }
+        }
+        if needed.is_chosen() {
+            self.out.assumed = assume_efforts(&mut self.out.joints);
         }
         balance(&mut self.out, &profile.arm_joints);
         Ok(self.out)
@@ -335,6 +342,7 @@ impl<'a> Folding<'a> {
             let (factor, offset) = (mimic.multiplier.unwrap_or(1.0), mimic.offset.unwrap_or(0.0));
             self.out.joints[follower].mimic = Some((leader, factor, offset));
         }
+        widen_followers(&mut self.out.joints);
         Ok(())
     }
 }

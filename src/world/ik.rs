@@ -42,6 +42,7 @@ fn approach(kinematics: &Kinematics, seed: &[f64], reach: &Reach) -> Result<Vec<
     for (position, joint) in positions.iter_mut().zip(kinematics.joints()) {
         *position = position.clamp(joint.lower, joint.upper);
     }
+    kinematics.follow(&mut positions);
     for _ in 0..MOST_ITERATIONS {
         let (grasp, jacobian) = kinematics.grasp_jacobian(&positions);
         let error = pose_error(&grasp, &reach.target);
@@ -50,6 +51,7 @@ fn approach(kinematics: &Kinematics, seed: &[f64], reach: &Reach) -> Result<Vec<
         }
         let jacobian = DMatrix::from_iterator(6, positions.len(), jacobian.iter().copied());
         step(kinematics, &mut positions, &jacobian, &error, &reach.mobility);
+        kinematics.follow(&mut positions);
     }
     Err(positions)
 }

@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use nalgebra::{Isometry3, Matrix6xX, Point3, Translation3, UnitQuaternion, Vector3};
 
+use crate::Gripper;
 use crate::description::{Joint, JointKind, RobotModel};
 use crate::surface::spread;
 use actcheck_data::{Part, Shape};
@@ -34,6 +35,10 @@ pub struct Kinematics {
     camera: Mount,
     /// Pairs of links that pass through each other, with the smaller index first.
     passing: BTreeSet<(usize, usize)>,
+    /// Links of the hand: only its own joints move them against each other.
+    hand: BTreeSet<usize>,
+    /// Joints that carry the hand and mimic others, as those of a telescope: the joint, its leader, factor and offset.
+    followers: Vec<(usize, usize, f64, f64)>,
 }
 
 impl Kinematics {
@@ -45,12 +50,45 @@ impl Kinematics {
         grasp: (usize, Isometry3<f64>),
         camera: Mount,
     ) -> Self {
-        Self { model, root, grasp, camera, passing: BTreeSet::new() }
+        Self { model, root, grasp, camera, passing: BTreeSet::new(), hand: BTreeSet::new(), followers: Vec::new() }
     }
 
-    /// The same geometry with pairs of links that pass through each other.
-    pub(crate) fn with_passing(self, passing: BTreeSet<(usize, usize)>) -> Self {
-        Self { passing, ..self }
+    /// The same geometry with joints that follow others, if they carry the hand.
+    pub(crate) fn with_followers(self, gripper: &Gripper) -> Self {
+        let joints = &self.model.joints;
+        let parent = |joint: &usize| joints[*joint].parent.checked_sub(1);
+        let path = std::iter::successors(self.grasp.0.checked_sub(1), parent).filter(|idx| !gripper.contains(*idx));
+        let followers =
+            path.filter_map(|idx| joints[idx].mimic.map(|(leader, factor, offset)| (idx, leader, factor, offset)));
+        let followers = followers.collect();
+        Self { followers, ..self }
+    }
+
+    /// Sets joints that carry the hand and follow others to the positions of these.
+    pub fn follow(&self, positions: &mut [f64]) {
+        for (joint, leader, factor, offset) in &self.followers {
+            if let Some(at) = positions.get(*leader).map(|at| factor * at + offset)
+                && let Some(position) = positions.get_mut(*joint)
+            {
+                *position = at;
+            }
+        }
+    }
+
+    /// Returns the joints that carry the hand and follow a joint, with their factors.
+    pub fn followers_of(&self, joint: usize) -> impl Iterator<Item = (usize, f64)> + '_ {
+        let of = move |follower: &&(usize, usize, f64, f64)| follower.1 == joint;
+        self.followers.iter().filter(of).map(|(follower, _, factor, _)| (*follower, *factor))
+    }
+
+    /// The same geometry with pairs of links that pass through each other, and the links of the hand.
+    pub(crate) fn with_passing(self, passing: BTreeSet<(usize, usize)>, hand: BTreeSet<usize>) -> Self {
+        Self { passing, hand, ..self }
+    }
+
+    /// Returns whether two links belong to the hand: an arm that moves does not bring them together.
+    pub(crate) fn are_of_hand(&self, first: usize, second: usize) -> bool {
+        self.hand.contains(&first) && self.hand.contains(&second)
     }
 
     /// Returns whether two links pass through each other.
@@ -143,7 +181,8 @@ impl Kinematics {
             .collect()
     }
 
-    /// Returns the pose and the Jacobian of the grasp link. Shape: 6 × joints, linear above angular.
+    /// Returns the pose and the Jacobian of the grasp link; joints that follow others move with these. Shape: 6 × joints,
+    /// linear above angular.
     pub fn grasp_jacobian(&self, positions: &[f64]) -> (Isometry3<f64>, Matrix6xX<f64>) {
         let poses = self.links(positions);
         let grasp = poses[self.grasp.0] * self.grasp.1;
@@ -159,6 +198,11 @@ impl Kinematics {
             jacobian.fixed_view_mut::<3, 1>(0, link - 1).copy_from(&linear);
             jacobian.fixed_view_mut::<3, 1>(3, link - 1).copy_from(&angular);
             link = joint.parent;
+        }
+        for (joint, leader, factor, _) in &self.followers {
+            let moved = jacobian.column(*joint) * *factor;
+            let mut column = jacobian.column_mut(*leader);
+            column += moved;
         }
         (grasp, jacobian)
     }

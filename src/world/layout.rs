@@ -4,6 +4,7 @@ use std::collections::BTreeSet;
 
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
+use crate::assumed::UNKNOWN_EFFORT;
 use crate::description::RobotModel;
 use crate::kinematics::Mount;
 use crate::wrist;
@@ -54,22 +55,37 @@ impl Named {
         Ok(Self { layout, finger_links, grasp, camera })
     }
 
-    /// Returns the pairs of links that pass through each other, with the smaller index first: those of the gripper's
-    /// mechanism and the palm, but not the two fingertips; and those of a wrist. Their convex shapes overlap where the real
-    /// ones do not.
+    /// Returns the pairs of links that pass through each other, with the smaller index first: those of the hand, but not
+    /// the two fingertips; and those of a wrist. Their convex shapes overlap where the real ones do not.
     pub(super) fn passing(&self, model: &RobotModel) -> BTreeSet<(usize, usize)> {
-        let gripper = &self.layout.gripper;
-        let mut of_gripper = vec![false; model.links.len()];
-        for (idx, joint) in model.joints.iter().enumerate() {
-            of_gripper[idx + 1] = gripper.contains(idx) || of_gripper[joint.parent];
-        }
-        let palms = gripper.joints().map(|joint| model.joints[joint].parent);
-        let moved = (0..of_gripper.len()).filter(|link| of_gripper[*link]);
-        let all: BTreeSet<usize> = moved.chain(palms).collect();
+        let all = self.links_of_hand(model);
         let [left, right] = self.finger_links;
         let pairs = all.iter().flat_map(|first| all.range(first + 1..).map(|second| (*first, *second)));
         let of_gripper = pairs.filter(|pair| *pair != (left.min(right), left.max(right)));
         of_gripper.chain(wrist::passing(model)).collect()
+    }
+
+    /// Returns the links of the gripper's mechanism, those that carry them, and the hand's other fingers.
+    pub(super) fn links_of_hand(&self, model: &RobotModel) -> BTreeSet<usize> {
+        let gripper = &self.layout.gripper;
+        let palms: BTreeSet<usize> = gripper.joints().map(|joint| model.joints[joint].parent).collect();
+        let moved_by = |begins: &dyn Fn(usize) -> bool| {
+            let mut moved = vec![false; model.links.len()];
+            for (idx, joint) in model.joints.iter().enumerate() {
+                moved[idx + 1] = begins(idx) || moved[joint.parent];
+            }
+            moved
+        };
+        // A link that carries an arm or the head too, such as a torso with the fingers of two arms, is not a hand.
+        let is_elsewhere = |idx: &usize| self.layout.arm.contains(idx) || self.layout.head.contains(idx);
+        let is_hand = |palm: usize| {
+            let below = moved_by(&|idx| model.joints[idx].parent == palm);
+            palm > 0 && !(0..model.joints.len()).any(|idx| below[idx + 1] && is_elsewhere(&idx))
+        };
+        let hands: BTreeSet<usize> = palms.iter().copied().filter(|palm| is_hand(*palm)).collect();
+        let moved = moved_by(&|idx| gripper.contains(idx) || hands.contains(&model.joints[idx].parent));
+        let moved = (0..model.links.len()).filter(|link| moved[*link]);
+        moved.chain(palms).collect()
     }
 }
 
@@ -99,8 +115,7 @@ fn moved(offset_m: [f64; 3], [roll, pitch, yaw]: [f64; 3]) -> Isometry3<f64> {
     Translation3::from(Vector3::from(offset_m)) * UnitQuaternion::from_euler_angles(roll, pitch, yaw)
 }
 
-/// Returns the largest force of each finger that the motors of a robot's gripper can give. Unit: newtons; infinite if a
-/// motor's limit is 0, which is unknown.
+/// Returns the largest force of each finger that the motors of a robot's gripper can give. Unit: newtons.
 ///
 /// # Errors
 /// As [`check_robot`].
@@ -108,7 +123,7 @@ pub fn grip_limit_n(profile: &RobotProfile) -> Result<f64, WorldError> {
     let model = RobotModel::read(profile)?;
     let gripper = Named::find(profile, &model)?.layout.gripper;
     let of = |(joint, lever_m): (usize, f64)| model.joints[joint].effort / lever_m;
-    Ok(gripper.motors().map(of).filter(|force_n| *force_n > 0.0).fold(f64::INFINITY, f64::min))
+    Ok(gripper.motors().map(of).fold(f64::INFINITY, f64::min))
 }
 
 /// Returns the joints of a robot's arm that can't hold its weight by their motors alone. They are simulated as balanced.
@@ -117,6 +132,15 @@ pub fn grip_limit_n(profile: &RobotProfile) -> Result<f64, WorldError> {
 /// [`WorldError`] if the URDF can't be read.
 pub fn balanced_joints(profile: &RobotProfile) -> Result<Vec<BalancedJoint>, WorldError> {
     RobotModel::read(profile).map(|model| model.balanced)
+}
+
+/// Returns the joints with a role whose largest effort is 0 in the URDF, and so unknown, and the effort that they are
+/// simulated with. Unit: newtons or newton metres.
+///
+/// # Errors
+/// [`WorldError`] if the URDF can't be read.
+pub fn assumed_efforts(profile: &RobotProfile) -> Result<(Vec<String>, f64), WorldError> {
+    RobotModel::read(profile).map(|model| (model.assumed, UNKNOWN_EFFORT))
 }
 
 /// Checks that a profile matches its URDF, without simulating.

@@ -3,6 +3,7 @@
 //! Never: decides the robot's actions, judges success, or attaches an object to the hand by a constraint.
 
 mod assemble;
+mod assumed;
 mod body;
 mod camera;
 mod clearance;
@@ -62,7 +63,7 @@ pub use error::WorldError;
 pub use fault::{Fault, Perturbation, Poison};
 pub use gripper::Gripper;
 pub use kinematics::{GRAVITY, Kinematics};
-pub use layout::{Layout, balanced_joints, check_robot, grip_limit_n};
+pub use layout::{Layout, assumed_efforts, balanced_joints, check_robot, grip_limit_n};
 pub use propose::{Proposal, complete, is_incomplete, propose};
 pub use recorder::{Contact, Course, Record, Tracks};
 pub use robot::geometry;

@@ -41,6 +41,11 @@ impl<'a> Needed<'a> {
         Self { moving: Some(moving), joints }
     }
 
+    /// Whether the profile has roles, which select the joints.
+    pub(super) fn is_chosen(&self) -> bool {
+        self.moving.is_some()
+    }
+
     /// Whether the simulation moves a joint.
     pub(super) fn contains(&self, joint: &urdf_rs::Joint) -> bool {
         self.moving.as_ref().is_none_or(|moving| moving.contains(joint.name.as_str()))

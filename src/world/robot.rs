@@ -61,8 +61,10 @@ pub fn geometry(start: &RobotStart) -> Result<(Kinematics, Layout, Vec<f64>), Wo
     let named = Named::find(&start.profile, &model)?;
     let positions = home(&start.profile, &model, &named, start.base);
     let root = root_of(start, &named.layout);
-    let passing = named.passing(&model);
-    let kinematics = Kinematics::new(model, root, named.grasp, named.camera).with_passing(passing);
+    let (passing, hand) = (named.passing(&model), named.links_of_hand(&model));
+    let kinematics = Kinematics::new(model, root, named.grasp, named.camera)
+        .with_passing(passing, hand)
+        .with_followers(&named.layout.gripper);
     Ok((kinematics, named.layout, positions))
 }
 
@@ -87,8 +89,10 @@ impl Robot {
         let named = Named::find(&profile, &model)?;
         let positions = home(&profile, &model, &named, start.base);
         let root = root_of(start, &named.layout);
-        let passing = named.passing(&model);
-        let kinematics = Kinematics::new(model.clone(), root, named.grasp, named.camera).with_passing(passing);
+        let (passing, links_of_hand) = (named.passing(&model), named.links_of_hand(&model));
+        let kinematics = Kinematics::new(model.clone(), root, named.grasp, named.camera)
+            .with_passing(passing, links_of_hand)
+            .with_followers(&named.layout.gripper);
         let bodies = insert_links(engine, &model, &kinematics.links(&positions), &named, &profile);
         let motors = insert_joints(engine, &model, &bodies, &named, &profile)?;
         let off_floor = links_on_floor(&model, &named, &profile);

@@ -51,8 +51,9 @@ struct Form {
 }
 
 impl SelfContact {
-    /// Finds the pairs of links that could collide. Leaves out neighbours, whose shapes overlap at their joint, links of
-    /// the gripper's mechanism, and pairs that overlap in one of the `right` postures, which are known to be valid, such as the one for driving.
+    /// Finds the pairs of links that could collide. Leaves out neighbours, whose shapes overlap at their joint, pairs of the
+    /// hand, which the arm does not bring together, and pairs that overlap in one of the `right` postures, which are known
+    /// to be valid, such as the one for driving.
     /// Pairs that are close in one of these may come as close in others.
     pub fn new(kinematics: &Kinematics, right: &[Vec<f64>]) -> Self {
         let links: Vec<Form> = kinematics.solids_of_links().map(Form::new).collect();
@@ -61,10 +62,9 @@ impl SelfContact {
         let mut pairs = Vec::new();
         for second in (0..links.len()).filter(is_solid) {
             let neighbour = kinematics.solid_parent(second);
-            for first in (0..second)
-                .filter(is_solid)
-                .filter(|first| neighbour != Some(*first) && !kinematics.pass(*first, second))
-            {
+            let passes = |first: usize| kinematics.pass(first, second) || kinematics.are_of_hand(first, second);
+            let others = (0..second).filter(is_solid).filter(|first| neighbour != Some(*first) && !passes(*first));
+            for first in others {
                 let pair = Pair { links: (first, second), clear_m: CLEAR_M };
                 let nearest = right.iter().map(|poses| gap(&links, pair, poses)).fold(CLEAR_M, f64::min);
                 let clear_m = if nearest < CLEAR_M { nearest * KEPT_SHARE } else { CLEAR_M };

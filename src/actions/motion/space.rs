@@ -66,7 +66,12 @@ impl<'a> ArmSpace<'a> {
         let moved = moved_links(kinematics, &layout.arm);
         let points: Vec<(usize, Point3<f64>)> =
             kinematics.surface_points(CHECK_M).into_iter().filter(|(link, _)| moved[*link]).collect();
-        let levers = layout.arm.iter().map(|joint| lever(kinematics, *joint, &points)).collect();
+        let levers = layout.arm.iter().map(|joint| {
+            let followers = kinematics.followers_of(*joint);
+            let of_followers: f64 = followers.map(|(own, factor)| factor.abs() * lever(kinematics, own, &points)).sum();
+            lever(kinematics, *joint, &points) + of_followers
+        });
+        let levers = levers.collect();
         let itself = SelfContact::new(kinematics, right);
         let is_hand = moved_links(kinematics, layout.arm.last().copied().as_slice());
         let (arm, arm_farther_m) = (layout.arm.as_slice(), 0.0);
@@ -104,12 +109,14 @@ impl<'a> ArmSpace<'a> {
             let (lower, upper) = (joint.lower.max(-HALF_TURN), joint.upper.min(HALF_TURN));
             positions[*idx] = lower + (upper - lower) * share;
         }
+        self.kinematics.follow(&mut positions);
         positions
     }
 
     /// Copies the arm's joint positions from one posture to another.
     pub(super) fn copy_arm(&self, from: &[f64], to: &mut [f64]) {
         self.arm.iter().for_each(|idx| to[*idx] = from[*idx]);
+        self.kinematics.follow(to);
     }
 
     /// Number of arm joints.

@@ -71,7 +71,7 @@ pub fn fold(robot: &Operator<'_>) -> Vec<Vec<f64>> {
 /// The arm moves there directly, or with one joint last: an arm whose upper part is vertical turns about it.
 pub fn tuck(robot: &Operator<'_>, held: &Held) -> Vec<Vec<f64>> {
     let start = robot.commanded();
-    let home = with_arm(start, &robot.layout().arm, &robot.profile().home);
+    let home = with_arm(robot, start, &robot.profile().home);
     let last = robot.layout().arm.iter().map(|last| {
         let mut before = home.clone();
         before[*last] = start[*last];
@@ -163,15 +163,16 @@ pub fn untuck(robot: &Operator<'_>, tucked: &[Vec<f64>], before: &[f64]) -> Vec<
     let arm = &robot.layout().arm;
     let values = |posture: &[f64]| arm.iter().map(|joint| posture[*joint]).collect::<Vec<f64>>();
     let back = tucked.iter().rev().skip(1).map(Vec::as_slice).chain((!tucked.is_empty()).then_some(before));
-    back.map(|posture| with_arm(robot.commanded(), arm, &values(posture))).collect()
+    back.map(|posture| with_arm(robot, robot.commanded(), &values(posture))).collect()
 }
 
 /// A posture with other positions of the arm's joints.
-fn with_arm(posture: &[f64], arm: &[usize], values: &[f64]) -> Vec<f64> {
+fn with_arm(robot: &Operator<'_>, posture: &[f64], values: &[f64]) -> Vec<f64> {
     let mut posture = posture.to_vec();
-    for (joint, value) in arm.iter().zip(values) {
+    for (joint, value) in robot.layout().arm.iter().zip(values) {
         posture[*joint] = *value;
     }
+    robot.kinematics().follow(&mut posture);
     posture
 }
 

@@ -114,7 +114,7 @@ const CODES_W: &[Code] = &[
         "W036",
         "a part of a model file is ignored or replaced, or is that of no real body",
         "the simulation has no counterpart for it, such as plugins and air drag; one moment of inertia exceeds the sum of \
-         the others; a gripper has no `<collision>`; or a joint moves the whole robot",
+         the others; a gripper has no `<collision>`; a joint moves the whole robot; or a colour is not four numbers",
         "nothing, if the model works without it; otherwise follow the help",
     ),
     code(

@@ -194,4 +194,10 @@ const CODES_S: &[Code] = &[
         "the joint's `effort` is too small, or springs that the URDF does not describe balance the arm",
         "nothing, if the robot has springs or counterweights: its arm is simulated as balanced",
     ),
+    code(
+        "S075",
+        "the effort of joints is unknown",
+        "the URDF limits the effort of joints with a role to 0, with which they could not move",
+        "write the largest force or torque of each joint into the URDF",
+    ),
 ];

@@ -16,6 +16,7 @@ mod nested;
 pub(crate) mod robot;
 pub(crate) mod robot_inertia;
 pub(crate) mod robot_shapes;
+pub(crate) mod robot_text;
 pub(crate) mod robot_tree;
 mod sdf;
 pub(crate) mod sdf_robot;

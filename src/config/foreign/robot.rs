@@ -6,7 +6,8 @@ use std::path::Path;
 use crate::foreign::geometry::Shapes;
 use crate::foreign::lookup::Lookup;
 use crate::foreign::robot_inertia::{self, Mend};
-use crate::foreign::robot_shapes::{self, Added};
+use crate::foreign::robot_shapes;
+use crate::foreign::robot_text::{self, Edit};
 use crate::foreign::robot_tree::{self, Tree};
 use crate::foreign::xml::{self, Node, Reader};
 use actcheck_base::{Diagnostics, Source};
@@ -22,8 +23,8 @@ pub(crate) struct RobotText {
     pub(crate) tree: Option<Tree>,
     /// Proposed changes of impossible moments of inertia.
     pub(crate) mends: Vec<Mend>,
-    /// Collision shapes for the links of the gripper, if they have none.
-    pub(crate) added: Vec<Added>,
+    /// Collision shapes for the links of the gripper, if they have none, and removals of unreadable colours.
+    pub(crate) edits: Vec<Edit>,
 }
 
 /// Reads the links, joints and collision meshes, and reports every fault with its span.
@@ -39,7 +40,7 @@ pub(crate) fn read(source: &Source, path: &Path, lookup: &Lookup, found: &mut Di
                 digest: shapes.digest.finish(),
                 tree: None,
                 mends: Vec::new(),
-                added: Vec::new(),
+                edits: Vec::new(),
             };
         }
     };
@@ -57,14 +58,16 @@ pub(crate) fn read(source: &Source, path: &Path, lookup: &Lookup, found: &mut Di
             read_collision(collision, &mut shapes, &mut meshes, &mut reader);
         }
     }
-    let added = robot_shapes::of_gripper(root, &mut reader);
-    for visual in &added {
-        read_collision(visual.shape, &mut shapes, &mut meshes, &mut reader);
+    let mut edits = robot_text::wrong_colours(root, &mut reader);
+    for change in robot_shapes::of_gripper(root, &mut reader) {
+        if let Some(seen) = change.seen {
+            read_collision(seen, &mut shapes, &mut meshes, &mut reader);
+        }
+        edits.push(change.edit);
     }
-    let added = added.into_iter().map(|visual| visual.added).collect();
     let mends = robot_inertia::check(root, &meshes, &mut reader);
     found.extend(reader.found);
-    RobotText { meshes, digest: shapes.digest.finish(), tree, mends, added }
+    RobotText { meshes, digest: shapes.digest.finish(), tree, mends, edits }
 }
 
 fn read_collision(

@@ -240,7 +240,7 @@ pub(crate) fn turned([x, y, z]: [f64; 3], [qx, qy, qz, qw]: [f64; 4]) -> Option<
 }
 
 /// Returns the beginning of a text, on one line.
-fn short(text: &str) -> String {
+pub(crate) fn short(text: &str) -> String {
     const MOST: usize = 60;
     let text = text.split_whitespace().collect::<Vec<_>>().join(" ");
     match text.char_indices().nth(MOST) {

@@ -1,9 +1,11 @@
 //! Finds the gripper of a profile; measures its opening on the model unless that is known.
 
+use std::f64::consts::{PI, TAU};
+
 use nalgebra::Isometry3;
 
 use crate::WorldError;
-use crate::description::RobotModel;
+use crate::description::{Joint, JointKind, RobotModel};
 use crate::gripper::coupling::{Follower, coupled};
 use crate::gripper::gap::{Gap, Probe};
 use crate::gripper::opening::{Gripper, Leader};
@@ -133,7 +135,14 @@ impl<'a> Drive<'a> {
 
     /// Returns the ways on which the gripper may open: the first and the last position of each leader.
     fn ways(&self) -> Vec<Vec<(f64, f64)>> {
-        let limits = |joint: &usize| (self.model.joints[*joint].lower, self.model.joints[*joint].upper);
+        let limits = |joint: &usize| {
+            let Joint { kind, lower, upper, .. } = self.model.joints[*joint];
+            match kind {
+                // More than a turn repeats it, with fewer entries in each turn.
+                JointKind::Revolute if upper - lower > TAU => (lower.max(-PI), upper.min(PI)),
+                _ => (lower, upper),
+            }
+        };
         let rising: Vec<(f64, f64)> = self.leaders.iter().map(limits).collect();
         let falling = |(from, to): (f64, f64)| (to, from);
         let mut ways = vec![rising.clone(), rising.iter().copied().map(falling).collect()];

@@ -5,7 +5,7 @@ use std::path::Path;
 use crate::description::RobotModel;
 use crate::layout::{Named, check_robot, grip_limit_n};
 use crate::robot::tests::alone;
-use crate::{Joint, World};
+use crate::{Joint, SelfContact, World, ik};
 use actcheck_base::{Files, Source};
 use actcheck_data::RobotProfile;
 
@@ -174,6 +174,49 @@ fn a_mimic_joint_outside_the_gripper_follows_its_leader() {
     }
 }
 
+/// A telescope has one motor: its further stages carry the hand as far again.
+#[test]
+fn inverse_kinematics_moves_the_joints_that_follow_others() {
+    let (left, right) = (turning(0.0, 0.6), turning(-0.6, 0.0));
+    let mut profile = hand(&left, &right, &["left", "right"]);
+    let stage = "<link name=\"stage\"/><joint name=\"second\" type=\"prismatic\"><parent link=\"stage\"/>\
+                 <child link=\"palm\"/><axis xyz=\"0 0 1\"/><limit lower=\"0\" upper=\"0.1\" effort=\"300\" velocity=\"0.2\"/>\
+                 <mimic joint=\"lift\" multiplier=\"0.5\"/></joint></robot>";
+    let text = profile.urdf.text.replacen("<child link=\"palm\"/>", "<child link=\"stage\"/>", 1);
+    profile.urdf = Source::new("hand.urdf", text.replace("</robot>", stage));
+    let world = alone(profile);
+    let kinematics = world.kinematics();
+    let at = |name: &str| kinematics.joints().iter().position(|joint| joint.name == name).expect("it has this joint");
+    let start = world.observe().positions;
+    let target = nalgebra::Translation3::new(0.0, 0.0, 0.15) * kinematics.grasp(&start);
+    let mut mobility = vec![0.0; start.len()];
+    mobility[at("lift")] = 1.0;
+    let found = ik::solve(kinematics, &start, &ik::Reach { target, mobility }).expect("it is within reach");
+    assert!((found[at("lift")] - 0.7).abs() < 2e-3, "{found:?}");
+    // The limits of the second stage would stop it at 0.1 m.
+    assert!((found[at("second")] - 0.35).abs() < 1e-3, "{found:?}");
+    assert!((kinematics.grasp(&found).translation.vector - target.translation.vector).norm() < 1e-3);
+}
+
+/// The convex shapes of neighbouring fingers overlap where the real ones do not; an arm brings none of them together.
+#[test]
+fn fingers_that_overlap_do_not_forbid_postures_of_the_arm() {
+    let (left, right) = (turning(0.0, 0.6), turning(-0.6, 0.0));
+    let profile = hand(&left, &right, &["left", "right"]);
+    let third = "<joint name=\"third\" type=\"fixed\"><parent link=\"left_finger\"/><child link=\"thumb\"/></joint>\
+                 <link name=\"thumb\"><collision><origin xyz=\"0.06 -0.02 0\"/><geometry><box size=\"0.1 0.09 0.03\"/>\
+                 </geometry></collision></link></robot>";
+    let mut thick = profile.clone();
+    thick.urdf = Source::new("hand.urdf", profile.urdf.text.replace("</robot>", third));
+    let world = alone(thick);
+    let mut positions = world.observe().positions;
+    let itself = SelfContact::new(world.kinematics(), &[]);
+    for opening_m in [0.0, 0.02, 0.1] {
+        world.layout().gripper.set(&mut positions, opening_m);
+        assert_eq!(itself.touching(&world.kinematics().links(&positions)), None, "{opening_m} m");
+    }
+}
+
 /// Fingers cannot press harder than their motor: its effort by the way of the fingertips.
 #[test]
 fn the_grip_is_as_strong_as_its_motors() {
@@ -186,8 +229,11 @@ fn the_grip_is_as_strong_as_its_motors() {
     // One motor moves both fingers, twice as far.
     let coupled = of(&hand(&left, &format!("{right}{MIMIC}"), &["left"]));
     assert!((coupled - 10.0 / lever_m).abs() < 0.5, "{coupled} N");
-    let unknown = turning(0.0, 0.6).replace("effort=\"20\"", "effort=\"0\"");
-    assert!(of(&hand(&unknown, FIXED, &["left"])).is_infinite());
+    // An effort of 0 is unknown: it is as if it were 100 Nm.
+    let efforts =
+        ["0", "100"].map(|effort| turning(0.0, 0.6).replace("effort=\"20\"", &format!("effort=\"{effort}\"")));
+    let [unknown, strong] = efforts.map(|left| of(&hand(&left, FIXED, &["left"])));
+    assert!((unknown - strong).abs() < 1e-9 && strong > 100.0, "{unknown} N, {strong} N");
 }
 
 /// The convex shapes of knuckles overlap where the real ones do not; those of fingertips meet.

@@ -24,6 +24,8 @@ const CENTRED_AT_M: f64 = 0.06;
 const LEAST_CHANGE_M: f64 = 0.008;
 /// Weight of a link that carries another one of the gripper: a knuckle rather than a fingertip.
 const CARRIER: f64 = 0.3;
+/// Weight of a joint whose largest effort is 0.
+const WITHOUT_MOTOR: f64 = 0.2;
 /// Weight of two links whose volumes differ by more than the share [`UNLIKE`].
 const UNALIKE: f64 = 0.7;
 const UNLIKE: f64 = 0.1;
@@ -109,7 +111,27 @@ fn groups(model: &RobotModel) -> BTreeMap<usize, BTreeSet<usize>> {
         let top = path.iter().copied().find(|joint| named(*joint)).unwrap_or(idx);
         groups.entry(model.joints[top].parent).or_default().insert(idx);
     }
-    groups
+    let mut hands: BTreeMap<usize, BTreeSet<usize>> = BTreeMap::new();
+    for (mut palm, mut joints) in groups {
+        while let Some(wrist) = wrist(model, &joints).filter(|wrist| !is_coupled(*wrist)) {
+            joints.remove(&wrist);
+            palm = wrist + 1;
+        }
+        hands.entry(palm).or_default().extend(joints);
+    }
+    hands
+}
+
+/// The joint of a group that carries all others, if these are on several branches: a wrist that is named after the gripper
+/// on it, rather than a finger.
+fn wrist(model: &RobotModel, joints: &BTreeSet<usize>) -> Option<usize> {
+    joints.iter().copied().find(|wrist| {
+        let others: Vec<usize> = joints.iter().copied().filter(|joint| joint != wrist).collect();
+        let is_beyond = |joint: usize, from: usize| chain(model, joint + 1).contains(&from);
+        let branch_off =
+            |joint: &usize| others.iter().any(|other| !is_beyond(*other, *joint) && !is_beyond(*joint, *other));
+        others.iter().all(|joint| is_beyond(*joint, *wrist)) && others.iter().any(branch_off)
+    })
 }
 
 /// Long chains before short ones, then right hands.
@@ -144,6 +166,7 @@ fn measure(
             };
             for (weight, frame) in all {
                 let Some(found) = rate(bare, model, palm, links, &named, frame) else { continue };
+                let weight = weight * powered(model, &named, joints);
                 let found = Found { score: found.score * weight * tips(model, links, joints), ..found };
                 if best.as_ref().is_none_or(|best| found.score > best.score + 1e-9) {
                     best = Some(found);
@@ -260,6 +283,12 @@ fn facing(model: &RobotModel, palm: usize, joints: &BTreeSet<usize>) -> Vec<[usi
 pub(super) fn leader(model: &RobotModel, joint: usize) -> usize {
     let next = |joint: &usize| model.joints[*joint].mimic.map(|(leader, ..)| leader);
     std::iter::successors(Some(joint), next).take(model.joints.len()).last().unwrap_or(joint)
+}
+
+/// Weight of joints that drive the fingers: springs move joints without an effort, if others have one.
+fn powered(model: &RobotModel, named: &[usize], joints: &BTreeSet<usize>) -> f64 {
+    let has_motor = |joint: &usize| model.joints[*joint].effort > 0.0;
+    if !named.iter().all(has_motor) && joints.iter().any(has_motor) { WITHOUT_MOTOR } else { 1.0 }
 }
 
 /// How much two links look like fingertips, from 0 to 1: they carry no other link of the gripper, and are alike.

@@ -40,7 +40,9 @@ pub(super) fn find(
 ) -> Result<Postures, WorldError> {
     let root = Pose::upright([0.0, 0.0, profile.mount_height_m], 0.0).to_isometry();
     let named = Named::find(profile, model)?;
-    let kinematics = Kinematics::new(Arc::clone(model), root, grasp, named.camera).with_passing(named.passing(model));
+    let kinematics = Kinematics::new(Arc::clone(model), root, grasp, named.camera)
+        .with_passing(named.passing(model), named.links_of_hand(model))
+        .with_followers(&named.layout.gripper);
     let arm = named.layout.arm.clone();
     let base: Vec<usize> = named.layout.base.iter().flatten().copied().collect();
     let mut start: Vec<f64> = model.joints.iter().map(|joint| 0.0_f64.clamp(joint.lower, joint.upper)).collect();
