@@ -4,6 +4,7 @@
 
 mod call;
 mod controls;
+mod cup;
 mod cut;
 mod external;
 mod forced;

@@ -1,7 +1,7 @@
 //! Robot profiles: the roles of a URDF's joints and links.
 
 use actcheck_base::{Diagnostic, Diagnostics, Digest, Files, Source, did_you_mean, digest_of};
-use actcheck_data::RobotProfile;
+use actcheck_data::{RobotProfile, Suction};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -25,8 +25,15 @@ const REQUIRED: [&str; 1] = ["urdf"];
 const USUAL: [&str; 7] =
     ["arm_joints", "finger_joints", "finger_links", "grasp_link", "camera_link", "max_opening_m", "home"];
 
+/// Keys of a gripper with fingers, which exclude those of a suction cup.
+const OF_FINGERS: [&str; 5] = ["finger_joints", "finger_links", "max_opening_m", "finger_friction", "grip_force_n"];
+
 /// Keys that depend on another key.
-const DEPENDENT: [(&str, &str); 6] = [
+const DEPENDENT: [(&str, &str); 10] = [
+    ("suction_force_n", "suction_radius_m"),
+    ("suction_radius_m", "suction_force_n"),
+    ("suction_friction", "suction_force_n"),
+    ("suction_force_n", "grasp_link"),
     ("grasp_turned_rad", "grasp_link"),
     ("grasp_offset_m", "grasp_link"),
     ("camera_turned_rad", "camera_link"),
@@ -37,6 +44,9 @@ const DEPENDENT: [(&str, &str); 6] = [
 
 /// Friction of the fingertips if the profile has none: that of rubber pads.
 const FINGER_FRICTION: f64 = 0.8;
+
+/// Friction of a suction cup's lip if the profile has none: that of rubber on dry metal, glass or wood.
+const LIP_FRICTION: f64 = 0.5;
 
 /// Rotation of the camera's frame relative to a link whose name contains `optical`, if the profile has none: by ROS's
 /// convention, z points forwards and y down in the frame of such a link. Unit: radians.
@@ -80,12 +90,21 @@ pub(crate) fn read_telling(
     })?;
     let mut table = Table::parse(&source)?;
     table.require(&REQUIRED);
-    table.expect(&USUAL);
+    let has_cup = table.has("suction_force_n") || table.has("suction_radius_m");
+    if has_cup {
+        exclude_fingers(&mut table);
+    }
+    let usual: Vec<&str> = USUAL.into_iter().filter(|key| !(has_cup && OF_FINGERS.contains(key))).collect();
+    table.expect(&usual);
     let mut found = Diagnostics::new();
     let (urdf, lookup) = find_urdf(files, path, packages, &mut table, &mut found);
     for (key, of) in DEPENDENT {
         if let (Some(span), false) = (table.key_span(key), table.has(of)) {
-            let help = format!("write `{of}` too, or leave out both: then they are found on the model");
+            let help = if key.starts_with("suction") {
+                "a suction cup needs `suction_force_n`, `suction_radius_m`, and a `grasp_link` at its lip".to_owned()
+            } else {
+                format!("write `{of}` too, or leave out both: then they are found on the model")
+            };
             table.fault("W011", span, format!("`{key}` depends on `{of}`, which is missing"), help);
         }
     }
@@ -213,6 +232,7 @@ pub fn bare(
         postures: Vec::new(),
         finger_friction: FINGER_FRICTION,
         grip_force_n: GRIP_FORCE_N,
+        suction: None,
         meshes: BTreeMap::new(),
     };
     Ok(with_meshes(profile, read))
@@ -284,6 +304,25 @@ fn read_base(table: &mut Table, roles: &mut Roles) -> Option<(Option<[String; 3]
     }
 }
 
+/// Reports each key of fingers in the profile of a robot with a suction cup.
+fn exclude_fingers(table: &mut Table) {
+    for key in OF_FINGERS {
+        if let Some(span) = table.key_span(key) {
+            let message = format!("`{key}` and the keys of a suction cup exclude each other");
+            let help = "a gripper has either fingers or a cup: remove the keys of the other one";
+            table.fault("W052", span, message, help);
+        }
+    }
+}
+
+/// Reads the suction cup. Returns `None` if the gripper has fingers.
+fn read_suction(table: &mut Table) -> Option<Suction> {
+    let force_n = table.number("suction_force_n", 0.1..=1000.0);
+    let radius_m = table.number("suction_radius_m", 0.002..=0.2);
+    let friction = table.number("suction_friction", 0.0..=2.0).unwrap_or(LIP_FRICTION);
+    Some(Suction { force_n: force_n?, radius_m: radius_m?, friction })
+}
+
 fn read_table(
     table: &mut Table,
     urdf: Option<&Source>,
@@ -316,6 +355,7 @@ fn read_table(
     roles.opening = opening_span.zip(max_opening_m);
     let finger_friction = table.number("finger_friction", 0.0..=2.0).unwrap_or(FINGER_FRICTION);
     let grip_force_n = table.number("grip_force_n", 0.1..=1000.0).unwrap_or(GRIP_FORCE_N);
+    let suction = read_suction(table);
     let n_arm_joints = arm_joints.as_ref().map_or(0, Vec::len);
     let home = posture(table, "home", n_arm_joints, roles);
     let postures = table.tables("postures").into_iter().filter_map(|mut posture_table| {
@@ -329,7 +369,7 @@ fn read_table(
     let mut digest = Digest::new();
     digest.update(table.source().text.as_bytes());
     digest.update(urdf.text.as_bytes());
-    Some(RobotProfile {
+    let profile = RobotProfile {
         name,
         urdf,
         base_joints,
@@ -351,9 +391,27 @@ fn read_table(
         postures,
         finger_friction,
         grip_force_n,
+        suction: None,
         meshes: BTreeMap::new(),
         digest: digest.finish(),
+    };
+    Some(match suction {
+        Some(cup) => with_cup(profile, cup),
+        None => profile,
     })
+}
+
+/// The profile with a suction cup instead of fingers.
+pub fn with_cup(profile: RobotProfile, cup: Suction) -> RobotProfile {
+    RobotProfile {
+        finger_joints: Vec::new(),
+        finger_links: [profile.grasp_link.clone(), profile.grasp_link.clone()],
+        max_opening_m: 2.0 * cup.radius_m,
+        finger_friction: cup.friction,
+        grip_force_n: cup.force_n,
+        suction: Some(cup),
+        ..profile
+    }
 }
 
 fn values(list: Vec<Located<String>>) -> Vec<String> {

@@ -35,7 +35,7 @@ pub use motion::{JointMoment, Motion, MotionRow};
 pub use places::{Location, Room};
 pub use pose::Pose;
 pub use quality::Quality;
-pub use robot::{LEAST_LINK_KG, RobotProfile, RobotView};
+pub use robot::{LEAST_LINK_KG, RobotProfile, RobotView, Suction};
 pub use robot_course::{Clearance, HeldCourse, JointCourse, RobotCourse, SelfCollision};
 pub use samples::{Samples, Series};
 pub use scene::{KnownKind, RobotStart, Role, Scene, SceneObject};

@@ -55,12 +55,41 @@ pub struct RobotProfile {
     pub postures: Vec<Vec<f64>>,
     /// Friction coefficient of the fingertips.
     pub finger_friction: f64,
-    /// Closing force of one finger. Unit: newtons.
+    /// Closing force of one finger; of a suction cup, its greatest pull. Unit: newtons.
     pub grip_force_n: f64,
+    /// The suction cup of a gripper without fingers: both `finger_links` are then the `grasp_link`, whose grasp frame is at
+    /// the cup's lip with its x axis along the axis of the cup; `max_opening_m` is the cup's diameter.
+    pub suction: Option<Suction>,
     /// Collision meshes by the file name in the URDF, in the file's own scale.
     pub meshes: BTreeMap<String, Vec<Shape>>,
     /// Digest of profile, URDF and meshes.
     pub digest: String,
+}
+
+/// A suction cup, which holds a surface by a seal.
+///
+/// The seal breaks if the pull along the cup's axis exceeds `force_n`, the shear force across it `friction · force_n`, or
+/// the peel moment about the middle of the lip `force_n · radius_m`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Suction {
+    /// Greatest pull along the cup's axis. Unit: newtons.
+    pub force_n: f64,
+    /// Radius of the lip. Unit: metres.
+    pub radius_m: f64,
+    /// Friction coefficient between the lip and a surface.
+    pub friction: f64,
+}
+
+impl Suction {
+    /// Returns the greatest shear force across the axis at a pull limit of `force_n`. Unit: newtons.
+    pub fn most_shear_n(&self, force_n: f64) -> f64 {
+        self.friction * force_n
+    }
+
+    /// Returns the greatest peel moment at a pull limit of `force_n`. Unit: newton metres.
+    pub fn most_peel_nm(&self, force_n: f64) -> f64 {
+        force_n * self.radius_m
+    }
 }
 
 /// A robot in one posture, for a picture.

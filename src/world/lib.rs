@@ -1,6 +1,7 @@
 //! Simulates a `Scene`: the only crate that uses the physics engine.
 //!
-//! Never: decides the robot's actions, judges success, or attaches an object to the hand by a constraint.
+//! Never: decides the robot's actions, judges success, or attaches an object to the hand by a constraint, other than the
+//! seal of a suction cup, which breaks beyond its limits.
 
 mod assemble;
 mod body;
@@ -49,6 +50,7 @@ mod share;
 mod shell;
 mod silhouette;
 mod simulation;
+mod suction;
 mod surface;
 mod views;
 mod wrist;

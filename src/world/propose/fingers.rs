@@ -46,6 +46,9 @@ pub(super) struct Hand {
 /// [`NoHand`] if there is none.
 pub(super) fn find(partial: &RobotProfile, model: &RobotModel) -> Result<Hand, NoHand> {
     let stated = Stated::of(partial, model)?;
+    if let (Some(_), Some((palm, _))) = (partial.suction, stated.grasp) {
+        return Ok(Hand { profile: partial.clone(), palm, notes: BTreeMap::new() });
+    }
     if let (Some(links), [_, ..], Some(grasp)) = (stated.links, stated.joints.as_slice(), stated.grasp) {
         let mut profile = partial.clone();
         if profile.max_opening_m == 0.0 {
