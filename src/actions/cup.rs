@@ -24,8 +24,11 @@ const SIDE_LOWEST_M: f64 = 0.055;
 const SIDE_PENALTY: f64 = 0.2;
 /// How far the hand goes on where it does not find the surface. Unit: metres. Three times the error of perceived heights.
 const DEEPER_M: f64 = 0.03;
-/// Shortest duration of that way. Unit: seconds.
-const DEEPER_SECS: f64 = 2.0;
+/// The last part of the approach, in which the hand is slow: as long as that way, and the error of inverse kinematics.
+/// Unit: metres.
+const SLOW_M: f64 = 0.032;
+/// Mean speed of the slow hand. Unit: m/s. At it, the arm stops within the way that a soft lip gives.
+const SLOW_M_S: f64 = 0.02;
 /// Time for the hand to come to rest before it feels for the surface. Unit: seconds.
 const REST_SECS: f64 = 0.3;
 
@@ -74,22 +77,29 @@ fn on_side(thing: &Sighting, cup: &Suction, heading: f64, thickness: f64) -> Gra
     Grasp { approach: Approach::Side, pose, heading, opening_m: 2.0 * cup.radius_m, penalty: SIDE_PENALTY }
 }
 
-/// Moves along the approach with the vacuum on until the cup feels a seal, or the arm feels something below the hand; some
-/// centimetres further if it feels neither.
+/// Moves along the approach with the vacuum on, slowly near the expected surface, until the cup feels a seal or the arm
+/// feels something below the hand; some centimetres further if it feels neither.
 ///
 /// # Errors
 /// [`Interrupt`] if the action has to end.
 pub fn approach(path: &[Vec<f64>], least_secs: f64, robot: &mut Operator<'_>) -> Result<(), Interrupt> {
     robot.wait(REST_SECS)?;
     robot.set_opening(0.0);
+    let Some(end) = path.last() else { return Ok(()) };
+    let lip = robot.kinematics().grasp(end);
+    let way_m = |robot: &Operator<'_>, posture: &[f64]| {
+        (robot.kinematics().grasp(posture).translation.vector - lip.translation.vector).norm()
+    };
+    let slow = path.iter().position(|posture| way_m(robot, posture) < SLOW_M).unwrap_or_default();
+    let (fast, slow) = path.split_at(slow);
     let mut touch = Touch::new(robot);
-    if robot.follow_until(path, least_secs, |robot| feels(robot) || touch.felt(robot))? {
+    if robot.follow_until(fast, least_secs, |robot| feels(robot) || touch.felt(robot))? {
         return Ok(());
     }
-    let Some(end) = path.last() else { return Ok(()) };
-    let axis = robot.kinematics().grasp(end).rotation * Vector3::x();
-    let deeper = straight(robot, end, &(axis * DEEPER_M));
-    robot.follow_until(&deeper, DEEPER_SECS, |robot| feels(robot) || touch.felt(robot))?;
+    let deeper = straight(robot, end, &(lip.rotation * Vector3::x() * DEEPER_M));
+    let slow = [slow, &deeper].concat();
+    let secs = (way_m(robot, robot.commanded()) + DEEPER_M) / SLOW_M_S;
+    robot.follow_until(&slow, secs, |robot| feels(robot) || touch.felt(robot))?;
     Ok(())
 }
 

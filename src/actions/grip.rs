@@ -65,8 +65,11 @@ impl GripWatch {
     /// Updates with the observation of the next control tick, and the force that the arm carries then. Unit: newtons.
     pub fn look(&mut self, observed: &Observation, load_n: f64) {
         let weak = observed.finger_efforts_n.iter().any(|effort| *effort < self.weak_n);
-        if !weak && !self.slipped {
-            self.load_n = load_n;
+        if !weak {
+            self.load_n = if self.slipped { self.load_n } else { load_n };
+        } else if self.weak_ticks == 0 && !self.slipped {
+            // A hold that broke in this tick carried the load for a part of it.
+            self.load_n = self.load_n.max(load_n);
         }
         self.weak_ticks = if weak { self.weak_ticks + 1 } else { 0 };
         let gave_way = observed.gripper_opening_m < self.opening_m - GAVE_WAY_M;

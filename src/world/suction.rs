@@ -1,15 +1,15 @@
 //! The suction cup: when its seal forms, the force that it carries, and when it breaks.
 //!
-//! A seal is a stiff joint between the cup's link and the body that it holds, from the moment at which the whole lip lies on
+//! A seal is a joint with the stiffness of a soft lip between the cup's link and the body that it holds, from the moment at which the whole lip lies on
 //! the body. The engine's solver gives the force of the joint; beyond the cup's limits, the joint is removed.
 
 use nalgebra::{Isometry3, Point3, Vector3};
 use parry3d::query::Ray;
-use rapier3d::prelude::{GenericJoint, ImpulseJointHandle, JointAxesMask};
+use rapier3d::prelude::{GenericJoint, ImpulseJointHandle, JointAxesMask, JointAxis, MotorModel, SpringCoefficients};
 
 use crate::World;
 use crate::contacts::{CONTACT_FLOOR_NEWTONS, Touch};
-use crate::convert::{from_vector, to_pose, to_vector};
+use crate::convert::{from_vector, to_pose, to_real, to_vector};
 use crate::engine::Owner;
 use actcheck_data::Suction;
 
@@ -21,6 +21,15 @@ const LIP_M: f64 = 0.003;
 const FLAT_COSINE: f64 = 0.985;
 /// Rays along the rim. With the one in the middle, they find edges and holes of more than half a radius.
 const N_RAYS: u32 = 8;
+/// Natural frequency of a body on the soft lip. Unit: hertz. Under its weight, a body sags by 1.1 mm.
+const LIP_FREQUENCY_HZ: f32 = 15.0;
+/// Tilt at which the lip resists with the greatest peel moment of the seal. Unit: radians. A stiffer lip would break where
+/// the hand presses a box that is not quite level on a table.
+const GIVE_RAD: f64 = 0.1;
+/// Ratio of the lip's damping to its stiffness against tilts. Unit: seconds. A box of 1 kg then swings only once.
+const GIVE_SECS: f64 = 0.1;
+/// Axes about which the lip gives.
+const TILTS: [JointAxis; 3] = [JointAxis::AngX, JointAxis::AngY, JointAxis::AngZ];
 /// Distance behind the lip at which rays start. Unit: metres. The lip may be pressed into a surface by some millimetres.
 const BEHIND_M: f64 = 0.01;
 /// An opening below this switches the vacuum on. Unit: metres.
@@ -60,11 +69,12 @@ pub(super) struct Load {
 }
 
 impl Load {
-    /// Returns whether a seal with this pull limit breaks.
+    /// Returns whether a seal with this pull limit breaks. A body that pushes presses the lip on it, as the vacuum does.
     pub(super) fn breaks(&self, cup: &Suction, limit_n: f64) -> bool {
+        let pressed_n = limit_n + (-self.force_n.x).max(0.0);
         let shear_n = self.force_n.yz().norm();
         let peel_nm = self.moment_nm.yz().norm();
-        self.force_n.x > limit_n || shear_n > cup.most_shear_n(limit_n) || peel_nm > cup.most_peel_nm(limit_n)
+        self.force_n.x > limit_n || shear_n > cup.most_shear_n(pressed_n) || peel_nm > cup.most_peel_nm(pressed_n)
     }
 }
 
@@ -100,6 +110,21 @@ impl Cup {
             _ => None,
         }
     }
+}
+
+/// Returns the joint of a seal, with its frames at the lip still to be set.
+fn lip_joint(cup: &Suction) -> GenericJoint {
+    let mut data = GenericJoint::new(JointAxesMask::LIN_AXES);
+    data.softness = SpringCoefficients { natural_frequency: LIP_FREQUENCY_HZ, damping_ratio: 1.0 };
+    let stiffness = cup.most_peel_nm(cup.force_n) / GIVE_RAD;
+    for axis in TILTS {
+        data.set_motor_model(axis, MotorModel::ForceBased);
+        // The engine's angle is that of a quaternion: half of the tilt.
+        data.set_motor(axis, 0.0, 0.0, to_real(2.0 * stiffness), to_real(GIVE_SECS * stiffness));
+    }
+    // The joint carries the push of the lip too: a contact would fight it.
+    data.set_contacts_enabled(false);
+    data
 }
 
 impl World {
@@ -142,10 +167,8 @@ impl World {
         let (link, body) = (self.robot.finger_links[0], self.objects[object].body);
         let from_link = self.robot.kinematics.links(&self.robot.positions)[link].inverse() * lip;
         let from_body = self.pose_of(&self.objects[object]).inverse() * lip;
-        let mut data = GenericJoint::new(JointAxesMask::LOCKED_FIXED_AXES);
+        let mut data = lip_joint(&cup.suction);
         data.set_local_frame1(to_pose(&from_link)).set_local_frame2(to_pose(&from_body));
-        // The joint carries the push of the lip too: a contact would fight it.
-        data.set_contacts_enabled(false);
         let joint = self.engine.impulse_joints.insert(self.robot.bodies[link], body, data, true);
         cup.vacuum = Vacuum::Sealed(Seal { joint, object, load: Load::default() });
         self.cup = Some(cup);
@@ -175,7 +198,7 @@ impl World {
         let mut nearest: Option<(f64, Vector3<f64>, usize)> = None;
         for (idx, object) in self.objects.iter().enumerate() {
             for solid in self.colliders_of(object.body) {
-                let most = crate::convert::to_real(BEHIND_M + LIP_M);
+                let most = to_real(BEHIND_M + LIP_M);
                 let Some(hit) = solid.shape().cast_ray_and_get_normal(solid.position(), &ray, most, true) else {
                     continue;
                 };
@@ -197,14 +220,15 @@ impl World {
         let parameters = &self.engine.integration_parameters;
         // The engine keeps the impulses of the last substep.
         let per_second = parameters.num_solver_iterations as f64 / f64::from(parameters.dt);
-        let of = |coordinate: usize| f64::from(joint.impulses[coordinate]) * per_second * share;
-        let [force_n, moment] = [0, 3].map(|first| Vector3::new(of(first), of(first + 1), of(first + 2)));
+        let impulse = |coordinate: usize| f64::from(joint.impulses[coordinate]);
+        let force_n = Vector3::new(impulse(0), impulse(1), impulse(2)) * (per_second * share);
+        let turns = TILTS.map(|axis| f64::from(joint.data.motors[axis as usize].impulse));
+        let moment_nm = Vector3::from(turns) * (per_second * share);
         if begins_tick {
             seal.load = Load::default();
         }
         seal.load.force_n += force_n;
-        // Its angular coordinates are components of a quaternion: half an angle.
-        seal.load.moment_nm += moment * 0.5;
+        seal.load.moment_nm += moment_nm;
     }
 
     /// Breaks the seal at the end of a control tick if its mean load in the tick exceeds its limits: air needs some
