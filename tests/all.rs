@@ -98,6 +98,7 @@ mod shrunk;
 mod statistics;
 mod stops;
 mod strangers;
+mod suction;
 mod support;
 mod tables;
 mod temporal;

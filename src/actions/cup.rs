@@ -11,7 +11,7 @@ use crate::grip::feels;
 use crate::operator::{Interrupt, Operator};
 use crate::pick::failed;
 use crate::place::{Touch, straight};
-use actcheck_data::{ActionReport, Suction};
+use actcheck_data::{ActionReport, Pose, Suction};
 use actcheck_world::Sighting;
 
 /// Number of headings of the base tried around an object.
@@ -61,6 +61,21 @@ pub fn grasps(thing: &Sighting, cup: &Suction) -> Result<Vec<Grasp>, String> {
         ));
     }
     Ok(found)
+}
+
+/// The poses of a lip on the middle of the top and of each side of an upright object of this size, if they are as wide as
+/// the cup. Frame: the object's, with the origin at its foot.
+pub fn lips_on(size_m: [f64; 3], cup: &Suction) -> Vec<Pose> {
+    let thing = Sighting { id: String::new(), pose: Pose::IDENTITY, size_m, furniture: false };
+    let mut found: Vec<Grasp> = grasps(&thing, cup).unwrap_or_default();
+    // The headings of a lip on the top make no difference.
+    let first_top = found.iter().position(|grasp| grasp.approach == Approach::Top);
+    let mut idx = 0;
+    found.retain(|grasp| {
+        idx += 1;
+        grasp.approach == Approach::Side || Some(idx - 1) == first_top
+    });
+    found.iter().map(|grasp| Pose::from_isometry(&grasp.pose)).collect()
 }
 
 /// The cup on the middle of an object's top, with the base at one heading and the hand turned relative to it.
@@ -123,7 +138,6 @@ pub fn broken(robot: &Operator<'_>, cup: &Suction, target: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use actcheck_data::Pose;
 
     const CUP: Suction = Suction { force_n: 40.0, radius_m: 0.02, friction: 0.5 };
 

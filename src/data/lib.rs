@@ -42,7 +42,7 @@ pub use scene::{KnownKind, RobotStart, Role, Scene, SceneObject};
 pub use scene_map::{NamedSurface, SceneMap};
 pub use settings::{Budget, CONTROL_HZ, Camera, Odometry, Physics, Range, Sensing};
 pub use shape::{Part, Shape, bounds};
-pub use snapshot::{BodyState, JointState, LinkState, RobotState, Snapshot};
+pub use snapshot::{BodyState, CupState, JointState, LinkState, RobotState, Snapshot};
 pub use stream::Stream;
 pub use trace::{
     ActionEnd, ActionReport, ActionTrace, ContactEpisode, Extremes, Form, Frames, Look, Perceived, PerceivedPlane,

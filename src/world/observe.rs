@@ -117,6 +117,7 @@ impl World {
             right_touches: touched_by(right),
             joints,
             links: self.link_states(&positions),
+            cup: self.cup_state(),
         }
     }
 

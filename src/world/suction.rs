@@ -5,13 +5,15 @@
 
 use nalgebra::{Isometry3, Point3, Vector3};
 use parry3d::query::Ray;
-use rapier3d::prelude::{GenericJoint, ImpulseJointHandle, JointAxesMask, JointAxis, MotorModel, SpringCoefficients};
+use rapier3d::prelude::{
+    Collider, GenericJoint, ImpulseJointHandle, JointAxesMask, JointAxis, MotorModel, SpringCoefficients,
+};
 
 use crate::World;
 use crate::contacts::{CONTACT_FLOOR_NEWTONS, Touch};
 use crate::convert::{from_vector, to_pose, to_real, to_vector};
-use crate::engine::Owner;
-use actcheck_data::Suction;
+use crate::engine::{Owner, collider};
+use actcheck_data::{CupState, ObjectModel, Part, Pose, Suction};
 
 /// Distance of a surface from the lip that the soft lip bridges. Unit: metres. A few millimetres for cups of some
 /// centimetres.
@@ -127,6 +129,50 @@ fn lip_joint(cup: &Suction) -> GenericJoint {
     data
 }
 
+/// Returns the owner of the surface on which the whole lip lies, of solids with their owners.
+fn surface_at(lip: &Isometry3<f64>, radius_m: f64, solids: &[(usize, &Collider)]) -> Option<usize> {
+    let rim = (0..N_RAYS).map(|idx| {
+        let angle = std::f64::consts::TAU * f64::from(idx) / f64::from(N_RAYS);
+        Vector3::new(0.0, radius_m * libm::cos(angle), radius_m * libm::sin(angle))
+    });
+    let mut under = None;
+    for offset in rim.chain([Vector3::zeros()]) {
+        let owner = surface_before(lip, &offset, solids)?;
+        if *under.get_or_insert(owner) != owner {
+            return None;
+        }
+    }
+    under
+}
+
+/// Returns the owner of the surface that is at a point of the lip and parallel to it.
+fn surface_before(lip: &Isometry3<f64>, offset: &Vector3<f64>, solids: &[(usize, &Collider)]) -> Option<usize> {
+    let axis = lip.rotation * Vector3::x();
+    let from = lip * Point3::from(offset - Vector3::x() * BEHIND_M);
+    let ray = Ray::new(to_vector(&from.coords), to_vector(&axis));
+    let mut nearest: Option<(f64, Vector3<f64>, usize)> = None;
+    for (owner, solid) in solids {
+        let most = to_real(BEHIND_M + LIP_M);
+        let Some(hit) = solid.shape().cast_ray_and_get_normal(solid.position(), &ray, most, true) else { continue };
+        let along = f64::from(hit.time_of_impact);
+        if nearest.is_none_or(|(known, ..)| along < known) {
+            nearest = Some((along, from_vector(hit.normal), *owner));
+        }
+    }
+    let (along, normal, owner) = nearest?;
+    let fits = (along - BEHIND_M).abs() <= LIP_M && -normal.dot(&axis) >= FLAT_COSINE;
+    fits.then_some(owner)
+}
+
+/// Returns whether a cup seals on a model, with its lip at a pose in the model's frame.
+pub fn would_seal(model: &ObjectModel, lip: &Pose, cup: &Suction) -> bool {
+    let parts = model.parts.iter().flat_map(Part::solids);
+    let built: Vec<Collider> =
+        parts.filter_map(|solid| Some(collider(&solid, Owner::Object(0), 0.0, 0.0)?.build())).collect();
+    let solids: Vec<(usize, &Collider)> = built.iter().map(|solid| (0, solid)).collect();
+    surface_at(&lip.to_isometry(), cup.radius_m, &solids).is_some()
+}
+
 impl World {
     /// Returns the gap between the fingers; for a suction cup, 0 while its vacuum is on, otherwise its diameter. Unit:
     /// metres.
@@ -137,6 +183,13 @@ impl World {
     /// Returns the force of each finger's motor; for a suction cup, twice that of its vacuum. Unit: newtons.
     pub(super) fn grip_forces_n(&self) -> [f64; 2] {
         self.cup.map_or_else(|| self.robot.finger_efforts(), |cup| [cup.suction_n(); 2])
+    }
+
+    /// Returns the state of the suction cup. Returns `None` if the gripper has fingers.
+    pub(super) fn cup_state(&self) -> Option<CupState> {
+        let cup = self.cup.as_ref()?;
+        let pull_n = cup.seal().map_or(0.0, |seal| seal.load.force_n.x);
+        Some(CupState { force_n: cup.limit_n, pull_n })
     }
 
     /// Switches the vacuum of a suction cup on or off, by the commanded opening and force.
@@ -163,7 +216,10 @@ impl World {
     pub(super) fn seal_surface(&mut self) {
         let Some(mut cup) = self.cup.filter(|cup| cup.vacuum == Vacuum::Open) else { return };
         let lip = self.robot.kinematics.grasp(&self.robot.positions);
-        let Some(object) = self.surface_at(&lip, cup.suction.radius_m) else { return };
+        let bodies = self.objects.iter().enumerate();
+        let solids = bodies.flat_map(|(idx, object)| self.colliders_of(object.body).map(move |solid| (idx, solid)));
+        let solids: Vec<(usize, &Collider)> = solids.collect();
+        let Some(object) = surface_at(&lip, cup.suction.radius_m, &solids) else { return };
         let (link, body) = (self.robot.finger_links[0], self.objects[object].body);
         let from_link = self.robot.kinematics.links(&self.robot.positions)[link].inverse() * lip;
         let from_body = self.pose_of(&self.objects[object]).inverse() * lip;
@@ -172,45 +228,6 @@ impl World {
         let joint = self.engine.impulse_joints.insert(self.robot.bodies[link], body, data, true);
         cup.vacuum = Vacuum::Sealed(Seal { joint, object, load: Load::default() });
         self.cup = Some(cup);
-    }
-
-    /// Returns the object on whose surface the whole lip lies, by its index.
-    fn surface_at(&self, lip: &Isometry3<f64>, radius_m: f64) -> Option<usize> {
-        let rim = (0..N_RAYS).map(|idx| {
-            let angle = std::f64::consts::TAU * f64::from(idx) / f64::from(N_RAYS);
-            Vector3::new(0.0, radius_m * libm::cos(angle), radius_m * libm::sin(angle))
-        });
-        let mut under = None;
-        for offset in rim.chain([Vector3::zeros()]) {
-            let object = self.surface_before(lip, &offset)?;
-            if *under.get_or_insert(object) != object {
-                return None;
-            }
-        }
-        under
-    }
-
-    /// Returns the object whose surface is at a point of the lip and parallel to it.
-    fn surface_before(&self, lip: &Isometry3<f64>, offset: &Vector3<f64>) -> Option<usize> {
-        let axis = lip.rotation * Vector3::x();
-        let from = lip * Point3::from(offset - Vector3::x() * BEHIND_M);
-        let ray = Ray::new(to_vector(&from.coords), to_vector(&axis));
-        let mut nearest: Option<(f64, Vector3<f64>, usize)> = None;
-        for (idx, object) in self.objects.iter().enumerate() {
-            for solid in self.colliders_of(object.body) {
-                let most = to_real(BEHIND_M + LIP_M);
-                let Some(hit) = solid.shape().cast_ray_and_get_normal(solid.position(), &ray, most, true) else {
-                    continue;
-                };
-                let along = f64::from(hit.time_of_impact);
-                if nearest.is_none_or(|(known, ..)| along < known) {
-                    nearest = Some((along, from_vector(hit.normal), idx));
-                }
-            }
-        }
-        let (along, normal, idx) = nearest?;
-        let fits = (along - BEHIND_M).abs() <= LIP_M && -normal.dot(&axis) >= FLAT_COSINE;
-        fits.then_some(idx)
     }
 
     /// Measures the load of the seal in a step that is this share of its control tick.
