@@ -396,22 +396,9 @@ fn read_table(
         digest: digest.finish(),
     };
     Some(match suction {
-        Some(cup) => with_cup(profile, cup),
+        Some(cup) => profile.with_cup(cup),
         None => profile,
     })
-}
-
-/// The profile with a suction cup instead of fingers.
-pub fn with_cup(profile: RobotProfile, cup: Suction) -> RobotProfile {
-    RobotProfile {
-        finger_joints: Vec::new(),
-        finger_links: [profile.grasp_link.clone(), profile.grasp_link.clone()],
-        max_opening_m: 2.0 * cup.radius_m,
-        finger_friction: cup.friction,
-        grip_force_n: cup.force_n,
-        suction: Some(cup),
-        ..profile
-    }
 }
 
 fn values(list: Vec<Located<String>>) -> Vec<String> {

@@ -80,6 +80,21 @@ pub struct Suction {
     pub friction: f64,
 }
 
+impl RobotProfile {
+    /// Returns the profile with a suction cup instead of fingers. The `grasp_link` must be known.
+    pub fn with_cup(self, cup: Suction) -> Self {
+        Self {
+            finger_joints: Vec::new(),
+            finger_links: [self.grasp_link.clone(), self.grasp_link.clone()],
+            max_opening_m: 2.0 * cup.radius_m,
+            finger_friction: cup.friction,
+            grip_force_n: cup.force_n,
+            suction: Some(cup),
+            ..self
+        }
+    }
+}
+
 impl Suction {
     /// Returns the greatest shear force across the axis at a pull limit of `force_n`. Unit: newtons.
     pub fn most_shear_n(&self, force_n: f64) -> f64 {

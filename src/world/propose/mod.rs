@@ -5,6 +5,7 @@
 //! proposed. Postures come from inverse kinematics, and have no overlapping links.
 
 mod body;
+mod cup;
 mod fingers;
 mod frames;
 mod postures;
