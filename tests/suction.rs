@@ -255,3 +255,75 @@ fn a_ball_smaller_than_the_cup_is_refused_or_does_not_seal() {
     let (_, said) = run("suction_arm", "bowl", "1");
     assert!(said.contains("the suction cup did not seal on bowl_1"), "{said}");
 }
+
+/// The warnings of `check` for a robot and an object, on one line.
+fn checked(robot: &str, thing: &str) -> String {
+    let (project, text) = project(robot, thing);
+    std::fs::write(project.path().join("configs/c.toml"), text).unwrap();
+    let output = actcheck(project.path(), &["check", "configs/c.toml"]);
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    format!("{}{}", stdout(&output), stderr(&output)).replace('│', " ").split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
+#[test]
+fn check_predicts_what_a_cup_can_hold() {
+    let said = checked("suction_arm", "bowl");
+    assert!(said.contains("S070") && said.contains("no flat place as wide as the cup, 4.0 cm"), "{said}");
+    let said = checked("suction_arm", "ingot");
+    assert!(said.contains("S072") && said.contains("`ingot` breaks the seal"), "{said}");
+    assert!(said.contains("holds 4.08 kg at rest and 2.72 kg with a safety factor of 1.5"), "{said}");
+    let said = checked("suction_arm", "crate");
+    assert!(!said.contains("S070") && !said.contains("S072"), "{said}");
+}
+
+#[test]
+fn a_cup_is_proposed_for_a_robot_with_a_link_of_this_name() {
+    let (project, text) = project("proposed.toml", "crate");
+    let urdf = root().join("models/robots/suction_arm.urdf");
+    let out = project.path().join("configs/proposed.toml");
+    let written = actcheck(project.path(), &["new", "robot", urdf.to_str().unwrap(), "--out", out.to_str().unwrap()]);
+    assert!(written.status.success(), "{}", stderr(&written));
+    assert!(stdout(&written).contains("a suction cup of 40 mm at suction_link"), "{}", stdout(&written));
+    let profile = std::fs::read_to_string(&out).unwrap();
+    for line in ["grasp_link = \"suction_link\"", "suction_radius_m = 0.02", "suction_force_n = 75"] {
+        assert!(profile.contains(line), "{profile}");
+    }
+    assert!(!profile.contains("finger"), "{profile}");
+    std::fs::write(project.path().join("configs/c.toml"), text).unwrap();
+    let output = actcheck(project.path(), &["run", "configs/c.toml", "--runs", "2", "--format", "json"]);
+    let json: Value = serde_json::from_str(&stdout(&output)).unwrap_or_else(|_| panic!("{}", stderr(&output)));
+    assert_eq!(json["runs_passed"]["count"], 2, "{json}{}", stderr(&output));
+}
+
+/// The mobile manipulator with a cup instead of fingers.
+fn mobile_cup(folder: &Path) {
+    let robots = root().join("models/robots");
+    let urdf = std::fs::read_to_string(robots.join("mobile_manipulator.urdf")).unwrap();
+    let (before, fingers) = urdf.split_once("  <!-- Position: distance of the pad").unwrap();
+    let (_, after) = fingers.split_once("  <!-- x points along the fingers").unwrap();
+    let cup = "<joint name=\"cup_joint\" type=\"fixed\"><parent link=\"hand_palm_link\"/><child link=\"cup_link\"/>\
+               <origin xyz=\"0 0 0.01\"/></joint><link name=\"cup_link\"><collision><origin xyz=\"0 0 0.035\"/>\
+               <geometry><cylinder radius=\"0.02\" length=\"0.07\"/></geometry></collision></link>\
+               <!-- x points along the fingers";
+    std::fs::write(folder.join("mobile_cup.urdf"), format!("{before}{cup}{after}")).unwrap();
+    let profile = std::fs::read_to_string(robots.join("mobile_manipulator.toml")).unwrap();
+    let of_fingers = ["finger_", "max_opening_m", "grip_force_n"];
+    let kept = profile.lines().filter(|line| !of_fingers.iter().any(|key| line.starts_with(key)));
+    let kept: Vec<&str> = kept.collect();
+    let kept = kept.join("\n").replace("mobile_manipulator.urdf", "mobile_cup.urdf");
+    let cup = "suction_force_n = 30\nsuction_radius_m = 0.02\n";
+    std::fs::write(folder.join("mobile_cup.toml"), kept.replacen("home = ", &format!("{cup}home = "), 1)).unwrap();
+}
+
+#[test]
+fn a_sealed_can_is_carried_to_another_table_and_let_go() {
+    let (project, text) = project("mobile_cup", "can");
+    mobile_cup(&project.path().join("models/robots"));
+    let text = text.replace("[[\"Pick\"]]", "[[\"Pick\", \"Place\"]]");
+    let text = text.replace("[pickObject]", "[placeSurface]\nplace_object_surfaces = [\"table\"]\n[pickObject]");
+    let text = text.replace("[scene]\nrequire = \"../rules/scene/within_fixed_arm.rls\"\n", "");
+    std::fs::write(project.path().join("configs/c.toml"), text).unwrap();
+    let output = actcheck(project.path(), &["run", "configs/c.toml", "--runs", "3", "--format", "json"]);
+    let json: Value = serde_json::from_str(&stdout(&output)).unwrap_or_else(|_| panic!("{}", stderr(&output)));
+    assert_eq!(json["runs_passed"]["count"], 3, "{json}{}", stderr(&output));
+}

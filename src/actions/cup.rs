@@ -20,8 +20,9 @@ const N_HEADINGS: u32 = 24;
 const TURNS_RAD: [f64; 4] = [0.0, FRAC_PI_4, FRAC_PI_2, -FRAC_PI_2];
 /// Least height of the middle of a level cup above the foot of an object: half of the hand's width. Unit: metres.
 const SIDE_LOWEST_M: f64 = 0.055;
-/// Penalty for a side, where the seal carries the object by friction. Equal to half a metre of driving.
-const SIDE_PENALTY: f64 = 0.2;
+/// Penalty for a side, where friction carries the object and its weight peels the lip off: more than those of all obstacles, so
+/// that a side is only used if no top is reachable.
+const SIDE_PENALTY: f64 = 4.0;
 /// How far the hand goes on where it does not find the surface. Unit: metres. Three times the error of perceived heights.
 const DEEPER_M: f64 = 0.03;
 /// The last part of the approach, in which the hand is slow: as long as that way, and the error of inverse kinematics.

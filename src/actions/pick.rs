@@ -1,5 +1,6 @@
 //! The pick skill: look (or recall an earlier percept), drive, reach, close, lift, retreat.
 
+use crate::grasp::Approach;
 use crate::grip::{EMPTY_M, close, feels};
 use crate::memory::Held;
 use crate::operator::{Interrupt, Operator};
@@ -73,8 +74,10 @@ pub fn pick(call: &ActionCall, robot: &mut Operator<'_>) -> Result<ActionReport,
 /// The reason for the action's report if it can't be picked.
 pub(super) fn planned(seen: &Sighting, others: &[Sighting], robot: &mut Operator<'_>) -> Result<Plan, String> {
     if let Some(suction) = robot.profile().suction {
-        let grasps = cup::grasps(seen, &suction)?;
-        let wanted = PlanRequest { grasps: &grasps, all: &grasps, taken: Some(seen) };
+        let all = cup::grasps(seen, &suction)?;
+        let (tops, sides): (Vec<_>, Vec<_>) = all.iter().cloned().partition(|grasp| grasp.approach == Approach::Top);
+        let grasps = if tops.is_empty() { sides } else { tops };
+        let wanted = PlanRequest { grasps: &grasps, all: &all, taken: Some(seen) };
         return plan::plan(robot, wanted, others).map_err(|reason| format!("{}: {reason}", seen.id));
     }
     let max_opening_m = robot.profile().max_opening_m;

@@ -3,7 +3,7 @@
 use crate::Env;
 use actcheck_actions as actions;
 use actcheck_base::Diagnostic;
-use actcheck_data::{ObjectModel, Suction};
+use actcheck_data::{ObjectModel, Pose, Suction};
 use actcheck_world::{self as world, GRAVITY};
 
 /// Safety factor of a seal against the accelerations of the arm. Vendors of cups take 1.5 for level motions.
@@ -13,14 +13,11 @@ impl Env {
     /// S070 or S072 for an object that the robot's suction cup can't hold.
     pub(super) fn unsealed(&self, key: &str, model: &ObjectModel, cup: &Suction) -> Option<Diagnostic> {
         let lips = actions::lips_on(model.size_m, cup);
-        let mut flat = lips.iter().filter(|lip| world::would_seal(model, lip, cup)).peekable();
-        if flat.peek().is_none() {
-            return Some(self.no_flat_place(key, model, cup));
+        let flat = lips.iter().filter(|lip| world::would_seal(model, lip, cup));
+        match flat.map(|lip| carried_n(lip, model, cup)).reduce(f64::max) {
+            Some(force_n) => self.too_heavy_to_seal(key, model, force_n),
+            None => Some(self.no_flat_place(key, model, cup)),
         }
-        // On a side, the seal carries the object by friction.
-        let is_top = |lip: &actcheck_data::Pose| (lip.position[2] - model.size_m[2]).abs() < 1e-6;
-        let force_n = if flat.any(is_top) { cup.force_n } else { cup.most_shear_n(cup.force_n) };
-        self.too_heavy_to_seal(key, model, force_n)
     }
 
     fn no_flat_place(&self, key: &str, model: &ObjectModel, cup: &Suction) -> Diagnostic {
@@ -54,4 +51,15 @@ impl Env {
         let help = "reduce the object's mass or `mass_scale`, or raise `suction_force_n` in the robot's profile";
         Some(self.campaign.warning("S072", key, message).help(help))
     }
+}
+
+/// The weight that a seal at this place of an upright object carries. On a side, it shears the lip and peels it off. Unit: newtons.
+fn carried_n(lip: &Pose, model: &ObjectModel, cup: &Suction) -> f64 {
+    let [x, y, z] = lip.position;
+    if (z - model.size_m[2]).abs() < 1e-6 {
+        return cup.force_n;
+    }
+    // The middle of the object is as far from the lip as the lip is from the object's axis.
+    let lever_m = libm::hypot(x, y).max(1e-6);
+    cup.most_shear_n(cup.force_n).min(cup.most_peel_nm(cup.force_n) / lever_m)
 }
