@@ -1,13 +1,14 @@
 //! Robot profiles: the roles of a URDF's joints and links.
 
 use actcheck_base::{Diagnostic, Diagnostics, Digest, Files, Source, did_you_mean, digest_of};
-use actcheck_data::{RobotProfile, Suction};
+use actcheck_data::RobotProfile;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use crate::foreign::{self, Lookup};
 use crate::paths::resolve_path;
+use crate::robot_cup::{OF_FINGERS, exclude_fingers, read_suction};
 use crate::robot_roles::Roles;
 use crate::xacro::{self, Inputs, Unexpanded};
 use crate::{Located, Table};
@@ -25,9 +26,6 @@ const REQUIRED: [&str; 1] = ["urdf"];
 const USUAL: [&str; 7] =
     ["arm_joints", "finger_joints", "finger_links", "grasp_link", "camera_link", "max_opening_m", "home"];
 
-/// Keys of a gripper with fingers, which exclude those of a suction cup.
-const OF_FINGERS: [&str; 5] = ["finger_joints", "finger_links", "max_opening_m", "finger_friction", "grip_force_n"];
-
 /// Keys that depend on another key.
 const DEPENDENT: [(&str, &str); 10] = [
     ("suction_force_n", "suction_radius_m"),
@@ -44,9 +42,6 @@ const DEPENDENT: [(&str, &str); 10] = [
 
 /// Friction of the fingertips if the profile has none: that of rubber pads.
 const FINGER_FRICTION: f64 = 0.8;
-
-/// Friction of a suction cup's lip if the profile has none: that of rubber on dry metal, glass or wood.
-const LIP_FRICTION: f64 = 0.5;
 
 /// Rotation of the camera's frame relative to a link whose name contains `optical`, if the profile has none: by ROS's
 /// convention, z points forwards and y down in the frame of such a link. Unit: radians.
@@ -302,25 +297,6 @@ fn read_base(table: &mut Table, roles: &mut Roles) -> Option<(Option<[String; 3]
             None
         }
     }
-}
-
-/// Reports each key of fingers in the profile of a robot with a suction cup.
-fn exclude_fingers(table: &mut Table) {
-    for key in OF_FINGERS {
-        if let Some(span) = table.key_span(key) {
-            let message = format!("`{key}` and the keys of a suction cup exclude each other");
-            let help = "a gripper has either fingers or a cup: remove the keys of the other one";
-            table.fault("W052", span, message, help);
-        }
-    }
-}
-
-/// Reads the suction cup. Returns `None` if the gripper has fingers.
-fn read_suction(table: &mut Table) -> Option<Suction> {
-    let force_n = table.number("suction_force_n", 0.1..=1000.0);
-    let radius_m = table.number("suction_radius_m", 0.002..=0.2);
-    let friction = table.number("suction_friction", 0.0..=2.0).unwrap_or(LIP_FRICTION);
-    Some(Suction { force_n: force_n?, radius_m: radius_m?, friction })
 }
 
 fn read_table(
