@@ -100,6 +100,7 @@ mod static_cameras;
 mod statistics;
 mod stops;
 mod strangers;
+mod suction;
 mod support;
 mod tables;
 mod temporal;

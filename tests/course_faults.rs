@@ -128,6 +128,7 @@ fn snapshot(act: &Act, secs: f64) -> Snapshot {
             left_touches: touches.clone(),
             right_touches: touches,
             links: Vec::new(),
+            cup: None,
         },
     }
 }

@@ -90,6 +90,7 @@ fn snapshot(time_secs: f64, bodies: Vec<BodyState>, holding: bool, choices: &mut
             left_touches: strings(if holding { &["glass_1"] } else { &[] }),
             right_touches: strings(if holding { &["glass_1"] } else { &[] }),
             links: vec![LinkState { name: "hand".to_owned(), pose: Pose::upright(three(choices, 0.0, 1.0), 0.4) }],
+            cup: None,
         },
     }
 }

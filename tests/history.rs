@@ -60,6 +60,7 @@ fn robot() -> Arc<RobotProfile> {
         postures: Vec::new(),
         finger_friction: 1.0,
         grip_force_n: 10.0,
+        suction: None,
         meshes: BTreeMap::new(),
         digest: String::new(),
     })

@@ -52,21 +52,33 @@ pub struct GripWatch {
     weak_n: f64,
     weak_ticks: u32,
     slipped: bool,
+    load_n: f64,
 }
 
 impl GripWatch {
     /// Starts from the current observation, with fingers commanded to press with this force.
     pub fn new(observed: &Observation, grip_force_n: f64) -> Self {
         let weak_n = WEAK_SHARE * grip_force_n;
-        Self { opening_m: observed.gripper_opening_m, weak_n, weak_ticks: 0, slipped: false }
+        Self { opening_m: observed.gripper_opening_m, weak_n, weak_ticks: 0, slipped: false, load_n: 0.0 }
     }
 
-    /// Updates with the observation of the next control tick.
-    pub fn look(&mut self, observed: &Observation) {
+    /// Updates with the observation of the next control tick, and the force that the arm carries then. Unit: newtons.
+    pub fn look(&mut self, observed: &Observation, load_n: f64) {
         let weak = observed.finger_efforts_n.iter().any(|effort| *effort < self.weak_n);
+        if !weak {
+            self.load_n = if self.slipped { self.load_n } else { load_n };
+        } else if self.weak_ticks == 0 && !self.slipped {
+            // A hold that broke in this tick carried the load for a part of it.
+            self.load_n = self.load_n.max(load_n);
+        }
         self.weak_ticks = if weak { self.weak_ticks + 1 } else { 0 };
         let gave_way = observed.gripper_opening_m < self.opening_m - GAVE_WAY_M;
         self.slipped = self.slipped || gave_way || self.weak_ticks >= WEAK_TICKS;
+    }
+
+    /// The force that the arm carried when the hold was last felt. Unit: newtons.
+    pub fn load_n(&self) -> f64 {
+        self.load_n
     }
 
     /// Whether the hold was lost at any time.
@@ -89,17 +101,17 @@ mod tests {
         let held = GripWatch::new(&felt(0.08, 7.0), 7.0);
         let mut shaken = held.clone();
         for effort in [7.0, 1.0, 1.0, 7.0, 6.0] {
-            shaken.look(&felt(0.078, effort));
+            shaken.look(&felt(0.078, effort), 2.0);
         }
         assert!(!shaken.slipped(), "brief shaking does not count as a slip");
         let mut closing = held.clone();
-        closing.look(&felt(0.065, 7.0));
-        closing.look(&felt(0.08, 7.0));
+        closing.look(&felt(0.065, 7.0), 2.0);
+        closing.look(&felt(0.08, 7.0), 3.0);
         assert!(closing.slipped(), "a lost hold is not regained");
         let mut weak = held;
         for _ in 0..WEAK_TICKS {
             assert!(!weak.slipped());
-            weak.look(&felt(0.08, 0.5));
+            weak.look(&felt(0.08, 0.5), 2.0);
         }
         assert!(weak.slipped());
     }

@@ -4,6 +4,7 @@
 
 mod call;
 mod controls;
+mod cup;
 mod cut;
 mod external;
 mod forced;
@@ -32,6 +33,7 @@ mod whereabouts;
 
 pub use call::ActionCall;
 pub use controls::Controls;
+pub use cup::lips_on;
 pub use cut::Cut;
 pub use external::{ExternalFault, ExternalSkill};
 pub use foresee::{ForeseenPick, ForeseenView, foresee_pick, foresee_view, needed_opening_m};

@@ -5,6 +5,7 @@ use nalgebra::Isometry3;
 use crate::controls::Drives;
 use crate::grip::GripWatch;
 use crate::memory::{Held, Memory, Standing};
+use crate::place::carried_n;
 use crate::sabotage::IDLE_SECS;
 use crate::{Cut, ExternalFault, Saboteur};
 use actcheck_data::{ActionReport, ChoiceName, Choices, KnownKind, Look, Perceived, Percept, Phase, RobotProfile};
@@ -160,6 +161,11 @@ impl<'a> Operator<'a> {
         self.world.profile()
     }
 
+    /// Whether the gripper is a suction cup.
+    pub fn has_cup(&self) -> bool {
+        self.profile().suction.is_some()
+    }
+
     /// The robot's measurements of itself.
     pub fn observe(&self) -> Observation {
         let observed = self.world.observe();
@@ -254,6 +260,11 @@ impl<'a> Operator<'a> {
     /// Whether a slip was felt since the watch began.
     pub fn felt_slip(&self) -> bool {
         self.grip.as_ref().is_some_and(GripWatch::slipped)
+    }
+
+    /// The load of the arm while the hold was last felt, since the watch began. Unit: newtons.
+    pub fn felt_load_n(&self) -> f64 {
+        self.grip.as_ref().map_or(0.0, GripWatch::load_n)
     }
 
     /// Fixed furniture and drive targets, according to the floor plan that the base uses.
@@ -449,7 +460,7 @@ impl<'a> Operator<'a> {
             return Err(Interrupt::Fault);
         }
         if let Some(mut watch) = self.grip.take() {
-            watch.look(&self.observe());
+            watch.look(&self.observe(), carried_n(self));
             self.grip = Some(watch);
         }
         if self.elapsed_secs() > self.budget_secs {

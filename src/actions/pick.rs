@@ -1,11 +1,12 @@
 //! The pick skill: look (or recall an earlier percept), drive, reach, close, lift, retreat.
 
+use crate::grasp::Approach;
 use crate::grip::{EMPTY_M, close, feels};
 use crate::memory::Held;
 use crate::operator::{Interrupt, Operator};
 use crate::perceive::look_again;
 use crate::plan::{self, Plan, PlanRequest};
-use crate::{ActionCall, grasp, memory};
+use crate::{ActionCall, cup, grasp, memory};
 use actcheck_data::{ActionReport, Pose};
 use actcheck_world::Sighting;
 
@@ -44,7 +45,10 @@ pub fn pick(call: &ActionCall, robot: &mut Operator<'_>) -> Result<ActionReport,
     robot.begin("approach");
     robot.follow(&way.near, 0.0)?;
     let (way, seen) = put_right(way, seen, robot)?;
-    robot.follow(&way.approach, APPROACH_SECS)?;
+    match robot.has_cup() {
+        true => cup::approach(&way.approach, APPROACH_SECS, robot)?,
+        false => robot.follow(&way.approach, APPROACH_SECS)?,
+    }
     robot.begin("close");
     robot.hold(None);
     let held = close(robot)?;
@@ -69,6 +73,13 @@ pub fn pick(call: &ActionCall, robot: &mut Operator<'_>) -> Result<ActionReport,
 /// # Errors
 /// The reason for the action's report if it can't be picked.
 pub(super) fn planned(seen: &Sighting, others: &[Sighting], robot: &mut Operator<'_>) -> Result<Plan, String> {
+    if let Some(suction) = robot.profile().suction {
+        let all = cup::grasps(seen, &suction)?;
+        let (tops, sides): (Vec<_>, Vec<_>) = all.iter().cloned().partition(|grasp| grasp.approach == Approach::Top);
+        let grasps = if tops.is_empty() { sides } else { tops };
+        let wanted = PlanRequest { grasps: &grasps, all: &all, taken: Some(seen) };
+        return plan::plan(robot, wanted, others).map_err(|reason| format!("{}: {reason}", seen.id));
+    }
     let max_opening_m = robot.profile().max_opening_m;
     let (grasps, all) = (grasp::grasps(seen, max_opening_m), grasp::all_grasps(seen, max_opening_m));
     let (grasps, all) = (grasp::centred(grasps, seen, robot), grasp::centred(all, seen, robot));
@@ -136,6 +147,9 @@ fn remember(robot: &mut Operator<'_>, seen: &Sighting) {
 }
 
 fn report(robot: &mut Operator<'_>, target: &str, stalled: bool) -> ActionReport {
+    if let Some(suction) = robot.profile().suction {
+        return cup::report(robot, &suction, target, stalled);
+    }
     let gap = robot.feel_opening();
     if !stalled {
         return failed(format!("the fingers did not close on {target}"));

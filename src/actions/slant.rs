@@ -84,6 +84,10 @@ pub(crate) fn aside(thing: &Sighting, hand: &Hand, robot: &Operator<'_>) -> Vec<
 }
 
 fn all(thing: &Sighting, hand: &Hand, robot: &Operator<'_>, (pitches, turns): (&[f64], &[f64])) -> Vec<Grasp> {
+    if robot.has_cup() {
+        // A slanted cup does not lie on the surface.
+        return Vec::new();
+    }
     let along = thing.pose.yaw();
     let only = robot.kinematics().only_pitch(&robot.layout().arm, robot.commanded());
     let pitches = only.as_ref().map_or(pitches, std::slice::from_ref);

@@ -305,6 +305,7 @@ mod tests {
             left_touches: vec![],
             right_touches: vec![],
             links: vec![],
+            cup: None,
         };
         Snapshot { time_secs, bodies: vec![body("mug_1", x), body("mug_2", 0.3)], robot }
     }

@@ -23,8 +23,8 @@ const IN_VIEW: f64 = 0.5;
 
 impl Env {
     /// Predicts which objects and surfaces the robot can't handle, as warnings with numbers: the gripper is too narrow
-    /// (S070), objects are out of reach (S071) or too heavy (S072), the camera does not see a surface (S073), the
-    /// arm's motors can't hold its own weight (S074), or efforts are unknown (S075).
+    /// or its cup does not seal (S070), objects are out of reach (S071) or too heavy (S072), the camera does not see a
+    /// surface (S073), the arm's motors can't hold its own weight (S074), or efforts are unknown (S075).
     pub fn forecast(&self) -> Diagnostics {
         let mut found = Diagnostics::new();
         let campaign = &self.campaign;
@@ -40,7 +40,11 @@ impl Env {
         for (idx, name) in campaign.candidates.get("pickObject").into_iter().flatten().enumerate() {
             let Some(model) = campaign.models.get(name) else { continue };
             let key = format!("pickObject.{idx}");
-            if let Some(warning) = self.too_wide(&key, model).or_else(|| self.too_slippery(&key, model)) {
+            let unheld = match self.campaign.robot.suction {
+                Some(cup) => self.unsealed(&key, model, &cup),
+                None => self.too_wide(&key, model).or_else(|| self.too_slippery(&key, model)),
+            };
+            if let Some(warning) = unheld {
                 found.push(warning);
                 continue;
             }

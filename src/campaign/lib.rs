@@ -13,6 +13,7 @@ mod export;
 mod failure;
 mod finished_run;
 mod forecast;
+mod forecast_cup;
 mod judging;
 mod last_failed;
 mod line;

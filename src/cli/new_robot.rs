@@ -42,15 +42,19 @@ pub fn robot(args: &NewRobotArgs) -> Result<(), Diagnostics> {
     let mut files = NewFiles::default();
     files.add(&out, text(&profile, &notes, args, folder));
     files.write("name another file with `--out PROFILE`, or delete it")?;
+    let gripper = match &profile.suction {
+        Some(cup) => format!("a suction cup of {:.0} mm at {}", cup.radius_m * 2e3, profile.grasp_link),
+        None => {
+            let [left, right] = &profile.finger_links;
+            format!("fingers {left} and {right} that open {:.0} mm", profile.max_opening_m * 1e3)
+        }
+    };
     output::print_prose(&format!(
-        "wrote {}: {} with an arm of {} joints, fingers {} and {} that open {:.0} mm, camera {}\n\
+        "wrote {}: {} with an arm of {} joints, {gripper}, camera {}\n\
          next: name it as `profile` in `[robot]` of a configuration, then `actcheck check CONFIG`\n",
         out.display(),
         if profile.base_joints.is_some() { "a mobile robot" } else { "a fixed robot" },
         profile.arm_joints.len(),
-        profile.finger_links[0],
-        profile.finger_links[1],
-        profile.max_opening_m * 1e3,
         profile.camera_link,
     ));
     Ok(())
@@ -103,8 +107,14 @@ fn stated(profile: &RobotProfile, args: &NewRobotArgs, folder: &Path) -> Vec<(&'
         keys.push(("mount_height_m", profile.mount_height_m.to_string()));
     }
     keys.push(("arm_joints", list(&profile.arm_joints)));
-    keys.push(("finger_joints", list(&profile.finger_joints)));
-    keys.push(("finger_links", list(&profile.finger_links)));
+    if let Some(cup) = &profile.suction {
+        keys.extend(grasp_frame(profile));
+        keys.push(("suction_force_n", cup.force_n.to_string()));
+        keys.push(("suction_radius_m", cup.radius_m.to_string()));
+    } else {
+        keys.push(("finger_joints", list(&profile.finger_joints)));
+        keys.push(("finger_links", list(&profile.finger_links)));
+    }
     if !profile.head_joints.is_empty() {
         keys.push(("head_joints", list(&profile.head_joints)));
     }
@@ -113,13 +123,12 @@ fn stated(profile: &RobotProfile, args: &NewRobotArgs, folder: &Path) -> Vec<(&'
 
 /// The keys that a profile may leave out.
 fn found(profile: &RobotProfile) -> Vec<(&'static str, String)> {
-    let mut keys = vec![
-        ("grasp_link", quoted(&profile.grasp_link)),
-        ("grasp_offset_m", numbers(&profile.grasp_offset_m)),
-        ("grasp_turned_rad", numbers(&profile.grasp_turned_rad)),
-        ("max_opening_m", profile.max_opening_m.to_string()),
-        ("camera_link", quoted(&profile.camera_link)),
-    ];
+    let mut keys = Vec::new();
+    if profile.suction.is_none() {
+        keys.extend(grasp_frame(profile));
+        keys.push(("max_opening_m", profile.max_opening_m.to_string()));
+    }
+    keys.push(("camera_link", quoted(&profile.camera_link)));
     let usual = if profile.camera_link.contains("optical") { robot::OPTICAL_TURNED_RAD } else { [0.0; 3] };
     if profile.camera_turned_rad != usual {
         keys.push(("camera_turned_rad", numbers(&profile.camera_turned_rad)));
@@ -127,6 +136,14 @@ fn found(profile: &RobotProfile) -> Vec<(&'static str, String)> {
     keys.push(("home", numbers(&profile.home)));
     keys.push(("postures", postures(profile)));
     keys
+}
+
+fn grasp_frame(profile: &RobotProfile) -> [(&'static str, String); 3] {
+    [
+        ("grasp_link", quoted(&profile.grasp_link)),
+        ("grasp_offset_m", numbers(&profile.grasp_offset_m)),
+        ("grasp_turned_rad", numbers(&profile.grasp_turned_rad)),
+    ]
 }
 
 fn postures(profile: &RobotProfile) -> String {

@@ -18,6 +18,7 @@ mod other_counts;
 mod paths;
 mod ranges;
 pub mod robot;
+mod robot_cup;
 mod robot_roles;
 mod schema;
 mod skill;

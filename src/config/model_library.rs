@@ -178,9 +178,9 @@ impl ModelLibrary {
             report.extend(errors.map(as_warning).collect());
         } else {
             let message = format!("{} models in {} can't be used", unusable.len(), self.told_folders());
-            let reasons = unusable.into_iter().filter_map(|(name, mut errors)| {
-                errors.next().map(|fault| format!("\n{name}: {}", fault.message))
-            });
+            let reasons = unusable
+                .into_iter()
+                .filter_map(|(name, mut errors)| errors.next().map(|fault| format!("\n{name}: {}", fault.message)));
             let help = "`[pickObject] model_list = [\"NAME\"]` shows all faults of a model";
             let help = format!("{help}{}", reasons.collect::<String>());
             report.push(Diagnostic::warning("W045", message).help(help));

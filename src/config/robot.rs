@@ -8,6 +8,7 @@ use std::sync::Arc;
 
 use crate::foreign::{self, Lookup};
 use crate::paths::resolve_path;
+use crate::robot_cup::{OF_FINGERS, exclude_fingers, read_suction};
 use crate::robot_roles::Roles;
 use crate::xacro::{self, Inputs, Unexpanded};
 use crate::{Located, Table};
@@ -26,7 +27,11 @@ const USUAL: [&str; 7] =
     ["arm_joints", "finger_joints", "finger_links", "grasp_link", "camera_link", "max_opening_m", "home"];
 
 /// Keys that depend on another key.
-const DEPENDENT: [(&str, &str); 6] = [
+const DEPENDENT: [(&str, &str); 10] = [
+    ("suction_force_n", "suction_radius_m"),
+    ("suction_radius_m", "suction_force_n"),
+    ("suction_friction", "suction_force_n"),
+    ("suction_force_n", "grasp_link"),
     ("grasp_turned_rad", "grasp_link"),
     ("grasp_offset_m", "grasp_link"),
     ("camera_turned_rad", "camera_link"),
@@ -80,12 +85,21 @@ pub(crate) fn read_telling(
     })?;
     let mut table = Table::parse(&source)?;
     table.require(&REQUIRED);
-    table.expect(&USUAL);
+    let has_cup = table.has("suction_force_n") || table.has("suction_radius_m");
+    if has_cup {
+        exclude_fingers(&mut table);
+    }
+    let usual: Vec<&str> = USUAL.into_iter().filter(|key| !(has_cup && OF_FINGERS.contains(key))).collect();
+    table.expect(&usual);
     let mut found = Diagnostics::new();
     let (urdf, lookup) = find_urdf(files, path, packages, &mut table, &mut found);
     for (key, of) in DEPENDENT {
         if let (Some(span), false) = (table.key_span(key), table.has(of)) {
-            let help = format!("write `{of}` too, or leave out both: then they are found on the model");
+            let help = if key.starts_with("suction") {
+                "a suction cup needs `suction_force_n`, `suction_radius_m`, and a `grasp_link` at its lip".to_owned()
+            } else {
+                format!("write `{of}` too, or leave out both: then they are found on the model")
+            };
             table.fault("W011", span, format!("`{key}` depends on `{of}`, which is missing"), help);
         }
     }
@@ -213,6 +227,7 @@ pub fn bare(
         postures: Vec::new(),
         finger_friction: FINGER_FRICTION,
         grip_force_n: GRIP_FORCE_N,
+        suction: None,
         meshes: BTreeMap::new(),
     };
     Ok(with_meshes(profile, read))
@@ -320,6 +335,7 @@ fn read_table(
     roles.opening = opening_span.zip(max_opening_m);
     let finger_friction = table.number("finger_friction", 0.0..=2.0).unwrap_or(FINGER_FRICTION);
     let grip_force_n = table.number("grip_force_n", 0.1..=1000.0).unwrap_or(GRIP_FORCE_N);
+    let suction = read_suction(table);
     let n_arm_joints = arm_joints.as_ref().map_or(0, Vec::len);
     let home = posture(table, "home", n_arm_joints, roles);
     let postures = table.tables("postures").into_iter().filter_map(|mut posture_table| {
@@ -333,7 +349,7 @@ fn read_table(
     let mut digest = Digest::new();
     digest.update(table.source().text.as_bytes());
     digest.update(urdf.text.as_bytes());
-    Some(RobotProfile {
+    let profile = RobotProfile {
         name,
         urdf,
         base_joints,
@@ -355,8 +371,13 @@ fn read_table(
         postures,
         finger_friction,
         grip_force_n,
+        suction: None,
         meshes: BTreeMap::new(),
         digest: digest.finish(),
+    };
+    Some(match suction {
+        Some(cup) => profile.with_cup(cup),
+        None => profile,
     })
 }
 

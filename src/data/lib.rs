@@ -35,14 +35,14 @@ pub use motion::{JointMoment, Motion, MotionRow};
 pub use places::{Location, Room};
 pub use pose::Pose;
 pub use quality::Quality;
-pub use robot::{LEAST_LINK_KG, RobotProfile, RobotView};
+pub use robot::{LEAST_LINK_KG, RobotProfile, RobotView, Suction};
 pub use robot_course::{Clearance, HeldCourse, JointCourse, RobotCourse, SelfCollision};
 pub use samples::{Samples, Series};
 pub use scene::{KnownKind, RobotStart, Role, Scene, SceneObject};
 pub use scene_map::{NamedSurface, SceneMap};
 pub use settings::{Budget, CONTROL_HZ, Camera, Odometry, Physics, Range, Sensing};
 pub use shape::{Part, Shape, bounds};
-pub use snapshot::{BodyState, JointState, LinkState, RobotState, Snapshot};
+pub use snapshot::{BodyState, CupState, JointState, LinkState, RobotState, Snapshot};
 pub use stream::Stream;
 pub use trace::{
     ActionEnd, ActionReport, ActionTrace, ContactEpisode, Extremes, Form, Frames, Look, Perceived, PerceivedPlane,

@@ -57,18 +57,60 @@ pub struct RobotProfile {
     pub postures: Vec<Vec<f64>>,
     /// Friction coefficient of the fingertips.
     pub finger_friction: f64,
-    /// Closing force of one finger. Unit: newtons.
+    /// Closing force of one finger; of a suction cup, its greatest pull. Unit: newtons.
     pub grip_force_n: f64,
+    /// The suction cup of a gripper without fingers: both `finger_links` are then the `grasp_link`, whose grasp frame is at
+    /// the cup's lip with its x axis along the axis of the cup; `max_opening_m` is the cup's diameter.
+    pub suction: Option<Suction>,
     /// Collision meshes by the file name in the URDF, in the file's own scale.
     pub meshes: BTreeMap<String, Vec<Shape>>,
     /// Digest of profile, URDF and meshes.
     pub digest: String,
 }
 
+/// A suction cup, which holds a surface by a seal.
+///
+/// The seal breaks if the pull along the cup's axis exceeds `force_n`, the shear force across it `friction · force_n`, or
+/// the peel moment about the middle of the lip `force_n · radius_m`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Suction {
+    /// Greatest pull along the cup's axis. Unit: newtons.
+    pub force_n: f64,
+    /// Radius of the lip. Unit: metres.
+    pub radius_m: f64,
+    /// Friction coefficient between the lip and a surface.
+    pub friction: f64,
+}
+
 impl RobotProfile {
     /// The `camera_link` of a camera that is fixed beside the robot: its pose is in the frame of the map, whose z axis
     /// points up from the floor.
     pub const MAP: &'static str = "map";
+
+    /// Returns the profile with a suction cup instead of fingers. The `grasp_link` must be known.
+    pub fn with_cup(self, cup: Suction) -> Self {
+        Self {
+            finger_joints: Vec::new(),
+            finger_links: [self.grasp_link.clone(), self.grasp_link.clone()],
+            max_opening_m: 2.0 * cup.radius_m,
+            finger_friction: cup.friction,
+            grip_force_n: cup.force_n,
+            suction: Some(cup),
+            ..self
+        }
+    }
+}
+
+impl Suction {
+    /// Returns the greatest shear force across the axis at a pull limit of `force_n`. Unit: newtons.
+    pub fn most_shear_n(&self, force_n: f64) -> f64 {
+        self.friction * force_n
+    }
+
+    /// Returns the greatest peel moment at a pull limit of `force_n`. Unit: newton metres.
+    pub fn most_peel_nm(&self, force_n: f64) -> f64 {
+        force_n * self.radius_m
+    }
 }
 
 /// A robot in one posture, for a picture.

@@ -77,6 +77,18 @@ pub struct RobotState {
     /// Poses of all links. Empty in traces of earlier versions.
     #[serde(skip)]
     pub links: Vec<LinkState>,
+    /// Its suction cup; `None` if its gripper has fingers.
+    #[serde(skip)]
+    pub cup: Option<CupState>,
+}
+
+/// A suction cup.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct CupState {
+    /// Greatest pull that its seal holds, at the commanded vacuum. Unit: newtons.
+    pub force_n: f64,
+    /// Mean pull on its seal along its axis in the last control tick; negative if it is pushed, 0 without a seal. Unit: newtons.
+    pub pull_n: f64,
 }
 
 /// One link of the robot.

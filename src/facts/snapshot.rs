@@ -50,6 +50,9 @@ fn write_robot(robot: &RobotState, writer: &mut Writer) {
     writer.number(gripper, "opening", robot.gripper_opening_m);
     writer.things(gripper, "leftTouches", &robot.left_touches);
     writer.things(gripper, "rightTouches", &robot.right_touches);
+    if let Some(cup) = robot.cup {
+        writer.numbers(gripper, ["suctionForce", "pull"], [cup.force_n, cup.pull_n]);
+    }
     for joint in &robot.joints {
         write_joint(joint, writer);
     }

@@ -3,7 +3,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use actcheck_data::{ActionTrace, Clearance, Interval, LinkState, Look, RobotCourse, Snapshot, Trace};
+use actcheck_data::{ActionTrace, Clearance, CupState, Interval, LinkState, Look, RobotCourse, Snapshot, Trace};
 
 /// The later fields of a whole trace, in the order of its parts.
 #[derive(Default, Serialize, Deserialize)]
@@ -26,6 +26,25 @@ impl Intervals {
     pub(super) fn fill(self, trace: &mut Trace) {
         for (course, intervals) in trace.robot_courses.iter_mut().zip(self.0) {
             course.intervals = intervals;
+        }
+    }
+}
+
+/// The suction cup in each snapshot, which follows [`Intervals`] in the file if the robot has one.
+#[derive(Default, Serialize, Deserialize)]
+pub(super) struct Cups(Vec<Option<CupState>>);
+
+impl Cups {
+    /// Returns `None` if the robot has fingers.
+    pub(super) fn of(trace: &Trace) -> Option<Self> {
+        let cups: Vec<Option<CupState>> = trace.snapshots.iter().map(|snapshot| snapshot.robot.cup).collect();
+        cups.iter().any(Option::is_some).then_some(Self(cups))
+    }
+
+    /// Sets the cup in each snapshot.
+    pub(super) fn fill(self, trace: &mut Trace) {
+        for (snapshot, cup) in trace.snapshots.iter_mut().zip(self.0) {
+            snapshot.robot.cup = cup;
         }
     }
 }

@@ -221,6 +221,7 @@ mod tests {
             left_touches: Vec::new(),
             right_touches: Vec::new(),
             links: Vec::new(),
+            cup: None,
         };
         Snapshot { time_secs, bodies: vec![body("table_1", true, "floor"), body("glass_1", false, "table_1")], robot }
     }

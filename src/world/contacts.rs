@@ -33,9 +33,21 @@ pub struct Touch {
 impl Touch {
     const NONE: Self =
         Self { normal_n: 0.0, depth_m: 0.0, force_n: Vector3::new(0.0, 0.0, 0.0), point_m: [0.0; 3], strongest_n: 0.0 };
+
+    /// A touch at one point, with this force on the second of the pair.
+    pub(super) fn at(normal_n: f64, force_n: Vector3<f64>, point_m: [f64; 3]) -> Self {
+        Self { normal_n, depth_m: 0.0, force_n, point_m, strongest_n: normal_n }
+    }
 }
 
 impl World {
+    /// Returns all contacts above [`CONTACT_FLOOR_NEWTONS`] and the seal of a suction cup, by ordered pair of owners.
+    pub(super) fn touches(&self) -> BTreeMap<(Owner, Owner), Touch> {
+        let mut found = touches(&self.engine);
+        found.extend(self.seal_touch());
+        found
+    }
+
     /// Returns the force of all contacts on the robot's hand in the last step, with its torque about the world's
     /// origin. Returns zero if the engine does not move the hand. Frame: world.
     pub(super) fn push_on_hand(&self) -> Twist {
@@ -85,8 +97,8 @@ fn impulse_of(point: &TrackedContact<ContactData>, normal: &Vector3<f64>) -> Vec
     normal * impulse - from_vector(point.data.warmstart_tangent_world) * share
 }
 
-/// Returns all contacts above [`CONTACT_FLOOR_NEWTONS`], by ordered pair of owners.
-pub fn touches(engine: &PhysicsWorld) -> BTreeMap<(Owner, Owner), Touch> {
+/// Returns the contacts above [`CONTACT_FLOOR_NEWTONS`] that the engine found, by ordered pair of owners.
+fn touches(engine: &PhysicsWorld) -> BTreeMap<(Owner, Owner), Touch> {
     let mut found: BTreeMap<(Owner, Owner), Touch> = BTreeMap::new();
     let per_second = 1.0 / f64::from(engine.integration_parameters.dt);
     for pair in engine.narrow_phase.contact_pairs() {

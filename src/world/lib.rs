@@ -1,6 +1,7 @@
 //! Simulates a `Scene`: the only crate that uses the physics engine.
 //!
-//! Never: decides the robot's actions, judges success, or attaches an object to the hand by a constraint.
+//! Never: decides the robot's actions, judges success, or attaches an object to the hand by a constraint, other than the
+//! seal of a suction cup, which breaks beyond its limits.
 
 mod assemble;
 mod assumed;
@@ -50,6 +51,7 @@ mod share;
 mod shell;
 mod silhouette;
 mod simulation;
+mod suction;
 mod surface;
 mod views;
 mod wrist;
@@ -72,6 +74,7 @@ pub use self_contact::SelfContact;
 pub use sense::Sighting;
 pub use settle::Settling;
 pub use simulation::{Command, Observation, World, build};
+pub use suction::would_seal;
 pub use views::robot_views;
 
 /// Version of the physics: the same scene and commands give the same bits only with the same version. It rises with each

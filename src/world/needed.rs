@@ -17,7 +17,8 @@ impl<'a> Needed<'a> {
     pub(super) fn of(robot: &'a urdf_rs::Robot, profile: &'a RobotProfile) -> Self {
         let joints: BTreeMap<&str, &urdf_rs::Joint> =
             robot.joints.iter().map(|joint| (joint.name.as_str(), joint)).collect();
-        if profile.arm_joints.is_empty() || profile.finger_joints.is_empty() {
+        let has_hand = !profile.finger_joints.is_empty() || profile.suction.is_some();
+        if profile.arm_joints.is_empty() || !has_hand {
             return Self { moving: None, joints };
         }
         let base = profile.base_joints.iter().flatten();

@@ -5,7 +5,6 @@ use std::collections::BTreeSet;
 use nalgebra::Point3;
 
 use crate::World;
-use crate::contacts::touches;
 use crate::convert::from_vector;
 use crate::engine::Owner;
 use crate::object::Object;
@@ -28,7 +27,7 @@ impl World {
     }
 
     fn pairs(&self) -> Vec<Pair> {
-        touches(&self.engine)
+        self.touches()
             .into_iter()
             .map(|((first, second), touch)| Pair { first, second, lift_on_second_n: touch.force_n.z })
             .collect()
@@ -113,11 +112,12 @@ impl World {
             base_true,
             base_believed: self.believed(base_true),
             gripper: Pose::from_isometry(&self.robot.kinematics.grasp(&positions)),
-            gripper_opening_m: self.robot.layout.gripper.opening_m(&positions),
+            gripper_opening_m: self.opening_m(&positions),
             left_touches: touched_by(left),
             right_touches: touched_by(right),
             joints,
             links: self.link_states(&positions),
+            cup: self.cup_state(),
         }
     }
 

@@ -71,6 +71,9 @@ impl World {
                 _ => {}
             }
         }
+        if let Some(sealed) = self.sealed() {
+            reached[sealed] = true;
+        }
         // Static objects do not transmit a push.
         let fixed: Vec<bool> = self
             .objects

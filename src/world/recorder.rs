@@ -7,7 +7,7 @@ use rapier3d::prelude::RigidBodyHandle;
 
 use crate::World;
 use crate::clearance::ClearanceMeter;
-use crate::contacts::{Touch, touches};
+use crate::contacts::Touch;
 use crate::convert::{from_pose, from_vector};
 use crate::engine::Owner;
 use crate::motion::MotionMeter;
@@ -255,7 +255,7 @@ impl World {
         if recording {
             self.record_extremes();
             self.record_base();
-            let touches = touches(&self.engine);
+            let touches = self.touches();
             self.record_contacts(&touches);
             self.record_robot(&touches);
             self.record_samples(&touches);

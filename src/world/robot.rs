@@ -146,14 +146,15 @@ impl Robot {
             .collect()
     }
 
-    /// Returns the force of each finger's motor by its control law; positive closes. Unit: newtons.
+    /// Returns the force of each finger's motor by its control law; positive closes; 0 for a suction cup. Unit: newtons.
     pub fn finger_efforts(&self) -> [f64; 2] {
-        self.layout.gripper.sides().map(|(idx, sign, lever_m)| {
+        let effort_of = |(idx, sign, lever_m): (usize, f64, f64)| {
             let (motor, position) = (&self.motors[idx], self.positions[idx]);
             let effort = motor.stiffness * (position - motor.setpoint)
                 + motor.damping * (self.velocities[idx] - motor.setpoint_velocity);
             effort.clamp(-motor.max_effort, motor.max_effort) * sign / lever_m
-        })
+        };
+        self.layout.gripper.sides().map_or([0.0; 2], |sides| sides.map(effort_of))
     }
 
     /// Returns the effort that each joint's motor gave in the last control tick, within its limit and without gravity

@@ -212,7 +212,7 @@ impl World {
     }
 
     fn reach(&self, room: &mut Room, poses: Vec<Isometry3<f64>>) -> Reach {
-        if !self.sliding.is_empty() {
+        if !self.sliding.is_empty() || self.sealed().is_some() {
             return Reach::All;
         }
         let rest: Vec<bool> = self.objects.iter().map(|object| self.rests(object)).collect();

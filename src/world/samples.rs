@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use crate::World;
-use crate::contacts::{Touch, touches};
+use crate::contacts::Touch;
 use crate::convert::{from_pose, from_vector};
 use crate::engine::Owner;
 use crate::object::Object;
@@ -46,7 +46,7 @@ impl World {
             series.extend([of("position", POSE_STEPS), of("velocity", VELOCITY_STEPS), of("effort", FORCE_STEPS)]);
         }
         self.recorder.samples = SampleMeter { series, ..SampleMeter::default() };
-        let touches = touches(&self.engine);
+        let touches = self.touches();
         self.record_samples(&touches);
     }
 
@@ -72,7 +72,7 @@ impl World {
         let (positions, velocities) = self.robot.state();
         let hand = Pose::from_isometry(&self.robot.kinematics.grasp(&positions));
         hand.position.into_iter().chain(hand.rotation).for_each(&mut put);
-        put(self.robot.layout.gripper.opening_m(&positions));
+        put(self.opening_m(&positions));
         let base = self.base_true();
         base.into_iter().chain(self.believed(base)).for_each(&mut put);
         let efforts = self.robot.loads();

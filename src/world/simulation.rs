@@ -16,6 +16,7 @@ use crate::odometry::Tracker;
 use crate::recorder::Recorder;
 use crate::robot::Robot;
 use crate::room::{Reach, Room};
+use crate::suction::Cup;
 use crate::{Fault, Kinematics, Layout, Poison, WorldError, fault};
 use actcheck_data::{CONTROL_HZ, Camera, KnownKind, Pose, RobotProfile, Scene, Sensing};
 use actcheck_scenario::FloorPlan;
@@ -26,9 +27,9 @@ pub struct Command {
     /// Target position of each joint, in the order of [`Kinematics::joints`]; for the base, by its own belief. Finger
     /// joints follow `gripper_opening_m` instead. Units: metres or radians.
     pub positions: Vec<f64>,
-    /// Gap between the fingers. Unit: metres.
+    /// Gap between the fingers; 0 switches the vacuum of a suction cup on. Unit: metres.
     pub gripper_opening_m: f64,
-    /// Largest force of one finger. Unit: newtons.
+    /// Largest force of one finger, or greatest pull of a suction cup. Unit: newtons.
     pub grip_force_n: f64,
     /// Effort-controlled joints, by index, each with its effort in addition to gravity compensation. Joints stay within
     /// their largest speed. Not for fingers. Units: newtons or newton metres.
@@ -44,9 +45,11 @@ pub struct Observation {
     pub positions: Vec<f64>,
     /// Joint velocities.
     pub velocities: Vec<f64>,
-    /// Gap between the fingers, measured by their encoders. Unit: metres.
+    /// Gap between the fingers, measured by their encoders; for a suction cup, 0 while its vacuum is on, otherwise its
+    /// diameter. Unit: metres.
     pub gripper_opening_m: f64,
-    /// Force of each finger's motor, left and right; positive closes. Unit: newtons.
+    /// Force of each finger's motor, left and right; positive closes. For a suction cup, twice the force of its vacuum by
+    /// its pressure sensor, 0 without a seal. Unit: newtons.
     pub finger_efforts_n: [f64; 2],
     /// Effort of each joint's motor, without gravity compensation. Units: newtons or newton metres.
     pub loads: Vec<f64>,
@@ -57,6 +60,8 @@ pub struct World {
     pub(super) engine: PhysicsWorld,
     pub(super) objects: Vec<Object>,
     pub(super) robot: Robot,
+    /// Its suction cup; `None` if its gripper has fingers.
+    pub(super) cup: Option<Cup>,
     pub(super) sensing: Sensing,
     /// Transform from the base's true pose to its believed pose. Frame: world.
     pub(super) believed_from_true: Isometry3<f64>,
@@ -108,6 +113,7 @@ pub fn build(scene: &Scene) -> Result<World, WorldError> {
         engine,
         recorder: Recorder::new(objects.len(), tracks, tick_secs),
         objects,
+        cup: robot.profile.suction.map(Cup::new),
         robot,
         sensing: scene.sensing.clone(),
         believed_from_true: Isometry3::identity(),
@@ -199,6 +205,7 @@ impl World {
         if self.fault.is_some() {
             return;
         }
+        self.seal_surface();
         let poses = self.robot.kinematics.links(&self.robot.positions);
         let holding = self.robot.kinematics.holding_efforts_at(&poses);
         let reach = self.find_room(poses);
@@ -220,7 +227,9 @@ impl World {
             self.robot.control(&mut self.engine, holding, dt, self.steps_per_tick - step);
             let ends_tick = step + 1 == self.steps_per_tick;
             self.step_robot(reach, dt, ends_tick);
-            self.robot.measure(&self.engine, holding, 1.0 / f64::from(self.steps_per_tick));
+            let share = 1.0 / f64::from(self.steps_per_tick);
+            self.robot.measure(&self.engine, holding, share);
+            self.measure_seal(share, step == 0);
             self.n_steps += 1;
             // Without the engine, no body moves before the end of the tick.
             if ends_tick || reach != Reach::Nothing {
@@ -230,6 +239,7 @@ impl World {
                 return;
             }
         }
+        self.judge_seal();
         self.record();
     }
 
@@ -300,7 +310,7 @@ impl World {
     /// Returns the robot's current measurements.
     pub fn observe(&self) -> Observation {
         let (mut positions, velocities) = self.robot.state();
-        let gripper_opening_m = self.robot.layout.gripper.opening_m(&positions);
+        let gripper_opening_m = self.opening_m(&positions);
         let loads = self.robot.loads();
         if let Some(base) = self.robot.layout.base {
             let believed = self.believed(base.map(|idx| positions[idx]));
@@ -313,7 +323,7 @@ impl World {
             positions,
             velocities,
             gripper_opening_m,
-            finger_efforts_n: self.robot.finger_efforts(),
+            finger_efforts_n: self.grip_forces_n(),
             loads,
         }
     }
@@ -378,6 +388,7 @@ impl World {
         }
         self.robot.aim_followers();
         self.robot.limit_grip(command.grip_force_n);
+        self.switch_vacuum(command.gripper_opening_m, command.grip_force_n);
         self.robot.push(&command.efforts);
     }
 

@@ -11,4 +11,6 @@ mod slim;
 mod spot;
 mod touch;
 
+pub(crate) use carry::straight;
 pub use skill::place;
+pub(crate) use touch::{Touch, carried_n};

@@ -10,7 +10,7 @@ use crate::pick::failed;
 use crate::place::touch::Touch;
 use crate::place::{carry, spot};
 use crate::plan::{self, Plan, PlanRequest};
-use crate::{ActionCall, memory};
+use crate::{ActionCall, cup, memory};
 use actcheck_data::ActionReport;
 use actcheck_world::Sighting;
 
@@ -97,7 +97,8 @@ fn in_hand(target: &str, robot: &mut Operator<'_>) -> Result<Held, Halt> {
     let nothing = || Halt::Failed(format!("nothing is in the hand: {target} can't be placed"));
     let held = robot.memory().held.clone().ok_or_else(nothing)?;
     robot.wait(LOOK_SECS)?;
-    if !feels(robot) || robot.feel_opening() < EMPTY_M {
+    let is_closed = !robot.has_cup() && robot.feel_opening() < EMPTY_M;
+    if is_closed || !feels(robot) {
         robot.hold(None);
         return Err(nothing());
     }
@@ -109,8 +110,12 @@ fn still_in_hand(held: &Held, robot: &mut Operator<'_>) -> Result<(), Halt> {
     if !robot.felt_slip() {
         return Ok(());
     }
+    let lost = match &robot.profile().suction {
+        Some(suction) => cup::broken(robot, suction, &held.id),
+        None => format!("{} slipped out of the hand on the way", held.id),
+    };
     robot.hold(None);
-    Err(Halt::Failed(format!("{} slipped out of the hand on the way", held.id)))
+    Err(Halt::Failed(lost))
 }
 
 /// The approximate pose of the surface, and all other objects. If the robot perceived its surroundings earlier, these
@@ -205,8 +210,11 @@ fn set_down(
     robot.begin("withdraw");
     withdraw(held, plan, robot)?;
     robot.wait(LOOK_SECS)?;
+    if robot.has_cup() && feels(robot) {
+        return Err(Halt::Failed("the suction cup did not let go: its vacuum is still felt".to_owned()));
+    }
     let gap = robot.feel_opening();
-    if gap < held.opening_m + spot::RELEASE_M / 2.0 {
+    if !robot.has_cup() && gap < held.opening_m + spot::RELEASE_M / 2.0 {
         return Err(Halt::Failed(format!("the hand did not open: its fingers are {:.1} cm apart", gap * 100.0)));
     }
     if !stands {

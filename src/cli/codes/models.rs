@@ -180,9 +180,9 @@ const CODES_W: &[Code] = &[
     ),
     code(
         "W052",
-        "a joint has two roles",
-        "it is in two lists of the profile, or `base` and `base_joints` are both set",
-        "leave it in one list",
+        "a joint has two roles, or keys of a profile exclude each other",
+        "a joint is in two lists, or `base` and `base_joints`, or keys of fingers and of a suction cup, are both set",
+        "leave the joint in one list, and the keys of one base and one gripper",
     ),
     code(
         "W053",

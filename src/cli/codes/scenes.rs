@@ -166,9 +166,10 @@ const CODES_S: &[Code] = &[
     ),
     code(
         "S070",
-        "an object is too wide for the gripper",
-        "its narrower side and a room of 1.0 cm are wider than `max_opening_m`",
-        "name a narrower object, or a robot whose gripper opens wider",
+        "an object is too wide for the gripper, or has no flat place for its suction cup",
+        "its narrower side and a room of 1.0 cm are wider than `max_opening_m`, or its top and sides are curved, hollow or \
+         narrower than the cup",
+        "name a narrower or flatter object, or a robot whose gripper opens wider or whose cup is smaller",
     ),
     code(
         "S071",
@@ -179,8 +180,8 @@ const CODES_S: &[Code] = &[
     code(
         "S072",
         "an object is too heavy for the gripper or the arm",
-        "friction between the fingers, or the effort of a joint, can't carry it",
-        "reduce the object's mass, or raise `grip_force_n` or the joint's `effort`",
+        "friction between the fingers, the seal of a suction cup, or the effort of a joint can't carry it",
+        "reduce the object's mass, or raise `grip_force_n`, `suction_force_n` or the joint's `effort`",
     ),
     code(
         "S073",

@@ -53,6 +53,9 @@ impl Gripper {
         grasp: (usize, Isometry3<f64>),
         n_intervals: usize,
     ) -> Result<Self, WorldError> {
+        if let Some(cup) = &profile.suction {
+            return Ok(Self::cup(2.0 * cup.radius_m));
+        }
         let named = profile.finger_joints.iter().map(|name| model.joint(name)).collect::<Result<Vec<_>, _>>()?;
         let [left, right] = links;
         // Some robots name their fingers as seen from the front.

@@ -33,6 +33,11 @@ pub struct Gripper {
 }
 
 impl Gripper {
+    /// A suction cup of this diameter, which has no joints. Unit: metres.
+    pub(super) fn cup(diameter_m: f64) -> Self {
+        Self { leaders: Vec::new(), followers: Vec::new(), sides: [0, 0], table: Vec::new(), widest_m: diameter_m }
+    }
+
     /// Returns all joints that move the fingers, those with a motor first.
     pub fn joints(&self) -> impl Iterator<Item = usize> + '_ {
         let leaders = self.leaders.iter().map(|leader| leader.joint);
@@ -68,17 +73,20 @@ impl Gripper {
     }
 
     /// For the left and the right finger: the joint that moves it, 1 or -1 for the direction of the joint in which the
-    /// finger opens, and the joint's lever.
-    pub(crate) fn sides(&self) -> [(usize, f64, f64); 2] {
-        self.sides.map(|side| {
-            let Leader { joint, closed, open, lever_m } = self.leaders[side];
-            (joint, (open - closed).signum(), lever_m)
-        })
+    /// finger opens, and the joint's lever. Returns `None` for a suction cup.
+    pub(crate) fn sides(&self) -> Option<[(usize, f64, f64); 2]> {
+        let of = |side: usize| {
+            let Leader { joint, closed, open, lever_m } = *self.leaders.get(side)?;
+            Some((joint, (open - closed).signum(), lever_m))
+        };
+        let [left, right] = self.sides;
+        Some([of(left)?, of(right)?])
     }
 
-    /// Returns the speeds of the left and the right fingertip. Unit: m/s; positive opens.
+    /// Returns the speeds of the left and the right fingertip; 0 for a suction cup. Unit: m/s; positive opens.
     pub fn speeds(&self, velocities: &[f64]) -> [f64; 2] {
-        self.sides().map(|(joint, sign, lever_m)| velocities[joint] * sign * lever_m)
+        let speed = |(joint, sign, lever_m): (usize, f64, f64)| velocities[joint] * sign * lever_m;
+        self.sides().map_or([0.0; 2], |sides| sides.map(speed))
     }
 
     /// Returns the widest opening. Unit: metres.

@@ -5,6 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion};
 
 use super::body::chain;
+use super::cup;
 use super::frames::{Pair, Root, likely};
 use super::stated::{NoHand, Stated};
 use crate::Gripper;
@@ -48,6 +49,9 @@ pub(super) struct Hand {
 /// [`NoHand`] if there is none.
 pub(super) fn find(partial: &RobotProfile, model: &RobotModel) -> Result<Hand, NoHand> {
     let stated = Stated::of(partial, model)?;
+    if let (Some(_), Some((palm, _))) = (partial.suction, stated.grasp) {
+        return Ok(Hand { profile: partial.clone(), palm, notes: BTreeMap::new() });
+    }
     if let (Some(links), [_, ..], Some(grasp)) = (stated.links, stated.joints.as_slice(), stated.grasp) {
         let mut profile = partial.clone();
         if profile.max_opening_m == 0.0 {
@@ -57,8 +61,11 @@ pub(super) fn find(partial: &RobotProfile, model: &RobotModel) -> Result<Hand, N
     }
     let groups = stated.groups(model).unwrap_or_else(|| groups(model));
     if groups.is_empty() {
+        if let Some(hand) = cup::find(partial, model) {
+            return Ok(hand);
+        }
         let what = "no gripper was found: none of its movable joints or their links has a name with `finger`, `grip`, \
-                    `hand`, `jaw`, `knuckle` or `thumb`";
+                    `hand`, `jaw`, `knuckle` or `thumb`, and no link one with `suction` or `vacuum`";
         return Err(NoHand::Gripper(what.to_owned()));
     }
     let mut rated: Vec<(usize, usize, &BTreeSet<usize>)> =
@@ -235,7 +242,7 @@ fn as_written(frame: &Isometry3<f64>) -> Isometry3<f64> {
 }
 
 /// Rounds to the tenth of a millimetre or milliradian.
-fn rounded(values: [f64; 3]) -> [f64; 3] {
+pub(super) fn rounded(values: [f64; 3]) -> [f64; 3] {
     values.map(|value| (value * 1e4).round() / 1e4 + 0.0)
 }
 

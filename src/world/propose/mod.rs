@@ -5,6 +5,7 @@
 //! proposed. Postures come from inverse kinematics, and have no overlapping links.
 
 mod body;
+mod cup;
 mod fingers;
 mod frames;
 mod postures;
@@ -41,9 +42,9 @@ pub fn propose(bare: &RobotProfile) -> Result<Proposal, WorldError> {
 /// Returns whether a profile leaves out roles that [`complete`] finds.
 pub fn is_incomplete(profile: &RobotProfile) -> bool {
     let names = [&profile.grasp_link, &profile.camera_link, &profile.finger_links[0]];
-    let lists = [&profile.arm_joints, &profile.finger_joints];
-    let missing = names.iter().any(|name| name.is_empty()) || lists.iter().any(|list| list.is_empty());
-    missing || profile.max_opening_m == 0.0 || profile.home.is_empty()
+    let missing = names.iter().any(|name| name.is_empty()) || profile.arm_joints.is_empty();
+    let no_hand = profile.suction.is_none() && profile.finger_joints.is_empty();
+    missing || no_hand || profile.max_opening_m == 0.0 || profile.home.is_empty()
 }
 
 /// Finds the roles that a profile leaves out, on a model whose meshes are convex: arm, fingers, grasp frame, opening,
