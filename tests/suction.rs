@@ -110,24 +110,6 @@ fn a_seal_breaks_if_and_only_if_the_pull_of_an_accelerated_mass_exceeds_its_forc
     }
 }
 
-/// A cup on the side of an upright plate carries it by friction: at most μ·F.
-#[test]
-fn a_level_cup_carries_a_plate_up_to_its_shear_force() {
-    for (share, expected) in [(0.85, true), (1.15, false)] {
-        let mass_kg = share * 0.5 * FORCE_N / GRAVITY;
-        let size_m = [0.02, 0.2, 0.2];
-        let plate = load(block(size_m), 0.02 + GAP_M + size_m[0] / 2.0, mass_kg);
-        let mut world = world(crane("ahead", TOP_M + 0.05), plate);
-        // The platform carries the plate before the lip does.
-        let open = world.hold();
-        steps(&mut world, &open, 0.5);
-        let command = close(&mut world);
-        assert!(holds(&world));
-        lift(&mut world, command, 0.05);
-        assert_eq!(holds(&world), expected, "{mass_kg} kg");
-    }
-}
-
 /// A bar that is held beside its middle peels the lip off: at most F·r.
 #[test]
 fn a_load_aside_of_the_cup_peels_it_off_beyond_force_times_radius() {
