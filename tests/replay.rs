@@ -121,6 +121,10 @@ fn other_rules_change_outcomes_but_not_the_trace() {
 #[test]
 fn runs_that_cannot_be_replayed_are_refused_with_the_reason() {
     let project = project();
+    // A shipped model would take the place of one of its name.
+    let objects = project.path().join("models/objects");
+    std::fs::rename(objects.join("glass.toml"), objects.join("tumbler.toml")).unwrap();
+    edit(&project.path().join("configs/pick.toml"), "[\"glass\"]", "[\"tumbler\"]");
     let run = format!("{}-1", campaign(project.path(), "1"));
     let unknown = actcheck(project.path(), &["replay", "zzzz-9", "--history", "h"]);
     assert_eq!(unknown.status.code(), Some(2));
@@ -128,8 +132,8 @@ fn runs_that_cannot_be_replayed_are_refused_with_the_reason() {
     let none = actcheck(project.path(), &["replay", "--campaign", "zzzz", "--history", "h"]);
     assert_eq!(none.status.code(), Some(2));
     assert!(stderr(&none).contains("H014"), "{}", stderr(&none));
-    std::fs::remove_file(project.path().join("models/objects/glass.toml")).unwrap();
+    std::fs::remove_file(objects.join("tumbler.toml")).unwrap();
     let gone = actcheck(project.path(), &["replay", &run, "--history", "h"]);
     assert_eq!(gone.status.code(), Some(2));
-    assert!(stderr(&gone).contains("glass"), "{}", stderr(&gone));
+    assert!(stderr(&gone).contains("tumbler"), "{}", stderr(&gone));
 }
