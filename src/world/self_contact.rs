@@ -1,6 +1,6 @@
 //! Detects postures in which links of the robot are too close to each other, for motion planning.
 
-use nalgebra::{Isometry3, Point3};
+use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
 use parry3d::query::distance;
 use rapier3d::math::Pose as EnginePose;
 use rapier3d::prelude::SharedShape;
@@ -33,12 +33,14 @@ struct Pair {
     clear_m: f64,
 }
 
-/// A convex solid with the ball around it, in its link's frame.
+/// A convex solid with the ball and the box around it, in its link's frame.
 #[derive(Clone)]
 struct Solid {
     pose: EnginePose,
     shape: SharedShape,
     ball: Ball,
+    /// Half extents of the box, whose middle is that of the ball. Unit: metres.
+    half: Vector3<f64>,
 }
 
 /// The convex solids of one link, in its frame.
@@ -122,13 +124,16 @@ fn gap(links: &[Form], Pair { links: (first, second), clear_m }: Pair, poses: &[
     }
     let (at_a, at_b) = (to_pose(&poses[first]), to_pose(&poses[second]));
     let mut nearest = clear_m;
-    let middles: Vec<Point3<f64>> = b.solids.iter().map(|solid| poses[second] * solid.ball.middle).collect();
+    let b_in_a = poses[first].inverse() * poses[second];
+    let turned: Matrix3<f64> = b_in_a.rotation.to_rotation_matrix().into_inner();
+    let middles: Vec<Point3<f64>> = b.solids.iter().map(|solid| b_in_a * solid.ball.middle).collect();
     for solid_a in &a.solids {
-        let middle = poses[first] * solid_a.ball.middle;
         let on_a = at_a * solid_a.pose;
         for (solid_b, middle_b) in b.solids.iter().zip(&middles) {
-            let apart = (middle - middle_b).norm() - solid_a.ball.radius - solid_b.ball.radius;
-            if apart > nearest + ROUNDING_M {
+            let way = middle_b - solid_a.ball.middle;
+            let apart = way.norm() - solid_a.ball.radius - solid_b.ball.radius;
+            let far = nearest + ROUNDING_M;
+            if apart > far || boxes_apart(way, &turned, [&solid_a.half, &solid_b.half]) > far {
                 continue;
             }
             // Convex solids are always supported; an unsupported pair would count as a collision.
@@ -137,6 +142,15 @@ fn gap(links: &[Form], Pair { links: (first, second), clear_m }: Pair, poses: &[
         }
     }
     nearest
+}
+
+/// Returns a lower bound of the distance of two boxes with these half extents, along the axes of both: the second one is
+/// turned, and its middle is at `way` from that of the first. Unit: metres.
+fn boxes_apart(way: Vector3<f64>, turned: &Matrix3<f64>, [first, second]: [&Vector3<f64>; 2]) -> f64 {
+    let spread = turned.abs();
+    let along_first = way.abs() - first - spread * second;
+    let along_second = turned.tr_mul(&way).abs() - second - spread.tr_mul(first);
+    along_first.max().max(along_second.max())
 }
 
 impl Ball {
@@ -162,8 +176,37 @@ impl Form {
         let around = Ball::around(solids).unwrap_or(Ball { middle: Point3::origin(), radius: 0.0 });
         let forms = solids.iter().filter_map(|solid| {
             let form = collider(solid, Owner::Floor, 0.0, 0.0)?;
-            Some(Solid { pose: form.position, shape: form.shape, ball: Ball::around(std::slice::from_ref(solid))? })
+            let (low, high) = solid.bounds();
+            let half = (Vector3::from(high) - Vector3::from(low)) / 2.0;
+            let ball = Ball::around(std::slice::from_ref(solid))?;
+            Some(Solid { pose: form.position, shape: form.shape, ball, half })
         });
         Self { solids: forms.collect(), middle: around.middle, radius: around.radius }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn boxes_are_never_farther_apart_than_said() {
+        let [first, second] = [Vector3::new(0.1, 0.2, 0.3), Vector3::new(0.3, 0.1, 0.05)];
+        let cuboid =
+            |half: &Vector3<f64>| parry3d::shape::Cuboid::new([half.x as f32, half.y as f32, half.z as f32].into());
+        let shapes = [cuboid(&first), cuboid(&second)];
+        let mut close = 0;
+        for step in 0..400 {
+            let [a, b] = [f64::from(step) * 0.7, f64::from(step) * 0.31];
+            let way =
+                Vector3::new(libm::cos(a), libm::sin(a) * libm::cos(b), libm::sin(b)) * (0.2 + f64::from(step) * 0.002);
+            let pose = Isometry3::new(way, Vector3::new(b, a, 0.4));
+            let bound = boxes_apart(way, &pose.rotation.to_rotation_matrix().into_inner(), [&first, &second]);
+            let true_m = distance(&EnginePose::IDENTITY, &shapes[0], &to_pose(&pose), &shapes[1])
+                .map_or(0.0, |found| f64::from(found.distance));
+            assert!(bound <= true_m + ROUNDING_M, "{bound} {true_m}");
+            close += usize::from(bound > 0.0 && true_m - bound < 0.02);
+        }
+        assert!(close > 40, "the bound is close where a face is nearest: {close}");
     }
 }
