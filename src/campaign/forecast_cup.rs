@@ -53,7 +53,8 @@ impl Env {
     }
 }
 
-/// The weight that a seal at this place of an upright object carries. On a side, it shears the lip and peels it off. Unit: newtons.
+/// The weight that a seal at this place of an upright object carries. On a side, it shears the lip and peels it off. Unit:
+/// newtons.
 fn carried_n(lip: &Pose, model: &ObjectModel, cup: &Suction) -> f64 {
     let [x, y, z] = lip.position;
     if (z - model.size_m[2]).abs() < 1e-6 {

@@ -22,7 +22,8 @@ const MAGIC: &[u8; 8] = b"actrace4";
 const WITHOUT_CANDIDATES: &[u8; 8] = b"actrace3";
 
 /// First part: choices, states, actions, time between frames, names of tracks, hash. The map, the forms of bodies, the
-/// courses of the robot, [`Details`], [`Intervals`] and, of a robot with a suction cup, [`Cups`] follow it. (Traces of earlier versions end before any of these.)
+/// courses of the robot, [`Details`], [`Intervals`] and, of a robot with a suction cup, [`Cups`] follow it. (Traces of
+/// earlier versions end before any of these.)
 type Head = (Vec<Choice>, Vec<Snapshot>, Vec<ActionTrace>, f64, Vec<String>, String);
 
 /// Encodes a run's file.

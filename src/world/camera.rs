@@ -1,5 +1,5 @@
-//! A depth camera on the robot's camera link, or fixed in the world: casts one ray per pixel against all colliders, including the robot's own
-//! links.
+//! A depth camera on the robot's camera link, or fixed in the world: casts one ray per pixel against all colliders,
+//! including the robot's own links.
 //!
 //! An image's noise is one recorded choice, `sense.camera.frame`: a seed from which the noise of each pixel is derived.
 //! Its nominal value, 0, is an image without noise. So a replay sees the same image, and a shrunk run shows whether the

@@ -1,7 +1,8 @@
 //! The suction cup: when its seal forms, the force that it carries, and when it breaks.
 //!
-//! A seal is a joint with the stiffness of a soft lip between the cup's link and the body that it holds, from the moment at which the whole lip lies on
-//! the body. The engine's solver gives the force of the joint; beyond the cup's limits, the joint is removed.
+//! A seal is a joint with the stiffness of a soft lip between the cup's link and the body that it holds, from the moment
+//! at which the whole lip lies on the body. The engine's solver gives the force of the joint; beyond the cup's limits, the
+//! joint is removed.
 
 use nalgebra::{Isometry3, Point3, Vector3};
 use parry3d::query::Ray;
@@ -180,7 +181,8 @@ impl World {
         self.cup.map_or_else(|| self.robot.layout.gripper.opening_m(positions), |cup| cup.opening_m())
     }
 
-    /// Returns the force of each finger's motor; for a suction cup, twice that of its vacuum. Unit: newtons.
+    /// Returns the force of each finger's motor; for a suction cup, the force of its vacuum, in the place of both fingers.
+    /// Unit: newtons.
     pub(super) fn grip_forces_n(&self) -> [f64; 2] {
         self.cup.map_or_else(|| self.robot.finger_efforts(), |cup| [cup.suction_n(); 2])
     }
