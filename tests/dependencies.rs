@@ -136,6 +136,36 @@ fn no_crate_has_an_advisory_without_an_exception() {
     assert!(outdated.is_empty(), "these exceptions of deny.toml are no longer needed: {outdated:?}");
 }
 
+/// The crates of the program with their features, in a build of these kinds of dependencies.
+fn features(kinds: &str) -> BTreeSet<String> {
+    let output = Command::new(env!("CARGO"))
+        .current_dir(root())
+        .args([
+            "tree",
+            "--workspace",
+            "--locked",
+            "--offline",
+            "--prefix",
+            "none",
+            "--format",
+            "{p} {f}",
+            "--edges",
+            kinds,
+        ])
+        .output()
+        .unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let text = String::from_utf8(output.stdout).unwrap();
+    text.lines().map(|line| line.trim_end_matches(" (*)").to_owned()).filter(|line| !line.is_empty()).collect()
+}
+
+/// One feature more makes cargo compile a crate and all that depend on it again: `make test` after `make`.
+#[test]
+fn tests_share_all_crates_of_the_program() {
+    let other: Vec<String> = features("normal,build").difference(&features("normal,build,dev")).cloned().collect();
+    assert!(other.is_empty(), "tests compile these with other features; give them to the program too: {other:?}");
+}
+
 #[test]
 fn an_advisory_applies_to_versions_that_are_neither_patched_nor_unaffected() {
     let advisory = advisory("RUSTSEC-0000-0001\txml\tvulnerability\t^0.37.9; >= 0.41.0\t< 0.3.0");

@@ -32,7 +32,7 @@ pub(super) enum Extent {
 }
 
 fn extract_to(trace: &Trace, extent: Extent) -> RunFacts {
-    let mut writer = Writer::default();
+    let mut writer = Writer::new();
     let mut facts = RunFacts::default();
     for state in &trace.snapshots {
         snapshot::write(state, &mut writer);

@@ -1,7 +1,6 @@
 //! Writer of a run's terms and triples.
 
 use std::collections::HashMap;
-use std::fmt::Write as _;
 
 use actcheck_base::names::escaped;
 use actcheck_base::{Term, TermId, Terms, Triple, names};
@@ -30,34 +29,20 @@ pub(super) fn shortest(value: f64) -> f64 {
     if single == 0.0 {
         return 0.0;
     }
-    let mut text = ShortText::default();
-    match write!(text, "{single:e}") {
-        Ok(()) => text.as_str().parse().unwrap_or(f64::from(single)),
-        Err(_) => f64::from(single),
+    if !single.is_finite() {
+        return f64::from(single);
     }
+    // Halfway between two numbers of the fewest digits, as 30.8515625 is, the standard library takes the larger one, and the
+    // faster library the even one. Such a number has at most 14 binary digits after the point.
+    let parsed = match (single * HALFWAY).fract() == 0.0 {
+        true => format!("{single:e}").parse(),
+        false => zmij::Buffer::new().format_finite(single).parse(),
+    };
+    parsed.unwrap_or(f64::from(single))
 }
 
-/// Text of a number, without an allocation: a run has hundreds of numbers.
-#[derive(Default)]
-struct ShortText {
-    bytes: [u8; 32],
-    len: usize,
-}
-
-impl ShortText {
-    fn as_str(&self) -> &str {
-        std::str::from_utf8(&self.bytes[..self.len]).unwrap_or_default()
-    }
-}
-
-impl std::fmt::Write for ShortText {
-    fn write_str(&mut self, text: &str) -> std::fmt::Result {
-        let end = self.len + text.len();
-        self.bytes.get_mut(self.len..end).ok_or(std::fmt::Error)?.copy_from_slice(text.as_bytes());
-        self.len = end;
-        Ok(())
-    }
-}
+/// 2¹⁴.
+const HALFWAY: f32 = 16_384.0;
 
 /// Interns terms and collects the triples of one state or action.
 #[derive(Default)]
@@ -72,7 +57,17 @@ pub(super) struct Writer {
     properties: HashMap<(usize, usize), TermId, RandomState>,
 }
 
+/// Room for the terms of a usual run.
+const TERMS: usize = 1024;
+
 impl Writer {
+    /// Creates a writer for a run.
+    pub(super) fn new() -> Self {
+        let terms = Terms::with_capacity(TERMS);
+        let numbers = HashMap::with_capacity_and_hasher(TERMS, RandomState::default());
+        Self { terms, numbers, ..Self::default() }
+    }
+
     /// Returns the collected triples, sorted and deduplicated, and starts an empty list.
     pub(super) fn take(&mut self) -> Vec<Triple> {
         let mut triples = std::mem::take(&mut self.triples);
@@ -183,6 +178,17 @@ mod tests {
         }
         assert!(shortest(f64::NAN).is_nan());
         assert_eq!(shortest(f64::NEG_INFINITY), f64::NEG_INFINITY);
+    }
+
+    #[test]
+    fn numbers_of_all_sizes_have_the_digits_of_the_standard_library() {
+        // A prime, so that all exponents and many fractions occur.
+        for bits in (0..f32::INFINITY.to_bits()).step_by(10_007) {
+            let single = f32::from_bits(bits);
+            let expected: f64 = format!("{single:e}").parse().unwrap_or(f64::NAN);
+            assert_eq!(shortest(single.into()).to_bits(), (expected + 0.0).to_bits(), "{single:e}");
+            assert_eq!(shortest((-single).into()), -expected, "{single:e}");
+        }
     }
 
     #[test]
