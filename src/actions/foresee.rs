@@ -64,7 +64,7 @@ fn payload(robot: &Operator<'_>, posture: &[f64]) -> ForeseenPick {
     let mut found = ForeseenPick { payload_kg: f64::INFINITY, weakest: String::new() };
     for idx in &robot.layout().arm {
         let joint = &kinematics.joints()[*idx];
-        let lever_m = jacobian[(2, *idx)];
+        let lever_m = jacobian[*idx].z;
         if lever_m.abs() < LEVER_M {
             continue;
         }

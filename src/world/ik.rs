@@ -1,6 +1,6 @@
 //! Inverse kinematics of the grasp link, within the joint limits.
 
-use nalgebra::{DMatrix, DVector, Isometry3, Vector6};
+use nalgebra::{Isometry3, Matrix6, Vector6};
 
 use crate::Kinematics;
 
@@ -49,7 +49,6 @@ fn approach(kinematics: &Kinematics, seed: &[f64], reach: &Reach) -> Result<Vec<
         if error.fixed_rows::<3>(0).norm() < REACHED_M && error.fixed_rows::<3>(3).norm() < REACHED_RAD {
             return Ok(positions);
         }
-        let jacobian = DMatrix::from_iterator(6, positions.len(), jacobian.iter().copied());
         step(kinematics, &mut positions, &jacobian, &error, &reach.mobility);
         kinematics.follow(&mut positions);
     }
@@ -60,7 +59,7 @@ fn approach(kinematics: &Kinematics, seed: &[f64], reach: &Reach) -> Result<Vec<
 fn step(
     kinematics: &Kinematics,
     positions: &mut [f64],
-    jacobian: &DMatrix<f64>,
+    jacobian: &[Vector6<f64>],
     error: &Vector6<f64>,
     mobility: &[f64],
 ) {
@@ -90,17 +89,23 @@ fn at_limit(position: f64, wanted: f64, lower: f64, upper: f64) -> bool {
     (wanted < lower && position <= lower + 1e-6) || (wanted > upper && position >= upper - 1e-6)
 }
 
-/// Computes W·Jᵀ·(J·W·Jᵀ + λ²·I)⁻¹·e, scaled down so that no component exceeds the largest step.
-fn least_squares(jacobian: &DMatrix<f64>, error: &Vector6<f64>, mobility: &[f64]) -> DVector<f64> {
-    let weights = DMatrix::from_diagonal(&DVector::from_column_slice(mobility));
-    let weighted = &weights * jacobian.transpose();
-    let square = jacobian * &weighted + DMatrix::identity(6, 6) * (DAMPING * DAMPING);
-    let error = DVector::from_column_slice(error.as_slice());
-    let Some(inverse) = square.try_inverse() else { return DVector::zeros(mobility.len()) };
-    let mut change = weighted * (inverse * error);
-    let largest = change.amax();
+/// Computes W·Jᵀ·(J·W·Jᵀ + λ²·I)⁻¹·e, scaled down so that no component exceeds the largest step. `jacobian`: its columns,
+/// one for each joint.
+///
+/// Sums are in a fixed order: products of matrices whose size is only known at run time use other instructions, which round
+/// differently, on other processors.
+fn least_squares(jacobian: &[Vector6<f64>], error: &Vector6<f64>, mobility: &[f64]) -> Vec<f64> {
+    let mut square = Matrix6::identity() * (DAMPING * DAMPING);
+    for (column, weight) in jacobian.iter().zip(mobility).filter(|(_, weight)| **weight != 0.0) {
+        square += column * (column * *weight).transpose();
+    }
+    let Some(factors) = square.cholesky() else { return vec![0.0; mobility.len()] };
+    let solved = factors.solve(error);
+    let mut change: Vec<f64> =
+        jacobian.iter().zip(mobility).map(|(column, weight)| weight * column.dot(&solved)).collect();
+    let largest = change.iter().fold(0.0, |largest: f64, change| largest.max(change.abs()));
     if largest > LARGEST_STEP {
-        change *= LARGEST_STEP / largest;
+        change.iter_mut().for_each(|change| *change *= LARGEST_STEP / largest);
     }
     change
 }

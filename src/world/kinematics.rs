@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
-use nalgebra::{Isometry3, Matrix6xX, Point3, Translation3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3, Vector6};
 
 use crate::Gripper;
 use crate::description::{Joint, JointKind, RobotModel};
@@ -134,15 +134,34 @@ impl Kinematics {
         poses
     }
 
+    /// Returns the pose of one link.
+    fn link(&self, link: usize, positions: &[f64]) -> Isometry3<f64> {
+        self.path_to(link).into_iter().fold(self.root, |parent, idx| self.moved(&parent, idx, positions))
+    }
+
+    /// The joints between the root and a link, in this order.
+    fn path_to(&self, link: usize) -> Vec<usize> {
+        let parent = |idx: &usize| self.model.joints[*idx].parent.checked_sub(1);
+        let mut path: Vec<usize> = std::iter::successors(link.checked_sub(1), parent).collect();
+        path.reverse();
+        path
+    }
+
+    /// The pose of the link that a joint moves, from that of its parent.
+    fn moved(&self, parent: &Isometry3<f64>, idx: usize, positions: &[f64]) -> Isometry3<f64> {
+        let joint = &self.model.joints[idx];
+        parent * joint.origin * motion(joint, positions[idx])
+    }
+
     /// Returns the pose of the grasp link.
     pub fn grasp(&self, positions: &[f64]) -> Isometry3<f64> {
-        self.links(positions)[self.grasp.0] * self.grasp.1
+        self.link(self.grasp.0, positions) * self.grasp.1
     }
 
     /// Returns the pose of the camera: x forwards, z up in the image.
     pub fn camera(&self, positions: &[f64]) -> Isometry3<f64> {
         match self.camera {
-            Mount::Link(link, pose) => self.links(positions)[link] * pose,
+            Mount::Link(link, pose) => self.link(link, positions) * pose,
             Mount::World(pose) => pose,
         }
     }
@@ -183,26 +202,24 @@ impl Kinematics {
 
     /// Returns the pose and the Jacobian of the grasp link; joints that follow others move with these. Shape: 6 × joints,
     /// linear above angular.
-    pub fn grasp_jacobian(&self, positions: &[f64]) -> (Isometry3<f64>, Matrix6xX<f64>) {
-        let poses = self.links(positions);
-        let grasp = poses[self.grasp.0] * self.grasp.1;
-        let mut jacobian = Matrix6xX::zeros(self.model.joints.len());
-        let mut link = self.grasp.0;
-        while link > 0 {
-            let joint = &self.model.joints[link - 1];
-            let (axis, point) = axis_in_world(joint, &poses);
-            let (linear, angular) = match joint.kind {
+    pub fn grasp_jacobian(&self, positions: &[f64]) -> (Isometry3<f64>, Vec<Vector6<f64>>) {
+        let (mut pose, mut axes) = (self.root, Vec::new());
+        for idx in self.path_to(self.grasp.0) {
+            axes.push((idx, axis_from(&self.model.joints[idx], &pose)));
+            pose = self.moved(&pose, idx, positions);
+        }
+        let grasp = pose * self.grasp.1;
+        let mut jacobian = vec![Vector6::zeros(); self.model.joints.len()];
+        for (idx, (axis, point)) in axes {
+            let (linear, angular) = match self.model.joints[idx].kind {
                 JointKind::Prismatic => (axis, Vector3::zeros()),
                 JointKind::Revolute => (axis.cross(&(grasp.translation.vector - point)), axis),
             };
-            jacobian.fixed_view_mut::<3, 1>(0, link - 1).copy_from(&linear);
-            jacobian.fixed_view_mut::<3, 1>(3, link - 1).copy_from(&angular);
-            link = joint.parent;
+            jacobian[idx] = Vector6::new(linear.x, linear.y, linear.z, angular.x, angular.y, angular.z);
         }
         for (joint, leader, factor, _) in &self.followers {
-            let moved = jacobian.column(*joint) * *factor;
-            let mut column = jacobian.column_mut(*leader);
-            column += moved;
+            let moved = jacobian[*joint] * *factor;
+            jacobian[*leader] += moved;
         }
         (grasp, jacobian)
     }
@@ -269,6 +286,11 @@ pub(super) fn motion(joint: &Joint, position: f64) -> Isometry3<f64> {
 
 /// Returns the direction of a joint's axis and a point on it. Frame: world.
 pub(super) fn axis_in_world(joint: &Joint, poses: &[Isometry3<f64>]) -> (Vector3<f64>, Vector3<f64>) {
-    let frame = poses[joint.parent] * joint.origin;
+    axis_from(joint, &poses[joint.parent])
+}
+
+/// As [`axis_in_world`], from the pose of the parent.
+fn axis_from(joint: &Joint, parent: &Isometry3<f64>) -> (Vector3<f64>, Vector3<f64>) {
+    let frame = parent * joint.origin;
     (frame.rotation * joint.axis.into_inner(), frame.translation.vector)
 }

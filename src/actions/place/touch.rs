@@ -17,7 +17,7 @@ pub fn carried_n(robot: &Operator<'_>) -> f64 {
     let arm = robot.layout().arm.iter();
     let (mut work, mut square) = (0.0, 1e-9);
     for idx in arm {
-        let rise = jacobian[(2, *idx)];
+        let rise = jacobian[*idx].z;
         work += rise * observed.loads[*idx];
         square += rise * rise;
     }
