@@ -7,8 +7,8 @@
 
 For each robot whose file is below one of the folders: a profile by `actcheck new robot` (after `check --mend` where the
 file has impossible moments of inertia), its lines, whether `check` accepts it, and how many of the runs pick a lone can,
-cube and box without noise, and place a can that the robot has found with its camera. The last column is the simulated
-time per CPU second of the picks. Nothing is edited by hand, but TIAGo's gripper comes from another package than its arm:
+cube and box without noise, and place a can that the robot has found with its camera. With `--speed`, the last
+figure is the simulated time by CPU time of a pick, on one core. Nothing is edited by hand, but TIAGo's gripper comes from another package than its arm:
 `tiago_gripper.urdf.xacro` includes `tiago_no_hand.urdf` and `pal_gripper_description/urdf/gripper.urdf.xacro`, and calls
 `pal_gripper` with the parent `wrist_ft_tool_link` and the origin of `end_effector.urdf.xacro`. Folders that are packages
 themselves are named one by one.
@@ -172,6 +172,23 @@ def reports(program, folder, history):
     return found[:3]
 
 
+def speed(args, folder, thing):
+    """Simulated seconds by CPU seconds: of all runs but one, so that the start of the program doesn't count."""
+    simulated, used = [], []
+    for runs in (1, args.runs):
+        history = folder / f"h_speed_{runs}"
+        shutil.rmtree(history, ignore_errors=True)
+        if (folder / f"h_{thing}" / "hulls").exists():
+            shutil.copytree(folder / f"h_{thing}" / "hulls", history / "hulls")
+        _, _, _, cpu, _ = call(
+            args.program, folder, "run", f"{thing}.toml", "--history", str(history), "--runs", str(runs), "--jobs", "1")
+        query = "SELECT (SUM(?secs) AS ?all) { ?execution act:ofRun ?run ; act:duration ?secs }"
+        _, out, _, _, _ = call(args.program, folder, "query", query, "--history", str(history), "--format", "csv")
+        simulated.append(float(out.split()[1]))
+        used.append(cpu)
+    return round((simulated[1] - simulated[0]) / max(used[1] - used[0], 1e-6), 1)
+
+
 def measure(args, name, model, arguments, start, packages):
     folder = args.work / re.sub(r"\W+", "_", name)
     folder.mkdir(parents=True, exist_ok=True)
@@ -221,6 +238,8 @@ def measure(args, name, model, arguments, start, packages):
             continue
         row[thing + "_why"] = reports(args.program, folder, history)
         row[thing + "_cpu"] = round(cpu, 1)
+    if args.speed and args.things and row.get("loads") == "yes":
+        row["speed"] = speed(args, folder, args.things[0])
     if mobile and args.place:
         (folder / "place.toml").write_text(PLACE.format(runs=args.runs))
         shutil.rmtree(folder / "h_place", ignore_errors=True)
@@ -256,6 +275,7 @@ def main():
     parser.add_argument("--things", nargs="*", default=["can", "cube", "box"])
     parser.add_argument("--check", action="store_true", help="also measure `check`, which plans picks everywhere")
     parser.add_argument("--place", action="store_true")
+    parser.add_argument("--speed", action="store_true", help="also measure simulated seconds by CPU seconds of picks")
     args = parser.parse_args()
     args.program = str(Path(args.program).resolve())
     args.work = args.work.resolve()
