@@ -4,7 +4,9 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use actcheck::base::{Outcome, Term, names};
-use actcheck::history::{CampaignEnd, History, QueryAnswer, Recheck, Repetition, RunRecord, RunStatus};
+use actcheck::history::{
+    CampaignEnd, History, NewestJudgements, QueryAnswer, Recheck, Repetition, RunRecord, RunStatus,
+};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 
@@ -63,7 +65,7 @@ fn history(dir: &Path, is_whole: &dyn Fn(u64) -> bool) -> History {
     let mut rechecks = Vec::new();
     for index in [3, 4, 90] {
         let id = format!("k-{index}");
-        let before = history.newest(&id, 1, std::slice::from_ref(&property)).unwrap().remove(0);
+        let before = NewestJudgements::of(&history).read(&id, 1, std::slice::from_ref(&property)).unwrap().remove(0);
         let mut now = before.judgement.clone();
         now.outcome = if now.outcome == Outcome::Passed { Outcome::Failed } else { Outcome::Passed };
         rechecks.push(Recheck { run: id, step: 1, action: names::act("Pick"), before: Some(before), now });

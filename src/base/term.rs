@@ -154,6 +154,11 @@ impl Terms {
         Self::default()
     }
 
+    /// Creates an empty interner with room for this many terms.
+    pub fn with_capacity(terms: usize) -> Self {
+        Self { by_id: Vec::with_capacity(terms), ids: HashTable::with_capacity(terms), ..Self::default() }
+    }
+
     /// Returns the ID of a term, interning the term if it is new.
     pub fn intern(&mut self, term: Term) -> TermId {
         let (hash, found) = self.find(term.key());

@@ -55,3 +55,4 @@ pub use run_all::{CampaignOptions, resume_all, run_all};
 pub use run_cases::{CaseRun, run_cases};
 pub use schedule::{Planned, PropertyOutcome, RunResult, Schedule, Steering, schedule_of};
 pub use solids::proposed_robot;
+pub use workers::side_by_side;

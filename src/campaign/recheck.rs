@@ -10,7 +10,7 @@ use crate::{Ending, RuleSet};
 use actcheck_base::{Diagnostic, Diagnostics, RunFacts};
 use actcheck_data::{ActionEnd, ActionTrace};
 use actcheck_facts as facts;
-use actcheck_history::{History, Recheck, RunRow, StoredJudgement};
+use actcheck_history::{History, NewestJudgements, Recheck, RunRow, StoredJudgement};
 use actcheck_rules::Budget;
 
 /// Options of [`recheck`]. The number of workers does not change the result.
@@ -65,7 +65,8 @@ pub fn recheck<'a>(
         Err(faults) => return RecheckEnd { ending: Ending::Stopped(faults), ..end },
     };
     let stopped = || stop.load(Ordering::Relaxed);
-    let judge = |run: &RunRow| (!stopped()).then(|| judge_run(history, run, rules_of(run)));
+    let newest = NewestJudgements::of(history);
+    let judge = |run: &RunRow| (!stopped()).then(|| judge_run(history, &newest, run, rules_of(run)));
     let mut chunks = runs.chunks(options.batch.max(1));
     let mut taken = 0;
     let mut judged: Option<Vec<Recheck>> = None;
@@ -115,7 +116,8 @@ pub fn judge_stored(
     jobs: usize,
     stop: &AtomicBool,
 ) -> Result<(Vec<Recheck>, Diagnostics), Diagnostics> {
-    let judge = |run: &RunRow| (!stop.load(Ordering::Relaxed)).then(|| judge_run(history, run, rules));
+    let newest = NewestJudgements::of(history);
+    let judge = |run: &RunRow| (!stop.load(Ordering::Relaxed)).then(|| judge_run(history, &newest, run, rules));
     let judged: Judged = workers(jobs)?.install(|| runs.par_iter().filter_map(judge).collect());
     let (rechecks, faults) = split_results(judged);
     Ok((rechecks.into_iter().flatten().collect(), faults))
@@ -134,19 +136,23 @@ fn split_results(batch: Judged) -> (Vec<Vec<Recheck>>, Diagnostics) {
 }
 
 /// Judges all actions of a run. A run that can't be judged has exactly one fault.
-fn judge_run(history: &History, run: &RunRow, rules: &RuleSet) -> Result<Vec<Recheck>, Diagnostics> {
-    let course = rules.rules.reads_course();
-    let trace = if course { history.sampled(&run.run)? } else { history.states(&run.run)? };
+fn judge_run(
+    history: &History,
+    newest: &NewestJudgements<'_>,
+    run: &RunRow,
+    rules: &RuleSet,
+) -> Result<Vec<Recheck>, Diagnostics> {
+    let trace = history.trace_of(run, rules.rules.reads_course())?;
     let facts = facts::extract(&trace);
     let mut rechecks = Vec::new();
     for (step, performed) in trace.actions.iter().enumerate() {
-        rechecks.extend(judge_step(history, run, step, performed, &facts, rules)?);
+        rechecks.extend(judge_step(newest, run, step, performed, &facts, rules)?);
     }
     Ok(rechecks)
 }
 
 fn judge_step(
-    history: &History,
+    newest: &NewestJudgements<'_>,
     run: &RunRow,
     step: usize,
     performed: &ActionTrace,
@@ -166,7 +172,7 @@ fn judge_step(
     }
     // The length of a test is not limited.
     let number = u32::try_from(step + 1).unwrap_or(u32::MAX);
-    let mut stored = history.newest(&run.run, number, &action.success_properties)?;
+    let mut stored = newest.read(&run.run, number, &action.success_properties)?;
     let (facts, budget) = (facts.action(step), Budget::default());
     let judged = judge_action(&rules.ontology, &rules.rules, action, &performed.end, facts, &budget)
         .map_err(|failure| Diagnostic::error("R091", failure.to_string()))?;

@@ -65,7 +65,7 @@ impl RuleSet {
             .flat_map(|action| action.success_properties.iter().chain(&action.preconditions))
             .collect();
         ontology.properties.retain(|iri, _| asked.contains(iri));
-        only.rules = RuleBook::prepare(&ontology)?;
+        only.rules = only.rules.restricted(&ontology)?;
         Ok(only)
     }
 }

@@ -12,3 +12,15 @@ pub(super) fn workers(jobs: usize) -> Result<ThreadPool, Diagnostics> {
     let pool = ThreadPoolBuilder::new().num_threads(jobs.max(1)).build();
     pool.map_err(|error| Diagnostic::error("X010", format!("workers can't be started: {error}")).into())
 }
+
+/// Does two things side by side with two workers or more, otherwise one after the other.
+///
+/// # Errors
+/// `X010` if the workers can't be started.
+pub fn side_by_side<A: Send, B: Send>(
+    jobs: usize,
+    first: impl FnOnce() -> A + Send,
+    second: impl FnOnce() -> B + Send,
+) -> Result<(A, B), Diagnostics> {
+    Ok(workers(jobs.min(2))?.install(|| rayon::join(first, second)))
+}

@@ -10,7 +10,7 @@ use crate::why::ontology_file;
 use crate::work::all_cores;
 use crate::{clock, history_dir, output, restore, stop};
 use actcheck_base::{Diagnostic, Diagnostics, Files, did_you_mean};
-use actcheck_campaign::{Ending, RecheckOptions, RuleSet, recheck as judge_anew};
+use actcheck_campaign::{Ending, RecheckOptions, RuleSet, recheck as judge_anew, side_by_side};
 use actcheck_history::{History, RunFilter, RunRow};
 use actcheck_report::{RecheckSummary, recheck_json, recheck_table, recheck_text};
 
@@ -47,17 +47,21 @@ pub struct RecheckArgs {
 /// Judges stored runs by the current rules, stores new and changed outcomes, and prints them. Returns the exit code.
 pub fn recheck(args: &RecheckArgs) -> Result<u8, Diagnostics> {
     let (files, path) = ontology(args)?;
-    let rules = RuleSet::prepare(&files, &path)?.only(&args.properties)?;
-    let history = history_dir::open(&args.history)?;
-    let runs = runs(&history, &args.campaigns)?;
+    let jobs = args.jobs.map_or_else(all_cores, usize::from);
+    let (rules, listed) = side_by_side(
+        jobs,
+        || RuleSet::prepare(&files, &path)?.only(&args.properties),
+        || {
+            let history = history_dir::open(&args.history)?;
+            let runs = runs(&history, &args.campaigns)?;
+            Ok((history, runs))
+        },
+    )?;
+    let (rules, (history, runs)) = both(rules, listed)?;
     let progress = Progress::new(runs.len() as u64, None);
     let bar = progress.bar();
     let stop = stop::on_interrupt(move || bar.println("stopping after the runs in flight; judgements so far are kept"));
-    let options = RecheckOptions {
-        jobs: args.jobs.map_or_else(all_cores, usize::from),
-        batch: RecheckOptions::BATCH,
-        at: (clock::system().now)(),
-    };
+    let options = RecheckOptions { jobs, batch: RecheckOptions::BATCH, at: (clock::system().now)() };
     if rules.reads_course() {
         restore::announce(&history, &runs, options.jobs)?;
     }
@@ -85,6 +89,18 @@ pub fn recheck(args: &RecheckArgs) -> Result<u8, Diagnostics> {
         Ending::Interrupted => Ok(stop::INTERRUPTED),
         Ending::Finished if !end.faults.is_empty() => Err(first_of(end.faults)),
         Ending::Finished | Ending::Budget(_) => Ok(summary.exit_code()),
+    }
+}
+
+/// Both results, or the faults of both.
+fn both<A, B>(first: Result<A, Diagnostics>, second: Result<B, Diagnostics>) -> Result<(A, B), Diagnostics> {
+    match (first, second) {
+        (Ok(first), Ok(second)) => Ok((first, second)),
+        (Err(mut faults), Err(others)) => {
+            faults.extend(others);
+            Err(faults)
+        }
+        (Err(faults), Ok(_)) | (Ok(_), Err(faults)) => Err(faults),
     }
 }
 

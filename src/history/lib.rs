@@ -65,7 +65,7 @@ pub use newest::NewestOutcomes;
 pub use outlines::Restore;
 pub use parts::HistoryPart;
 pub use rdf_text::{RdfSyntax, rdf_text};
-pub use recheck::{Recheck, StoredJudgement};
+pub use recheck::{NewestJudgements, Recheck, StoredJudgement};
 pub use record::{CampaignEnd, CampaignRecord, Repetition, RunRecord, RunStatus, SkillRecord};
 pub use rows::{ActionDetail, CampaignRow, ObjectDetail, OutcomeRow, RunDetail, RunFilter, RunRow};
 pub use scene_digest::SceneDigest;

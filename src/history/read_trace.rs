@@ -8,7 +8,7 @@ use oxigraph::store::Store;
 use crate::detail::Parts;
 use crate::statements::iri;
 use crate::write_run::run_node;
-use crate::{History, fault, trace_file, trace_parts};
+use crate::{History, RunRow, fault, trace_file, trace_parts};
 use actcheck_base::{Diagnostic, Diagnostics, Files, RunFacts};
 use actcheck_data::{Choice, Trace};
 use actcheck_facts::extract;
@@ -34,12 +34,27 @@ impl History {
     /// # Errors
     /// As [`History::trace`].
     pub fn sampled(&self, name: &str) -> Result<Trace, Diagnostics> {
-        let id = self.resolve(name)?;
-        if self.is_outline(&id)? {
-            let (choices, trace) = self.restored(&id)?;
-            return Ok(self.encoded_again(&id, &choices, &trace, trace_file::decode_sampled)?.1);
+        self.sampled_of(&self.resolve(name)?)
+    }
+
+    fn sampled_of(&self, id: &str) -> Result<Trace, Diagnostics> {
+        if self.is_outline(id)? {
+            let (choices, trace) = self.restored(id)?;
+            return Ok(self.encoded_again(id, &choices, &trace, trace_file::decode_sampled)?.1);
         }
-        Ok(self.decoded(&id, trace_file::decode_sampled)?.1)
+        Ok(self.decoded(id, trace_file::decode_sampled)?.1)
+    }
+
+    /// Returns the trace of a run of a list without the motion of its bodies, and with the samples of its actions if
+    /// `course`: as [`History::sampled`] or [`History::states`], but the store isn't asked whether there is such a run.
+    ///
+    /// # Errors
+    /// As [`History::trace`].
+    pub fn trace_of(&self, run: &RunRow, course: bool) -> Result<Trace, Diagnostics> {
+        if course {
+            return self.sampled_of(&run.run);
+        }
+        self.states_of(&run.run)
     }
 
     /// Returns the trace of a run, named as in [`History::resolve`], without the motion of its bodies: everything from
@@ -48,10 +63,13 @@ impl History {
     /// # Errors
     /// As [`History::trace`].
     pub fn states(&self, name: &str) -> Result<Trace, Diagnostics> {
-        let id = self.resolve(name)?;
-        match self.outlined_states(&id)? {
+        self.states_of(&self.resolve(name)?)
+    }
+
+    fn states_of(&self, id: &str) -> Result<Trace, Diagnostics> {
+        match self.outlined_states(id)? {
             Some((_, trace)) => Ok(trace),
-            None => Ok(self.decoded(&id, trace_file::decode_states)?.1),
+            None => Ok(self.decoded(id, trace_file::decode_states)?.1),
         }
     }
 

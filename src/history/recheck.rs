@@ -5,6 +5,7 @@
 //! one that no other supersedes.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::sync::{PoisonError, RwLock};
 
 use oxigraph::model::{GraphNameRef, NamedNode, NamedNodeRef, NamedOrBlankNode, Quad, QuadRef, Term};
 use oxigraph::store::{StorageError, Store};
@@ -46,6 +47,71 @@ pub struct Recheck {
     pub now: Judgement,
 }
 
+/// Reader of the newest judgements of many runs, each of which it reads before its new judgements are written.
+///
+/// It looks up once whether a property has been judged in any run, which takes longer than all else for a new property.
+pub struct NewestJudgements<'h> {
+    history: &'h History,
+    known: RwLock<BTreeMap<String, Judged>>,
+}
+
+/// Whether any run in the store has a judgement of a property.
+#[derive(Debug, Clone, Copy)]
+struct Judged {
+    /// By its campaign.
+    own: bool,
+    /// After it was made.
+    later: bool,
+}
+
+impl<'h> NewestJudgements<'h> {
+    /// A reader that knows nothing yet.
+    pub fn of(history: &'h History) -> Self {
+        Self { history, known: RwLock::default() }
+    }
+
+    /// Returns the newest judgements of properties (IRIs) in one action of a run, sorted by property. `step` counts from 1.
+    ///
+    /// # Errors
+    /// The store can't be read.
+    pub fn read(&self, run: &str, step: u32, properties: &[String]) -> Result<Vec<StoredJudgement>, Diagnostics> {
+        let execution = execution(run, step);
+        let store = self.history.store_with(|| Wanted::run(run_node(run).as_str()))?;
+        let fault = |error| self.history.fault("reading a run's outcomes", &error);
+        let (mut judged, mut later) = (Vec::new(), Vec::new());
+        for property in properties {
+            let is = self.is_judged(property, &store).map_err(fault)?;
+            judged.extend(is.own.then(|| property.clone()));
+            later.extend(is.later.then(|| property.clone()));
+        }
+        let in_campaign = GraphNameRef::DefaultGraph;
+        // Judgements of the campaign supersede nothing.
+        let superseded = &mut BTreeSet::new();
+        let own = match self.history.outlined_quads(run)? {
+            Some(outline) => stored(&outline, in_campaign, &execution, properties, superseded),
+            None if judged.is_empty() => Ok(Vec::new()),
+            None => match self.history.own_judgements(run, step, &judged, &store) {
+                Some(own) => Ok(own),
+                None => stored(&*store, in_campaign, &execution, &judged, superseded),
+            },
+        };
+        with_later(own.map_err(fault)?, &store, &execution, &later).map_err(fault)
+    }
+
+    fn is_judged(&self, property: &str, store: &Store) -> Result<Judged, StorageError> {
+        if let Some(known) = self.known.read().unwrap_or_else(PoisonError::into_inner).get(property) {
+            return Ok(*known);
+        }
+        let later = iri(GRAPH);
+        let has =
+            |graph| store.has_value(iri("earl:test").as_ref(), NamedNodeRef::new_unchecked(property).into(), graph);
+        let judged =
+            Judged { own: has(GraphNameRef::DefaultGraph)?, later: has(GraphNameRef::NamedNode(later.as_ref()))? };
+        self.known.write().unwrap_or_else(PoisonError::into_inner).insert(property.to_owned(), judged);
+        Ok(judged)
+    }
+}
+
 impl Recheck {
     /// Whether it differs from the newest judgement in the history.
     pub fn is_news(&self) -> bool {
@@ -67,24 +133,6 @@ impl History {
             .transpose()
             .map(|quad| quad.is_some())
             .map_err(|error| self.fault("reading later judgements", &error))
-    }
-
-    /// Returns the newest judgements of properties (IRIs) in one action of a run, sorted by property. `step` counts
-    /// from 1.
-    ///
-    /// # Errors
-    /// The store can't be read.
-    pub fn newest(&self, run: &str, step: u32, properties: &[String]) -> Result<Vec<StoredJudgement>, Diagnostics> {
-        let execution = execution(run, step);
-        let store = self.store_with(|| Wanted::run(run_node(run).as_str()))?;
-        let newest = match self.outlined_quads(run)? {
-            Some(outline) => newest(&outline, &store, &execution, properties),
-            None => match self.own_judgements(run, step, properties, &store) {
-                Some(own) => with_later(own, &store, &execution, properties),
-                None => newest(&*store, &store, &execution, properties),
-            },
-        };
-        newest.map_err(|error| self.fault("reading a run's outcomes", &error))
     }
 
     /// The campaign's own judgements of an action, from the copy in the run's trace file. Returns `None` if they must be
@@ -178,18 +226,6 @@ fn execution(run: &str, step: u32) -> NamedNode {
     below(&run_node(run), &step.to_string())
 }
 
-/// `own` has the campaign's own outcomes, `later` those made after the run.
-fn newest(
-    own: &impl QuadSource,
-    later: &Store,
-    execution: &NamedNode,
-    properties: &[String],
-) -> Result<Vec<StoredJudgement>, StorageError> {
-    // Those of the campaign supersede nothing.
-    let own = stored(own, GraphNameRef::DefaultGraph, execution, properties, &mut BTreeSet::new())?;
-    with_later(own, later, execution, properties)
-}
-
 /// Adds the judgements made after the run, and removes those that they supersede.
 fn with_later(
     mut found: Vec<StoredJudgement>,
@@ -197,6 +233,9 @@ fn with_later(
     execution: &NamedNode,
     properties: &[String],
 ) -> Result<Vec<StoredJudgement>, StorageError> {
+    if properties.is_empty() {
+        return Ok(found);
+    }
     let graph = iri(GRAPH);
     let mut superseded = BTreeSet::new();
     found.extend(stored(later, GraphNameRef::NamedNode(graph.as_ref()), execution, properties, &mut superseded)?);
@@ -214,10 +253,6 @@ fn stored(
     superseded: &mut BTreeSet<String>,
 ) -> Result<Vec<StoredJudgement>, StorageError> {
     let mut found = Vec::new();
-    // A new property was judged nowhere: no outcome of the action needs to be looked at.
-    if !is_judged(store, properties, graph)? {
-        return Ok(found);
-    }
     let test = iri("earl:test");
     for node in subjects_in(store, "earl:subject", execution.as_ref(), graph)? {
         // Those of the campaign supersede nothing. A look-up takes a tenth of the time of reading a node.
@@ -233,17 +268,6 @@ fn stored(
         }
     }
     Ok(found)
-}
-
-/// Returns whether any of the properties has an outcome in a graph.
-fn is_judged(store: &impl QuadSource, properties: &[String], graph: GraphNameRef<'_>) -> Result<bool, StorageError> {
-    let test = iri("earl:test");
-    for property in properties {
-        if store.has_value(test.as_ref(), NamedNodeRef::new_unchecked(property).into(), graph)? {
-            return Ok(true);
-        }
-    }
-    Ok(false)
 }
 
 /// The judgements of an action that were made after the run and that no other supersedes, unsorted.

@@ -113,7 +113,7 @@ impl Pack {
 
 /// Compresses bytes and encodes them in Base64, which is safe inside markup.
 pub(super) fn packed(bytes: &[u8]) -> String {
-    let level = if bytes.len() < LARGE { 7 } else { 2 };
+    let level = if bytes.len() < LARGE { 4 } else { 2 };
     let mut encoder = ZlibEncoder::new(Vec::with_capacity(bytes.len() / 3), Compression::new(level));
     // Writing to memory does not fail. If it did, the page would report that it can't read this part.
     let deflated = encoder.write_all(bytes).and_then(|()| encoder.finish()).unwrap_or_default();

@@ -1,6 +1,7 @@
 //! The rules of an ontology, prepared once and used by every worker for every run.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use crate::check::checking::unique;
 use crate::check::formulas::Bound;
@@ -15,7 +16,7 @@ use crate::model::universe::Universe;
 #[cfg(feature = "sparql")]
 use crate::sparql::{dataset::Statements, query::Query, snapshot::snapshot};
 use crate::temporal::{NO_INTERVALS, UNRECORDED, lacks_intervals};
-use actcheck_base::{ActionFacts, Diagnostics, Findings, RuleFault, Terms};
+use actcheck_base::{ActionFacts, Diagnostics, Findings, RuleFault, Term, Terms};
 
 /// Every property's rules with the libraries, parsed, checked and planned. Shared between threads.
 ///
@@ -60,6 +61,8 @@ pub struct RuleBook {
     pub(crate) fixed_rules: Planned,
     pub(crate) libraries: Planned,
     pub(crate) properties: BTreeMap<String, Judge>,
+    /// The ontology's statements with their closure; `None` without statements.
+    pub(crate) closed: Option<Arc<[[Term; 3]]>>,
     /// The ontology's statements, for queries.
     #[cfg(feature = "sparql")]
     pub(crate) statements: Statements,

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 #[cfg(feature = "sparql")]
 use std::collections::BTreeSet;
+use std::sync::Arc;
 
 use crate::book::judge::{Judge, JudgeRules, RuleBook};
 use crate::book::owl::owl_closure_within;
@@ -27,7 +28,7 @@ use crate::model::universe::Universe;
 use crate::sparql::{dataset::Statements, query::Query};
 use crate::syntax::{Syntax, parse};
 use crate::temporal::{IntervalTerms, add_margin, add_moment, define_moment, reads_course};
-use actcheck_base::{Diagnostic, Diagnostics, Digest, TermId, Terms};
+use actcheck_base::{Diagnostic, Diagnostics, Digest, Term, TermId, Terms};
 use actcheck_ontology::{Ontology, Property, RuleLanguage};
 
 impl RuleBook {
@@ -46,6 +47,15 @@ impl RuleBook {
     pub fn prepare_within(ontology: &Ontology, budget: &Budget) -> Result<Self, Diagnostics> {
         Preparing::within(budget).run(ontology)
     }
+
+    /// Prepares the rules of an ontology that differs from this book's only in having fewer properties. The closure of
+    /// its statements is not computed again.
+    ///
+    /// # Errors
+    /// As [`RuleBook::prepare`].
+    pub fn restricted(&self, ontology: &Ontology) -> Result<Self, Diagnostics> {
+        Preparing { closed: self.closed.clone(), ..Preparing::default() }.run(ontology)
+    }
 }
 
 /// The state of preparing a book.
@@ -58,6 +68,8 @@ pub(crate) struct Preparing {
     derived: BTreeSet<String>,
     /// Budget of each evaluation over the ontology alone.
     budget: Budget,
+    /// The ontology's statements with their closure, once they are known.
+    closed: Option<Arc<[[Term; 3]]>>,
 }
 
 impl Preparing {
@@ -204,6 +216,7 @@ impl Preparing {
             fixed_rules: fixed,
             libraries,
             properties,
+            closed: self.closed,
             #[cfg(feature = "sparql")]
             statements,
             warnings: self.diagnostics,
@@ -265,11 +278,18 @@ impl Preparing {
         if ontology.triples.is_empty() {
             return Vec::new();
         }
-        let closed = owl_closure_within(&ontology.triples, &self.budget).unwrap_or_else(|found| {
-            self.diagnostics.extend(found);
-            Vec::new()
-        });
-        closed.into_iter().map(|triple| triple.map(|term| self.terms.intern(term))).collect()
+        let closed = match self.closed.take() {
+            Some(closed) => closed,
+            None => owl_closure_within(&ontology.triples, &self.budget)
+                .unwrap_or_else(|found| {
+                    self.diagnostics.extend(found);
+                    Vec::new()
+                })
+                .into(),
+        };
+        let ids = closed.iter().map(|triple| triple.each_ref().map(|term| self.terms.intern(term.clone()))).collect();
+        self.closed = Some(closed);
+        ids
     }
 
     /// Prepares the SPARQL properties.

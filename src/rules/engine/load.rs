@@ -11,6 +11,9 @@ use crate::model::universe::Universe;
 use crate::temporal::{things_of, values_of};
 use actcheck_base::{ActionFacts, Course, Term, TermId, Triple};
 
+/// Room for the rows of one property: subject and value of ten things in three states.
+const USUAL_ROWS: usize = 3 * 3 * 10;
+
 /// The given predicates that the rules read.
 #[derive(Debug, Clone)]
 pub(crate) struct Given {
@@ -108,7 +111,11 @@ impl Given {
                 let reader = readers.of(*p, universe);
                 if let Some(predicate) = reader {
                     let (s, o) = (universe.of_run(*s), universe.of_run(*o));
-                    rows[predicate].extend([phase, s, o]);
+                    let rows = &mut rows[predicate];
+                    if rows.is_empty() {
+                        rows.reserve(USUAL_ROWS);
+                    }
+                    rows.extend([phase, s, o]);
                 }
                 if let Some(predicate) = self.any_state {
                     let (s, p, o) = (universe.of_run(*s), universe.of_run(*p), universe.of_run(*o));
