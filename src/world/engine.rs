@@ -88,7 +88,7 @@ pub fn engine(physics: &Physics) -> Result<PhysicsWorld, WorldError> {
 }
 
 /// The collision group of the floor.
-const FLOOR_GROUP: Group = Group::GROUP_32;
+pub const FLOOR_GROUP: Group = Group::GROUP_32;
 
 /// Returns the collision groups of a body that does not collide with the floor.
 pub fn off_floor() -> InteractionGroups {

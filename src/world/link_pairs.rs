@@ -1,11 +1,11 @@
 //! The pairs of the robot's links that collide with each other in the simulation.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
-use rapier3d::prelude::{PairFilterContext, PhysicsHooks, SolverFlags};
+use rapier3d::prelude::{Group, InteractionGroups, InteractionTestMode, PairFilterContext, PhysicsHooks, SolverFlags};
 
 use crate::World;
-use crate::engine::Owner;
+use crate::engine::{FLOOR_GROUP, Owner};
 use crate::robot_course::TOUCH_M;
 
 /// Pairs of links, each with the smaller index first. All other links pass through each other: neighbours, whose shapes
@@ -23,7 +23,28 @@ impl LinkPairs {
     pub(super) fn iter(&self) -> impl Iterator<Item = (usize, usize)> {
         self.pairs.iter().copied()
     }
+
+    /// Returns the number of the collision group of each link: links that collide with the same ones share it. The last
+    /// group has all links for which there are too few groups.
+    fn groups(&self, links: usize) -> Vec<u32> {
+        let mut partners = vec![BTreeSet::new(); links];
+        for (first, second) in self.iter() {
+            partners[first].insert(second);
+            partners[second].insert(first);
+        }
+        let mut numbers = BTreeMap::new();
+        let number = |partners| {
+            let next = u32::try_from(numbers.len()).unwrap_or(u32::MAX).min(LINK_GROUPS - 1);
+            *numbers.entry(partners).or_insert(next)
+        };
+        partners.into_iter().map(number).collect()
+    }
 }
+
+/// Number of collision groups for links.
+const LINK_GROUPS: u32 = 30;
+/// The collision group of everything but links and floor.
+const OTHERS: Group = Group::GROUP_31;
 
 impl PhysicsHooks for LinkPairs {
     fn filter_contact_pair(&self, context: &PairFilterContext<'_>) -> Option<SolverFlags> {
@@ -51,5 +72,42 @@ impl World {
         let passes = |pair: &(usize, usize)| neighbours.contains(pair) || self.robot.kinematics.pass(pair.0, pair.1);
         let apart = |pair: &(usize, usize)| !passes(pair) && self.depth_of(pair.0, pair.1) <= TOUCH_M;
         LinkPairs { pairs: pairs.filter(apart).collect(), pass: false }
+    }
+
+    /// Puts links that pass through each other into collision groups that do, as far as there are groups. The engine then
+    /// never looks at their pairs, of which a gripper with many pieces has thousands.
+    pub(super) fn group_links(&mut self) {
+        let numbers = self.link_pairs.groups(self.robot.bodies.len());
+        let group = |link: usize| Group::from_bits_retain(1 << numbers[link]);
+        let mut partners = vec![OTHERS; numbers.len()];
+        for (first, second) in self.link_pairs.iter() {
+            partners[first] |= group(second);
+            partners[second] |= group(first);
+        }
+        for (link, body) in self.robot.bodies.iter().enumerate() {
+            let Some(body) = self.engine.bodies.get(*body) else { continue };
+            for handle in body.colliders() {
+                let Some(collider) = self.engine.colliders.get_mut(*handle) else { continue };
+                let floor = collider.collision_groups().filter & FLOOR_GROUP;
+                let groups = InteractionGroups::new(group(link), partners[link] | floor, InteractionTestMode::And);
+                collider.set_collision_groups(groups);
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn links_with_the_same_partners_share_a_group_and_no_others_do() {
+        let pairs = |pairs: &[(usize, usize)]| LinkPairs { pairs: pairs.iter().copied().collect(), pass: false };
+        assert_eq!(pairs(&[(0, 2), (1, 2)]).groups(4), [0, 0, 1, 2]);
+        let all: Vec<(usize, usize)> =
+            (0..40).flat_map(|first| (first + 1..40).map(move |second| (first, second))).collect();
+        let groups = pairs(&all).groups(40);
+        assert_eq!(groups[..30], (0..30).collect::<Vec<u32>>());
+        assert!(groups[30..].iter().all(|group| *group == 29), "{groups:?}");
     }
 }

@@ -2,11 +2,12 @@
 
 use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
 use parry3d::query::distance;
-use rapier3d::math::Pose as EnginePose;
+use parry3d::query::gjk::{self, CsoPoint, GJKResult, VoronoiSimplex};
+use rapier3d::math::{Pose as EnginePose, Vector as EngineVector};
 use rapier3d::prelude::SharedShape;
 
 use crate::Kinematics;
-use crate::convert::to_pose;
+use crate::convert::{to_pose, to_real, to_vector};
 use crate::engine::{Owner, collider};
 use crate::room::Ball;
 use actcheck_data::Part;
@@ -97,7 +98,7 @@ impl SelfContact {
 
     /// The first two links that collide, or nearly so, at these link poses.
     pub fn touching(&self, poses: &[Isometry3<f64>]) -> Option<(usize, usize)> {
-        self.pairs.iter().find(|pair| gap(&self.links, **pair, poses) < pair.clear_m).map(|pair| pair.links)
+        self.pairs.iter().find(|pair| is_closer(&self.links, **pair, poses)).map(|pair| pair.links)
     }
 }
 
@@ -116,19 +117,61 @@ impl TwoLinks {
 }
 
 /// Returns the distance of two links at these link poses, or their clearance if they are farther apart. Unit: metres.
-fn gap(links: &[Form], Pair { links: (first, second), clear_m }: Pair, poses: &[Isometry3<f64>]) -> f64 {
+fn gap(links: &[Form], pair: Pair, poses: &[Isometry3<f64>]) -> f64 {
+    nearest(links, pair, poses, |[a, b], b_in_a, _| {
+        let found = distance(&EnginePose::IDENTITY, a.shape.as_ref(), b_in_a, b.shape.as_ref());
+        // Convex solids are always supported; an unsupported pair would count as a collision.
+        found.map_or(0.0, |found| f64::from(found.distance))
+    })
+}
+
+/// Whether two links are closer than their clearance at these link poses. This takes a quarter of the time of [`gap`]: a
+/// direction in which the solids are far enough apart suffices.
+fn is_closer(links: &[Form], pair: Pair, poses: &[Isometry3<f64>]) -> bool {
+    let clear_m = pair.clear_m;
+    let found = nearest(
+        links,
+        pair,
+        poses,
+        |solids, b_in_a, towards_b| {
+            if are_closer(solids, b_in_a, towards_b, clear_m) { 0.0 } else { clear_m }
+        },
+    );
+    found < clear_m
+}
+
+/// Whether two solids are closer than this. Unit: metres. `towards_b`: a direction in the frame of the first.
+fn are_closer([a, b]: [&Solid; 2], b_in_a: &EnginePose, towards_b: EngineVector, clear_m: f64) -> bool {
+    let (Some(shape_a), Some(shape_b)) = (a.shape.as_support_map(), b.shape.as_support_map()) else {
+        let found = distance(&EnginePose::IDENTITY, a.shape.as_ref(), b_in_a, b.shape.as_ref());
+        return !found.is_ok_and(|found| f64::from(found.distance) >= clear_m);
+    };
+    let direction = towards_b.try_normalize().unwrap_or(EngineVector::X);
+    let mut simplex = VoronoiSimplex::new();
+    simplex.reset(CsoPoint::from_shapes(b_in_a, shape_a, shape_b, direction));
+    let found = gjk::closest_points(b_in_a, shape_a, shape_b, to_real(clear_m), false, &mut simplex);
+    !matches!(found, GJKResult::NoIntersection(_))
+}
+
+/// Returns the least of the distances of all pairs of solids by `measure`, or the clearance of the links if all are farther
+/// apart. Unit: metres. `measure` gets the pose of the second solid and the direction of its middle in the frame of the first.
+fn nearest(
+    links: &[Form],
+    Pair { links: (first, second), clear_m }: Pair,
+    poses: &[Isometry3<f64>],
+    measure: impl Fn([&Solid; 2], &EnginePose, EngineVector) -> f64,
+) -> f64 {
     let (a, b) = (&links[first], &links[second]);
     let apart = poses[first] * a.middle - poses[second] * b.middle;
     if apart.norm() > a.radius + b.radius + clear_m {
         return clear_m;
     }
-    let (at_a, at_b) = (to_pose(&poses[first]), to_pose(&poses[second]));
     let mut nearest = clear_m;
     let b_in_a = poses[first].inverse() * poses[second];
     let turned: Matrix3<f64> = b_in_a.rotation.to_rotation_matrix().into_inner();
+    let placed = to_pose(&b_in_a);
     let middles: Vec<Point3<f64>> = b.solids.iter().map(|solid| b_in_a * solid.ball.middle).collect();
     for solid_a in &a.solids {
-        let on_a = at_a * solid_a.pose;
         for (solid_b, middle_b) in b.solids.iter().zip(&middles) {
             let way = middle_b - solid_a.ball.middle;
             let apart = way.norm() - solid_a.ball.radius - solid_b.ball.radius;
@@ -136,9 +179,12 @@ fn gap(links: &[Form], Pair { links: (first, second), clear_m }: Pair, poses: &[
             if apart > far || boxes_apart(way, &turned, [&solid_a.half, &solid_b.half]) > far {
                 continue;
             }
-            // Convex solids are always supported; an unsupported pair would count as a collision.
-            let found = distance(&on_a, solid_a.shape.as_ref(), &(at_b * solid_b.pose), solid_b.shape.as_ref());
-            nearest = nearest.min(found.map_or(0.0, |found| f64::from(found.distance)));
+            let b_in_a = solid_a.pose.inv_mul(&(placed * solid_b.pose));
+            let towards_b = solid_a.pose.rotation.inverse() * to_vector(&way);
+            nearest = nearest.min(measure([solid_a, solid_b], &b_in_a, towards_b));
+            if nearest <= 0.0 {
+                return nearest;
+            }
         }
     }
     nearest

@@ -133,6 +133,7 @@ pub fn build(scene: &Scene) -> Result<World, WorldError> {
         watch: None,
     };
     world.link_pairs = world.find_link_pairs();
+    world.group_links();
     Ok(world)
 }
 
