@@ -5,50 +5,89 @@ use nalgebra::{Isometry3, Point3};
 /// Margin for rounding when a link is skipped by its bounding sphere. Unit: metres.
 const ROUNDING_M: f64 = 1e-9;
 
-/// Points on one link, in the link's frame, with a bounding sphere.
+/// Largest number of points in a cluster: about as many as cost as much as its sphere saves.
+const CLUSTER: usize = 6;
+
+/// Points on one link, in the link's frame.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LinkPoints {
     /// The link's index.
     pub link: usize,
-    centre: Point3<f64>,
-    /// Unit: metres.
-    radius: f64,
     /// Unit: metres.
     pub points: Vec<Point3<f64>>,
+    around: Sphere,
+    /// The same points in clusters of neighbours.
+    clusters: Vec<(Sphere, Vec<Point3<f64>>)>,
+}
+
+/// A bounding sphere. Unit: metres.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Sphere {
+    centre: Point3<f64>,
+    radius: f64,
+}
+
+impl Sphere {
+    /// The sphere around points with its centre at their mean.
+    fn around(points: &[Point3<f64>]) -> Self {
+        let sum = points.iter().fold(Point3::origin(), |sum, point| sum + point.coords);
+        let centre = sum / points.len().max(1) as f64;
+        Self { centre, radius: points.iter().map(|point| (point - centre).norm()).fold(0.0, f64::max) }
+    }
+
+    /// Whether all points in it are farther than `least` from an obstacle. Unit: metres.
+    fn is_beyond(&self, pose: &Isometry3<f64>, least: f64, distance: impl Fn(&Point3<f64>) -> f64) -> bool {
+        distance(&(pose * self.centre)) - self.radius - ROUNDING_M > least
+    }
+}
+
+/// Splits points along the longest side of their box until each cluster is small.
+fn clusters(mut points: Vec<Point3<f64>>, found: &mut Vec<(Sphere, Vec<Point3<f64>>)>) {
+    if points.len() <= CLUSTER {
+        found.push((Sphere::around(&points), points));
+        return;
+    }
+    let side = |axis: &usize| {
+        let along = || points.iter().map(|point| point[*axis]);
+        along().fold(f64::NEG_INFINITY, f64::max) - along().fold(f64::INFINITY, f64::min)
+    };
+    let longest = (0..3).max_by(|a, b| side(a).total_cmp(&side(b))).unwrap_or(0);
+    points.sort_by(|a, b| a[longest].total_cmp(&b[longest]));
+    let upper = points.split_off(points.len() / 2);
+    clusters(points, found);
+    clusters(upper, found);
 }
 
 impl LinkPoints {
     /// Groups points (link, position on it) by link.
     pub fn grouped(points: &[(usize, Point3<f64>)]) -> Vec<Self> {
-        let mut grouped: Vec<Self> = Vec::new();
+        let mut grouped: Vec<(usize, Vec<Point3<f64>>)> = Vec::new();
         for (link, point) in points {
-            match grouped.iter_mut().find(|group| group.link == *link) {
-                Some(group) => group.points.push(*point),
-                None => {
-                    grouped.push(Self { link: *link, centre: Point3::origin(), radius: 0.0, points: vec![*point] });
-                }
+            match grouped.iter_mut().find(|(known, _)| known == link) {
+                Some((_, group)) => group.push(*point),
+                None => grouped.push((*link, vec![*point])),
             }
         }
-        grouped.iter_mut().for_each(Self::bound);
-        grouped
-    }
-
-    /// Computes the bounding sphere around the mean of the points.
-    fn bound(&mut self) {
-        let sum = self.points.iter().fold(Point3::origin(), |sum, point| sum + point.coords);
-        self.centre = sum / self.points.len() as f64;
-        self.radius = self.points.iter().map(|point| (point - self.centre).norm()).fold(0.0, f64::max);
+        let of_link = |(link, points): (usize, Vec<Point3<f64>>)| {
+            let mut found = Vec::new();
+            clusters(points.clone(), &mut found);
+            Self { link, around: Sphere::around(&points), clusters: found, points }
+        };
+        grouped.into_iter().map(of_link).collect()
     }
 
     /// The smaller of `least` and the smallest distance of a point to the obstacle. Unit: metres.
     ///
     /// `distance` is the signed distance to the obstacle, which must not change by more than the point moves: the
-    /// points are skipped if the bounding sphere is farther than `least`.
+    /// points in a bounding sphere that is farther than `least` are skipped.
     pub fn nearest(&self, pose: &Isometry3<f64>, least: f64, distance: impl Fn(&Point3<f64>) -> f64) -> f64 {
-        if distance(&(pose * self.centre)) - self.radius - ROUNDING_M > least {
+        if self.around.is_beyond(pose, least, &distance) {
             return least;
         }
-        self.points.iter().fold(least, |least, point| least.min(distance(&(pose * point))))
+        self.clusters.iter().fold(least, |least, (around, points)| match around.is_beyond(pose, least, &distance) {
+            true => least,
+            false => points.iter().fold(least, |least, point| least.min(distance(&(pose * point)))),
+        })
     }
 }
 

@@ -133,11 +133,13 @@ impl<'a> ArmSpace<'a> {
     /// The clearances of a posture, and whether it is free of self-collisions.
     pub fn room(&self, positions: &[f64]) -> (Room, bool) {
         let links = self.kinematics.links(positions);
-        (self.room_of(&links), !self.itself.touches(&links))
+        let endless = Room { furniture_m: f64::INFINITY, things_m: f64::INFINITY };
+        (self.room_of(&links, endless), !self.itself.touches(&links))
     }
 
-    fn room_of(&self, links: &[Isometry3<f64>]) -> Room {
-        let mut room = Room { furniture_m: f64::INFINITY, things_m: f64::INFINITY };
+    /// The clearances at these link poses, but at most these.
+    fn room_of(&self, links: &[Isometry3<f64>], most: Room) -> Room {
+        let mut room = most;
         for points in &self.points {
             let pose = &links[points.link];
             let farther_m = if self.is_hand[points.link] { 0.0 } else { self.arm_farther_m };
@@ -154,8 +156,9 @@ impl<'a> ArmSpace<'a> {
 
     /// Whether a posture is free of collisions and keeps these clearances.
     pub fn is_free(&self, positions: &[f64], least: Room) -> bool {
-        let (room, clear_of_itself) = self.room(positions);
-        clear_of_itself && room.holds(least)
+        let links = self.kinematics.links(positions);
+        // Points farther away need no look.
+        self.room_of(&links, least).holds(least) && !self.itself.touches(&links)
     }
 
     /// Whether the straight path between two postures is free, not counting its first end.
