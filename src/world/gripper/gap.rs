@@ -5,12 +5,14 @@ use std::sync::Arc;
 use nalgebra::{Isometry3, Point3, Vector3};
 use parry3d::bounding_volume::{Aabb, BoundingVolume as _};
 use parry3d::query::{Ray, RayCast as _};
+use parry3d::shape::ConvexPolyhedron;
 
 use crate::convert::{to_real, to_vector};
 use crate::description::RobotModel;
 use crate::engine::{Owner, collider};
 use crate::kinematics::motion;
 use actcheck_data::Part;
+use rapier3d::math::{Real, Vector as EngineVector};
 use rapier3d::prelude::Collider;
 
 /// Distances from the grasp frame along the fingers at which their surfaces are measured. Unit: metres.
@@ -58,16 +60,69 @@ pub(crate) struct Moving {
     pub(crate) fingers: [Vec<usize>; 2],
 }
 
-/// The shapes of a link in its frame, each with the box around it.
+/// The shapes of a link in its frame.
 #[derive(Debug)]
 pub(crate) struct Surface {
-    solids: Vec<(Aabb, Collider)>,
+    solids: Vec<Solid>,
+}
+
+/// A shape with the box around it.
+#[derive(Debug)]
+struct Solid {
+    around: Aabb,
+    collider: Collider,
+    /// The faces of a shape that is a convex hull.
+    faces: Option<Vec<Face>>,
+}
+
+/// The half space behind a face of a hull, in the frame of the hull.
+#[derive(Debug, Clone, Copy)]
+struct Face {
+    outwards: EngineVector,
+    /// Unit: metres.
+    offset: Real,
 }
 
 impl Surface {
     pub(crate) fn of(solids: &[Part]) -> Self {
         let built = solids.iter().filter_map(|solid| collider(solid, Owner::Floor, 0.0, 0.0)).map(|made| made.build());
-        Self { solids: built.map(|solid| (solid.compute_aabb().loosened(BOX_SLACK_M), solid)).collect() }
+        Self { solids: built.map(Solid::new).collect() }
+    }
+}
+
+impl Solid {
+    fn new(collider: Collider) -> Self {
+        let face = |hull: &ConvexPolyhedron, outwards: EngineVector| {
+            let along = hull.points().iter().map(|point| outwards.dot(*point));
+            Face { outwards, offset: along.fold(Real::NEG_INFINITY, Real::max) }
+        };
+        let hull = collider.shape().as_convex_polyhedron();
+        let faces = hull.map(|hull| hull.faces().iter().map(|one| face(hull, one.normal)).collect());
+        Self { around: collider.compute_aabb().loosened(BOX_SLACK_M), faces, collider }
+    }
+
+    /// Distance along a ray in the frame of the link to this solid: 0 inside. The ray is cut off at each face of a hull,
+    /// which takes a tenth of the time of the library's search.
+    fn hit(&self, ray: &Ray, most: Real) -> Option<Real> {
+        if !self.around.intersects_local_ray(ray, most) {
+            return None;
+        }
+        let Some(faces) = &self.faces else {
+            return self.collider.shape().cast_ray(self.collider.position(), ray, most, true);
+        };
+        let ray = ray.inverse_transform_by(self.collider.position());
+        let (mut enters, mut leaves) = (0.0, most);
+        for face in faces {
+            let (behind, along) = (face.offset - face.outwards.dot(ray.origin), face.outwards.dot(ray.dir));
+            if along < 0.0 {
+                enters = Real::max(enters, behind / along);
+            } else if along > 0.0 {
+                leaves = Real::min(leaves, behind / along);
+            } else if behind < 0.0 {
+                return None;
+            }
+        }
+        (enters <= leaves).then_some(enters)
     }
 }
 
@@ -139,8 +194,7 @@ impl<'a> Probe<'a> {
     /// Distance to a finger's surface along a ray in the frame of its link.
     fn hit(&self, side: usize, ray: &Ray) -> Option<f64> {
         let most = to_real(2.0 * AWAY_M);
-        let near = self.surfaces[side].solids.iter().filter(|(around, _)| around.intersects_local_ray(ray, most));
-        let hits = near.filter_map(|(_, solid)| solid.shape().cast_ray(solid.position(), ray, most, true));
+        let hits = self.surfaces[side].solids.iter().filter_map(|solid| solid.hit(ray, most));
         hits.map(f64::from).min_by(f64::total_cmp)
     }
 
@@ -154,5 +208,35 @@ impl<'a> Probe<'a> {
             at = joint.parent;
         }
         pose
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use actcheck_data::{Pose, Shape};
+
+    #[test]
+    fn rays_meet_hulls_where_the_library_finds_them() {
+        let at = |n: u32| libm::sin(f64::from(n * n) * 12.9898) * 0.03;
+        let points: Vec<[f64; 3]> = (0..60).map(|n| [at(n), at(n + 1000), 2.0 * at(n + 2000)]).collect();
+        let part = Part { pose: Pose::default(), shape: Shape::Hull { points, volume: 1e-5 } };
+        let surface = Surface::of(&[part]);
+        let solid = &surface.solids[0];
+        assert!(solid.faces.is_some());
+        let mut hits = 0;
+        for trial in 0..500 {
+            let origin = Vector3::new(0.2, at(trial), at(trial + 500));
+            let direction = Vector3::new(-1.0, at(trial + 700), at(trial + 900)).normalize();
+            let ray = Ray::new(to_vector(&origin), to_vector(&direction));
+            let expected = solid.collider.shape().cast_ray(solid.collider.position(), &ray, 1.0, true);
+            match (solid.hit(&ray, 1.0), expected) {
+                (Some(found), Some(expected)) => assert!((found - expected).abs() < 1e-4, "{found} {expected}"),
+                // At a tangent either may miss.
+                (found, expected) => assert_eq!(found, expected, "trial {trial}"),
+            }
+            hits += usize::from(expected.is_some());
+        }
+        assert!((100..450).contains(&hits), "{hits}");
     }
 }
