@@ -255,8 +255,8 @@ mod tests {
             }
             let found = surface.solids[0].hit(&Ray::new(to_vector(&origin), to_vector(&direction)), 1.0);
             match found {
-                Some(found) => assert!((f64::from(found) - enters).abs() < 1e-4, "trial {trial}: {found} {enters}"),
-                None => assert!(leaves < enters + 1e-4, "trial {trial}: {enters} {leaves}"),
+                Some(found) => assert!((f64::from(found) - enters).abs() < 5e-4, "trial {trial}: {found} {enters}"),
+                None => assert!(leaves < enters + 5e-4, "trial {trial}: {enters} {leaves}"),
             }
             hits += usize::from(found.is_some());
         }
