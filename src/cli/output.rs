@@ -1,5 +1,6 @@
 //! Results to the output stream, diagnostics to the error stream.
 
+use std::collections::{BTreeMap, HashMap};
 use std::io::{IsTerminal, Write};
 
 use miette::{GraphicalReportHandler, GraphicalTheme, ThemeCharacters, ThemeStyles};
@@ -70,14 +71,15 @@ pub fn print_diagnostics(faults: &Diagnostics) {
     let mut text = String::new();
     let page = terminal::of_errors();
     let handler = handler(page);
-    for fault in faults.iter().take(MOST_PRINTED) {
+    let told = once(faults);
+    for fault in told.iter().take(MOST_PRINTED) {
         let fault = broken_into_lines(with_file_in_message(fault), page);
         if handler.render_report(&mut text, &fault).is_err() {
             text.push_str(&fault.to_string());
         }
         text.push('\n');
     }
-    if let Some(more @ 1..) = faults.len().checked_sub(MOST_PRINTED) {
+    if let Some(more @ 1..) = told.len().checked_sub(MOST_PRINTED) {
         text.push_str(&format!("{more} more are not printed\n"));
     }
     let errors = faults.iter().filter(|fault| fault.severity == Severity::Error).count();
@@ -89,6 +91,39 @@ pub fn print_diagnostics(faults: &Diagnostics) {
         text.push_str(&page.set(&format!("`actcheck explain {}` prints usual causes and the way out\n", first.code)));
     }
     print_error_text(&text);
+}
+
+/// Number of places that are named for a warning with many.
+const PLACES_NAMED: usize = 3;
+
+/// The diagnostics with each warning once, since all files of a collection often have the same one. Its help names other
+/// places.
+fn once(faults: &Diagnostics) -> Vec<Diagnostic> {
+    let mut told: Vec<Diagnostic> = Vec::new();
+    let mut first: HashMap<(&str, &str, Option<&str>), usize> = HashMap::new();
+    let mut others: BTreeMap<usize, (usize, Vec<String>)> = BTreeMap::new();
+    for fault in faults.iter() {
+        let same = (fault.code, fault.message.as_str(), fault.help.as_deref());
+        match first.get(&same) {
+            Some(first) if fault.severity == Severity::Warning && fault.source.is_some() => {
+                let (count, named) = others.entry(*first).or_default();
+                *count += 1;
+                // Finding a place takes time in proportion to its file.
+                named.extend(if named.len() < PLACES_NAMED { fault.place() } else { None });
+            }
+            _ => {
+                first.entry(same).or_insert(told.len());
+                told.push(fault.clone());
+            }
+        }
+    }
+    for (idx, (count, named)) in others {
+        let help = told[idx].help.take().map_or_else(String::new, |help| help + "\n");
+        let places = if count == 1 { "place" } else { "places" };
+        let more = if count > named.len() { ", …" } else { "" };
+        told[idx].help = Some(format!("{help}the same in {count} more {places}: {}{more}", named.join(", ")));
+    }
+    told
 }
 
 /// Breaks message and help between words, but not within code.

@@ -334,7 +334,8 @@ fn check_fit(campaign: &Campaign, designator: &str, surfaces: &[(String, Surface
         for (platform, surface) in surfaces.iter().filter(|(_, surface)| !placement::fits(surface, model)) {
             let message = format!("the model `{}` does not fit on `{platform}`", model.name);
             let [x, y] = surface.size_m;
-            let help = format!("it is {} × {} m, and the surface is {x} × {y} m", model.size_m[0], model.size_m[1]);
+            let [length, width, _] = model.size_m;
+            let help = format!("it is {length:.2} × {width:.2} m, and the surface is {x:.2} × {y:.2} m");
             found.push(campaign.fault("S007", &key, message).help(help));
         }
     }
