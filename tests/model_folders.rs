@@ -85,3 +85,25 @@ fn unusable_models_that_are_not_named_are_one_warning_with_a_reason_each() {
         assert_eq!(said.lines().filter(|line| line.contains(&format!(" {name}: "))).count(), 1, "{said}");
     }
 }
+
+/// Regression: a collection of 93 models printed the same warning 81 times.
+#[test]
+fn a_warning_of_many_files_is_printed_once() {
+    let project = project("\"mine\"", "coffee_table", "cube_1\", \"cube_2\", \"cube_3\", \"cube_4\", \"cube_5");
+    for number in 1..=5 {
+        let folder = project.path().join(format!("mine/cube_{number}"));
+        std::fs::create_dir_all(&folder).unwrap();
+        let sdf = format!(
+            "<sdf version=\"1.6\"><model name=\"cube_{number}\"><link name=\"l\"><collision name=\"c\">\
+             <geometry><box><size>0.05 0.05 0.05</size></box></geometry><surface><contact/></surface></collision>\
+             </link></model></sdf>"
+        );
+        std::fs::write(folder.join("model.sdf"), sdf).unwrap();
+    }
+    let said = stderr(&actcheck(project.path(), &["check", "c.toml"]));
+    let words = said.replace('│', " ").split_whitespace().collect::<Vec<_>>().join(" ");
+    assert_eq!(words.matches("`<contact>` in `<surface>` is ignored").count(), 1, "{said}");
+    let others = "the same in 4 more places: mine/cube_2/model.sdf:1:";
+    assert!(words.contains(others) && words.contains("mine/cube_4/") && words.contains(", …"), "{said}");
+    assert!(!words.contains("mine/cube_5/"), "{said}");
+}
