@@ -86,7 +86,12 @@ fn a_linkage_with_limits_against_its_coupling_does_not_block_the_fingers() {
         <mimic joint=\"finger_left_joint\" multiplier=\"-1\"/></joint><link name=\"linkage\"><inertial>\
         <mass value=\"0.05\"/><inertia ixx=\"1e-5\" ixy=\"0\" ixz=\"0\" iyy=\"1e-5\" iyz=\"0\" izz=\"1e-5\"/></inertial></link></robot>";
     let (said, passed) = check_and_run(folder.path(), &fixed_arm().replace("</robot>", linkage), "");
+    let warning = "`linkage_joint` has the limits 0 to 0.07, but `finger_left_joint` moves it from -0.0";
+    assert!(said.contains("W036") && said.contains(warning), "{said}");
     assert!(passed >= 3, "{passed} of 4 picks passed: {said}");
+    let mirrored = linkage.replace("lower=\"0\" upper=\"0.07\"", "lower=\"-0.07\" upper=\"0\"");
+    let (said, _) = check_and_run(folder.path(), &fixed_arm().replace("</robot>", &mirrored), "");
+    assert!(!said.contains("has the limits"), "{said}");
 }
 
 /// The Panda of another public package has fingers without shapes, and a hand whose shapes for planning contain them.

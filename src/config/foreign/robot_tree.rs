@@ -181,8 +181,40 @@ fn check_mimics(root: Node, tree: &Tree, reader: &mut Reader) {
             let known = tree.joints.iter().filter(|(_, joint)| joint.motion != Motion::Fixed);
             let help = did_you_mean(leader, known.map(|(name, _)| name.as_str()));
             reader.error("W051", mimic, format!("there is no movable joint `{leader}` to mimic"), help);
+            continue;
+        }
+        let own = joint.attribute("name").and_then(|name| Some((name, tree.joints.get(name)?)));
+        if let (Some((name, own)), Some(leader_joint)) = (own, tree.joints.get(leader)) {
+            check_coupling(mimic, (name, own), (leader, leader_joint), reader);
         }
     }
+}
+
+/// Share of its range by which a joint may leave its limits without a warning: they are often rounded.
+const BEYOND_SHARE: f64 = 0.05;
+
+/// Warns about limits of a joint that its leader makes it leave: as stated, they would block both.
+fn check_coupling(
+    mimic: Node,
+    (name, own): (&str, &TreeJoint),
+    (leader, leads): (&str, &TreeJoint),
+    reader: &mut Reader,
+) {
+    let number =
+        |key: &str, otherwise: f64| mimic.attribute(key).map_or(Some(otherwise), |written| written.trim().parse().ok());
+    let (Some(factor), Some(offset)) = (number("multiplier", 1.0), number("offset", 0.0)) else { return };
+    let ends = [leads.lower, leads.upper].map(|end| factor * end + offset);
+    let (low, high): (f64, f64) = (ends[0].min(ends[1]), ends[0].max(ends[1]));
+    let slack = BEYOND_SHARE * (high - low);
+    if !slack.is_finite() || (low >= own.lower - slack && high <= own.upper + slack) {
+        return;
+    }
+    let message = format!(
+        "`{name}` has the limits {} to {}, but `{leader}` moves it from {low:.3} to {high:.3}",
+        own.lower, own.upper
+    );
+    let help = "its limits are taken as those of its coupling: check `<limit>` and the multiplier";
+    reader.warning("W036", mimic, message, help);
 }
 
 /// Checks that there are one root and no cycles.
