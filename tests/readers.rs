@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
-use actcheck::history::{CampaignEnd, History, RunFilter};
+use actcheck::history::{CampaignEnd, History, NewestJudgements, RunFilter};
 
 use crate::history::{sample_campaign, sample_run};
 use crate::support::foreign::left_out;
@@ -190,4 +190,25 @@ fn a_run_starts_and_ends_beside_readers_in_a_loop() {
     assert!(status.code().is_some_and(|code| code < 2), "{status}");
     assert!(seen.is_sorted() && seen.first() == Some(&4), "{seen:?}");
     assert_eq!(runs(&History::open_to_read(&dir).unwrap()), 7);
+}
+
+/// A reader loads the statements of a run from the journal when they are asked for: what the first run lacks, others may have.
+#[test]
+fn a_property_that_only_some_waiting_runs_have_is_found_in_these() {
+    let folder = tempfile::tempdir().unwrap();
+    let writer = History::open(folder.path()).unwrap();
+    writer.begin_campaign(&sample_campaign("k", 2)).unwrap();
+    let property = sample_run("k", 0).judgements[0][0].property.clone();
+    for index in 0..2 {
+        let mut run = sample_run("k", index);
+        if index == 0 {
+            run.judgements[0].retain(|judgement| judgement.property != property);
+        }
+        writer.commit(&run).unwrap();
+    }
+    let reader = History::open_to_read(folder.path()).unwrap();
+    let newest = NewestJudgements::of(&reader);
+    let found = |id: &str| newest.read(id, 1, std::slice::from_ref(&property)).unwrap();
+    assert_eq!(found(&sample_run("k", 0).id), []);
+    assert_eq!(found(&sample_run("k", 1).id)[0].judgement, sample_run("k", 1).judgements[0][0]);
 }

@@ -17,7 +17,7 @@ use crate::read::{Node, id_of, subjects_in};
 use crate::statements::{Statements, iri, time};
 use crate::wanted::Wanted;
 use crate::write_run::{assertion_of, run_node, unique, write_assertion};
-use crate::{History, RunDetail};
+use crate::{History, RunDetail, lists};
 use actcheck_base::{Diagnostics, Judgement};
 use actcheck_verdict::{action_score, run_score};
 
@@ -80,7 +80,7 @@ impl<'h> NewestJudgements<'h> {
         let fault = |error| self.history.fault("reading a run's outcomes", &error);
         let (mut judged, mut later) = (Vec::new(), Vec::new());
         for property in properties {
-            let is = self.is_judged(property, &store).map_err(fault)?;
+            let is = self.is_judged(property)?;
             judged.extend(is.own.then(|| property.clone()));
             later.extend(is.later.then(|| property.clone()));
         }
@@ -98,15 +98,18 @@ impl<'h> NewestJudgements<'h> {
         with_later(own.map_err(fault)?, &store, &execution, &later).map_err(fault)
     }
 
-    fn is_judged(&self, property: &str, store: &Store) -> Result<Judged, StorageError> {
+    fn is_judged(&self, property: &str) -> Result<Judged, Diagnostics> {
         if let Some(known) = self.known.read().unwrap_or_else(PoisonError::into_inner).get(property) {
             return Ok(*known);
         }
-        let later = iri(GRAPH);
-        let has =
-            |graph| store.has_value(iri("earl:test").as_ref(), NamedNodeRef::new_unchecked(property).into(), graph);
-        let judged =
-            Judged { own: has(GraphNameRef::DefaultGraph)?, later: has(GraphNameRef::NamedNode(later.as_ref()))? };
+        // The store of a reader may lack the judgements of other runs until they are asked for.
+        self.history.store_with(lists::of_outcomes)?;
+        let store = self.history.store_with(lists::of_rechecked)?;
+        let (test, later) = (iri("earl:test"), iri(GRAPH));
+        let has = |graph| store.has_value(test.as_ref(), NamedNodeRef::new_unchecked(property).into(), graph);
+        let judged = has(GraphNameRef::DefaultGraph)
+            .and_then(|own| Ok(Judged { own, later: has(GraphNameRef::NamedNode(later.as_ref()))? }))
+            .map_err(|error| self.history.fault("reading outcomes", &error))?;
         self.known.write().unwrap_or_else(PoisonError::into_inner).insert(property.to_owned(), judged);
         Ok(judged)
     }

@@ -125,8 +125,8 @@ fn gap(links: &[Form], pair: Pair, poses: &[Isometry3<f64>]) -> f64 {
     })
 }
 
-/// Whether two links are closer than their clearance at these link poses. This takes a quarter of the time of [`gap`]: a
-/// direction in which the solids are far enough apart suffices.
+/// Whether two links are closer than their clearance at these link poses. This takes less than half of the time of [`gap`]:
+/// a direction in which the solids are far enough apart suffices.
 fn is_closer(links: &[Form], pair: Pair, poses: &[Isometry3<f64>]) -> bool {
     let clear_m = pair.clear_m;
     let found = nearest(
