@@ -314,3 +314,16 @@ fn a_sealed_can_is_carried_to_another_table_and_let_go() {
     let json: Value = serde_json::from_str(&stdout(&output)).unwrap_or_else(|_| panic!("{}", stderr(&output)));
     assert_eq!(json["runs_passed"]["count"], 3, "{json}{}", stderr(&output));
 }
+
+/// Half of the cup may lie beside the edge of a carton that is only a centimetre wider on each side.
+#[test]
+fn a_cup_that_does_not_seal_is_tried_beside() {
+    let project = shipped_project();
+    let run = ["run", "configs/suction_arm.toml", "--runs", "20", "--history", "h"];
+    let output = actcheck(project.path(), &run);
+    assert!(output.status.code() < Some(2), "{}", stderr(&output));
+    let query = "SELECT (COUNT(*) AS ?held) { ?a earl:test act:ObjectInGripper ; earl:result/act:outcome \"passed\" }";
+    let answer = stdout(&actcheck(project.path(), &["query", query, "--history", "h", "--format", "csv"]));
+    let held: u32 = answer.lines().nth(1).unwrap().parse().unwrap();
+    assert!(held >= 17, "{held} of 20 are held (15 with a single trial)\n{}", stderr(&output));
+}

@@ -32,6 +32,12 @@ const SLOW_M: f64 = 0.032;
 const SLOW_M_S: f64 = 0.02;
 /// Time for the hand to come to rest before it feels for the surface. Unit: seconds.
 const REST_SECS: f64 = 0.3;
+/// How far the hand backs off a surface on which the cup does not seal. Unit: metres.
+const BACK_M: f64 = 0.02;
+/// Directions across the axis of the cup in which it is tried again: the first lip may have met an edge.
+const BESIDE: [[f64; 2]; 4] = [[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]];
+/// How far beside the first place, as a share of the cup's radius: as far as a lip that is half beside an edge needs.
+const BESIDE_SHARE: f64 = 0.5;
 
 /// All poses of a cup on the perceived surfaces of an object: on its top, and on the sides of one that is not round.
 ///
@@ -94,11 +100,36 @@ fn on_side(thing: &Sighting, cup: &Suction, heading: f64, thickness: f64) -> Gra
 }
 
 /// Moves along the approach with the vacuum on, slowly near the expected surface, until the cup feels a seal or the arm
-/// feels something below the hand; some centimetres further if it feels neither.
+/// feels something below the hand; some centimetres further if it feels neither. Without a seal, it tries beside this place.
 ///
 /// # Errors
 /// [`Interrupt`] if the action has to end.
-pub fn approach(path: &[Vec<f64>], least_secs: f64, robot: &mut Operator<'_>) -> Result<(), Interrupt> {
+pub fn approach(path: &[Vec<f64>], least_secs: f64, cup: &Suction, robot: &mut Operator<'_>) -> Result<(), Interrupt> {
+    descend(path, least_secs, robot)?;
+    let lip = |robot: &Operator<'_>| robot.kinematics().grasp(robot.commanded());
+    let first = lip(robot);
+    let axis = first.rotation * Vector3::x();
+    for [y, z] in BESIDE {
+        robot.wait(REST_SECS)?;
+        if feels(robot) {
+            break;
+        }
+        let back = straight(robot, robot.commanded(), &(axis * -BACK_M));
+        robot.follow(&back, 0.0)?;
+        let beside = first.rotation * Vector3::new(0.0, y, z) * (BESIDE_SHARE * cup.radius_m);
+        let over = first.translation.vector + beside - axis * BACK_M - lip(robot).translation.vector;
+        let across = straight(robot, robot.commanded(), &over);
+        robot.follow(&across, 0.0)?;
+        robot.wait(REST_SECS)?;
+        let mut touch = Touch::new(robot);
+        let down = straight(robot, robot.commanded(), &(axis * (2.0 * BACK_M)));
+        robot.follow_until(&down, 2.0 * BACK_M / SLOW_M_S, |robot| feels(robot) || touch.felt(robot))?;
+    }
+    Ok(())
+}
+
+/// The first part of [`approach`]: until a seal, a touch or the end of the way.
+fn descend(path: &[Vec<f64>], least_secs: f64, robot: &mut Operator<'_>) -> Result<(), Interrupt> {
     robot.wait(REST_SECS)?;
     robot.set_opening(0.0);
     let Some(end) = path.last() else { return Ok(()) };

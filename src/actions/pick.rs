@@ -45,9 +45,9 @@ pub fn pick(call: &ActionCall, robot: &mut Operator<'_>) -> Result<ActionReport,
     robot.begin("approach");
     robot.follow(&way.near, 0.0)?;
     let (way, seen) = put_right(way, seen, robot)?;
-    match robot.has_cup() {
-        true => cup::approach(&way.approach, APPROACH_SECS, robot)?,
-        false => robot.follow(&way.approach, APPROACH_SECS)?,
+    match robot.profile().suction {
+        Some(suction) => cup::approach(&way.approach, APPROACH_SECS, &suction, robot)?,
+        None => robot.follow(&way.approach, APPROACH_SECS)?,
     }
     robot.begin("close");
     robot.hold(None);
