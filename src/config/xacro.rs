@@ -233,19 +233,28 @@ fn plain(text: &str) -> String {
 #[cfg(test)]
 mod tests {
     use std::fs;
-    use std::os::unix::fs::PermissionsExt as _;
 
     use super::*;
     use crate::foreign::{self, Lookup};
     use crate::mutations::cases;
     use actcheck_base::{Diagnostics, Files};
 
+    /// Writes an executable script by another process. A child that another test starts meanwhile would inherit an open file of
+    /// ours, and a program that is open for writing can't be started ("Text file busy").
+    fn write_program(path: &Path, script: &str) {
+        let write = Command::new("sh")
+            .args(["-c", "printf %s \"$2\" > \"$1\" && chmod 755 \"$1\"", "sh"])
+            .arg(path)
+            .arg(script)
+            .status();
+        assert!(write.expect("a shell").success());
+    }
+
     /// Expands a file with a shell script in the place of xacro.
     fn expanded(script: &str, limit: Duration) -> Result<Source, Unexpanded> {
         let folder = tempfile::tempdir().expect("a folder");
         let program = folder.path().join("xacro");
-        fs::write(&program, format!("#!/bin/sh\n{script}\n")).expect("a script");
-        fs::set_permissions(&program, fs::Permissions::from_mode(0o755)).expect("it is executable");
+        write_program(&program, &format!("#!/bin/sh\n{script}\n"));
         expand_with(&program, Path::new("r.urdf.xacro"), Inputs::default(), limit)
     }
 
@@ -264,8 +273,7 @@ mod tests {
         let program = folder.path().join("xacro");
         let script = "#!/bin/sh\nfound=${PYTHONPATH%%:*}\ncat \"$found/ament_index_python/packages.py\" > /dev/null || exit 1\n\
                       echo \"$found|$ACTCHECK_PACKAGE_DIRS|$2 $3\"\n";
-        fs::write(&program, script).expect("a script");
-        fs::set_permissions(&program, fs::Permissions::from_mode(0o755)).expect("it is executable");
+        write_program(&program, script);
         let folders = [PathBuf::from("/a/packages"), PathBuf::from("/b")];
         let arguments = ["arm:=left".to_owned(), "hand:=none".to_owned()];
         let inputs = Inputs { arguments: &arguments, folders: &folders };
@@ -290,9 +298,7 @@ mod tests {
         ];
         let folder = tempfile::tempdir().expect("a folder");
         let (program, printed) = (folder.path().join("xacro"), folder.path().join("printed"));
-        fs::write(&program, format!("#!/bin/sh\ncat '{}'\n[ ! -e \"$1\" ] || exit 1\n", printed.display()))
-            .expect("a script");
-        fs::set_permissions(&program, fs::Permissions::from_mode(0o755)).expect("it is executable");
+        write_program(&program, &format!("#!/bin/sh\ncat '{}'\n[ ! -e \"$1\" ] || exit 1\n", printed.display()));
         let urdf =
             b"<robot name=\"r\"><link name=\"a\"><inertial><mass value=\"1\"/></inertial></link><link name=\"b\"/>\
             <joint name=\"j\" type=\"prismatic\"><parent link=\"a\"/><child link=\"b\"/><limit lower=\"0\" upper=\"1\" \
