@@ -192,7 +192,7 @@ fn a_run_starts_and_ends_beside_readers_in_a_loop() {
     assert_eq!(runs(&History::open_to_read(&dir).unwrap()), 7);
 }
 
-/// A reader loads the statements of a run from the journal when they are asked for: what the first run lacks, others may have.
+/// A reader loads the statements of a run from the journal when they are asked for: others may have more than the first one.
 #[test]
 fn a_property_that_only_some_waiting_runs_have_is_found_in_these() {
     let folder = tempfile::tempdir().unwrap();
