@@ -7,11 +7,11 @@
 
 For each robot whose file is below one of the folders: a profile by `actcheck new robot` (after `check --mend` where the
 file has impossible moments of inertia), its lines, whether `check` accepts it, and how many of the runs pick a lone can,
-cube and box without noise, and place a can that the robot has found with its camera. With `--speed`, the last
-figure is the simulated time by CPU time of a pick, on one core. Nothing is edited by hand, but TIAGo's gripper comes from another package than its arm:
-`tiago_gripper.urdf.xacro` includes `tiago_no_hand.urdf` and `pal_gripper_description/urdf/gripper.urdf.xacro`, and calls
-`pal_gripper` with the parent `wrist_ft_tool_link` and the origin of `end_effector.urdf.xacro`. Folders that are packages
-themselves are named one by one.
+cube and box without noise, and place a can that the robot has found with its camera. With `--speed`, the last figure
+is the simulated time by CPU time of a pick, on one core. Nothing is edited by hand, but TIAGo's gripper comes from
+another package than its arm: `tiago_gripper.urdf.xacro` includes `tiago_no_hand.urdf` and
+`pal_gripper_description/urdf/gripper.urdf.xacro`, and calls `pal_gripper` with the parent `wrist_ft_tool_link` and
+the origin of `end_effector.urdf.xacro`. Folders that are packages themselves are named one by one.
 """
 
 import argparse

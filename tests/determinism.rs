@@ -1,5 +1,5 @@
-//! Every shipped campaign gives the same outcomes, scores and body states with one worker and with two, and picks the
-//! same ones on another processor.
+//! Every shipped campaign gives the same outcomes, scores and body states with one worker and with two. Runs
+//! have the same bits on another processor.
 
 use std::path::Path;
 use std::process::Command;

@@ -34,9 +34,9 @@ const SLOW_M_S: f64 = 0.02;
 const REST_SECS: f64 = 0.3;
 /// How far the hand backs off a surface on which the cup does not seal. Unit: metres.
 const BACK_M: f64 = 0.02;
-/// Directions across the axis of the cup in which it is tried again: the first lip may have met an edge.
+/// Directions across the axis of the cup in which it is tried again: part of the lip may have been beyond an edge.
 const BESIDE: [[f64; 2]; 4] = [[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]];
-/// How far beside the first place, as a share of the cup's radius: as far as a lip that is half beside an edge needs.
+/// Distance of these trials from the first one, as a share of the cup's radius.
 const BESIDE_SHARE: f64 = 0.5;
 
 /// All poses of a cup on the perceived surfaces of an object: on its top, and on the sides of one that is not round.

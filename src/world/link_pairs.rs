@@ -8,6 +8,11 @@ use crate::World;
 use crate::engine::{FLOOR_GROUP, Owner};
 use crate::robot_course::TOUCH_M;
 
+/// Number of collision groups for links.
+const LINK_GROUPS: u32 = 30;
+/// A collision group without links: objects are in all groups, and links collide with this one.
+const OTHERS: Group = Group::GROUP_31;
+
 /// Pairs of links, each with the smaller index first. All other links pass through each other: neighbours, whose shapes
 /// overlap at their joint, the links of a gripper's mechanism, and links that overlap in the initial posture, which is
 /// known to be valid.
@@ -40,11 +45,6 @@ impl LinkPairs {
         partners.into_iter().map(number).collect()
     }
 }
-
-/// Number of collision groups for links.
-const LINK_GROUPS: u32 = 30;
-/// The collision group of everything but links and floor.
-const OTHERS: Group = Group::GROUP_31;
 
 impl PhysicsHooks for LinkPairs {
     fn filter_contact_pair(&self, context: &PairFilterContext<'_>) -> Option<SolverFlags> {

@@ -150,7 +150,15 @@ fn are_closer([a, b]: [&Solid; 2], b_in_a: &EnginePose, towards_b: EngineVector,
     let mut simplex = VoronoiSimplex::new();
     simplex.reset(CsoPoint::from_shapes(b_in_a, shape_a, shape_b, direction));
     let found = gjk::closest_points(b_in_a, shape_a, shape_b, to_real(clear_m), false, &mut simplex);
-    !matches!(found, GJKResult::NoIntersection(_))
+    match found {
+        GJKResult::NoIntersection(direction) if direction != EngineVector::X => false,
+        // The search also ends with this direction if it does not converge: it counts only if they are apart in it.
+        GJKResult::NoIntersection(direction) => {
+            let nearest = CsoPoint::from_shapes(b_in_a, shape_a, shape_b, direction).point;
+            -direction.dot(nearest) <= to_real(clear_m)
+        }
+        _ => true,
+    }
 }
 
 /// Returns the least of the distances of all pairs of solids by `measure`, or the clearance of the links if all are farther
