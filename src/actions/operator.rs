@@ -40,6 +40,9 @@ const PEAK_OVER_MEAN: f64 = 1.5;
 const HELD_BACK_M: f64 = 0.03;
 /// As [`HELD_BACK_M`], for revolute joints. Unit: radians.
 const HELD_BACK_RAD: f64 = 0.1;
+/// Time for which the base has to be that far behind: while its pose estimate changes, it falls behind and catches up. Unit:
+/// seconds.
+const BASE_BEHIND_SECS: f64 = 0.4;
 /// Time for a robot that gives up to come to rest. Unit: seconds.
 const GIVE_UP_SECS: f64 = 0.5;
 
@@ -347,14 +350,19 @@ impl<'a> Operator<'a> {
         let shortest: f64 = legs.iter().sum();
         let secs = (shortest * PEAK_OVER_MEAN / SPEED_SHARE).max(least_secs);
         let tick = self.world.tick_secs();
-        let mut time = 0.0;
+        let (mut time, mut behind_secs) = (0.0, 0.0);
         while time < secs {
             time += tick;
             let s = (time / secs).min(1.0);
             self.command.positions = along(&course, &legs, shortest * s * s * (3.0 - 2.0 * s));
             self.tick()?;
-            if let Some(behind) = self.held_back() {
+            if let Some(behind) = self.held_back(self.layout().arm.iter()) {
                 return Err(Interrupt::HeldUp(behind));
+            }
+            match self.held_back(self.layout().base.iter().flatten()) {
+                Some(behind) if behind_secs > BASE_BEHIND_SECS => return Err(Interrupt::HeldUp(behind)),
+                Some(_) => behind_secs += tick,
+                None => behind_secs = 0.0,
             }
             if enough(self) {
                 return Ok(true);
@@ -363,11 +371,11 @@ impl<'a> Operator<'a> {
         Ok(false)
     }
 
-    /// A sentence about a joint that is far behind its target, because something holds it back.
-    fn held_back(&self) -> Option<String> {
-        let (layout, positions) = (self.layout(), self.observe().positions);
-        let moved = layout.arm.iter().chain(layout.base.iter().flatten());
-        moved.copied().find_map(|idx| {
+    /// A sentence about one of these joints that is far behind its target.
+    fn held_back<'b>(&self, mut joints: impl Iterator<Item = &'b usize>) -> Option<String> {
+        let positions = self.observe().positions;
+        joints.find_map(|idx| {
+            let idx = *idx;
             let joint = &self.kinematics().joints()[idx];
             let most = if joint.kind == JointKind::Prismatic { HELD_BACK_M } else { HELD_BACK_RAD };
             let off = (positions[idx] - self.command.positions[idx]).abs();

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use nalgebra::{Point3, Vector3};
 use parry3d::query::TrackedContact;
-use rapier3d::prelude::{Collider, ContactData, ContactManifold, PhysicsWorld, SolverContact};
+use rapier3d::prelude::{Collider, ContactData, ContactManifold, ContactPair, PhysicsWorld, SolverContact};
 
 use crate::World;
 use crate::convert::{from_pose, from_vector};
@@ -60,7 +60,7 @@ impl World {
             let owner = collider.map(|collider| Owner::from_tag(collider.user_data));
             matches!(owner, Some(Owner::Link(link)) if hand.has(link))
         };
-        for pair in engine.narrow_phase.contact_pairs() {
+        for pair in engine.narrow_phase.contact_pairs().filter(|pair| has_solved(pair)) {
             // Links of the hand push each other with opposite forces.
             let sign = match (is_ours(pair.collider1), is_ours(pair.collider2)) {
                 (true, false) => -per_second,
@@ -79,6 +79,11 @@ impl World {
         }
         push
     }
+}
+
+/// Returns whether the engine solved any point of a pair of colliders in the last step: it keeps many pairs that are near.
+fn has_solved(pair: &ContactPair) -> bool {
+    pair.solver_manifolds().iter().any(|manifold| !manifold.data.solver_contacts.is_empty())
 }
 
 /// Returns the points of a contact that the engine solved in the last step. It leaves out some of those that it found: they
@@ -101,7 +106,7 @@ fn impulse_of(point: &TrackedContact<ContactData>, normal: &Vector3<f64>) -> Vec
 fn touches(engine: &PhysicsWorld) -> BTreeMap<(Owner, Owner), Touch> {
     let mut found: BTreeMap<(Owner, Owner), Touch> = BTreeMap::new();
     let per_second = 1.0 / f64::from(engine.integration_parameters.dt);
-    for pair in engine.narrow_phase.contact_pairs() {
+    for pair in engine.narrow_phase.contact_pairs().filter(|pair| has_solved(pair)) {
         let of = |handle| engine.colliders.get(handle);
         let (Some(one), Some(other)) = (of(pair.collider1), of(pair.collider2)) else { continue };
         let [first, second] = [one, other].map(|collider| Owner::from_tag(collider.user_data));

@@ -55,6 +55,9 @@ const CONTACT_FREQUENCY_HZ: f32 = 90.0;
 const SUPPORT_FREQUENCY_HZ: f32 = 30.0;
 /// Damping ratio of contacts: the engine's default, which keeps stacks at rest.
 const CONTACT_DAMPING: f32 = 10.0;
+/// The engine's unit of length. It keeps pairs of shapes whose boxes are nearer to each other than 8 cm in this unit, and
+/// looks at them in every step. Unit: metres.
+pub const LENGTH_UNIT: f32 = 0.125;
 /// Friction coefficient of the floor: that of wood.
 const FLOOR_FRICTION: f32 = 0.5;
 
@@ -71,7 +74,13 @@ pub fn engine(physics: &Physics) -> Result<PhysicsWorld, WorldError> {
         return Err(WorldError::Scene { what });
     }
     let softness = |frequency| SpringCoefficients { natural_frequency: frequency, damping_ratio: CONTACT_DAMPING };
+    let defaults = IntegrationParameters::default();
     let parameters = IntegrationParameters {
+        length_unit: LENGTH_UNIT,
+        normalized_allowed_linear_error: defaults.normalized_allowed_linear_error / LENGTH_UNIT,
+        normalized_max_corrective_velocity: defaults.normalized_max_corrective_velocity / LENGTH_UNIT,
+        normalized_prediction_distance: defaults.normalized_prediction_distance / LENGTH_UNIT,
+        normalized_max_linear_velocity: defaults.normalized_max_linear_velocity / LENGTH_UNIT,
         dt: 1.0 / to_real(f64::from(physics.steps_per_second)),
         num_solver_iterations: physics.iterations as usize,
         // Without it, friction acts only in the second of the solver's two passes, and every grasp slips slowly.
@@ -80,7 +89,7 @@ pub fn engine(physics: &Physics) -> Result<PhysicsWorld, WorldError> {
         static_contact_softness: softness(SUPPORT_FREQUENCY_HZ),
         // Recycled contacts may be off by centimetres, but contacts decide verdicts.
         contact_recycling: false,
-        ..IntegrationParameters::default()
+        ..defaults
     };
     let gravity = to_vector(&Vector3::new(0.0, 0.0, -GRAVITY));
     let narrow_phase = fresh::narrow_phase();

@@ -21,6 +21,9 @@ const GIVEN_GAIN: f64 = 1e6;
 /// Most changes of the set of saturated motors in a substep.
 const MOST_CHANGES: usize = 8;
 
+/// Most factors that are kept in a control tick.
+const MOST_FACTORS: usize = 8;
+
 /// The joint of each drive with its gain, unless it is at a bound, and the factor of the equations with these gains.
 type Factored = (Vec<(usize, Option<f64>)>, Factor);
 
@@ -36,7 +39,33 @@ pub(super) struct Equations {
     apparent: Vec<Option<f64>>,
     /// Momenta that gravity, contacts and given velocities add in a substep of this step.
     added: Vec<f64>,
-    factor: Option<Factored>,
+    /// The factors found so far, since drives often return to the same bounds.
+    factors: Vec<Factored>,
+    drives: Vec<Drive>,
+    momenta: Vec<f64>,
+}
+
+impl Equations {
+    /// Returns the factor of the equations with the drives that are not at a bound.
+    fn factor(&mut self) -> &Factor {
+        let gain = |drive: &Drive| drive.at.is_none().then_some(drive.gain);
+        let is_of = |(known, _): &Factored| {
+            known.len() == self.drives.len()
+                && known.iter().zip(&self.drives).all(|(known, drive)| *known == (drive.joint, gain(drive)))
+        };
+        let at = self.factors.iter().position(is_of).unwrap_or_else(|| {
+            let size = self.momenta.len();
+            let mut matrix = self.matrix.clone();
+            for drive in self.drives.iter().filter(|drive| drive.at.is_none()) {
+                matrix[drive.joint * size + drive.joint] += drive.gain;
+            }
+            let free = self.drives.iter().map(|drive| (drive.joint, gain(drive))).collect();
+            self.factors.truncate(MOST_FACTORS - 1);
+            self.factors.insert(0, (free, Factor::new(matrix, size)));
+            0
+        });
+        &self.factors[at].1
+    }
 }
 
 impl Robot {
@@ -48,16 +77,9 @@ impl Robot {
         let secs = f64::from(parameters.dt) / n_substeps as f64;
         let mut step = self.equations.take().unwrap_or_else(|| self.equations(secs));
         self.begin_step(&mut step);
-        let mut saturated: Vec<Option<usize>> = vec![None; self.motors.len()];
         for _ in 0..n_substeps {
-            let mut drives = self.drives(&mut step);
-            for (drive, at) in drives.iter_mut().zip(&saturated) {
-                drive.at = *at;
-            }
-            self.velocities = self.solve(&mut step, &mut drives);
-            for (at, drive) in saturated.iter_mut().zip(&drives) {
-                *at = drive.at;
-            }
+            self.set_drives(&mut step);
+            self.solve(&mut step);
             for (position, velocity) in self.positions.iter_mut().zip(&self.velocities) {
                 *position += velocity * step.secs;
             }
@@ -84,12 +106,23 @@ impl Robot {
                 }
             }
         }
-        Box::new(Equations { inertias, secs, matrix, apparent: vec![None; n_joints], added: Vec::new(), factor: None })
+        Box::new(Equations {
+            inertias,
+            secs,
+            matrix,
+            apparent: vec![None; n_joints],
+            added: Vec::with_capacity(n_joints),
+            factors: Vec::new(),
+            drives: Vec::with_capacity(2 * n_joints),
+            momenta: Vec::with_capacity(n_joints),
+        })
     }
 
     /// Sets the momenta that gravity, contacts and given velocities add in the substeps of the next step.
     fn begin_step(&self, step: &mut Equations) {
         let secs = step.secs;
+        // At first, no drive of the step is at a bound.
+        step.drives.clear();
         step.added.clear();
         step.added.extend(step.inertias.bias.iter().map(|bias| -secs * bias));
         if let Some((hand, push)) = self.load() {
@@ -112,21 +145,25 @@ impl Robot {
         self.share == Share::Hand && self.shares(joint)
     }
 
-    /// Returns the drives of all motors, followed by those of the stops that are passed. Motors in the engine have no
-    /// drive here, but their place.
-    fn drives(&self, step: &mut Equations) -> Vec<Drive> {
+    /// Sets the drives of all motors, followed by those of the stops that are passed. Motors in the engine have no
+    /// drive here, but their place. Motors that were at a bound in the last substep are there at first.
+    fn set_drives(&self, step: &mut Equations) {
         let limits = |idx: usize| match &self.model.joints[idx] {
             joint if joint.upper - joint.lower < WIDEST_RANGE => [joint.lower, joint.upper],
             _ => [f64::NEG_INFINITY, f64::INFINITY],
         };
-        let of_motors = self.motors.iter().zip(&self.positions).enumerate();
-        let mut drives: Vec<Drive> = of_motors
-            .map(|(idx, (motor, position))| match self.is_given(idx) {
+        let (secs, n_joints) = (step.secs, self.motors.len());
+        step.drives.truncate(n_joints);
+        for (idx, (motor, position)) in self.motors.iter().zip(&self.positions).enumerate() {
+            let drive = match self.is_given(idx) {
                 true => Drive::none(idx),
-                false => motor.law.drive(idx, *position, limits(idx), step.secs),
-            })
-            .collect();
-        let secs = step.secs;
+                false => motor.law.drive(idx, *position, limits(idx), secs),
+            };
+            match step.drives.get_mut(idx) {
+                Some(last) => *last = Drive { at: last.at, ..drive },
+                None => step.drives.push(drive),
+            }
+        }
         let turn = std::f64::consts::TAU * f64::from(STOP_FREQUENCY_HZ);
         let recovery = turn / (secs * turn + 2.0 * f64::from(STOP_DAMPING));
         let rest = 1.0 / (secs * recovery) - 1.0;
@@ -138,55 +175,40 @@ impl Robot {
                 let bounds = if past > 0.0 { [f64::NEG_INFINITY, 0.0] } else { [0.0, f64::INFINITY] };
                 let apparent = *step.apparent[idx].get_or_insert_with(|| step.inertias.apparent(idx));
                 let gain = apparent / softness;
-                drives.push(Drive { joint: idx, gain, wanted: -past * recovery, bounds, at: None });
+                step.drives.push(Drive { joint: idx, gain, wanted: -past * recovery, bounds, at: None });
             }
         }
-        drives
     }
 
-    /// Returns the velocities after a substep. Finds the drives that are at a bound by trial.
-    fn solve(&self, step: &mut Equations, drives: &mut [Drive]) -> Vec<f64> {
-        let n_joints = self.motors.len();
-        let mut momenta = step.inertias.times(&self.velocities);
-        momenta.iter_mut().zip(&step.added).for_each(|(momentum, added)| *momentum += added);
+    /// Sets the velocities to those after a substep. Finds the drives that are at a bound by trial.
+    fn solve(&mut self, step: &mut Equations) {
+        step.inertias.momenta(&self.velocities, &mut step.momenta);
+        step.momenta.iter_mut().zip(&step.added).for_each(|(momentum, added)| *momentum += added);
         for (idx, joint) in self.model.joints.iter().enumerate().filter(|(idx, _)| !self.is_given(*idx)) {
             if let Some((leader, factor, offset)) = joint.mimic {
                 let off = self.positions[idx] - factor * self.positions[leader] - offset;
                 for (row, share) in [(idx, 1.0), (leader, -factor)] {
-                    momenta[row] -= share * COUPLING_GAIN * off / step.secs;
+                    step.momenta[row] -= share * COUPLING_GAIN * off / step.secs;
                 }
             }
         }
-        let mut found = self.velocities.clone();
         for _ in 0..MOST_CHANGES {
-            found.copy_from_slice(&momenta);
-            for drive in drives.iter() {
-                found[drive.joint] += match drive.at {
+            self.velocities.copy_from_slice(&step.momenta);
+            for drive in &step.drives {
+                self.velocities[drive.joint] += match drive.at {
                     Some(bound) => drive.bounds[bound],
                     None => drive.gain * drive.wanted,
                 };
             }
-            let gain = |drive: &Drive| drive.at.is_none().then_some(drive.gain);
-            let free: Vec<(usize, Option<f64>)> = drives.iter().map(|drive| (drive.joint, gain(drive))).collect();
-            if step.factor.as_ref().is_none_or(|(known, _)| *known != free) {
-                let mut matrix = step.matrix.clone();
-                for drive in drives.iter().filter(|drive| drive.at.is_none()) {
-                    matrix[drive.joint * n_joints + drive.joint] += drive.gain;
-                }
-                step.factor = Some((free, Factor::new(matrix, n_joints)));
-            }
-            if let Some((_, factor)) = &step.factor {
-                factor.solve(&mut found);
-            }
+            step.factor().solve(&mut self.velocities);
             let mut changed = false;
-            for drive in drives.iter_mut() {
-                changed |= drive.update(found[drive.joint]);
+            for drive in &mut step.drives {
+                changed |= drive.update(self.velocities[drive.joint]);
             }
             if !changed {
                 break;
             }
         }
-        found
     }
 }
 
@@ -252,7 +274,9 @@ mod tests {
         let energies = |positions: &[f64], velocities: &[f64]| {
             let poses = robot.kinematics.links(positions);
             let now = inertias(&robot.model, &poses, velocities);
-            let kinetic: f64 = now.times(velocities).iter().zip(velocities).map(|(p, v)| p * v / 2.0).sum();
+            let mut momenta = Vec::new();
+            now.momenta(velocities, &mut momenta);
+            let kinetic: f64 = momenta.iter().zip(velocities).map(|(p, v)| p * v / 2.0).sum();
             let links = robot.model.links.iter().zip(&poses);
             let heights = links.map(|(link, pose)| link.mass * (pose * nalgebra::Point3::from(link.com)).z);
             (kinetic, kinetic + GRAVITY * heights.sum::<f64>())

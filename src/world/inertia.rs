@@ -1,5 +1,7 @@
 //! The robot's mass matrix, and the forces of gravity and of its own motion on the joints.
 
+use std::cell::OnceCell;
+
 use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
 
 use crate::description::{JointKind, RobotModel};
@@ -14,13 +16,16 @@ pub(super) struct Inertias {
     pub(super) bias: Vec<f64>,
     /// Motion of each joint at unit velocity.
     axes: Vec<Twist>,
+    /// The factor of the mass matrix, once it is needed.
+    factor: OnceCell<Factor>,
 }
 
 impl Inertias {
-    /// Returns the momenta of the joints at these velocities.
-    pub(super) fn times(&self, velocities: &[f64]) -> Vec<f64> {
+    /// Sets the momenta of the joints to those at these velocities.
+    pub(super) fn momenta(&self, velocities: &[f64], momenta: &mut Vec<f64>) {
         let rows = self.mass.chunks(velocities.len().max(1));
-        rows.map(|row| row.iter().zip(velocities).map(|(a, b)| a * b).sum()).collect()
+        momenta.clear();
+        momenta.extend(rows.map(|row| row.iter().zip(velocities).map(|(a, b)| a * b).sum::<f64>()));
     }
 
     /// Adds the inertia of each joint's motor.
@@ -42,7 +47,7 @@ impl Inertias {
     pub(super) fn apparent(&self, joint: usize) -> f64 {
         let mut unit = vec![0.0; self.bias.len()];
         unit[joint] = 1.0;
-        Factor::new(self.mass.clone(), unit.len()).solve(&mut unit);
+        self.factor.get_or_init(|| Factor::new(self.mass.clone(), unit.len())).solve(&mut unit);
         1.0 / unit[joint]
     }
 }
@@ -163,5 +168,5 @@ pub(super) fn inertias(model: &RobotModel, poses: &[Isometry3<f64>], velocities:
         onto.about += bulk.about;
         forces[joint.parent] = forces[joint.parent].plus(force, 1.0);
     }
-    Inertias { mass, bias, axes }
+    Inertias { mass, bias, axes, factor: OnceCell::new() }
 }

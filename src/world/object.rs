@@ -8,7 +8,7 @@ use rapier3d::prelude::{
 };
 
 use crate::convert::{to_pose, to_real, to_vector};
-use crate::engine::{Owner, collider};
+use crate::engine::{LENGTH_UNIT, Owner, collider};
 use crate::furniture::slides;
 use crate::shell::{Hollow, hollows_of};
 use actcheck_data::{Inertia, ObjectModel, Part, Role, SceneObject};
@@ -51,7 +51,7 @@ pub(super) fn insert(engine: &mut PhysicsWorld, idx: usize, object: &SceneObject
     let body = engine.insert_body(builder.pose(to_pose(&placed)));
     if let Some(body) = engine.bodies.get_mut(body) {
         let activation = body.activation_mut();
-        activation.normalized_linear_threshold = SLEEP_SPEED;
+        activation.normalized_linear_threshold = SLEEP_SPEED / LENGTH_UNIT;
         activation.time_until_sleep = SLEEP_AFTER_SECS;
     }
     // If the model states its inertia, the shapes have no mass of their own.

@@ -93,7 +93,7 @@ pub struct Shortcuts {
     pub hand_alone: bool,
     /// A closed surface instead of the staves of a hollow object while nothing is at its mouth.
     pub shells: bool,
-    /// Half of the substeps where the engine moves the hand alone.
+    /// Half of the substeps where the engine moves the hand alone, and one where the robot touches nothing.
     pub few_substeps: bool,
 }
 
@@ -169,8 +169,11 @@ impl World {
 
     /// Sets the engine's substeps for a tick.
     pub(super) fn set_substeps(&mut self, reach: Reach) {
-        let few = self.room.shortcuts.few_substeps && reach == Reach::Hand;
-        let substeps = if few { self.substeps.div_ceil(2) } else { self.substeps };
+        let substeps = match reach {
+            Reach::Nothing if self.room.shortcuts.few_substeps => 1,
+            Reach::Hand if self.room.shortcuts.few_substeps => self.substeps.div_ceil(2),
+            _ => self.substeps,
+        };
         self.engine.integration_parameters.num_solver_iterations = substeps;
     }
 
