@@ -7,11 +7,12 @@ runs both campaigns in turn, each in a process of its own with one worker.
 
 The task is that of `configs/pick.toml`: a glass on a coffee table among one to five other objects, the same robot
 (URDF), models, ranges and noise, 240 steps per second of simulated time and 60 commands. The peer draws scenes with
-Hypothesis, evenly in their ranges as actcheck does, lets them settle, plans, drives, grasps, lifts and retreats with a controller of its own in Python, records
-contacts at each command and poses ten times a second, writes the state before and after and the contacts as RDF into a
-pyoxigraph store on disk and the poses into a compressed file, and checks five properties in SPARQL. Scenes are not the
-same as those of actcheck, and the peer has neither proofs nor margins nor shrinking. Objects at rest sleep in both. The
-peer's joints start and stop at once, at their largest speed, so that its runs are a third shorter in simulated time.
+Hypothesis, evenly in their ranges as actcheck does, lets them settle, plans, drives, grasps, lifts and retreats with
+a controller of its own in Python, records contacts at each command and poses ten times a second, writes the state
+before and after and the contacts as RDF into a pyoxigraph store on disk and the poses into a compressed file, and
+checks five properties in SPARQL. Scenes are not the same as those of actcheck, and the peer has neither proofs nor
+margins nor shrinking. Objects at rest sleep in both. The peer's joints start and stop at once, at their largest
+speed, so that its runs are a third shorter in simulated time.
 """
 
 import argparse

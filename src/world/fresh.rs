@@ -143,13 +143,13 @@ fn keep_shallow(
 
 #[cfg(test)]
 mod tests {
-    use super::*;
-    use parry3d::shape::{Cuboid, Cylinder};
-    use rapier3d::prelude::Rotation;
-
     /// A stave of a glass over the upper edge of a bottle, as in a simulation: they touched along `last` a step before.
     #[test]
     fn bodies_that_touch_at_an_edge_are_not_deep_in_each_other() {
+        use super::*;
+        use parry3d::shape::{Cuboid, Cylinder};
+        use rapier3d::prelude::Rotation;
+
         let pos12 = Pose {
             rotation: Rotation::from_xyzw(-0.156_316_7, -0.921_394_35, -0.288_845_5, -0.207_764_55),
             translation: Vector::new(0.020_994_356, -0.042_384_822, 0.074_235_68),
