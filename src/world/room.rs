@@ -93,7 +93,7 @@ pub struct Shortcuts {
     pub hand_alone: bool,
     /// A closed surface instead of the staves of a hollow object while nothing is at its mouth.
     pub shells: bool,
-    /// Half of the substeps where the engine moves the hand alone, and one where the robot touches nothing.
+    /// Half of the substeps where the engine moves the hand alone, and where the robot touches nothing.
     pub few_substeps: bool,
 }
 
@@ -170,8 +170,7 @@ impl World {
     /// Sets the engine's substeps for a tick.
     pub(super) fn set_substeps(&mut self, reach: Reach) {
         let substeps = match reach {
-            Reach::Nothing if self.room.shortcuts.few_substeps => 1,
-            Reach::Hand if self.room.shortcuts.few_substeps => self.substeps.div_ceil(2),
+            Reach::Nothing | Reach::Hand if self.room.shortcuts.few_substeps => self.substeps.div_ceil(2),
             _ => self.substeps,
         };
         self.engine.integration_parameters.num_solver_iterations = substeps;
