@@ -1,6 +1,7 @@
 //! All integration tests in one program: the large libraries are linked once.
 
 mod accessible;
+mod articulated;
 mod bisect;
 mod bounds;
 mod broken;

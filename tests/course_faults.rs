@@ -106,6 +106,7 @@ fn body(id: &str, category: &str, fixed: bool, middle_m: [f64; 3], size_m: [f64;
         asleep: false,
         size_m: Some(size_m),
         grasp_distance_m: None,
+        part: None,
     }
 }
 

@@ -33,6 +33,7 @@ fn model(name: &str) -> Arc<ObjectModel> {
         fixed: false,
         inertia: None,
         surface: None,
+        moving: Vec::new(),
         digest: digest_of(name),
     })
 }
@@ -76,6 +77,7 @@ fn scene() -> Scene {
         mass_kg: 0.31,
         friction: 0.7,
         restitution: 0.05,
+        attached: None,
     };
     Scene {
         map: actcheck::data::SceneMap::default(),

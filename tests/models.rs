@@ -83,7 +83,7 @@ fn a_broken_model_is_named_and_the_others_work() {
     let campaign = campaign(folder.path(), &format!("model_dir = \"models\"\n{USED}")).unwrap();
     let said = campaign.warnings.to_string();
     for part in
-        ["broken_lamp/model.sdf:6:25", "there is no `broken_lamp/meshes/foot.stl`", "`hinge` is of the type revolute"]
+        ["broken_lamp/model.sdf:6:25", "there is no `broken_lamp/meshes/foot.stl`", "`hinge` is of the type universal"]
     {
         assert!(said.contains(part), "{said}");
     }

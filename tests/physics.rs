@@ -65,6 +65,7 @@ pub(crate) fn block(size: [f64; 3]) -> Arc<ObjectModel> {
         fixed: false,
         inertia: None,
         surface: None,
+        moving: Vec::new(),
         digest: String::new(),
     })
 }
@@ -77,7 +78,16 @@ pub(crate) fn object(
     mass_kg: f64,
     friction: f64,
 ) -> SceneObject {
-    SceneObject { id: id.to_owned(), restitution: model.restitution, model, role, pose, mass_kg, friction }
+    SceneObject {
+        id: id.to_owned(),
+        restitution: model.restitution,
+        model,
+        role,
+        pose,
+        mass_kg,
+        friction,
+        attached: None,
+    }
 }
 
 /// A scene with the robot far away.

@@ -292,6 +292,7 @@ mod tests {
             asleep: true,
             size_m: None,
             grasp_distance_m: None,
+            part: None,
         }
     }
 

@@ -273,10 +273,18 @@ pub(super) fn recorded_overrides(history: &History, record: &CampaignRecord) -> 
     }
 }
 
-/// Sets the category of models that come without one, from their name if the ontology has such a class; else they stay
+/// Sets the category of models that come without one, and of all moving parts, from their name if the ontology has such a class; else they stay
 /// `act:Object`.
 fn categorise(campaign: &mut Campaign, ontology: &Ontology) {
     let used = campaign.used_models();
+    for model in campaign.models.values_mut() {
+        for idx in 0..model.moving.len() {
+            if let Some(class) = ontology.class_called(&model.moving[idx].name) {
+                let part = &mut Arc::make_mut(model).moving[idx];
+                Arc::make_mut(&mut part.model).category = class.to_owned();
+            }
+        }
+    }
     for name in &campaign.uncategorised {
         let Some(model) = campaign.models.get_mut(name) else { continue };
         // Models that only a world has are called WORLD/NAME. Configurations can't name them.

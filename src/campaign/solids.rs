@@ -27,16 +27,28 @@ struct HullCache {
 pub(super) fn decompose_meshes(campaign: &mut Campaign, faults: &mut Diagnostics) {
     let mut cache = HullCache { folder: campaign.history.join(FOLDER), known: BTreeMap::new() };
     let used = campaign.used_models();
-    for (name, model) in &mut campaign.models {
-        let has_mesh = model.parts.iter().any(|part| matches!(part.shape, Shape::Mesh { .. }));
-        if has_mesh && used.contains(name) {
-            match solid_parts(model, &mut cache) {
-                Ok(parts) => Arc::make_mut(model).parts = parts,
-                Err(reason) => faults.push(unusable(&format!("a mesh of the model `{name}`"), &reason)),
-            }
+    for (name, model) in campaign.models.iter_mut().filter(|(name, _)| used.contains(*name)) {
+        let moving = 0..model.moving.len();
+        decompose_model(name, model, &mut cache, faults);
+        for idx in moving.filter(|idx| has_mesh(&model.moving[*idx].model)).collect::<Vec<_>>() {
+            decompose_model(name, &mut Arc::make_mut(model).moving[idx].model, &mut cache, faults);
         }
     }
     decompose_with(&mut cache, Arc::make_mut(&mut campaign.robot), faults);
+}
+
+fn has_mesh(model: &ObjectModel) -> bool {
+    model.parts.iter().any(|part| matches!(part.shape, Shape::Mesh { .. }))
+}
+
+fn decompose_model(name: &str, model: &mut Arc<ObjectModel>, cache: &mut HullCache, faults: &mut Diagnostics) {
+    if !has_mesh(model) {
+        return;
+    }
+    match solid_parts(model, cache) {
+        Ok(parts) => Arc::make_mut(model).parts = parts,
+        Err(reason) => faults.push(unusable(&format!("a mesh of the model `{name}`"), &reason)),
+    }
 }
 
 /// Proposes a profile for a robot without roles, with the basis of each guess by the profile's key. Meshes are decomposed

@@ -49,6 +49,7 @@ pub fn read(source: &Source) -> Result<ObjectModel, Diagnostics> {
         fixed: false,
         inertia: None,
         surface,
+        moving: Vec::new(),
         digest,
     };
     if !found.has_errors() {

@@ -164,6 +164,7 @@ fn wall_model(size_m: [f64; 3]) -> ObjectModel {
         fixed: true,
         inertia: None,
         surface: None,
+        moving: Vec::new(),
         digest: String::new(),
     }
 }

@@ -1,6 +1,6 @@
 //! Triangle meshes.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
@@ -54,6 +54,20 @@ impl Mesh {
         let has_extent = |[a, b, c]: &[u32; 3]| a != b && b != c && a != c;
         let triangles: Vec<[u32; 3]> =
             self.triangles.iter().map(|corners| corners.map(&mut place)).filter(has_extent).collect();
+        Self { vertices, triangles }
+    }
+
+    /// Keeps the first of all triangles with the same corners: some programs write the back of each face, too.
+    #[must_use]
+    pub fn one_sided(&self) -> Self {
+        let Self { vertices, triangles } = self.welded();
+        let mut known = BTreeSet::new();
+        let is_first = |corners: &[u32; 3]| {
+            let mut corners = *corners;
+            corners.sort_unstable();
+            known.insert(corners)
+        };
+        let triangles = triangles.into_iter().filter(is_first).collect();
         Self { vertices, triangles }
     }
 
@@ -135,6 +149,9 @@ mod tests {
         assert_eq!(mesh.welded().vertices.len(), 4);
         assert!((mesh.volume() - 1.0 / 6.0).abs() < 1e-12);
         assert!((mesh.scaled([2.0, -1.0, 3.0]).volume() - 1.0).abs() < 1e-12);
+        let backs = mesh.triangles.iter().map(|[a, b, c]| [*c, *b, *a]);
+        let both = Mesh { triangles: mesh.triangles.iter().copied().chain(backs).collect(), ..mesh.clone() };
+        assert!(both.volume() < 1e-12 && (both.one_sided().volume() - mesh.volume()).abs() < 1e-12);
         assert!(
             Mesh::new(corner.to_vec(), vec![[0, 1, 4]]).expect_err("the index is out of range").contains("triangle 1")
         );

@@ -1,13 +1,15 @@
 //! Models of objects and furniture.
 
+use std::sync::Arc;
+
 use serde::{Deserialize, Serialize};
 
-use crate::{Part, Pose, Shape};
+use crate::{Part, PartJoint, Pose, Shape};
 
-/// A rigid object or piece of furniture, made of shapes.
+/// A rigid object or piece of furniture, made of shapes. Joints may move further parts of it.
 ///
 /// Frame: the model's own, z up, in its upright pose; the origin is on the ground below its middle.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct ObjectModel {
     /// Name in configurations; the file's name without its extension.
     pub name: String,
@@ -31,8 +33,26 @@ pub struct ObjectModel {
     pub inertia: Option<Inertia>,
     /// For furniture: the flat rectangle on top that can hold objects.
     pub surface: Option<Surface>,
+    /// Parts that joints move, such as drawers and doors. Their shapes and masses are not among those above; the outer
+    /// dimensions contain them.
+    pub moving: Vec<MovingPart>,
     /// Digest of the model's files.
     pub digest: String,
+}
+
+/// A part of a model that a joint moves.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MovingPart {
+    /// Name, unique in the model.
+    pub name: String,
+    /// Its shapes and mass. It has no moving parts of its own.
+    pub model: Arc<ObjectModel>,
+    /// Pose of its origin while its joint is at 0. Frame: the whole model's.
+    pub pose: Pose,
+    /// The part that carries it, by its index; `None` if the model itself does.
+    pub on: Option<usize>,
+    /// How it moves. Frame: the whole model's, while all joints are at 0.
+    pub joint: PartJoint,
 }
 
 /// Mass distribution of a model. Frame: the model's.
@@ -69,6 +89,16 @@ impl ObjectModel {
         self.parts.iter().flat_map(Part::solids).collect()
     }
 
+    /// Returns the convex solids of the model and of its moving parts, with all joints at 0. Frame: the model's.
+    pub fn all_solids(&self) -> Vec<Part> {
+        let of_part = |part: &MovingPart| -> Vec<Part> {
+            let at = part.pose.to_isometry();
+            let placed = |pose: &Pose| Pose::from_isometry(&(at * pose.to_isometry()));
+            part.model.solids().into_iter().map(|solid| Part { pose: placed(&solid.pose), ..solid }).collect()
+        };
+        self.solids().into_iter().chain(self.moving.iter().flat_map(of_part)).collect()
+    }
+
     /// Scales the model uniformly; the mass stays the same.
     #[must_use]
     pub fn scaled(&self, by: f64) -> Self {
@@ -91,6 +121,17 @@ impl ObjectModel {
                 .collect(),
             surface: self.surface.map(surface),
             inertia: self.inertia.map(inertia),
+            moving: self
+                .moving
+                .iter()
+                .map(|part| MovingPart {
+                    name: part.name.clone(),
+                    model: Arc::new(part.model.scaled(by)),
+                    pose: placed(&part.pose),
+                    on: part.on,
+                    joint: part.joint.scaled(by),
+                })
+                .collect(),
             ..self.clone()
         }
     }

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use crate::{ObjectModel, Physics, Pose, RobotProfile, SceneMap, Sensing};
+use crate::{MovingPart, ObjectModel, PartJoint, Physics, Pose, RobotProfile, SceneMap, Sensing};
 
 /// A sampled scene. Frame of all poses: world; z up; the floor at 0.
 #[derive(Debug, Clone)]
@@ -41,6 +41,8 @@ pub struct SceneObject {
     pub friction: f64,
     /// Coefficient of restitution.
     pub restitution: f64,
+    /// The object that carries it, if it is a part that a joint moves.
+    pub attached: Option<Attached>,
 }
 
 impl SceneObject {
@@ -48,6 +50,46 @@ impl SceneObject {
     pub fn is_fixed(&self) -> bool {
         self.role == Role::Platform || self.model.fixed
     }
+
+    /// Returns the parts of the object that joints move, as objects of their own.
+    pub fn moving_parts(&self) -> Vec<Self> {
+        let id_of = |part: &MovingPart| format!("{}_{}", self.id, part.name);
+        let (mass_scale, friction_scale) =
+            (self.mass_kg / self.model.mass_kg, self.friction / self.model.friction.max(f64::MIN_POSITIVE));
+        let place = self.pose.to_isometry();
+        let part = |part: &MovingPart| {
+            let carrier = part.on.and_then(|on| self.model.moving.get(on));
+            Self {
+                id: id_of(part),
+                model: Arc::clone(&part.model),
+                role: Role::Part,
+                pose: Pose::from_isometry(&(place * part.pose.to_isometry())),
+                mass_kg: part.model.mass_kg * mass_scale,
+                friction: part.model.friction * friction_scale,
+                restitution: part.model.restitution,
+                attached: Some(Attached {
+                    to: carrier.map_or_else(|| self.id.clone(), id_of),
+                    whole: self.id.clone(),
+                    frame: self.pose,
+                    joint: part.joint,
+                }),
+            }
+        };
+        self.model.moving.iter().map(part).collect()
+    }
+}
+
+/// The attachment of a part to another object.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Attached {
+    /// Id of the object that carries it: the whole object, or another part of it.
+    pub to: String,
+    /// Id of the object that it is a part of.
+    pub whole: String,
+    /// The frame of the joint's axis. Frame: world.
+    pub frame: Pose,
+    /// How it moves.
+    pub joint: PartJoint,
 }
 
 /// The role of an object in a scene.
@@ -63,10 +105,12 @@ pub enum Role {
     PlaceOther,
     /// An obstacle for the base.
     Obstacle,
+    /// A part of another object that a joint moves, such as a drawer.
+    Part,
 }
 
 impl Role {
-    const ALL: [Self; 5] = [Self::Platform, Self::Target, Self::Other, Self::PlaceOther, Self::Obstacle];
+    const ALL: [Self; 6] = [Self::Platform, Self::Target, Self::Other, Self::PlaceOther, Self::Obstacle, Self::Part];
 
     /// Its name in messages and histories.
     pub fn word(self) -> &'static str {
@@ -76,6 +120,7 @@ impl Role {
             Self::Other => "other",
             Self::PlaceOther => "place-other",
             Self::Obstacle => "obstacle",
+            Self::Part => "part",
         }
     }
 

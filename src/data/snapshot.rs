@@ -55,6 +55,10 @@ pub struct BodyState {
     /// bodies and in traces of earlier versions.
     #[serde(skip)]
     pub grasp_distance_m: Option<f64>,
+    /// If it is a part that a joint moves: the id of the whole, and the joint's position in metres or radians. `None` in
+    /// traces read from a history.
+    #[serde(skip)]
+    pub part: Option<(String, f64)>,
 }
 
 /// The robot.

@@ -35,6 +35,10 @@ fn write_body(body: &BodyState, writer: &mut Writer) {
     if let Some(distance) = body.grasp_distance_m {
         writer.number(subject, "gripperDistance", distance);
     }
+    if let Some((whole, position)) = &body.part {
+        writer.things(subject, "partOf", std::slice::from_ref(whole));
+        writer.number(subject, "jointPosition", *position);
+    }
     writer.things(subject, "touches", &body.touches);
     writer.things(subject, "restsOn", &body.rests_on);
     writer.boolean(subject, "asleep", body.asleep);

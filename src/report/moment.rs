@@ -208,6 +208,7 @@ mod tests {
             asleep: false,
             size_m: None,
             grasp_distance_m: None,
+            part: None,
         }
     }
 

@@ -77,6 +77,8 @@ pub fn draw(space: &Space, test: usize, choices: &mut Choices) -> Result<Scene, 
     let mut map = world.map(Surroundings::scene_map).unwrap_or_default();
     map.locations.extend(builder.front.clone());
     builder.set_obstacles(base, world, drives, &map)?;
+    let parts: Vec<SceneObject> = builder.objects.iter().flat_map(SceneObject::moving_parts).collect();
+    builder.objects.extend(parts);
     let name = builder.designators.get("world").and_then(|names| names.first()).cloned();
     Ok(Scene {
         world: name.unwrap_or_else(|| DEFAULT_WORLD.to_owned()),
@@ -99,6 +101,7 @@ pub(super) fn platform(id: String, model: Arc<ObjectModel>, pose: Pose) -> Scene
         friction: model.friction,
         restitution: model.restitution,
         model,
+        attached: None,
     }
 }
 
@@ -333,6 +336,7 @@ impl<'a> SceneBuilder<'a> {
                 friction: model.friction * friction_scale,
                 restitution,
                 model,
+                attached: None,
             });
             return Ok(id);
         }

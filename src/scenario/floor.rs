@@ -234,6 +234,7 @@ impl SceneBuilder<'_> {
                 friction: model.friction,
                 restitution: model.restitution,
                 model,
+                attached: None,
             });
             return Ok(());
         }

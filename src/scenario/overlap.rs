@@ -21,9 +21,9 @@ pub struct Solid {
 }
 
 impl Solid {
-    /// Creates the solid of a model whose origin has this pose. Frame: world.
+    /// Creates the solid of a model whose origin has this pose, with its moving parts. Frame: world.
     pub fn new(model: &ObjectModel, pose: &Pose) -> Self {
-        Self::of_parts(&model.solids(), pose)
+        Self::of_parts(&model.all_solids(), pose)
     }
 
     /// Creates the solid of convex parts whose frame has this pose. Frame: world.

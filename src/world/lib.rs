@@ -5,6 +5,7 @@
 
 mod assemble;
 mod assumed;
+mod attach;
 mod body;
 mod camera;
 mod clearance;

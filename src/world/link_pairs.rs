@@ -1,4 +1,4 @@
-//! The pairs of the robot's links that collide with each other in the simulation.
+//! The pairs of the robot's links that collide with each other in the simulation, and of parts of objects.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -21,6 +21,8 @@ pub(super) struct LinkPairs {
     pairs: BTreeSet<(usize, usize)>,
     /// Whether these links pass through each other too, because of a fault that is injected on purpose.
     pub(super) pass: bool,
+    /// The whole that each part of an object belongs to, by their indices: nothing collides within a whole.
+    pub(super) wholes: BTreeMap<usize, usize>,
 }
 
 impl LinkPairs {
@@ -51,6 +53,10 @@ impl PhysicsHooks for LinkPairs {
         let owner = |handle| context.colliders.get(handle).map(|collider| Owner::from_tag(collider.user_data));
         let collide = match (owner(context.collider1), owner(context.collider2)) {
             (Some(Owner::Link(a)), Some(Owner::Link(b))) => !self.pass && self.pairs.contains(&(a.min(b), a.max(b))),
+            (Some(Owner::Object(a)), Some(Owner::Object(b))) => {
+                let whole = |idx| self.wholes.get(&idx).copied().unwrap_or(idx);
+                whole(a) != whole(b)
+            }
             _ => true,
         };
         collide.then_some(SolverFlags::COMPUTE_RIGID_IMPULSES)
@@ -71,7 +77,7 @@ impl World {
             .flat_map(|first| solid.iter().filter(move |second| *second > first).map(move |second| (*first, *second)));
         let passes = |pair: &(usize, usize)| neighbours.contains(pair) || self.robot.kinematics.pass(pair.0, pair.1);
         let apart = |pair: &(usize, usize)| !passes(pair) && self.depth_of(pair.0, pair.1) <= TOUCH_M;
-        LinkPairs { pairs: pairs.filter(apart).collect(), pass: false }
+        LinkPairs { pairs: pairs.filter(apart).collect(), ..LinkPairs::default() }
     }
 
     /// Puts links that pass through each other into collision groups that do, as far as there are groups. The engine then
@@ -102,7 +108,8 @@ mod tests {
 
     #[test]
     fn links_with_the_same_partners_share_a_group_and_no_others_do() {
-        let pairs = |pairs: &[(usize, usize)]| LinkPairs { pairs: pairs.iter().copied().collect(), pass: false };
+        let pairs =
+            |pairs: &[(usize, usize)]| LinkPairs { pairs: pairs.iter().copied().collect(), ..LinkPairs::default() };
         assert_eq!(pairs(&[(0, 2), (1, 2)]).groups(4), [0, 0, 1, 2]);
         let all: Vec<(usize, usize)> =
             (0..40).flat_map(|first| (first + 1..40).map(move |second| (first, second))).collect();

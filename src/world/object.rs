@@ -7,6 +7,7 @@ use rapier3d::prelude::{
     CoefficientCombineRule, ColliderBuilder, MassProperties, PhysicsWorld, RigidBodyBuilder, RigidBodyHandle,
 };
 
+use crate::attach::Attachment;
 use crate::convert::{to_pose, to_real, to_vector};
 use crate::engine::{LENGTH_UNIT, Owner, collider};
 use crate::furniture::slides;
@@ -36,6 +37,8 @@ pub(super) struct Object {
     pub(super) placed: Isometry3<f64>,
     /// Its tubes, if it can move.
     pub(super) hollows: Vec<Hollow>,
+    /// Its attachment to another object, if it is a part of it.
+    pub(super) attached: Option<Attachment>,
 }
 
 /// Adds one object with the shapes of its model.
@@ -81,6 +84,7 @@ pub(super) fn insert(engine: &mut PhysicsWorld, idx: usize, object: &SceneObject
         restitution: object.restitution,
         placed,
         hollows,
+        attached: None,
     }
 }
 

@@ -50,6 +50,9 @@ impl World {
             }
             touching.insert(name);
         }
+        if let Some(attached) = &object.attached {
+            carriers.insert(self.objects[attached.to].id.clone());
+        }
         let (aabb_min, aabb_max) = self.aabb(object);
         let body = self.engine.bodies.get(object.body);
         let velocities = body.map(|body| {
@@ -75,6 +78,10 @@ impl World {
             asleep: body.is_some_and(rapier3d::prelude::RigidBody::is_sleeping),
             size_m: Some(object.model.size_m),
             grasp_distance_m: None,
+            part: object
+                .attached
+                .as_ref()
+                .and_then(|attached| Some((self.objects[attached.whole].id.clone(), self.part_position(object)?))),
         }
     }
 

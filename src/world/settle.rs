@@ -58,6 +58,10 @@ impl World {
 
     fn left(&self) -> Vec<String> {
         let gone = |object: &&super::object::Object| {
+            // A part hangs or falls shut by itself.
+            if let Some(off_m) = self.off_its_joint_m(object) {
+                return off_m.is_nan() || off_m > LEFT_M;
+            }
             let way = (self.pose_of(object).translation.vector - object.placed.translation.vector).norm();
             way.is_nan() || way > LEFT_M
         };

@@ -7,6 +7,7 @@ use std::sync::Arc;
 use nalgebra::{Isometry3, Vector3};
 use rapier3d::prelude::{PhysicsWorld, RigidBodyHandle};
 
+use crate::attach::attach;
 use crate::convert::{from_pose, from_vector, to_vector};
 use crate::engine::{add_floor, engine};
 use crate::furniture::Sliding;
@@ -103,8 +104,9 @@ pub fn build(scene: &Scene) -> Result<World, WorldError> {
     let mut engine = engine(&scene.physics)?;
     add_floor(&mut engine);
     let robot = Robot::insert(&mut engine, &scene.robot)?;
-    let objects: Vec<Object> =
+    let mut objects: Vec<Object> =
         scene.objects.iter().enumerate().map(|(idx, object)| object::insert(&mut engine, idx, object)).collect();
+    attach(&mut engine, &scene.objects, &mut objects);
     let steps_per_second = scene.physics.steps_per_second;
     let steps_per_tick = (steps_per_second / CONTROL_HZ).max(1);
     let tick_secs = f64::from(steps_per_tick) / f64::from(steps_per_second);
@@ -133,6 +135,7 @@ pub fn build(scene: &Scene) -> Result<World, WorldError> {
         watch: None,
     };
     world.link_pairs = world.find_link_pairs();
+    world.link_pairs.wholes = world.wholes();
     world.group_links();
     Ok(world)
 }

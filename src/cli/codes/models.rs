@@ -107,7 +107,7 @@ const CODES_W: &[Code] = &[
     code(
         "W035",
         "a model file uses a feature that is not supported",
-        "an object with movable joints, nested models, or a tilted model in a world",
+        "an object with a ball joint, links that no joint connects, or a joint that moves the whole model",
         "follow the help; robots are read through `[robot] profile`",
     ),
     code(

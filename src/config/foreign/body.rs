@@ -1,9 +1,11 @@
 //! A rigid body read from SDF or URDF, and its conversion to a model.
 
+use std::sync::Arc;
+
 use nalgebra::{Isometry3, Matrix3, Point3, Translation3, Vector3};
 
 use actcheck_base::names;
-use actcheck_data::{Inertia, ObjectModel, Part, Pose, Shape, Surface, bounds};
+use actcheck_data::{Inertia, MovingPart, ObjectModel, Part, PartJoint, Pose, Shape, Surface, bounds};
 
 /// Density of a body without a mass: that of water, SDF's default. Unit: kg/m³.
 const DENSITY: f64 = 1000.0;
@@ -27,6 +29,17 @@ pub(crate) struct Body {
     pub(crate) friction: Option<f64>,
     pub(crate) restitution: Option<f64>,
     pub(crate) fixed: bool,
+    /// Bodies that joints move; each after the one that carries it.
+    pub(crate) moving: Vec<MovingBody>,
+}
+
+/// A body that a joint moves. Frame: the file's own.
+pub(crate) struct MovingBody {
+    pub(crate) name: String,
+    pub(crate) body: Body,
+    /// The moving body that carries it, by its index.
+    pub(crate) on: Option<usize>,
+    pub(crate) joint: PartJoint,
 }
 
 /// Mass of one link. Frame: the file's own.
@@ -41,13 +54,13 @@ impl Body {
     /// Converts the body to a model: places its origin at `pose`, then moves it so that its middle is above the origin
     /// and its lowest point at z = 0. The caller sets the category.
     pub(crate) fn into_model(self, name: &str, digest: String, pose: &Isometry3<f64>) -> ObjectModel {
-        let turned = self.placed(pose);
-        let (low, high) = bounds(&turned);
+        let everything: Vec<Part> = self.all().flat_map(|body| body.placed(pose)).collect();
+        let (low, high) = bounds(&everything);
         let foot = Vector3::new((low.x + high.x) / 2.0, (low.y + high.y) / 2.0, low.z);
         let model_from_file = Translation3::from(-foot) * pose;
         let parts = self.placed(&model_from_file);
         let size = high - low;
-        let surface = surface(&parts, size.z);
+        let surface = surface(&parts, bounds(&parts).1.z);
         let by_volume = DENSITY * parts.iter().map(|part| part.shape.volume()).sum::<f64>();
         let stated: f64 = self.masses.iter().map(|mass| mass.kg).sum();
         let is_stated = !self.has_unknown_mass && stated > 0.0;
@@ -63,8 +76,14 @@ impl Body {
             parts,
             fixed: self.fixed,
             surface,
+            moving: self.moving.into_iter().map(|moving| moving.into_part(&model_from_file)).collect(),
             digest,
         }
+    }
+
+    /// The body and all that joints move.
+    fn all(&self) -> impl Iterator<Item = &Self> {
+        std::iter::once(self).chain(self.moving.iter().map(|moving| &moving.body))
     }
 
     fn placed(&self, at: &Isometry3<f64>) -> Vec<Part> {
@@ -91,6 +110,22 @@ impl Body {
             com_m: com.into(),
             about_com: [0, 1, 2].map(|row| [sum[(row, 0)], sum[(row, 1)], sum[(row, 2)]]),
         })
+    }
+}
+
+impl MovingBody {
+    fn into_part(self, model_from_file: &Isometry3<f64>) -> MovingPart {
+        let model = self.body.into_model(&self.name, String::new(), model_from_file);
+        let part_from_file = Translation3::from(Vector3::from(model.origin_m) - model_from_file.translation.vector);
+        let axis = model_from_file.rotation * Vector3::from(self.joint.axis);
+        let anchor = model_from_file * Point3::from(self.joint.anchor_m);
+        MovingPart {
+            name: self.name,
+            model: Arc::new(model),
+            pose: Pose::from_isometry(&part_from_file.inverse().into()),
+            on: self.on,
+            joint: PartJoint { axis: axis.into(), anchor_m: anchor.coords.into(), ..self.joint },
+        }
     }
 }
 

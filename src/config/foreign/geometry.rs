@@ -76,7 +76,10 @@ impl<'a> Shapes<'a> {
             Ok(file) => {
                 self.digest.update(&file.bytes);
                 reader.found.extend(file.warnings);
-                Some(Shape::Mesh { mesh: file.mesh.scaled(scale) })
+                let mesh = file.mesh.scaled(scale);
+                // With the backs of its faces, a mesh has no volume.
+                let mesh = if mesh.volume() > LEAST_VOLUME { mesh } else { mesh.one_sided() };
+                Some(Shape::Mesh { mesh })
             }
             Err(faults) => {
                 // A fault without a source, as of a binary mesh file, is reported where the file is named.

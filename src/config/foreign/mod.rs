@@ -3,6 +3,7 @@
 //! An element that the simulation does not support is an error if it changes the model, and a warning if the model
 //! works without it. Never: ignores an element silently, decomposes a mesh, or guesses a category.
 
+mod assembly;
 mod body;
 mod collada;
 mod folder;
@@ -19,6 +20,7 @@ pub(crate) mod robot_shapes;
 pub(crate) mod robot_text;
 pub(crate) mod robot_tree;
 mod sdf;
+mod sdf_joint;
 pub(crate) mod sdf_robot;
 mod urdf;
 mod urdf_text;

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use nalgebra::{Isometry3, Matrix3};
+use nalgebra::{Isometry3, Matrix3, Translation3};
 
 use crate::foreign::body::{Body, Mass, is_possible};
 use crate::foreign::geometry::{Shapes, check_volume};
@@ -11,10 +11,13 @@ use crate::foreign::lookup::Lookup;
 use crate::foreign::nested::{Links, Role};
 use crate::foreign::xml::{self, Bound, Node, Reader};
 use actcheck_base::{Diagnostics, Source};
-use actcheck_data::{Part, Pose};
+use actcheck_data::{Part, Pose, Shape};
 
 /// Supported minor versions of SDF 1.
 const VERSIONS: std::ops::RangeInclusive<u32> = 3..=12;
+
+/// Thickness of the plate that a plane becomes. Unit: metres.
+const PLANE_M: f64 = 0.02;
 
 /// A model read from SDF or URDF.
 pub(crate) struct SdfModel {
@@ -117,15 +120,19 @@ pub(crate) fn pose(node: Node, reader: &mut Reader) -> Option<Isometry3<f64>> {
     Some(xml::placed([x, y, z], [roll * unit, pitch * unit, yaw * unit]))
 }
 
-/// Reads a model's links, with those of nested and included models, as one rigid body.
+/// Reads a model's links, with those of nested and included models, as one body and those that joints move.
 pub(crate) fn read_model(model: Node, role: Role, shapes: &mut Shapes, reader: &mut Reader) -> Body {
     let fixed = role == Role::Furniture || is_static(model, reader);
-    let mut body = Body { fixed, ..Body::default() };
     let links = Links::of(model, role, reader);
-    links.check_joints(role, body.fixed, reader);
-    for (link, at) in &links.links {
-        read_link(*link, at, role, &mut body, shapes, reader);
+    let assembly = links.assembly(role, fixed, reader);
+    let fixed = fixed || links.is_anchored();
+    links.check_connected(fixed, reader);
+    let mut bodies = assembly.empty_bodies(fixed);
+    for (idx, (link, at)) in links.links.iter().enumerate() {
+        read_link(*link, at, role, &mut bodies[assembly.body_of(idx)], shapes, reader);
     }
+    let names: Vec<&str> = links.links.iter().map(|(link, _)| link.attribute("name").unwrap_or_default()).collect();
+    let mut body = assembly.attach(bodies, &names, reader);
     links.read_included(role, &mut body, shapes, reader);
     if body.parts.is_empty() && role == Role::Object && !reader.found.has_errors() {
         let message = "the model has no solid shape: none of its links has a `<collision>`".to_owned();
@@ -177,7 +184,8 @@ fn read_link(
         reader.warning("W036", decay, message, "the model works without it");
     }
     let before = body.parts.len();
-    for collision in xml::children(link, "collision").filter(|collision| role == Role::Object || !is_plane(*collision))
+    for collision in
+        xml::children(link, "collision").filter(|collision| role == Role::Object || plane(*collision).is_none())
     {
         read_collision(collision, &at, body, shapes, reader);
     }
@@ -193,15 +201,35 @@ fn read_link(
     }
 }
 
-/// Whether a `<collision>` is a plane: every world has a floor.
-fn is_plane(collision: Node) -> bool {
-    xml::child(collision, "geometry").is_some_and(|geometry| xml::child(geometry, "plane").is_some())
+/// Returns the plane that a `<collision>` is.
+fn plane(collision: Node<'_>) -> Option<Node<'_>> {
+    xml::child(collision, "geometry").and_then(|geometry| xml::child(geometry, "plane"))
+}
+
+/// Reads a plane of a model that never moves, as a plate.
+fn read_plane(plane: Node, reader: &mut Reader) -> Option<Shape> {
+    let [x, y] = match xml::child(plane, "size") {
+        Some(size) => reader.numbers(size, xml::text(size), Bound::Positive)?,
+        None => [1.0; 2],
+    };
+    if let Some(normal) = xml::child(plane, "normal") {
+        let [x, y, z] = reader.numbers(normal, xml::text(normal), Bound::Finite)?;
+        if x != 0.0 || y != 0.0 || z <= 0.0 {
+            let message = "a plane that is not level can't be simulated".to_owned();
+            reader.error("W035", normal, message, "turn the `<pose>` of the collision instead");
+            return None;
+        }
+    }
+    Some(Shape::Box { size: [x, y, PLANE_M] })
 }
 
 fn read_collision(collision: Node, link: &Isometry3<f64>, body: &mut Body, shapes: &mut Shapes, reader: &mut Reader) {
     reader.warn_about_unknown_children(collision, &["pose", "geometry", "surface", "max_contacts", "laser_retro"]);
     let at = pose(collision, reader);
-    let shape = reader.required(collision, "geometry").and_then(|geometry| shapes.sdf(geometry, reader));
+    let (at, shape) = match plane(collision).filter(|_| body.fixed) {
+        Some(plane) => (at.map(|at| at * Translation3::new(0.0, 0.0, -PLANE_M / 2.0)), read_plane(plane, reader)),
+        None => (at, reader.required(collision, "geometry").and_then(|geometry| shapes.sdf(geometry, reader))),
+    };
     if let Some(surface) = xml::child(collision, "surface") {
         read_surface(surface, body, reader);
     }

@@ -1,9 +1,10 @@
-//! Reads objects in URDF as one rigid body.
+//! Reads objects in URDF.
 
 use std::path::Path;
 
-use nalgebra::{Isometry3, Matrix3};
+use nalgebra::{Isometry3, Matrix3, Vector3};
 
+use crate::foreign::assembly::{Assembly, Join};
 use crate::foreign::body::{Body, Mass};
 use crate::foreign::geometry::{Shapes, check_volume};
 use crate::foreign::lenient::repaired;
@@ -11,7 +12,7 @@ use crate::foreign::lookup::Lookup;
 use crate::foreign::sdf::{SdfModel, possible};
 use crate::foreign::xml::{self, Bound, Node, Reader};
 use actcheck_base::{Diagnostics, Source};
-use actcheck_data::{Part, Pose};
+use actcheck_data::{Part, PartJoint, Pose};
 
 /// Longest chain of links; a longer one is a cycle.
 const LONGEST_CHAIN: usize = 256;
@@ -29,7 +30,7 @@ pub(crate) fn read(source: &Source, path: &Path, lookup: &Lookup) -> (Option<Sdf
     let root = document.root_element();
     let mut body = Body::default();
     if root.tag_name().name() == "robot" {
-        read_robot(root, &mut body, &mut shapes, &mut reader);
+        body = read_robot(root, &mut shapes, &mut reader);
     } else {
         let message = format!("the root is `<{}>` instead of `<robot>`", root.tag_name().name());
         reader.error("W032", root, message, "a URDF file begins with `<robot name=\"…\">`");
@@ -42,22 +43,83 @@ pub(crate) fn read(source: &Source, path: &Path, lookup: &Lookup) -> (Option<Sdf
     (Some(SdfModel { body, pose: Isometry3::identity(), is_static: false, digest }), found)
 }
 
-fn read_robot(root: Node, body: &mut Body, shapes: &mut Shapes, reader: &mut Reader) {
+fn read_robot(root: Node, shapes: &mut Shapes, reader: &mut Reader) -> Body {
     reader.warn_about_unknown_children(root, &["link", "joint", "material"]);
     let joints: Vec<Node> = xml::children(root, "joint").collect();
-    for joint in joints.iter().filter(|joint| joint.attribute("type") != Some("fixed")) {
-        let (name, kind) = (joint.attribute("name").unwrap_or(""), joint.attribute("type").unwrap_or("unknown"));
-        let message = format!("the joint `{name}` is of the type {kind}, but objects must be rigid");
-        reader.error("W035", *joint, message, "make the joint `fixed`; robots are read through `[robot] profile`");
+    let links: Vec<Node> = xml::children(root, "link").collect();
+    let places: Vec<Option<Isometry3<f64>>> = links.iter().map(|link| place(*link, &joints, reader)).collect();
+    let mut joins = Vec::new();
+    for joint in joints {
+        let end = |which| {
+            let name = xml::child(joint, which).and_then(|end| end.attribute("link"));
+            links.iter().position(|link| link.attribute("name") == name)
+        };
+        let (Some(parent), Some(child)) = (end("parent"), end("child")) else { continue };
+        let moves = match (joint.attribute("type"), &places[child]) {
+            (Some("fixed"), _) => None,
+            (_, Some(at)) => match read_joint(joint, at, reader) {
+                Some(moves) => Some(moves),
+                None => continue,
+            },
+            (_, None) => continue,
+        };
+        joins.push(Join { node: joint, parent, child, joint: moves });
     }
-    for link in xml::children(root, "link") {
-        let Some(at) = place(link, &joints, reader) else { continue };
-        read_link(link, &at, body, shapes, reader);
+    let assembly = Assembly::of(links.len(), &joins, reader);
+    let mut bodies = assembly.empty_bodies(false);
+    for (idx, (link, at)) in links.iter().zip(&places).enumerate() {
+        if let Some(at) = at {
+            read_link(*link, at, &mut bodies[assembly.body_of(idx)], shapes, reader);
+        }
     }
+    let names: Vec<&str> = links.iter().map(|link| link.attribute("name").unwrap_or_default()).collect();
+    let body = assembly.attach(bodies, &names, reader);
     if body.parts.is_empty() && !reader.found.has_errors() {
         let message = "the object has no solid shape: none of its links has a `<collision>`".to_owned();
         reader.error("W038", root, message, "give a link a `<collision>`; a `<visual>` does not collide");
     }
+    body
+}
+
+/// Reads a joint that moves a link, whose pose is known. Returns `None` after it has reported a fault.
+fn read_joint(joint: Node, at: &Isometry3<f64>, reader: &mut Reader) -> Option<PartJoint> {
+    let name = joint.attribute("name").unwrap_or_default();
+    let kind = joint.attribute("type").unwrap_or("unknown");
+    if !["revolute", "continuous", "prismatic"].contains(&kind) {
+        let message = format!("the joint `{name}` is of the type {kind}, which can't be simulated");
+        reader.error("W035", joint, message, "use revolute, continuous, prismatic or fixed");
+        return None;
+    }
+    let mut numbers = |element: &str, attribute: &str, otherwise: f64| {
+        let written = xml::child(joint, element).and_then(|node| Some((node, node.attribute(attribute)?)));
+        match written {
+            Some((node, text)) => reader.numbers::<1>(node, text, Bound::Finite).map(|[number]| number),
+            None => Some(otherwise),
+        }
+    };
+    let range = match kind {
+        "continuous" => [f64::NEG_INFINITY, f64::INFINITY],
+        _ => [numbers("limit", "lower", 0.0)?, numbers("limit", "upper", 0.0)?],
+    };
+    let (damping, friction) =
+        (numbers("dynamics", "damping", 0.0)?.max(0.0), numbers("dynamics", "friction", 0.0)?.max(0.0));
+    let axis = match xml::child(joint, "axis").and_then(|axis| Some((axis, axis.attribute("xyz")?))) {
+        Some((axis, text)) => Vector3::from(reader.numbers::<3>(axis, text, Bound::Finite)?),
+        None => Vector3::x(),
+    };
+    let Some(axis) = (at.rotation * axis).try_normalize(1e-9) else {
+        let message = format!("the axis of the joint `{name}` must not be zero");
+        reader.error("W034", joint, message, "write, for example, `<axis xyz=\"0 0 1\"/>`");
+        return None;
+    };
+    if range[0] > range[1] {
+        let message =
+            format!("the joint `{name}` has a lower limit of {} above its upper limit of {}", range[0], range[1]);
+        reader.error("W034", joint, message, "exchange the limits");
+        return None;
+    }
+    let anchor_m = at.translation.vector.into();
+    Some(PartJoint { slides: kind == "prismatic", axis: axis.into(), anchor_m, range, damping, friction })
 }
 
 /// Returns the pose of a link relative to the root, through its chain of fixed joints.

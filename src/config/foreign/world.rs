@@ -179,9 +179,11 @@ impl Gathering<'_> {
         let is_still = sdf::is_static(include, &mut self.reader);
         let is_upright = (at.rotation * Vector3::z()).z >= UPRIGHT_COSINE;
         let has_pose = xml::child(include, "pose").is_some();
+        let moves = |model: &ObjectModel| !is_still && !model.moving.is_empty();
         if let Some(model) = self.included.models.get(&named)
             && is_upright
             && !self.included.posed.contains(&named)
+            && (model.moving.is_empty() || moves(model))
         {
             self.warn_if_movable(is_still || model.fixed, &named, include);
             // A model's origin is below its middle; the file's origin may differ.

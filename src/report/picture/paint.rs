@@ -38,7 +38,7 @@ pub(super) fn rgb_of(role: Role) -> u32 {
     match role {
         Role::Target => TARGET,
         Role::Obstacle => OBSTACLE,
-        Role::Other | Role::PlaceOther | Role::Platform => OTHER,
+        Role::Other | Role::PlaceOther | Role::Platform | Role::Part => OTHER,
     }
 }
 
