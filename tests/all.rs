@@ -110,6 +110,7 @@ mod terminal;
 mod terms;
 mod true_claims;
 mod trust;
+mod two_arms;
 mod unchanging;
 mod wheel;
 mod worlds;

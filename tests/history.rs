@@ -49,6 +49,7 @@ fn robot() -> Arc<RobotProfile> {
         finger_joints: vec![String::new(), String::new()],
         head_joints: Vec::new(),
         other_joints: Vec::new(),
+        parked: Vec::new(),
         grasp_link: String::new(),
         grasp_turned_rad: [0.0; 3],
         camera_turned_rad: [0.0; 3],

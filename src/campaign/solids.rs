@@ -51,21 +51,21 @@ fn decompose_model(name: &str, model: &mut Arc<ObjectModel>, cache: &mut HullCac
     }
 }
 
-/// Proposes a profile for a robot without roles, with the basis of each guess by the profile's key. Meshes are decomposed
-/// with the cache in the folder of a history.
+/// Proposes a profile for a robot without roles, and for that of its hands with `hand` in a name. Meshes are decomposed with
+/// the cache in the folder of a history.
 ///
 /// # Errors
 /// W037 for each mesh without a convex decomposition; W020 to W024 if no profile can be proposed.
 pub fn proposed_robot(
     mut robot: RobotProfile,
     history: &Path,
-) -> Result<(RobotProfile, BTreeMap<&'static str, String>), Diagnostics> {
+    hand: Option<&str>,
+) -> Result<world::Proposal, Diagnostics> {
     let mut cache = HullCache { folder: history.join(FOLDER), known: BTreeMap::new() };
     let mut faults = Diagnostics::new();
     decompose_with(&mut cache, &mut robot, &mut faults);
     faults.or(())?;
-    let proposal = world::propose(&robot).map_err(|error| error.diagnostic())?;
-    Ok((proposal.profile, proposal.notes))
+    Ok(world::propose(&robot, hand).map_err(|error| error.diagnostic())?)
 }
 
 /// Finds the roles that the robot's profile leaves out, and limits the force of its grip to that of its motors.

@@ -27,6 +27,9 @@ pub struct NewRobotArgs {
     /// An argument of the xacro file, such as `gripper:=robotiq_2f_85`
     #[arg(long = "xacro-arg", value_name = "NAME:=VALUE")]
     pub xacro_args: Vec<String>,
+    /// Of several hands, the one with TEXT in the name of a link or joint of its arm: `left`, for example
+    #[arg(long, value_name = "TEXT")]
+    pub hand: Option<String>,
     /// The profile to write [default: the model's name with the extension .toml, in this folder]
     #[arg(long, value_name = "PROFILE")]
     pub out: Option<PathBuf>,
@@ -38,7 +41,8 @@ pub fn robot(args: &NewRobotArgs) -> Result<(), Diagnostics> {
     let name = bare.name.clone();
     let out = args.out.clone().unwrap_or_else(|| PathBuf::from(format!("{name}.toml")));
     let folder = out.parent().unwrap_or(Path::new(""));
-    let (profile, notes) = proposed_robot(bare, &folder.join(HISTORY))?;
+    let proposal = proposed_robot(bare, &folder.join(HISTORY), args.hand.as_deref())?;
+    let (profile, notes, other_hands) = (proposal.profile, proposal.notes, proposal.other_hands);
     let mut files = NewFiles::default();
     files.add(&out, text(&profile, &notes, args, folder));
     files.write("name another file with `--out PROFILE`, or delete it")?;
@@ -57,6 +61,12 @@ pub fn robot(args: &NewRobotArgs) -> Result<(), Diagnostics> {
         profile.arm_joints.len(),
         profile.camera_link,
     ));
+    if !other_hands.is_empty() {
+        let others = other_hands.join("`, `");
+        output::print_prose(&format!(
+            "this robot has another hand at `{others}`: `--hand TEXT` proposes a profile for it\n"
+        ));
+    }
     Ok(())
 }
 
@@ -117,6 +127,11 @@ fn stated(profile: &RobotProfile, args: &NewRobotArgs, folder: &Path) -> Vec<(&'
     }
     if !profile.head_joints.is_empty() {
         keys.push(("head_joints", list(&profile.head_joints)));
+    }
+    if !profile.parked.is_empty() {
+        let (joints, positions): (Vec<String>, Vec<f64>) = profile.parked.iter().cloned().unzip();
+        keys.push(("parked_joints", list(&joints)));
+        keys.push(("parked", numbers(&positions)));
     }
     keys
 }

@@ -215,6 +215,7 @@ pub fn bare(
         finger_joints: Vec::new(),
         head_joints: Vec::new(),
         other_joints: Vec::new(),
+        parked: Vec::new(),
         grasp_link: none(),
         grasp_turned_rad: [0.0; 3],
         grasp_offset_m: [0.0; 3],
@@ -316,6 +317,13 @@ fn read_table(
     roles.joints.push(("head_joints", head_joints.clone()));
     let other_joints = table.strings("other_joints").unwrap_or_default();
     roles.joints.push(("other_joints", other_joints.clone()));
+    let parked_joints = table.strings("parked_joints").unwrap_or_default();
+    roles.joints.push(("parked_joints", parked_joints.clone()));
+    let parked = posture(table, "parked", ("parked_joints", parked_joints.len()), roles).unwrap_or_default();
+    if let (Some(span), false) = (table.key_span("parked_joints"), table.has("parked")) {
+        let message = "`parked_joints` needs `parked`: the position of each of them".to_owned();
+        table.fault("W011", span, message, "give one position for each joint, in metres or radians");
+    }
     let (grasp_link, camera_link) = (table.string("grasp_link"), table.string("camera_link"));
     // A camera that is fixed in the world is on no link.
     let in_world = camera_link.as_ref().is_some_and(|link| link.value == RobotProfile::MAP);
@@ -337,9 +345,9 @@ fn read_table(
     let grip_force_n = table.number("grip_force_n", 0.1..=1000.0).unwrap_or(GRIP_FORCE_N);
     let suction = read_suction(table);
     let n_arm_joints = arm_joints.as_ref().map_or(0, Vec::len);
-    let home = posture(table, "home", n_arm_joints, roles);
+    let home = posture(table, "home", ("arm_joints", n_arm_joints), roles);
     let postures = table.tables("postures").into_iter().filter_map(|mut posture_table| {
-        let arm = posture(&mut posture_table, "arm", n_arm_joints, roles);
+        let arm = posture(&mut posture_table, "arm", ("arm_joints", n_arm_joints), roles);
         posture_table.finish(found);
         arm
     });
@@ -359,6 +367,7 @@ fn read_table(
         finger_joints: finger_joints.unwrap_or_default(),
         head_joints: values(head_joints),
         other_joints: values(other_joints),
+        parked: values(parked_joints).into_iter().zip(parked).collect(),
         grasp_link: grasp_link.map(|link| link.value).unwrap_or_default(),
         grasp_turned_rad,
         grasp_offset_m,
@@ -423,15 +432,21 @@ fn names<const N: usize>(table: &mut Table, key: &'static str, roles: &mut Roles
 }
 
 /// Reads one position for each arm joint.
-fn posture(table: &mut Table, key: &str, n_arm_joints: usize, roles: &mut Roles) -> Option<Vec<f64>> {
-    let span = table.key_span(key)?;
-    let positions = table.number_list(key, ..)?;
-    if positions.len() != n_arm_joints && n_arm_joints > 0 {
-        let message = format!("`{key}` has {} positions for {n_arm_joints} arm joints", positions.len());
-        table.fault("W011", span, message, "give one position for each joint of `arm_joints`");
+fn posture(
+    table: &mut Table,
+    key: &str,
+    (joints, n_joints): (&'static str, usize),
+    roles: &mut Roles,
+) -> Option<Vec<f64>> {
+    let span = table.key_span(key);
+    let (positions, span) = (table.number_list(key, ..)?, span?);
+    if positions.len() != n_joints && (n_joints > 0 || joints != "arm_joints") {
+        let what = if joints == "arm_joints" { "arm joints" } else { "parked joints" };
+        let message = format!("`{key}` has {} positions for {n_joints} {what}", positions.len());
+        table.fault("W011", span, message, format!("give one position for each joint of `{joints}`"));
         return None;
     }
-    roles.postures.push((span, positions.clone()));
+    roles.postures.push((span, joints, positions.clone()));
     Some(positions)
 }
 

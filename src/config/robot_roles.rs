@@ -16,8 +16,8 @@ pub(super) struct Roles {
     pub(super) joints: Vec<(&'static str, Vec<Located<String>>)>,
     /// Links named by the profile.
     pub(super) links: Vec<Vec<Located<String>>>,
-    /// Postures of the arm, each with its span and positions.
-    pub(super) postures: Vec<(Span, Vec<f64>)>,
+    /// Positions of the joints that a key of the profile names, each with its span.
+    pub(super) postures: Vec<(Span, &'static str, Vec<f64>)>,
     /// The widest gap between the fingers, with its span.
     pub(super) opening: Option<(Span, f64)>,
 }
@@ -55,8 +55,8 @@ impl Roles {
     }
 
     fn check_postures(&self, tree: &Tree, table: &mut Table) {
-        for (span, positions) in &self.postures {
-            for (joint, position) in self.of("arm_joints").iter().zip(positions) {
+        for (span, key, positions) in &self.postures {
+            for (joint, position) in self.of(key).iter().zip(positions) {
                 let Some(limits) = tree.joints.get(&joint.value) else { continue };
                 if *position < limits.lower - SLACK || *position > limits.upper + SLACK {
                     let message = format!("{position} is beyond the limits of `{}`", joint.value);

@@ -31,6 +31,9 @@ pub struct RobotProfile {
     pub head_joints: Vec<String>,
     /// Joints without another role that programs may move. All joints without a role are rigid.
     pub other_joints: Vec<String>,
+    /// Positions of rigid joints, such as those of a second arm; all others are at 0 or at the limit nearest to it. Units:
+    /// metres or radians.
+    pub parked: Vec<(String, f64)>,
     /// Link between the fingertips; its x axis points along the fingers, its y axis across them.
     pub grasp_link: String,
     /// Rotation of the grasp frame relative to that link, if the link's axes differ: about its fixed x, y and z axes,

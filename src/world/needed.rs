@@ -11,15 +11,18 @@ pub(super) struct Needed<'a> {
     /// `None` if the profile has no roles yet: all joints move.
     moving: Option<BTreeSet<&'a str>>,
     joints: BTreeMap<&'a str, &'a urdf_rs::Joint>,
+    /// Positions of rigid joints that the profile gives.
+    parked: BTreeMap<&'a str, f64>,
 }
 
 impl<'a> Needed<'a> {
     pub(super) fn of(robot: &'a urdf_rs::Robot, profile: &'a RobotProfile) -> Self {
         let joints: BTreeMap<&str, &urdf_rs::Joint> =
             robot.joints.iter().map(|joint| (joint.name.as_str(), joint)).collect();
+        let parked = profile.parked.iter().map(|(name, position)| (name.as_str(), *position)).collect();
         let has_hand = !profile.finger_joints.is_empty() || profile.suction.is_some();
         if profile.arm_joints.is_empty() || !has_hand {
-            return Self { moving: None, joints };
+            return Self { moving: None, joints, parked };
         }
         let base = profile.base_joints.iter().flatten();
         let roles = base.chain(&profile.arm_joints).chain(&profile.head_joints).chain(&profile.finger_joints);
@@ -39,7 +42,7 @@ impl<'a> Needed<'a> {
                 break;
             }
         }
-        Self { moving: Some(moving), joints }
+        Self { moving: Some(moving), joints, parked }
     }
 
     /// Whether the profile has roles, which select the joints.
@@ -52,7 +55,8 @@ impl<'a> Needed<'a> {
         self.moving.as_ref().is_none_or(|moving| moving.contains(joint.name.as_str()))
     }
 
-    /// The position of a rigid joint: 0, or the limit nearest to it; by its coupling if it has one.
+    /// The position of a rigid joint: that of the profile, otherwise 0 or the limit nearest to it; by its coupling if it has
+    /// one.
     pub(super) fn rest(&self, joint: &urdf_rs::Joint) -> f64 {
         let mut at = joint;
         let (mut factor, mut offset) = (1.0, 0.0);
@@ -64,7 +68,8 @@ impl<'a> Needed<'a> {
             factor *= mimic.multiplier.unwrap_or(1.0);
             at = leader;
         }
-        within(joint, factor * within(at, 0.0) + offset)
+        let parked = self.parked.get(at.name.as_str()).copied().unwrap_or(0.0);
+        within(joint, factor * within(at, parked) + offset)
     }
 }
 

@@ -32,6 +32,8 @@ const UNALIKE: f64 = 0.7;
 const UNLIKE: f64 = 0.1;
 /// Weight of a direction from the palm's origin: its frame may be anywhere.
 const FROM_PALM: f64 = 0.9;
+/// Fewest joints that carry a hand of an arm.
+const FEWEST_ARM_JOINTS: usize = 4;
 /// Openings wider than this are worth no more. Unit: metres.
 const WIDE_M: f64 = 0.12;
 
@@ -41,23 +43,26 @@ pub(super) struct Hand {
     /// The link that carries the fingers.
     pub(super) palm: usize,
     pub(super) notes: BTreeMap<&'static str, String>,
+    /// Names of the links that carry other hands.
+    pub(super) others: Vec<String>,
 }
 
-/// Finds the best gripper, and keeps the parts that the profile names.
+/// Finds the best gripper, and keeps the parts that the profile names. Of several hands, only those with `wanted` in a
+/// name of theirs or of their arm count.
 ///
 /// # Errors
 /// [`NoHand`] if there is none.
-pub(super) fn find(partial: &RobotProfile, model: &RobotModel) -> Result<Hand, NoHand> {
+pub(super) fn find(partial: &RobotProfile, model: &RobotModel, wanted: Option<&str>) -> Result<Hand, NoHand> {
     let stated = Stated::of(partial, model)?;
     if let (Some(_), Some((palm, _))) = (partial.suction, stated.grasp) {
-        return Ok(Hand { profile: partial.clone(), palm, notes: BTreeMap::new() });
+        return Ok(Hand { profile: partial.clone(), palm, notes: BTreeMap::new(), others: Vec::new() });
     }
     if let (Some(links), [_, ..], Some(grasp)) = (stated.links, stated.joints.as_slice(), stated.grasp) {
         let mut profile = partial.clone();
         if profile.max_opening_m == 0.0 {
             profile.max_opening_m = as_opening(Gripper::find(partial, model, links, grasp)?.widest_m());
         }
-        return Ok(Hand { profile, palm: grasp.0, notes: BTreeMap::new() });
+        return Ok(Hand { profile, palm: grasp.0, notes: BTreeMap::new(), others: Vec::new() });
     }
     let groups = stated.groups(model).unwrap_or_else(|| groups(model));
     if groups.is_empty() {
@@ -70,14 +75,44 @@ pub(super) fn find(partial: &RobotProfile, model: &RobotModel) -> Result<Hand, N
     }
     let mut rated: Vec<(usize, usize, &BTreeSet<usize>)> =
         groups.iter().map(|(palm, joints)| (rank(model, *palm), *palm, joints)).collect();
+    if let Some(wanted) = wanted {
+        let hands: Vec<&str> = rated.iter().map(|(_, palm, _)| model.links[*palm].name.as_str()).collect();
+        let unknown =
+            || NoHand::Gripper(format!("no hand has `{wanted}` in a name: there are `{}`", hands.join("`, `")));
+        let chosen: Vec<_> = rated.iter().copied().filter(|(_, palm, _)| is_called(model, *palm, wanted)).collect();
+        if chosen.is_empty() {
+            return Err(unknown());
+        }
+        rated = chosen;
+    }
     rated.retain(|(_, palm, _)| stated.grasp.is_none_or(|(link, _)| link == *palm));
     rated.sort_by_key(|(rank, palm, _)| (std::cmp::Reverse(*rank), *palm));
     // The meshes are in the model already.
     let light = RobotProfile { meshes: BTreeMap::new(), ..partial.clone() };
     let best = rated.iter().find_map(|(_, palm, joints)| measure(&light, model, &stated, *palm, joints));
-    let best =
-        best.map(|hand| Hand { profile: RobotProfile { meshes: partial.meshes.clone(), ..hand.profile }, ..hand });
+    let others_than = |own: usize| {
+        let others = groups.keys().filter(|palm| **palm != own && chain(model, **palm).len() >= FEWEST_ARM_JOINTS);
+        others.map(|palm| model.links[*palm].name.clone()).collect()
+    };
+    let best = best.map(|hand| Hand {
+        profile: RobotProfile { meshes: partial.meshes.clone(), ..hand.profile },
+        others: others_than(hand.palm),
+        ..hand
+    });
     best.ok_or_else(|| NoHand::Gripper(why_none(model, &rated)))
+}
+
+/// Whether a name of a hand or of the arm that carries it contains a text; for `left` and `right`, also the abbreviation of
+/// one letter. Fingers don't count: each hand has a left one.
+fn is_called(model: &RobotModel, palm: usize, text: &str) -> bool {
+    let text = text.to_lowercase();
+    let letter = ["left", "right"].contains(&text.as_str()).then(|| &text[..1]);
+    let is_so = |name: &str| {
+        let name = name.to_lowercase();
+        name.contains(&text) || letter.is_some_and(|letter| name.split(['_', '-']).any(|word| word == letter))
+    };
+    let has = |joint: &usize| is_so(&model.joints[*joint].name) || is_so(&model.links[*joint + 1].name);
+    chain(model, palm).iter().any(has)
 }
 
 /// Why none of these groups of joints is a gripper.
@@ -212,7 +247,7 @@ fn measure(
         profile.max_opening_m = as_opening(found.widest_m);
         notes.insert("max_opening_m", "measured at that place".to_owned());
     }
-    Some(Hand { profile, palm, notes })
+    Some(Hand { profile, palm, notes, others: Vec::new() })
 }
 
 /// Not wider than measured, up to the rounding of limits. Unit: metres.

@@ -26,17 +26,20 @@ pub struct Proposal {
     pub profile: RobotProfile,
     /// The basis of guesses, by the profile's key: lower-case sentences without a full stop.
     pub notes: BTreeMap<&'static str, String>,
+    /// Links of the robot that carry other hands.
+    pub other_hands: Vec<String>,
 }
 
 /// Openings narrower than this are measured between other parts than fingertips. Unit: metres.
 const LEAST_OPENING_M: f64 = 0.02;
 
-/// Proposes a profile for a robot without roles, whose meshes are convex.
+/// Proposes a profile for a robot without roles, whose meshes are convex. Of several hands, it takes one with `hand` in the
+/// name of a link or joint of its arm.
 ///
 /// # Errors
 /// [`WorldError`] if the URDF can't be used, or no gripper is found.
-pub fn propose(bare: &RobotProfile) -> Result<Proposal, WorldError> {
-    find(bare, true)
+pub fn propose(bare: &RobotProfile, hand: Option<&str>) -> Result<Proposal, WorldError> {
+    find(bare, true, hand)
 }
 
 /// Returns whether a profile leaves out roles that [`complete`] finds.
@@ -53,16 +56,16 @@ pub fn is_incomplete(profile: &RobotProfile) -> bool {
 /// # Errors
 /// As [`propose`].
 pub fn complete(partial: &RobotProfile) -> Result<Proposal, WorldError> {
-    find(partial, false)
+    find(partial, false, None)
 }
 
 /// Finds the roles that a profile leaves out; its base, mount and head too if `all`.
-fn find(partial: &RobotProfile, all: bool) -> Result<Proposal, WorldError> {
+fn find(partial: &RobotProfile, all: bool, wanted: Option<&str>) -> Result<Proposal, WorldError> {
     let name = partial.urdf.name.to_string();
     // All joints move in the model of a profile without roles.
     let bare = RobotProfile { arm_joints: Vec::new(), planar_base: false, ..partial.clone() };
     let model = RobotModel::read(&bare)?;
-    let hand = fingers::find(partial, &model).map_err(|error| error.named(&name))?;
+    let hand = fingers::find(partial, &model, wanted).map_err(|error| error.named(&name))?;
     let mut notes = hand.notes;
     let mut profile = hand.profile;
     let body = body::find(&model, hand.palm, &mut notes);
@@ -90,10 +93,48 @@ fn find(partial: &RobotProfile, all: bool) -> Result<Proposal, WorldError> {
         let grasp = frame(&model, &profile.grasp_link, profile.grasp_offset_m, profile.grasp_turned_rad)?;
         (profile.home, profile.postures) = postures::find(&profile, &model, grasp, &mut notes)?;
     }
+    if all {
+        profile.parked = parked(partial, &profile, &hand.others, &mut notes);
+    }
     // Joints without a role are rigid from now on: a finger that no named joint moves may narrow the opening.
     let narrower = Named::find(&profile, &RobotModel::read(&profile)?)?.layout.gripper.widest_m();
     if partial.max_opening_m == 0.0 && narrower > LEAST_OPENING_M {
         profile.max_opening_m = profile.max_opening_m.min(fingers::as_opening(narrower));
     }
-    Ok(Proposal { profile, notes })
+    Ok(Proposal { profile, notes, other_hands: hand.others })
+}
+
+/// The joints of another arm at its home. Stretched out, as all joints are at 0 for some robots, it is in the way.
+fn parked(
+    bare: &RobotProfile,
+    own: &RobotProfile,
+    others: &[String],
+    notes: &mut BTreeMap<&'static str, String>,
+) -> Vec<(String, f64)> {
+    let Some(other) = others.first() else { return Vec::new() };
+    let Ok(found) = home_of(bare, other) else { return Vec::new() };
+    notes.insert("parked_joints", format!("the arm of the hand `{other}` at its own home"));
+    let own: Vec<&String> = own.base_joints.iter().flatten().chain(&own.arm_joints).chain(&own.head_joints).collect();
+    let positions = found.arm_joints.into_iter().zip(found.home);
+    positions.filter(|(joint, _)| !own.contains(&joint)).collect()
+}
+
+/// A profile for the hand at a link, without one for the other hands.
+fn home_of(bare: &RobotProfile, palm: &str) -> Result<RobotProfile, WorldError> {
+    let name = bare.urdf.name.to_string();
+    let model = RobotModel::read(&RobotProfile { arm_joints: Vec::new(), planar_base: false, ..bare.clone() })?;
+    let hand = fingers::find(bare, &model, Some(palm)).map_err(|error| error.named(&name))?;
+    let mut notes = BTreeMap::new();
+    let body = body::find(&model, hand.palm, &mut notes);
+    let arm_joints = body.arm.iter().map(|idx| model.joints[*idx].name.clone()).collect();
+    let planar_base = body.drives && body.own_base.is_none();
+    let base_joints =
+        planar_base.then(|| ["planar_x_joint", "planar_y_joint", "planar_heading_joint"].map(str::to_owned));
+    let mount_height_m = body.mount_height_m;
+    let mut profile = RobotProfile { arm_joints, planar_base, base_joints, mount_height_m, ..hand.profile };
+    (profile.camera_link, profile.camera_turned_rad) = (body.camera_link, body.camera_turned_rad);
+    let model = Arc::new(RobotModel::read(&profile)?);
+    let grasp = frame(&model, &profile.grasp_link, profile.grasp_offset_m, profile.grasp_turned_rad)?;
+    (profile.home, profile.postures) = postures::find(&profile, &model, grasp, &mut notes)?;
+    Ok(profile)
 }
