@@ -317,10 +317,11 @@ fn read_table(
     roles.joints.push(("head_joints", head_joints.clone()));
     let other_joints = table.strings("other_joints").unwrap_or_default();
     roles.joints.push(("other_joints", other_joints.clone()));
+    let (parked_span, has_parked) = (table.key_span("parked_joints"), table.has("parked"));
     let parked_joints = table.strings("parked_joints").unwrap_or_default();
     roles.joints.push(("parked_joints", parked_joints.clone()));
     let parked = posture(table, "parked", ("parked_joints", parked_joints.len()), roles).unwrap_or_default();
-    if let (Some(span), false) = (table.key_span("parked_joints"), table.has("parked")) {
+    if let (Some(span), false) = (parked_span, has_parked) {
         let message = "`parked_joints` needs `parked`: the position of each of them".to_owned();
         table.fault("W011", span, message, "give one position for each joint, in metres or radians");
     }
