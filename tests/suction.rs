@@ -20,8 +20,10 @@ const CRANE_KG: f64 = 4.0;
 const TOP_M: f64 = 0.5;
 /// Gap between the lip and the load. Unit: metres.
 const GAP_M: f64 = 1e-3;
-/// Joints of the crane.
+/// Joints of the crane, and the mass that the second moves besides the load. Unit: kilograms.
 const LIFT: usize = 0;
+const SLIDE: usize = 1;
+const TROLLEY_KG: f64 = 1.0;
 
 /// The crane, with its cup at `link` and its lift at this height. Unit: metres.
 fn crane(link: &str, lift_m: f64) -> RobotProfile {
@@ -121,6 +123,27 @@ fn a_load_aside_of_the_cup_peels_it_off_beyond_force_times_radius() {
         assert!(holds(&world));
         lift(&mut world, command, 0.12);
         assert_eq!(holds(&world), expected, "{aside_m} m aside");
+    }
+}
+
+/// A load m that is pulled aside at an acceleration a shears the lip with m·a: at most its friction times F.
+#[test]
+fn a_load_that_is_pulled_aside_shears_off_beyond_friction_times_force() {
+    let (mass_kg, friction) = (0.6, 0.5);
+    for (share, expected) in [(0.6, true), (0.8, true), (1.25, false), (1.6, false)] {
+        // Flat, so that the moment of its middle about the lip does not peel it off.
+        let mut world = above([0.15, 0.15, 0.02], 0.0, mass_kg);
+        let command = close(&mut world);
+        lift(&mut world, command, 0.05);
+        assert!(holds(&world));
+        let mut command = world.hold();
+        command.gripper_opening_m = 0.0;
+        let acceleration = share * friction * FORCE_N / mass_kg;
+        command.efforts = vec![(SLIDE, (mass_kg + TROLLEY_KG) * acceleration)];
+        // Until shortly before the joint's largest speed.
+        let secs = (0.8 / acceleration).min(0.1);
+        steps(&mut world, &command, secs);
+        assert_eq!(holds(&world), expected, "{share} of the limit");
     }
 }
 
