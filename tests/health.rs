@@ -34,7 +34,7 @@ fn examined(history: &History, campaign: &str) -> Health {
     let mut meter = HealthMeter::default();
     history.each_vitals(campaign, |run| meter.add(run)).unwrap();
     let outcomes = history.outcomes(&RunFilter::default()).unwrap();
-    outcomes.iter().for_each(|row| meter.add_outcome(&row.property, row.outcome));
+    outcomes.iter().for_each(|row| meter.add_outcomes(&row.property, row.outcome, 1));
     meter.finish()
 }
 

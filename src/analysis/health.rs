@@ -126,14 +126,14 @@ impl HealthMeter {
         u128::from_str_radix(&digest.finish(), 16).unwrap_or_default()
     }
 
-    /// Adds one outcome of a property (IRI).
-    pub fn add_outcome(&mut self, property: &str, outcome: Outcome) {
+    /// Adds equal outcomes of a property (IRI).
+    pub fn add_outcomes(&mut self, property: &str, outcome: Outcome, count: u64) {
         if !self.judged.contains_key(property) {
             self.judged.insert(property.to_owned(), (0, 0));
         }
         if let Some((not, all)) = self.judged.get_mut(property) {
-            *not += u64::from(outcome == Outcome::Inapplicable);
-            *all += u64::from(matches!(outcome, Outcome::Inapplicable | Outcome::Passed | Outcome::Failed));
+            *not += count * u64::from(outcome == Outcome::Inapplicable);
+            *all += count * u64::from(matches!(outcome, Outcome::Inapplicable | Outcome::Passed | Outcome::Failed));
         }
     }
 
@@ -284,7 +284,7 @@ mod tests {
         let inapplicable = |applies: u64, all: u64| {
             let mut meter = HealthMeter::default();
             let outcome = |at| if at < applies { Outcome::Passed } else { Outcome::Inapplicable };
-            (0..all).for_each(|at| meter.add_outcome("p", outcome(at)));
+            (0..all).for_each(|at| meter.add_outcomes("p", outcome(at), 1));
             meter.inapplicable()
         };
         assert_eq!(inapplicable(1, 10), [HealthProblem::Inapplicable("p".into(), 9, 10)]);

@@ -1,12 +1,16 @@
 //! `actcheck health`
 
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
 use clap::Args;
 
 use crate::options::{Format, HistoryArgs};
+use crate::work::both;
 use crate::{compare, history_dir, integrity, output};
 use actcheck_analysis::HealthMeter;
-use actcheck_base::{Diagnostic, Diagnostics};
-use actcheck_history::{History, RunFilter, Wish};
+use actcheck_base::{Diagnostic, Diagnostics, Outcome};
+use actcheck_history::{History, JudgedRun, RunFilter, Wish};
 use actcheck_report::{HealthSummary, health_json, health_table, health_text};
 
 /// `actcheck health`
@@ -56,12 +60,27 @@ pub fn health(args: &HealthArgs) -> Result<u8, Diagnostics> {
 /// # Errors
 /// `H014` the campaign does not exist; or the history can't be read.
 pub(super) fn examine(history: &History, campaign: &str) -> Result<HealthSummary, Diagnostics> {
-    let mut meter = HealthMeter::default();
-    history.each_vitals(campaign, |run| meter.add(run))?;
-    let filter = RunFilter { campaign: Some(campaign.to_owned()), ..RunFilter::default() };
-    history.each_judged(&filter, Wish::default(), &mut |run| {
-        run.outcomes.iter().for_each(|own| meter.add_outcome(&own.property, own.outcome));
-    })?;
+    // Traces and statements are read side by side.
+    let (vitals, outcomes) = both(
+        || {
+            let mut meter = HealthMeter::default();
+            history.each_vitals(campaign, |run| meter.add(run)).map(|_| meter)
+        },
+        || {
+            let mut outcomes: BTreeMap<(Arc<str>, Outcome), u64> = BTreeMap::new();
+            let filter = RunFilter { campaign: Some(campaign.to_owned()), ..RunFilter::default() };
+            let add = &mut |run: JudgedRun| {
+                for own in run.outcomes {
+                    *outcomes.entry((own.property, own.outcome)).or_default() += 1;
+                }
+            };
+            history.each_judged(&filter, Wish::default(), add).map(|_| outcomes)
+        },
+    );
+    let mut meter = vitals?;
+    for ((property, outcome), count) in outcomes? {
+        meter.add_outcomes(&property, outcome, count);
+    }
     Ok(HealthSummary {
         campaign: campaign.to_owned(),
         history: history.dir().display().to_string(),
