@@ -213,3 +213,28 @@ fn a_campaign_with_a_cabinet_knows_its_parts() {
     assert_eq!(replayed.status.code(), Some(0), "{}{}", stdout(&replayed), stderr(&replayed));
     assert!(Path::new(&folder.path().join(".actcheck")).exists());
 }
+
+/// A world includes the cabinet twice: the one that is static there has no moving parts.
+#[test]
+fn parts_move_in_a_world_unless_their_model_is_static_there() {
+    let folder = tempfile::tempdir().unwrap();
+    copy(&root().join("tests/models/articulated"), &folder.path().join("models"));
+    let include = |name: &str, y: f64, is_static: bool| {
+        format!(
+            "<include><uri>model://cabinet</uri><name>{name}</name><pose>0 {y} 0 0 0 0</pose>\
+            <static>{is_static}</static></include>"
+        )
+    };
+    let world = [include("kitchen", 0.0, false), include("still", 2.0, true)].concat();
+    std::fs::create_dir(folder.path().join("models/worlds")).unwrap();
+    let world = format!("<sdf version=\"1.7\"><world name=\"w\">{world}</world></sdf>");
+    std::fs::write(folder.path().join("models/worlds/w.world"), world).unwrap();
+    let text = "tests = [[\"Pick\"]]\ntest_count = 1\nseed = 4\nmodel_dir = \"models\"\n[world]\nworlds = [\"w\"]\n\
+        [objectSurface]\nobject_surfaces = [\"kitchen\"]\n[pickObject]\nmodel_list = [\"can\"]\n";
+    std::fs::write(folder.path().join("c.toml"), text).unwrap();
+    let ran = actcheck(folder.path(), &["run", "c.toml"]);
+    assert!(matches!(ran.status.code(), Some(0 | 1)), "{}", stderr(&ran));
+    let query = "SELECT DISTINCT ?whole { GRAPH ?g { ?part w:partOf ?whole } }";
+    let found = stdout(&actcheck(folder.path(), &["query", query, "--format", "csv"]));
+    assert!(found.contains("kitchen") && found.lines().count() == 2, "{found}");
+}

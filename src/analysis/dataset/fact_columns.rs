@@ -59,7 +59,7 @@ pub(super) const BODIES: TableSpec = TableSpec {
         text("model", "its model"),
         text("category", "its class (IRI)"),
         text("kinds", "local names of its class and the superclasses, nearest first"),
-        text("role", "its role in the scene: platform, target, other, place-other or obstacle"),
+        text("role", "its role in the scene: platform, target, other, place-other, obstacle or part"),
         bool("fixed", "whether it is furniture: robot and objects can't carry it away"),
         X,
         Y,
