@@ -49,6 +49,19 @@ fn low_objects_are_picked_from_high_and_wide_surfaces() {
     }
 }
 
+/// A bowl is wider than any hand here: one finger goes inside, and the wall turns until it lies between both.
+#[test]
+fn a_bowl_is_taken_at_its_rim() {
+    let project = project();
+    for robot in ["mobile_manipulator", "fixed_arm"] {
+        let case = (robot, "coffee_table", "bowl");
+        let (said, passed) = run(project.path(), case, "4");
+        assert_eq!(passed, 4, "{case:?}: {said}");
+        let checked = check(project.path(), &configuration(robot, "coffee_table", "bowl"), &[]);
+        assert!(!checked.contains("S070"), "{checked}");
+    }
+}
+
 #[test]
 fn a_failed_plan_names_the_obstacle_or_the_distance() {
     let project = project();
@@ -71,11 +84,11 @@ fn check_predicts_the_limits_of_gripper_arm_and_camera() {
     let project = project();
     let robots = project.path().join("models/robots");
     let profile = std::fs::read_to_string(robots.join("fixed_arm.toml")).unwrap();
-    std::fs::write(robots.join("narrow.toml"), profile.replace("max_opening_m = 0.14", "max_opening_m = 0.08"))
+    std::fs::write(robots.join("narrow.toml"), profile.replace("max_opening_m = 0.14", "max_opening_m = 0.07"))
         .unwrap();
-    let said = check(project.path(), &configuration("narrow", "coffee_table", "glass"), &[]);
-    assert!(said.contains("S070") && said.contains("8.8 cm × 8.8 cm across and needs 9.8 cm"), "{said}");
-    assert!(said.contains("open 8.0 cm") && said.contains("c.toml:17"), "{said}");
+    let said = check(project.path(), &configuration("narrow", "coffee_table", "can"), &[]);
+    assert!(said.contains("S070") && said.contains("6.6 cm × 6.6 cm across and needs 7.6 cm"), "{said}");
+    assert!(said.contains("open 7.0 cm") && said.contains("c.toml:17"), "{said}");
 
     let said = check(project.path(), &configuration("mobile_manipulator", "high_shelf", "cube"), &[]);
     assert!(said.contains("S071") && said.contains("of 3 places on `high_shelf`"), "{said}");

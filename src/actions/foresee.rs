@@ -10,7 +10,8 @@ use crate::memory::Memory;
 use crate::operator::Operator;
 use crate::perceive::towards;
 use crate::pick::planned;
-use actcheck_data::Choices;
+use crate::rim;
+use actcheck_data::{Choices, Rim};
 use actcheck_world::{GRAVITY, World};
 
 /// Effects of the load smaller than this don't count: the joint carries nothing of it. Unit: metres, or 1.
@@ -39,6 +40,11 @@ pub struct ForeseenView {
 /// Width that the gripper needs for an object of this width. Unit: metres.
 pub fn needed_opening_m(width_m: f64) -> f64 {
     width_m + LEAST_ROOM_M
+}
+
+/// Whether a gripper that opens this wide takes a vessel at its rim. Unit: metres.
+pub fn takes_rim(rim: &Rim, max_opening_m: f64) -> bool {
+    rim::opening_m(rim, max_opening_m).is_some()
 }
 
 /// Plans a pick of an object with the abstract detector, as the reference skill does at the start of a run.

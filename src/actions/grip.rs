@@ -62,6 +62,11 @@ impl GripWatch {
         Self { opening_m: observed.gripper_opening_m, weak_n, weak_ticks: 0, slipped: false, load_n: 0.0 }
     }
 
+    /// The same for a wall of this thickness: a vessel that is held at its rim turns until its wall lies between the fingers.
+    pub fn of_wall(self, wall_m: f64) -> Self {
+        Self { opening_m: wall_m / 2.0 + GAVE_WAY_M, ..self }
+    }
+
     /// Updates with the observation of the next control tick, and the force that the arm carries then. Unit: newtons.
     pub fn look(&mut self, observed: &Observation, load_n: f64) {
         let weak = observed.finger_efforts_n.iter().any(|effort| *effort < self.weak_n);

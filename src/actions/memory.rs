@@ -133,7 +133,7 @@ mod tests {
 
     fn recalled(things: Vec<PerceivedThing>) -> Result<(Sighting, Vec<Sighting>), String> {
         let plane = PerceivedPlane { pose: Pose::upright([1.0, 0.0, 0.7], 0.3), size_m: [0.6, 0.5] };
-        let kind = KnownKind { name: "glass".into(), category: GLASS.into(), size_m: [0.088, 0.088, 0.146] };
+        let kind = KnownKind { name: "glass".into(), category: GLASS.into(), size_m: [0.088, 0.088, 0.146], rim: None };
         recall(&Perceived { plane: Some(plane), things, look: None }, "glass_1", &kind, &Vector3::zeros())
     }
 

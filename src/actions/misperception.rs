@@ -61,7 +61,12 @@ mod tests {
 
     #[test]
     fn a_mistaken_object_gets_another_category_and_size() {
-        let kind = |name: &str, side: f64| KnownKind { name: name.into(), category: name.into(), size_m: [side; 3] };
+        let kind = |name: &str, side: f64| KnownKind {
+            name: name.into(),
+            category: name.into(),
+            size_m: [side; 3],
+            rim: None,
+        };
         let kinds = [kind("can", 0.1), kind("glass", 0.12), kind("bowl", 0.3)];
         let mut things = vec![thing(None, 0.0), thing(Some("can"), 1.0)];
         assert!(mistake(&mut things, Some("glass"), &kinds));

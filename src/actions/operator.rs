@@ -255,9 +255,13 @@ impl<'a> Operator<'a> {
         self.memory.held = held;
     }
 
-    /// Starts watching whether the held object stays in the hand.
-    pub fn watch_grip(&mut self) {
-        self.grip = Some(GripWatch::new(&self.observe(), self.profile().grip_force_n));
+    /// Starts watching whether the held object stays in the hand; if it is held at a wall, with the thickness of this.
+    pub fn watch_grip(&mut self, wall_m: Option<f64>) {
+        let watch = GripWatch::new(&self.observe(), self.profile().grip_force_n);
+        self.grip = Some(match wall_m {
+            Some(wall_m) => watch.of_wall(wall_m),
+            None => watch,
+        });
     }
 
     /// Whether a slip was felt since the watch began.

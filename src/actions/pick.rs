@@ -6,8 +6,8 @@ use crate::memory::Held;
 use crate::operator::{Interrupt, Operator};
 use crate::perceive::look_again;
 use crate::plan::{self, Plan, PlanRequest};
-use crate::{ActionCall, cup, grasp, memory};
-use actcheck_data::{ActionReport, Pose};
+use crate::{ActionCall, cup, grasp, memory, rim};
+use actcheck_data::{ActionReport, Pose, Rim};
 use actcheck_world::Sighting;
 
 /// Designator of the object to pick.
@@ -40,7 +40,8 @@ pub fn pick(call: &ActionCall, robot: &mut Operator<'_>) -> Result<ActionReport,
     robot.begin("drive");
     robot.follow(&way.drive, 0.0)?;
     robot.begin("reach");
-    robot.set_opening(robot.profile().max_opening_m);
+    let (widest_m, rim) = (robot.profile().max_opening_m, rim_of(&seen, robot));
+    robot.set_opening(rim.and_then(|rim| rim::opening_m(&rim, widest_m)).unwrap_or(widest_m));
     robot.follow(&way.reach, 0.0)?;
     robot.begin("approach");
     robot.follow(&way.near, 0.0)?;
@@ -53,14 +54,14 @@ pub fn pick(call: &ActionCall, robot: &mut Operator<'_>) -> Result<ActionReport,
     robot.hold(None);
     let held = close(robot)?;
     if held {
-        remember(robot, &seen);
+        remember(robot, &seen, rim.map(|rim| rim.wall_m));
     }
     robot.begin("lift");
     robot.follow(&way.lift, LIFT_SECS)?;
     robot.begin("retract");
     robot.follow(&way.retreat, 0.0)?;
     robot.wait(LOOK_SECS)?;
-    let report = report(robot, target, held);
+    let report = report(robot, target, held, rim.map_or(EMPTY_M, |rim| rim.wall_m / 2.0));
     // The settled object is as wide as the gap between the fingers.
     let opening_m = robot.observe().gripper_opening_m;
     let held = robot.memory().held.clone().filter(|_| report.succeeded);
@@ -83,11 +84,24 @@ pub(super) fn planned(seen: &Sighting, others: &[Sighting], robot: &mut Operator
     let max_opening_m = robot.profile().max_opening_m;
     let (grasps, all) = (grasp::grasps(seen, max_opening_m), grasp::all_grasps(seen, max_opening_m));
     let (grasps, all) = (grasp::centred(grasps, seen, robot), grasp::centred(all, seen, robot));
+    let (grasps, all) = match rim_of(seen, robot) {
+        Some(rim) => {
+            let at_rim = rim::grasps(seen, &rim, max_opening_m);
+            (at_rim.clone(), at_rim)
+        }
+        None => (grasps, all),
+    };
     if grasps.is_empty() {
         return Err(format!("{} is too wide for the gripper", seen.id));
     }
     let wanted = PlanRequest { grasps: &grasps, all: &all, taken: Some(seen) };
     plan::plan(robot, wanted, others).map_err(|reason| format!("{}: {reason}", seen.id))
+}
+
+/// The rim of a vessel that is too wide for the hand.
+fn rim_of(seen: &Sighting, robot: &Operator<'_>) -> Option<Rim> {
+    let is_too_wide = grasp::grasps(seen, robot.profile().max_opening_m).is_empty();
+    robot.kind_of(&seen.id).filter(|_| is_too_wide && !robot.has_cup())?.rim
 }
 
 /// The target and all other objects: as perceived by an earlier action of the run, otherwise from the abstract
@@ -130,7 +144,7 @@ fn put_right(mut way: Plan, seen: Sighting, robot: &mut Operator<'_>) -> Result<
 }
 
 /// Keeps the grasped object in memory for later actions.
-fn remember(robot: &mut Operator<'_>, seen: &Sighting) {
+fn remember(robot: &mut Operator<'_>, seen: &Sighting, wall_m: Option<f64>) {
     let observed = robot.observe();
     let foot = seen.pose.to_isometry();
     let grasp = robot.kinematics().grasp(&observed.positions);
@@ -143,10 +157,11 @@ fn remember(robot: &mut Operator<'_>, seen: &Sighting) {
         opening_m: observed.gripper_opening_m,
     };
     robot.hold(Some(held));
-    robot.watch_grip();
+    robot.watch_grip(wall_m);
 }
 
-fn report(robot: &mut Operator<'_>, target: &str, stalled: bool) -> ActionReport {
+/// Reports success if the fingers hold something that is not thinner than this. Unit: metres.
+fn report(robot: &mut Operator<'_>, target: &str, stalled: bool, thinnest_m: f64) -> ActionReport {
     if let Some(suction) = robot.profile().suction {
         return cup::report(robot, &suction, target, stalled);
     }
@@ -157,7 +172,7 @@ fn report(robot: &mut Operator<'_>, target: &str, stalled: bool) -> ActionReport
     if robot.felt_slip() {
         return failed(format!("{target} slipped out of the hand: its fingers are {:.1} mm apart", gap * 1e3));
     }
-    if gap < EMPTY_M {
+    if gap < thinnest_m {
         return failed(format!("the hand is empty: its fingers are {:.1} mm apart", gap * 1e3));
     }
     if !feels(robot) {

@@ -123,7 +123,8 @@ impl Env {
     fn too_wide(&self, key: &str, model: &ObjectModel) -> Option<Diagnostic> {
         let (robot, [width, depth, _]) = (&self.campaign.robot, model.size_m);
         let needed_m = actions::needed_opening_m(width.min(depth));
-        if needed_m <= robot.max_opening_m || self.campaign.lying.0 > 0.0 {
+        let at_rim = model.rim().is_some_and(|rim| actions::takes_rim(&rim, robot.max_opening_m));
+        if needed_m <= robot.max_opening_m || at_rim || self.campaign.lying.0 > 0.0 {
             return None;
         }
         let message = format!(

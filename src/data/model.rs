@@ -6,6 +6,9 @@ use serde::{Deserialize, Serialize};
 
 use crate::{Part, PartJoint, Pose, Shape};
 
+/// Smallest difference of positions and angles that counts for the form of a vessel. Units: metres and radians.
+const ROUGHLY: f64 = 2e-3;
+
 /// A rigid object or piece of furniture, made of shapes. Joints may move further parts of it.
 ///
 /// Frame: the model's own, z up, in its upright pose; the origin is on the ground below its middle.
@@ -55,6 +58,21 @@ pub struct MovingPart {
     pub joint: PartJoint,
 }
 
+/// The wall of an open, upright vessel around the middle of a model.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Rim {
+    /// Outer radius at the upper end. Unit: metres.
+    pub radius_m: f64,
+    /// Height of the upper end. Unit: metres.
+    pub top_m: f64,
+    /// How much the radius grows per metre of height.
+    pub slope: f64,
+    /// Thickness of the wall. Unit: metres.
+    pub wall_m: f64,
+    /// Height of the floor inside. Unit: metres.
+    pub floor_m: f64,
+}
+
 /// Mass distribution of a model. Frame: the model's.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Inertia {
@@ -97,6 +115,25 @@ impl ObjectModel {
             part.model.solids().into_iter().map(|solid| Part { pose: placed(&solid.pose), ..solid }).collect()
         };
         self.solids().into_iter().chain(self.moving.iter().flat_map(of_part)).collect()
+    }
+
+    /// Returns the rim of an open vessel: an upright wall around the middle that reaches up to the top, with nothing above its
+    /// floor.
+    pub fn rim(&self) -> Option<Rim> {
+        let is_central = |part: &Part| {
+            let at = part.pose.to_isometry();
+            at.rotation.angle() < ROUGHLY && at.translation.vector.xy().norm() < ROUGHLY
+        };
+        let of = |(idx, part): (usize, &Part)| {
+            let Shape::Tube { radius_low, radius_high, wall, height, .. } = part.shape else { return None };
+            let top_m = part.bounds().1[2];
+            let others = self.parts.iter().enumerate().filter(|(other, _)| *other != idx);
+            let floor_m = others.map(|(_, other)| other.bounds().1[2]).fold(0.0, f64::max);
+            let is_open = top_m > self.size_m[2] - ROUGHLY && floor_m < top_m / 2.0;
+            let slope = (radius_high - radius_low) / height;
+            (is_central(part) && is_open).then_some(Rim { radius_m: radius_high, top_m, slope, wall_m: wall, floor_m })
+        };
+        self.parts.iter().enumerate().find_map(of)
     }
 
     /// Scales the model uniformly; the mass stays the same.

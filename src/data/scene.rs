@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use crate::{MovingPart, ObjectModel, PartJoint, Physics, Pose, RobotProfile, SceneMap, Sensing};
+use crate::{MovingPart, ObjectModel, PartJoint, Physics, Pose, Rim, RobotProfile, SceneMap, Sensing};
 
 /// A sampled scene. Frame of all poses: world; z up; the floor at 0.
 #[derive(Debug, Clone)]
@@ -155,4 +155,13 @@ pub struct KnownKind {
     pub category: String,
     /// Outer dimensions when upright. Unit: metres. Shape: x, y, z.
     pub size_m: [f64; 3],
+    /// The wall of an open vessel, which a hand can take at its rim.
+    pub rim: Option<Rim>,
+}
+
+impl KnownKind {
+    /// Returns the knowledge about a model.
+    pub fn of(model: &ObjectModel) -> Self {
+        Self { name: model.name.clone(), category: model.category.clone(), size_m: model.size_m, rim: model.rim() }
+    }
 }

@@ -128,12 +128,7 @@ fn drives(campaign: &Campaign) -> Vec<Option<usize>> {
 /// All models except platforms, sorted by name.
 fn known_kinds(campaign: &Campaign) -> Arc<[KnownKind]> {
     let models = campaign.models.values().filter(|model| model.surface.is_none());
-    let kinds = models.map(|model| KnownKind {
-        name: model.name.clone(),
-        category: model.category.clone(),
-        size_m: model.size_m,
-    });
-    kinds.collect()
+    models.map(|model| KnownKind::of(model)).collect()
 }
 
 fn is_of_objects(designator: &str) -> bool {

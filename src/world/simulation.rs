@@ -192,7 +192,7 @@ impl World {
     /// pose. Returns `None` if there is no such id.
     pub fn kind_of(&self, id: &str) -> Option<KnownKind> {
         let model = &self.objects.iter().find(|object| object.id == id)?.model;
-        Some(KnownKind { name: model.name.clone(), category: model.category.clone(), size_m: model.size_m })
+        Some(KnownKind::of(model))
     }
 
     /// Performs one control tick: passes the command to the controllers, steps physics, and records the state.

@@ -67,7 +67,7 @@ fn try_to_place(call: &ActionCall, robot: &mut Operator<'_>) -> Result<String, H
     let surface = call.value(SURFACE).ok_or_else(|| Halt::Failed("no surface was named to place it on".to_owned()))?;
     robot.begin("feel");
     let held = in_hand(target, robot)?;
-    robot.watch_grip();
+    robot.watch_grip(None);
     robot.begin("fold");
     robot.follow(&carry::fold(robot), FOLD_SECS)?;
     let folded = robot.commanded().to_vec();
