@@ -100,6 +100,9 @@ fn now_secs() -> f64 {
     START.elapsed().as_secs_f64()
 }
 
+/// The engine's unit of length, as in actcheck. Unit: metres.
+const UNIT: f32 = 0.125;
+
 /// The same scene written directly with `rapier3d`.
 struct ByHand {
     world: engine::PhysicsWorld,
@@ -108,14 +111,20 @@ struct ByHand {
 impl ByHand {
     fn new(scene: &Scene, may_sleep: bool) -> Self {
         let softness = |frequency| engine::SpringCoefficients { natural_frequency: frequency, damping_ratio: 10.0 };
+        let defaults = engine::IntegrationParameters::default();
         let parameters = engine::IntegrationParameters {
+            length_unit: UNIT,
+            normalized_allowed_linear_error: defaults.normalized_allowed_linear_error / UNIT,
+            normalized_max_corrective_velocity: defaults.normalized_max_corrective_velocity / UNIT,
+            normalized_prediction_distance: defaults.normalized_prediction_distance / UNIT,
+            normalized_max_linear_velocity: defaults.normalized_max_linear_velocity / UNIT,
             dt: 1.0 / real(f64::from(scene.physics.steps_per_second)),
             num_solver_iterations: scene.physics.iterations as usize,
             friction_in_bias_pass: true,
             contact_softness: softness(90.0),
             static_contact_softness: softness(30.0),
             contact_recycling: false,
-            ..engine::IntegrationParameters::default()
+            ..defaults
         };
         let gravity = vector(&Vector3::new(0.0, 0.0, -9.81));
         let mut world = engine::PhysicsWorld {
@@ -135,7 +144,7 @@ impl ByHand {
             let builder = builder.pose(pose(&object.pose.to_isometry())).can_sleep(may_sleep);
             let body = world.insert_body(builder);
             if let Some(body) = world.bodies.get_mut(body) {
-                body.activation_mut().normalized_linear_threshold = 0.02;
+                body.activation_mut().normalized_linear_threshold = 0.02 / UNIT;
                 body.activation_mut().time_until_sleep = 0.3;
             }
             let density = object.mass_kg / object.model.volume();

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use nalgebra::{Isometry3, Vector3};
 
+use crate::grip::EMPTY_M;
 use actcheck_data::{KnownKind, Perceived, PerceivedPlane, PerceivedThing, Pose};
 use actcheck_world::Sighting;
 
@@ -42,6 +43,20 @@ pub struct Held {
     pub heading: f64,
     /// Gap between the fingers that hold it. Unit: metres.
     pub opening_m: f64,
+    /// Thickness of the wall between the fingers, if it is held at its rim. Unit: metres.
+    pub wall_m: Option<f64>,
+}
+
+impl Held {
+    /// Returns the gap between the fingers below which it is no longer between them. Unit: metres.
+    pub fn least_gap_m(&self) -> f64 {
+        least_gap_m(self.wall_m)
+    }
+}
+
+/// Returns the gap between the fingers below which nothing is between them, or no wall of this thickness. Unit: metres.
+pub fn least_gap_m(wall_m: Option<f64>) -> f64 {
+    wall_m.map_or(EMPTY_M, |wall_m| wall_m / 2.0)
 }
 
 /// Weight of the distance against the size mismatch. No unit: both are metres.

@@ -1,7 +1,7 @@
 //! The pick skill: look (or recall an earlier percept), drive, reach, close, lift, retreat.
 
 use crate::grasp::Approach;
-use crate::grip::{EMPTY_M, close, feels};
+use crate::grip::{close, feels};
 use crate::memory::Held;
 use crate::operator::{Interrupt, Operator};
 use crate::perceive::look_again;
@@ -16,6 +16,8 @@ const TARGET: &str = "pickObject";
 const LOOK_SECS: f64 = 0.5;
 /// Shortest duration of the last part of the approach, at about 6 cm/s. Unit: seconds.
 const APPROACH_SECS: f64 = 2.5;
+/// A vessel whose perceived height differs from its kind's by more lies. Unit: metres.
+const UPRIGHT_M: f64 = 0.02;
 /// Shortest duration of the lift. Unit: seconds.
 const LIFT_SECS: f64 = 2.0;
 
@@ -61,7 +63,7 @@ pub fn pick(call: &ActionCall, robot: &mut Operator<'_>) -> Result<ActionReport,
     robot.begin("retract");
     robot.follow(&way.retreat, 0.0)?;
     robot.wait(LOOK_SECS)?;
-    let report = report(robot, target, held, rim.map_or(EMPTY_M, |rim| rim.wall_m / 2.0));
+    let report = report(robot, target, held, memory::least_gap_m(rim.map(|rim| rim.wall_m)));
     // The settled object is as wide as the gap between the fingers.
     let opening_m = robot.observe().gripper_opening_m;
     let held = robot.memory().held.clone().filter(|_| report.succeeded);
@@ -98,10 +100,12 @@ pub(super) fn planned(seen: &Sighting, others: &[Sighting], robot: &mut Operator
     plan::plan(robot, wanted, others).map_err(|reason| format!("{}: {reason}", seen.id))
 }
 
-/// The rim of a vessel that is too wide for the hand.
+/// The rim of an upright vessel that is too wide for the hand, as the robot knows its kind.
 fn rim_of(seen: &Sighting, robot: &Operator<'_>) -> Option<Rim> {
     let is_too_wide = grasp::grasps(seen, robot.profile().max_opening_m).is_empty();
-    robot.kind_of(&seen.id).filter(|_| is_too_wide && !robot.has_cup())?.rim
+    let name = robot.kind_of(&seen.id).filter(|_| is_too_wide && !robot.has_cup())?.name;
+    let rim = robot.known_kinds().iter().find(|kind| kind.name == name)?.rim;
+    rim.filter(|rim| (seen.size_m[2] - rim.top_m).abs() < UPRIGHT_M)
 }
 
 /// The target and all other objects: as perceived by an earlier action of the run, otherwise from the abstract
@@ -155,6 +159,7 @@ fn remember(robot: &mut Operator<'_>, seen: &Sighting, wall_m: Option<f64>) {
         grasp_from_foot: foot.inverse() * grasp,
         heading: Pose::from_isometry(&robot.base()).yaw(),
         opening_m: observed.gripper_opening_m,
+        wall_m,
     };
     robot.hold(Some(held));
     robot.watch_grip(wall_m);

@@ -65,7 +65,8 @@ pub fn remember(call: &ActionCall, end: &End, grasped: Grasped, robot: &mut Oper
     let Some((foot, size_m, taken)) = before.or_else(|| seen_now(id, robot)) else { return Ok(()) };
     let opening_m = robot.observe().gripper_opening_m;
     let grasp_from_foot = foot.inverse() * taken.grasp;
-    let held = Held { id: id.to_owned(), size_m, foot, grasp_from_foot, heading: taken.heading, opening_m };
+    let held =
+        Held { id: id.to_owned(), size_m, foot, grasp_from_foot, heading: taken.heading, opening_m, wall_m: None };
     robot.hold(Some(held));
     Ok(())
 }

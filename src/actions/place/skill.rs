@@ -2,7 +2,7 @@
 
 use nalgebra::{Point3, Vector3};
 
-use crate::grip::{EMPTY_M, feels};
+use crate::grip::feels;
 use crate::memory::{Held, furniture};
 use crate::operator::{Interrupt, Operator};
 use crate::perceive::{Survey, survey};
@@ -67,7 +67,7 @@ fn try_to_place(call: &ActionCall, robot: &mut Operator<'_>) -> Result<String, H
     let surface = call.value(SURFACE).ok_or_else(|| Halt::Failed("no surface was named to place it on".to_owned()))?;
     robot.begin("feel");
     let held = in_hand(target, robot)?;
-    robot.watch_grip(None);
+    robot.watch_grip(held.wall_m);
     robot.begin("fold");
     robot.follow(&carry::fold(robot), FOLD_SECS)?;
     let folded = robot.commanded().to_vec();
@@ -97,7 +97,7 @@ fn in_hand(target: &str, robot: &mut Operator<'_>) -> Result<Held, Halt> {
     let nothing = || Halt::Failed(format!("nothing is in the hand: {target} can't be placed"));
     let held = robot.memory().held.clone().ok_or_else(nothing)?;
     robot.wait(LOOK_SECS)?;
-    let is_closed = !robot.has_cup() && robot.feel_opening() < EMPTY_M;
+    let is_closed = !robot.has_cup() && robot.feel_opening() < held.least_gap_m();
     if is_closed || !feels(robot) {
         robot.hold(None);
         return Err(nothing());

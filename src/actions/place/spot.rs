@@ -146,8 +146,15 @@ mod tests {
         let foot = Pose::upright([0.0, 0.0, 0.7], 0.3).to_isometry();
         let grasp = Pose::upright([0.0, 0.0, 0.77], 1.0).to_isometry();
         let grasp_from_foot = foot.inverse() * grasp;
-        let held =
-            Held { id: "g".into(), size_m: [0.09, 0.09, 0.15], foot, grasp_from_foot, heading: 1.0, opening_m: 0.08 };
+        let held = Held {
+            id: "g".into(),
+            size_m: [0.09, 0.09, 0.15],
+            foot,
+            grasp_from_foot,
+            heading: 1.0,
+            opening_m: 0.08,
+            wall_m: None,
+        };
         assert!(is_level(&held));
         let found = ways(&held, &[Point3::new(2.0, 1.0, 0.4)], 0.135);
         assert_eq!(found.len(), N_HEADINGS as usize);
