@@ -114,8 +114,8 @@ const CODES_W: &[Code] = &[
         "W036",
         "a part of a model file is ignored or replaced, or is that of no real body",
         "the simulation has no counterpart for it, such as plugins and air drag; one moment of inertia exceeds the sum of \
-         the others; a gripper has no `<collision>`; a joint moves the whole robot; the limits of a joint contradict its \
-         coupling; or a colour is not four numbers",
+         the others; a gripper, or a link that a joint moves, has no `<collision>`; a joint moves the whole robot; the \
+         limits of a joint contradict its coupling; or a colour is not four numbers",
         "nothing, if the model works without it; otherwise follow the help",
     ),
     code(
