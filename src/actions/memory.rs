@@ -48,13 +48,13 @@ pub struct Held {
 }
 
 impl Held {
-    /// Returns the gap between the fingers below which it is no longer between them. Unit: metres.
+    /// Returns the smallest gap between fingers that hold it. Unit: metres.
     pub fn least_gap_m(&self) -> f64 {
         least_gap_m(self.wall_m)
     }
 }
 
-/// Returns the gap between the fingers below which nothing is between them, or no wall of this thickness. Unit: metres.
+/// Returns the smallest gap between fingers that hold something, or a wall of this thickness. Unit: metres.
 pub fn least_gap_m(wall_m: Option<f64>) -> f64 {
     wall_m.map_or(EMPTY_M, |wall_m| wall_m / 2.0)
 }
