@@ -302,6 +302,10 @@ fn a_cup_is_proposed_for_a_robot_with_a_link_of_this_name() {
     let output = actcheck(project.path(), &["run", "configs/c.toml", "--runs", "2", "--format", "json"]);
     let json: Value = serde_json::from_str(&stdout(&output)).unwrap_or_else(|_| panic!("{}", stderr(&output)));
     assert_eq!(json["runs_passed"]["count"], 2, "{json}{}", stderr(&output));
+    let other = ["new", "robot", urdf.to_str().unwrap(), "--hand", "nowhere", "--out", "other.toml"];
+    let refused = actcheck(project.path(), &other);
+    assert_eq!(refused.status.code(), Some(2));
+    assert!(stderr(&refused).contains("no hand has `nowhere` in a name"), "{}", stderr(&refused));
 }
 
 /// The mobile manipulator with a cup instead of fingers.

@@ -360,10 +360,11 @@ impl<'a> Operator<'a> {
             let s = (time / secs).min(1.0);
             self.command.positions = along(&course, &legs, shortest * s * s * (3.0 - 2.0 * s));
             self.tick()?;
-            if let Some(behind) = self.held_back(self.layout().arm.iter()) {
+            let positions = self.observe().positions;
+            if let Some(behind) = self.held_back(&positions, self.layout().arm.iter()) {
                 return Err(Interrupt::HeldUp(behind));
             }
-            match self.held_back(self.layout().base.iter().flatten()) {
+            match self.held_back(&positions, self.layout().base.iter().flatten()) {
                 Some(behind) if behind_secs > BASE_BEHIND_SECS => return Err(Interrupt::HeldUp(behind)),
                 Some(_) => behind_secs += tick,
                 None => behind_secs = 0.0,
@@ -376,8 +377,7 @@ impl<'a> Operator<'a> {
     }
 
     /// A sentence about one of these joints that is far behind its target.
-    fn held_back<'b>(&self, mut joints: impl Iterator<Item = &'b usize>) -> Option<String> {
-        let positions = self.observe().positions;
+    fn held_back<'b>(&self, positions: &[f64], mut joints: impl Iterator<Item = &'b usize>) -> Option<String> {
         joints.find_map(|idx| {
             let idx = *idx;
             let joint = &self.kinematics().joints()[idx];

@@ -273,8 +273,8 @@ pub(super) fn recorded_overrides(history: &History, record: &CampaignRecord) -> 
     }
 }
 
-/// Sets the category of models that come without one, and of all moving parts, from their name if the ontology has such a class; else they stay
-/// `act:Object`.
+/// Sets the category of models that come without one, and of all moving parts, from their name if the ontology has such a
+/// class; else they stay `act:Object`.
 fn categorise(campaign: &mut Campaign, ontology: &Ontology) {
     let used = campaign.used_models();
     for model in campaign.models.values_mut() {

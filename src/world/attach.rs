@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use nalgebra::{Isometry3, Rotation3, Translation3, UnitQuaternion, Vector3};
 use rapier3d::prelude::{
-    ActiveHooks, GenericJoint, JointAxesMask, JointAxis, MotorModel, PhysicsWorld, SpringCoefficients,
+    ActiveHooks, GenericJoint, JointAxesMask, JointAxis, MotorModel, PhysicsWorld, RigidBodyHandle, SpringCoefficients,
 };
 
 use crate::World;
@@ -66,12 +66,7 @@ pub(super) fn attach(engine: &mut PhysicsWorld, scene: &[SceneObject], objects: 
     }
 }
 
-fn insert(
-    engine: &mut PhysicsWorld,
-    carrier: rapier3d::prelude::RigidBodyHandle,
-    part: rapier3d::prelude::RigidBodyHandle,
-    attachment: &Attachment,
-) {
+fn insert(engine: &mut PhysicsWorld, carrier: RigidBodyHandle, part: RigidBodyHandle, attachment: &Attachment) {
     let PartJoint { slides, range, damping, friction, .. } = attachment.joint;
     let (locked, axis) = match slides {
         true => (JointAxesMask::LOCKED_PRISMATIC_AXES, JointAxis::LinX),

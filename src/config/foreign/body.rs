@@ -116,13 +116,13 @@ impl Body {
 impl MovingBody {
     fn into_part(self, model_from_file: &Isometry3<f64>) -> MovingPart {
         let model = self.body.into_model(&self.name, String::new(), model_from_file);
-        let part_from_file = Translation3::from(Vector3::from(model.origin_m) - model_from_file.translation.vector);
+        let part_from_model = Translation3::from(Vector3::from(model.origin_m) - model_from_file.translation.vector);
         let axis = model_from_file.rotation * Vector3::from(self.joint.axis);
         let anchor = model_from_file * Point3::from(self.joint.anchor_m);
         MovingPart {
             name: self.name,
             model: Arc::new(model),
-            pose: Pose::from_isometry(&part_from_file.inverse().into()),
+            pose: Pose::from_isometry(&part_from_model.inverse().into()),
             on: self.on,
             joint: PartJoint { axis: axis.into(), anchor_m: anchor.coords.into(), ..self.joint },
         }

@@ -16,7 +16,7 @@ use crate::foreign::xml::{self, Node, Reader};
 use crate::foreign::{folder, sdf};
 use crate::{Furniture, WorldMap};
 use actcheck_base::{Diagnostics, Severity, Source, digest_of};
-use actcheck_data::{Location, ObjectModel, Pose};
+use actcheck_data::{Location, ObjectModel, Part, Pose};
 
 /// Elements of a world that are read, or that do not affect its geometry: light, Gazebo's display and time steps.
 const KNOWN: [&str; 16] = [
@@ -139,7 +139,14 @@ impl Gathering<'_> {
     /// whole building would be around the robot.
     fn add_solids(&mut self, piece: &Furniture, building: ObjectModel, node: Node) {
         let at = piece.pose.to_isometry();
-        for (number, part) in (1..).zip(building.parts) {
+        // The doors of a building stay as in the file.
+        let moving = building.moving.iter().flat_map(|part| {
+            let at = part.pose.to_isometry();
+            let placed = move |solid: &Part| Pose::from_isometry(&(at * solid.pose.to_isometry()));
+            part.model.parts.iter().map(move |solid| Part { pose: placed(solid), ..solid.clone() })
+        });
+        let parts: Vec<Part> = building.parts.iter().cloned().chain(moving).collect();
+        for (number, part) in (1..).zip(parts) {
             let (friction, restitution) = (Some(building.friction), Some(building.restitution));
             let body = Body { parts: vec![part], friction, restitution, fixed: true, ..Body::default() };
             let digest = digest_of(&format!("{} {number}", building.digest));

@@ -6,7 +6,7 @@ use std::f64::consts::PI;
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 
 use super::body::chain;
-use super::fingers::{Hand, rounded};
+use super::fingers::{Hand, is_called, rounded};
 use super::frames::corners;
 use crate::description::RobotModel;
 use actcheck_data::{RobotProfile, Suction};
@@ -24,9 +24,10 @@ const RADIUS_M: f64 = 0.015;
 const RADII_M: (f64, f64) = (0.003, 0.1);
 
 /// Finds a link with the name of a cup, and proposes its lip as the grasp frame. Returns `None` if there is none.
-pub(super) fn find(partial: &RobotProfile, model: &RobotModel) -> Option<Hand> {
+pub(super) fn find(partial: &RobotProfile, model: &RobotModel, wanted: Option<&str>) -> Option<Hand> {
     let has_word = |name: &str| WORDS.iter().any(|word| name.to_lowercase().contains(word));
-    let named = model.frames().filter(|(name, _)| has_word(name));
+    let is_wanted = |link: usize| wanted.is_none_or(|wanted| is_called(model, link, wanted));
+    let named = model.frames().filter(|(name, (link, _))| has_word(name) && is_wanted(*link));
     let far =
         |(_, (link, at)): &(&str, &(usize, Isometry3<f64>))| (chain(model, *link).len(), at.translation.vector.norm());
     // Of several links of one tool, the farthest from the arm.

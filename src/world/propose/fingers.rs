@@ -66,8 +66,12 @@ pub(super) fn find(partial: &RobotProfile, model: &RobotModel, wanted: Option<&s
     }
     let groups = stated.groups(model).unwrap_or_else(|| groups(model));
     if groups.is_empty() {
-        if let Some(hand) = cup::find(partial, model) {
+        if let Some(hand) = cup::find(partial, model, wanted) {
             return Ok(hand);
+        }
+        if let (Some(wanted), Some(other)) = (wanted, cup::find(partial, model, None)) {
+            let there = &model.links[other.palm].name;
+            return Err(NoHand::Gripper(format!("no hand has `{wanted}` in a name: there is `{there}`")));
         }
         let what = "no gripper was found: none of its movable joints or their links has a name with `finger`, `grip`, \
                     `hand`, `jaw`, `knuckle` or `thumb`, and no link one with `suction` or `vacuum`";
@@ -104,7 +108,7 @@ pub(super) fn find(partial: &RobotProfile, model: &RobotModel, wanted: Option<&s
 
 /// Whether a name of a hand or of the arm that carries it contains a text; for `left` and `right`, also the abbreviation of
 /// one letter. Fingers don't count: each hand has a left one.
-fn is_called(model: &RobotModel, palm: usize, text: &str) -> bool {
+pub(super) fn is_called(model: &RobotModel, palm: usize, text: &str) -> bool {
     let text = text.to_lowercase();
     let letter = ["left", "right"].contains(&text.as_str()).then(|| &text[..1]);
     let is_so = |name: &str| {
