@@ -311,7 +311,7 @@ fn a_new_thing_is_explained_by_the_match_it_was_made_for() {
     assert!(other.contains("missing a new thing for this") && other.contains("nearest event(_:0, \"cup\")"), "{other}");
 }
 
-/// The outcome of one property, its witness included, does not depend on the properties judged with it.
+/// The outcome of one property, its witness and explanation included, does not depend on the properties judged with it.
 #[test]
 fn the_labels_of_a_property_are_its_own() {
     let mut ontology = Ontology::default();
@@ -332,6 +332,15 @@ fn the_labels_of_a_property_are_its_own() {
         let names: Vec<String> = names.iter().map(ToString::to_string).collect();
         book.judge(&facts.as_action(), &names, &Budget::default())
     };
+    let explained = |names: &[&str]| -> Vec<String> {
+        let found = book.explain_all(&facts.as_action(), names, &Budget::default());
+        found.into_iter().map(|explanation| explanation.unwrap().to_text()).collect()
+    };
+    let alone: Vec<String> = ["c", "b", "a"].iter().flat_map(|name| explained(&[name])).collect();
+    assert_eq!(explained(&["c", "b", "a"]), alone);
+    assert!(alone[0].contains("_:1"), "{}", alone[0]);
+    let unknown = book.explain_all(&facts.as_action(), &["d", "a"], &Budget::default());
+    assert!(unknown[0].is_err() && unknown[1].is_ok());
     let all = judged(&["a", "b", "c"]);
     for (name, label) in [("a", "_:1"), ("b", "_:1"), ("c", "_:1")] {
         assert_eq!(judged(&[name])[name], all[name]);

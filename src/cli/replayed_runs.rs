@@ -78,9 +78,11 @@ pub(super) fn explained(trace: &Trace, rules: &RuleBook, run: &RunDetail, budget
     let mut found = Vec::new();
     for (idx, action) in run.actions.iter().enumerate() {
         let Some(seen) = facts.action(idx) else { continue };
-        for judgement in action.judgements.iter().filter(|judgement| judgement.outcome == Outcome::Failed) {
-            if let Ok(explanation) = rules.explain(&seen, &judgement.property, budget) {
-                let (step, property) = (action.step, judgement.property.clone());
+        let failed = action.judgements.iter().filter(|judgement| judgement.outcome == Outcome::Failed);
+        let failed: Vec<&str> = failed.map(|judgement| judgement.property.as_str()).collect();
+        for (property, explanation) in failed.iter().zip(rules.explain_all(&seen, &failed, budget)) {
+            if let Ok(explanation) = explanation {
+                let (step, property) = (action.step, (*property).to_owned());
                 let text = explanation.to_text();
                 found.push(Explained { step, property, text, deciding: explanation.deciding });
             }

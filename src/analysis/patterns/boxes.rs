@@ -2,7 +2,7 @@
 
 use crate::patterns::Condition;
 use crate::patterns::cells::{Axis, Conditions};
-use crate::patterns::likelihood::{Count, Likelihood, one};
+use crate::patterns::likelihood::{Count, Likelihood, failures_of, one};
 
 /// Summing the boxes of three parameters costs as much as counting this many runs. (Measured with eight cells each.)
 const BOXES_IN_RUNS: u64 = 50_000;
@@ -104,7 +104,7 @@ impl<'a> Runs<'a> {
             sums[usize::from(*cell)] += one;
         }
         best.tried += along.len() as u64;
-        let (score, place) = along.highest(&sums, self.likelihood);
+        let (score, place) = along.highest(&sums, self.likelihood, 0);
         best.take(score, || vec![along.condition(place)]);
     }
 
@@ -120,10 +120,11 @@ impl<'a> Runs<'a> {
         across.expand(&sums, along.cells, &mut rows);
         let mut highest = 0.0f64;
         for (of_first, row) in rows.chunks_exact(along.cells).enumerate() {
-            if self.limit(row) <= highest {
+            let fewest = self.likelihood.fewest_failures(highest);
+            if failures(row) < fewest {
                 continue;
             }
-            let (score, of_second) = along.highest(row, self.likelihood);
+            let (score, of_second) = along.highest(row, self.likelihood, fewest);
             highest = highest.max(score);
             best.take(score, || vec![across.condition(of_first), along.condition(of_second)]);
         }
@@ -139,25 +140,23 @@ impl<'a> Runs<'a> {
         }
         best.tried += a.len() as u64 * b.len() as u64 * c.len() as u64;
         let (mut planes, mut rows) = (Vec::new(), Vec::new());
+        let mut fewest = self.likelihood.fewest_failures(best.score);
         a.expand(&sums, b.cells * c.cells, &mut planes);
         for (of_first, plane) in planes.chunks_exact(b.cells * c.cells).enumerate() {
-            if self.limit(plane) <= best.score {
+            if failures(plane) < fewest {
                 continue;
             }
             b.expand(plane, c.cells, &mut rows);
             for (of_second, row) in rows.chunks_exact(c.cells).enumerate() {
-                if self.limit(row) <= best.score {
+                if failures(row) < fewest {
                     continue;
                 }
-                let (score, of_third) = c.highest(row, self.likelihood);
-                best.take(score, || vec![a.condition(of_first), b.condition(of_second), c.condition(of_third)]);
+                let (score, of_third) = c.highest(row, self.likelihood, fewest);
+                if best.take(score, || vec![a.condition(of_first), b.condition(of_second), c.condition(of_third)]) {
+                    fewest = self.likelihood.fewest_failures(best.score);
+                }
             }
         }
-    }
-
-    /// Returns an upper bound of the score of any box within these cells.
-    fn limit(&self, cells: &[Count]) -> f64 {
-        self.likelihood.most(cells.iter().fold(0, |sum, count| sum.wrapping_add(*count)))
     }
 
     /// Returns the cell of each run in the grid of two parameters.
@@ -169,23 +168,34 @@ impl<'a> Runs<'a> {
 }
 
 impl Best {
-    fn take(&mut self, score: f64, conditions: impl FnOnce() -> Vec<Condition>) {
-        if score > self.score {
+    /// Takes a box if it scores higher. Returns whether it does.
+    fn take(&mut self, score: f64, conditions: impl FnOnce() -> Vec<Condition>) -> bool {
+        let is_higher = score > self.score;
+        if is_higher {
             self.score = score;
             self.conditions = conditions();
         }
+        is_higher
     }
 }
 
+/// Returns the number of failures in some cells.
+fn failures(cells: &[Count]) -> u64 {
+    failures_of(cells.iter().fold(0, |sum, count| sum.wrapping_add(*count)))
+}
+
 impl Axis {
-    /// Returns the highest score and the index of its condition, or (0, 0) if no score exceeds 0.
-    pub(super) fn highest(&self, row: &[Count], likelihood: &Likelihood) -> (f64, usize) {
+    /// Returns the highest score of the conditions with at least `fewest` failures, and the index of its condition, or
+    /// (0, 0) if no score exceeds 0.
+    pub(super) fn highest(&self, row: &[Count], likelihood: &Likelihood, fewest: u64) -> (f64, usize) {
         let mut highest = (0.0, 0);
         let mut place = 0;
         let mut look = |count: Count| {
-            let score = likelihood.gain(count);
-            if score > highest.0 {
-                highest = (score, place);
+            if failures_of(count) >= fewest {
+                let score = likelihood.gain(count);
+                if score > highest.0 {
+                    highest = (score, place);
+                }
             }
             place += 1;
         };

@@ -13,6 +13,11 @@ pub(super) fn parts(count: Count) -> (usize, usize) {
     ((count & 0xFFFF_FFFF) as usize, (count >> 32) as usize)
 }
 
+/// Returns the failures of a count.
+pub(super) fn failures_of(count: Count) -> u64 {
+    count >> 32
+}
+
 /// Scores patterns among some runs.
 ///
 /// The score is the logarithm of the likelihood ratio between one rate of failures within the pattern and another
@@ -61,10 +66,20 @@ impl Likelihood {
         self.of_failed[failed] + self.of_passed[runs.wrapping_sub(failed)] - self.of_runs[runs] - self.alike
     }
 
-    /// Returns an upper bound of the score of any part of a pattern: that of all its failures without its passes.
-    pub fn most(&self, within: Count) -> f64 {
-        let (_, failed) = parts(within);
-        self.gain(failed as u64 | ((failed as u64) << 32))
+    /// Returns how many failures a pattern needs at least to score above `score`: as many as a pattern needs that has no
+    /// passes.
+    pub fn fewest_failures(&self, score: f64) -> u64 {
+        // The score of a pattern without passes increases with its failures.
+        let (mut below, mut above) = (0, self.failed + 1);
+        while above - below > 1 {
+            let failures = below + (above - below) / 2;
+            if self.gain(failures | (failures << 32)) > score {
+                above = failures;
+            } else {
+                below = failures;
+            }
+        }
+        above
     }
 }
 
@@ -81,7 +96,11 @@ mod tests {
         assert!((likelihood.gain(count(20, 12)) - expected).abs() < 1e-12);
         assert_eq!(likelihood.gain(count(20, 4)), 0.0);
         assert_eq!(likelihood.gain(count(20, 1)), 0.0);
-        assert!(likelihood.most(count(20, 12)) > likelihood.gain(count(12, 11)));
+        for failed in 1..20 {
+            let fewest = likelihood.fewest_failures(likelihood.gain(count(failed, failed)));
+            assert_eq!(fewest, failed + 1, "a pattern of {failed} failures and no passes scores as much");
+        }
+        assert_eq!(likelihood.fewest_failures(0.0), 1);
         assert_eq!(parts(one(true) + one(false) + one(true)), (3, 2));
     }
 }

@@ -73,7 +73,7 @@ fn best_of(axis: &Axis, input: &PatternInput, likelihood: &Likelihood) -> Option
     for (cell, failed) in axis.of_run.iter().zip(&input.failed) {
         sums[usize::from(*cell)] += one(*failed);
     }
-    let (score, place) = axis.highest(&sums, likelihood);
+    let (score, place) = axis.highest(&sums, likelihood, 0);
     (score > 0.0).then(|| (score, axis.condition(place)))
 }
 

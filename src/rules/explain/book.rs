@@ -21,14 +21,42 @@ impl RuleBook {
     /// # Errors
     /// The property is unknown, a value is invalid, or the budget was exceeded.
     pub fn explain(&self, facts: &ActionFacts<'_>, property: &str, budget: &Budget) -> Result<Explanation, RuleFault> {
+        self.explain_all(facts, &[property], budget).remove(0)
+    }
+
+    /// Explains several properties (by IRI) in an action, in the given order. Evaluates the libraries once.
+    ///
+    /// Each property has an error of its own: see [`RuleBook::explain`].
+    pub fn explain_all(
+        &self,
+        facts: &ActionFacts<'_>,
+        properties: &[&str],
+        budget: &Budget,
+    ) -> Vec<Result<Explanation, RuleFault>> {
+        let mut base = None;
+        properties.iter().map(|property| self.explained(facts, property, &mut base, budget)).collect()
+    }
+
+    fn explained<'a>(
+        &'a self,
+        facts: &ActionFacts<'a>,
+        property: &str,
+        base: &mut Option<Base<'a>>,
+        budget: &Budget,
+    ) -> Result<Explanation, RuleFault> {
         let judge = self.property(property)?;
         if judge.rules.reads_intervals() && lacks_intervals(facts) {
             return Err(RuleFault::Value(NO_INTERVALS.to_owned()));
         }
         match &judge.rules {
             JudgeRules::Datalog { planned, verdict, .. } => {
-                let evaluated = self.evaluate_for_proofs(facts, planned, verdict, budget)?;
-                Ok(explained(&judge.label, evaluated.findings.clone()?, verdict, &evaluated.context(self, planned)))
+                let base = match base {
+                    Some(base) => base,
+                    None => base.insert(self.base(facts, budget)?),
+                };
+                let evaluated = self.evaluate_for_proofs(base, planned, verdict, budget)?;
+                let context = evaluated.context(self, base, planned);
+                Ok(explained(&judge.label, evaluated.findings.clone()?, verdict, &context))
             }
             #[cfg(feature = "sparql")]
             JudgeRules::Sparql(_) => {
@@ -59,9 +87,10 @@ impl RuleBook {
                     Ok((goal, predicate))
                 });
                 let (goal, predicate) = goal.map_err(|faults| invalid_goal(&faults))?;
-                let mut evaluated = self.evaluate_for_proofs(facts, planned, verdict, budget)?;
-                let (known, unknown) = goal.known(&mut evaluated.universe);
-                let context = evaluated.context(self, planned);
+                let mut base = self.base(facts, budget)?;
+                let evaluated = self.evaluate_for_proofs(&mut base, planned, verdict, budget)?;
+                let (known, unknown) = goal.known(&mut base.universe);
+                let context = evaluated.context(self, &base, planned);
                 Ok(Explanation { unknown, ..goal_explained(statement, predicate, &known, &context) })
             }
             #[cfg(feature = "sparql")]
@@ -75,61 +104,82 @@ impl RuleBook {
         self.properties.get(iri).ok_or_else(|| RuleFault::Value(format!("unknown property {iri}")))
     }
 
-    /// Evaluates the rules of a property over an action, and keeps the tuples of every stage.
-    fn evaluate_for_proofs<'a>(
-        &'a self,
-        facts: &ActionFacts<'a>,
-        planned: &Planned,
-        verdict: &Verdict,
-        budget: &Budget,
-    ) -> Result<Evaluated<'a>, RuleFault> {
+    /// Evaluates the libraries over an action, and keeps the tuples of every stage.
+    fn base<'a>(&'a self, facts: &ActionFacts<'a>, budget: &Budget) -> Result<Base<'a>, RuleFault> {
         let mut universe = Universe::of_action(&self.terms, facts);
         let (mut rounds, mut meter) = (Rounds::default(), Meter::new(budget));
         let given = self.given.load(facts, &mut universe, &self.predicates, &self.indexes);
         let own = self.given.load(facts, &mut universe, &self.predicates, &self.indexes);
-        let mut enriched = Layers { own, below: vec![&self.fixed] };
-        let mut evaluate = |planned: &Planned, layers: &mut Layers<'_>| {
-            let (predicates, indexes) = (&self.predicates, &self.indexes);
-            let rounds = Some(&mut rounds);
-            evaluate_recording_rounds(planned, predicates, indexes, layers, &mut universe, &mut meter, rounds)
-                .map_err(|stopped| fault(&meter, stopped, planned))
-        };
-        evaluate(&self.libraries, &mut enriched)?;
-        let mut layers = Layers { own: Tables::default(), below: vec![&enriched.own, &self.fixed] };
-        evaluate(planned, &mut layers)?;
-        let findings = findings(verdict, &layers, &universe);
-        let own = layers.own;
-        let watch = meter.into_watch();
+        let mut layers = Layers { own, below: vec![&self.fixed] };
+        self.evaluate_recording(&self.libraries, &mut layers, (&mut universe, &mut rounds), &mut meter)?;
+        let enriched = layers.own;
+        let label = universe.next_label();
+        Ok(Base { universe, label, rounds, given, enriched })
+    }
+
+    /// Evaluates the rules of a property.
+    fn evaluate_for_proofs(
+        &self,
+        base: &mut Base<'_>,
+        planned: &Planned,
+        verdict: &Verdict,
+        budget: &Budget,
+    ) -> Result<Evaluated, RuleFault> {
+        let Base { universe, label, rounds, enriched, .. } = base;
+        universe.label_from(*label);
+        let mut meter = Meter::new(budget);
+        let mut layers = Layers { own: Tables::default(), below: vec![enriched, &self.fixed] };
+        self.evaluate_recording(planned, &mut layers, (universe, rounds), &mut meter)?;
+        let findings = findings(verdict, &layers, universe);
+        let (own, watch) = (layers.own, meter.into_watch());
         let stated = stated_facts(&[planned, &self.libraries, &self.fixed_rules], &self.predicates, &self.indexes);
-        Ok(Evaluated { universe, rounds, given, stated, enriched: enriched.own, own, watch, findings })
+        Ok(Evaluated { stated, own, watch, findings })
+    }
+
+    fn evaluate_recording(
+        &self,
+        planned: &Planned,
+        layers: &mut Layers<'_>,
+        (universe, rounds): (&mut Universe<'_>, &mut Rounds),
+        meter: &mut Meter,
+    ) -> Result<(), RuleFault> {
+        let (predicates, indexes) = (&self.predicates, &self.indexes);
+        evaluate_recording_rounds(planned, predicates, indexes, layers, universe, meter, Some(rounds))
+            .map_err(|stopped| fault(meter, stopped, planned))
     }
 }
 
-/// The tuples of one action and one property by stage, from which proofs are built.
-struct Evaluated<'a> {
+/// The tuples of one action, which the explanations of all its properties share.
+struct Base<'a> {
     universe: Universe<'a>,
+    /// The first label for the new things of a property.
+    label: u64,
     rounds: Rounds,
     /// The facts of the action.
     given: Tables,
-    /// The facts written in the rule texts.
-    stated: Tables,
     /// The facts of the action with the tuples of the libraries.
     enriched: Tables,
+}
+
+/// The tuples of one property by stage, from which proofs are built.
+struct Evaluated {
+    /// The facts written in the rule texts.
+    stated: Tables,
     /// The tuples of the property's rules.
     own: Tables,
     watch: Watch,
     findings: Result<Findings, RuleFault>,
 }
 
-impl Evaluated<'_> {
-    fn context<'c>(&'c self, book: &'c RuleBook, planned: &'c Planned) -> ProofContext<'c> {
+impl Evaluated {
+    fn context<'c>(&'c self, book: &'c RuleBook, base: &'c Base<'_>, planned: &'c Planned) -> ProofContext<'c> {
         ProofContext {
             predicates: &book.predicates,
             rules: planned.rules.iter().chain(&book.libraries.rules).chain(&book.fixed_rules.rules).collect(),
-            layers: vec![&self.own, &self.enriched, &book.fixed],
-            facts: vec![&self.given, &book.fixed_facts, &self.stated],
-            rounds: &self.rounds,
-            universe: &self.universe,
+            layers: vec![&self.own, &base.enriched, &book.fixed],
+            facts: vec![&base.given, &book.fixed_facts, &self.stated],
+            rounds: &base.rounds,
+            universe: &base.universe,
             watch: &self.watch,
             exhausted: Cell::new(false),
             deciding: RefCell::default(),
