@@ -47,7 +47,7 @@ pub(super) struct RunPlace {
     pub(super) weight: Option<f64>,
     /// Why each scene that was drawn before was discarded, in order.
     pub(super) discards: Vec<String>,
-    /// Wall-clock time from the campaign's start until the run is stored. Unit: seconds.
+    /// Wall-clock time from the campaign's start until the run is made. Unit: seconds.
     pub(super) elapsed_secs: f64,
 }
 

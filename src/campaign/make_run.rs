@@ -1,21 +1,21 @@
-//! Makes one planned run: draws scenes until one can be built.
+//! Makes one planned run: draws scenes until one can be built, and encodes the run for the history.
 
 use crate::attempt::{Attempt, AttemptFault, time_limit};
 use crate::finished_run::{FinishedRun, RunPlace};
 use crate::{Env, Failure, Planned, RunContext, RunResult};
-use actcheck_base::{Diagnostic, Diagnostics};
-use actcheck_history::RunRecord;
+use actcheck_base::{Diagnostic, Diagnostics, Outcome};
+use actcheck_history::{Entry, RunRecord, RunStatus};
 
 /// Maximum number of scenes drawn for one run; then the campaign stops.
 ///
 /// If one scene in five of a space can be built, one run in 70,000 is left without a scene.
 pub(super) const SCENES_PER_RUN: u64 = 50;
 
-/// A new run, and why each scene that was drawn before was discarded.
+/// A new run.
 pub(super) struct MadeRun {
-    planned: Planned,
-    run: FinishedRun,
-    discards: Vec<String>,
+    pub(super) record: RunRecord,
+    /// The run as the history stores it.
+    pub(super) entry: Entry,
 }
 
 /// The result of a planned run.
@@ -30,15 +30,22 @@ pub(super) enum Making {
     Impossible(Diagnostics),
 }
 
-/// Makes a planned run. Draws scenes until one can be built.
-pub(super) fn make_run(env: &Env, campaign: &str, planned: Planned, context: &RunContext) -> Making {
+/// Makes a planned run of a campaign that began at a time of the context's clock (unit: seconds). Draws scenes until one
+/// can be built.
+pub(super) fn make_run(env: &Env, campaign: &str, began_secs: f64, planned: Planned, context: &RunContext) -> Making {
     let mut discards = Vec::new();
     for number in 0..SCENES_PER_RUN {
         let choices = || planned.choices(env.campaign.seed, number);
         let cut = time_limit(env, context);
         let attempt = Attempt { campaign, index: planned.index, choices: &choices, cut };
         match attempt.make(env, context) {
-            Ok(run) => return Making::Run(Box::new(MadeRun { planned, run, discards })),
+            Ok(run) => {
+                let record = record(run, campaign, &planned, discards, (context.clock.secs)() - began_secs);
+                return match entry(env, &record) {
+                    Ok(entry) => Making::Run(Box::new(MadeRun { record, entry })),
+                    Err(faults) => Making::Impossible(faults),
+                };
+            }
             Err(AttemptFault::Failure(Failure::Interrupted)) => return Making::Interrupted,
             Err(AttemptFault::Failure(Failure::Discard(reason))) => discards.push(reason),
             Err(AttemptFault::Crash(reason)) => {
@@ -49,19 +56,27 @@ pub(super) fn make_run(env: &Env, campaign: &str, planned: Planned, context: &Ru
     Making::Impossible(no_scene(env, &planned, discards.last()).into())
 }
 
-impl MadeRun {
-    /// The record of the run, with repetition and weight from its plan. Only the first run of a scene has the discards.
-    pub(super) fn into_record(self, campaign: &str, elapsed_secs: f64) -> RunRecord {
-        let planned = self.planned;
-        let is_first = planned.repetition.is_none_or(|number| number == 0);
-        self.run.into_record(RunPlace {
-            campaign: campaign.to_owned(),
-            shrunk_from: None,
-            repetition: planned.repetition(),
-            weight: planned.steering.as_ref().and_then(|steering| steering.weight),
-            discards: if is_first { self.discards } else { Vec::new() },
-            elapsed_secs,
-        })
+/// The record of a run, with repetition and weight from its plan. Only the first run of a scene has the discards.
+fn record(run: FinishedRun, campaign: &str, planned: &Planned, discards: Vec<String>, elapsed_secs: f64) -> RunRecord {
+    let is_first = planned.repetition.is_none_or(|number| number == 0);
+    run.into_record(RunPlace {
+        campaign: campaign.to_owned(),
+        shrunk_from: None,
+        repetition: planned.repetition(),
+        weight: planned.steering.as_ref().and_then(|steering| steering.weight),
+        discards: if is_first { discards } else { Vec::new() },
+        elapsed_secs,
+    })
+}
+
+/// Encodes a run: whole, or only its outline, as the campaign's configuration says.
+fn entry(env: &Env, record: &RunRecord) -> Result<Entry, Diagnostics> {
+    let failed = record.status != RunStatus::Completed
+        || record.judgements.iter().flatten().any(|judgement| judgement.outcome == Outcome::Failed);
+    if env.campaign.keeping.keeps_whole(record.seed, record.index, failed) {
+        Entry::whole(record)
+    } else {
+        Entry::outline(record)
     }
 }
 

@@ -1,4 +1,4 @@
-//! Runs a campaign on several workers and commits its runs in the order of the schedule.
+//! Runs a campaign on several workers, which also encode their runs, and writes these in the order of the schedule.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::ops::ControlFlow;
@@ -7,15 +7,14 @@ use std::sync::mpsc::{Receiver, Sender, channel};
 use std::sync::{Mutex, PoisonError};
 
 use crate::broken_runs::BrokenRuns;
-use crate::make_run::{Making, make_run};
+use crate::make_run::{MadeRun, Making, make_run};
 use crate::tally::Tally;
 use crate::workers::workers;
 use crate::{
-    CampaignResult, Clock, Ending, Env, ExhaustedBudget, Planned, RunContext, RunResult, Schedule, StoredRuns,
-    schedule_of,
+    CampaignResult, Ending, Env, ExhaustedBudget, Planned, RunContext, RunResult, Schedule, StoredRuns, schedule_of,
 };
-use actcheck_base::{Diagnostics, Keeping, Outcome};
-use actcheck_history::{History, RunRecord, RunStatus};
+use actcheck_base::Diagnostics;
+use actcheck_history::{History, RunRecord};
 
 /// Maximum number of runs per worker that are made but not stored yet, because an earlier run is missing.
 const AHEAD: usize = 4;
@@ -47,7 +46,7 @@ struct Made {
     making: Making,
 }
 
-/// Makes every run of the schedule, commits each in a transaction of its own, and then calls `on_run`.
+/// Makes every run of the schedule, stores each completely or not at all, and then calls `on_run`.
 ///
 /// Runs are stored in the order of the schedule, whatever the number of workers: the history always has a prefix of the
 /// schedule. Budgets count the runs in the same order, and runs beyond a budget are discarded. `stop`, or the
@@ -78,8 +77,9 @@ pub fn resume_all(
     let jobs = options.jobs.max(1);
     let halt = AtomicBool::new(false);
     let clock = options.context.clock;
+    // Less the time taken before it was interrupted.
     let began_secs = (clock.secs)() - stored.elapsed_secs;
-    let mut writer = RunWriter::new(env, history, campaign, clock, began_secs, &mut on_run);
+    let mut writer = RunWriter::new(env, history, &mut on_run);
     writer.end.discards = stored.discards;
     let time_up_at = env.campaign.limits.time_secs.map_or(f64::INFINITY, |limit| began_secs + limit);
     let pool = match workers(jobs) {
@@ -97,7 +97,7 @@ pub fn resume_all(
         for _ in 0..jobs {
             let (give, taken, halt) = (give.clone(), &taken, &halt);
             scope.spawn(move |_| {
-                work(env, campaign, &options.context, taken, &give, &|| {
+                work((env, campaign, began_secs), &options.context, taken, &give, &|| {
                     stop.load(Ordering::Relaxed) || halt.load(Ordering::Relaxed) || (clock.secs)() >= time_up_at
                 });
             });
@@ -118,8 +118,7 @@ pub fn resume_all(
 
 /// One worker: processes orders until the channel is closed.
 fn work(
-    env: &Env,
-    campaign: &str,
+    (env, campaign, began_secs): (&Env, &str, f64),
     context: &RunContext,
     orders: &Mutex<Receiver<Order>>,
     give: &Sender<Made>,
@@ -128,7 +127,8 @@ fn work(
     loop {
         let order = orders.lock().unwrap_or_else(PoisonError::into_inner).recv();
         let Ok(Order { position, planned }) = order else { return };
-        let making = if stopped() { Making::Interrupted } else { make_run(env, campaign, planned, context) };
+        let making =
+            if stopped() { Making::Interrupted } else { make_run(env, campaign, began_secs, planned, context) };
         if give.send(Made { position, making }).is_err() {
             return;
         }
@@ -179,51 +179,27 @@ fn conduct(
 /// Writes the runs in the order of the schedule, and decides when the campaign ends.
 struct RunWriter<'a> {
     history: &'a History,
-    /// Id of the campaign.
-    campaign: &'a str,
-    clock: Clock,
-    /// Start of the campaign on that clock, less the time taken before it was interrupted.
-    began_secs: f64,
     on_run: &'a mut dyn FnMut(&RunRecord),
     end: CampaignResult,
     tally: Tally,
     broken: BrokenRuns,
     /// Summaries of the batch's runs for the schedule.
     results: Vec<RunResult>,
-    keeping: Keeping,
 }
 
 impl<'a> RunWriter<'a> {
-    fn new(
-        env: &Env,
-        history: &'a History,
-        campaign: &'a str,
-        clock: Clock,
-        began_secs: f64,
-        on_run: &'a mut dyn FnMut(&RunRecord),
-    ) -> Self {
+    fn new(env: &Env, history: &'a History, on_run: &'a mut dyn FnMut(&RunRecord)) -> Self {
         let end = CampaignResult { ending: Ending::Finished, committed: 0, discards: Vec::new(), rates: Vec::new() };
         let tally = Tally::new(env);
-        Self {
-            history,
-            campaign,
-            clock,
-            began_secs,
-            on_run,
-            end,
-            tally,
-            broken: BrokenRuns::new(&env.campaign.launcher),
-            results: Vec::new(),
-            keeping: env.campaign.keeping,
-        }
+        Self { history, on_run, end, tally, broken: BrokenRuns::new(&env.campaign.launcher), results: Vec::new() }
     }
 
     /// Stores the next run of the schedule. Breaks if it is the last one.
     fn write(&mut self, making: Making) -> ControlFlow<()> {
         match making {
             Making::Run(made) => {
-                let record = made.into_record(self.campaign, (self.clock.secs)() - self.began_secs);
-                if let Err(faults) = self.commit(&record) {
+                let MadeRun { record, entry } = *made;
+                if let Err(faults) = self.history.write(&entry) {
                     self.stop(faults);
                     return ControlFlow::Break(());
                 }
@@ -264,16 +240,6 @@ impl<'a> RunWriter<'a> {
                 ControlFlow::Break(())
             }
             None => ControlFlow::Continue(()),
-        }
-    }
-
-    fn commit(&mut self, record: &RunRecord) -> Result<(), Diagnostics> {
-        let failed = record.status != RunStatus::Completed
-            || record.judgements.iter().flatten().any(|judgement| judgement.outcome == Outcome::Failed);
-        if self.keeping.keeps_whole(record.seed, record.index, failed) {
-            self.history.commit(record)
-        } else {
-            self.history.commit_outline(record)
         }
     }
 

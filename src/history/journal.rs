@@ -11,6 +11,7 @@
 use std::collections::{HashMap, HashSet};
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, ErrorKind, Read as _, Seek as _, SeekFrom, Write as _};
+use std::num::NonZero;
 use std::path::{Path, PathBuf};
 
 use flate2::read::DeflateDecoder;
@@ -27,6 +28,9 @@ use crate::wanted::Wanted;
 pub(super) const NAME: &str = "journal";
 /// Size of a record's header. Unit: bytes.
 const HEADER: usize = 16;
+
+/// Fewer records are not worth a thread.
+const FEWEST_RECORDS: usize = 20;
 
 /// The journal of a history that this process owns.
 #[derive(Debug)]
@@ -53,26 +57,25 @@ impl Journal {
         self.file.is_none()
     }
 
-    /// Adds statements in one record: all of them or, on an error, none.
+    /// Adds a record: all of it or, on an error, nothing.
     ///
     /// # Errors
     /// The disk is full or can't be written.
-    pub(super) fn append(&mut self, quads: &[Quad]) -> io::Result<()> {
-        let record = encode(quads)?;
+    pub(super) fn append(&mut self, Record { bytes: record, statements }: &Record) -> io::Result<()> {
         let is_new = self.is_new();
         let file = match self.file.take() {
             Some(file) => file,
             None => OpenOptions::new().create(true).write(true).truncate(true).open(&self.path)?,
         };
         let file = self.file.insert(file);
-        let written = file.write_all(&record).and_then(|()| if self.synced { file.sync_data() } else { Ok(()) });
+        let written = file.write_all(record).and_then(|()| if self.synced { file.sync_data() } else { Ok(()) });
         if let Err(error) = written {
             // Otherwise the next record would follow half a one. If this fails too, the disk does not work.
             let _ = cut(file, self.length);
             return Err(error);
         }
         self.length += record.len() as u64;
-        self.statements += quads.len();
+        self.statements += statements;
         if is_new && self.synced { sync_folder(&self.path) } else { Ok(()) }
     }
 
@@ -119,11 +122,50 @@ pub(super) fn read(dir: &Path) -> io::Result<Vec<u8>> {
     }
 }
 
+/// All statements of a journal.
+#[derive(Debug, Default)]
+pub(super) struct Statements {
+    /// Those of the default graph, in order, in one list for each thread that decoded them.
+    pub(super) of_default: Vec<Vec<Quad>>,
+    /// Those of named graphs.
+    pub(super) of_named: Vec<Vec<Quad>>,
+}
+
+impl Statements {
+    /// Number of statements.
+    pub(super) fn len(&self) -> usize {
+        self.of_default.iter().chain(&self.of_named).map(Vec::len).sum()
+    }
+
+    /// Iterates over all of them.
+    pub(super) fn into_quads(self) -> impl Iterator<Item = Quad> {
+        self.of_default.into_iter().chain(self.of_named).flatten()
+    }
+}
+
 /// Returns the statements of a journal, and whether all of it could be read. Half a record at the end was left by a
-/// killed process: it was never reported.
-pub(super) fn statements(bytes: &[u8]) -> (Vec<Quad>, bool) {
-    let (part, is_whole) = part(bytes, &Wanted::all());
-    (part.quads, is_whole)
+/// killed process: it was never reported. All cores share the work.
+pub(super) fn statements(bytes: &[u8]) -> (Statements, bool) {
+    let records: Vec<Option<(usize, &[u8])>> = records(bytes).collect();
+    let cores = std::thread::available_parallelism().map_or(1, NonZero::get);
+    let of_each = records.len().div_ceil(cores).max(FEWEST_RECORDS);
+    let decoded = |records: &[Option<(usize, &[u8])>]| {
+        let (part, is_whole) = part_of(records.iter().copied(), &Wanted::all());
+        let (of_default, of_named) = part.quads.into_iter().partition(|quad| quad.graph_name.is_default_graph());
+        (of_default, of_named, is_whole)
+    };
+    let parts: Vec<(Vec<Quad>, Vec<Quad>, bool)> = std::thread::scope(|scope| {
+        let threads: Vec<_> = records.chunks(of_each).map(|records| scope.spawn(|| decoded(records))).collect();
+        let joined = threads.into_iter().map(|thread| thread.join());
+        joined.map(|part| part.unwrap_or_else(|panic| std::panic::resume_unwind(panic))).collect()
+    });
+    let (mut all, mut all_whole) = (Statements::default(), true);
+    for (of_default, of_named, is_whole) in parts {
+        all.of_default.push(of_default);
+        all.of_named.push(of_named);
+        all_whole &= is_whole;
+    }
+    (all, all_whole)
 }
 
 /// Returns whether all of a journal can be read.
@@ -141,8 +183,12 @@ pub(super) struct Part {
 
 /// Returns the wanted statements of a journal, and whether all of it could be read.
 pub(super) fn part(bytes: &[u8], wanted: &Wanted) -> (Part, bool) {
+    part_of(records(bytes), wanted)
+}
+
+fn part_of<'b>(records: impl Iterator<Item = Option<(usize, &'b [u8])>>, wanted: &Wanted) -> (Part, bool) {
     let (mut part, mut is_whole, mut inflated) = (Part::default(), true, Vec::new());
-    for record in records(bytes) {
+    for record in records {
         let read = record.and_then(|(count, content)| {
             inflated.clear();
             DeflateDecoder::new(content).read_to_end(&mut inflated).ok()?;
@@ -216,19 +262,33 @@ pub(super) fn numbered<'q>(quads: impl IntoIterator<Item = &'q Quad>) -> Content
     (terms, rows)
 }
 
-fn encode(quads: &[Quad]) -> io::Result<Vec<u8>> {
-    let content = postcard::to_stdvec(&numbered(quads)).map_err(io::Error::other)?;
-    let mut encoder = DeflateEncoder::new(vec![0; HEADER], Compression::fast());
-    encoder.write_all(&content)?;
-    let mut record = encoder.finish()?;
-    let size = u32::try_from(record.len() - HEADER).map_err(io::Error::other)?;
-    let sum = sum_of(&record[HEADER..]);
-    for (at, value) in [size, quads.len() as u32, sum].into_iter().enumerate() {
-        record[at * 4..][..4].copy_from_slice(&value.to_le_bytes());
+/// Statements that are encoded for the journal.
+#[derive(Debug)]
+pub(super) struct Record {
+    bytes: Vec<u8>,
+    /// Number of statements in it.
+    statements: usize,
+}
+
+impl Record {
+    /// Encodes statements.
+    ///
+    /// # Errors
+    /// They have more than 4 GB.
+    pub(super) fn of(quads: &[Quad]) -> io::Result<Self> {
+        let content = postcard::to_stdvec(&numbered(quads)).map_err(io::Error::other)?;
+        let mut encoder = DeflateEncoder::new(vec![0; HEADER], Compression::fast());
+        encoder.write_all(&content)?;
+        let mut bytes = encoder.finish()?;
+        let size = u32::try_from(bytes.len() - HEADER).map_err(io::Error::other)?;
+        let sum = sum_of(&bytes[HEADER..]);
+        for (at, value) in [size, quads.len() as u32, sum].into_iter().enumerate() {
+            bytes[at * 4..][..4].copy_from_slice(&value.to_le_bytes());
+        }
+        let header = sum_of(&bytes[..HEADER - 4]);
+        bytes[HEADER - 4..HEADER].copy_from_slice(&header.to_le_bytes());
+        Ok(Self { bytes, statements: quads.len() })
     }
-    let header = sum_of(&record[..HEADER - 4]);
-    record[HEADER - 4..HEADER].copy_from_slice(&header.to_le_bytes());
-    Ok(record)
 }
 
 pub(super) fn written(term: TermRef<'_>) -> Written<'_> {
@@ -322,10 +382,15 @@ mod tests {
         [with(&GraphName::DefaultGraph), with(&node("g").into())]
     }
 
+    fn statements(bytes: &[u8]) -> (Vec<Quad>, bool) {
+        let (statements, is_whole) = super::statements(bytes);
+        (statements.into_quads().collect(), is_whole)
+    }
+
     fn journalled(dir: &Path) -> Vec<u8> {
         let mut journal = Journal::new(dir);
         for quads in sample() {
-            journal.append(&quads).expect("it can be written");
+            journal.append(&Record::of(&quads).expect("they are few")).expect("it can be written");
         }
         assert_eq!(journal.statements, 14);
         read(dir).expect("it can be read")
@@ -340,6 +405,20 @@ mod tests {
         assert_eq!(statements(&[bytes, vec![0; 40]].concat()), (sample().concat(), true));
         Journal::new(folder.path()).remove().expect("it can be removed");
         assert_eq!(statements(&read(folder.path()).expect("it is gone")), (Vec::new(), true));
+    }
+
+    #[test]
+    fn threads_share_the_records_of_a_long_journal() {
+        let mut bytes = Vec::new();
+        let [of_default, of_named] = sample();
+        for _ in 0..3 * FEWEST_RECORDS {
+            bytes.extend(Record::of(&[of_default.as_slice(), &of_named].concat()).expect("memory").bytes);
+        }
+        let expected = [vec![of_default; 3 * FEWEST_RECORDS].concat(), vec![of_named; 3 * FEWEST_RECORDS].concat()];
+        assert_eq!(statements(&bytes), (expected.concat(), true));
+        let last = bytes.len() - 1;
+        bytes[last] ^= 1;
+        assert!(!statements(&bytes).1, "the last thread's record is damaged");
     }
 
     #[test]
@@ -364,7 +443,7 @@ mod tests {
     fn half_a_record_at_the_end_is_left_out() {
         let folder = ScratchFolder::create().expect("it can be created");
         let bytes = journalled(folder.path());
-        let [first, second] = sample().map(|quads| encode(&quads).expect("memory").len());
+        let [first, second] = sample().map(|quads| Record::of(&quads).expect("memory").bytes.len());
         assert_eq!(bytes.len(), first + second);
         for length in 0..bytes.len() {
             let whole = if length < first { Vec::new() } else { sample()[0].clone() };

@@ -8,6 +8,7 @@ mod columns;
 mod counted;
 mod detail;
 mod dump;
+mod entry;
 mod evaluation;
 mod fault;
 mod folder;
@@ -57,6 +58,7 @@ mod write_scene;
 
 pub use answer::{Cancel, QueryAnswer};
 pub use counted::{newest_of_alike, without_counts};
+pub use entry::Entry;
 pub use foreign::{ForeignAnswer, check_query};
 pub use integrity::{Damage, Integrity};
 pub use judged::{JudgedOutcome, JudgedRun, Judgements, LaterRules, Wish};

@@ -129,7 +129,7 @@ impl History {
         let snapshot = Snapshot::salvage(&folder)?;
         let (journal, is_whole) = journal::statements(&snapshot.journal);
         let opened = read_tables(&folder, Arc::new(snapshot))?;
-        let salvaged = salvage(&opened.store, journal, is_whole, &folder.traced())
+        let salvaged = salvage(&opened.store, journal.into_quads().collect(), is_whole, &folder.traced())
             .map_err(|error| fault::store(dir, "reading it", &error))?;
         let store = OpenStore { store: salvaged.store, snapshot: opened.snapshot.clone() };
         let opened = Opened { store, snapshot: opened.snapshot, loaded: Mutex::new(Wanted::all()), can_rest: false };

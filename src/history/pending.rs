@@ -6,7 +6,7 @@ use std::sync::PoisonError;
 use oxigraph::model::{Quad, Term};
 use oxigraph::store::{StorageError, Store};
 
-use crate::journal::{self, Journal, Part};
+use crate::journal::{self, Journal, Part, Record, Statements};
 use crate::snapshot::Snapshot;
 use crate::{History, fault};
 use actcheck_base::Diagnostics;
@@ -46,12 +46,18 @@ impl History {
     }
 
     /// Stores statements: all of them or, on an error, none.
-    pub(super) fn enter(&self, quads: &[Quad], doing: &str) -> Result<(), Diagnostics> {
+    pub(super) fn enter_quads(&self, quads: &[Quad], doing: &str) -> Result<(), Diagnostics> {
+        let record = Record::of(quads).map_err(|error| fault::io(self.dir(), doing, &error))?;
+        self.enter(&record, doing)
+    }
+
+    /// Stores the statements of a record: all of them or, on an error, none.
+    pub(super) fn enter(&self, record: &Record, doing: &str) -> Result<(), Diagnostics> {
         let mut journal = self.journal();
         if journal.is_new() {
             self.folder.mark_journal(true)?;
         }
-        journal.append(quads).map_err(|error| fault::io(self.dir(), doing, &error))
+        journal.append(record).map_err(|error| fault::io(self.dir(), doing, &error))
     }
 
     pub(super) fn sync_journal(&self) -> Result<(), Diagnostics> {
@@ -69,11 +75,11 @@ impl History {
         if journal.statements == 0 {
             return Ok(());
         }
-        self.take_over(&mut journal, |store, quads| {
-            if quads.len() >= FEWEST_LOADED {
-                return load(store, quads);
+        self.take_over(&mut journal, |store, statements| {
+            if statements.len() >= FEWEST_LOADED {
+                return load(store, statements);
             }
-            store.extend(quads)?;
+            store.extend(statements.into_quads())?;
             store.flush()
         })
     }
@@ -91,12 +97,12 @@ impl History {
             return Ok(());
         }
         let synced = journal.synced;
-        self.take_over(&mut journal, |store, quads| {
-            if quads.len() >= FEWEST_READ {
-                return load(store, quads);
+        self.take_over(&mut journal, |store, statements| {
+            if statements.len() >= FEWEST_READ {
+                return load(store, statements);
             }
             // Transactions survive a kill, too.
-            extend(store, quads)?;
+            extend(store, statements.into_quads().collect())?;
             if synced { store.flush() } else { Ok(()) }
         })
     }
@@ -104,24 +110,24 @@ impl History {
     /// Writes the journal of a killed process into the store.
     pub(super) fn take_over_journal(&self) -> Result<(), Diagnostics> {
         let mut journal = self.journal();
-        self.take_over(&mut journal, |store, quads| match quads.len() {
+        self.take_over(&mut journal, |store, statements| match statements.len() {
             0 => Ok(()),
-            1..FEWEST_LOADED => extend(store, quads).and_then(|()| store.flush()),
-            _ => load(store, quads),
+            1..FEWEST_LOADED => extend(store, statements.into_quads().collect()).and_then(|()| store.flush()),
+            _ => load(store, statements),
         })
     }
 
     fn take_over(
         &self,
         journal: &mut Journal,
-        take: impl FnOnce(&Store, Vec<Quad>) -> Result<(), StorageError>,
+        take: impl FnOnce(&Store, Statements) -> Result<(), StorageError>,
     ) -> Result<(), Diagnostics> {
         let bytes = journal::read(self.dir()).map_err(|error| fault::io(self.dir(), "reading its journal", &error))?;
-        let (quads, is_whole) = journal::statements(&bytes);
+        let (statements, is_whole) = journal::statements(&bytes);
         if !is_whole {
             return Err(fault::damaged(self.dir(), DAMAGED));
         }
-        take(&*self.bare_store()?, quads).map_err(|error| self.fault("writing its tables", &error))?;
+        take(&*self.bare_store()?, statements).map_err(|error| self.fault("writing its tables", &error))?;
         // Only then: a killed process leaves the statements in both.
         journal.remove().map_err(|error| self.unwritten(&error))
     }
@@ -132,11 +138,14 @@ impl History {
 }
 
 /// Writes statements directly into tables.
-fn load(store: &Store, quads: Vec<Quad>) -> Result<(), StorageError> {
-    // One batch, so that there is one table for each index. The library counts a thousand statements as a megabyte.
-    let megabytes = quads.len() / 1000 + 1;
-    let mut loader = store.bulk_loader().with_num_threads(1).with_max_memory_size_in_megabytes(megabytes);
-    loader.load_quads(quads)?;
+fn load(store: &Store, statements: Statements) -> Result<(), StorageError> {
+    // The library makes the tables of each batch in a thread. Default graph and named graphs have indexes of their own,
+    // so that there is still one table for each index. The library counts a thousand statements as a megabyte.
+    let threads = 2;
+    let megabytes = threads * (statements.len() / 1000 + 1);
+    let mut loader = store.bulk_loader().with_num_threads(threads).with_max_memory_size_in_megabytes(megabytes);
+    loader.load_quads(statements.of_named.into_iter().flatten())?;
+    loader.load_quads(statements.of_default.into_iter().flatten())?;
     loader.commit()
 }
 

@@ -14,19 +14,18 @@ use crate::folder::Folder;
 use crate::journal::Journal;
 use crate::open::Opened;
 use crate::outlines::{LoadedFiles, Outline, Restore, Shelf, View};
-use crate::quad_source::RunQuads;
 use crate::read::{short_id, subjects, text_of};
 use crate::snapshot::Snapshot;
 use crate::statements::iri;
 use crate::wanted::Wanted;
 use crate::write_campaign::{self, campaign_node};
-use crate::write_run::{self, run_node};
+use crate::write_run::run_node;
 use crate::{
     CampaignEnd, CampaignRecord, CampaignRow, Cancel, Judgements, OutcomeRow, QueryAnswer, RunDetail, RunFilter,
-    RunRecord, RunRow, RunVitals, Wish, detail, fault, graphs, query, trace_file, trace_parts, vitals,
+    RunRecord, RunRow, RunVitals, Wish, detail, fault, query, trace_file, vitals,
 };
 use crate::{lists, read_campaign};
-use actcheck_base::{Diagnostic, Diagnostics, Digest, Source, names, nearest, write_atomic};
+use actcheck_base::{Diagnostic, Diagnostics, Digest, Source, names, nearest};
 
 /// A history that only this process may write, or that it only reads (after [`History::open_to_read`]).
 ///
@@ -77,7 +76,7 @@ impl History {
     pub fn begin_campaign(&self, record: &CampaignRecord) -> Result<(), Diagnostics> {
         self.check_ids("campaign", [&record.id])?;
         self.remove_orphans()?;
-        self.enter(&write_campaign::beginning(record), "writing the campaign")?;
+        self.enter_quads(&write_campaign::beginning(record), "writing the campaign")?;
         self.flush()
     }
 
@@ -102,42 +101,6 @@ impl History {
         taken_back().map_err(|error| self.fault("reopening the campaign", &error))?;
         self.remove_orphans()?;
         self.flush()
-    }
-
-    /// Stores a run, completely or (on an error) not at all.
-    ///
-    /// # Errors
-    /// Writing failed: `H005`, `H006`. Runs stored before are complete.
-    pub fn commit(&self, record: &RunRecord) -> Result<(), Diagnostics> {
-        self.check_ids("run", [&record.id])?;
-        let doing = format!("writing run {}", record.id);
-        let (run, in_memory) = (run_node(&record.id), RunQuads::new(write_run::quads_without_facts(record)));
-        let parts = detail::parts(&in_memory, &run).map_err(|error| self.fault(&doing, &error))?;
-        let bytes = trace_file::encode(&record.choices, &record.trace)
-            .and_then(|trace| trace_parts::appended(trace, &record.trace.hash, &parts))
-            .map_err(|error| Diagnostic::error("H006", format!("{doing} failed: {error}")))?;
-        let mut quads = in_memory.into_quads();
-        graphs::write(&record.facts, &run, &mut quads);
-        let file = self.folder.trace(&record.id);
-        write_atomic(&file, &bytes).map_err(|error| fault::io(self.dir(), &doing, &error))?;
-        self.enter(&quads, &doing).inspect_err(|_| {
-            // A trace without a run is harmless; if it can't be removed now, the next campaign removes it.
-            let _ = std::fs::remove_file(&file);
-        })?;
-        self.load_long_journal()
-    }
-
-    /// Stores the outline of a run, completely or (on an error) not at all: everything except its motion over time, which
-    /// comes back when the run is simulated again.
-    ///
-    /// # Errors
-    /// As [`History::commit`].
-    pub fn commit_outline(&self, record: &RunRecord) -> Result<(), Diagnostics> {
-        self.check_ids("run", [&record.id])?;
-        let doing = format!("writing run {}", record.id);
-        let outline =
-            Outline::of(record).map_err(|error| Diagnostic::error("H006", format!("{doing} failed: {error}")))?;
-        self.enter_outline(&record.campaign, record.index, &outline)
     }
 
     /// Stores the outlines of several runs of a campaign in one file: all of them or, on an error, none.
@@ -182,7 +145,7 @@ impl History {
     /// # Errors
     /// Writing failed: `H005`, `H006`.
     pub fn finish_campaign(&self, id: &str, end: &CampaignEnd) -> Result<(), Diagnostics> {
-        self.enter(&write_campaign::end(id, end), "writing the end of the campaign")?;
+        self.enter_quads(&write_campaign::end(id, end), "writing the end of the campaign")?;
         self.shelf().pack(id).map_err(|error| fault::io(self.dir(), "writing outlines", &error))?;
         self.load_journal()?;
         self.flush()?;

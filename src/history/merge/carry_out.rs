@@ -244,7 +244,7 @@ impl Writer<'_> {
             return Ok(());
         }
         if old.is_empty() {
-            self.into.enter(new, "writing merged data")?;
+            self.into.enter_quads(new, "writing merged data")?;
             return self.into.load_long_journal();
         }
         replace(&*self.into.store()?, new, old).map_err(|error| self.into.fault("writing merged data", &error))
