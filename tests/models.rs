@@ -3,12 +3,13 @@
 //! A wrong model is a folder below `tests/diagnostics/models/` that holds the model `thing`, with its diagnostics in
 //! `expected`. A new case needs no Rust: run with `UPDATE_EXPECT=1` to write the files, and review them.
 
+use std::fs;
 use std::path::{Path, PathBuf};
 
 use actcheck::base::{Diagnostics, Files, Source};
 use actcheck::campaign::Env;
 use actcheck::config::{self, Campaign, Overrides};
-use actcheck::data::Shape;
+use actcheck::data::{ObjectModel, Shape};
 use actcheck::rules::Budget;
 
 use crate::support::expected::assert_diagnostics;
@@ -74,6 +75,93 @@ fn models_of_all_formats_have_the_values_of_their_files() {
     assert!((pill_box.mass_kg - 0.25).abs() < 1e-9);
     near(pill_box.inertia.unwrap().com_m, [0.0, 0.0, (0.2 * 0.03 + 0.05 * 0.075) / 0.25]);
     assert!(matches!(pill_box.parts[1].shape, Shape::Capsule { .. }));
+}
+
+/// A model of SDF with a post, an arm that turns on it, and a weight on the arm. `frames` and the poses of arm, hinge,
+/// the arm's box and weight, and the axis.
+fn arm_on_a_post(frames: &str, [arm, hinge, solid, weight, axis]: [&str; 5]) -> ObjectModel {
+    let link = |name: &str, pose: &str, solid: &str| {
+        format!(
+            "<link name=\"{name}\">{pose}<collision name=\"c\">{solid}<geometry><box><size>0.1 0.05 0.2</size></box></geometry></collision></link>"
+        )
+    };
+    let text = format!(
+        "<sdf version=\"1.9\"><model name=\"thing\">{frames}{}{}{}<joint name=\"hinge\" type=\"revolute\">\
+         <parent>post</parent><child>arm</child>{hinge}<axis>{axis}</axis></joint><joint name=\"screw\" type=\"fixed\">\
+         <parent>arm</parent><child>weight</child></joint></model></sdf>",
+        link("post", "<pose>0 0 0.1 0 0 0</pose>", ""),
+        link("arm", arm, solid),
+        link("weight", weight, "")
+    );
+    let (folder, _) = project("");
+    let thing = folder.path().join("m/thing");
+    fs::create_dir_all(&thing).unwrap();
+    fs::write(thing.join("model.sdf"), text).unwrap();
+    fs::write(thing.join("model.config"), "<model><name>thing</name><sdf>model.sdf</sdf></model>").unwrap();
+    let campaign = campaign(folder.path(), "model_dir = \"m\"\n").unwrap_or_else(|faults| panic!("{faults}"));
+    ObjectModel::clone(&campaign.models["thing"])
+}
+
+/// Poses relative to a `<frame>`, a link, a joint and the model, and an axis in the frame of a link, are those of the same
+/// model with all poses in the frame of the parent.
+#[test]
+fn poses_relative_to_other_frames_are_those_of_the_parent() {
+    let turned = "0 0 1.5707963267948966";
+    let plain = arm_on_a_post(
+        "",
+        [
+            &format!("<pose>0.3 0 0.1 {turned}</pose>"),
+            "<pose>0.05 0 0 0 0 0</pose>",
+            "<pose>0 0.1 0 0 0 0</pose>",
+            &format!("<pose>0.3 0.05 0.15 {turned}</pose>"),
+            "<xyz expressed_in=\"__model__\">1 0 0</xyz>",
+        ],
+    );
+    let framed = arm_on_a_post(
+        &format!("<frame name=\"mount\" attached_to=\"post\"><pose>0.3 0 0 {turned}</pose></frame>"),
+        [
+            "<pose relative_to=\"mount\"/>",
+            &format!("<pose relative_to=\"__model__\">0.3 0.05 0.1 {turned}</pose>"),
+            &format!("<pose relative_to=\"post\">0.2 0 0 {turned}</pose>"),
+            "<pose relative_to=\"hinge\">0 0 0.05 0 0 0</pose>",
+            "<xyz expressed_in=\"post\">1 0 0</xyz>",
+        ],
+    );
+    // As the tools of Gazebo's authors write it: the hinge on the post, the arm on the hinge.
+    let chained = arm_on_a_post(
+        "",
+        [
+            "<pose relative_to=\"hinge\">-0.05 0 0 0 0 0</pose>",
+            &format!("<pose relative_to=\"post\">0.3 0.05 0 {turned}</pose>"),
+            "<pose>0 0.1 0 0 0 0</pose>",
+            "<pose relative_to=\"arm\">0.05 0 0.05 0 0 0</pose>",
+            "<xyz expressed_in=\"hinge\">0 -1 0</xyz>",
+        ],
+    );
+    let numbers = |model: &ObjectModel| {
+        let moving = &model.moving[0];
+        let parts = model.parts.iter().chain(&moving.model.parts);
+        let mut numbers: Vec<f64> = parts.flat_map(|part| [part.bounds().0, part.bounds().1].concat()).collect();
+        numbers.extend([moving.joint.axis, moving.joint.anchor_m].concat());
+        numbers
+    };
+    let expected = numbers(&plain);
+    assert_eq!(expected.len(), 24, "three solids, an axis and a place");
+    for found in [numbers(&framed), numbers(&chained)] {
+        let is_near = |(found, expected): (&f64, &f64)| (found - expected).abs() < 1e-9;
+        assert!(found.len() == 24 && found.iter().zip(&expected).all(is_near), "{found:?}\n{expected:?}");
+    }
+}
+
+/// A folder may have worlds alone.
+#[test]
+fn a_model_folder_may_have_worlds_alone() {
+    let (folder, _) = project("");
+    let worlds = folder.path().join("m/worlds");
+    fs::create_dir_all(&worlds).unwrap();
+    assert!(campaign(folder.path(), "model_dir = \"m\"\n").unwrap_err().to_string().contains("C010"));
+    fs::write(worlds.join("yard.sdf"), "<sdf version=\"1.9\"><world name=\"yard\"/></sdf>").unwrap();
+    campaign(folder.path(), "model_dir = \"m\"\n").unwrap_or_else(|faults| panic!("{faults}"));
 }
 
 /// The broken model is named with all its faults; the others work.

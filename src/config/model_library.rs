@@ -135,7 +135,8 @@ impl ModelLibrary {
     fn is_bare(&self, folder: &Path) -> bool {
         let objects = folder.join("objects");
         let has_toml = self.files.list(&objects).iter().any(|path| is_toml(path));
-        !has_toml && [folder, &objects].iter().all(|place| foreign::find(&self.files, place).is_empty())
+        let has_worlds = self.files.list(&folder.join("worlds")).iter().any(|path| is_world(path));
+        !has_toml && !has_worlds && [folder, &objects].iter().all(|place| foreign::find(&self.files, place).is_empty())
     }
 
     /// Reads `[categories]`: categories by model name, which override those in the models' files.
@@ -266,7 +267,6 @@ impl ModelLibrary {
 
     /// The worlds of the model folder, then the shipped ones.
     fn world_files(&self) -> Vec<(Files, PathBuf)> {
-        let is_world = |path: &PathBuf| is_toml(path) || path.extension().is_some_and(|e| e == "world" || e == "sdf");
         let own = self.folders.iter().flat_map(|folder| self.files.list(&folder.join("worlds")));
         let own = own.map(|path| (self.files.clone(), path));
         let shipped = Files::Shipped.list(&Path::new(SHIPPED_MODELS).join("worlds"));
@@ -431,6 +431,11 @@ fn read_start(table: &mut Table) -> Option<[Range; 3]> {
     let (x, y) = (table.range(keys[0], -14.0..=14.0), table.range(keys[1], -14.0..=14.0));
     let heading = table.range(keys[2], -std::f64::consts::TAU..=std::f64::consts::TAU);
     Some([x?, y?, heading?])
+}
+
+/// Whether a file in `worlds` is a world.
+fn is_world(path: &Path) -> bool {
+    path.extension().is_some_and(|ending| ["toml", "world", "sdf"].iter().any(|known| ending == *known))
 }
 
 fn is_toml(path: &Path) -> bool {

@@ -5,7 +5,7 @@
 use std::collections::BTreeMap;
 use std::rc::Rc;
 
-use nalgebra::{Matrix4, Point3, Rotation3, Unit, Vector3};
+use nalgebra::{Isometry3, Matrix4, Point3, Rotation3, Unit, Vector3};
 
 use crate::foreign::mesh_file::{MOST_TRIANGLES, checked};
 use crate::foreign::xml::{self, Node};
@@ -264,7 +264,8 @@ fn transform(node: Node<'_>) -> Result<Matrix4<f64>, Fault<'_>> {
             "matrix" => 16,
             "translate" | "scale" => 3,
             "rotate" => 4,
-            "lookat" | "skew" => return Err((element, format!("`<{kind}>` is not supported"))),
+            "lookat" => 9,
+            "skew" => return Err((element, format!("`<{kind}>` is not supported"))),
             _ => continue,
         };
         if xml::text(element).len() > LONGEST_TRANSFORM {
@@ -278,6 +279,15 @@ fn transform(node: Node<'_>) -> Result<Matrix4<f64>, Fault<'_>> {
             "matrix" => Matrix4::from_row_slice(&numbers),
             "translate" => Matrix4::new_translation(&Vector3::from_row_slice(&numbers)),
             "scale" => Matrix4::new_nonuniform_scaling(&Vector3::from_row_slice(&numbers)),
+            "lookat" => {
+                let [eye, target] = [0, 3].map(|at| Point3::from_slice(&numbers[at..at + 3]));
+                let up = Vector3::from_row_slice(&numbers[6..]);
+                if (target - eye).cross(&up).norm() < 1e-9 {
+                    return Err((element, "`<lookat>` must look in a direction other than up".to_owned()));
+                }
+                // A node that looks along its own −z axis.
+                Isometry3::look_at_rh(&eye, &target, &up).inverse().to_homogeneous()
+            }
             _ => match Unit::try_new(Vector3::from_row_slice(&numbers[..3]), 1e-9) {
                 Some(axis) => Rotation3::from_axis_angle(&axis, numbers[3].to_radians()).to_homogeneous(),
                 None => Matrix4::identity(),
@@ -293,4 +303,27 @@ fn list<'a, T: std::str::FromStr>(node: Node<'a>, what: &str) -> Result<Vec<T>, 
     words
         .map(|word| word.parse().map_err(|_| (node, format!("`<{what}>` contains `{word}`, which is not a number"))))
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::Vector4;
+
+    #[test]
+    fn a_node_looks_along_its_own_axis() {
+        let moved = |text: &str, point: [f64; 3]| {
+            let text = format!("<node>{text}</node>");
+            let document = roxmltree::Document::parse(&text).expect("it is XML");
+            let matrix = transform(document.root_element()).map_err(|(_, message)| message)?;
+            Ok::<_, String>((matrix * Vector4::new(point[0], point[1], point[2], 1.0)).xyz())
+        };
+        // From (1, 2, 3) along +y, with +z above.
+        let view = "<lookat>1 2 3 1 5 3 0 0 1</lookat>";
+        for (point, expected) in [([0.0, 0.0, -1.0], [1.0, 3.0, 3.0]), ([0.0, 1.0, 0.0], [1.0, 2.0, 4.0])] {
+            let found = moved(view, point).expect("it looks somewhere");
+            assert!((found - Vector3::from(expected)).norm() < 1e-9, "{found}");
+        }
+        assert!(moved("<lookat>1 2 3 1 2 5 0 0 1</lookat>", [0.0; 3]).is_err(), "it looks up");
+    }
 }

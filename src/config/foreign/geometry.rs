@@ -1,12 +1,13 @@
 //! Shapes in SDF and URDF.
 
+use std::f64::consts::PI;
 use std::path::Path;
 
 use crate::foreign::lookup::Lookup;
 use crate::foreign::mesh_file;
 use crate::foreign::xml::{self, Bound, Node, Reader};
 use actcheck_base::{Diagnostic, Diagnostics, Digest};
-use actcheck_data::Shape;
+use actcheck_data::{Mesh, Shape};
 
 /// Reads the shapes of one file.
 pub(crate) struct Shapes<'a> {
@@ -20,7 +21,7 @@ pub(crate) struct Shapes<'a> {
 }
 
 /// Help text with the supported kinds of geometry.
-const KINDS: &str = "use a box, cylinder, sphere, capsule or mesh";
+const KINDS: &str = "use a box, cylinder, sphere, capsule, cone, ellipsoid or mesh";
 
 impl<'a> Shapes<'a> {
     pub(crate) fn new(lookup: &'a Lookup<'a>, path: &'a Path) -> Self {
@@ -135,11 +136,64 @@ fn primitive<'n>(
             Some(Shape::Capsule { radius: radius?, height: length? })
         }
         "sphere" => Some(Shape::Sphere { radius: number(reader, "radius")? }),
+        "ellipsoid" => {
+            let (node, text) = written("radii", reader)?;
+            Some(Shape::Mesh { mesh: ellipsoid(reader.numbers(node, text, Bound::Positive)?)? })
+        }
+        "cone" => {
+            let (radius, length) = (number(reader, "radius"), number(reader, "length"));
+            Some(Shape::Mesh { mesh: cone(radius?, length?)? })
+        }
         other => {
             reader.error("W035", kind, format!("the geometry `<{other}>` can't be simulated"), KINDS);
             None
         }
     }
+}
+
+/// Number of faces around a cone or an ellipsoid; from pole to pole, an ellipsoid has half as many.
+const AROUND: u32 = 24;
+
+/// Returns a cone as a mesh, with its tip above and its middle at the origin. Units: metres.
+fn cone(radius: f64, length: f64) -> Option<Mesh> {
+    let mut vertices = vec![[0.0, 0.0, length / 2.0], [0.0, 0.0, -length / 2.0]];
+    vertices.extend((0..AROUND).map(|step| {
+        let [x, y] = around(step);
+        [radius * x, radius * y, -length / 2.0]
+    }));
+    let on = |step: u32| 2 + step % AROUND;
+    let triangles = (0..AROUND).flat_map(|step| [[0, on(step), on(step + 1)], [1, on(step + 1), on(step)]]);
+    Mesh::new(vertices, triangles.collect()).ok()
+}
+
+/// Returns a point on the unit circle.
+fn around(step: u32) -> [f64; 2] {
+    let angle = 2.0 * PI * f64::from(step) / f64::from(AROUND);
+    [libm::cos(angle), libm::sin(angle)]
+}
+
+/// Returns an ellipsoid as a mesh whose vertices are on it, and which has 97 % of its volume. Unit: metres.
+fn ellipsoid(radii: [f64; 3]) -> Option<Mesh> {
+    let rings = AROUND / 2;
+    let mut vertices = vec![[0.0, 0.0, 1.0], [0.0, 0.0, -1.0]];
+    for ring in 1..rings {
+        let polar = PI * f64::from(ring) / f64::from(rings);
+        vertices.extend((0..AROUND).map(|step| {
+            let [x, y] = around(step);
+            [libm::sin(polar) * x, libm::sin(polar) * y, libm::cos(polar)]
+        }));
+    }
+    let on = |ring: u32, step: u32| 2 + (ring - 1) * AROUND + step % AROUND;
+    let mut triangles = Vec::new();
+    for step in 0..AROUND {
+        triangles.push([0, on(1, step), on(1, step + 1)]);
+        triangles.push([1, on(rings - 1, step + 1), on(rings - 1, step)]);
+        for ring in 1..rings - 1 {
+            let [a, b, c, d] = [on(ring, step), on(ring, step + 1), on(ring + 1, step), on(ring + 1, step + 1)];
+            triangles.extend([[a, c, b], [b, c, d]]);
+        }
+    }
+    Mesh::new(vertices, triangles).ok().map(|mesh| mesh.scaled(radii))
 }
 
 /// Smallest volume of a collision mesh: that of a cube of 0.1 mm. Unit: cubic metres.
@@ -153,4 +207,32 @@ pub(crate) fn check_volume(shape: &Shape, collision: Node, reader: &mut Reader) 
     }
     let message = "the mesh has no volume".to_owned();
     reader.error("W037", collision, message, "a collision mesh must be a closed surface; use a thin box for a sheet");
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn meshes_of_primitives_have_their_extents_and_volumes() {
+        let extents = |mesh: &Mesh| {
+            let along = |axis: usize| mesh.vertices.iter().map(move |vertex| vertex[axis]);
+            [0, 1, 2].map(|axis| (along(axis).fold(f64::MAX, f64::min), along(axis).fold(f64::MIN, f64::max)))
+        };
+        let near = |found: [(f64, f64); 3], expected: [(f64, f64); 3]| {
+            let is_near = |(found, expected): (&(f64, f64), &(f64, f64))| {
+                (found.0 - expected.0).abs() < 1e-9 && (found.1 - expected.1).abs() < 1e-9
+            };
+            found.iter().zip(&expected).all(is_near)
+        };
+        let ellipsoid = ellipsoid([0.1, 0.05, 0.2]).expect("it is a mesh");
+        assert!(near(extents(&ellipsoid), [(-0.1, 0.1), (-0.05, 0.05), (-0.2, 0.2)]));
+        let share = ellipsoid.volume() / (4.0 / 3.0 * PI * 0.1 * 0.05 * 0.2);
+        assert!((0.965..1.0).contains(&share), "{share}");
+        let cone = cone(0.1, 0.3).expect("it is a mesh");
+        assert!(near(extents(&cone), [(-0.1, 0.1), (-0.1, 0.1), (-0.15, 0.15)]));
+        // The area of a regular polygon with 24 corners.
+        let base = 12.0 * 0.1 * 0.1 * libm::sin(2.0 * PI / 24.0);
+        assert!((cone.volume() - base * 0.3 / 3.0).abs() < 1e-9, "{}", cone.volume());
+    }
 }

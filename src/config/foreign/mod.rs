@@ -21,6 +21,7 @@ pub(crate) mod robot_text;
 pub(crate) mod robot_tree;
 mod sdf;
 mod sdf_joint;
+mod sdf_pose;
 pub(crate) mod sdf_robot;
 mod urdf;
 mod urdf_text;

@@ -6,8 +6,8 @@ use crate::foreign::assembly::{Assembly, Join, free_name};
 use crate::foreign::body::{Body, Mass, MovingBody};
 use crate::foreign::folder;
 use crate::foreign::geometry::Shapes;
-use crate::foreign::sdf::pose;
 use crate::foreign::sdf_joint;
+use crate::foreign::sdf_pose::pose;
 use crate::foreign::xml::{self, Node, Reader};
 use actcheck_data::{Part, PartJoint, Pose};
 

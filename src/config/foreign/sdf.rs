@@ -9,6 +9,7 @@ use crate::foreign::geometry::{Shapes, check_volume};
 use crate::foreign::lenient::repaired;
 use crate::foreign::lookup::Lookup;
 use crate::foreign::nested::{Links, Role};
+use crate::foreign::sdf_pose::pose;
 use crate::foreign::xml::{self, Bound, Node, Reader};
 use actcheck_base::{Diagnostics, Source};
 use actcheck_data::{Part, Pose, Shape};
@@ -94,30 +95,6 @@ pub(crate) fn check_version(root: Node, reader: &mut Reader) -> Option<()> {
     let message = format!("SDF {version} is not supported");
     reader.error("W032", root, message, format!("use a version from 1.{} to 1.{}", VERSIONS.start(), VERSIONS.end()));
     None
-}
-
-/// Reads the pose of an element; the identity if it has none.
-///
-/// Only poses in the frame of the parent element are supported (W035). Returns `None` after it has reported a fault.
-pub(crate) fn pose(node: Node, reader: &mut Reader) -> Option<Isometry3<f64>> {
-    let Some(written) = xml::child(node, "pose") else { return Some(Isometry3::identity()) };
-    let relative_to = written.attribute("relative_to").or_else(|| written.attribute("frame")).unwrap_or("");
-    if !["", "__model__", "world"].contains(&relative_to) {
-        let message = format!("a pose relative to `{relative_to}` is not supported");
-        reader.error("W035", written, message, "write the pose in the frame of the parent element");
-        return None;
-    }
-    let text = xml::text(written);
-    if text.is_empty() {
-        return Some(Isometry3::identity());
-    }
-    if written.attribute("rotation_format") == Some("quat_xyzw") {
-        let [x, y, z, qx, qy, qz, qw] = reader.numbers(written, text, Bound::Finite)?;
-        return xml::turned([x, y, z], [qx, qy, qz, qw]);
-    }
-    let [x, y, z, roll, pitch, yaw] = reader.numbers(written, text, Bound::Finite)?;
-    let unit = if written.attribute("degrees") == Some("true") { 1f64.to_radians() } else { 1.0 };
-    Some(xml::placed([x, y, z], [roll * unit, pitch * unit, yaw * unit]))
 }
 
 /// Reads a model's links, with those of nested and included models, as one body and those that joints move.

@@ -1,8 +1,8 @@
 //! Reads the joints of objects in SDF.
 
-use nalgebra::{Isometry3, Vector3};
+use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 
-use crate::foreign::sdf::pose;
+use crate::foreign::sdf_pose::{frame, pose};
 use crate::foreign::xml::{self, Bound, Node, Reader};
 use actcheck_data::PartJoint;
 
@@ -33,12 +33,9 @@ pub(crate) fn read(
         Some(xyz) => Vector3::from(reader.numbers::<3>(xyz, xml::text(xyz), Bound::Finite)?),
         None => Vector3::z(),
     };
-    let of_model = match xml::child(axis, "use_parent_model_frame") {
-        Some(node) => reader.boolean(node)?,
-        None => written.and_then(|xyz| xyz.attribute("expressed_in")) == Some("__model__") || is_old(joint),
-    };
-    let frame = if of_model { model.rotation } else { at.rotation };
-    let Some(direction) = (frame * direction).try_normalize(1e-9) else {
+    let own = model.rotation.inverse() * at.rotation;
+    let rotation = model.rotation * axis_rotation(joint, axis, own, reader)?;
+    let Some(direction) = (rotation * direction).try_normalize(1e-9) else {
         let message = format!("the axis of the joint `{name}` must not be zero");
         reader.error("W034", axis, message, "write, for example, `<xyz>0 0 1</xyz>`");
         return None;
@@ -71,6 +68,23 @@ pub(crate) fn read(
     }
     let anchor_m = at.translation.vector.into();
     Some(PartJoint { slides: kind == "prismatic", axis: direction.into(), anchor_m, range, damping, friction })
+}
+
+/// Returns the orientation of the frame in which the axis of a joint is written, in the frame of its model. `own`: that of
+/// the joint. Returns `None` after it has reported a fault.
+pub(crate) fn axis_rotation(
+    joint: Node,
+    axis: Node,
+    own: UnitQuaternion<f64>,
+    reader: &mut Reader,
+) -> Option<UnitQuaternion<f64>> {
+    let named = xml::child(axis, "xyz").and_then(|xyz| xyz.attribute("expressed_in")).filter(|name| !name.is_empty());
+    let of_model = match (xml::child(axis, "use_parent_model_frame"), named) {
+        (Some(node), _) => reader.boolean(node)?,
+        (None, Some(name)) => return frame(joint, name, reader).map(|frame| frame.rotation),
+        (None, None) => is_old(joint),
+    };
+    Some(if of_model { UnitQuaternion::identity() } else { own })
 }
 
 /// Whether a joint does not move: it is fixed, or its range is a single position.

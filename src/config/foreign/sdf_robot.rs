@@ -4,7 +4,9 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::{Isometry3, Matrix3, Vector3};
 
-use crate::foreign::sdf::{check_version, pose};
+use crate::foreign::sdf::check_version;
+use crate::foreign::sdf_joint;
+use crate::foreign::sdf_pose::pose;
 use crate::foreign::urdf_text::{Inertial, UrdfJoint, UrdfText, escaped};
 use crate::foreign::xml::{self, Bound, Node, Reader};
 use actcheck_base::{Diagnostics, Source, did_you_mean};
@@ -155,6 +157,11 @@ fn shape(geometry: Node, reader: &mut Reader) -> Option<String> {
             let [x, y, z] = reader.numbers(size, xml::text(size), Bound::Positive)?;
             format!("<box size=\"{x} {y} {z}\"/>")
         }
+        "ellipsoid" => {
+            let radii = reader.required(kind, "radii")?;
+            let [x, y, z] = reader.numbers(radii, xml::text(radii), Bound::Positive)?.map(|radius| 2.0 * radius);
+            format!("<box size=\"{x} {y} {z}\"/>")
+        }
         "mesh" => {
             let uri = reader.required(kind, "uri").map(xml::text)?;
             let scale = xml::child(kind, "scale").map_or("1 1 1", xml::text);
@@ -162,7 +169,7 @@ fn shape(geometry: Node, reader: &mut Reader) -> Option<String> {
         }
         other => {
             let message = format!("the shape {other} can't be part of a robot");
-            reader.error("W035", kind, message, "use a box, cylinder, capsule, sphere or mesh");
+            reader.error("W035", kind, message, "use a box, cylinder, capsule, ellipsoid, sphere or mesh");
             return None;
         }
     })
@@ -197,11 +204,7 @@ fn write_joint(
         Some(xyz) => Vector3::from(reader.numbers::<3>(xyz, xml::text(xyz), Bound::Finite)?),
         None => Vector3::z(),
     };
-    let of_model = match xml::child(axis, "use_parent_model_frame") {
-        Some(node) => reader.boolean(node)?,
-        None => written.and_then(|xyz| xyz.attribute("expressed_in")) == Some("__model__"),
-    };
-    let direction = if of_model { to.rotation.inverse() * direction } else { direction };
+    let direction = to.rotation.inverse() * sdf_joint::axis_rotation(joint, axis, to.rotation, reader)? * direction;
     let limits = xml::child(axis, "limit");
     let mut limit = |name: &str, otherwise: f64| match limits.and_then(|limits| xml::child(limits, name)) {
         Some(node) => reader.number(node, Bound::Finite),
