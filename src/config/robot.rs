@@ -16,9 +16,6 @@ use crate::{Located, Table};
 /// Number of folders above the URDF that are searched for `package://`. `PACKAGE/robots/FILE.urdf` needs two.
 const PACKAGE_LEVELS: usize = 4;
 
-/// Base joints that `base = "planar"` adds below the URDF's root: x, y, heading.
-const PLANAR_JOINTS: [&str; 3] = ["planar_x_joint", "planar_y_joint", "planar_heading_joint"];
-
 /// Required keys of a profile. The others are found on the model, when its meshes are known.
 const REQUIRED: [&str; 1] = ["urdf"];
 
@@ -285,7 +282,7 @@ fn read_base(table: &mut Table, roles: &mut Roles) -> Option<(Option<[String; 3]
     let joints = if table.has("base_joints") { Some(names(table, "base_joints", roles)?) } else { None };
     let Some(kind) = kind else { return Some((joints, false)) };
     match (kind.value.as_str(), joints) {
-        ("planar", None) => Some((Some(PLANAR_JOINTS.map(str::to_owned)), true)),
+        ("planar", None) => Some((Some(RobotProfile::PLANAR_JOINTS.map(str::to_owned)), true)),
         ("fixed", None) => Some((None, false)),
         ("planar" | "fixed", Some(_)) => {
             let message = format!("`base = \"{}\"` and `base_joints` exclude each other", kind.value);

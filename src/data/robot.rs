@@ -89,6 +89,8 @@ impl RobotProfile {
     /// The `camera_link` of a camera that is fixed beside the robot: its pose is in the frame of the map, whose z axis
     /// points up from the floor.
     pub const MAP: &'static str = "map";
+    /// Joints of a planar base that is added below the URDF's root: x, y, heading.
+    pub const PLANAR_JOINTS: [&'static str; 3] = ["planar_x_joint", "planar_y_joint", "planar_heading_joint"];
 
     /// Returns the profile with a suction cup instead of fingers. The `grasp_link` must be known.
     pub fn with_cup(self, cup: Suction) -> Self {

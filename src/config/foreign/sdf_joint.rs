@@ -28,14 +28,9 @@ pub(crate) fn read(
     }
     let at = link * pose(joint, reader)?;
     let axis = reader.required(joint, "axis")?;
-    let written = xml::child(axis, "xyz");
-    let direction = match written {
-        Some(xyz) => Vector3::from(reader.numbers::<3>(xyz, xml::text(xyz), Bound::Finite)?),
-        None => Vector3::z(),
-    };
     let own = model.rotation.inverse() * at.rotation;
-    let rotation = model.rotation * axis_rotation(joint, axis, own, reader)?;
-    let Some(direction) = (rotation * direction).try_normalize(1e-9) else {
+    let direction = direction(joint, axis, own, reader)?;
+    let Some(direction) = (model.rotation * direction).try_normalize(1e-9) else {
         let message = format!("the axis of the joint `{name}` must not be zero");
         reader.error("W034", axis, message, "write, for example, `<xyz>0 0 1</xyz>`");
         return None;
@@ -70,21 +65,27 @@ pub(crate) fn read(
     Some(PartJoint { slides: kind == "prismatic", axis: direction.into(), anchor_m, range, damping, friction })
 }
 
-/// Returns the orientation of the frame in which the axis of a joint is written, in the frame of its model. `own`: that of
-/// the joint. Returns `None` after it has reported a fault.
-pub(crate) fn axis_rotation(
+/// Returns the direction of a joint's axis in the frame of its model. `own`: the orientation of the joint in that frame.
+/// Returns `None` after it has reported a fault.
+pub(crate) fn direction(
     joint: Node,
     axis: Node,
     own: UnitQuaternion<f64>,
     reader: &mut Reader,
-) -> Option<UnitQuaternion<f64>> {
-    let named = xml::child(axis, "xyz").and_then(|xyz| xyz.attribute("expressed_in")).filter(|name| !name.is_empty());
-    let of_model = match (xml::child(axis, "use_parent_model_frame"), named) {
-        (Some(node), _) => reader.boolean(node)?,
-        (None, Some(name)) => return frame(joint, name, reader).map(|frame| frame.rotation),
-        (None, None) => is_old(joint),
+) -> Option<Vector3<f64>> {
+    let written = xml::child(axis, "xyz");
+    let direction = match written {
+        Some(xyz) => Vector3::from(reader.numbers::<3>(xyz, xml::text(xyz), Bound::Finite)?),
+        None => Vector3::z(),
     };
-    Some(if of_model { UnitQuaternion::identity() } else { own })
+    let named = written.and_then(|xyz| xyz.attribute("expressed_in")).filter(|name| !name.is_empty());
+    let rotation = match (xml::child(axis, "use_parent_model_frame"), named) {
+        (Some(node), _) if reader.boolean(node)? => UnitQuaternion::identity(),
+        (None, Some(name)) => frame(joint, name, reader)?.rotation,
+        (None, None) if is_old(joint) => UnitQuaternion::identity(),
+        _ => own,
+    };
+    Some(rotation * direction)
 }
 
 /// Whether a joint does not move: it is fixed, or its range is a single position.

@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use nalgebra::{Isometry3, Matrix3, Vector3};
+use nalgebra::{Isometry3, Matrix3};
 
 use crate::foreign::sdf::check_version;
 use crate::foreign::sdf_joint;
@@ -199,12 +199,7 @@ fn write_joint(
         }
     };
     let axis = reader.required(joint, "axis")?;
-    let written = xml::child(axis, "xyz");
-    let direction = match written {
-        Some(xyz) => Vector3::from(reader.numbers::<3>(xyz, xml::text(xyz), Bound::Finite)?),
-        None => Vector3::z(),
-    };
-    let direction = to.rotation.inverse() * sdf_joint::axis_rotation(joint, axis, to.rotation, reader)? * direction;
+    let direction = to.rotation.inverse() * sdf_joint::direction(joint, axis, to.rotation, reader)?;
     let limits = xml::child(axis, "limit");
     let mut limit = |name: &str, otherwise: f64| match limits.and_then(|limits| xml::child(limits, name)) {
         Some(node) => reader.number(node, Bound::Finite),

@@ -76,7 +76,7 @@ fn find(partial: &RobotProfile, all: bool, wanted: Option<&str>) -> Result<Propo
         let own_base = body.own_base.map(|joints| joints.map(|idx| model.joints[idx].name.clone()));
         profile.planar_base = body.drives && own_base.is_none();
         profile.base_joints = match profile.planar_base {
-            true => Some(["planar_x_joint", "planar_y_joint", "planar_heading_joint"].map(str::to_owned)),
+            true => Some(RobotProfile::PLANAR_JOINTS.map(str::to_owned)),
             false => own_base,
         };
     }
@@ -88,10 +88,7 @@ fn find(partial: &RobotProfile, all: bool, wanted: Option<&str>) -> Result<Propo
         (profile.camera_link, profile.camera_turned_rad) = (body.camera_link, body.camera_turned_rad);
     }
     if profile.home.is_empty() {
-        // With the base, so that inverse kinematics moves it too.
-        let model = Arc::new(RobotModel::read(&profile)?);
-        let grasp = frame(&model, &profile.grasp_link, profile.grasp_offset_m, profile.grasp_turned_rad)?;
-        (profile.home, profile.postures) = postures::find(&profile, &model, grasp, &mut notes)?;
+        profile = with_home(profile, &mut notes)?;
     }
     if all {
         profile.parked = parked(partial, &profile, &hand.others, &mut notes);
@@ -104,19 +101,35 @@ fn find(partial: &RobotProfile, all: bool, wanted: Option<&str>) -> Result<Propo
     Ok(Proposal { profile, notes, other_hands: hand.others })
 }
 
-/// The joints of another arm at its home. Stretched out, as all joints are at 0 for some robots, it is in the way.
+/// The joints of the other arms at their homes. Stretched out, as all joints are at 0 for some robots, it is in the way.
 fn parked(
     bare: &RobotProfile,
     own: &RobotProfile,
     others: &[String],
     notes: &mut BTreeMap<&'static str, String>,
 ) -> Vec<(String, f64)> {
-    let Some(other) = others.first() else { return Vec::new() };
-    let Ok(found) = home_of(bare, other) else { return Vec::new() };
-    notes.insert("parked_joints", format!("the arm of the hand `{other}` at its own home"));
     let own: Vec<&String> = own.base_joints.iter().flatten().chain(&own.arm_joints).chain(&own.head_joints).collect();
-    let positions = found.arm_joints.into_iter().zip(found.home);
-    positions.filter(|(joint, _)| !own.contains(&joint)).collect()
+    let mut parked: Vec<(String, f64)> = Vec::new();
+    let mut hands = Vec::new();
+    for other in others {
+        let Ok(found) = home_of(bare, other) else { continue };
+        let known = parked.len();
+        for (joint, position) in found.arm_joints.into_iter().zip(found.home) {
+            if !own.contains(&&joint) && parked.iter().all(|(known, _)| *known != joint) {
+                parked.push((joint, position));
+            }
+        }
+        if parked.len() > known {
+            hands.push(format!("`{other}`"));
+        }
+    }
+    let note = match hands.as_slice() {
+        [] => return parked,
+        [hand] => format!("the arm of the hand {hand} at its own home"),
+        several => format!("the arms of the hands {} at their own homes", several.join(", ")),
+    };
+    notes.insert("parked_joints", note);
+    parked
 }
 
 /// A profile for the hand at a link, without one for the other hands.
@@ -128,13 +141,20 @@ fn home_of(bare: &RobotProfile, palm: &str) -> Result<RobotProfile, WorldError> 
     let body = body::find(&model, hand.palm, &mut notes);
     let arm_joints = body.arm.iter().map(|idx| model.joints[*idx].name.clone()).collect();
     let planar_base = body.drives && body.own_base.is_none();
-    let base_joints =
-        planar_base.then(|| ["planar_x_joint", "planar_y_joint", "planar_heading_joint"].map(str::to_owned));
+    let base_joints = planar_base.then(|| RobotProfile::PLANAR_JOINTS.map(str::to_owned));
     let mount_height_m = body.mount_height_m;
     let mut profile = RobotProfile { arm_joints, planar_base, base_joints, mount_height_m, ..hand.profile };
     (profile.camera_link, profile.camera_turned_rad) = (body.camera_link, body.camera_turned_rad);
+    with_home(profile, &mut notes)
+}
+
+/// Adds home and postures. The profile has its base, so that inverse kinematics moves it too.
+fn with_home(
+    mut profile: RobotProfile,
+    notes: &mut BTreeMap<&'static str, String>,
+) -> Result<RobotProfile, WorldError> {
     let model = Arc::new(RobotModel::read(&profile)?);
     let grasp = frame(&model, &profile.grasp_link, profile.grasp_offset_m, profile.grasp_turned_rad)?;
-    (profile.home, profile.postures) = postures::find(&profile, &model, grasp, &mut notes)?;
+    (profile.home, profile.postures) = postures::find(&profile, &model, grasp, notes)?;
     Ok(profile)
 }
