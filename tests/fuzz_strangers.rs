@@ -174,9 +174,13 @@ fn meshes() {
 
 #[test]
 fn models_and_worlds() {
-    const WORDS: [&str; 18] = [
+    const WORDS: [&str; 22] = [
         "<link name=\"l\">",
         "</link>",
+        "<frame name=\"f\" attached_to=\"l\"><pose relative_to=\"j\">0 0 1 0 0 0</pose></frame>",
+        "<pose relative_to=\"f\"/>",
+        "<cone><radius>1</radius><length>1</length></cone>",
+        "<ellipsoid><radii>1 2 3</radii></ellipsoid>",
         "<joint name=\"j\" type=\"fixed\">",
         "<include><uri>model://lamp</uri></include>",
         "<collision name=\"c\">",

@@ -88,7 +88,7 @@ fn named(model: Node, name: &str, at: Node, depth: usize, reader: &mut Reader) -
         return Some(in_model(nested, depth, reader)? * named(nested, rest, at, depth + 1, reader)?);
     }
     let known: Vec<&str> = frames().filter_map(name_of).collect();
-    reader.error("W035", at, format!("there is no frame `{name}`"), did_you_mean(name, known.into_iter()));
+    reader.error("W035", at, format!("there is no frame `{name}`"), did_you_mean(name, known));
     None
 }
 
