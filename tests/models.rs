@@ -153,6 +153,66 @@ fn poses_relative_to_other_frames_are_those_of_the_parent() {
     }
 }
 
+/// Objects of MuJoCo: a file beside others, and one in a folder of its name.
+#[test]
+fn objects_of_mujoco_have_the_values_of_their_files() {
+    let (folder, _) = project("");
+    let models = folder.path().join("m");
+    fs::create_dir_all(models.join("chest")).unwrap();
+    let tin = "<mujoco><compiler angle=\"degree\"/><worldbody><body><body name=\"object\"><freejoint/>\
+        <geom type=\"cylinder\" size=\"0.03 0.05\" density=\"500\" friction=\"0.7 0.3 0.1\"/>\
+        <geom type=\"box\" size=\"1 1 1\" contype=\"0\" conaffinity=\"0\"/></body>\
+        <site name=\"top\" pos=\"0 0 0.05\"/></body></worldbody></mujoco>";
+    let chest = "<mujoco><worldbody><body name=\"chest\"><joint type=\"free\"/>\
+        <geom type=\"box\" size=\"0.2 0.1 0.1\" mass=\"3\"/><geom type=\"ellipsoid\" size=\"0.05 0.05 0.02\" pos=\"0 0 0.1\" mass=\"1\"/>\
+        <body name=\"lid\" pos=\"0 0.1 0.13\"><joint name=\"hinge\" axis=\"1 0 0\" range=\"0 90\" frictionloss=\"0.4\" damping=\"0.2\"/>\
+        <geom type=\"box\" size=\"0.2 0.1 0.01\" pos=\"0 -0.1 0\" density=\"600\"/></body></body></worldbody></mujoco>";
+    fs::write(models.join("tin.xml"), tin).unwrap();
+    fs::write(models.join("chest/chest.xml"), chest).unwrap();
+    fs::write(models.join("package.xml"), "<package><name>things</name></package>").unwrap();
+    let campaign = campaign(folder.path(), "model_dir = \"m\"\n").unwrap_or_else(|faults| panic!("{faults}"));
+    assert_eq!(campaign.models.keys().collect::<Vec<_>>(), ["chest", "tin"]);
+    let near = |found: f64, expected: f64| assert!((found - expected).abs() < 1e-6, "{found} is not {expected}");
+    let tin = &campaign.models["tin"];
+    near(tin.mass_kg, 500.0 * std::f64::consts::PI * 0.03 * 0.03 * 0.1);
+    near(tin.friction, 0.7);
+    assert_eq!((tin.parts.len(), tin.fixed), (1, false));
+    let chest = &campaign.models["chest"];
+    let lid = &chest.moving[0];
+    near(chest.mass_kg, 4.0);
+    near(lid.model.mass_kg, 600.0 * 0.4 * 0.2 * 0.02);
+    near(lid.joint.range[1], std::f64::consts::FRAC_PI_2);
+    assert_eq!((lid.name.as_str(), lid.joint.friction, lid.joint.damping), ("lid", 0.4, 0.2));
+}
+
+/// A world of MuJoCo: bodies and walls at its top are furniture, and the robot drives on the floor around a lone table.
+#[test]
+fn a_campaign_runs_in_a_world_of_mujoco() {
+    let (folder, _) = project("");
+    let worlds = folder.path().join("m/worlds");
+    fs::create_dir_all(&worlds).unwrap();
+    let text = "<mujoco><worldbody><geom type=\"plane\" size=\"3 3 .1\"/><body name=\"desk\" pos=\"0 0 0.2\">\
+        <geom type=\"box\" size=\"0.3 0.4 0.2\"/></body><body name=\"lamp\" pos=\"0 1 0.5\"><freejoint/>\
+        <geom type=\"cylinder\" size=\"0.1 0.5\"/></body><body name=\"poster\"><geom size=\"1\" contype=\"0\" conaffinity=\"0\"/>\
+        </body><geom name=\"wall\" type=\"box\" size=\"0.05 1 1\" pos=\"0.6 0 1\"/></worldbody></mujoco>";
+    fs::write(worlds.join("office.xml"), text).unwrap();
+    let rest = "[world]\nworlds = [\"office\"]\n[objectLocation]\nlocation_list = [\"desk_front\"]\n[objectSurface]\n\
+        object_surfaces = [\"desk\"]\n[pickObject]\nmodel_list = [\"can\"]\n";
+    let path = folder.path().join("c.toml");
+    fs::write(&path, format!("tests = [[\"MoveTo\"]]\ntest_count = 2\nseed = 1\nmodel_dir = \"m\"\n{rest}")).unwrap();
+    let campaign =
+        campaign(folder.path(), &format!("model_dir = \"m\"\n{rest}")).unwrap_or_else(|faults| panic!("{faults}"));
+    let office = &campaign.worlds["office"];
+    let names: Vec<&str> = office.furniture.iter().map(|piece| piece.name.as_str()).collect();
+    assert_eq!(names, ["desk", "lamp", "wall"]);
+    assert_eq!(office.furniture[1].pose.position, [0.0, 1.0, 0.0]);
+    let checked = actcheck(folder.path(), &["check", "c.toml"]);
+    assert!(stderr(&checked).contains("`lamp` can move"), "{}", stderr(&checked));
+    let ran = actcheck(folder.path(), &["run", "c.toml"]);
+    assert!(stdout(&ran).contains("0 did not complete"), "{}{}", stdout(&ran), stderr(&ran));
+    assert!(stdout(&ran).contains("GoalReached"), "{}", stdout(&ran));
+}
+
 /// A folder may have worlds alone.
 #[test]
 fn a_model_folder_may_have_worlds_alone() {

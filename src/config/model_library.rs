@@ -435,7 +435,7 @@ fn read_start(table: &mut Table) -> Option<[Range; 3]> {
 
 /// Whether a file in `worlds` is a world.
 fn is_world(path: &Path) -> bool {
-    path.extension().is_some_and(|ending| ["toml", "world", "sdf"].iter().any(|known| ending == *known))
+    path.extension().is_some_and(|ending| ["toml", "world", "sdf", "xml"].iter().any(|known| ending == *known))
 }
 
 fn is_toml(path: &Path) -> bool {

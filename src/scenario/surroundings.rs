@@ -7,6 +7,11 @@ use crate::draw::platform;
 use actcheck_config::WorldMap;
 use actcheck_data::{NamedSurface, ObjectModel, SceneMap, SceneObject};
 
+/// Furniture within less than this leaves no floor to drive on. Unit: metres.
+const NARROW_M: f64 = 2.0;
+/// Length and width of the floor around such furniture. Unit: metres.
+const FLOOR_M: f64 = 5.0;
+
 /// A world with its furniture and walls as objects of a scene.
 #[derive(Debug, Clone)]
 pub(super) struct Surroundings {
@@ -54,10 +59,22 @@ impl Surroundings {
         self.standing.iter().filter(move |object| Some(object.id.as_str()) != but)
     }
 
-    /// The bounding rectangle of furniture and rooms: minimum and maximum x and y. Unit: metres.
+    /// The bounding rectangle of furniture and rooms: minimum and maximum x and y. Without rooms, a world whose furniture
+    /// is all in one place also has the floor around it. Unit: metres.
     pub(super) fn extent(&self) -> ([f64; 2], [f64; 2]) {
         let middles = self.standing.iter().map(|object| [object.pose.position[0], object.pose.position[1]]);
-        around(self.corners().chain(middles))
+        let (mut low, mut high) = around(self.corners().chain(middles));
+        if self.map.rooms.is_empty() {
+            for axis in 0..2 {
+                let side = high[axis] - low[axis];
+                if side < NARROW_M {
+                    // Also without any furniture.
+                    let middle = if side.is_finite() { f64::midpoint(low[axis], high[axis]) } else { 0.0 };
+                    (low[axis], high[axis]) = (middle - FLOOR_M / 2.0, middle + FLOOR_M / 2.0);
+                }
+            }
+        }
+        (low, high)
     }
 
     /// The bounding rectangle of the rooms; `None` if the world has none. Unit: metres. Frame: world.

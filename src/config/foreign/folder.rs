@@ -1,4 +1,4 @@
-//! Finds and reads SDF and URDF models in a folder with Gazebo's layout.
+//! Finds and reads SDF, URDF and MJCF models in a folder with Gazebo's or MuJoCo's layout.
 
 use std::path::{Path, PathBuf};
 
@@ -8,21 +8,26 @@ use crate::foreign::lenient::repaired;
 use crate::foreign::lookup::Lookup;
 use crate::foreign::nested::Role;
 use crate::foreign::sdf::SdfModel;
+use crate::foreign::urdf::Materials;
 use crate::foreign::xml::{self, Node, Reader};
-use crate::foreign::{sdf, urdf};
-use actcheck_base::{Diagnostic, Diagnostics, Files, Severity, did_you_mean};
+use crate::foreign::{mjcf, sdf, urdf};
+use actcheck_base::{Diagnostic, Diagnostics, Files, Severity, Source, did_you_mean};
 use actcheck_data::ObjectModel;
+
+/// The beginning of the root of MJCF files.
+const MJCF: &[u8] = b"<mujoco";
 
 /// A model found in a folder.
 #[derive(Debug, Clone)]
 pub(crate) struct Found {
-    /// Name in configurations: the folder's, or the URDF's without its extension.
+    /// Name in configurations: the folder's, or that of the URDF or MJCF file without its extension.
     pub(crate) name: String,
-    /// Path of its `model.config`, `model.sdf` or URDF.
+    /// Path of its `model.config`, SDF, URDF or MJCF file.
     pub(crate) path: PathBuf,
 }
 
-/// Finds the models of a folder, sorted by name: `NAME/model.config`, `NAME/model.sdf`, `NAME/model.urdf`, `NAME.urdf`.
+/// Finds the models of a folder, sorted by name: `NAME/model.config`, `NAME/model.sdf`, `NAME/model.urdf`, `NAME.urdf`, and of
+/// MJCF `NAME/NAME.xml`, `NAME/model.xml`, `NAME.xml`.
 pub(crate) fn find(files: &Files, folder: &Path) -> Vec<Found> {
     let mut found: Vec<Found> = Vec::new();
     for model in files.folders(folder) {
@@ -31,7 +36,8 @@ pub(crate) fn find(files: &Files, folder: &Path) -> Vec<Found> {
         }
     }
     for path in files.list(folder) {
-        if let (Some("urdf"), Some(stem)) = (path.extension().and_then(|ending| ending.to_str()), path.file_stem()) {
+        let is_model = path.extension().is_some_and(|ending| ending == "urdf") || is_mjcf(files, &path);
+        if let (true, Some(stem)) = (is_model, path.file_stem()) {
             found.push(Found { name: stem.to_string_lossy().into_owned(), path: path.clone() });
         }
     }
@@ -75,9 +81,15 @@ fn read_sdf_model(
         _ => found.path.clone(),
     };
     let source = lookup.files.read(&path).map_err(|reason| unreadable(&path, &reason))?;
-    let is_urdf = path.extension().is_some_and(|ending| ending == "urdf");
-    let (model, said) =
-        if is_urdf { urdf::read(&source, &path, lookup) } else { sdf::read(&source, &path, lookup, role, depth) };
+    let (model, said) = match path.extension().and_then(|ending| ending.to_str()) {
+        Some("urdf") => urdf::read(&source, &path, lookup, &Materials::default()),
+        Some("xml") if is_mjcf(lookup.files, &path) => {
+            let (urdf, materials) = mjcf::object(&source, &path, lookup.files)?;
+            let (model, said) = urdf::read(&urdf, &path, lookup, &materials);
+            (model, said.into_iter().map(|fault| if fault.code == "W038" { unseen(&source) } else { fault }).collect())
+        }
+        _ => sdf::read(&source, &path, lookup, role, depth),
+    };
     model.map(|model| (model, said.clone())).ok_or(said)
 }
 
@@ -139,7 +151,22 @@ fn named(name: &str, lookup: &Lookup) -> Option<Found> {
 fn model_file(files: &Files, folder: &Path) -> Option<PathBuf> {
     let inside = files.list(folder);
     let known = ["model.config", "model.sdf", "model.urdf"].map(|file| folder.join(file));
-    known.into_iter().find(|path| inside.contains(path))
+    let of_name = folder.file_name().map(|name| folder.join(name).with_added_extension("xml"));
+    let in_mjcf = of_name.into_iter().chain([folder.join("model.xml")]).filter(|path| is_mjcf(files, path));
+    known.into_iter().chain(in_mjcf).find(|path| inside.contains(path))
+}
+
+/// Whether a file is MJCF: XML whose root is `<mujoco>`.
+fn is_mjcf(files: &Files, path: &Path) -> bool {
+    path.extension().is_some_and(|ending| ending == "xml")
+        && files.read_bytes(path).is_ok_and(|bytes| bytes.windows(MJCF.len()).any(|part| part == MJCF))
+}
+
+/// W038 in terms of MJCF.
+fn unseen(source: &Source) -> Diagnostic {
+    Diagnostic::error("W038", "the object has no solid shape: none of its geoms collides")
+        .at(source, 0..0)
+        .help("set `contype` and `conaffinity` of a geom to 1; a geom for which both are 0 is only seen")
 }
 
 fn unreadable(path: &Path, reason: &str) -> Diagnostic {

@@ -1,4 +1,4 @@
-//! Reads mesh files: stl and obj with the `mesh_loader` crate, dae with [`collada`](super::collada).
+//! Reads mesh files: stl and obj with the `mesh_loader` crate, dae with [`collada`](super::collada), and MuJoCo's msh.
 
 use std::borrow::Cow;
 use std::path::Path;
@@ -43,6 +43,7 @@ pub(crate) fn read(files: &Files, path: &Path) -> Result<MeshFile, Diagnostics> 
         "stl" => of_scene(mesh_loader::stl::from_slice(&as_binary(&bytes))),
         // Materials do not affect collisions, so their files are not read.
         "obj" => of_scene(mesh_loader::obj::from_slice(&bytes, Some(path), |_| Ok(Vec::new()))),
+        "msh" => of_msh(&bytes),
         "dae" => {
             let text = std::str::from_utf8(&bytes).map_err(|_| unusable("it is not UTF-8 text".to_owned()))?;
             return collada::read(&Source::new(shown.to_string(), text), &mut warnings).map(|mesh| MeshFile {
@@ -68,6 +69,26 @@ fn as_binary(bytes: &[u8]) -> Cow<'_, [u8]> {
     let mut marked = bytes.to_vec();
     marked[..5].copy_from_slice(b"     ");
     Cow::Owned(marked)
+}
+
+/// Reads a binary mesh of MuJoCo: the numbers of vertices, normals, texture coordinates and faces, then these.
+///
+/// Source: MuJoCo's documentation, "XML Reference", `asset/mesh`.
+fn of_msh(bytes: &[u8]) -> Result<Mesh, String> {
+    let words: Vec<[u8; 4]> = bytes.chunks_exact(4).filter_map(|word| word.try_into().ok()).collect();
+    let ends_early = || "it ends too early".to_owned();
+    let counts = words.first_chunk::<4>().ok_or_else(ends_early)?.map(u32::from_le_bytes);
+    let [vertices, normals, texture, faces] = counts.map(|count| count as usize);
+    let before_faces = 4 + 3 * vertices + 3 * normals + 2 * texture;
+    if !bytes.len().is_multiple_of(4) || words.len() != before_faces + 3 * faces {
+        return Err("its length does not fit the numbers of its vertices and faces".to_owned());
+    }
+    let (points, _) = words[4..4 + 3 * vertices].as_chunks::<3>();
+    let (triangles, _) = words[before_faces..].as_chunks::<3>();
+    checked(
+        points.iter().map(|point| point.map(|word| f64::from(f32::from_le_bytes(word)))).collect(),
+        triangles.iter().map(|corners| corners.map(u32::from_le_bytes)).collect(),
+    )
 }
 
 /// Merges all meshes of a file.
@@ -98,6 +119,21 @@ pub(crate) fn checked(vertices: Vec<[f64; 3]>, triangles: Vec<[u32; 3]>) -> Resu
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_mesh_of_mujoco_is_read_and_a_cut_one_is_refused() {
+        let mut bytes: Vec<u8> = [4_u32, 1, 2, 4].into_iter().flat_map(u32::to_le_bytes).collect();
+        let numbers: [f32; 19] =
+            [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 9.0, 9.0, 9.0, 9.0, 9.0, 9.0, 9.0];
+        bytes.extend(numbers.into_iter().flat_map(f32::to_le_bytes));
+        bytes.extend([0_u32, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3].into_iter().flat_map(u32::to_le_bytes));
+        let mesh = of_msh(&bytes).expect("it is a tetrahedron");
+        assert!((mesh.volume() - 1.0 / 6.0).abs() < 1e-9);
+        assert!((0..bytes.len()).all(|length| of_msh(&bytes[..length]).is_err()));
+        let mut large = bytes.clone();
+        large[..4].copy_from_slice(&u32::MAX.to_le_bytes());
+        assert!(of_msh(&large).is_err());
+    }
 
     /// Binary files of some exporters begin with the word that marks files of text.
     #[test]

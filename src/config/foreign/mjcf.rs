@@ -1,4 +1,4 @@
-//! Converts a robot in MJCF, MuJoCo's format, to URDF: bodies, joints, geoms, inertias, equalities of joints.
+//! Converts a robot or an object in MJCF, MuJoCo's format, to URDF: bodies, joints, geoms, inertias, equalities of joints.
 //!
 //! Sites and cameras become links, so that a profile can name them. Tendons, contacts and options are not read.
 
@@ -9,6 +9,7 @@ use std::rc::Rc;
 use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
 
 use crate::foreign::mjcf_compiler::{Attributes, Compiler};
+use crate::foreign::urdf::{Materials, Matter};
 use crate::foreign::urdf_text::{Inertial, UrdfJoint, UrdfText, escaped};
 use crate::foreign::xml::{self, Bound, Node, Reader};
 use actcheck_base::{Diagnostics, Source};
@@ -26,33 +27,120 @@ const VELOCITY: [f64; 2] = [2.0, 0.5];
 /// Range of an unlimited sliding joint. Unit: metres.
 const SLIDES_M: f64 = 10.0;
 
-/// Converts a text.
+/// Converts the text of a robot.
 ///
 /// # Errors
 /// Faults of the text: W031 to W036, W055.
 pub(crate) fn to_urdf(source: &Source, path: &Path, files: &actcheck_base::Files) -> Result<Source, Diagnostics> {
+    converted(source, path, files, None).map(|(urdf, _)| urdf)
+}
+
+/// Converts the text of an object. Also returns the mass of bodies without `<inertial>`, which URDF can't state.
+///
+/// # Errors
+/// Faults of the text: W031 to W036, W055.
+pub(crate) fn object(
+    source: &Source,
+    path: &Path,
+    files: &actcheck_base::Files,
+) -> Result<(Source, Materials), Diagnostics> {
+    let (urdf, materials) = converted(source, path, files, Some(Materials::default()))?;
+    Ok((urdf, materials.unwrap_or_default()))
+}
+
+/// A body, or a solid without a body, at the top of a world.
+pub(crate) struct Piece {
+    pub(crate) name: String,
+    pub(crate) urdf: Source,
+    pub(crate) materials: Materials,
+    /// Whether it can move freely.
+    pub(crate) moves: bool,
+}
+
+/// Converts the text of a world, one object for each body at its top.
+///
+/// # Errors
+/// Faults of the text: W031 to W036, W055.
+pub(crate) fn world(source: &Source, path: &Path, files: &actcheck_base::Files) -> Result<Vec<Piece>, Diagnostics> {
+    with_robot(source, path, files, |root, robot, reader| {
+        let mut pieces = Vec::new();
+        let Some(worldbody) = xml::child(root, "worldbody") else { return pieces };
+        let mut names = BTreeMap::new();
+        let mut named = |written: Option<&str>, otherwise: &str| {
+            let mut name = unique(&mut names, written.unwrap_or(otherwise));
+            // Names are parts of names of models and locations.
+            name.retain(|letter| !letter.is_control() && letter != '/');
+            name
+        };
+        for body in xml::children(worldbody, "body") {
+            let free = |joint: &Node| joint.has_tag_name("freejoint") || joint.attribute("type") == Some("free");
+            let moves = body.children().any(|child| free(&child));
+            let mut own = robot.alone();
+            let world = own.unique("world");
+            own.out.link(&world, None, &[]);
+            own.body(body, &world, &Isometry3::identity(), None, reader);
+            pieces.push(own.piece(named(body.attribute("name"), "body"), reader.source, moves));
+        }
+        for geom in xml::children(worldbody, "geom") {
+            let mut own = robot.alone();
+            if let Some((pose, shape, _)) = own.solid(geom, &Isometry3::identity(), None, reader) {
+                own.out.link("solid", None, &[(pose, shape)]);
+                pieces.push(own.piece(named(geom.attribute("name"), "solid"), reader.source, false));
+            }
+        }
+        pieces
+    })
+}
+
+fn converted(
+    source: &Source,
+    path: &Path,
+    files: &actcheck_base::Files,
+    materials: Option<Materials>,
+) -> Result<(Source, Option<Materials>), Diagnostics> {
+    with_robot(source, path, files, |root, mut robot, reader| {
+        robot.materials = materials;
+        let world = robot.unique("world");
+        robot.out.link(&world, None, &[]);
+        match xml::child(root, "worldbody") {
+            Some(worldbody) => robot.children(worldbody, &world, &Isometry3::identity(), None, reader),
+            None => reader.error("W033", root, "`<mujoco>` has no `<worldbody>`".to_owned(), "add the bodies"),
+        }
+        let name = root.attribute("model").unwrap_or("robot").to_owned();
+        (Source::new(format!("{} (as URDF)", source.name), robot.out.finish(&name)), robot.materials)
+    })
+}
+
+/// Reads the settings of a text, and calls `read` with its root and a robot without bodies.
+fn with_robot<T>(
+    source: &Source,
+    path: &Path,
+    files: &actcheck_base::Files,
+    read: impl FnOnce(Node, Robot, &mut Reader) -> T,
+) -> Result<T, Diagnostics> {
     let text = crate::foreign::mjcf_compiler::with_includes(source, path, files, 0)?;
     let source = &Source::new(source.name.to_string(), text);
     let document = xml::parse_model(source, &source.text)?;
     let root = document.root_element();
     let mut reader = Reader::new(source);
     let compiler = Compiler::read(root, &mut reader);
-    let mut robot = Robot {
+    let robot = Robot {
         out: UrdfText::default(),
         mimics: mimics(root, &mut reader),
         efforts: efforts(root, &compiler, &mut reader),
         compiler: Rc::new(compiler),
         names: BTreeMap::new(),
+        materials: None,
     };
-    let world = robot.unique("world");
-    robot.out.link(&world, None, &[]);
-    match xml::child(root, "worldbody") {
-        Some(worldbody) => robot.children(worldbody, &world, &Isometry3::identity(), None, &mut reader),
-        None => reader.error("W033", root, "`<mujoco>` has no `<worldbody>`".to_owned(), "add the robot's bodies"),
-    }
-    reader.found.or(())?;
-    let name = root.attribute("model").unwrap_or("robot").to_owned();
-    Ok(Source::new(format!("{} (as URDF)", source.name), robot.out.finish(&name)))
+    let found = read(root, robot, &mut reader);
+    reader.found.or(found)
+}
+
+/// A name that no other has.
+fn unique(names: &mut BTreeMap<String, u32>, name: &str) -> String {
+    let count = names.entry(name.to_owned()).or_insert(0);
+    *count += 1;
+    if *count == 1 { name.to_owned() } else { format!("{name}_{count}") }
 }
 
 /// Joints that equalities couple to others, with the leader, factor and offset.
@@ -103,14 +191,31 @@ struct Robot {
     efforts: BTreeMap<String, f64>,
     /// Names in use, each with the number of its copies.
     names: BTreeMap<String, u32>,
+    /// Of an object; `None` for a robot.
+    materials: Option<Materials>,
 }
 
 impl Robot {
     /// A name that no other link or joint has.
     fn unique(&mut self, name: &str) -> String {
-        let count = self.names.entry(name.to_owned()).or_insert(0);
-        *count += 1;
-        if *count == 1 { name.to_owned() } else { format!("{name}_{count}") }
+        unique(&mut self.names, name)
+    }
+
+    /// Another one of the same file, without bodies, for an object.
+    fn alone(&self) -> Self {
+        Self {
+            out: UrdfText::default(),
+            compiler: Rc::clone(&self.compiler),
+            mimics: self.mimics.clone(),
+            efforts: self.efforts.clone(),
+            names: BTreeMap::new(),
+            materials: Some(Materials::default()),
+        }
+    }
+
+    fn piece(self, name: String, source: &Source, moves: bool) -> Piece {
+        let urdf = Source::new(format!("{} (`{name}` as URDF)", source.name), self.out.finish(&name));
+        Piece { name, urdf, materials: self.materials.unwrap_or_default(), moves }
     }
 
     /// Writes the bodies, sites and cameras in a body. `shift` is the body's frame in the frame of its link.
@@ -141,7 +246,9 @@ impl Robot {
         let name = self.unique(body.attribute("name").unwrap_or("body"));
         let attributes = compiler.attributes(body, class);
         let mut at = shift * compiler.pose(&attributes, body, reader);
-        let joints: Vec<Node> = xml::children(body, "joint").collect();
+        // A body that moves freely is the whole robot or object.
+        let is_free = |joint: &Node| compiler.attributes(*joint, class).get("type") == Some("free");
+        let joints: Vec<Node> = xml::children(body, "joint").filter(|joint| !is_free(joint)).collect();
         let mut from = parent.to_owned();
         // Position of the body's origin in the frame of its link.
         let mut own = Isometry3::identity();
@@ -163,9 +270,15 @@ impl Robot {
             self.out.joint(&UrdfJoint::fixed(&fixed, parent, &name, at));
         }
         let solids = self.solids(body, &own, class, reader);
-        let inertial = self.inertial(body, &own, class, &solids, reader);
+        let inertial = match &mut self.materials {
+            Some(materials) if xml::child(body, "inertial").is_none() => {
+                materials.add(&name, body, &compiler, class);
+                None
+            }
+            _ => Some(self.inertial(body, &own, class, &solids, reader)),
+        };
         let solids: Vec<(Isometry3<f64>, String)> = solids.into_iter().map(|(pose, shape, _)| (pose, shape)).collect();
-        self.out.link(&name, Some(&inertial), &solids);
+        self.out.link(&name, inertial.as_ref(), &solids);
         self.children(body, &name, &own, class, reader);
     }
 
@@ -183,7 +296,12 @@ impl Robot {
             "slide" => ("prismatic", true),
             other => {
                 let message = format!("a joint of the type {other} can't be simulated");
-                reader.error("W035", joint, message, "joints of robots are `hinge` or `slide`");
+                reader.error(
+                    "W035",
+                    joint,
+                    message,
+                    "use `hinge` or `slide`; the joint of the whole model may be `free`",
+                );
                 return None;
             }
         };
@@ -211,6 +329,7 @@ impl Robot {
             (None, false) => ("continuous", [0.0; 2]),
         };
         let damping = attributes.get("damping").and_then(|text| text.split_whitespace().next()?.parse().ok());
+        let friction = attributes.get("frictionloss").and_then(|text| text.parse().ok());
         let own_effort =
             attributes.get("actuatorfrcrange").and_then(|text| reader.numbers::<2>(joint, text, Bound::Finite));
         let effort =
@@ -227,6 +346,8 @@ impl Robot {
             effort: effort.filter(|effort| *effort > 0.0).unwrap_or(EFFORT),
             velocity: VELOCITY[usize::from(slides)],
             damping: damping.unwrap_or(0.0),
+            // Robots overcome it with their motors.
+            friction: friction.filter(|_| self.materials.is_some()).unwrap_or(0.0),
             mimic: self.mimics.get(&name).cloned(),
         });
         Some(())
@@ -240,22 +361,28 @@ impl Robot {
         class: Option<&str>,
         reader: &mut Reader,
     ) -> Vec<(Isometry3<f64>, String, Option<f64>)> {
-        let mut found = Vec::new();
-        for geom in xml::children(body, "geom") {
-            let attributes = self.compiler.attributes(geom, class);
-            if attributes.get("contype") == Some("0") && attributes.get("conaffinity") == Some("0") {
-                continue;
-            }
-            let pose = own * self.compiler.pose(&attributes, geom, reader);
-            if let Some((moved, shape, volume)) = self.shape(geom, &attributes, reader) {
-                let density = attributes.get("density").and_then(|text| text.parse().ok()).unwrap_or(DENSITY);
-                let stated = attributes.get("mass").and_then(|text| text.parse().ok());
-                // An end-to-end geom has its pose from its ends.
-                let pose = moved.map_or(pose, |moved| own * moved);
-                found.push((pose, shape, stated.or(volume.map(|volume| volume * density))));
-            }
+        xml::children(body, "geom").filter_map(|geom| self.solid(geom, own, class, reader)).collect()
+    }
+
+    /// Returns a geom if it collides, with its mass if its volume is known.
+    fn solid(
+        &self,
+        geom: Node,
+        own: &Isometry3<f64>,
+        class: Option<&str>,
+        reader: &mut Reader,
+    ) -> Option<(Isometry3<f64>, String, Option<f64>)> {
+        let attributes = self.compiler.attributes(geom, class);
+        if !collides(&attributes) {
+            return None;
         }
-        found
+        let pose = own * self.compiler.pose(&attributes, geom, reader);
+        let (moved, shape, volume) = self.shape(geom, &attributes, reader)?;
+        let density = attributes.get("density").and_then(|text| text.parse().ok()).unwrap_or(DENSITY);
+        let stated = attributes.get("mass").and_then(|text| text.parse().ok());
+        // An end-to-end geom has its pose from its ends.
+        let pose = moved.map_or(pose, |moved| own * moved);
+        Some((pose, shape, stated.or(volume.map(|volume| volume * density))))
     }
 
     /// The pose of a geom that is given by its ends, its element of a `<geometry>`, and its volume if it is known.
@@ -278,7 +405,7 @@ impl Robot {
             return Some((None, format!("<mesh filename=\"{file}\" scale=\"{scale}\"/>"), None));
         }
         if !["sphere", "box", "cylinder", "capsule", "ellipsoid"].contains(&kind) {
-            // A plane or a height field does not belong to a robot.
+            // A plane or a height field does not belong to a robot or an object.
             return None;
         }
         let size: Vec<f64> = attributes
@@ -319,6 +446,10 @@ impl Robot {
                 format!("<capsule radius=\"{r}\" length=\"{}\"/>", 2.0 * half),
                 2.0 * PI * r * r * half + 4.0 / 3.0 * PI * r.powi(3),
             ),
+            "ellipsoid" if self.materials.is_some() => {
+                let [x, y, z] = [size[0], size[1], size[2]];
+                (format!("<ellipsoid radii=\"{x} {y} {z}\"/>"), 4.0 / 3.0 * PI * x * y * z)
+            }
             _ => {
                 let [x, y, z] = [size[0], size[1], size[2]].map(|extent| 2.0 * extent);
                 (format!("<box size=\"{x} {y} {z}\"/>"), x * y * z)
@@ -369,6 +500,31 @@ impl Robot {
             (Matrix3::identity() * d.norm_squared() - d * d.transpose()) * *kg + cube(*kg)
         };
         Inertial { pose: Isometry3::translation(com.x, com.y, com.z), kg, about_com: parts.iter().map(of_point).sum() }
+    }
+}
+
+/// Whether a geom can touch others.
+fn collides(attributes: &Attributes<'_>) -> bool {
+    attributes.get("contype") != Some("0") || attributes.get("conaffinity") != Some("0")
+}
+
+impl Materials {
+    /// Adds a body without `<inertial>`: its mass, if all of its geoms state theirs, otherwise its density.
+    fn add(&mut self, name: &str, body: Node, compiler: &Compiler, class: Option<&str>) {
+        let geoms: Vec<Node> = xml::children(body, "geom").collect();
+        let number = |geom: &Node, name: &str| {
+            let attributes = compiler.attributes(*geom, class);
+            let of_vector = attributes.get(name).and_then(|text| text.split_whitespace().next()?.parse::<f64>().ok());
+            of_vector.filter(|_| collides(&attributes)).filter(|number| *number >= 0.0 && number.is_finite())
+        };
+        let solid: Vec<&Node> = geoms.iter().filter(|geom| collides(&compiler.attributes(**geom, class))).collect();
+        let masses: Option<Vec<f64>> = solid.iter().map(|geom| number(geom, "mass")).collect();
+        let kg = masses.map(|masses| masses.iter().sum::<f64>()).filter(|kg| *kg > 0.0);
+        let density = solid.iter().find_map(|geom| number(geom, "density")).filter(|density| *density > 0.0);
+        let matter = kg.map_or(Matter::Density(density.unwrap_or(DENSITY)), Matter::Mass);
+        self.of_link.insert(name.to_owned(), matter);
+        let friction = solid.iter().filter_map(|geom| number(geom, "friction")).reduce(f64::max);
+        self.friction = self.friction.into_iter().chain(friction).reduce(f64::max);
     }
 }
 

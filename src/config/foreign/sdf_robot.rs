@@ -231,6 +231,7 @@ fn write_joint(
         effort: stated(effort, EFFORT),
         velocity: stated(velocity, VELOCITY),
         damping,
+        friction: 0.0,
         mimic: mimic(axis, reader),
     });
     Some(())

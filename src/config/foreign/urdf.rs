@@ -1,5 +1,6 @@
 //! Reads objects in URDF.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 
 use nalgebra::{Isometry3, Matrix3, Vector3};
@@ -17,8 +18,30 @@ use actcheck_data::{Part, PartJoint, Pose};
 /// Longest chain of links; a longer one is a cycle.
 const LONGEST_CHAIN: usize = 256;
 
+/// Properties that URDF can't state, of an object that was converted to it.
+#[derive(Debug, Default)]
+pub(crate) struct Materials {
+    /// By the names of links without `<inertial>`.
+    pub(crate) of_link: BTreeMap<String, Matter>,
+    pub(crate) friction: Option<f64>,
+}
+
+/// The basis of a link's mass.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Matter {
+    /// Unit: kilograms.
+    Mass(f64),
+    /// Unit: kg/m³.
+    Density(f64),
+}
+
 /// Reads the object of a URDF file and its faults. The object is `None` if there are errors.
-pub(crate) fn read(source: &Source, path: &Path, lookup: &Lookup) -> (Option<SdfModel>, Diagnostics) {
+pub(crate) fn read(
+    source: &Source,
+    path: &Path,
+    lookup: &Lookup,
+    materials: &Materials,
+) -> (Option<SdfModel>, Diagnostics) {
     let text = repaired(&source.text);
     let document = match xml::parse_model(source, &text) {
         Ok(document) => document,
@@ -27,10 +50,14 @@ pub(crate) fn read(source: &Source, path: &Path, lookup: &Lookup) -> (Option<Sdf
     let mut reader = Reader::new(source);
     let mut shapes = Shapes::new(lookup, path);
     shapes.digest.update(source.text.as_bytes());
+    if !materials.of_link.is_empty() {
+        shapes.digest.update(format!("{materials:?}").as_bytes());
+    }
     let root = document.root_element();
     let mut body = Body::default();
     if root.tag_name().name() == "robot" {
-        body = read_robot(root, &mut shapes, &mut reader);
+        body = read_robot(root, materials, &mut shapes, &mut reader);
+        body.friction = materials.friction;
     } else {
         let message = format!("the root is `<{}>` instead of `<robot>`", root.tag_name().name());
         reader.error("W032", root, message, "a URDF file begins with `<robot name=\"…\">`");
@@ -43,7 +70,7 @@ pub(crate) fn read(source: &Source, path: &Path, lookup: &Lookup) -> (Option<Sdf
     (Some(SdfModel { body, pose: Isometry3::identity(), is_static: false, digest }), found)
 }
 
-fn read_robot(root: Node, shapes: &mut Shapes, reader: &mut Reader) -> Body {
+fn read_robot(root: Node, materials: &Materials, shapes: &mut Shapes, reader: &mut Reader) -> Body {
     reader.warn_about_unknown_children(root, &["link", "joint", "material"]);
     let joints: Vec<Node> = xml::children(root, "joint").collect();
     let links: Vec<Node> = xml::children(root, "link").collect();
@@ -69,7 +96,7 @@ fn read_robot(root: Node, shapes: &mut Shapes, reader: &mut Reader) -> Body {
     let mut bodies = assembly.empty_bodies(false);
     for (idx, (link, at)) in links.iter().zip(&places).enumerate() {
         if let Some(at) = at {
-            read_link(*link, at, &mut bodies[assembly.body_of(idx)], shapes, reader);
+            read_link((*link, at, materials), &mut bodies[assembly.body_of(idx)], shapes, reader);
         }
     }
     let names: Vec<&str> = links.iter().map(|link| link.attribute("name").unwrap_or_default()).collect();
@@ -149,7 +176,12 @@ pub(crate) fn origin(node: Node, reader: &mut Reader) -> Option<Isometry3<f64>> 
     Some(xml::placed(three("xyz")?, three("rpy")?))
 }
 
-fn read_link(link: Node, at: &Isometry3<f64>, body: &mut Body, shapes: &mut Shapes, reader: &mut Reader) {
+fn read_link(
+    (link, at, materials): (Node, &Isometry3<f64>, &Materials),
+    body: &mut Body,
+    shapes: &mut Shapes,
+    reader: &mut Reader,
+) {
     reader.warn_about_unknown_children(link, &["inertial", "collision", "visual"]);
     let before = body.parts.len();
     for collision in xml::children(link, "collision") {
@@ -159,9 +191,21 @@ fn read_link(link: Node, at: &Isometry3<f64>, body: &mut Body, shapes: &mut Shap
         check_volume(&shape, collision, reader);
         body.parts.push(Part { pose: Pose::from_isometry(&(at * placed)), shape });
     }
-    match xml::child(link, "inertial").and_then(|inertial| read_inertial(inertial, at, reader)) {
-        Some(mass) => body.masses.push(mass),
-        None => body.has_unknown_mass |= body.parts.len() > before,
+    if let Some(mass) = xml::child(link, "inertial").and_then(|inertial| read_inertial(inertial, at, reader)) {
+        body.masses.push(mass);
+        return;
+    }
+    let own = &body.parts[before..];
+    let kg = match link.attribute("name").and_then(|name| materials.of_link.get(name)) {
+        Some(Matter::Mass(kg)) => Some(*kg),
+        Some(Matter::Density(density)) => Some(density * own.iter().map(|part| part.shape.volume()).sum::<f64>()),
+        None => None,
+    };
+    match kg {
+        _ if own.is_empty() => {}
+        // Moments without a tensor follow from the shapes.
+        Some(kg) => body.masses.push(Mass { kg, com: at.translation.vector, about_com: None }),
+        None => body.has_unknown_mass = true,
     }
 }
 

@@ -25,6 +25,8 @@ pub(crate) struct UrdfJoint<'a> {
     pub(crate) effort: f64,
     pub(crate) velocity: f64,
     pub(crate) damping: f64,
+    /// Unit: newtons or newton metres.
+    pub(crate) friction: f64,
     /// The joint that it follows, with factor and offset.
     pub(crate) mimic: Option<(String, f64, f64)>,
 }
@@ -63,7 +65,7 @@ impl UrdfText {
 
     /// Writes a joint.
     pub(crate) fn joint(&mut self, joint: &UrdfJoint<'_>) {
-        let UrdfJoint { kind, axis, range: [lower, upper], effort, velocity, damping, .. } = joint;
+        let UrdfJoint { kind, axis, range: [lower, upper], effort, velocity, damping, friction, .. } = joint;
         let _ = writeln!(
             self.text,
             "  <joint name=\"{}\" type=\"{kind}\">{}<parent link=\"{}\"/><child link=\"{}\"/>",
@@ -76,8 +78,11 @@ impl UrdfText {
             let _ = writeln!(
                 self.text,
                 "    <axis xyz=\"{} {} {}\"/><limit lower=\"{lower}\" upper=\"{upper}\" effort=\"{effort}\" \
-                 velocity=\"{velocity}\"/><dynamics damping=\"{damping}\"/>",
-                axis.x, axis.y, axis.z,
+                 velocity=\"{velocity}\"/><dynamics damping=\"{damping}\"{}/>",
+                axis.x,
+                axis.y,
+                axis.z,
+                if *friction > 0.0 { format!(" friction=\"{friction}\"") } else { String::new() },
             );
         }
         if let Some((leader, factor, offset)) = &joint.mimic {
@@ -115,6 +120,7 @@ impl<'a> UrdfJoint<'a> {
             effort: 0.0,
             velocity: 0.0,
             damping: 0.0,
+            friction: 0.0,
             mimic: None,
         }
     }

@@ -1,4 +1,4 @@
-//! Reads Gazebo worlds: their models as static furniture, with a location in front of each surface.
+//! Reads worlds of Gazebo and MuJoCo: their models as static furniture, with a location in front of each surface.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
@@ -14,7 +14,7 @@ use crate::foreign::nested::Role;
 use crate::foreign::sdf::check_version;
 use crate::foreign::sdf_pose::pose;
 use crate::foreign::xml::{self, Node, Reader};
-use crate::foreign::{folder, sdf};
+use crate::foreign::{folder, mjcf, sdf, urdf};
 use crate::{Furniture, WorldMap};
 use actcheck_base::{Diagnostics, Severity, Source, digest_of};
 use actcheck_data::{Location, ObjectModel, Part, Pose};
@@ -67,7 +67,7 @@ const ROOM_M: f64 = 2.5;
 /// Largest number of solids of a building that become pieces of their own: each is perceived on its own.
 const MOST_PIECES: usize = 200;
 
-/// Reads a Gazebo world. It is `None` if there are errors.
+/// Reads a world in SDF or MJCF. It is `None` if there are errors.
 ///
 /// # Errors
 /// All faults of the text: it is not XML (W031) or not SDF of a supported version (W032), lacks an element (W033), has
@@ -83,7 +83,9 @@ pub(crate) fn read(name: &str, source: &Source, path: &Path, included: &Included
     let mut gathering =
         Gathering { path, included, world: World { map, models: Vec::new() }, reader: Reader::new(source) };
     let root = document.root_element();
-    if check_version(root, &mut gathering.reader).is_some()
+    if root.has_tag_name("mujoco") {
+        gathering.bodies(root, source);
+    } else if check_version(root, &mut gathering.reader).is_some()
         && let Some(world) = gathering.reader.required(root, "world")
     {
         gathering.reader.warn_about_unknown_children(world, &KNOWN);
@@ -206,6 +208,26 @@ impl Gathering<'_> {
         self.warn_if_movable(is_still || model.is_static, &named, include);
         let at = if has_pose { at } else { model.pose };
         Some(self.place(model.body, model.digest, &at, name))
+    }
+
+    /// Adds the bodies of a world in MJCF.
+    fn bodies(&mut self, root: Node, source: &Source) {
+        let pieces = match mjcf::world(source, self.path, self.included.lookup.files) {
+            Ok(pieces) => pieces,
+            Err(faults) => return self.reader.found.extend(faults),
+        };
+        for piece in pieces {
+            let (model, said) = urdf::read(&piece.urdf, self.path, self.included.lookup, &piece.materials);
+            let Some(mut model) = model else {
+                // A body that is only seen has no solids.
+                self.reader.found.extend(said.into_iter().filter(|fault| fault.code != "W038").collect());
+                continue;
+            };
+            self.warn_if_movable(!piece.moves, &piece.name, root);
+            model.body.fixed = true;
+            let furniture = self.place(model.body, model.digest, &Isometry3::identity(), &piece.name);
+            self.add(furniture, root);
+        }
     }
 
     /// Adds a body as a model of its own, and returns the piece of furniture that it is at a pose.
