@@ -4,11 +4,13 @@ use std::collections::BTreeMap;
 
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 
-use crate::description::{JointKind, RobotModel};
+use crate::description::{Joint, JointKind, RobotModel};
 use crate::kinematics::motion;
 
 /// Words in the names of cameras, the best first.
 const CAMERA_WORDS: [&str; 9] = ["rgbd", "depth", "xtion", "astra", "kinect", "realsense", "d435", "camera", "stereo"];
+/// A lift that takes longer from end to end is left at 0: actions have a minute. Unit: seconds.
+const SLOW_SECS: f64 = 15.0;
 /// Height of a table-top arm's root. Unit: metres. That of a low table.
 const TABLE_M: f64 = 0.4;
 /// A root with shapes further below it than this is on its own pedestal. Unit: metres.
@@ -44,8 +46,10 @@ pub(super) fn find(model: &RobotModel, palm: usize, notes: &mut BTreeMap<&'stati
         notes.insert("base", format!("it has wheels, such as `{wheel}`"));
     }
     let drives = own_base.is_some() || wheel.is_some();
-    let arm: Vec<usize> = path.into_iter().filter(|idx| model.joints[*idx].mimic.is_none()).collect();
-    notes.insert("arm_joints", format!("the joints between the root and the hand `{}`", model.links[palm].name));
+    let (slow, arm): (Vec<usize>, Vec<usize>) =
+        path.into_iter().filter(|idx| model.joints[*idx].mimic.is_none()).partition(|idx| is_slow(&model.joints[*idx]));
+    let slow: String = slow.iter().map(|idx| &model.joints[*idx]).map(left_out).collect();
+    notes.insert("arm_joints", format!("the joints between the root and the hand `{}`{slow}", model.links[palm].name));
     let (camera_link, camera, camera_turned_rad) = camera(model, palm, notes);
     let others: Vec<usize> = arm.iter().copied().chain(own_base.into_iter().flatten()).collect();
     let head = head(model, camera, &others);
@@ -63,6 +67,20 @@ pub(super) fn find(model: &RobotModel, palm: usize, notes: &mut BTreeMap<&'stati
     };
     let mount_height_m = (mount_height_m * 1000.0).round() / 1000.0;
     Body { arm, head, own_base, drives, mount_height_m, camera_link, camera_turned_rad }
+}
+
+/// Whether a lift takes so long that most of an action would be spent on it.
+fn is_slow(joint: &Joint) -> bool {
+    joint.kind == JointKind::Prismatic && (joint.lower..=joint.upper).contains(&0.0) && travel_secs(joint) > SLOW_SECS
+}
+
+/// Time from one end to the other. Unit: seconds.
+fn travel_secs(joint: &Joint) -> f64 {
+    (joint.upper - joint.lower) / joint.velocity
+}
+
+fn left_out(joint: &Joint) -> String {
+    format!(", but not `{}`, which takes {:.0} s from end to end and stays at 0", joint.name, travel_secs(joint))
 }
 
 /// Returns the joints between the root and a link, from the root outwards.
