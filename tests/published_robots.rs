@@ -231,3 +231,28 @@ fn a_hand_that_cannot_be_tilted_grasps_at_its_own_slant() {
     assert!(!said.contains("S071"), "{said}");
     assert!(passed >= 3, "{passed} of 4 picks passed: {said}");
 }
+
+/// The PR2's torso takes 24 s from end to end, and most of its picks took longer than a minute.
+#[test]
+fn a_slow_lift_is_no_joint_of_the_proposed_arm() {
+    let folder = tempfile::tempdir().unwrap();
+    let arm_joints = |velocity: &str| {
+        let lift = format!(
+            "<link name=\"floor_link\"/><joint name=\"lift_joint\" type=\"prismatic\"><parent link=\"floor_link\"/>\
+             <child link=\"pedestal_link\"/><axis xyz=\"0 0 1\"/>\
+             <limit lower=\"0\" upper=\"0.31\" effort=\"9000\" velocity=\"{velocity}\"/></joint></robot>"
+        );
+        let (urdf, out) = (fixed_arm().replace("</robot>", &lift), format!("{velocity}.toml"));
+        std::fs::write(folder.path().join("robot.urdf"), urdf).unwrap();
+        let made = actcheck(folder.path(), &["new", "robot", "robot.urdf", "--out", &out]);
+        assert!(made.status.success(), "{}", stderr(&made));
+        let text = std::fs::read_to_string(folder.path().join(out)).unwrap();
+        let line = text.lines().find(|line| line.starts_with("arm_joints")).unwrap_or_default().to_owned();
+        (line, text)
+    };
+    let (arm, text) = arm_joints("0.1");
+    assert!(arm.contains("lift_joint"), "{text}");
+    let (arm, text) = arm_joints("0.013");
+    assert!(arm.contains("wrist_roll_joint") && !arm.contains("lift_joint"), "{text}");
+    assert!(text.contains("but not `lift_joint`, which takes 24 s from end to end and stays at 0"), "{text}");
+}
