@@ -234,7 +234,7 @@ fn a_hand_that_cannot_be_tilted_grasps_at_its_own_slant() {
 
 /// The PR2's torso takes 24 s from end to end, and most of its picks took longer than a minute.
 #[test]
-fn a_slow_lift_is_no_joint_of_the_proposed_arm() {
+fn a_slow_lift_is_not_proposed_for_the_arm() {
     let folder = tempfile::tempdir().unwrap();
     let arm_joints = |velocity: &str| {
         let lift = format!(
