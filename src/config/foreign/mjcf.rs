@@ -9,13 +9,14 @@ use std::rc::Rc;
 use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
 
 use crate::foreign::mjcf_compiler::{Attributes, Compiler};
-use crate::foreign::urdf::{Materials, Matter};
+use crate::foreign::mjcf_materials::collides;
+use crate::foreign::urdf::Materials;
 use crate::foreign::urdf_text::{Inertial, UrdfJoint, UrdfText, escaped};
 use crate::foreign::xml::{self, Bound, Node, Reader};
 use actcheck_base::{Diagnostics, Source};
 
 /// Density of geoms: MuJoCo's default. Unit: kg/m³.
-const DENSITY: f64 = 1000.0;
+pub(super) const DENSITY: f64 = 1000.0;
 /// Mass of a body with neither a mass nor a shape whose volume is known. Unit: kilograms.
 const UNKNOWN_KG: f64 = 0.1;
 /// Edge of the cube whose inertia such a body gets. Unit: metres.
@@ -48,50 +49,6 @@ pub(crate) fn object(
     Ok((urdf, materials.unwrap_or_default()))
 }
 
-/// A body, or a solid without a body, at the top of a world.
-pub(crate) struct Piece {
-    pub(crate) name: String,
-    pub(crate) urdf: Source,
-    pub(crate) materials: Materials,
-    /// Whether it can move freely.
-    pub(crate) moves: bool,
-}
-
-/// Converts the text of a world, one object for each body at its top.
-///
-/// # Errors
-/// Faults of the text: W031 to W036, W055.
-pub(crate) fn world(source: &Source, path: &Path, files: &actcheck_base::Files) -> Result<Vec<Piece>, Diagnostics> {
-    with_robot(source, path, files, |root, robot, reader| {
-        let mut pieces = Vec::new();
-        let Some(worldbody) = xml::child(root, "worldbody") else { return pieces };
-        let mut names = BTreeMap::new();
-        let mut named = |written: Option<&str>, otherwise: &str| {
-            let mut name = unique(&mut names, written.unwrap_or(otherwise));
-            // Names are parts of names of models and locations.
-            name.retain(|letter| !letter.is_control() && letter != '/');
-            name
-        };
-        for body in xml::children(worldbody, "body") {
-            let free = |joint: &Node| joint.has_tag_name("freejoint") || joint.attribute("type") == Some("free");
-            let moves = body.children().any(|child| free(&child));
-            let mut own = robot.alone();
-            let world = own.unique("world");
-            own.out.link(&world, None, &[]);
-            own.body(body, &world, &Isometry3::identity(), None, reader);
-            pieces.push(own.piece(named(body.attribute("name"), "body"), reader.source, moves));
-        }
-        for geom in xml::children(worldbody, "geom") {
-            let mut own = robot.alone();
-            if let Some((pose, shape, _)) = own.solid(geom, &Isometry3::identity(), None, reader) {
-                own.out.link("solid", None, &[(pose, shape)]);
-                pieces.push(own.piece(named(geom.attribute("name"), "solid"), reader.source, false));
-            }
-        }
-        pieces
-    })
-}
-
 fn converted(
     source: &Source,
     path: &Path,
@@ -112,7 +69,7 @@ fn converted(
 }
 
 /// Reads the settings of a text, and calls `read` with its root and a robot without bodies.
-fn with_robot<T>(
+pub(super) fn with_robot<T>(
     source: &Source,
     path: &Path,
     files: &actcheck_base::Files,
@@ -137,7 +94,7 @@ fn with_robot<T>(
 }
 
 /// A name that no other has.
-fn unique(names: &mut BTreeMap<String, u32>, name: &str) -> String {
+pub(super) fn unique(names: &mut BTreeMap<String, u32>, name: &str) -> String {
     let count = names.entry(name.to_owned()).or_insert(0);
     *count += 1;
     if *count == 1 { name.to_owned() } else { format!("{name}_{count}") }
@@ -184,25 +141,25 @@ fn efforts(root: Node, compiler: &Compiler, reader: &mut Reader) -> BTreeMap<Str
     found
 }
 
-struct Robot {
-    out: UrdfText,
+pub(super) struct Robot {
+    pub(super) out: UrdfText,
     compiler: Rc<Compiler>,
     mimics: BTreeMap<String, (String, f64, f64)>,
     efforts: BTreeMap<String, f64>,
     /// Names in use, each with the number of its copies.
     names: BTreeMap<String, u32>,
     /// Of an object; `None` for a robot.
-    materials: Option<Materials>,
+    pub(super) materials: Option<Materials>,
 }
 
 impl Robot {
     /// A name that no other link or joint has.
-    fn unique(&mut self, name: &str) -> String {
+    pub(super) fn unique(&mut self, name: &str) -> String {
         unique(&mut self.names, name)
     }
 
     /// Another one of the same file, without bodies, for an object.
-    fn alone(&self) -> Self {
+    pub(super) fn alone(&self) -> Self {
         Self {
             out: UrdfText::default(),
             compiler: Rc::clone(&self.compiler),
@@ -211,11 +168,6 @@ impl Robot {
             names: BTreeMap::new(),
             materials: Some(Materials::default()),
         }
-    }
-
-    fn piece(self, name: String, source: &Source, moves: bool) -> Piece {
-        let urdf = Source::new(format!("{} (`{name}` as URDF)", source.name), self.out.finish(&name));
-        Piece { name, urdf, materials: self.materials.unwrap_or_default(), moves }
     }
 
     /// Writes the bodies, sites and cameras in a body. `shift` is the body's frame in the frame of its link.
@@ -240,7 +192,14 @@ impl Robot {
         }
     }
 
-    fn body(&mut self, body: Node, parent: &str, shift: &Isometry3<f64>, class: Option<&str>, reader: &mut Reader) {
+    pub(super) fn body(
+        &mut self,
+        body: Node,
+        parent: &str,
+        shift: &Isometry3<f64>,
+        class: Option<&str>,
+        reader: &mut Reader,
+    ) {
         let compiler = Rc::clone(&self.compiler);
         let class = body.attribute("childclass").or(class);
         let name = self.unique(body.attribute("name").unwrap_or("body"));
@@ -365,7 +324,7 @@ impl Robot {
     }
 
     /// Returns a geom if it collides, with its mass if its volume is known.
-    fn solid(
+    pub(super) fn solid(
         &self,
         geom: Node,
         own: &Isometry3<f64>,
@@ -500,31 +459,6 @@ impl Robot {
             (Matrix3::identity() * d.norm_squared() - d * d.transpose()) * *kg + cube(*kg)
         };
         Inertial { pose: Isometry3::translation(com.x, com.y, com.z), kg, about_com: parts.iter().map(of_point).sum() }
-    }
-}
-
-/// Whether a geom can touch others.
-fn collides(attributes: &Attributes<'_>) -> bool {
-    attributes.get("contype") != Some("0") || attributes.get("conaffinity") != Some("0")
-}
-
-impl Materials {
-    /// Adds a body without `<inertial>`: its mass, if all of its geoms state theirs, otherwise its density.
-    fn add(&mut self, name: &str, body: Node, compiler: &Compiler, class: Option<&str>) {
-        let geoms: Vec<Node> = xml::children(body, "geom").collect();
-        let number = |geom: &Node, name: &str| {
-            let attributes = compiler.attributes(*geom, class);
-            let of_vector = attributes.get(name).and_then(|text| text.split_whitespace().next()?.parse::<f64>().ok());
-            of_vector.filter(|_| collides(&attributes)).filter(|number| *number >= 0.0 && number.is_finite())
-        };
-        let solid: Vec<&Node> = geoms.iter().filter(|geom| collides(&compiler.attributes(**geom, class))).collect();
-        let masses: Option<Vec<f64>> = solid.iter().map(|geom| number(geom, "mass")).collect();
-        let kg = masses.map(|masses| masses.iter().sum::<f64>()).filter(|kg| *kg > 0.0);
-        let density = solid.iter().find_map(|geom| number(geom, "density")).filter(|density| *density > 0.0);
-        let matter = kg.map_or(Matter::Density(density.unwrap_or(DENSITY)), Matter::Mass);
-        self.of_link.insert(name.to_owned(), matter);
-        let friction = solid.iter().filter_map(|geom| number(geom, "friction")).reduce(f64::max);
-        self.friction = self.friction.into_iter().chain(friction).reduce(f64::max);
     }
 }
 

@@ -14,7 +14,7 @@ use crate::foreign::nested::Role;
 use crate::foreign::sdf::check_version;
 use crate::foreign::sdf_pose::pose;
 use crate::foreign::xml::{self, Node, Reader};
-use crate::foreign::{folder, mjcf, sdf, urdf};
+use crate::foreign::{folder, mjcf_world, sdf, urdf};
 use crate::{Furniture, WorldMap};
 use actcheck_base::{Diagnostics, Severity, Source, digest_of};
 use actcheck_data::{Location, ObjectModel, Part, Pose};
@@ -212,7 +212,7 @@ impl Gathering<'_> {
 
     /// Adds the bodies of a world in MJCF.
     fn bodies(&mut self, root: Node, source: &Source) {
-        let pieces = match mjcf::world(source, self.path, self.included.lookup.files) {
+        let pieces = match mjcf_world::read(source, self.path, self.included.lookup.files) {
             Ok(pieces) => pieces,
             Err(faults) => return self.reader.found.extend(faults),
         };
