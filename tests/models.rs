@@ -159,7 +159,7 @@ fn objects_of_mujoco_have_the_values_of_their_files() {
     let (folder, _) = project("");
     let models = folder.path().join("m");
     fs::create_dir_all(models.join("chest")).unwrap();
-    let tin = "<mujoco><compiler angle=\"degree\"/><worldbody><body><body name=\"object\"><freejoint/>\
+    let tin = "<?xml version=\"1.0\"?><!-- a tin --><mujoco><compiler angle=\"degree\"/><worldbody><body><body name=\"object\"><freejoint/>\
         <geom type=\"cylinder\" size=\"0.03 0.05\" density=\"500\" friction=\"0.7 0.3 0.1\"/>\
         <geom type=\"box\" size=\"1 1 1\" contype=\"0\" conaffinity=\"0\"/></body>\
         <site name=\"top\" pos=\"0 0 0.05\"/></body></worldbody></mujoco>";
@@ -169,7 +169,7 @@ fn objects_of_mujoco_have_the_values_of_their_files() {
         <geom type=\"box\" size=\"0.2 0.1 0.01\" pos=\"0 -0.1 0\" density=\"600\"/></body></body></worldbody></mujoco>";
     fs::write(models.join("tin.xml"), tin).unwrap();
     fs::write(models.join("chest/chest.xml"), chest).unwrap();
-    fs::write(models.join("package.xml"), "<package><name>things</name></package>").unwrap();
+    fs::write(models.join("package.xml"), "<!-- <mujoco> --><package><mujoco/></package>").unwrap();
     let campaign = campaign(folder.path(), "model_dir = \"m\"\n").unwrap_or_else(|faults| panic!("{faults}"));
     assert_eq!(campaign.models.keys().collect::<Vec<_>>(), ["chest", "tin"]);
     let near = |found: f64, expected: f64| assert!((found - expected).abs() < 1e-6, "{found} is not {expected}");

@@ -14,9 +14,6 @@ use crate::foreign::{mjcf, sdf, urdf};
 use actcheck_base::{Diagnostic, Diagnostics, Files, Severity, Source, did_you_mean};
 use actcheck_data::ObjectModel;
 
-/// The beginning of the root of MJCF files.
-const MJCF: &[u8] = b"<mujoco";
-
 /// A model found in a folder.
 #[derive(Debug, Clone)]
 pub(crate) struct Found {
@@ -156,10 +153,27 @@ fn model_file(files: &Files, folder: &Path) -> Option<PathBuf> {
     known.into_iter().chain(in_mjcf).find(|path| inside.contains(path))
 }
 
-/// Whether a file is MJCF: XML whose root is `<mujoco>`.
+/// Whether a file is MJCF: XML whose root is `<mujoco>`. A URDF may have such an element, too, but not as its root.
 fn is_mjcf(files: &Files, path: &Path) -> bool {
-    path.extension().is_some_and(|ending| ending == "xml")
-        && files.read_bytes(path).is_ok_and(|bytes| bytes.windows(MJCF.len()).any(|part| part == MJCF))
+    let is_xml = path.extension().is_some_and(|ending| ending == "xml");
+    is_xml && files.read_bytes(path).is_ok_and(|bytes| begins_with_mujoco(&String::from_utf8_lossy(&bytes)))
+}
+
+/// Whether the first element of a text is `<mujoco>`.
+fn begins_with_mujoco(text: &str) -> bool {
+    let mut rest = text;
+    while let Some(at) = rest.find('<') {
+        rest = &rest[at..];
+        let end = if rest.starts_with("<!--") {
+            "-->"
+        } else if rest.starts_with("<?") || rest.starts_with("<!") {
+            ">"
+        } else {
+            return rest.starts_with("<mujoco");
+        };
+        rest = rest.split_once(end).map_or("", |(_, after)| after);
+    }
+    false
 }
 
 /// W038 in terms of MJCF.
