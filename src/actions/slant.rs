@@ -9,7 +9,7 @@ use crate::grasp::{Approach, Grasp, LEAST_ROOM_M, TOP_DEPTH_M, centred, hand, is
 use crate::motion::moved_links;
 use crate::operator::Operator;
 use crate::plan::FURNITURE_CLEAR_M;
-use actcheck_world::Sighting;
+use actcheck_world::{JointKind, Sighting};
 
 /// Downward pitches of the hand, from straight down to nearly level. Unit: radians.
 const PITCHES_RAD: [f64; 7] = [FRAC_PI_2, 1.3, 1.1, 0.95, 0.75, 0.55, 0.4];
@@ -38,25 +38,39 @@ const TURNED_COST: f64 = 0.1;
 /// Spacing of the points on the hand. Unit: metres.
 const SPACING_M: f64 = 0.02;
 
-/// Points on the open hand, in the frame of the grasp.
-pub(crate) struct Hand(Vec<Point3<f64>>);
+/// Openings at which turning fingers are looked at while they close: their tips swing out. Shares of the widest.
+const CLOSING: [f64; 4] = [0.8, 0.6, 0.4, 0.2];
+
+/// Points on the hand, in the frame of the grasp.
+pub(crate) struct Hand {
+    /// Of the open hand.
+    open: Vec<Point3<f64>>,
+    /// The same, and those of fingers that turn while they close.
+    swept: Vec<Point3<f64>>,
+}
 
 impl Hand {
-    /// The hand of a robot, opened as far as possible.
+    /// The hand of a robot.
     pub(crate) fn new(robot: &Operator<'_>) -> Self {
         let (kinematics, layout) = (robot.kinematics(), robot.layout());
-        let mut posture = robot.commanded().to_vec();
-        layout.gripper.set(&mut posture, robot.profile().max_opening_m);
-        let links = kinematics.links(&posture);
-        let from_world = kinematics.grasp(&posture).inverse();
         let is_hand = moved_links(kinematics, layout.arm.last().copied().as_slice());
-        let points = kinematics.surface_points(SPACING_M).into_iter().filter(|(link, _)| is_hand[*link]);
-        Self(points.map(|(link, point)| from_world * links[link] * point).collect())
+        let mut points = kinematics.surface_points(SPACING_M);
+        points.retain(|(link, _)| is_hand[*link]);
+        let at = |opening_m: f64| -> Vec<Point3<f64>> {
+            let mut posture = robot.commanded().to_vec();
+            layout.gripper.set(&mut posture, opening_m);
+            let links = kinematics.links(&posture);
+            let from_world = kinematics.grasp(&posture).inverse();
+            points.iter().map(|(link, point)| from_world * links[*link] * point).collect()
+        };
+        let open = at(robot.profile().max_opening_m);
+        let closing = closing_m(robot).into_iter().flat_map(at);
+        Self { swept: open.iter().copied().chain(closing).collect(), open }
     }
 
     /// Height of the grasp frame above the lowest point of a hand, and how far ahead of it that point is. Unit: metres.
     fn lowest(&self, turned: &Isometry3<f64>, ahead: &nalgebra::Vector3<f64>) -> (f64, f64) {
-        let points = self.0.iter().map(|point| turned.rotation * point.coords);
+        let points = self.swept.iter().map(|point| turned.rotation * point.coords);
         let lowest = points.min_by(|a, b| a.z.total_cmp(&b.z)).unwrap_or_default();
         (-lowest.z, lowest.dot(ahead))
     }
@@ -69,8 +83,17 @@ impl Hand {
             true => point.x * point.x + point.y * point.y < (width.max(depth) / 2.0 + BESIDE_M).powi(2),
             false => point.x.abs() < width / 2.0 + BESIDE_M && point.y.abs() < depth / 2.0 + BESIDE_M,
         };
-        self.0.iter().map(|point| from_world * point).all(|point| point.z > height + BESIDE_M || !is_over(&point))
+        self.open.iter().map(|point| from_world * point).all(|point| point.z > height + BESIDE_M || !is_over(&point))
     }
+}
+
+/// Openings of fingers that turn, on their way from the widest to nearly closed. Empty for fingers that slide, which do not
+/// come closer to the surface. Unit: metres.
+pub(crate) fn closing_m(robot: &Operator<'_>) -> Vec<f64> {
+    let joints = robot.kinematics().joints();
+    let turns = robot.layout().gripper.joints().any(|idx| joints[idx].kind == JointKind::Revolute);
+    let widest_m = robot.profile().max_opening_m;
+    CLOSING.into_iter().filter(|_| turns).map(|share| share * widest_m).collect()
 }
 
 /// Grasps with the hand ahead of the base, at many slants.

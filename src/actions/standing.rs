@@ -1,6 +1,6 @@
 //! Grasp planning for an arm with a fixed base.
 
-use nalgebra::{Isometry3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Vector3};
 
 use crate::grasp::{Approach, Grasp, rolled};
 use crate::hindrance::{Hindrance, Nearest};
@@ -17,6 +17,8 @@ const MOST_SAMPLES: u32 = 3000;
 const SAMPLES_A_GRASP: u32 = 500;
 /// Clearance that the arm keeps on its path if both ends have it. Unit: metres.
 const WAY_CLEAR_M: f64 = 0.03;
+/// How much the clearance of a turning link may change. Unit: metres.
+const TURNING_M: f64 = 1e-3;
 /// Cost of a hand heading that deviates from the direction base to object. Unit: cost per radian.
 const ASIDE_COST: f64 = 0.15;
 /// The same for a hand that points straight down, where the deviation only affects the last joint.
@@ -30,12 +32,14 @@ const LARGEST_STEP: f64 = 0.6;
 const STEP_M: f64 = 0.03;
 /// An arm with fewer joints reaches only some orientations at each place.
 const FULL_ARM: usize = 6;
-/// Times that a grasp is turned towards an orientation that such an arm reaches.
-const MOST_TURNS: usize = 8;
-/// A turn that ends this. Unit: radians.
-const SMALL_TURN_RAD: f64 = 1e-3;
+/// How far such an arm may turn its hand on a straight path. Unit: radians. The sides of a held object then stay between
+/// the fingers.
+const SMALL_TURN_RAD: f64 = 0.1;
 /// Largest turn: somewhat more than half the angle between two candidates. Unit: radians.
 const LARGEST_TURN_RAD: f64 = 0.2;
+/// Lift heights of an arm on the surface, which is short, and the length of its level approach. Unit: metres.
+const SHORT_LIFTS_M: [f64; 3] = [0.12, 0.09, 0.06];
+const SHORT_APPROACH_M: f64 = 0.08;
 /// Distances to retreat with the object, in order of preference. Unit: metres.
 const RETREATS_M: [f64; 2] = [0.1, 0.05];
 
@@ -53,7 +57,12 @@ pub fn plan(operator: &mut Operator<'_>, wanted: PlanRequest<'_>, others: &[Sigh
     let mut things: Vec<Pillar> = wanted.taken.iter().map(|thing| Pillar::new(thing)).collect();
     let n_taken = things.len();
     things.extend(others.iter().filter(|seen| !seen.furniture).map(Pillar::new));
-    let arm = Arm::new(operator, &furniture, (&things, &things[n_taken..]));
+    let mut arm = Arm::new(operator, &furniture, (&things, &things[n_taken..]));
+    if let Some(thing) = wanted.taken {
+        // The fingers close no further than to the object.
+        let narrowest_m = thing.size_m[0].min(thing.size_m[1]);
+        arm.closing_m.extend(slant::closing_m(operator).into_iter().filter(|opening_m| *opening_m > narrowest_m));
+    }
     let all = if wanted.all.is_empty() { wanted.grasps } else { wanted.all };
     let mut nearest = Nearest::default();
     let mut found = best(&arm, all, &mut samples, &mut nearest);
@@ -96,6 +105,12 @@ struct Arm<'a> {
     before: ArmSpace<'a>,
     /// Free space without the object to grasp.
     meanwhile: ArmSpace<'a>,
+    /// Lift heights, the best first. Unit: metres.
+    lifts_m: &'static [f64],
+    /// Length of the last part of a level approach. Unit: metres.
+    approach_m: f64,
+    /// Openings at which fingers that turn have to clear the surface. Unit: metres.
+    closing_m: Vec<f64>,
 }
 
 impl<'a> Arm<'a> {
@@ -104,10 +119,20 @@ impl<'a> Arm<'a> {
         let start = operator.commanded().to_vec();
         let mut postures = operator.profile().postures.clone();
         postures.push(operator.profile().home.clone());
-        let right = std::slice::from_ref(&start);
-        let before = ArmSpace::new(kinematics, layout, furniture, things, right);
+        let space = |right: &[Vec<f64>]| ArmSpace::new(kinematics, layout, furniture, things, right);
+        let mut opened = start.clone();
+        layout.gripper.set(&mut opened, operator.profile().max_opening_m);
+        let mut before = space(std::slice::from_ref(&start));
+        if !before.room(&opened).1 {
+            // Fingers that turn wide open come close to the wrist, wherever the arm is.
+            before = space(&[start.clone(), opened]);
+        }
         let meanwhile = before.among(others);
-        Self { kinematics, layout, start, postures, before, meanwhile }
+        let (lifts_m, approach_m) = match operator.profile().on_surface {
+            true => (SHORT_LIFTS_M.as_slice(), SHORT_APPROACH_M),
+            false => (LIFTS_M.as_slice(), APPROACH_M),
+        };
+        Self { kinematics, layout, start, postures, before, meanwhile, lifts_m, approach_m, closing_m: Vec::new() }
     }
 
     /// Lower bound of a grasp's cost, independent of the path to it.
@@ -159,23 +184,25 @@ impl<'a> Arm<'a> {
         (least, bound): (f64, f64),
         samples: &mut Samples,
     ) -> Result<Plan, Hindrance> {
-        let turned = match self.layout.arm.len() < FULL_ARM {
-            true => Some(self.turned_to_arm(grasp, seed).ok_or(Hindrance::OutOfReach)?),
-            false => None,
-        };
-        let grasp = turned.as_ref().unwrap_or(grasp);
-        let at_thing = self.solve(seed, &grasp.pose).ok_or(Hindrance::OutOfReach)?;
-        let lift = LIFTS_M.iter().find_map(|height| self.straight(&at_thing, &(Vector3::z() * *height)));
+        let (at_thing, turn) = self.solve_turned(seed, &grasp.pose, LARGEST_TURN_RAD).ok_or(Hindrance::OutOfReach)?;
+        let lift = self.lifts_m.iter().find_map(|height| self.straight(&at_thing, &(Vector3::z() * *height)));
         let lift = lift.ok_or(Hindrance::NoLift)?;
-        let back = -Vector3::new(libm::cos(grasp.heading), libm::sin(grasp.heading), 0.0);
+        let heading = grasp.heading + turn;
+        let back = -Vector3::new(libm::cos(heading), libm::sin(heading), 0.0);
         let mut approach = match grasp.approach {
-            Approach::Side => self.straight(&at_thing, &(back * APPROACH_M)).ok_or(Hindrance::NoLift)?,
+            Approach::Side => self.straight(&at_thing, &(back * self.approach_m)).ok_or(Hindrance::NoLift)?,
             Approach::Top => lift.clone(),
         };
         approach.reverse();
         let near = approach.remove(0);
+        let closing = self.closing_m.iter().map(|opening_m| {
+            let mut posture = at_thing.clone();
+            self.layout.gripper.set(&mut posture, *opening_m);
+            posture
+        });
+        let closing: Vec<Vec<f64>> = closing.collect();
         approach.push(at_thing);
-        let legs = [approach.as_slice(), lift.as_slice()].concat();
+        let legs = [approach.as_slice(), closing.as_slice(), lift.as_slice()].concat();
         let mut nearest = f64::INFINITY;
         for posture in legs {
             let (room, clear_of_itself) = self.meanwhile.room(&posture);
@@ -207,40 +234,32 @@ impl<'a> Arm<'a> {
     /// A path from the current posture to another.
     fn way(&self, to: &[f64], samples: &mut Samples) -> Option<Vec<Vec<f64>>> {
         let wanted = Room { furniture_m: WAY_CLEAR_M, things_m: WAY_CLEAR_M };
-        let least = wanted.least(self.before.room(&self.start).0).least(self.before.room(to).0);
+        let start = self.before.room(&self.start).0;
+        let mut least = wanted.least(start).least(self.before.room(to).0);
+        if start.furniture_m < WAY_CLEAR_M {
+            // A link that only turns above the surface on which the arm is mounted keeps its distance up to rounding.
+            least.furniture_m -= TURNING_M;
+        }
         if least.furniture_m < 0.0 || least.things_m < LEAST_CLEAR_M {
             return None;
         }
         motion::way(&self.before, &self.start, to, least, &mut samples.share(SAMPLES_A_GRASP))
     }
 
-    /// The grasp with its heading turned to the nearest one that an arm of few joints reaches: such an arm moves its hand
-    /// in a vertical plane. Returns `None` if that is far from the grasp's own.
-    fn turned_to_arm(&self, grasp: &Grasp, seed: &[f64]) -> Option<Grasp> {
-        let mut mobility = vec![0.0; seed.len()];
-        self.layout.arm.iter().for_each(|idx| mobility[*idx] = 1.0);
-        let mut turned = grasp.clone();
-        for _ in 0..MOST_TURNS {
-            let reach = ik::Reach { target: turned.pose, mobility: mobility.clone() };
-            let nearest = ik::nearest(self.kinematics, seed, &reach);
-            let off = self.kinematics.grasp(&nearest).rotation * turned.pose.rotation.inverse();
-            let turn = off.scaled_axis().z;
-            if turn.abs() < SMALL_TURN_RAD {
-                break;
-            }
-            turned.heading += turn;
-            turned.pose.rotation = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), turn) * turned.pose.rotation;
-            if (turned.heading - grasp.heading).abs() > LARGEST_TURN_RAD {
-                return None;
-            }
+    /// Inverse kinematics. An arm of few joints may turn the hand, by as much as `most_rad`; returns the turn.
+    fn solve_turned(&self, seed: &[f64], target: &Isometry3<f64>, most_rad: f64) -> Option<(Vec<f64>, f64)> {
+        let reach = self.reach(target, seed.len());
+        match self.layout.arm.len() < FULL_ARM {
+            true => ik::solve_turned(self.kinematics, seed, &reach, most_rad),
+            false => ik::solve(self.kinematics, seed, &reach).map(|found| (found, 0.0)),
         }
-        Some(turned)
     }
 
-    fn solve(&self, seed: &[f64], target: &Isometry3<f64>) -> Option<Vec<f64>> {
-        let mut mobility = vec![0.0; seed.len()];
+    /// A pose for the hand that the arm alone should reach.
+    fn reach(&self, target: &Isometry3<f64>, n_joints: usize) -> ik::Reach {
+        let mut mobility = vec![0.0; n_joints];
         self.layout.arm.iter().for_each(|idx| mobility[*idx] = 1.0);
-        ik::solve(self.kinematics, seed, &ik::Reach { target: *target, mobility })
+        ik::Reach { target: *target, mobility }
     }
 
     /// Postures a few centimetres apart on a straight path of the hand with fixed orientation. Returns `None` if the
@@ -254,7 +273,7 @@ impl<'a> Arm<'a> {
             let mut target = hand;
             target.translation.vector += by * (step as f64 / n_steps as f64);
             let last = path.last().map_or(from, Vec::as_slice);
-            let next = self.solve(last, &target)?;
+            let (next, _) = self.solve_turned(last, &target, SMALL_TURN_RAD)?;
             if next.iter().zip(last).any(|(a, b)| (a - b).abs() > LARGEST_STEP) {
                 return None;
             }

@@ -113,6 +113,15 @@ fn stated(profile: &RobotProfile, args: &NewRobotArgs, folder: &Path) -> Vec<(&'
         Some(joints) => keys.push(("base_joints", list(joints))),
         None => {}
     }
+    if profile.on_surface {
+        keys.push(("mount", quoted("surface")));
+    }
+    if profile.mount_turned_rad != 0.0 {
+        keys.push(("mount_turned_rad", profile.mount_turned_rad.to_string()));
+    }
+    if let Some(reach_m) = &profile.reach_m {
+        keys.push(("reach_m", numbers(reach_m)));
+    }
     if profile.mount_height_m != 0.0 {
         keys.push(("mount_height_m", profile.mount_height_m.to_string()));
     }

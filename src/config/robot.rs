@@ -208,6 +208,9 @@ pub fn bare(
         base_joints: None,
         planar_base: false,
         mount_height_m: 0.0,
+        mount_turned_rad: 0.0,
+        on_surface: false,
+        reach_m: None,
         arm_joints: Vec::new(),
         finger_joints: Vec::new(),
         head_joints: Vec::new(),
@@ -297,6 +300,23 @@ fn read_base(table: &mut Table, roles: &mut Roles) -> Option<(Option<[String; 3]
     }
 }
 
+/// Reads where a fixed robot is mounted, and how far it reaches.
+fn read_place(table: &mut Table, is_mobile: bool) -> (bool, Option<[f64; 2]>) {
+    for key in ["mount", "mount_turned_rad", "reach_m"].into_iter().filter(|_| is_mobile) {
+        if let Some(span) = table.key_span(key) {
+            let help = format!("leave out `{key}`, or the base if the robot does not drive");
+            table.fault("W052", span, format!("`{key}` is of a fixed robot, and this one has a mobile base"), help);
+        }
+    }
+    let mount = table.string("mount");
+    let on_surface = mount.as_ref().is_some_and(|mount| mount.value == "surface");
+    if let Some(mount) = mount.filter(|mount| !["floor", "surface"].contains(&mount.value.as_str())) {
+        let help = did_you_mean(&mount.value, ["floor", "surface"]);
+        table.fault("W011", mount.span, format!("unknown mount `{}`", mount.value), help);
+    }
+    (on_surface, table.range("reach_m", 0.0..=3.0).map(|(nearest, farthest)| [nearest, farthest]))
+}
+
 fn read_table(
     table: &mut Table,
     urdf: Option<&Source>,
@@ -336,6 +356,8 @@ fn read_table(
     let farthest_m = if in_world { 100.0 } else { 1.0 };
     let camera_offset_m = table.numbers("camera_offset_m", -farthest_m..=farthest_m).unwrap_or([0.0; 3]);
     let mount_height_m = table.number("mount_height_m", 0.0..=3.0).unwrap_or(0.0);
+    let (on_surface, reach_m) = read_place(table, base.as_ref().is_some_and(|(joints, _)| joints.is_some()));
+    let mount_turned_rad = table.number("mount_turned_rad", -std::f64::consts::TAU..=std::f64::consts::TAU).unwrap_or(0.0);
     let opening_span = table.key_span("max_opening_m");
     let max_opening_m = table.number("max_opening_m", 0.001..=1.0);
     roles.opening = opening_span.zip(max_opening_m);
@@ -361,6 +383,9 @@ fn read_table(
         base_joints,
         planar_base,
         mount_height_m,
+        mount_turned_rad,
+        on_surface,
+        reach_m,
         arm_joints: values(arm_joints.unwrap_or_default()),
         finger_joints: finger_joints.unwrap_or_default(),
         head_joints: values(head_joints),

@@ -20,8 +20,17 @@ pub struct RobotProfile {
     pub base_joints: Option<[String; 3]>,
     /// Whether those joints are added below the URDF's root instead of being part of it: `base = "planar"`.
     pub planar_base: bool,
-    /// Height of the root above the floor, for a base on a mount, which is not simulated, or on wheels. Unit: metres.
+    /// Height of the root above what the robot is mounted on, for a base on a mount, which is not simulated, or on wheels.
+    /// Unit: metres.
     pub mount_height_m: f64,
+    /// Rotation of the root of a fixed robot about the vertical, if its arm does not work along the root's x axis. Unit:
+    /// radians.
+    pub mount_turned_rad: f64,
+    /// Whether it is mounted on the surface that holds the objects, beside its edge, instead of on the floor.
+    pub on_surface: bool,
+    /// Distances from the root, nearest and farthest, at which a fixed arm takes objects: targets are placed between them.
+    /// `None`: anywhere on the half of the surface towards the robot. Unit: metres.
+    pub reach_m: Option<[f64; 2]>,
     /// Joints that position the hand (lift and arm), from the base outwards.
     pub arm_joints: Vec<String>,
     /// Joints with motors that move the fingers: left then right, or one for both or for the only finger that moves.

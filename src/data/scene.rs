@@ -142,6 +142,8 @@ pub struct RobotStart {
     pub profile: Arc<RobotProfile>,
     /// Pose of its base. Units: metres, metres, radians. Shape: x, y, heading.
     pub base: [f64; 3],
+    /// Height of its root above the floor. Unit: metres.
+    pub root_height_m: f64,
     /// The kinds of objects that it can recognise: all models of the campaign, in this scene or not.
     pub knows: Arc<[KnownKind]>,
 }

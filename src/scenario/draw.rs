@@ -6,6 +6,7 @@ use std::sync::Arc;
 
 use crate::overlap::Solid;
 use crate::surroundings::Surroundings;
+use crate::placement::Reach;
 use crate::{Space, placement};
 use actcheck_data::{
     ChoiceName, Choices, Location, ObjectAxis, ObjectModel, PlacedObject, Pose, RobotStart, Role, Scene, SceneObject,
@@ -50,6 +51,8 @@ pub fn draw(space: &Space, test: usize, choices: &mut Choices) -> Result<Scene, 
         designators: BTreeMap::new(),
         platform: None,
         front: None,
+        reach: None,
+        ground_m: 0.0,
     };
     let world = builder.choose_world();
     builder.choose_names();
@@ -57,6 +60,7 @@ pub fn draw(space: &Space, test: usize, choices: &mut Choices) -> Result<Scene, 
         Some(world) if world.surfaces().next().is_some() => builder.take_platform(world),
         _ => builder.set_platform(),
     };
+    let mounted = surface.as_ref().map(|surface| builder.mount(surface)).transpose()?.flatten();
     if let Some(surface) = surface {
         if !space.targets.is_empty() {
             builder.set_target(&surface)?;
@@ -73,18 +77,23 @@ pub fn draw(space: &Space, test: usize, choices: &mut Choices) -> Result<Scene, 
         builder.name_front(world);
     }
     let drives = drive == Some(0);
-    let base = if drives { builder.start_elsewhere(world)? } else { builder.start_robot(surface.as_ref())? };
+    let base = match mounted {
+        Some(base) => base,
+        None if drives => builder.start_elsewhere(world)?,
+        None => builder.start_robot(surface.as_ref())?,
+    };
     let mut map = world.map(Surroundings::scene_map).unwrap_or_default();
     map.locations.extend(builder.front.clone());
     builder.set_obstacles(base, world, drives, &map)?;
     let parts: Vec<SceneObject> = builder.objects.iter().flat_map(SceneObject::moving_parts).collect();
     builder.objects.extend(parts);
+    let root_height_m = builder.ground_m + space.robot.mount_height_m;
     let name = builder.designators.get("world").and_then(|names| names.first()).cloned();
     Ok(Scene {
         world: name.unwrap_or_else(|| DEFAULT_WORLD.to_owned()),
         map,
         objects: builder.objects,
-        robot: RobotStart { profile: Arc::clone(&space.robot), base, knows: Arc::clone(&space.knows) },
+        robot: RobotStart { profile: Arc::clone(&space.robot), base, root_height_m, knows: Arc::clone(&space.knows) },
         designators: builder.designators,
         sensing: space.sensing.clone(),
         physics: space.physics.clone(),
@@ -119,6 +128,10 @@ pub(super) struct SceneBuilder<'a> {
     pub(super) platform: Option<Pose>,
     /// The location in front of the platform, if it is not one of the world's.
     pub(super) front: Option<Location>,
+    /// Height of what the robot is mounted on: the floor, or the surface. Unit: metres.
+    pub(super) ground_m: f64,
+    /// The places within reach of a fixed arm, if its profile tells.
+    pub(super) reach: Option<Reach>,
 }
 
 impl<'a> SceneBuilder<'a> {
@@ -226,11 +239,12 @@ impl<'a> SceneBuilder<'a> {
         surface
     }
 
-    /// Places the target on the reachable part of the surface. Nominal: the centre.
+    /// Places the target on the reachable part of the surface. Nominal: the centre, or the middle of the arm's reach.
     fn set_target(&mut self, surface: &Surface) -> Result<(), Discard> {
         let target = PlacedObject::Target;
         if let Some(model) = self.choose(ChoiceName::Object(target, ObjectAxis::Model), &self.space.targets) {
-            let id = self.place(target, model, Role::Target, surface, [0.0, 0.0])?;
+            let nominal = self.reach.map_or([0.0; 2], |reach| reach.middle());
+            let id = self.place(target, model, Role::Target, surface, nominal)?;
             self.designators.insert("pickObject".to_owned(), vec![id]);
         }
         Ok(())
@@ -357,9 +371,17 @@ impl<'a> SceneBuilder<'a> {
         let stance = if lies { placement::lying(model) } else { placement::standing(model) };
         let yaw = self.simple(object, ObjectAxis::Yaw, (-PI, PI));
         let whole = placement::area(surface, &stance, yaw)?;
-        let area = if role == Role::Target { placement::reachable(whole, surface) } else { whole };
+        let reach = self.reach.filter(|_| role == Role::Target);
+        let area = match (role, &reach) {
+            (_, Some(reach)) => reach.clip(whole),
+            (Role::Target, None) => placement::reachable(whole, surface),
+            _ => whole,
+        };
         let x = self.between(object, ObjectAxis::X, area.x, nominal[0]);
         let y = self.between(object, ObjectAxis::Y, area.y, nominal[1]);
+        if reach.is_some_and(|reach| !reach.holds([x, y])) {
+            return None;
+        }
         let foot = Pose::upright([x, y, surface.height_m], yaw);
         Some(if lies { Pose::from_isometry(&(foot.to_isometry() * stance.foot_from_model)) } else { foot })
     }

@@ -9,6 +9,7 @@ use crate::draw::{Discard, SceneBuilder, TRIES};
 use crate::floor_plan::{FRONT_GAP_M, Outline, front_of};
 use crate::kept_free::KeptFree;
 use crate::overlap::Solid;
+use crate::placement::Reach;
 use crate::surroundings::Surroundings;
 use actcheck_data::{
     ChoiceName, Location, ObjectAxis, ObjectModel, Part, PlacedObject, Pose, Role, SceneMap, SceneObject, Shape,
@@ -19,6 +20,8 @@ use actcheck_data::{
 const BASE_GAP_M: [f64; 3] = [0.59, FRONT_GAP_M, 0.79];
 /// The same for a fixed arm: near enough to reach the far edge of a table, with a small gap in front of it.
 const FIXED_GAP_M: [f64; 3] = [0.18, 0.22, 0.26];
+/// The same for an arm on the surface: negative, beyond the edge.
+const MOUNTED_GAP_M: [f64; 3] = [-0.09, -0.07, -0.05];
 /// Maximum lateral offset of the base from the surface's centre. Unit: metres.
 const BASE_SIDE_M: f64 = 0.05;
 /// Maximum heading offset of the base from the surface's centre. Unit: radians.
@@ -28,6 +31,8 @@ const BASE_HEADING_RAD: f64 = 0.05;
 const BASE_ROOM_M: f64 = 0.4;
 /// The same for a fixed base, which is as slim as its pedestal.
 const FIXED_ROOM_M: f64 = 0.17;
+/// The same for an arm on the surface. Half the width of the base of a table-top arm, and room for a hand.
+const MOUNTED_ROOM_M: f64 = 0.1;
 /// Height of that free space. Unit: metres.
 const BASE_HEIGHT_M: f64 = 1.2;
 /// Minimum distance between start and goal of a base that has to drive. Unit: metres.
@@ -50,7 +55,11 @@ impl SceneBuilder<'_> {
         if let Some(ranges) = self.space.start {
             return self.start_within(ranges);
         }
-        let [least, nominal, most] = if self.is_fixed() { FIXED_GAP_M } else { BASE_GAP_M };
+        let [least, nominal, most] = match (self.space.robot.on_surface, self.is_fixed()) {
+            (true, _) => MOUNTED_GAP_M,
+            (false, true) => FIXED_GAP_M,
+            (false, false) => BASE_GAP_M,
+        };
         let edge = surface.map_or(0.0, |surface| surface.size_m[0] / 2.0);
         let mut draw = |axis: StartAxis, low: f64, high: f64, nominal: f64| {
             self.choices.real(ChoiceName::Robot(axis), low, high, nominal)
@@ -61,6 +70,31 @@ impl SceneBuilder<'_> {
         Ok(self.in_world([-edge - gap, side, heading]))
     }
 
+    /// Draws the place of a fixed arm before the objects if they depend on it: they keep clear of an arm on the surface, and
+    /// targets are within its reach. Returns `None` for all other robots.
+    pub(super) fn mount(&mut self, surface: &Surface) -> Result<Option<[f64; 3]>, Discard> {
+        let robot = &self.space.robot;
+        if !robot.on_surface && robot.reach_m.is_none() {
+            return Ok(None);
+        }
+        if robot.on_surface {
+            self.ground_m = self.platform.map_or(0.0, |platform| platform.position[2]) + surface.height_m;
+        }
+        let base = self.start_robot(Some(surface))?;
+        if robot.on_surface {
+            self.solids.push(self.own_room(base));
+        }
+        self.reach = robot.reach_m.map(|limits| self.reach_from(base, limits));
+        Ok(Some(base))
+    }
+
+    /// Transforms a base from the world to the platform's frame.
+    fn reach_from(&self, [x, y, heading]: [f64; 3], limits: [f64; 2]) -> Reach {
+        let platform = self.platform.unwrap_or(Pose::IDENTITY);
+        let root = platform.to_isometry().inverse() * Point3::new(x, y, 0.0);
+        Reach { root: root.xy(), heading: heading - platform.yaw(), limits }
+    }
+
     /// Whether the robot has no mobile base.
     fn is_fixed(&self) -> bool {
         self.space.robot.base_joints.is_none()
@@ -68,7 +102,12 @@ impl SceneBuilder<'_> {
 
     /// The space that the robot occupies at the start.
     fn own_room(&self, base: [f64; 3]) -> Solid {
-        room_for_base(base, if self.is_fixed() { FIXED_ROOM_M } else { BASE_ROOM_M })
+        let radius = match (self.space.robot.on_surface, self.is_fixed()) {
+            (true, _) => MOUNTED_ROOM_M,
+            (false, true) => FIXED_ROOM_M,
+            (false, false) => BASE_ROOM_M,
+        };
+        room_for_base(base, radius, self.ground_m)
     }
 
     /// Transforms x, y and heading from the platform's frame to the world.
@@ -188,7 +227,7 @@ impl SceneBuilder<'_> {
             Some(world) => world.map.locations.iter().map(|location| location.at).collect(),
             None => self.fronts(),
         };
-        rooms.extend(fronts.into_iter().map(|front| room_for_base(front, BASE_ROOM_M)));
+        rooms.extend(fronts.into_iter().map(|front| room_for_base(front, BASE_ROOM_M, 0.0)));
         let range = if drives { self.arena(world) } else { world.map_or_else(|| field(base), Surroundings::extent) };
         let kept_free =
             (!may_block && !self.is_fixed()).then(|| KeptFree::new(&self.objects, map, &self.designators, base));
@@ -293,9 +332,9 @@ fn field([x, y, _]: [f64; 3]) -> ([f64; 2], [f64; 2]) {
     ([x - FIELD_M, y - FIELD_M], [x + FIELD_M / 2.0, y + FIELD_M])
 }
 
-/// The space that a base occupies: a cylinder.
-fn room_for_base([x, y, _]: [f64; 3], radius: f64) -> Solid {
+/// The space that a base occupies: a cylinder above the floor, or above the surface that it is mounted on.
+fn room_for_base([x, y, _]: [f64; 3], radius: f64, ground_m: f64) -> Solid {
     let room = Shape::Cylinder { radius, height: BASE_HEIGHT_M };
-    let pose = Pose::upright([x, y, BASE_HEIGHT_M / 2.0 + 0.05], 0.0);
+    let pose = Pose::upright([x, y, ground_m + (BASE_HEIGHT_M / 2.0 + 0.05)], 0.0);
     Solid::of_parts(&[Part { pose, shape: room }], &Pose::IDENTITY)
 }

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Point2, Translation3, UnitQuaternion, Vector3, distance};
 
 use actcheck_data::{ObjectModel, Surface};
 
@@ -58,6 +58,40 @@ pub(super) fn reachable(area: Area, surface: &Surface) -> Area {
     let farthest = -surface.size_m[0] / 2.0 + REACH_M;
     let nearest = area.x.0;
     Area { x: (nearest, area.x.1.min(farthest).max(nearest)), y: (area.y.0.max(-SIDE_M), area.y.1.min(SIDE_M)) }
+}
+
+/// The places within reach of a fixed arm. Frame: that of the surface. Unit: metres.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Reach {
+    /// The root of the arm.
+    pub(super) root: Point2<f64>,
+    /// Its heading. Unit: radians.
+    pub(super) heading: f64,
+    /// Distances from the root, nearest and farthest.
+    pub(super) limits: [f64; 2],
+}
+
+impl Reach {
+    /// The part of an area in the square around the farthest places.
+    pub(super) fn clip(&self, area: Area) -> Area {
+        let side = |(low, high): (f64, f64), at: f64| {
+            let (low, high) = (low.max(at - self.limits[1]), high.min(at + self.limits[1]));
+            (low, high.max(low))
+        };
+        Area { x: side(area.x, self.root.x), y: side(area.y, self.root.y) }
+    }
+
+    /// Whether a place is neither too near nor too far.
+    pub(super) fn holds(&self, place: [f64; 2]) -> bool {
+        let from_root = distance(&self.root, &Point2::from(place));
+        (self.limits[0]..=self.limits[1]).contains(&from_root)
+    }
+
+    /// The place in the middle of the range, straight ahead.
+    pub(super) fn middle(&self) -> [f64; 2] {
+        let ahead = f64::midpoint(self.limits[0], self.limits[1]);
+        [self.root.x + ahead * libm::cos(self.heading), self.root.y + ahead * libm::sin(self.heading)]
+    }
 }
 
 /// Whether an object fits on a surface at yaw 0 or 90°.

@@ -1,6 +1,6 @@
 //! Inverse kinematics of the grasp link, within the joint limits.
 
-use nalgebra::{Isometry3, Matrix6, Vector6};
+use nalgebra::{Isometry3, Matrix6, UnitQuaternion, Vector3, Vector6};
 
 use crate::Kinematics;
 
@@ -20,6 +20,10 @@ const REACHED_RAD: f64 = 2e-3;
 /// Damping of the least squares: keeps steps small near singular postures.
 const DAMPING: f64 = 0.03;
 const MOST_ITERATIONS: usize = 80;
+/// Iterations in which an arm of few joints keeps the heading of its target if it can.
+const HEADED_ITERATIONS: usize = 30;
+/// Weight of the heading in these.
+const HEADING_WEIGHT: f64 = 0.2;
 /// Largest change of a joint in one iteration. Units: metres or radians.
 const LARGEST_STEP: f64 = 0.3;
 
@@ -27,32 +31,70 @@ const LARGEST_STEP: f64 = 0.3;
 ///
 /// Uses damped least squares; a joint that reaches its limit is held there and the others are solved again.
 pub fn solve(kinematics: &Kinematics, seed: &[f64], reach: &Reach) -> Option<Vec<f64>> {
-    approach(kinematics, seed, reach).ok()
+    let mut positions = started(kinematics, seed);
+    for _ in 0..MOST_ITERATIONS {
+        let (grasp, jacobian) = kinematics.grasp_jacobian(&positions);
+        let error = pose_error(&grasp, &reach.target);
+        if is_reached(&error) {
+            return Some(positions);
+        }
+        step(kinematics, &mut positions, &jacobian, &error, &reach.mobility);
+        kinematics.follow(&mut positions);
+    }
+    None
 }
 
-/// Returns joint positions near `seed` that come as close to the target as the solver gets: for arms with fewer than six
-/// joints, which reach few orientations.
-pub fn nearest(kinematics: &Kinematics, seed: &[f64], reach: &Reach) -> Vec<f64> {
-    approach(kinematics, seed, reach).unwrap_or_else(|nearest| nearest)
+/// As [`solve`] for an arm with fewer than six joints, which moves its hand in a vertical plane: the target may turn about
+/// the vertical, by at most `most_rad`. Returns the turn too. Unit: radians.
+pub fn solve_turned(
+    kinematics: &Kinematics,
+    seed: &[f64],
+    reach: &Reach,
+    most_rad: f64,
+) -> Option<(Vec<f64>, f64)> {
+    let mut positions = started(kinematics, seed);
+    for iteration in 0..MOST_ITERATIONS {
+        let (grasp, mut jacobian) = kinematics.grasp_jacobian(&positions);
+        let turn = heading_of(&(grasp.rotation * reach.target.rotation.inverse()));
+        let target = turned(&reach.target, turn);
+        let mut error = pose_error(&grasp, &target);
+        if is_reached(&error) && (iteration > HEADED_ITERATIONS || turn.abs() < REACHED_RAD) {
+            return (turn.abs() <= most_rad).then_some((positions, turn));
+        }
+        // At first the target pulls the heading along: a joint that turns the hand alone follows.
+        let weight = if iteration < HEADED_ITERATIONS { HEADING_WEIGHT } else { 0.0 };
+        error[5] = (error[5] - turn) * weight;
+        jacobian.iter_mut().for_each(|column| column[5] *= weight);
+        step(kinematics, &mut positions, &jacobian, &error, &reach.mobility);
+        kinematics.follow(&mut positions);
+    }
+    None
 }
 
-/// The error has the last positions of the solver, which do not reach the target.
-fn approach(kinematics: &Kinematics, seed: &[f64], reach: &Reach) -> Result<Vec<f64>, Vec<f64>> {
+/// A target that is turned about the vertical through its place.
+pub fn turned(target: &Isometry3<f64>, turn: f64) -> Isometry3<f64> {
+    let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), turn);
+    Isometry3::from_parts(target.translation, turn * target.rotation)
+}
+
+/// The angle of the part of a rotation that is about the vertical. Unit: radians.
+fn heading_of(rotation: &UnitQuaternion<f64>) -> f64 {
+    let angle = 2.0 * libm::atan2(rotation.k, rotation.w);
+    libm::atan2(libm::sin(angle), libm::cos(angle))
+}
+
+/// The seed within the joint limits.
+fn started(kinematics: &Kinematics, seed: &[f64]) -> Vec<f64> {
     let mut positions = seed.to_vec();
     for (position, joint) in positions.iter_mut().zip(kinematics.joints()) {
         *position = position.clamp(joint.lower, joint.upper);
     }
     kinematics.follow(&mut positions);
-    for _ in 0..MOST_ITERATIONS {
-        let (grasp, jacobian) = kinematics.grasp_jacobian(&positions);
-        let error = pose_error(&grasp, &reach.target);
-        if error.fixed_rows::<3>(0).norm() < REACHED_M && error.fixed_rows::<3>(3).norm() < REACHED_RAD {
-            return Ok(positions);
-        }
-        step(kinematics, &mut positions, &jacobian, &error, &reach.mobility);
-        kinematics.follow(&mut positions);
-    }
-    Err(positions)
+    positions
+}
+
+fn is_reached(error: &Vector6<f64>) -> bool {
+    error.fixed_rows::<3>(0).norm() < REACHED_M && error.fixed_rows::<3>(3).norm() < REACHED_RAD
 }
 
 /// Performs one iteration. Joints that would pass a limit stop at it, and the others compensate.

@@ -73,8 +73,8 @@ fn root_of(start: &RobotStart, layout: &Layout) -> Isometry3<f64> {
     let [x, y, heading] = start.base;
     match layout.base {
         // The root of a mobile robot is above the world's origin, which is the frame of its odometry.
-        Some(_) => Isometry3::translation(0.0, 0.0, start.profile.mount_height_m),
-        None => Pose::upright([x, y, start.profile.mount_height_m], heading).to_isometry(),
+        Some(_) => Isometry3::translation(0.0, 0.0, start.root_height_m),
+        None => Pose::upright([x, y, start.root_height_m], heading + start.profile.mount_turned_rad).to_isometry(),
     }
 }
 
@@ -334,7 +334,7 @@ pub(super) mod tests {
             map: actcheck_data::SceneMap::default(),
             world: "empty".to_owned(),
             objects: Vec::new(),
-            robot: RobotStart { profile, base: [-1.0, 0.3, 0.4], knows: Arc::new([]) },
+            robot: RobotStart { profile, base: [-1.0, 0.3, 0.4], root_height_m: 0.0, knows: Arc::new([]) },
             designators: BTreeMap::new(),
             sensing: Sensing {
                 position_noise_m: 0.0,

@@ -12,7 +12,8 @@ use actcheck_data::{Part, Pose, RobotProfile, RobotStart, RobotView};
 /// # Errors
 /// As [`geometry`].
 pub fn robot_views(profile: &Arc<RobotProfile>) -> Result<Vec<RobotView>, WorldError> {
-    let start = RobotStart { profile: Arc::clone(profile), base: [0.0; 3], knows: Arc::new([]) };
+    let root_height_m = profile.mount_height_m;
+    let start = RobotStart { profile: Arc::clone(profile), base: [0.0; 3], root_height_m, knows: Arc::new([]) };
     let (kinematics, layout, home) = geometry(&start)?;
     let reach = profile.postures.iter().enumerate().map(|(idx, posture)| (format!("posture {}", idx + 1), posture));
     let postures = std::iter::once(("home".to_owned(), &profile.home)).chain(reach);

@@ -26,6 +26,10 @@ pub(super) struct Body {
     pub(super) own_base: Option<[usize; 3]>,
     pub(super) drives: bool,
     pub(super) mount_height_m: f64,
+    /// Height of its lowest shape in the frame of the root. Unit: metres.
+    pub(super) lowest_m: f64,
+    /// Whether it is fixed, without a pedestal of its own.
+    pub(super) is_table_top: bool,
     pub(super) camera_link: String,
     pub(super) camera_turned_rad: [f64; 3],
 }
@@ -66,7 +70,8 @@ pub(super) fn find(model: &RobotModel, palm: usize, notes: &mut BTreeMap<&'stati
         }
     };
     let mount_height_m = (mount_height_m * 1000.0).round() / 1000.0;
-    Body { arm, head, own_base, drives, mount_height_m, camera_link, camera_turned_rad }
+    let is_table_top = !drives && lowest_m >= -PEDESTAL_M;
+    Body { arm, head, own_base, drives, mount_height_m, lowest_m, is_table_top, camera_link, camera_turned_rad }
 }
 
 /// Whether a lift takes so long that most of an action would be spent on it.

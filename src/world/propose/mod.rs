@@ -9,10 +9,13 @@ mod cup;
 mod fingers;
 mod frames;
 mod postures;
+mod short_arm;
 mod stated;
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
+
+use nalgebra::Isometry3;
 
 use crate::WorldError;
 use crate::description::RobotModel;
@@ -87,8 +90,14 @@ fn find(partial: &RobotProfile, all: bool, wanted: Option<&str>) -> Result<Propo
     if profile.camera_link.is_empty() {
         (profile.camera_link, profile.camera_turned_rad) = (body.camera_link, body.camera_turned_rad);
     }
+    let (model, grasp) = with_grasp(&profile)?;
+    let is_short =
+        all && body.is_table_top && short_arm::put_on_surface(&mut profile, &model, grasp, body.lowest_m, &mut notes)?;
     if profile.home.is_empty() {
-        profile = with_home(profile, &mut notes)?;
+        (profile.home, profile.postures) = postures::find(&profile, &model, grasp, &mut notes)?;
+    }
+    if is_short {
+        short_arm::measure_reach(&mut profile, &model, grasp, &mut notes)?;
     }
     if all {
         profile.parked = parked(partial, &profile, &hand.others, &mut notes);
@@ -145,16 +154,14 @@ fn home_of(bare: &RobotProfile, palm: &str) -> Result<RobotProfile, WorldError> 
     let mount_height_m = body.mount_height_m;
     let mut profile = RobotProfile { arm_joints, planar_base, base_joints, mount_height_m, ..hand.profile };
     (profile.camera_link, profile.camera_turned_rad) = (body.camera_link, body.camera_turned_rad);
-    with_home(profile, &mut notes)
+    let (model, grasp) = with_grasp(&profile)?;
+    (profile.home, profile.postures) = postures::find(&profile, &model, grasp, &mut notes)?;
+    Ok(profile)
 }
 
-/// Adds home and postures. The profile has its base, so that inverse kinematics moves it too.
-fn with_home(
-    mut profile: RobotProfile,
-    notes: &mut BTreeMap<&'static str, String>,
-) -> Result<RobotProfile, WorldError> {
-    let model = Arc::new(RobotModel::read(&profile)?);
+/// The model of a profile with its base, so that inverse kinematics moves it too, and the frame of its grasp.
+fn with_grasp(profile: &RobotProfile) -> Result<(Arc<RobotModel>, (usize, Isometry3<f64>)), WorldError> {
+    let model = Arc::new(RobotModel::read(profile)?);
     let grasp = frame(&model, &profile.grasp_link, profile.grasp_offset_m, profile.grasp_turned_rad)?;
-    (profile.home, profile.postures) = postures::find(&profile, &model, grasp, notes)?;
-    Ok(profile)
+    Ok((model, grasp))
 }

@@ -29,7 +29,50 @@ const SHARES: [f64; 2] = [0.5, 0.75];
 /// Direction of the hand at home, for a fixed arm: aside, out of the way. Unit: radians.
 const ASIDE_RAD: f64 = -1.3;
 
+/// An arm with fewer joints reaches only some orientations at each place.
+const FULL_ARM: usize = 6;
+/// Largest turn of the hand of such an arm from the direction to its place: any. The fingers may slant to one side of it.
+/// Unit: radians.
+const LARGEST_TURN_RAD: f64 = std::f64::consts::PI;
+
 type Postures = (Vec<f64>, Vec<Vec<f64>>);
+
+/// The robot with its root above the floor.
+pub(super) struct Standing {
+    pub(super) kinematics: Kinematics,
+    arm: Vec<usize>,
+    base: Vec<usize>,
+    start: Vec<f64>,
+}
+
+impl Standing {
+    pub(super) fn new(
+        profile: &RobotProfile,
+        model: &Arc<RobotModel>,
+        grasp: (usize, Isometry3<f64>),
+    ) -> Result<Self, WorldError> {
+        let root = Pose::upright([0.0, 0.0, profile.mount_height_m], profile.mount_turned_rad).to_isometry();
+        let named = Named::find(profile, model)?;
+        let kinematics = Kinematics::new(Arc::clone(model), root, grasp, named.camera)
+            .with_passing(named.passing(model), named.links_of_hand(model))
+            .with_followers(&named.layout.gripper);
+        let arm = named.layout.arm.clone();
+        let base: Vec<usize> = named.layout.base.iter().flatten().copied().collect();
+        let mut start: Vec<f64> = model.joints.iter().map(|joint| 0.0_f64.clamp(joint.lower, joint.upper)).collect();
+        named.layout.gripper.set(&mut start, profile.max_opening_m / 2.0);
+        Ok(Self { kinematics, arm, base, start })
+    }
+
+    /// A search for its postures, with random ones that it drew.
+    pub(super) fn search(&self) -> (Search<'_>, Vec<Vec<f64>>) {
+        let (start, arm, base) = (self.start.clone(), self.arm.clone(), self.base.clone());
+        let kinematics = &self.kinematics;
+        let mut search = Search { kinematics, start, arm, base, contact: None, near: None, n_drawn: 0 };
+        let samples: Vec<Vec<f64>> = (0..N_SAMPLES).map(|_| search.random()).collect();
+        search.contact = Some(contact(kinematics, &samples));
+        (search, samples)
+    }
+}
 
 /// Finds the posture at home and the seeds.
 pub(super) fn find(
@@ -38,18 +81,8 @@ pub(super) fn find(
     grasp: (usize, Isometry3<f64>),
     notes: &mut BTreeMap<&'static str, String>,
 ) -> Result<Postures, WorldError> {
-    let root = Pose::upright([0.0, 0.0, profile.mount_height_m], 0.0).to_isometry();
-    let named = Named::find(profile, model)?;
-    let kinematics = Kinematics::new(Arc::clone(model), root, grasp, named.camera)
-        .with_passing(named.passing(model), named.links_of_hand(model))
-        .with_followers(&named.layout.gripper);
-    let arm = named.layout.arm.clone();
-    let base: Vec<usize> = named.layout.base.iter().flatten().copied().collect();
-    let mut start: Vec<f64> = model.joints.iter().map(|joint| 0.0_f64.clamp(joint.lower, joint.upper)).collect();
-    named.layout.gripper.set(&mut start, profile.max_opening_m / 2.0);
-    let mut search = Search { kinematics: &kinematics, start, arm, base, contact: None, near: None, n_drawn: 0 };
-    let samples: Vec<Vec<f64>> = (0..N_SAMPLES).map(|_| search.random()).collect();
-    search.contact = Some(contact(&kinematics, &samples));
+    let standing = Standing::new(profile, model, grasp)?;
+    let (mut search, samples) = standing.search();
     let aside = if profile.base_joints.is_none() { search.aside() } else { None };
     search.near.clone_from(&aside);
     if let Some(note) = notes.get_mut("arm_joints") {
@@ -99,7 +132,8 @@ fn contact(kinematics: &Kinematics, samples: &[Vec<f64>]) -> SelfContact {
     all.without(&always)
 }
 
-struct Search<'a> {
+/// A search for postures.
+pub(super) struct Search<'a> {
     kinematics: &'a Kinematics,
     start: Vec<f64>,
     arm: Vec<usize>,
@@ -112,7 +146,7 @@ struct Search<'a> {
 
 impl Search<'_> {
     /// A random posture of the arm.
-    fn random(&mut self) -> Vec<f64> {
+    pub(super) fn random(&mut self) -> Vec<f64> {
         let mut posture = self.start.clone();
         for idx in &self.arm {
             let joint = &self.kinematics.joints()[*idx];
@@ -123,13 +157,13 @@ impl Search<'_> {
         posture
     }
 
-    fn is_free(&self, posture: &[f64]) -> bool {
+    pub(super) fn is_free(&self, posture: &[f64]) -> bool {
         let poses = self.kinematics.links(posture);
         self.contact.as_ref().is_none_or(|contact| contact.overlaps(&poses).is_empty())
     }
 
     /// Where the arm begins, and its length.
-    fn arm_reach(&self) -> (Point3<f64>, f64) {
+    pub(super) fn arm_reach(&self) -> (Point3<f64>, f64) {
         let poses = self.kinematics.links(&self.start);
         let turning = self.arm.iter().filter(|idx| self.kinematics.joints()[**idx].kind == JointKind::Revolute);
         let mut at: Vec<Point3<f64>> = turning.map(|idx| Point3::from(poses[idx + 1].translation.vector)).collect();
@@ -157,7 +191,7 @@ impl Search<'_> {
     }
 
     /// Downward pitches of the hand that the arm could have: that at the start if no joint changes it.
-    fn pitches(&self) -> Vec<f64> {
+    pub(super) fn pitches(&self) -> Vec<f64> {
         self.kinematics.only_pitch(&self.arm, &self.start).map_or(PITCHES_RAD.to_vec(), |pitch| vec![pitch])
     }
 
@@ -181,7 +215,7 @@ impl Search<'_> {
         for number in 0..2 * N_SEEDS {
             let seed = if number < 2 { self.near.clone().unwrap_or(self.start.clone()) } else { self.random() };
             let reach = &reaches[usize::from(number % 2 == 1)];
-            let Some(found) = ik::solve(self.kinematics, &seed, reach) else { continue };
+            let Some(found) = self.solve(&seed, reach) else { continue };
             if !self.is_free(&found) {
                 continue;
             }
@@ -191,6 +225,50 @@ impl Search<'_> {
             }
         }
         best.map(|(_, found)| found)
+    }
+
+    /// Inverse kinematics; an arm of few joints may turn the hand somewhat.
+    pub(super) fn solve(&self, seed: &[f64], reach: &Reach) -> Option<Vec<f64>> {
+        if reach.mobility.iter().filter(|weight| **weight > 0.0).count() >= FULL_ARM {
+            return ik::solve(self.kinematics, seed, reach);
+        }
+        ik::solve_turned(self.kinematics, seed, reach, LARGEST_TURN_RAD).map(|(found, _)| found)
+    }
+
+    /// The direction in which the hand is, on the average of postures with the first joint in the middle of its range.
+    /// `None` if that joint is not vertical. Unit: radians.
+    pub(super) fn bearing(&self, samples: &[Vec<f64>]) -> Option<f64> {
+        let first = *self.arm.first()?;
+        let joint = &self.kinematics.joints()[first];
+        let root = self.kinematics.links(&self.start)[joint.parent].rotation;
+        let axis = root * (joint.origin.rotation * joint.axis.into_inner());
+        if joint.kind != JointKind::Revolute || axis.z.abs() < 0.99 {
+            return None;
+        }
+        let shoulder = self.arm_reach().0.coords;
+        let hand = |sample: &Vec<f64>| {
+            let mut posture = sample.clone();
+            posture[first] = f64::midpoint(joint.lower, joint.upper);
+            self.kinematics.grasp(&posture).translation.vector - shoulder
+        };
+        let sum = samples.iter().map(hand).fold(Vector3::zeros(), |sum, hand| sum + hand);
+        Some(libm::atan2(sum.y, sum.x))
+    }
+
+    /// The start with the arm in a posture of a profile.
+    pub(super) fn with_arm(&self, posture: &[f64]) -> Vec<f64> {
+        let mut positions = self.start.clone();
+        for (idx, position) in self.arm.iter().zip(posture) {
+            positions[*idx] = *position;
+        }
+        positions
+    }
+
+    /// The weights of joints if the arm alone moves.
+    pub(super) fn mobility(&self) -> Vec<f64> {
+        let mut mobility = vec![0.0; self.start.len()];
+        self.arm.iter().for_each(|idx| mobility[*idx] = 1.0);
+        mobility
     }
 
     /// How close the joints are to their limits, and how far the base has turned.
@@ -254,7 +332,7 @@ impl Search<'_> {
 }
 
 /// A pose of the hand with a heading and a downward pitch, its fingers closing horizontally.
-fn hand(place: &Point3<f64>, heading: f64, pitch: f64) -> Isometry3<f64> {
+pub(super) fn hand(place: &Point3<f64>, heading: f64, pitch: f64) -> Isometry3<f64> {
     let (sin, cos) = (libm::sin(heading), libm::cos(heading));
     let forward = Vector3::new(cos * libm::cos(pitch), sin * libm::cos(pitch), -libm::sin(pitch));
     let left = Vector3::new(-sin, cos, 0.0);
