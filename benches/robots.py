@@ -8,7 +8,7 @@
 For each robot whose file is below one of the folders: a profile by `actcheck new robot` (after `check --mend` where the
 file has impossible moments of inertia), its lines, whether `check` accepts it, and how many of the runs pick a lone can,
 cube and box without noise, and place a can that the robot has found with its camera. With `--speed`, the last figure
-is the simulated time by CPU time of a pick, on one core. Nothing is edited by hand, but TIAGo's gripper comes from
+is the simulated time by CPU time of a pick, on one core: of the thing that the robot picked most often, or of a block or peg if it picked none. Nothing is edited by hand, but TIAGo's gripper comes from
 another package than its arm: `tiago_gripper.urdf.xacro` includes `tiago_no_hand.urdf` and
 `pal_gripper_description/urdf/gripper.urdf.xacro`, and calls `pal_gripper` with the parent `wrist_ft_tool_link` and
 the origin of `end_effector.urdf.xacro`. Folders that are packages themselves are named one by one.
@@ -68,6 +68,21 @@ size_m = [0.05, 0.05, 0.05]
 shape = "box"
 at_m = [0, 0, 0.025]
 size_m = [0.05, 0.05, 0.05]
+"""
+
+# For hands that open too little for the others, to measure the speed of a robot that moves: a block, and a peg for hands that
+# open less than 5 cm.
+BLOCK = CUBE.replace("0.05, 0.05, 0.05", "0.03, 0.03, 0.03").replace("0.025", "0.015").replace("mass_kg = 0.1", "mass_kg = 0.02")
+PEG = """category = "act:Can"
+mass_kg = 0.03
+friction = 0.6
+restitution = 0.05
+size_m = [0.018, 0.018, 0.09]
+[[parts]]
+shape = "cylinder"
+at_m = [0, 0, 0.045]
+radius_m = 0.009
+height_m = 0.09
 """
 
 PICK = """tests = [["Pick"]]
@@ -174,12 +189,13 @@ def reports(program, folder, history):
 
 def speed(args, folder, thing):
     """Simulated seconds by CPU seconds: of all runs but one, so that the start of the program doesn't count."""
+    folder_of_hulls = folder / f"h_{args.things[0]}" / "hulls"
     simulated, used = [], []
     for runs in (1, args.runs):
         history = folder / f"h_speed_{runs}"
         shutil.rmtree(history, ignore_errors=True)
-        if (folder / f"h_{thing}" / "hulls").exists():
-            shutil.copytree(folder / f"h_{thing}" / "hulls", history / "hulls")
+        if folder_of_hulls.exists():
+            shutil.copytree(folder_of_hulls, history / "hulls")
         _, _, _, cpu, _ = call(
             args.program, folder, "run", f"{thing}.toml", "--history", str(history), "--runs", str(runs), "--jobs", "1")
         query = "SELECT (SUM(?secs) AS ?all) { ?execution act:ofRun ?run ; act:duration ?secs }"
@@ -187,6 +203,18 @@ def speed(args, folder, thing):
         simulated.append(float(out.split()[1]))
         used.append(cpu)
     return round((simulated[1] - simulated[0]) / max(used[1] - used[0], 1e-6), 1)
+
+
+def surface_for(profile, mobile):
+    """A surface as high as the arm works: a low one for an arm on a mount of that height or on the surface itself, and a
+    workbench for an upright robot."""
+    height = re.search(r"\nmount_height_m = ([\d.]+)", profile)
+    if mobile or not height and "\nmount " not in profile:
+        return "coffee_table"
+    if height and float(height[1]) > 1.0:
+        return "workbench"
+    low = "\nmount " in profile or float(height[1]) == 0.4
+    return "mini_coffee_table" if low else "coffee_table"
 
 
 def measure(args, name, model, arguments, start, packages):
@@ -206,15 +234,17 @@ def measure(args, name, model, arguments, start, packages):
     mobile = "\nbase" in text
     reach = re.search(r"reaches ([\d.]+) m", text)
     require = ""
-    if not mobile and reach:
+    if not mobile and reach and "\nreach_m" not in text:
         (folder / "within.rls").write_text(WITHIN.format(squared=round((0.8 * float(reach[1])) ** 2, 4)))
         require = '[scene]\nrequire = "within.rls"'
     models = folder / "models" / "objects"
     if not models.exists():
         shutil.copytree(Path(__file__).resolve().parent.parent / "models" / "objects", models)
     (models / "cube.toml").write_text(CUBE)
-    surface = "coffee_table" if mobile or "mount_height_m = 0.4" not in text else "mini_coffee_table"
-    for thing in args.things:
+    (models / "block.toml").write_text(BLOCK)
+    (models / "peg.toml").write_text(PEG)
+    surface = surface_for(text, mobile)
+    for thing in [*args.things, "block", "peg"]:
         values = {"runs": args.runs, "thing": thing, "surface": surface, "start": "\n".join(start), "require": require}
         (folder / f"{thing}.toml").write_text(PICK.format(**values))
     if args.check:
@@ -239,7 +269,11 @@ def measure(args, name, model, arguments, start, packages):
         row[thing + "_why"] = reports(args.program, folder, history)
         row[thing + "_cpu"] = round(cpu, 1)
     if args.speed and args.things and row.get("loads") == "yes":
-        row["speed"] = speed(args, folder, args.things[0])
+        opening = re.search(r"max_opening_m = ([\d.]+)", text)
+        small = "peg" if opening and float(opening[1]) < 0.05 else "block"
+        most = max(args.things, key=lambda thing: row[thing] if isinstance(row[thing], int) else 0)
+        row["speed_of"] = most if row[most] not in (0, "-") else small
+        row["speed"] = speed(args, folder, row["speed_of"])
     if mobile and args.place:
         (folder / "place.toml").write_text(PLACE.format(runs=args.runs))
         shutil.rmtree(folder / "h_place", ignore_errors=True)

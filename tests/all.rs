@@ -103,6 +103,7 @@ mod stops;
 mod strangers;
 mod suction;
 mod support;
+mod table_top_arms;
 mod tables;
 mod temporal;
 mod temporal_programs;

@@ -87,7 +87,7 @@ fn scene() -> Scene {
         map: actcheck::data::SceneMap::default(),
         world: "living room".to_owned(),
         objects: BODIES.iter().enumerate().map(object).collect(),
-        robot: RobotStart { profile: robot(), base: [-0.6, 0.0, 0.1], knows: Arc::new([]) },
+        robot: RobotStart { profile: robot(), base: [-0.6, 0.0, 0.1], root_height_m: 0.0, knows: Arc::new([]) },
         designators: sample_trace(0).actions[0].parameters.clone(),
         sensing: Sensing {
             position_noise_m: 0.005,

@@ -96,7 +96,7 @@ pub(crate) fn scene(objects: Vec<SceneObject>) -> Scene {
         map: actcheck::data::SceneMap::default(),
         world: "empty".to_owned(),
         objects,
-        robot: RobotStart { profile: robot(), base: [-5.0, 0.0, 0.0], knows: Arc::new([]) },
+        robot: RobotStart { profile: robot(), base: [-5.0, 0.0, 0.0], root_height_m: 0.0, knows: Arc::new([]) },
         designators: BTreeMap::new(),
         sensing: PERFECT,
         physics: Physics {

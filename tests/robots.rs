@@ -33,7 +33,7 @@ fn every_wrong_robot_is_reported_with_its_place() {
         let profile = format!("{}/robot.toml", case.file_name().unwrap().display());
         (case.join("expected"), said_of(Path::new(WRONG), &profile))
     };
-    assert_diagnostics(47, Files::Disk.folders(Path::new(WRONG)).into_iter().map(report));
+    assert_diagnostics(50, Files::Disk.folders(Path::new(WRONG)).into_iter().map(report));
     let said = said_of(Path::new(WRONG), "fixed_amr");
     assert!(said.contains("there is no robot `fixed_amr`") && said.contains("did you mean `fixed_arm`?"), "{said}");
 }

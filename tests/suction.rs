@@ -45,7 +45,8 @@ fn world(profile: RobotProfile, load: SceneObject) -> World {
     let platform =
         object("platform", block([1.0, 1.0, TOP_M]), Role::Platform, Pose::upright([0.0, 0.0, 0.0], 0.0), 1.0, 0.5);
     let mut scene = scene(vec![platform, load]);
-    scene.robot = RobotStart { profile: Arc::new(profile), base: [0.0; 3], knows: Arc::new([]) };
+    let root_height_m = profile.mount_height_m;
+    scene.robot = RobotStart { profile: Arc::new(profile), base: [0.0; 3], root_height_m, knows: Arc::new([]) };
     let mut world = build(&scene).expect("the scene is right");
     world.begin_record();
     world

@@ -4,29 +4,11 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
+use crate::support::urdf::{joint, link};
 use crate::support::{actcheck, stderr, stdout};
 
 /// The URDF of a torso with two arms of five joints, which are stretched out at 0.
 fn two_arms() -> String {
-    let link = |name: &str, size: [f64; 3], at: [f64; 3], mass: f64| {
-        let [x, y, z] = at;
-        let moment = |a: f64, b: f64| mass * (a * a + b * b) / 12.0;
-        let (ixx, iyy, izz) = (moment(size[1], size[2]), moment(size[0], size[2]), moment(size[0], size[1]));
-        format!(
-            "<link name=\"{name}\"><inertial><origin xyz=\"{x} {y} {z}\"/><mass value=\"{mass}\"/>\
-            <inertia ixx=\"{ixx}\" iyy=\"{iyy}\" izz=\"{izz}\" ixy=\"0\" ixz=\"0\" iyz=\"0\"/></inertial>\
-            <collision><origin xyz=\"{x} {y} {z}\"/><geometry><box size=\"{} {} {}\"/></geometry></collision></link>\n",
-            size[0], size[1], size[2]
-        )
-    };
-    let joint = |name: &str, kind: &str, ends: [&str; 2], at: [f64; 3], axis: &str, range: [f64; 2]| {
-        format!(
-            "<joint name=\"{name}\" type=\"{kind}\"><parent link=\"{}\"/><child link=\"{}\"/>\
-            <origin xyz=\"{} {} {}\"/><axis xyz=\"{axis}\"/>\
-            <limit lower=\"{}\" upper=\"{}\" effort=\"100\" velocity=\"1\"/></joint>\n",
-            ends[0], ends[1], at[0], at[1], at[2], range[0], range[1]
-        )
-    };
     let mut text = "<robot name=\"two_arms\">\n".to_owned();
     text += &link("torso", [0.15, 0.2, 0.5], [0.0, 0.0, 0.25], 20.0);
     for (side, sign) in [("left", 1.0), ("right", -1.0)] {
@@ -92,4 +74,35 @@ fn a_robot_with_two_arms_picks_with_either() {
     let said = stderr(&unknown);
     assert!(said.contains("no hand has `middle` in a name") && said.contains("left_palm"), "{said}");
     assert!(!folder.path().join("m.toml").exists());
+}
+
+/// A torso that turns moves both arms: arms of six joints leave it out.
+#[test]
+fn a_torso_that_turns_is_not_part_of_an_arm() {
+    let folder = tempfile::tempdir().unwrap();
+    let spine = link("pelvis", [0.15, 0.2, 0.1], [0.0, 0.0, -0.1], 20.0);
+    let waist = joint("waist_joint", "revolute", ["pelvis", "torso"], [0.0; 3], "0 0 1", [-1.0, 1.0]);
+    let mut urdf = two_arms().replace("<link name=\"torso\">", &format!("{spine}{waist}<link name=\"torso\">"));
+    let proposed = |urdf: &str| {
+        std::fs::write(folder.path().join("two_arms.urdf"), urdf).unwrap();
+        let _ = std::fs::remove_file(folder.path().join("left.toml"));
+        let text = profile(folder.path(), "left");
+        let arm = text.lines().find(|line| line.starts_with("arm_joints")).unwrap_or_default().to_owned();
+        (arm, text)
+    };
+    assert!(proposed(&urdf).0.contains("waist_joint"), "arms of five joints need it");
+    for side in ["left", "right"] {
+        let forearm = format!("<link name=\"{side}_forearm\">");
+        let parent = format!("<parent link=\"{side}_forearm\"/>");
+        let turned = link(&format!("{side}_forearm_turn"), [0.02; 3], [0.0; 3], 0.1);
+        let ends = [&*format!("{side}_forearm"), &*format!("{side}_forearm_turn")];
+        let joint = joint(&format!("{side}_turn_joint"), "revolute", ends, [0.15, 0.0, 0.0], "1 0 0", [-2.0, 2.0]);
+        assert!(urdf.contains(&forearm) && urdf.contains(&parent));
+        urdf = urdf.replace(&parent, &format!("<parent link=\"{side}_forearm_turn\"/>"));
+        urdf = urdf.replace(&forearm, &format!("{turned}{joint}{forearm}"));
+    }
+    let (arm, text) = proposed(&urdf);
+    assert!(arm.contains("left_turn_joint") && !arm.contains("waist_joint"), "{text}");
+    assert!(text.contains("but not `waist_joint`, which moves the other arm too and stays at 0"), "{text}");
+    assert!(!text.contains("parked_joints = [\"waist_joint") && !text.contains("\"waist_joint\""), "{text}");
 }

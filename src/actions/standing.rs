@@ -1,6 +1,6 @@
 //! Grasp planning for an arm with a fixed base.
 
-use nalgebra::{Isometry3, Vector3};
+use nalgebra::{Isometry3, Point3, Vector3};
 
 use crate::grasp::{Approach, Grasp, rolled};
 use crate::hindrance::{Hindrance, Nearest};
@@ -17,6 +17,8 @@ const MOST_SAMPLES: u32 = 3000;
 const SAMPLES_A_GRASP: u32 = 500;
 /// Clearance that the arm keeps on its path if both ends have it. Unit: metres.
 const WAY_CLEAR_M: f64 = 0.03;
+/// Margin of an arm's length. Unit: metres. More than the error of inverse kinematics.
+const SPAN_MARGIN_M: f64 = 2e-3;
 /// How much the clearance of a turning link may change. Unit: metres.
 const TURNING_M: f64 = 1e-3;
 /// Cost of a hand heading that deviates from the direction base to object. Unit: cost per radian.
@@ -80,6 +82,10 @@ fn best(arm: &Arm<'_>, all: &[Grasp], samples: &mut Samples, nearest: &mut Neare
     grasps.sort_by(|a, b| a.0.total_cmp(&b.0));
     let mut best: Option<Plan> = None;
     for (cost, grasp) in grasps {
+        if arm.span.is_beyond(&grasp.pose) {
+            nearest.note(Hindrance::OutOfReach);
+            continue;
+        }
         for seed in arm.seeds(grasp) {
             let bound = best.as_ref().map_or(f64::INFINITY, |best| best.cost);
             if cost >= bound {
@@ -111,6 +117,42 @@ struct Arm<'a> {
     approach_m: f64,
     /// Openings at which fingers that turn have to clear the surface. Unit: metres.
     closing_m: Vec<f64>,
+    span: Span,
+}
+
+/// The length of an arm, from its first joint to its last. Poses beyond it need no search for joint positions.
+struct Span {
+    /// The first joint. Frame: world.
+    from: Vector3<f64>,
+    /// The last joint in the frame of the grasp, if the arm reaches any orientation of the hand; else the grasp itself.
+    end: Point3<f64>,
+    /// Greatest distance of the two. Unit: metres.
+    length_m: f64,
+}
+
+impl Span {
+    fn of(kinematics: &Kinematics, arm: &[usize], start: &[f64]) -> Self {
+        let links = kinematics.links(start);
+        let grasp = kinematics.grasp(start);
+        let at = |idx: &usize| links[idx + 1].translation.vector;
+        let mut points: Vec<Vector3<f64>> = arm.iter().map(at).collect();
+        let last_turns = arm.last().is_some_and(|idx| kinematics.joints()[*idx].kind == JointKind::Revolute);
+        if arm.len() < FULL_ARM || !last_turns {
+            points.push(grasp.translation.vector);
+        }
+        let joints = arm.iter().map(|idx| &kinematics.joints()[*idx]);
+        let slides = joints.filter(|joint| joint.kind == JointKind::Prismatic);
+        let slides_m: f64 = slides.map(|joint| joint.upper - joint.lower).sum();
+        let links_m: f64 = points.windows(2).map(|pair| (pair[1] - pair[0]).norm()).sum();
+        let end = points.last().copied().unwrap_or_default();
+        let from = points.first().copied().unwrap_or_default();
+        Self { from, end: grasp.inverse() * Point3::from(end), length_m: links_m + slides_m + SPAN_MARGIN_M }
+    }
+
+    /// Whether no posture brings the hand to a pose.
+    fn is_beyond(&self, pose: &Isometry3<f64>) -> bool {
+        ((pose * self.end).coords - self.from).norm() > self.length_m
+    }
 }
 
 impl<'a> Arm<'a> {
@@ -128,11 +170,23 @@ impl<'a> Arm<'a> {
             before = space(&[start.clone(), opened]);
         }
         let meanwhile = before.among(others);
+        let span = Span::of(kinematics, &layout.arm, &start);
         let (lifts_m, approach_m) = match operator.profile().on_surface {
             true => (SHORT_LIFTS_M.as_slice(), SHORT_APPROACH_M),
             false => (LIFTS_M.as_slice(), APPROACH_M),
         };
-        Self { kinematics, layout, start, postures, before, meanwhile, lifts_m, approach_m, closing_m: Vec::new() }
+        Self {
+            kinematics,
+            layout,
+            start,
+            postures,
+            before,
+            meanwhile,
+            lifts_m,
+            approach_m,
+            closing_m: Vec::new(),
+            span,
+        }
     }
 
     /// Lower bound of a grasp's cost, independent of the path to it.
@@ -207,7 +261,7 @@ impl<'a> Arm<'a> {
         for posture in legs {
             let (room, clear_of_itself) = self.meanwhile.room(&posture);
             if !clear_of_itself {
-                return Err(Hindrance::Itself { links: None });
+                return Err(Hindrance::Itself { links: self.meanwhile.touching(&posture) });
             }
             let lack_m = (FURNITURE_CLEAR_M - room.furniture_m).max(LEAST_CLEAR_M - room.things_m);
             let is_free = room.furniture_m >= FURNITURE_CLEAR_M && room.things_m >= LEAST_CLEAR_M;

@@ -357,7 +357,8 @@ fn read_table(
     let camera_offset_m = table.numbers("camera_offset_m", -farthest_m..=farthest_m).unwrap_or([0.0; 3]);
     let mount_height_m = table.number("mount_height_m", 0.0..=3.0).unwrap_or(0.0);
     let (on_surface, reach_m) = read_place(table, base.as_ref().is_some_and(|(joints, _)| joints.is_some()));
-    let mount_turned_rad = table.number("mount_turned_rad", -std::f64::consts::TAU..=std::f64::consts::TAU).unwrap_or(0.0);
+    let mount_turned_rad =
+        table.number("mount_turned_rad", -std::f64::consts::TAU..=std::f64::consts::TAU).unwrap_or(0.0);
     let opening_span = table.key_span("max_opening_m");
     let max_opening_m = table.number("max_opening_m", 0.001..=1.0);
     roles.opening = opening_span.zip(max_opening_m);

@@ -20,7 +20,7 @@ pub struct RobotProfile {
     pub base_joints: Option<[String; 3]>,
     /// Whether those joints are added below the URDF's root instead of being part of it: `base = "planar"`.
     pub planar_base: bool,
-    /// Height of the root above what the robot is mounted on, for a base on a mount, which is not simulated, or on wheels.
+    /// Height of the root above the floor or the surface that the robot is mounted on: of a mount, which is not simulated, or wheels.
     /// Unit: metres.
     pub mount_height_m: f64,
     /// Rotation of the root of a fixed robot about the vertical, if its arm does not work along the root's x axis. Unit:

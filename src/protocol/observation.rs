@@ -29,6 +29,7 @@ struct Joints<'a> {
 struct Base {
     position_m: [f64; 2],
     heading_rad: f64,
+    height_m: f64,
 }
 
 #[derive(Debug, Serialize)]
@@ -58,11 +59,12 @@ impl<'a> Observed<'a> {
                 ([root.position[0], root.position[1]], root.yaw())
             }
         };
+        let height_m = robot.base_of(positions).translation.vector.z;
         let [left, right] = measured.finger_efforts_n;
         Self {
             time_s: robot.elapsed_secs(),
             joints: Joints { positions, velocities: &measured.velocities, efforts: &measured.loads },
-            base: Base { position_m, heading_rad },
+            base: Base { position_m, heading_rad, height_m },
             gripper: Gripper { opening_m: measured.gripper_opening_m, force_n: left.min(right) },
             budget_left_s: robot.budget_left_secs(),
             truth: privileged.then(|| truth(robot)),

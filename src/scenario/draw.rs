@@ -5,8 +5,8 @@ use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
 
 use crate::overlap::Solid;
-use crate::surroundings::Surroundings;
 use crate::placement::Reach;
+use crate::surroundings::Surroundings;
 use crate::{Space, placement};
 use actcheck_data::{
     ChoiceName, Choices, Location, ObjectAxis, ObjectModel, PlacedObject, Pose, RobotStart, Role, Scene, SceneObject,
@@ -128,9 +128,9 @@ pub(super) struct SceneBuilder<'a> {
     pub(super) platform: Option<Pose>,
     /// The location in front of the platform, if it is not one of the world's.
     pub(super) front: Option<Location>,
-    /// Height of what the robot is mounted on: the floor, or the surface. Unit: metres.
+    /// Height of the floor or the surface on which the robot is mounted. Unit: metres.
     pub(super) ground_m: f64,
-    /// The places within reach of a fixed arm, if its profile tells.
+    /// The places within reach of a fixed arm, if its profile states them.
     pub(super) reach: Option<Reach>,
 }
 

@@ -46,12 +46,7 @@ pub fn solve(kinematics: &Kinematics, seed: &[f64], reach: &Reach) -> Option<Vec
 
 /// As [`solve`] for an arm with fewer than six joints, which moves its hand in a vertical plane: the target may turn about
 /// the vertical, by at most `most_rad`. Returns the turn too. Unit: radians.
-pub fn solve_turned(
-    kinematics: &Kinematics,
-    seed: &[f64],
-    reach: &Reach,
-    most_rad: f64,
-) -> Option<(Vec<f64>, f64)> {
+pub fn solve_turned(kinematics: &Kinematics, seed: &[f64], reach: &Reach, most_rad: f64) -> Option<(Vec<f64>, f64)> {
     let mut positions = started(kinematics, seed);
     for iteration in 0..MOST_ITERATIONS {
         let (grasp, mut jacobian) = kinematics.grasp_jacobian(&positions);

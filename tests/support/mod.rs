@@ -13,6 +13,7 @@ pub mod paged;
 pub mod planted;
 pub mod server;
 pub mod triple_store;
+pub mod urdf;
 
 use std::collections::BTreeMap;
 use std::io::ErrorKind;

@@ -148,7 +148,7 @@ class Simulation:
                 "velocities": [0.0] * len(names),
                 "efforts": [0.0] * len(names),
             },
-            "base": {"position_m": [x, y], "heading_rad": heading},
+            "base": {"position_m": [x, y], "heading_rad": heading, "height_m": 0.0},
             "gripper": {"opening_m": self.opening_m, "force_n": self.force_n},
             "budget_left_s": 60.0 - self.time_s,
         }

@@ -137,6 +137,11 @@ impl<'a> ArmSpace<'a> {
         (self.room_of(&links, endless), !self.itself.touches(&links))
     }
 
+    /// The first two links of the robot that come too close to each other in a posture.
+    pub fn touching(&self, positions: &[f64]) -> Option<(usize, usize)> {
+        self.itself.touching(&self.kinematics.links(positions))
+    }
+
     /// The clearances at these link poses, but at most these.
     fn room_of(&self, links: &[Isometry3<f64>], most: Room) -> Room {
         let mut room = most;

@@ -14,7 +14,7 @@ const LEAST: Room = Room { furniture_m: 0.01, things_m: 0.01 };
 fn arm() -> (Kinematics, Layout, Vec<f64>) {
     let path = Path::new("models/robots/fixed_arm.toml");
     let profile = actcheck_config::robot::read(&Files::Shipped, path).expect("the shipped robot is valid");
-    let start = RobotStart { profile: Arc::new(profile), base: [0.0; 3], knows: Arc::new([]) };
+    let start = RobotStart { profile: Arc::new(profile), base: [0.0; 3], root_height_m: 0.0, knows: Arc::new([]) };
     geometry(&start).expect("the shipped robot is valid")
 }
 

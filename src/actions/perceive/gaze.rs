@@ -127,8 +127,7 @@ mod tests {
     fn the_head_can_look_ahead_from_any_posture() {
         let path = Path::new("models/robots/mobile_manipulator.toml");
         let profile = actcheck_config::robot::read(&Files::Shipped, path).expect("the shipped robot is valid");
-        let start =
-            RobotStart { profile: Arc::new(profile), base: [0.0; 3], root_height_m: 0.0, knows: Arc::new([]) };
+        let start = RobotStart { profile: Arc::new(profile), base: [0.0; 3], root_height_m: 0.0, knows: Arc::new([]) };
         let (kinematics, layout, mut posture) = geometry(&start).expect("the shipped robot is valid");
         for pan in [-3.8, -3.0, -1.0, 0.0, 1.7] {
             posture[layout.head[0]] = pan;

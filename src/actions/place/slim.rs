@@ -199,8 +199,7 @@ mod tests {
     fn the_hand_comes_close_without_tilting_its_load() {
         let path = Path::new("models/robots/fixed_arm.toml");
         let profile = actcheck_config::robot::read(&Files::Shipped, path).expect("the shipped robot is valid");
-        let start =
-            RobotStart { profile: Arc::new(profile), base: [0.0; 3], root_height_m: 0.0, knows: Arc::new([]) };
+        let start = RobotStart { profile: Arc::new(profile), base: [0.0; 3], root_height_m: 0.0, knows: Arc::new([]) };
         let (kinematics, layout, mut start) = geometry(&start).expect("the shipped robot is valid");
         for (idx, value) in layout.arm.iter().zip([-0.9, 0.7, 0.0, 1.59, 0.0, 0.85, 0.0]) {
             start[*idx] = value;

@@ -11,6 +11,8 @@ use crate::kinematics::motion;
 const CAMERA_WORDS: [&str; 9] = ["rgbd", "depth", "xtion", "astra", "kinect", "realsense", "d435", "camera", "stereo"];
 /// A lift that takes longer from end to end is left at 0: actions have a minute. Unit: seconds.
 const SLOW_SECS: f64 = 15.0;
+/// An arm with fewer joints reaches only some orientations at each place.
+pub(super) const FULL_ARM: usize = 6;
 /// Height of a table-top arm's root. Unit: metres. That of a low table.
 const TABLE_M: f64 = 0.4;
 /// A root with shapes further below it than this is on its own pedestal. Unit: metres.
@@ -34,7 +36,13 @@ pub(super) struct Body {
     pub(super) camera_turned_rad: [f64; 3],
 }
 
-pub(super) fn find(model: &RobotModel, palm: usize, notes: &mut BTreeMap<&'static str, String>) -> Body {
+/// Finds the body of the hand at `palm`. `others` are the names of links that carry other hands.
+pub(super) fn find(
+    model: &RobotModel,
+    palm: usize,
+    others: &[String],
+    notes: &mut BTreeMap<&'static str, String>,
+) -> Body {
     let mut path = chain(model, palm);
     let own_base = own_base(model, &path);
     if own_base.is_some() {
@@ -52,10 +60,18 @@ pub(super) fn find(model: &RobotModel, palm: usize, notes: &mut BTreeMap<&'stati
     let drives = own_base.is_some() || wheel.is_some();
     let (slow, arm): (Vec<usize>, Vec<usize>) =
         path.into_iter().filter(|idx| model.joints[*idx].mimic.is_none()).partition(|idx| is_slow(&model.joints[*idx]));
-    let slow: String = slow.iter().map(|idx| &model.joints[*idx]).map(left_out).collect();
-    notes.insert("arm_joints", format!("the joints between the root and the hand `{}`{slow}", model.links[palm].name));
+    let torso = torso(model, &arm, others);
+    let (arm, torso): (Vec<usize>, Vec<usize>) = arm.into_iter().partition(|idx| !torso.contains(idx));
+    let slow = slow.iter().map(|idx| &model.joints[*idx]).map(left_out);
+    let of_torso = torso.iter().map(|idx| &model.joints[*idx].name);
+    let of_torso = of_torso.map(|name| format!(", but not `{name}`, which moves the other arm too and stays at 0"));
+    let left_out: String = slow.chain(of_torso).collect();
+    notes.insert(
+        "arm_joints",
+        format!("the joints between the root and the hand `{}`{left_out}", model.links[palm].name),
+    );
     let (camera_link, camera, camera_turned_rad) = camera(model, palm, notes);
-    let others: Vec<usize> = arm.iter().copied().chain(own_base.into_iter().flatten()).collect();
+    let others: Vec<usize> = arm.iter().copied().chain(own_base.into_iter().flatten()).chain(torso).collect();
     let head = head(model, camera, &others);
     let lowest_m = lowest(model);
     let mount_height_m = match (drives, lowest_m < -PEDESTAL_M) {
@@ -72,6 +88,16 @@ pub(super) fn find(model: &RobotModel, palm: usize, notes: &mut BTreeMap<&'stati
     let mount_height_m = (mount_height_m * 1000.0).round() / 1000.0;
     let is_table_top = !drives && lowest_m >= -PEDESTAL_M;
     Body { arm, head, own_base, drives, mount_height_m, lowest_m, is_table_top, camera_link, camera_turned_rad }
+}
+
+/// The joints of a torso that turns or bends below several arms, if the arm has enough others.
+fn torso(model: &RobotModel, arm: &[usize], others: &[String]) -> Vec<usize> {
+    let palms = others.iter().filter_map(|other| model.links.iter().position(|link| link.name == *other));
+    let chains: Vec<Vec<usize>> = palms.map(|palm| chain(model, palm)).collect();
+    let is_shared = |idx: &&usize| chains.iter().any(|chain| chain.contains(idx));
+    let turns = |idx: &&usize| model.joints[**idx].kind == JointKind::Revolute;
+    let torso: Vec<usize> = arm.iter().filter(turns).filter(is_shared).copied().collect();
+    if arm.len() - torso.len() >= FULL_ARM { torso } else { Vec::new() }
 }
 
 /// Whether a lift takes so long that most of an action would be spent on it.

@@ -71,7 +71,7 @@ fn find(partial: &RobotProfile, all: bool, wanted: Option<&str>) -> Result<Propo
     let hand = fingers::find(partial, &model, wanted).map_err(|error| error.named(&name))?;
     let mut notes = hand.notes;
     let mut profile = hand.profile;
-    let body = body::find(&model, hand.palm, &mut notes);
+    let body = body::find(&model, hand.palm, &hand.others, &mut notes);
     let joint_names = |joints: &[usize]| joints.iter().map(|idx| model.joints[*idx].name.clone()).collect::<Vec<_>>();
     if all {
         profile.head_joints = joint_names(&body.head);
@@ -147,7 +147,7 @@ fn home_of(bare: &RobotProfile, palm: &str) -> Result<RobotProfile, WorldError> 
     let model = RobotModel::read(&RobotProfile { arm_joints: Vec::new(), planar_base: false, ..bare.clone() })?;
     let hand = fingers::find(bare, &model, Some(palm)).map_err(|error| error.named(&name))?;
     let mut notes = BTreeMap::new();
-    let body = body::find(&model, hand.palm, &mut notes);
+    let body = body::find(&model, hand.palm, &hand.others, &mut notes);
     let arm_joints = body.arm.iter().map(|idx| model.joints[*idx].name.clone()).collect();
     let planar_base = body.drives && body.own_base.is_none();
     let base_joints = planar_base.then(|| RobotProfile::PLANAR_JOINTS.map(str::to_owned));

@@ -6,6 +6,7 @@ use std::sync::Arc;
 
 use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
 
+use super::body::FULL_ARM;
 use crate::description::{JointKind, RobotModel};
 use crate::ik::{self, Reach};
 use crate::layout::Named;
@@ -29,8 +30,6 @@ const SHARES: [f64; 2] = [0.5, 0.75];
 /// Direction of the hand at home, for a fixed arm: aside, out of the way. Unit: radians.
 const ASIDE_RAD: f64 = -1.3;
 
-/// An arm with fewer joints reaches only some orientations at each place.
-const FULL_ARM: usize = 6;
 /// Largest turn of the hand of such an arm from the direction to its place: any. The fingers may slant to one side of it.
 /// Unit: radians.
 const LARGEST_TURN_RAD: f64 = std::f64::consts::PI;

@@ -61,7 +61,7 @@ class RobotDescription:
     tool_link: str
     #: Rotation of the tool in that link (roll, pitch, yaw; radians): x points along the fingers, y across them.
     tool_turned_rad: tuple[float, float, float]
-    #: Height of the root of a robot with a fixed base. Unit: metres.
+    #: Height of the root above its mount: the floor or a surface. Unit: metres.
     mount_height_m: float
     max_opening_m: float
     grip_force_n: float
@@ -121,6 +121,8 @@ class Observation:
     force_n: float
     #: Simulated time left in the action's budget. Unit: seconds.
     budget_left_s: float
+    #: Height of the robot's root above the floor. Unit: metres.
+    root_height_m: float
     #: True poses and sizes of all objects; empty unless the program is privileged.
     truth: tuple[Thing, ...] = ()
 
@@ -138,6 +140,7 @@ class Observation:
             opening_m=gripper["opening_m"],
             force_n=gripper["force_n"],
             budget_left_s=sent["budget_left_s"],
+            root_height_m=base["height_m"],
             truth=things_from_wire(sent["truth"]["objects"]) if sent.get("truth") else (),
         )
 

@@ -238,8 +238,9 @@ class Robot:
         if link not in self._chains:
             root, tip = Pose.upright((0.0, 0.0, 0.0)), Pose.upright((0.0, 0.0, 0.0))
             if not self.description.base_joints:
-                x, y, heading = self.call.observation.base
-                root = Pose.upright((x, y, self.description.mount_height_m), heading)
+                observation = self.call.observation
+                x, y, heading = observation.base
+                root = Pose.upright((x, y, observation.root_height_m), heading)
             if link == self.description.tool_link:
                 tip = Pose(tip.position, rotation(*self.description.tool_turned_rad))
             self._chains[link] = Chain(self._urdf, link, root, tip)
