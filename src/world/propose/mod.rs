@@ -33,6 +33,9 @@ pub struct Proposal {
     pub other_hands: Vec<String>,
 }
 
+/// A frame on a link, by its index: the pose of the grasp relative to the link.
+type GraspFrame = (usize, Isometry3<f64>);
+
 /// Openings narrower than this are measured between other parts than fingertips. Unit: metres.
 const LEAST_OPENING_M: f64 = 0.02;
 
@@ -160,7 +163,7 @@ fn home_of(bare: &RobotProfile, palm: &str) -> Result<RobotProfile, WorldError> 
 }
 
 /// The model of a profile with its base, so that inverse kinematics moves it too, and the frame of its grasp.
-fn with_grasp(profile: &RobotProfile) -> Result<(Arc<RobotModel>, (usize, Isometry3<f64>)), WorldError> {
+fn with_grasp(profile: &RobotProfile) -> Result<(Arc<RobotModel>, GraspFrame), WorldError> {
     let model = Arc::new(RobotModel::read(profile)?);
     let grasp = frame(&model, &profile.grasp_link, profile.grasp_offset_m, profile.grasp_turned_rad)?;
     Ok((model, grasp))

@@ -6,6 +6,7 @@ use std::sync::Arc;
 
 use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
 
+use super::GraspFrame;
 use super::body::FULL_ARM;
 use crate::description::{JointKind, RobotModel};
 use crate::ik::{self, Reach};
@@ -45,11 +46,7 @@ pub(super) struct Standing {
 }
 
 impl Standing {
-    pub(super) fn new(
-        profile: &RobotProfile,
-        model: &Arc<RobotModel>,
-        grasp: (usize, Isometry3<f64>),
-    ) -> Result<Self, WorldError> {
+    pub(super) fn new(profile: &RobotProfile, model: &Arc<RobotModel>, grasp: GraspFrame) -> Result<Self, WorldError> {
         let root = Pose::upright([0.0, 0.0, profile.mount_height_m], profile.mount_turned_rad).to_isometry();
         let named = Named::find(profile, model)?;
         let kinematics = Kinematics::new(Arc::clone(model), root, grasp, named.camera)
@@ -77,7 +74,7 @@ impl Standing {
 pub(super) fn find(
     profile: &RobotProfile,
     model: &Arc<RobotModel>,
-    grasp: (usize, Isometry3<f64>),
+    grasp: GraspFrame,
     notes: &mut BTreeMap<&'static str, String>,
 ) -> Result<Postures, WorldError> {
     let standing = Standing::new(profile, model, grasp)?;

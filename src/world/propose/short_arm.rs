@@ -4,8 +4,9 @@ use std::collections::BTreeMap;
 use std::f64::consts::FRAC_PI_2;
 use std::sync::Arc;
 
-use nalgebra::{Isometry3, Point3, Vector3};
+use nalgebra::{Point3, Vector3};
 
+use super::GraspFrame;
 use super::postures::{Search, Standing, hand};
 use crate::WorldError;
 use crate::description::RobotModel;
@@ -29,7 +30,7 @@ const N_SEEDS: usize = 6;
 pub(super) fn put_on_surface(
     profile: &mut RobotProfile,
     model: &Arc<RobotModel>,
-    grasp: (usize, Isometry3<f64>),
+    grasp: GraspFrame,
     lowest_m: f64,
     notes: &mut BTreeMap<&'static str, String>,
 ) -> Result<bool, WorldError> {
@@ -54,7 +55,7 @@ pub(super) fn put_on_surface(
 pub(super) fn measure_reach(
     profile: &mut RobotProfile,
     model: &Arc<RobotModel>,
-    grasp: (usize, Isometry3<f64>),
+    grasp: GraspFrame,
     notes: &mut BTreeMap<&'static str, String>,
 ) -> Result<(), WorldError> {
     let standing = Standing::new(profile, model, grasp)?;
