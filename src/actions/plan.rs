@@ -182,6 +182,8 @@ pub(super) struct Planner<'a> {
     pub(super) itself: SelfContact,
     /// Positions of the head's joints, the present ones first.
     heads: Vec<Vec<f64>>,
+    /// Whether each link is moved by the head's joints.
+    is_head: Vec<bool>,
     /// Weight of the base's heading in inverse kinematics, from 0 to 1: 1 if the hand points ahead of the base.
     heading_mobility: f64,
 }
@@ -215,6 +217,7 @@ impl<'a> Planner<'a> {
             ground,
             itself,
             heads,
+            is_head: moved_links(kinematics, &layout.head),
             heading_mobility,
         }
     }
@@ -359,20 +362,27 @@ impl<'a> Planner<'a> {
     /// The hindrance if the arm can't follow, or would collide with the robot in every posture of the head.
     fn lifted(&self, at_thing: Vec<f64>) -> Result<(Vec<f64>, Vec<Vec<f64>>), Hindrance> {
         let mut hindrance = Hindrance::NoLift;
-        let found = LIFTS_M.iter().filter_map(|height| self.vertically(&at_thing, *height)).find_map(|lift| {
-            let touching = |posture: &Vec<f64>| self.itself.touching(&self.kinematics.links(posture));
+        let touching = |posture: &Vec<f64>| self.itself.touching(&self.kinematics.links(posture));
+        for height in LIFTS_M {
+            let Some(lift) = self.vertically(&at_thing, height) else { continue };
             hindrance = Hindrance::Itself { links: None };
-            self.heads.iter().find_map(|head| {
+            for head in &self.heads {
                 let at_thing = self.with_head(&at_thing, head);
                 let lift: Vec<Vec<f64>> = lift.iter().map(|posture| self.with_head(posture, head)).collect();
-                let links = std::iter::once(&at_thing).chain(&lift).find_map(touching);
-                if links.is_some() {
-                    hindrance = Hindrance::Itself { links };
+                let postures = std::iter::once(&at_thing).chain(&lift).enumerate();
+                let touched = postures.into_iter().find_map(|(step, posture)| Some((step, touching(posture)?)));
+                let Some((step, links)) = touched else { return Ok((at_thing, lift)) };
+                hindrance = Hindrance::Itself { links: Some(links) };
+                if !self.is_head[links.0] && !self.is_head[links.1] {
+                    // No other posture of the head helps, and no other lift if the links touch before it.
+                    if step == 0 {
+                        return Err(hindrance);
+                    }
+                    break;
                 }
-                links.is_none().then_some((at_thing, lift))
-            })
-        });
-        found.ok_or(hindrance)
+            }
+        }
+        Err(hindrance)
     }
 
     fn with_head(&self, posture: &[f64], head: &[f64]) -> Vec<f64> {

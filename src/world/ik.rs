@@ -32,8 +32,9 @@ const LARGEST_STEP: f64 = 0.3;
 /// Uses damped least squares; a joint that reaches its limit is held there and the others are solved again.
 pub fn solve(kinematics: &Kinematics, seed: &[f64], reach: &Reach) -> Option<Vec<f64>> {
     let mut positions = started(kinematics, seed);
+    let mut jacobian = vec![Vector6::zeros(); positions.len()];
     for _ in 0..MOST_ITERATIONS {
-        let (grasp, jacobian) = kinematics.grasp_jacobian(&positions);
+        let grasp = kinematics.fill_jacobian(&positions, &mut jacobian);
         let error = pose_error(&grasp, &reach.target);
         if is_reached(&error) {
             return Some(positions);
@@ -48,8 +49,9 @@ pub fn solve(kinematics: &Kinematics, seed: &[f64], reach: &Reach) -> Option<Vec
 /// the vertical, by at most `most_rad`. Returns the turn too. Unit: radians.
 pub fn solve_turned(kinematics: &Kinematics, seed: &[f64], reach: &Reach, most_rad: f64) -> Option<(Vec<f64>, f64)> {
     let mut positions = started(kinematics, seed);
+    let mut jacobian = vec![Vector6::zeros(); positions.len()];
     for iteration in 0..MOST_ITERATIONS {
-        let (grasp, mut jacobian) = kinematics.grasp_jacobian(&positions);
+        let grasp = kinematics.fill_jacobian(&positions, &mut jacobian);
         let turn = heading_of(&(grasp.rotation * reach.target.rotation.inverse()));
         let target = turned(&reach.target, turn);
         let mut error = pose_error(&grasp, &target);
@@ -138,8 +140,11 @@ fn least_squares(jacobian: &[Vector6<f64>], error: &Vector6<f64>, mobility: &[f6
     }
     let Some(factors) = square.cholesky() else { return vec![0.0; mobility.len()] };
     let solved = factors.solve(error);
-    let mut change: Vec<f64> =
-        jacobian.iter().zip(mobility).map(|(column, weight)| weight * column.dot(&solved)).collect();
+    let of_joint = |(column, weight): (&Vector6<f64>, &f64)| match *weight == 0.0 {
+        true => 0.0,
+        false => weight * column.dot(&solved),
+    };
+    let mut change: Vec<f64> = jacobian.iter().zip(mobility).map(of_joint).collect();
     let largest = change.iter().fold(0.0, |largest: f64, change| largest.max(change.abs()));
     if largest > LARGEST_STEP {
         change.iter_mut().for_each(|change| *change *= LARGEST_STEP / largest);

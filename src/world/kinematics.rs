@@ -32,6 +32,8 @@ pub struct Kinematics {
     /// Pose of the root. Frame: world.
     root: Isometry3<f64>,
     grasp: (usize, Isometry3<f64>),
+    /// The joints between the root and the grasp link, in this order.
+    path: Vec<usize>,
     camera: Mount,
     /// Pairs of links that pass through each other, with the smaller index first.
     passing: BTreeSet<(usize, usize)>,
@@ -50,7 +52,9 @@ impl Kinematics {
         grasp: (usize, Isometry3<f64>),
         camera: Mount,
     ) -> Self {
-        Self { model, root, grasp, camera, passing: BTreeSet::new(), hand: BTreeSet::new(), followers: Vec::new() }
+        let path = path_to(&model, grasp.0);
+        let (passing, hand, followers) = (BTreeSet::new(), BTreeSet::new(), Vec::new());
+        Self { model, root, grasp, path, camera, passing, hand, followers }
     }
 
     /// The same geometry with joints that follow others, if they carry the hand.
@@ -136,15 +140,12 @@ impl Kinematics {
 
     /// Returns the pose of one link.
     fn link(&self, link: usize, positions: &[f64]) -> Isometry3<f64> {
-        self.path_to(link).into_iter().fold(self.root, |parent, idx| self.moved(&parent, idx, positions))
+        self.along(&path_to(&self.model, link), positions)
     }
 
-    /// The joints between the root and a link, in this order.
-    fn path_to(&self, link: usize) -> Vec<usize> {
-        let parent = |idx: &usize| self.model.joints[*idx].parent.checked_sub(1);
-        let mut path: Vec<usize> = std::iter::successors(link.checked_sub(1), parent).collect();
-        path.reverse();
-        path
+    /// Returns the pose of the link at the end of a path.
+    fn along(&self, path: &[usize], positions: &[f64]) -> Isometry3<f64> {
+        path.iter().fold(self.root, |parent, idx| self.moved(&parent, *idx, positions))
     }
 
     /// The pose of the link that a joint moves, from that of its parent.
@@ -155,7 +156,7 @@ impl Kinematics {
 
     /// Returns the pose of the grasp link.
     pub fn grasp(&self, positions: &[f64]) -> Isometry3<f64> {
-        self.link(self.grasp.0, positions) * self.grasp.1
+        self.along(&self.path, positions) * self.grasp.1
     }
 
     /// Returns the pose of the camera: x forwards, z up in the image.
@@ -203,25 +204,40 @@ impl Kinematics {
     /// Returns the pose and the Jacobian of the grasp link; joints that follow others move with these. Shape: 6 × joints,
     /// linear above angular.
     pub fn grasp_jacobian(&self, positions: &[f64]) -> (Isometry3<f64>, Vec<Vector6<f64>>) {
-        let (mut pose, mut axes) = (self.root, Vec::new());
-        for idx in self.path_to(self.grasp.0) {
-            axes.push((idx, axis_from(&self.model.joints[idx], &pose)));
-            pose = self.moved(&pose, idx, positions);
+        let mut jacobian = vec![Vector6::zeros(); self.model.joints.len()];
+        let grasp = self.fill_jacobian(positions, &mut jacobian);
+        (grasp, jacobian)
+    }
+
+    /// As [`Kinematics::grasp_jacobian`], into columns that were made for the same joints: 0 or an earlier Jacobian.
+    pub(crate) fn fill_jacobian(&self, positions: &[f64], jacobian: &mut [Vector6<f64>]) -> Isometry3<f64> {
+        let mut pose = self.root;
+        for idx in &self.path {
+            let joint = &self.model.joints[*idx];
+            let frame = pose * joint.origin;
+            // The axis and a point on it, until the place of the grasp is known.
+            let (axis, point) = (frame.rotation * joint.axis.into_inner(), frame.translation.vector);
+            jacobian[*idx] = Vector6::new(point.x, point.y, point.z, axis.x, axis.y, axis.z);
+            pose = frame * motion(joint, positions[*idx]);
         }
         let grasp = pose * self.grasp.1;
-        let mut jacobian = vec![Vector6::zeros(); self.model.joints.len()];
-        for (idx, (axis, point)) in axes {
-            let (linear, angular) = match self.model.joints[idx].kind {
+        for idx in &self.path {
+            let [px, py, pz, ax, ay, az]: [f64; 6] = jacobian[*idx].into();
+            let (point, axis) = (Vector3::new(px, py, pz), Vector3::new(ax, ay, az));
+            let (linear, angular) = match self.model.joints[*idx].kind {
                 JointKind::Prismatic => (axis, Vector3::zeros()),
                 JointKind::Revolute => (axis.cross(&(grasp.translation.vector - point)), axis),
             };
-            jacobian[idx] = Vector6::new(linear.x, linear.y, linear.z, angular.x, angular.y, angular.z);
+            jacobian[*idx] = Vector6::new(linear.x, linear.y, linear.z, angular.x, angular.y, angular.z);
+        }
+        for (_, leader, ..) in self.followers.iter().filter(|(_, leader, ..)| !self.path.contains(leader)) {
+            jacobian[*leader] = Vector6::zeros();
         }
         for (joint, leader, factor, _) in &self.followers {
             let moved = jacobian[*joint] * *factor;
             jacobian[*leader] += moved;
         }
-        (grasp, jacobian)
+        grasp
     }
 
     /// Returns the downward pitch of the hand if no joint of the arm changes it, because all that turn are vertical. Unit:
@@ -246,6 +262,14 @@ impl Kinematics {
     pub(crate) fn holding_efforts_at(&self, poses: &[Isometry3<f64>]) -> Vec<f64> {
         holding_efforts(&self.model, poses)
     }
+}
+
+/// The joints between the root and a link, in this order.
+fn path_to(model: &RobotModel, link: usize) -> Vec<usize> {
+    let parent = |idx: &usize| model.joints[*idx].parent.checked_sub(1);
+    let mut path: Vec<usize> = std::iter::successors(link.checked_sub(1), parent).collect();
+    path.reverse();
+    path
 }
 
 /// Returns the forces and torques that compensate gravity, with the links at these poses. Units: newtons or newton metres.

@@ -23,6 +23,8 @@ const TICKS_PER_LOOK: u64 = 3;
 const OVERLOAD_SHARE: f64 = 0.99;
 /// Links that penetrate each other by no more than this only touch. Unit: metres.
 pub(super) const TOUCH_M: f64 = 1e-4;
+/// Error of positions in 32 bits. Unit: metres.
+const ROUNDING_M: f64 = 1e-4;
 
 /// Measures a [`RobotCourse`].
 #[derive(Default)]
@@ -139,10 +141,14 @@ impl World {
 
     /// Returns the penetration depth of two links; 0 if they are apart. Unit: metres.
     pub(super) fn depth_of(&self, first: usize, second: usize) -> f64 {
+        if self.are_links_apart(first, second) {
+            return 0.0;
+        }
         let balls = |idx: usize| self.colliders_of(self.robot.bodies[idx]).map(|solid| (ball(solid), solid));
+        let of_second: Vec<((Point3<f64>, f64), &Collider)> = balls(second).collect();
         let mut deepest = 0.0f64;
         for ((middle, radius), a) in balls(first) {
-            for ((other, other_radius), b) in balls(second) {
+            for ((other, other_radius), b) in &of_second {
                 if (middle - other).norm() > radius + other_radius {
                     continue;
                 }
@@ -151,6 +157,17 @@ impl World {
             }
         }
         deepest
+    }
+
+    /// Whether the balls around all shapes of two links are apart.
+    fn are_links_apart(&self, first: usize, second: usize) -> bool {
+        let ball = |idx: usize| {
+            let ball = self.robot.balls[idx].as_ref()?;
+            let body = self.engine.bodies.get(self.robot.bodies[idx])?;
+            Some((from_pose(body.position()) * ball.middle, ball.radius))
+        };
+        let (Some((one, radius)), Some((other, other_radius))) = (ball(first), ball(second)) else { return false };
+        (one - other).norm() > radius + other_radius + ROUNDING_M
     }
 
     /// Returns the colliders of a body, without shells.

@@ -48,8 +48,10 @@ struct Solid {
 #[derive(Clone)]
 struct Form {
     solids: Vec<Solid>,
-    /// Centre of their bounding sphere.
+    /// Centre of their bounding sphere and bounding box.
     middle: Point3<f64>,
+    /// Half extents of that box. Unit: metres.
+    half: Vector3<f64>,
     radius: f64,
 }
 
@@ -176,15 +178,27 @@ fn nearest(
     }
     let mut nearest = clear_m;
     let b_in_a = poses[first].inverse() * poses[second];
-    let turned: Matrix3<f64> = b_in_a.rotation.to_rotation_matrix().into_inner();
+    let turned = Turned::new(b_in_a.rotation.to_rotation_matrix().into_inner());
+    let middle_b = b_in_a * b.middle;
+    // Most solids of two links are far from the box around the other link.
+    if turned.boxes_apart(middle_b - a.middle, [&a.half, &b.half]) > clear_m + ROUNDING_M {
+        return clear_m;
+    }
+    let of_b = b.solids.iter().map(|solid| (solid, b_in_a * solid.ball.middle));
+    let near_a = |(solid, middle): &(&Solid, Point3<f64>)| {
+        turned.boxes_apart(middle - a.middle, [&a.half, &solid.half]) <= clear_m + ROUNDING_M
+    };
+    let of_b: Vec<(&Solid, Point3<f64>)> = of_b.filter(near_a).collect();
     let placed = to_pose(&b_in_a);
-    let middles: Vec<Point3<f64>> = b.solids.iter().map(|solid| b_in_a * solid.ball.middle).collect();
     for solid_a in &a.solids {
-        for (solid_b, middle_b) in b.solids.iter().zip(&middles) {
+        if turned.boxes_apart(middle_b - solid_a.ball.middle, [&solid_a.half, &b.half]) > nearest + ROUNDING_M {
+            continue;
+        }
+        for (solid_b, middle_b) in &of_b {
             let way = middle_b - solid_a.ball.middle;
             let apart = way.norm() - solid_a.ball.radius - solid_b.ball.radius;
             let far = nearest + ROUNDING_M;
-            if apart > far || boxes_apart(way, &turned, [&solid_a.half, &solid_b.half]) > far {
+            if apart > far || turned.boxes_apart(way, [&solid_a.half, &solid_b.half]) > far {
                 continue;
             }
             let b_in_a = solid_a.pose.inv_mul(&(placed * solid_b.pose));
@@ -198,13 +212,25 @@ fn nearest(
     nearest
 }
 
-/// Returns a lower bound of the distance of two boxes with these half extents, along the axes of both: the second one is
-/// turned, and its middle is at `way` from that of the first. Unit: metres.
-fn boxes_apart(way: Vector3<f64>, turned: &Matrix3<f64>, [first, second]: [&Vector3<f64>; 2]) -> f64 {
-    let spread = turned.abs();
-    let along_first = way.abs() - first - spread * second;
-    let along_second = turned.tr_mul(&way).abs() - second - spread.tr_mul(first);
-    along_first.max().max(along_second.max())
+/// The rotation of one box relative to another.
+struct Turned {
+    turned: Matrix3<f64>,
+    /// Its elements without their signs.
+    spread: Matrix3<f64>,
+}
+
+impl Turned {
+    fn new(turned: Matrix3<f64>) -> Self {
+        Self { spread: turned.abs(), turned }
+    }
+
+    /// Returns a lower bound of the distance of two boxes with these half extents, along the axes of both: the second one
+    /// is turned, and its middle is at `way` from that of the first. Unit: metres.
+    fn boxes_apart(&self, way: Vector3<f64>, [first, second]: [&Vector3<f64>; 2]) -> f64 {
+        let along_first = way.abs() - first - self.spread * second;
+        let along_second = self.turned.tr_mul(&way).abs() - second - self.spread.tr_mul(first);
+        along_first.max().max(along_second.max())
+    }
 }
 
 impl Ball {
@@ -235,7 +261,13 @@ impl Form {
             let ball = Ball::around(std::slice::from_ref(solid))?;
             Some(Solid { pose: form.position, shape: form.shape, ball, half })
         });
-        Self { solids: forms.collect(), middle: around.middle, radius: around.radius }
+        let ends = solids.iter().map(actcheck_data::Part::bounds).reduce(|(low, high), (lower, upper)| {
+            let pick =
+                |of: fn(f64, f64) -> f64, a: [f64; 3], b: [f64; 3]| [of(a[0], b[0]), of(a[1], b[1]), of(a[2], b[2])];
+            (pick(f64::min, low, lower), pick(f64::max, high, upper))
+        });
+        let half = ends.map_or(Vector3::zeros(), |(low, high)| (Vector3::from(high) - Vector3::from(low)) / 2.0);
+        Self { solids: forms.collect(), middle: around.middle, half, radius: around.radius }
     }
 }
 
@@ -255,7 +287,8 @@ mod tests {
             let way =
                 Vector3::new(libm::cos(a), libm::sin(a) * libm::cos(b), libm::sin(b)) * (0.2 + f64::from(step) * 0.002);
             let pose = Isometry3::new(way, Vector3::new(b, a, 0.4));
-            let bound = boxes_apart(way, &pose.rotation.to_rotation_matrix().into_inner(), [&first, &second]);
+            let bound =
+                Turned::new(pose.rotation.to_rotation_matrix().into_inner()).boxes_apart(way, [&first, &second]);
             let true_m = distance(&EnginePose::IDENTITY, &shapes[0], &to_pose(&pose), &shapes[1])
                 .map_or(0.0, |found| f64::from(found.distance));
             assert!(bound <= true_m + ROUNDING_M, "{bound} {true_m}");
