@@ -75,6 +75,7 @@ pub fn resume_all(
     mut on_run: impl FnMut(&RunRecord),
 ) -> CampaignResult {
     let jobs = options.jobs.max(1);
+    history.use_threads(jobs);
     let halt = AtomicBool::new(false);
     let clock = options.context.clock;
     // Less the time taken before it was interrupted.

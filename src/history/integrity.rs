@@ -65,7 +65,7 @@ impl History {
                     .to_owned(),
             }),
         }
-        if journal::read(dir).is_ok_and(|bytes| !journal::statements(&bytes).1) {
+        if journal::read(dir).is_ok_and(|bytes| !journal::statements(&bytes, journal::cores()).1) {
             let reason = pending::DAMAGED.to_owned();
             found.damage.push(Damage { file: PathBuf::from(journal::NAME), run: None, reason });
         }

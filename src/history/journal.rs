@@ -143,12 +143,16 @@ impl Statements {
     }
 }
 
+/// Number of this machine's cores.
+pub(super) fn cores() -> usize {
+    std::thread::available_parallelism().map_or(1, NonZero::get)
+}
+
 /// Returns the statements of a journal, and whether all of it could be read. Half a record at the end was left by a
-/// killed process: it was never reported. All cores share the work.
-pub(super) fn statements(bytes: &[u8]) -> (Statements, bool) {
+/// killed process: it was never reported. As many threads share the work.
+pub(super) fn statements(bytes: &[u8], threads: usize) -> (Statements, bool) {
     let records: Vec<Option<(usize, &[u8])>> = records(bytes).collect();
-    let cores = std::thread::available_parallelism().map_or(1, NonZero::get);
-    let of_each = records.len().div_ceil(cores).max(FEWEST_RECORDS);
+    let of_each = records.len().div_ceil(threads.max(1)).max(FEWEST_RECORDS);
     let decoded = |records: &[Option<(usize, &[u8])>]| {
         let (part, is_whole) = part_of(records.iter().copied(), &Wanted::all());
         let (of_default, of_named) = part.quads.into_iter().partition(|quad| quad.graph_name.is_default_graph());
@@ -383,7 +387,7 @@ mod tests {
     }
 
     fn statements(bytes: &[u8]) -> (Vec<Quad>, bool) {
-        let (statements, is_whole) = super::statements(bytes);
+        let (statements, is_whole) = super::statements(bytes, 2);
         (statements.into_quads().collect(), is_whole)
     }
 

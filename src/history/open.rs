@@ -127,7 +127,7 @@ impl History {
     pub fn open_to_salvage(dir: &Path) -> Result<(Self, Vec<String>), Diagnostics> {
         let folder = Folder::to_read(dir)?;
         let snapshot = Snapshot::salvage(&folder)?;
-        let (journal, is_whole) = journal::statements(&snapshot.journal);
+        let (journal, is_whole) = journal::statements(&snapshot.journal, journal::cores());
         let opened = read_tables(&folder, Arc::new(snapshot))?;
         let salvaged = salvage(&opened.store, journal.into_quads().collect(), is_whole, &folder.traced())
             .map_err(|error| fault::store(dir, "reading it", &error))?;
@@ -189,6 +189,7 @@ impl History {
             view: Mutex::default(),
             loaded: LoadedFiles::default(),
             single_outlines: AtomicUsize::new(0),
+            threads: AtomicUsize::new(journal::cores()),
             restore: OnceLock::new(),
         }
     }

@@ -2,6 +2,7 @@
 
 use std::io;
 use std::sync::PoisonError;
+use std::sync::atomic::Ordering;
 
 use oxigraph::model::{Quad, Term};
 use oxigraph::store::{StorageError, Store};
@@ -75,9 +76,9 @@ impl History {
         if journal.statements == 0 {
             return Ok(());
         }
-        self.take_over(&mut journal, |store, statements| {
+        self.take_over(&mut journal, |store, statements, threads| {
             if statements.len() >= FEWEST_LOADED {
-                return load(store, statements);
+                return load(store, statements, threads);
             }
             store.extend(statements.into_quads())?;
             store.flush()
@@ -97,9 +98,9 @@ impl History {
             return Ok(());
         }
         let synced = journal.synced;
-        self.take_over(&mut journal, |store, statements| {
+        self.take_over(&mut journal, |store, statements, threads| {
             if statements.len() >= FEWEST_READ {
-                return load(store, statements);
+                return load(store, statements, threads);
             }
             // Transactions survive a kill, too.
             extend(store, statements.into_quads().collect())?;
@@ -110,24 +111,25 @@ impl History {
     /// Writes the journal of a killed process into the store.
     pub(super) fn take_over_journal(&self) -> Result<(), Diagnostics> {
         let mut journal = self.journal();
-        self.take_over(&mut journal, |store, statements| match statements.len() {
+        self.take_over(&mut journal, |store, statements, threads| match statements.len() {
             0 => Ok(()),
             1..FEWEST_LOADED => extend(store, statements.into_quads().collect()).and_then(|()| store.flush()),
-            _ => load(store, statements),
+            _ => load(store, statements, threads),
         })
     }
 
     fn take_over(
         &self,
         journal: &mut Journal,
-        take: impl FnOnce(&Store, Statements) -> Result<(), StorageError>,
+        take: impl FnOnce(&Store, Statements, usize) -> Result<(), StorageError>,
     ) -> Result<(), Diagnostics> {
+        let threads = self.threads.load(Ordering::Relaxed);
         let bytes = journal::read(self.dir()).map_err(|error| fault::io(self.dir(), "reading its journal", &error))?;
-        let (statements, is_whole) = journal::statements(&bytes);
+        let (statements, is_whole) = journal::statements(&bytes, threads);
         if !is_whole {
             return Err(fault::damaged(self.dir(), DAMAGED));
         }
-        take(&*self.bare_store()?, statements).map_err(|error| self.fault("writing its tables", &error))?;
+        take(&*self.bare_store()?, statements, threads).map_err(|error| self.fault("writing its tables", &error))?;
         // Only then: a killed process leaves the statements in both.
         journal.remove().map_err(|error| self.unwritten(&error))
     }
@@ -138,10 +140,10 @@ impl History {
 }
 
 /// Writes statements directly into tables.
-fn load(store: &Store, statements: Statements) -> Result<(), StorageError> {
+fn load(store: &Store, statements: Statements, threads: usize) -> Result<(), StorageError> {
     // The library makes the tables of each batch in a thread. Default graph and named graphs have indexes of their own,
     // so that there is still one table for each index. The library counts a thousand statements as a megabyte.
-    let threads = 2;
+    let threads = threads.min(2);
     let megabytes = threads * (statements.len() / 1000 + 1);
     let mut loader = store.bulk_loader().with_num_threads(threads).with_max_memory_size_in_megabytes(megabytes);
     loader.load_quads(statements.of_named.into_iter().flatten())?;

@@ -47,10 +47,17 @@ pub struct History {
     pub(super) loaded: LoadedFiles,
     /// Number of outlines that this process has written.
     pub(super) single_outlines: AtomicUsize,
+    /// Greatest number of threads that make its tables.
+    pub(super) threads: AtomicUsize,
     pub(super) restore: OnceLock<Box<Restore>>,
 }
 
 impl History {
+    /// Limits the threads that write its tables at the end of a campaign: otherwise, all cores do.
+    pub fn use_threads(&self, threads: usize) {
+        self.threads.store(threads.max(1), Ordering::Relaxed);
+    }
+
     /// The folder as the caller gave it.
     pub fn dir(&self) -> &Path {
         self.folder.dir()
