@@ -168,7 +168,7 @@ impl Env {
         (surface, values): &(String, BTreeMap<ChoiceName, Vec<ChoiceValue>>),
         test: usize,
     ) -> Option<Diagnostic> {
-        let mut reasons = Vec::new();
+        let (mut reasons, mut n_places) = (Vec::new(), 0);
         let mut weakest: Option<actions::ForeseenPick> = None;
         for [x, y] in PLACES_M {
             let mut values = values.clone();
@@ -180,6 +180,7 @@ impl Env {
             let (Some(target), Ok(mut world)) = (designated(&scene, "pickObject"), world::build(&scene)) else {
                 continue;
             };
+            n_places += 1;
             match actions::foresee_pick(&target, &mut world, &mut Choices::named(&values)) {
                 Ok(pick) if weakest.as_ref().is_none_or(|least| pick.payload_kg < least.payload_kg) => {
                     weakest = Some(pick);
@@ -193,7 +194,7 @@ impl Env {
                 "the arm can't pick `{}` at {} of {} places on `{surface}`: {reason}",
                 model.name,
                 reasons.len(),
-                PLACES_M.len(),
+                n_places,
             );
             let help =
                 "picks there will fail: name a lower or smaller surface, or add `postures` to the robot's profile";
