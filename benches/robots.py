@@ -8,9 +8,9 @@
 For each robot whose file is below one of the folders: a profile by `actcheck new robot` (after `check --mend` where the
 file has impossible moments of inertia), its lines, whether `check` accepts it, and how many of the runs pick a lone can,
 cube and box without noise, and place a can that the robot has found with its camera. With `--speed`, the last figure
-is the simulated time by CPU time of a pick, on one core: of the thing that the robot picked most often. If it picked none, of the thing, also a block or a
-peg, for which it moved longest. Nothing is edited by hand, but TIAGo's gripper comes from
-another package than its arm: `tiago_gripper.urdf.xacro` includes `tiago_no_hand.urdf` and
+is the simulated time by CPU time of a pick, on one core: of the thing that the robot picked most often. If it picked
+none, of the thing, also a block or a peg, for which it moved longest. Nothing is edited by hand, but TIAGo's gripper
+comes from another package than its arm: `tiago_gripper.urdf.xacro` includes `tiago_no_hand.urdf` and
 `pal_gripper_description/urdf/gripper.urdf.xacro`, and calls `pal_gripper` with the parent `wrist_ft_tool_link` and
 the origin of `end_effector.urdf.xacro`. Folders that are packages themselves are named one by one.
 """

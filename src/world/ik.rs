@@ -158,3 +158,45 @@ fn pose_error(from: &Isometry3<f64>, to: &Isometry3<f64>) -> Vector6<f64> {
     let angular = (to.rotation * from.rotation.inverse()).scaled_axis();
     Vector6::new(linear.x, linear.y, linear.z, angular.x, angular.y, angular.z)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::robot::tests::lonely;
+
+    /// With five of its joints, an arm reaches the places and slants of its own postures, whatever their heading: the hand
+    /// turns by the angle that is returned, and nothing else about the target changes.
+    #[test]
+    fn an_arm_of_five_joints_reaches_targets_that_are_turned_by_an_unreachable_angle() {
+        let world = lonely();
+        let (kinematics, layout) = (world.kinematics(), world.layout());
+        let start = world.observe().positions;
+        let five = &layout.arm[..5];
+        let mut mobility = vec![0.0; start.len()];
+        five.iter().for_each(|idx| mobility[*idx] = 1.0);
+        let (mut n_reached, mut n_exact) = (0, 0);
+        for trial in 0..40 {
+            let mut posture = start.clone();
+            for (place, idx) in five.iter().enumerate() {
+                let off = libm::sin(f64::from(trial) * 1.7 + place as f64 * 2.3) * 0.25;
+                let joint = &kinematics.joints()[*idx];
+                posture[*idx] = (posture[*idx] + off).clamp(joint.lower, joint.upper);
+            }
+            let target = turned(&kinematics.grasp(&posture), 0.15 * libm::cos(f64::from(trial)));
+            let reach = Reach { target, mobility: mobility.clone() };
+            n_exact += u32::from(solve(kinematics, &start, &reach).is_some());
+            let Some((found, turn)) = solve_turned(kinematics, &start, &reach, 0.3) else { continue };
+            n_reached += 1;
+            let error = pose_error(&kinematics.grasp(&found), &turned(&target, turn));
+            assert!(is_reached(&error), "{error}");
+            assert!(turn.abs() <= 0.3, "{turn}");
+            let moved = (0..start.len()).filter(|idx| !five.contains(idx)).all(|idx| found[idx] == start[idx]);
+            assert!(moved, "only the five joints move");
+        }
+        assert!(n_reached >= 36 && n_exact < n_reached, "{n_reached} reached, {n_exact} without a turn");
+        // A turn that is not allowed is no solution.
+        let target = turned(&kinematics.grasp(&start), 1.0);
+        let found = solve_turned(kinematics, &start, &Reach { target, mobility }, 0.1);
+        assert!(found.is_none_or(|(_, turn)| turn.abs() <= 0.1));
+    }
+}

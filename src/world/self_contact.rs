@@ -296,4 +296,41 @@ mod tests {
         }
         assert!(close > 40, "the bound is close where a face is nearest: {close}");
     }
+
+    /// Skipping solids by the boxes around their links never changes whether links are too close.
+    #[test]
+    fn links_touch_exactly_if_two_of_their_solids_do() {
+        let world = crate::robot::tests::lonely();
+        let kinematics = world.kinematics();
+        let start = world.observe().positions;
+        let itself = SelfContact::new(kinematics, std::slice::from_ref(&start));
+        let (mut close, mut apart) = (0, 0);
+        for trial in 0..150 {
+            let mut posture = start.clone();
+            for (idx, joint) in kinematics.joints().iter().enumerate() {
+                let share = libm::sin(f64::from(trial) * 3.1 + idx as f64 * 1.9);
+                posture[idx] = (posture[idx] + share * 2.0).clamp(joint.lower, joint.upper);
+            }
+            let poses = kinematics.links(&posture);
+            let least = |pair: &Pair| {
+                let (first, second) = pair.links;
+                let of = |link: usize| itself.links[link].solids.iter().map(move |solid| (link, solid));
+                let placed = |(link, solid): (usize, &Solid)| to_pose(&poses[link]) * solid.pose;
+                let all = of(first).flat_map(|a| of(second).map(move |b| (a, b)));
+                let gaps = all.map(|(a, b)| {
+                    let found = distance(&placed(a), a.1.shape.as_ref(), &placed(b), b.1.shape.as_ref());
+                    found.map_or(0.0, |found| f64::from(found.distance))
+                });
+                gaps.fold(f64::INFINITY, f64::min) - pair.clear_m
+            };
+            for pair in &itself.pairs {
+                let spare = least(pair);
+                if spare.abs() > ROUNDING_M {
+                    assert_eq!(is_closer(&itself.links, *pair, &poses), spare < 0.0, "{:?} by {spare}", pair.links);
+                    if spare < 0.0 { close += 1 } else { apart += 1 }
+                }
+            }
+        }
+        assert!(close > 100 && apart > 1000, "{close} close, {apart} apart");
+    }
 }
