@@ -14,7 +14,7 @@ use crate::ik::Reach;
 use actcheck_data::RobotProfile;
 
 /// Longest arm that is mounted on the surface. Unit: metres. In front of a table, an arm has a quarter of a metre before it.
-const SHORT_M: f64 = 0.55;
+const SHORT_M: f64 = 0.65;
 /// Height of the hand that takes a small object from above, and how far it lifts it. Unit: metres.
 const LOW_M: f64 = 0.03;
 const LIFT_M: f64 = 0.06;
