@@ -100,3 +100,22 @@ fn objects_are_within_reach_of_an_arm_on_the_table_and_clear_of_it() {
         }
     }
 }
+
+/// Jaws that turn are a wedge around a wide object. Friction holds a cube of 4 cm between them, and not a slippery one of 7 cm.
+#[test]
+fn check_predicts_objects_that_turning_jaws_squeeze_out() {
+    let folder = tempfile::tempdir().unwrap();
+    write_project(folder.path(), 4);
+    let cube = std::fs::read_to_string(folder.path().join("models/objects/cube.toml")).unwrap();
+    let wide = cube.replace("0.04", "0.07").replace("0.02]", "0.035]").replace("friction = 0.5", "friction = 0.2");
+    std::fs::write(folder.path().join("models/objects/wide.toml"), wide).unwrap();
+    let config = std::fs::read_to_string(folder.path().join("c.toml")).unwrap();
+    std::fs::write(folder.path().join("w.toml"), config.replace("[\"cube\"]", "[\"wide\"]")).unwrap();
+    let said = |config: &str| stderr(&actcheck(folder.path(), &["check", config]));
+    assert!(!said("c.toml").contains("S072"), "{}", said("c.toml"));
+    let words = said("w.toml").replace('│', " ").split_whitespace().collect::<Vec<_>>().join(" ");
+    assert!(words.contains("S072") && words.contains("`wide` is squeezed out of the gripper"), "{words}");
+    let ran = actcheck(folder.path(), &["run", "w.toml", "--history", "h", "--format", "json"]);
+    let json: serde_json::Value = serde_json::from_str(&stdout(&ran)).unwrap_or_else(|_| panic!("{}", stderr(&ran)));
+    assert!(json["runs_passed"]["count"].as_u64().unwrap() <= 1, "{}", stderr(&ran));
+}

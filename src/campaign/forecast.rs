@@ -42,7 +42,10 @@ impl Env {
             let key = format!("pickObject.{idx}");
             let unheld = match self.campaign.robot.suction {
                 Some(cup) => self.unsealed(&key, model, &cup),
-                None => self.too_wide(&key, model).or_else(|| self.too_slippery(&key, model)),
+                None => {
+                    let narrow = self.too_wide(&key, model).or_else(|| self.too_slippery(&key, model));
+                    narrow.or_else(|| self.squeezed_out(&key, model))
+                }
             };
             if let Some(warning) = unheld {
                 found.push(warning);
@@ -157,6 +160,31 @@ impl Env {
         );
         let help = "every pick of it will fail: reduce the object's mass, or raise `grip_force_n` in the robot's profile, or \
              the `effort` of the finger joints in the URDF if that limits it";
+        Some(self.campaign.warning("S072", key, message).help(help))
+    }
+
+    /// S072 if the fingers are so steep a wedge around the object that friction does not hold it: half of the angle between
+    /// them is above the friction angle.
+    fn squeezed_out(&self, key: &str, model: &ObjectModel) -> Option<Diagnostic> {
+        let (robot, [width, depth, _]) = (&self.campaign.robot, model.size_m);
+        let width_m = width.min(depth);
+        let steepness = world::wedge(robot, width_m).ok()? / 2.0;
+        let friction = (robot.finger_friction * model.friction).sqrt();
+        if steepness < friction {
+            return None;
+        }
+        let degrees = |tangent: f64| libm::atan(tangent).to_degrees();
+        let message = format!(
+            "`{}` is squeezed out of the gripper: where the fingers of {} hold its width of {}, they are at {:.0}° to each \
+             other, and friction with a coefficient of {friction:.2} holds up to {:.0}°",
+            model.name,
+            robot.name,
+            centimetres(width_m),
+            2.0 * degrees(steepness),
+            2.0 * degrees(friction),
+        );
+        let help = "most picks of it will fail: name a narrower object or one with more friction, or set `grasp_offset_m` in the \
+             robot's profile nearer to the fingertips, where the fingers are less far apart";
         Some(self.campaign.warning("S072", key, message).help(help))
     }
 

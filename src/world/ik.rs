@@ -194,7 +194,7 @@ mod tests {
             assert!(moved, "only the five joints move");
         }
         assert!(n_reached >= 36 && n_exact < n_reached, "{n_reached} reached, {n_exact} without a turn");
-        // A turn that is not allowed is no solution.
+        // A larger turn than allowed is not a solution.
         let target = turned(&kinematics.grasp(&start), 1.0);
         let found = solve_turned(kinematics, &start, &Reach { target, mobility }, 0.1);
         assert!(found.is_none_or(|(_, turn)| turn.abs() <= 0.1));

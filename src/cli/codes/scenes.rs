@@ -180,7 +180,8 @@ const CODES_S: &[Code] = &[
     code(
         "S072",
         "an object is too heavy for the gripper or the arm",
-        "friction between the fingers, the seal of a suction cup, or the effort of a joint can't carry it",
+        "friction between the fingers, the seal of a suction cup, or the effort of a joint can't carry it, or fingers that turn \
+         squeeze it out",
         "reduce the object's mass, or raise `grip_force_n`, `suction_force_n` or the joint's `effort`",
     ),
     code(
