@@ -119,3 +119,16 @@ fn check_predicts_objects_that_turning_jaws_squeeze_out() {
     let json: serde_json::Value = serde_json::from_str(&stdout(&ran)).unwrap_or_else(|_| panic!("{}", stderr(&ran)));
     assert!(json["runs_passed"]["count"].as_u64().unwrap() <= 1, "{}", stderr(&ran));
 }
+
+#[test]
+fn a_reach_without_room_for_an_object_is_named() {
+    let folder = tempfile::tempdir().unwrap();
+    write_project(folder.path(), 1);
+    let profile = std::fs::read_to_string(folder.path().join("desk_arm.toml")).unwrap();
+    let near = profile.lines().map(|line| if line.starts_with("reach_m") { "reach_m = [0, 0.05]" } else { line });
+    std::fs::write(folder.path().join("desk_arm.toml"), near.collect::<Vec<_>>().join("\n")).unwrap();
+    let ran = actcheck(folder.path(), &["run", "c.toml", "--history", "h"]);
+    assert_eq!(ran.status.code(), Some(2), "{}", stderr(&ran));
+    let words = stderr(&ran).replace('│', " ").split_whitespace().collect::<Vec<_>>().join(" ");
+    assert!(words.contains("S030") && words.contains("by `reach_m` in its profile"), "{words}");
+}

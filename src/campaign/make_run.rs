@@ -81,6 +81,13 @@ fn entry(env: &Env, record: &RunRecord) -> Result<Entry, Diagnostics> {
 }
 
 fn no_scene(env: &Env, planned: &Planned, last: Option<&String>) -> Diagnostic {
+    let room = "put fewer objects on the surface (`[surfaceObjects] count`), smaller ones, or a larger surface";
+    let help = match env.campaign.robot.reach_m {
+        Some([nearest, farthest]) => format!(
+            "{room}; objects to pick must be {nearest} to {farthest} m from the robot's root, by `reach_m` in its profile"
+        ),
+        None => room.to_owned(),
+    };
     Diagnostic::error(
         "S030",
         format!(
@@ -90,5 +97,5 @@ fn no_scene(env: &Env, planned: &Planned, last: Option<&String>) -> Diagnostic {
         ),
     )
     .at(&env.campaign.source, 0..0)
-    .help("put fewer objects on the surface (`[surfaceObjects] count`), smaller ones, or a larger surface")
+    .help(help)
 }
