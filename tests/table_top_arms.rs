@@ -40,7 +40,7 @@ fn write_project(folder: &Path, count: u32) {
     let config = format!(
         "tests = [[\"Pick\"]]\ntest_count = {count}\nseed = 5\nmodel_dir = \"models\"\n[objectSurface]\n\
         object_surfaces = [\"mini_coffee_table\"]\n[pickObject]\nmodel_list = [\"cube\"]\n[surfaceObjects]\n\
-        model_list = [\"salt_shaker\"]\ncount = [0, 2]\n[robot]\nprofile = \"desk_arm.toml\"\n"
+        model_list = [\"salt_shaker\", \"spoon\"]\ncount = [0, 2]\n[robot]\nprofile = \"desk_arm.toml\"\n"
     );
     std::fs::write(folder.join("c.toml"), config).unwrap();
     let made = actcheck(folder, &["new", "robot", "desk_arm.urdf"]);

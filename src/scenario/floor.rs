@@ -33,6 +33,10 @@ const BASE_ROOM_M: f64 = 0.4;
 const FIXED_ROOM_M: f64 = 0.17;
 /// The same for an arm on the surface. Half the width of the base of a table-top arm, and room for a hand.
 const MOUNTED_ROOM_M: f64 = 0.1;
+/// Height of the lower end of that space above the floor, and for an arm on the surface, above that. Unit: metres. The latter
+/// is the least at which it is clear of the surface itself.
+const FOOT_M: f64 = 0.05;
+const MOUNTED_FOOT_M: f64 = 0.005;
 /// Height of that free space. Unit: metres.
 const BASE_HEIGHT_M: f64 = 1.2;
 /// Minimum distance between start and goal of a base that has to drive. Unit: metres.
@@ -102,12 +106,12 @@ impl SceneBuilder<'_> {
 
     /// The space that the robot occupies at the start.
     fn own_room(&self, base: [f64; 3]) -> Solid {
-        let radius = match (self.space.robot.on_surface, self.is_fixed()) {
-            (true, _) => MOUNTED_ROOM_M,
-            (false, true) => FIXED_ROOM_M,
-            (false, false) => BASE_ROOM_M,
+        let (radius, foot_m) = match (self.space.robot.on_surface, self.is_fixed()) {
+            (true, _) => (MOUNTED_ROOM_M, self.ground_m + MOUNTED_FOOT_M),
+            (false, true) => (FIXED_ROOM_M, FOOT_M),
+            (false, false) => (BASE_ROOM_M, FOOT_M),
         };
-        room_for_base(base, radius, self.ground_m)
+        room_for_base(base, radius, foot_m)
     }
 
     /// Transforms x, y and heading from the platform's frame to the world.
@@ -227,7 +231,7 @@ impl SceneBuilder<'_> {
             Some(world) => world.map.locations.iter().map(|location| location.at).collect(),
             None => self.fronts(),
         };
-        rooms.extend(fronts.into_iter().map(|front| room_for_base(front, BASE_ROOM_M, 0.0)));
+        rooms.extend(fronts.into_iter().map(|front| room_for_base(front, BASE_ROOM_M, FOOT_M)));
         let range = if drives { self.arena(world) } else { world.map_or_else(|| field(base), Surroundings::extent) };
         let kept_free =
             (!may_block && !self.is_fixed()).then(|| KeptFree::new(&self.objects, map, &self.designators, base));
@@ -333,8 +337,8 @@ fn field([x, y, _]: [f64; 3]) -> ([f64; 2], [f64; 2]) {
 }
 
 /// The space that a base occupies: a cylinder above the floor, or above the surface that it is mounted on.
-fn room_for_base([x, y, _]: [f64; 3], radius: f64, ground_m: f64) -> Solid {
+fn room_for_base([x, y, _]: [f64; 3], radius: f64, foot_m: f64) -> Solid {
     let room = Shape::Cylinder { radius, height: BASE_HEIGHT_M };
-    let pose = Pose::upright([x, y, ground_m + (BASE_HEIGHT_M / 2.0 + 0.05)], 0.0);
+    let pose = Pose::upright([x, y, BASE_HEIGHT_M / 2.0 + foot_m], 0.0);
     Solid::of_parts(&[Part { pose, shape: room }], &Pose::IDENTITY)
 }
