@@ -19,6 +19,7 @@ mod paths;
 mod ranges;
 pub mod robot;
 mod robot_cup;
+mod robot_place;
 mod robot_roles;
 mod schema;
 mod skill;

@@ -1,6 +1,6 @@
 //! Robot profiles: the roles of a URDF's joints and links.
 
-use actcheck_base::{Diagnostic, Diagnostics, Digest, Files, Source, did_you_mean, digest_of};
+use actcheck_base::{Diagnostic, Diagnostics, Digest, Files, Source, digest_of};
 use actcheck_data::RobotProfile;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -9,6 +9,7 @@ use std::sync::Arc;
 use crate::foreign::{self, Lookup};
 use crate::paths::resolve_path;
 use crate::robot_cup::{OF_FINGERS, exclude_fingers, read_suction};
+use crate::robot_place::{read_base, read_place};
 use crate::robot_roles::Roles;
 use crate::xacro::{self, Inputs, Unexpanded};
 use crate::{Located, Table};
@@ -279,44 +280,6 @@ fn with_meshes(mut profile: RobotProfile, read: foreign::robot::RobotText) -> Ro
     profile
 }
 
-/// Reads the base: joints of the URDF, joints added below its root (`true`), or none.
-fn read_base(table: &mut Table, roles: &mut Roles) -> Option<(Option<[String; 3]>, bool)> {
-    let kind = table.string("base");
-    let joints = if table.has("base_joints") { Some(names(table, "base_joints", roles)?) } else { None };
-    let Some(kind) = kind else { return Some((joints, false)) };
-    match (kind.value.as_str(), joints) {
-        ("planar", None) => Some((Some(RobotProfile::PLANAR_JOINTS.map(str::to_owned)), true)),
-        ("fixed", None) => Some((None, false)),
-        ("planar" | "fixed", Some(_)) => {
-            let message = format!("`base = \"{}\"` and `base_joints` exclude each other", kind.value);
-            table.fault("W052", kind.span, message, "use `base_joints` only if the URDF has joints for the base");
-            None
-        }
-        (other, _) => {
-            let help = did_you_mean(other, ["planar", "fixed"]);
-            table.fault("W011", kind.span, format!("unknown base `{other}`"), help);
-            None
-        }
-    }
-}
-
-/// Reads where a fixed robot is mounted, and how far it reaches.
-fn read_place(table: &mut Table, is_mobile: bool) -> (bool, Option<[f64; 2]>) {
-    for key in ["mount", "mount_turned_rad", "reach_m"].into_iter().filter(|_| is_mobile) {
-        if let Some(span) = table.key_span(key) {
-            let help = format!("leave out `{key}`, or the base if the robot does not drive");
-            table.fault("W052", span, format!("`{key}` is of a fixed robot, and this one has a mobile base"), help);
-        }
-    }
-    let mount = table.string("mount");
-    let on_surface = mount.as_ref().is_some_and(|mount| mount.value == "surface");
-    if let Some(mount) = mount.filter(|mount| !["floor", "surface"].contains(&mount.value.as_str())) {
-        let help = did_you_mean(&mount.value, ["floor", "surface"]);
-        table.fault("W011", mount.span, format!("unknown mount `{}`", mount.value), help);
-    }
-    (on_surface, table.range("reach_m", 0.0..=3.0).map(|(nearest, farthest)| [nearest, farthest]))
-}
-
 fn read_table(
     table: &mut Table,
     urdf: Option<&Source>,
@@ -433,7 +396,7 @@ fn finger_joints(table: &mut Table, roles: &mut Roles) -> Option<Vec<String>> {
 }
 
 /// Reads a list of exactly `N` names: of links if the key ends in `_links`, else of joints.
-fn names<const N: usize>(table: &mut Table, key: &'static str, roles: &mut Roles) -> Option<[String; N]> {
+pub(super) fn names<const N: usize>(table: &mut Table, key: &'static str, roles: &mut Roles) -> Option<[String; N]> {
     let span = table.key_span(key)?;
     let list = table.strings(key)?;
     let length = list.len();
