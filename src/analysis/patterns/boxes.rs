@@ -190,34 +190,46 @@ impl Axis {
     pub(super) fn highest(&self, row: &[Count], likelihood: &Likelihood, fewest: u64) -> (f64, usize) {
         let mut highest = (0.0, 0);
         let mut place = 0;
-        let mut look = |count: Count| {
+        let mut look = |count: Count, place: &mut usize| {
             if failures_of(count) >= fewest {
                 let score = likelihood.gain(count);
                 if score > highest.0 {
-                    highest = (score, place);
+                    highest = (score, *place);
                 }
             }
-            place += 1;
+            *place += 1;
         };
         match &self.conditions {
             Conditions::Ranges(_) | Conditions::Arcs(_) => {
+                let all = row[1..self.cells].iter().fold(0, |sum: Count, count| sum.wrapping_add(*count));
+                let mut rest = all;
                 for first in 1..self.cells {
+                    // The other ranges have no more failures than those that begin here together.
+                    if failures_of(rest) < fewest {
+                        place = self.cells * (self.cells - 1) / 2;
+                        break;
+                    }
                     let mut sum: Count = 0;
                     for count in &row[first..self.cells] {
                         sum = sum.wrapping_add(*count);
-                        look(sum);
+                        look(sum, &mut place);
                     }
+                    rest = rest.wrapping_sub(row[first]);
                 }
                 if let Conditions::Arcs(_) = self.conditions {
-                    let all = row[1..self.cells].iter().fold(0, |sum: Count, count| sum.wrapping_add(*count));
+                    let (mut begun, mut outside) = (0, all);
                     for (first, last) in self.gaps() {
-                        look(row[first..=last].iter().fold(all, |sum, count| sum.wrapping_sub(*count)));
+                        let from = if begun == first { last } else { first };
+                        let before = if begun == first { outside } else { all };
+                        outside = row[from..=last].iter().fold(before, |sum, count| sum.wrapping_sub(*count));
+                        begun = first;
+                        look(outside, &mut place);
                     }
                 }
             }
             Conditions::Kinds(kinds) => {
                 for (_, members) in kinds {
-                    look(members.iter().fold(0, |sum, cell| sum.wrapping_add(row[*cell])));
+                    look(members.iter().fold(0, |sum, cell| sum.wrapping_add(row[*cell])), &mut place);
                 }
             }
         }
