@@ -223,7 +223,7 @@ impl Search<'_> {
         best.map(|(_, found)| found)
     }
 
-    /// Inverse kinematics; an arm of few joints may turn the hand somewhat.
+    /// Inverse kinematics; an arm of few joints may turn the hand.
     pub(super) fn solve(&self, seed: &[f64], reach: &Reach) -> Option<Vec<f64>> {
         if reach.mobility.iter().filter(|weight| **weight > 0.0).count() >= FULL_ARM {
             return ik::solve(self.kinematics, seed, reach);
