@@ -42,6 +42,7 @@ fn main() {
     println!("{:44} {:>8} {:>8} {:>8} {:>22}", "", "workers", "runs/s", "written", "times as fast as simulating");
     let judge = |what: &str, jobs: usize, properties: &[String]| {
         settle(history.dir());
+        history.use_threads(jobs);
         let start = Instant::now();
         // As `actcheck recheck` does.
         let prepare = || RuleSet::prepare(&Files::Disk, &ontology).and_then(|rules| rules.only(properties));

@@ -41,6 +41,9 @@ pub struct RecheckEnd {
     pub faults: Diagnostics,
 }
 
+/// Number of runs that a worker takes at once: few, so that no worker waits long for the others at the end of a batch.
+const SHARED: usize = 4;
+
 /// The results of one batch of runs.
 type Judged = Vec<Result<Vec<Recheck>, Diagnostics>>;
 
@@ -79,7 +82,7 @@ pub fn recheck<'a>(
         let (written, fresh) = pool.install(|| {
             rayon::join(
                 || judged.as_ref().map_or(Ok(()), |batch| history.commit_rechecks(batch, &options.at)),
-                || next.map(|runs| runs.par_iter().filter_map(judge).collect::<Judged>()),
+                || next.map(|runs| runs.par_iter().with_max_len(SHARED).filter_map(judge).collect::<Judged>()),
             )
         });
         if let Err(faults) = written {

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use crate::options::HistoryArgs;
 use crate::restore;
+use crate::work::all_cores;
 use actcheck_base::{Diagnostic, Diagnostics};
 use actcheck_history::History;
 
@@ -15,7 +16,15 @@ const NONE_FOUND: &str = "X002";
 /// # Errors
 /// No history or several are found, or the history can't be opened.
 pub fn open(args: &HistoryArgs) -> Result<History, Diagnostics> {
-    let history = History::open_existing(&folder(args)?)?;
+    open_with(args, all_cores())
+}
+
+/// Like [`open`], with at most this number of threads.
+///
+/// # Errors
+/// As [`open`].
+pub fn open_with(args: &HistoryArgs, threads: usize) -> Result<History, Diagnostics> {
+    let history = History::open_existing_with(&folder(args)?, threads)?;
     restore::allow(&history);
     Ok(history)
 }

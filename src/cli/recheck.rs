@@ -52,7 +52,7 @@ pub fn recheck(args: &RecheckArgs) -> Result<u8, Diagnostics> {
         jobs,
         || RuleSet::prepare(&files, &path)?.only(&args.properties),
         || {
-            let history = history_dir::open(&args.history)?;
+            let history = history_dir::open_with(&args.history, jobs)?;
             let runs = runs(&history, &args.campaigns)?;
             Ok((history, runs))
         },

@@ -63,7 +63,7 @@ fn kept(contacts: &[ContactEpisode], extent: Extent) -> Vec<&ContactEpisode> {
 
 fn write_contact(number: usize, contact: &ContactEpisode, writer: &mut Writer) {
     let subject = writer.named("contact", &number.to_string());
-    writer.class(subject, &names::w("Contact"));
+    writer.world_class(subject, "Contact");
     for (property, id) in ["first", "second"].into_iter().zip(&contact.pair) {
         let thing = writer.thing(id);
         writer.state(subject, property, thing);
@@ -85,7 +85,7 @@ fn write_extremes(extremes: &Extremes, writer: &mut Writer) {
 
 fn write_percept(number: usize, percept: &Percept, began_secs: f64, writer: &mut Writer) {
     let subject = writer.named("percept", &number.to_string());
-    writer.class(subject, &names::w("Percept"));
+    writer.world_class(subject, "Percept");
     let seen = writer.thing(&percept.id);
     writer.state(subject, "ofObject", seen);
     writer.numbers(subject, ["x", "y", "z"], percept.pose.position);
@@ -122,7 +122,7 @@ pub(super) fn write_cameras(action: &ActionTrace, writer: &mut Writer) {
 fn write_perceived(perceived: &Perceived, began_secs: f64, writer: &mut Writer) {
     if let Some(plane) = &perceived.plane {
         let subject = writer.w("perceivedPlane");
-        writer.class(subject, &names::w("PerceivedPlane"));
+        writer.world_class(subject, "PerceivedPlane");
         writer.numbers(subject, ["x", "y", "z"], plane.pose.position);
         writer.numbers(subject, ["yaw", "tilt"], [plane.pose.yaw(), plane.pose.tilt()]);
         writer.numbers(subject, ["extentX", "extentY"], plane.size_m);
@@ -130,7 +130,7 @@ fn write_perceived(perceived: &Perceived, began_secs: f64, writer: &mut Writer) 
     }
     for (idx, thing) in perceived.things.iter().enumerate() {
         let subject = writer.named("perceivedObject", &(idx + 1).to_string());
-        writer.class(subject, &names::w("PerceivedObject"));
+        writer.world_class(subject, "PerceivedObject");
         writer.numbers(subject, ["x", "y", "z"], thing.pose.position);
         writer.number(subject, "yaw", thing.pose.yaw());
         writer.numbers(subject, ["sizeX", "sizeY", "sizeZ"], thing.size_m);

@@ -1,14 +1,13 @@
 //! Facts about a world's map: its locations, rooms and surfaces. They hold in every snapshot.
 
 use crate::writer::Writer;
-use actcheck_base::names;
 use actcheck_data::SceneMap;
 
 /// Writes every named place.
 pub(super) fn write(map: &SceneMap, writer: &mut Writer) {
     for location in &map.locations {
         let subject = writer.named("location", &location.name);
-        writer.class(subject, &names::w("Location"));
+        writer.world_class(subject, "Location");
         writer.text(subject, "name", &location.name);
         writer.numbers(subject, ["x", "y", "yaw"], location.at);
         if let Some(surface) = &location.surface {
@@ -19,14 +18,14 @@ pub(super) fn write(map: &SceneMap, writer: &mut Writer) {
     }
     for room in &map.rooms {
         let subject = writer.named("room", &room.name);
-        writer.class(subject, &names::w("Room"));
+        writer.world_class(subject, "Room");
         writer.text(subject, "name", &room.name);
         writer.numbers(subject, ["lowX", "lowY"], room.low_m);
         writer.numbers(subject, ["highX", "highY"], room.high_m);
     }
     for surface in &map.surfaces {
         let subject = writer.thing(&surface.id);
-        writer.class(subject, &names::w("Surface"));
+        writer.world_class(subject, "Surface");
         let [x, y, z] = surface.at;
         writer.number(subject, "surfaceHeight", z);
         writer.numbers(subject, ["surfaceLength", "surfaceWidth"], surface.size_m);

@@ -1,7 +1,6 @@
 //! Facts about the robot's joints, self-contacts and held objects during one action.
 
 use crate::writer::Writer;
-use actcheck_base::names;
 use actcheck_data::RobotCourse;
 
 /// A joint that used less than this share of its maximum speed counts as unmoved: its speed is not written.
@@ -27,7 +26,7 @@ pub(super) fn write(course: &RobotCourse, writer: &mut Writer) {
     }
     for (idx, contact) in course.self_contacts.iter().enumerate() {
         let subject = writer.named("selfContact", &(idx + 1).to_string());
-        writer.class(subject, &names::w("SelfContact"));
+        writer.world_class(subject, "SelfContact");
         for (property, link) in ["firstLink", "secondLink"].into_iter().zip(&contact.pair) {
             let link = writer.thing(link);
             writer.state(subject, property, link);

@@ -1,7 +1,7 @@
 //! Facts about one snapshot.
 
 use crate::writer::Writer;
-use actcheck_base::{TermId, names};
+use actcheck_base::TermId;
 use actcheck_data::{BodyState, JointState, Pose, RobotState, Snapshot};
 
 pub(super) const POSITION: [&str; 3] = ["x", "y", "z"];
@@ -72,7 +72,7 @@ pub(super) fn write_links(robot: &RobotState, writer: &mut Writer) {
 
 fn write_joint(joint: &JointState, writer: &mut Writer) {
     let subject = writer.named("joint", &joint.name);
-    writer.class(subject, &names::w("Joint"));
+    writer.world_class(subject, "Joint");
     writer.numbers(
         subject,
         ["position", "velocity", "lower", "upper", "maxVelocity", "maxEffort"],

@@ -53,8 +53,12 @@ pub(super) struct Writer {
     iri: String,
     /// IDs of numbers, by the bits of their f32: most are the same before and after an action.
     numbers: HashMap<u32, TermId, RandomState>,
-    /// IDs of properties, by the place and the length of their texts.
-    properties: HashMap<(usize, usize), TermId, RandomState>,
+    /// IDs of terms that the program itself names, by the place and the length of their texts.
+    constants: HashMap<(usize, usize), TermId, RandomState>,
+    /// IDs of the objects in the simulation, by their IDs there.
+    things: HashMap<String, TermId, RandomState>,
+    /// ID of `rdf:type`, once it is in use.
+    rdf_type: Option<TermId>,
 }
 
 /// Room for the terms of a usual run.
@@ -78,37 +82,47 @@ impl Writer {
 
     /// Interns the IRI of an object in the simulation.
     pub(super) fn thing(&mut self, id: &str) -> TermId {
-        self.terms.intern(Term::iri(thing_iri(id)))
+        if let Some(known) = self.things.get(id) {
+            return *known;
+        }
+        let thing = self.terms.intern_iri(&thing_iri(id));
+        self.things.insert(id.to_owned(), thing);
+        thing
     }
 
     /// Interns a term of the world vocabulary.
     pub(super) fn w(&mut self, local: &str) -> TermId {
-        self.iri.clear();
-        self.iri.push_str(names::W);
-        self.iri.push_str(local);
-        self.terms.intern(Term::iri(&self.iri))
+        self.world_iri(&[local])
     }
 
-    /// Interns a property of the world vocabulary.
-    fn property(&mut self, local: &'static str) -> TermId {
+    /// Interns the IRI of the world vocabulary that ends in these parts.
+    fn world_iri(&mut self, parts: &[&str]) -> TermId {
+        self.iri.clear();
+        self.iri.push_str(names::W);
+        self.iri.extend(parts.iter().copied());
+        self.terms.intern_iri(&self.iri)
+    }
+
+    /// Interns a term of the world vocabulary that the program itself names: a property or a class.
+    fn constant(&mut self, local: &'static str) -> TermId {
         // A text of the program has one place in memory, which is compared faster than the text.
         let place = (local.as_ptr() as usize, local.len());
-        if let Some(id) = self.properties.get(&place) {
+        if let Some(id) = self.constants.get(&place) {
             return *id;
         }
         let id = self.w(local);
-        self.properties.insert(place, id);
+        self.constants.insert(place, id);
         id
     }
 
     /// Interns a term of the world vocabulary with a heading, such as `w:joint/NAME`.
     pub(super) fn named(&mut self, heading: &str, name: &str) -> TermId {
-        self.w(&format!("{heading}/{}", escaped(name)))
+        self.world_iri(&[heading, "/", &escaped(name)])
     }
 
     /// Adds a triple with a property of the world vocabulary.
     pub(super) fn state(&mut self, subject: TermId, property: &'static str, value: TermId) {
-        let property = self.property(property);
+        let property = self.constant(property);
         self.triples.push([subject, property, value]);
     }
 
@@ -139,13 +153,13 @@ impl Writer {
 
     /// Adds a string.
     pub(super) fn text(&mut self, subject: TermId, property: &'static str, value: &str) {
-        let value = self.terms.intern(Term::string(value));
+        let value = self.terms.intern_string(value);
         self.state(subject, property, value);
     }
 
     /// Adds a relation to an IRI.
     pub(super) fn iri(&mut self, subject: TermId, property: &'static str, iri: &str) {
-        let value = self.terms.intern(Term::iri(iri));
+        let value = self.terms.intern_iri(iri);
         self.state(subject, property, value);
     }
 
@@ -157,11 +171,22 @@ impl Writer {
         }
     }
 
-    /// Adds the class of the subject.
-    pub(super) fn class(&mut self, subject: TermId, class: &str) {
-        let property = self.terms.intern(Term::iri(format!("{}type", names::RDF)));
-        let class = self.terms.intern(Term::iri(class));
+    /// Adds the class of the subject, an IRI.
+    pub(super) fn class(&mut self, subject: TermId, iri: &str) {
+        let property = self.rdf_type();
+        let class = self.terms.intern_iri(iri);
         self.triples.push([subject, property, class]);
+    }
+
+    /// Adds the class of the subject, from the world vocabulary.
+    pub(super) fn world_class(&mut self, subject: TermId, local: &'static str) {
+        let property = self.rdf_type();
+        let class = self.constant(local);
+        self.triples.push([subject, property, class]);
+    }
+
+    fn rdf_type(&mut self) -> TermId {
+        *self.rdf_type.get_or_insert_with(|| self.terms.intern(Term::iri(format!("{}type", names::RDF))))
     }
 }
 

@@ -5,6 +5,7 @@ use std::collections::BTreeSet;
 use oxigraph::sparql::QueryEvaluationError;
 use oxigraph::store::Store;
 
+use crate::threads::cores;
 use crate::{History, RunFilter, RunRow, lists};
 use actcheck_base::Diagnostics;
 
@@ -20,7 +21,7 @@ pub fn newest_of_alike(runs: &[RunRow]) -> BTreeSet<String> {
 /// Returns the ids of the runs of a store that count in rates over all of its campaigns.
 pub(super) fn counted_runs(store: &Store) -> Result<BTreeSet<String>, QueryEvaluationError> {
     let selected = lists::selected_campaigns(store)?;
-    let mut runs = lists::runs(store, &RunFilter::default())?;
+    let mut runs = lists::runs(store, &RunFilter::default(), cores())?;
     runs.retain(|run| !selected.contains(&run.campaign));
     Ok(newest_of_alike(&runs))
 }

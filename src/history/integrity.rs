@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use crate::folder::Folder;
 use crate::salvage::scan;
 use crate::seal::{Found, Seal};
+use crate::threads::cores;
 use crate::write_run::run_node;
 use crate::{History, RunFilter, detail, fault, journal, pending, trace_file, trace_parts};
 use actcheck_base::Diagnostics;
@@ -49,7 +50,9 @@ impl History {
         match Seal::read(&folder) {
             Found::Whole(seal) => {
                 let reason = "it has changed since it was written";
-                found.damage.extend(seal.damage(&folder, u64::MAX).into_iter().map(|name| of_store(&name, reason)));
+                found
+                    .damage
+                    .extend(seal.damage(&folder, u64::MAX, cores()).into_iter().map(|name| of_store(&name, reason)));
                 found.damage.extend(seal.damaged_copies(&folder).into_iter().map(|name| Damage {
                     file: Path::new("seal").join(name),
                     run: None,
@@ -65,7 +68,7 @@ impl History {
                     .to_owned(),
             }),
         }
-        if journal::read(dir).is_ok_and(|bytes| !journal::statements(&bytes, journal::cores()).1) {
+        if journal::read(dir).is_ok_and(|bytes| !journal::statements(&bytes, cores()).1) {
             let reason = pending::DAMAGED.to_owned();
             found.damage.push(Damage { file: PathBuf::from(journal::NAME), run: None, reason });
         }

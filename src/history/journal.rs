@@ -11,7 +11,6 @@
 use std::collections::{HashMap, HashSet};
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, ErrorKind, Read as _, Seek as _, SeekFrom, Write as _};
-use std::num::NonZero;
 use std::path::{Path, PathBuf};
 
 use flate2::read::DeflateDecoder;
@@ -22,6 +21,7 @@ use oxigraph::model::{BlankNode, GraphName, Literal, NamedNode, NamedOrBlankNode
 use serde::{Deserialize, Serialize};
 
 use crate::chosen::Chosen;
+use crate::threads::joined;
 use crate::wanted::Wanted;
 
 /// Name of the file in the folder of a history.
@@ -143,11 +143,6 @@ impl Statements {
     }
 }
 
-/// Number of this machine's cores.
-pub(super) fn cores() -> usize {
-    std::thread::available_parallelism().map_or(1, NonZero::get)
-}
-
 /// Returns the statements of a journal, and whether all of it could be read. Half a record at the end was left by a
 /// killed process: it was never reported. As many threads share the work.
 pub(super) fn statements(bytes: &[u8], threads: usize) -> (Statements, bool) {
@@ -160,8 +155,7 @@ pub(super) fn statements(bytes: &[u8], threads: usize) -> (Statements, bool) {
     };
     let parts: Vec<(Vec<Quad>, Vec<Quad>, bool)> = std::thread::scope(|scope| {
         let threads: Vec<_> = records.chunks(of_each).map(|records| scope.spawn(|| decoded(records))).collect();
-        let joined = threads.into_iter().map(|thread| thread.join());
-        joined.map(|part| part.unwrap_or_else(|panic| std::panic::resume_unwind(panic))).collect()
+        threads.into_iter().map(joined).collect()
     });
     let (mut all, mut all_whole) = (Statements::default(), true);
     for (of_default, of_named, is_whole) in parts {

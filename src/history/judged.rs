@@ -89,7 +89,7 @@ impl History {
     ) -> Result<LaterRules, Diagnostics> {
         let mut reading = Reading::begin(self, filter, wish)?;
         let store = self.store_with(lists::of_runs)?;
-        let whole = lists::runs(&store, filter).map_err(|error| self.query_fault(&error))?;
+        let whole = lists::runs(&store, filter, self.threads()).map_err(|error| self.query_fault(&error))?;
         self.check_ids("run", whole.iter().flat_map(|run| [&run.run, &run.campaign]))?;
         let mut order = lists::campaign_ids(&store).map_err(|error| self.query_fault(&error))?;
         order.retain(|id| filter.campaign.as_ref().is_none_or(|campaign| campaign == id));

@@ -45,6 +45,7 @@ mod statements;
 mod store;
 mod syntax_fault;
 mod terms;
+mod threads;
 mod trace_details;
 mod trace_file;
 mod trace_parts;

@@ -1,6 +1,6 @@
 //! Lists of campaigns, runs and outcomes.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 use oxigraph::model::{GraphNameRef, Literal, Term};
 use oxigraph::sparql::QueryEvaluationError;
@@ -10,6 +10,7 @@ use crate::detail::{outcome, status, version};
 use crate::read::{Node, id_of, select, select_columns, text_of};
 use crate::read_campaign::skill;
 use crate::statements::iri;
+use crate::threads::side_by_side;
 use crate::wanted::Wanted;
 use crate::write_campaign::campaign_node;
 use crate::{CampaignRow, OutcomeRow, Repetition, RunFilter, RunRow};
@@ -25,11 +26,17 @@ const STARTS: &str = "
 SELECT ?campaign WHERE { ?campaign a act:Campaign ; prov:startedAtTime ?started } ORDER BY ?started ?campaign";
 
 const RUNS: &str = "
-SELECT ?run ?campaign ?index ?test ?status ?score ?hash ?started ?scene ?repetition ?weight WHERE {
+SELECT ?run ?campaign ?index ?test ?status ?weight WHERE {
     ?run act:campaign ?campaign . ?run act:index ?index . ?run act:test ?test . ?run act:status ?status .
-    ?run act:score ?score . ?run act:traceHash ?hash . ?run prov:startedAtTime ?started .
-    OPTIONAL { ?run act:sceneNumber ?scene ; act:repetition ?repetition }
     OPTIONAL { ?run act:weight ?weight }
+}";
+
+/// The other values of [`RUNS`]: two queries share the work between two threads.
+const RUN_RESULTS: &str = "
+SELECT ?run ?campaign ?score ?hash ?started ?scene ?repetition WHERE {
+    ?run act:campaign ?campaign . ?run act:score ?score . ?run act:traceHash ?hash .
+    ?run prov:startedAtTime ?started .
+    OPTIONAL { ?run act:sceneNumber ?scene ; act:repetition ?repetition }
 }";
 
 const OUTCOMES: &str = "
@@ -89,7 +96,7 @@ SELECT ?run ?step ?property ?at ?outcome ?rule WHERE {
 const LOOK_UP_COST: usize = 6;
 
 /// Queries of the runs that count in rates.
-pub(super) const COUNTED: [&str; 3] = [SELECTED, STARTS, RUNS];
+pub(super) const COUNTED: [&str; 4] = [SELECTED, STARTS, RUNS, RUN_RESULTS];
 
 /// The statements that [`campaigns`] reads.
 pub(super) fn of_campaigns() -> Wanted {
@@ -100,7 +107,7 @@ pub(super) fn of_campaigns() -> Wanted {
 
 /// The statements that [`runs`] reads.
 pub(super) fn of_runs() -> Wanted {
-    Wanted::queries(&[STARTS, RUNS])
+    Wanted::queries(&[STARTS, RUNS, RUN_RESULTS])
 }
 
 /// The statements that [`outcomes`] reads.
@@ -229,26 +236,37 @@ fn has_most_runs(store: &Store, campaign: &str) -> Result<bool, StorageError> {
     Ok(all.map(|quad| quad.map(drop)).collect::<Result<Vec<()>, _>>()?.len() <= own * LOOK_UP_COST)
 }
 
-/// The runs that match a filter, sorted by the start of their campaign, then by index.
-pub(super) fn runs(store: &Store, filter: &RunFilter) -> Result<Vec<RunRow>, QueryEvaluationError> {
+/// The runs that match a filter, sorted by the start of their campaign, then by index. Up to two threads read them.
+pub(super) fn runs(store: &Store, filter: &RunFilter, threads: usize) -> Result<Vec<RunRow>, QueryEvaluationError> {
     let ranks = ranks(store)?;
-    let mut rows: Vec<RunRow> = of_filtered(store, RUNS, filter)?
-        .iter()
-        .map(|row| RunRow {
-            run: id(row, 0),
-            campaign: id(row, 1),
-            index: number(row, 2),
-            repetition: optional(row, 8).zip(optional(row, 9)).map(|(scene, number)| Repetition { scene, number }),
-            weight: optional(row, 10),
-            test: text(row, 3),
-            status: status(Some(&text(row, 4))),
-            score: number(row, 5),
-            trace_hash: text(row, 6),
-            started: text(row, 7),
+    let of_campaign = RunFilter { campaign: filter.campaign.clone(), ..RunFilter::default() };
+    let (runs, results) =
+        side_by_side(threads, || of_filtered(store, RUNS, filter), || of_filtered(store, RUN_RESULTS, &of_campaign));
+    let mut results: HashMap<String, Row> = results?.into_iter().map(|row| (id(&row, 0), row)).collect();
+    let joined = runs?.into_iter().filter_map(|row| {
+        let run = id(&row, 0);
+        let result = results.remove(&run)?;
+        Some(RunRow {
+            run,
+            campaign: id(&row, 1),
+            index: number(&row, 2),
+            test: text(&row, 3),
+            status: status(Some(&text(&row, 4))),
+            weight: optional(&row, 5),
+            score: number(&result, 2),
+            trace_hash: text(&result, 3),
+            started: text(&result, 4),
+            repetition: repetition(&result),
         })
-        .collect();
+    });
+    let mut rows: Vec<RunRow> = joined.collect();
     sort_by_rank(&ranks, &mut rows);
     Ok(rows)
+}
+
+/// The place of a run in its repetition, from a row of [`RUN_RESULTS`].
+fn repetition(result: &Row) -> Option<Repetition> {
+    Some(Repetition { scene: optional(result, 5)?, number: optional(result, 6)? })
 }
 
 fn sort_by_rank(ranks: &BTreeMap<String, usize>, rows: &mut [RunRow]) {

@@ -16,6 +16,7 @@ use crate::pending;
 use crate::salvage::salvage;
 use crate::seal::{Found, Seal};
 use crate::snapshot::{MOST_COMPARED, Snapshot};
+use crate::threads::cores;
 use crate::wanted::Wanted;
 use crate::{History, fault};
 use actcheck_base::Diagnostics;
@@ -97,7 +98,7 @@ impl History {
     /// `H001` the folder can't be used, `H002` another process has it open, `H003` it holds other files, `H004` a newer
     /// program wrote it, `H005` the disk is full, `H006`, `H007` it is damaged.
     pub fn open(dir: &Path) -> Result<Self, Diagnostics> {
-        Self::open_folder(Folder::lock_exclusive(dir, true)?)
+        Self::open_folder(Folder::lock_exclusive(dir, true)?, cores())
     }
 
     /// Opens the existing history in a folder.
@@ -105,7 +106,15 @@ impl History {
     /// # Errors
     /// As [`History::open`]; also `H003` if the folder has no history.
     pub fn open_existing(dir: &Path) -> Result<Self, Diagnostics> {
-        Self::open_folder(Folder::lock_exclusive(dir, false)?)
+        Self::open_existing_with(dir, cores())
+    }
+
+    /// Like [`History::open_existing`], with a number of threads instead of all cores: see [`History::use_threads`].
+    ///
+    /// # Errors
+    /// As [`History::open_existing`].
+    pub fn open_existing_with(dir: &Path, threads: usize) -> Result<Self, Diagnostics> {
+        Self::open_folder(Folder::lock_exclusive(dir, false)?, threads)
     }
 
     /// Opens the state of an existing history at this moment for reading. It needs no permission to write the folder,
@@ -127,7 +136,7 @@ impl History {
     pub fn open_to_salvage(dir: &Path) -> Result<(Self, Vec<String>), Diagnostics> {
         let folder = Folder::to_read(dir)?;
         let snapshot = Snapshot::salvage(&folder)?;
-        let (journal, is_whole) = journal::statements(&snapshot.journal, journal::cores());
+        let (journal, is_whole) = journal::statements(&snapshot.journal, cores());
         let opened = read_tables(&folder, Arc::new(snapshot))?;
         let salvaged = salvage(&opened.store, journal.into_quads().collect(), is_whole, &folder.traced())
             .map_err(|error| fault::store(dir, "reading it", &error))?;
@@ -166,15 +175,16 @@ impl History {
         snapshot.map(|snapshot| snapshot.state())
     }
 
-    fn open_folder(folder: Folder) -> Result<Self, Diagnostics> {
+    fn open_folder(folder: Folder, threads: usize) -> Result<Self, Diagnostics> {
         // The library would drop unreadable parts.
         if let Found::Whole(seal) = Seal::read(&folder)
-            && let Some(name) = seal.damage(&folder, MOST_COMPARED).first()
+            && let Some(name) = seal.damage(&folder, MOST_COMPARED, threads).first()
         {
             return Err(fault::damaged_file(folder.dir(), name));
         }
         let opened = own(&folder)?;
         let history = Self::with(opened, folder);
+        history.use_threads(threads);
         history.take_over_journal()?;
         Ok(history)
     }
@@ -189,7 +199,7 @@ impl History {
             view: Mutex::default(),
             loaded: LoadedFiles::default(),
             single_outlines: AtomicUsize::new(0),
-            threads: AtomicUsize::new(journal::cores()),
+            threads: AtomicUsize::new(cores()),
             restore: OnceLock::new(),
         }
     }

@@ -2,7 +2,6 @@
 
 use std::io;
 use std::sync::PoisonError;
-use std::sync::atomic::Ordering;
 
 use oxigraph::model::{Quad, Term};
 use oxigraph::store::{StorageError, Store};
@@ -123,7 +122,7 @@ impl History {
         journal: &mut Journal,
         take: impl FnOnce(&Store, Statements, usize) -> Result<(), StorageError>,
     ) -> Result<(), Diagnostics> {
-        let threads = self.threads.load(Ordering::Relaxed);
+        let threads = self.threads();
         let bytes = journal::read(self.dir()).map_err(|error| fault::io(self.dir(), "reading its journal", &error))?;
         let (statements, is_whole) = journal::statements(&bytes, threads);
         if !is_whole {

@@ -47,15 +47,21 @@ pub struct History {
     pub(super) loaded: LoadedFiles,
     /// Number of outlines that this process has written.
     pub(super) single_outlines: AtomicUsize,
-    /// Greatest number of threads that make its tables.
+    /// Greatest number of threads that make its tables, and that read lists of runs.
     pub(super) threads: AtomicUsize,
     pub(super) restore: OnceLock<Box<Restore>>,
 }
 
 impl History {
-    /// Limits the threads that write its tables at the end of a campaign: otherwise, all cores do.
+    /// Limits the threads that write its tables at the end of a campaign, and that read lists of runs: otherwise, all cores
+    /// do.
     pub fn use_threads(&self, threads: usize) {
         self.threads.store(threads.max(1), Ordering::Relaxed);
+    }
+
+    /// Greatest number of threads.
+    pub(super) fn threads(&self) -> usize {
+        self.threads.load(Ordering::Relaxed)
     }
 
     /// The folder as the caller gave it.
@@ -208,7 +214,8 @@ impl History {
 
     /// The runs that are kept whole.
     pub(super) fn whole_runs(&self) -> Result<Vec<RunRow>, Diagnostics> {
-        lists::runs(&*self.store_with(lists::of_runs)?, &RunFilter::default()).map_err(|error| self.query_fault(&error))
+        lists::runs(&*self.store_with(lists::of_runs)?, &RunFilter::default(), self.threads())
+            .map_err(|error| self.query_fault(&error))
     }
 
     /// Returns the ids of all campaigns except those of [`History::selected_campaigns`], sorted by start.
@@ -282,8 +289,8 @@ impl History {
         self.campaign(campaign)?;
         self.each_outlined_vitals(campaign, &mut each)?;
         let filter = RunFilter { campaign: Some(campaign.to_owned()), ..RunFilter::default() };
-        let whole =
-            lists::runs(&*self.store_with(lists::of_runs)?, &filter).map_err(|error| self.query_fault(&error))?;
+        let whole = lists::runs(&*self.store_with(lists::of_runs)?, &filter, self.threads())
+            .map_err(|error| self.query_fault(&error))?;
         let store = self.store_with(vitals::wanted)?;
         let fault = |error| self.fault("reading a run", &error);
         let columns = vitals::Columns::read(&store).map_err(fault)?;

@@ -11,6 +11,7 @@ use crate::outlines::loaded::Loaded;
 use crate::outlines::row::Outlined;
 use crate::outlines::shelf::{IndexSet, Needed, Shelf, Unread, are_apart, unread};
 use crate::quad_source::RunQuads;
+use crate::threads::joined;
 use crate::{History, RunDetail, RunFilter, RunRow, RunVitals, detail, trace_file};
 use crate::{graphs, merge, write_run};
 use actcheck_base::Diagnostics;
@@ -268,7 +269,7 @@ impl History {
             for runs in receive {
                 runs.iter().for_each(&mut *each);
             }
-            reader.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))
+            joined(reader)
         })
     }
 

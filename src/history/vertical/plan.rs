@@ -9,6 +9,7 @@ use spargebra::Query;
 use crate::light::parser;
 use crate::open::OpenStore;
 use crate::read::id_of;
+use crate::threads::cores;
 use crate::vertical::counts::{Counter, Counts};
 use crate::vertical::rewrite::{MakeEvaluator, Rewriter, uses_counts};
 use crate::vertical::scan::Files;
@@ -78,6 +79,6 @@ fn counts(rewriter: &mut Rewriter<'_>) -> Result<Counts, Stop> {
     let campaigns = lists::campaign_ids(store).map_err(Stop::Failed)?;
     let mut counter = Counter::new(&selected, &campaigns);
     rewriter.files.traced(&mut |runs| counter.add(runs))?;
-    let stored = lists::runs(store, &RunFilter::default()).map_err(Stop::Failed)?;
+    let stored = lists::runs(store, &RunFilter::default(), cores()).map_err(Stop::Failed)?;
     Ok(counter.finish(&stored))
 }
