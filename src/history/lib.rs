@@ -15,6 +15,7 @@ mod folder;
 mod foreign;
 mod frames;
 mod graphs;
+mod inflate;
 mod integrity;
 mod journal;
 mod judged;

@@ -3,14 +3,14 @@
 //! It has two compressed parts: first the data from which facts are extracted, then the motion of all bodies, which
 //! only pictures and replay need.
 
-use std::io::{Read, Write};
+use std::io::Write;
 use std::sync::Arc;
 
 use flate2::Compression;
-use flate2::read::GzDecoder;
 use flate2::write::GzEncoder;
 
 use crate::frames;
+use crate::inflate::expanded;
 use crate::trace_details::{Cups, Details, Intervals};
 use actcheck_base::Steps;
 use actcheck_data::{ActionTrace, Choice, Form, Frames, RobotCourse, Samples, SceneMap, Series, Snapshot, Trace};
@@ -238,11 +238,4 @@ pub(super) fn after_trace(bytes: &[u8]) -> Result<&[u8], String> {
 pub(super) fn compressed(bytes: &[u8]) -> Result<Vec<u8>, String> {
     let mut encoder = GzEncoder::new(Vec::new(), Compression::default());
     encoder.write_all(bytes).and_then(|()| encoder.finish()).map_err(|error| error.to_string())
-}
-
-pub(super) fn expanded(bytes: &[u8]) -> Result<Vec<u8>, String> {
-    // The motion of bodies expands three to five times.
-    let mut out = Vec::with_capacity(4 * bytes.len());
-    GzDecoder::new(bytes).read_to_end(&mut out).map_err(|error| error.to_string())?;
-    Ok(out)
 }

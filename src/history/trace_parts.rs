@@ -8,7 +8,8 @@ use std::io::{Read as _, Seek as _, SeekFrom};
 use std::path::Path;
 
 use crate::detail::Parts;
-use crate::trace_file::{compressed, expanded};
+use crate::inflate::expanded;
+use crate::trace_file::compressed;
 
 /// Last bytes of a file that has a copy. The last one is its version; it increases whenever a type of [`Parts`] changes.
 const MAGIC: &[u8; 8] = b"actpart1";
