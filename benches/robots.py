@@ -71,6 +71,19 @@ at_m = [0, 0, 0.025]
 size_m = [0.05, 0.05, 0.05]
 """
 
+# A full slim can of 0.25 litres, for hands that open too little for a can of 0.33 litres.
+SLIM_CAN = """category = "act:Can"
+mass_kg = 0.27
+friction = 0.35
+restitution = 0.1
+size_m = [0.053, 0.053, 0.134]
+[[parts]]
+shape = "cylinder"
+at_m = [0, 0, 0.067]
+radius_m = 0.0265
+height_m = 0.134
+"""
+
 # For hands that open too little for the others, to measure the speed of a robot that moves: a block, and a peg for hands that
 # open less than 5 cm.
 BLOCK = CUBE.replace("0.05, 0.05, 0.05", "0.03, 0.03, 0.03").replace("0.025", "0.015").replace("mass_kg = 0.1", "mass_kg = 0.02")
@@ -243,6 +256,7 @@ def measure(args, name, model, arguments, start, packages):
     if not models.exists():
         shutil.copytree(Path(__file__).resolve().parent.parent / "models" / "objects", models)
     (models / "cube.toml").write_text(CUBE)
+    (models / "slim_can.toml").write_text(SLIM_CAN)
     (models / "block.toml").write_text(BLOCK)
     (models / "peg.toml").write_text(PEG)
     surface = surface_for(text, mobile)

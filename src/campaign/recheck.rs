@@ -18,7 +18,7 @@ use actcheck_rules::Budget;
 pub struct RecheckOptions {
     /// Workers.
     pub jobs: usize,
-    /// Number of runs whose judgements are written in one transaction.
+    /// Number of runs whose judgements are written together.
     pub batch: usize,
     /// Timestamp of the judgements, as RFC 3339.
     pub at: String,
@@ -26,7 +26,7 @@ pub struct RecheckOptions {
 
 impl RecheckOptions {
     /// Default batch: a quarter of a second of work. This is short enough for a progress bar and Ctrl-C, and long
-    /// enough to make the cost of a transaction negligible.
+    /// enough to make the cost of writing negligible.
     pub const BATCH: usize = 256;
 }
 
@@ -47,8 +47,7 @@ const SHARED: usize = 4;
 /// The results of one batch of runs.
 type Judged = Vec<Result<Vec<Recheck>, Diagnostics>>;
 
-/// Judges runs by the rules that `rules_of` returns for each, and stores changed judgements, one transaction for each
-/// batch.
+/// Judges runs by the rules that `rules_of` returns for each, and stores changed judgements, those of a batch together.
 ///
 /// `on_batch` is called once a batch is in the history, with all judgements (unchanged ones too) in the order of the
 /// runs. When `stop` is set, it ends after the runs in flight; their judgements are stored. A run that can't be judged
@@ -99,7 +98,7 @@ pub fn recheck<'a>(
             rechecks.into_iter().flatten().collect()
         });
     }
-    end.ending = match history.flush() {
+    end.ending = match history.finish_rechecks() {
         Err(faults) => Ending::Stopped(faults),
         Ok(()) if end.judged + (end.faults.len() as u64) < runs.len() as u64 => Ending::Interrupted,
         Ok(()) => Ending::Finished,

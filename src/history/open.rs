@@ -213,6 +213,11 @@ impl History {
     /// journal.
     pub(super) fn store_with(&self, wanted: impl FnOnce() -> Wanted) -> Result<OpenStore, Diagnostics> {
         self.complete_store()?;
+        self.loaded_store_with(wanted)
+    }
+
+    /// Like [`History::store_with`], but without the statements that the owner has in the journal.
+    pub(super) fn loaded_store_with(&self, wanted: impl FnOnce() -> Wanted) -> Result<OpenStore, Diagnostics> {
         if self.is_resting() {
             self.wake()?;
         }

@@ -50,6 +50,7 @@ pub struct Recheck {
 /// Reader of the newest judgements of many runs, each of which it reads before its new judgements are written.
 ///
 /// It looks up once whether a property has been judged in any run, which takes longer than all else for a new property.
+/// Judgements that the owner stores after that are not read.
 pub struct NewestJudgements<'h> {
     history: &'h History,
     known: RwLock<BTreeMap<String, Judged>>,
@@ -76,7 +77,6 @@ impl<'h> NewestJudgements<'h> {
     /// The store can't be read.
     pub fn read(&self, run: &str, step: u32, properties: &[String]) -> Result<Vec<StoredJudgement>, Diagnostics> {
         let execution = execution(run, step);
-        let store = self.history.store_with(|| Wanted::run(run_node(run).as_str()))?;
         let fault = |error| self.history.fault("reading a run's outcomes", &error);
         let (mut judged, mut later) = (Vec::new(), Vec::new());
         for property in properties {
@@ -84,6 +84,7 @@ impl<'h> NewestJudgements<'h> {
             judged.extend(is.own.then(|| property.clone()));
             later.extend(is.later.then(|| property.clone()));
         }
+        let store = self.history.loaded_store_with(|| Wanted::run(run_node(run).as_str()))?;
         let in_campaign = GraphNameRef::DefaultGraph;
         // Judgements of the campaign supersede nothing.
         let superseded = &mut BTreeSet::new();
@@ -207,7 +208,7 @@ impl History {
         Ok(counts)
     }
 
-    /// Stores the new judgements in one transaction: all of them or none. `at` is RFC 3339.
+    /// Stores the new judgements: all of them or none. `at` is RFC 3339.
     ///
     /// # Errors
     /// Writing failed: `H005`, `H006`. Data stored before is complete.
@@ -221,7 +222,17 @@ impl History {
         }
         let graph = iri(GRAPH);
         let quads = statements.quads.into_iter().map(|quad| Quad { graph_name: graph.clone().into(), ..quad });
-        self.store()?.extend(quads).map_err(|error| self.fault("writing outcomes", &error))
+        self.enter_quads(&quads.collect::<Vec<Quad>>(), "writing outcomes")?;
+        self.load_long_journal()
+    }
+
+    /// Writes the judgements since the last call to tables, and flushes everything to the disk.
+    ///
+    /// # Errors
+    /// Writing failed: `H005`, `H006`.
+    pub fn finish_rechecks(&self) -> Result<(), Diagnostics> {
+        self.load_journal()?;
+        self.flush()
     }
 }
 
