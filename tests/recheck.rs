@@ -4,7 +4,7 @@ use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use actcheck::base::{Files, Outcome, Term, names};
-use actcheck::campaign::{Ending, RecheckEnd, RecheckOptions, RuleSet, recheck};
+use actcheck::campaign::{Ending, RecheckEnd, RecheckOptions, RuleSet, judge_stored, recheck};
 use actcheck::data::ActionEnd;
 use actcheck::facts::extract;
 use actcheck::history::{History, QueryAnswer, Recheck, RunFilter, RunStatus};
@@ -12,7 +12,7 @@ use serde_json::Value;
 use tempfile::TempDir;
 
 use crate::history::{sample_campaign, sample_run};
-use crate::support::{actcheck, copy, edit, project, root, stderr, stdout};
+use crate::support::{actcheck, copy, copy_open, edit, project, root, stderr, stdout};
 
 const NEW_RULE: &str = "
 @prefix act: <http://actions#> .
@@ -302,6 +302,28 @@ fn a_stopped_recheck_keeps_whole_batches_and_can_continue() {
     assert_eq!(again.iter().filter(|recheck| recheck.is_news()).count() as u64, 14 - judged.len() as u64);
     let order: Vec<&str> = again.iter().map(|recheck| recheck.run.as_str()).collect();
     assert_eq!(order, (1..=14).map(|number| format!("k-{number}")).collect::<Vec<_>>());
+}
+
+/// New judgements go to the tables of the store together, at the end. Readers see them before, and so does the next owner
+/// if this one is killed.
+#[test]
+fn judgements_that_are_not_in_tables_yet_are_read_and_survive_a_kill() {
+    let (folder, history, rules) = filled(6);
+    let rules = rules.only(&["StaysUpright".to_owned()]).unwrap();
+    let runs = history.runs(&RunFilter::default()).unwrap();
+    let judged = |history: &History| judge_stored(history, &runs, &rules, 1, &AtomicBool::new(false)).unwrap().0;
+    history.commit_rechecks(&judged(&history), "2026-08-02T12:00:00Z").unwrap();
+    assert!(folder.path().join("h/journal").exists());
+    assert_eq!(kept(&History::open_to_read(history.dir()).unwrap()), 6);
+    let left = folder.path().join("left");
+    copy_open(history.dir(), &left);
+    let next = History::open(&left).unwrap();
+    for history in [next, history] {
+        assert!(!judged(&history).iter().any(Recheck::is_news));
+        assert_eq!(kept(&history), 6);
+        history.finish_rechecks().unwrap();
+        assert!(!history.dir().join("journal").exists());
+    }
 }
 
 #[test]
