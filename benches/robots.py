@@ -71,33 +71,30 @@ at_m = [0, 0, 0.025]
 size_m = [0.05, 0.05, 0.05]
 """
 
-# A full slim can of 0.25 litres, for hands that open too little for a can of 0.33 litres.
-SLIM_CAN = """category = "act:Can"
-mass_kg = 0.27
-friction = 0.35
-restitution = 0.1
-size_m = [0.053, 0.053, 0.134]
+CAN = """category = "act:Can"
+mass_kg = {mass}
+friction = {friction}
+restitution = 0.05
+size_m = [{diameter}, {diameter}, {height}]
 [[parts]]
 shape = "cylinder"
-at_m = [0, 0, 0.067]
-radius_m = 0.0265
-height_m = 0.134
+at_m = [0, 0, {middle}]
+radius_m = {radius}
+height_m = {height}
 """
 
+
+def can(diameter, height, mass, friction):
+    """The model of a cylinder. Units: metres, kilograms."""
+    return CAN.format(diameter=diameter, radius=diameter / 2, height=height, middle=height / 2, mass=mass, friction=friction)
+
+
+# A full slim can of 0.25 litres, for hands that open too little for one of 0.33 litres (`--things slim_can`).
+SLIM_CAN = can(0.053, 0.134, 0.27, 0.35)
 # For hands that open too little for the others, to measure the speed of a robot that moves: a block, and a peg for hands that
 # open less than 5 cm.
 BLOCK = CUBE.replace("0.05, 0.05, 0.05", "0.03, 0.03, 0.03").replace("0.025", "0.015").replace("mass_kg = 0.1", "mass_kg = 0.02")
-PEG = """category = "act:Can"
-mass_kg = 0.03
-friction = 0.6
-restitution = 0.05
-size_m = [0.018, 0.018, 0.09]
-[[parts]]
-shape = "cylinder"
-at_m = [0, 0, 0.045]
-radius_m = 0.009
-height_m = 0.09
-"""
+PEG = can(0.018, 0.09, 0.03, 0.6)
 
 PICK = """tests = [["Pick"]]
 test_count = {runs}
