@@ -50,7 +50,7 @@ pub struct Recheck {
 /// Reader of the newest judgements of many runs, each of which it reads before its new judgements are written.
 ///
 /// It looks up once whether a property has been judged in any run, which takes longer than all else for a new property.
-/// Judgements that the owner stores after that are not read.
+/// Judgements that the owner stores after that are not read: they stay in the journal until the end.
 pub struct NewestJudgements<'h> {
     history: &'h History,
     known: RwLock<BTreeMap<String, Judged>>,

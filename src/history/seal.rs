@@ -101,7 +101,7 @@ impl Seal {
 
     /// Returns the names of the files of a folder's store that differ from their checksums. Files that no longer exist
     /// are left out: a later process may have merged them into others. `most` is the largest size of a store whose
-    /// tables are compared. Unit: bytes. As many threads compare them.
+    /// tables are compared. Unit: bytes. `threads` is the number of threads that compare them.
     pub(super) fn damage(&self, folder: &Folder, most: u64, threads: usize) -> Vec<String> {
         let with_tables = self.size() <= most;
         let is_wrong = |name: &str| {

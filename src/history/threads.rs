@@ -24,7 +24,7 @@ pub(super) fn side_by_side<A, B: Send>(
     })
 }
 
-/// The items for which `keep` returns true, in their order. As many threads examine them.
+/// The items for which `keep` returns true, in their order. `threads` is the number of threads that examine them.
 pub(super) fn filtered<T: Sync>(threads: usize, items: &[T], keep: impl Fn(&T) -> bool + Sync) -> Vec<&T> {
     let next = AtomicUsize::new(0);
     let share = || {
