@@ -147,7 +147,7 @@ pub(super) fn insert_joints(
         })?;
         let gripper = &named.layout.gripper;
         let saturation = if joint.kind == JointKind::Prismatic { SATURATION_M } else { SATURATION_RAD };
-        let armature = gripper.lever_m(idx).map_or(0.0, |lever_m| ROTOR_KG * lever_m * lever_m);
+        let armature = gripper.armature(idx, ROTOR_KG);
         let (saturation, max_effort, damping_secs) = match gripper.lever_m(idx) {
             Some(lever_m) => {
                 let force_n = profile.grip_force_n * lever_m;

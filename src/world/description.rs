@@ -1,7 +1,7 @@
 //! Converts a URDF to the simulated tree: movable links, with fixed links and those of joints without a role merged into
 //! them.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, OnceLock};
 
 use nalgebra::{Isometry3, Matrix3, Translation3, Unit, UnitQuaternion, Vector3};
@@ -84,6 +84,12 @@ pub struct RobotModel {
     pub joints: Vec<Joint>,
     /// For every URDF link: the index of the link that it was merged into, and its pose in that link's frame.
     frames: BTreeMap<String, (usize, Isometry3<f64>)>,
+    /// Whether a joint lets the whole robot move freely: it stands on the floor.
+    pub(crate) floats: bool,
+    /// The joint that the file lets lead a mechanism, by the joint that leads it here.
+    pub(crate) own_leaders: BTreeMap<usize, usize>,
+    /// Links that pass through each other because the file says so, with the smaller index first.
+    pub(crate) passing: BTreeSet<(usize, usize)>,
     /// Names of its movable joints that are rigid here, for messages.
     rigid: Vec<String>,
     /// Joints that can't hold the arm's weight by their motors alone.
@@ -127,6 +133,19 @@ impl RobotModel {
                 self.joints.iter().map(|known| &known.name).chain(&self.rigid).map(String::as_str),
             ),
         })
+    }
+
+    /// Returns the joint at the end of a joint's chain of couplings, with the factor and the offset of the whole chain.
+    pub(crate) fn leader_of(&self, joint: usize) -> (usize, f64, f64) {
+        let (mut at, mut factor, mut offset) = (joint, 1.0, 0.0);
+        // A chain that is longer than this is a circle.
+        for _ in 0..self.joints.len() {
+            let Some((leader, next_factor, next_offset)) = self.joints[at].mimic else { break };
+            offset += factor * next_offset;
+            factor *= next_factor;
+            at = leader;
+        }
+        (at, factor, offset)
     }
 
     /// All URDF links, each with the link that it was merged into and its pose in that link's frame, by name.
@@ -178,6 +197,9 @@ impl<'a> Folding<'a> {
             links: Vec::new(),
             joints: Vec::new(),
             frames: BTreeMap::new(),
+            floats: robot.joints.iter().any(|joint| joint.joint_type == urdf_rs::JointType::Floating),
+            own_leaders: BTreeMap::new(),
+            passing: BTreeSet::new(),
             rigid: Vec::new(),
             balanced: Vec::new(),
             assumed: Vec::new(),
@@ -219,6 +241,9 @@ impl<'a> Folding<'a> {
             }
         }
         self.resolve_mimics(&needed)?;
+        let link = |name: &str| self.out.frames.get(name).map(|(link, _)| *link);
+        let pairs = disabled_collisions(&profile.urdf.text).filter_map(|[a, b]| Some((link(&a)?, link(&b)?)));
+        self.out.passing = pairs.filter(|(a, b)| a != b).map(|(a, b)| (a.min(b), a.max(b))).collect();
         for link in &mut self.out.links {
             if link.mass == 0.0 {
                 link.weigh();
@@ -342,9 +367,70 @@ impl<'a> Folding<'a> {
             let (factor, offset) = (mimic.multiplier.unwrap_or(1.0), mimic.offset.unwrap_or(0.0));
             self.out.joints[follower].mimic = Some((leader, factor, offset));
         }
+        // Each follows the joint at the end of its chain: the engine closes one coupling better than two.
+        for idx in 0..self.out.joints.len() {
+            if let (Some(_), (leader, factor, offset)) = (self.out.joints[idx].mimic, self.out.leader_of(idx)) {
+                self.out.joints[idx].mimic = Some((leader, factor, offset));
+            }
+        }
+        lead_with_carriers(&mut self.out);
         widen_followers(&mut self.out.joints);
         Ok(())
     }
+}
+
+/// Lets a joint that carries another one of its mechanism lead it, if the leading joint carries none: as the motor of a
+/// four-bar linkage, whose force arrives at the fingertips only through couplings.
+fn lead_with_carriers(model: &mut RobotModel) {
+    let carries = |model: &RobotModel, joint: usize, other: usize| {
+        let above = |idx: &usize| model.joints[*idx].parent.checked_sub(1);
+        joint != other && std::iter::successors(Some(other), above).any(|idx| idx == joint)
+    };
+    for leader in 0..model.joints.len() {
+        let followers: Vec<usize> = (0..model.joints.len())
+            .filter(|idx| model.joints[*idx].mimic.is_some_and(|(leads, ..)| leads == leader))
+            .collect();
+        if followers.iter().any(|other| carries(model, leader, *other)) {
+            continue;
+        }
+        let leads = |idx: &usize| {
+            let joint = &model.joints[*idx];
+            let is_strong = joint.mimic.is_some_and(|(_, factor, _)| factor.abs() > LEAST_FACTOR);
+            let is_alike = joint.kind == model.joints[leader].kind;
+            is_strong && is_alike && followers.iter().any(|other| carries(model, *idx, *other))
+        };
+        let Some(new) = followers.iter().copied().find(leads) else { continue };
+        let Some((_, factor, offset)) = model.joints[new].mimic.take() else { continue };
+        let Joint { lower, upper, effort, velocity, .. } = model.joints[leader];
+        let ends = [lower, upper].map(|end| factor * end + offset);
+        let joint = &mut model.joints[new];
+        (joint.lower, joint.upper) = (ends[0].min(ends[1]), ends[0].max(ends[1]));
+        (joint.effort, joint.velocity) = (effort / factor.abs(), velocity * factor.abs());
+        model.own_leaders.insert(new, leader);
+        model.joints[leader].mimic = Some((new, 1.0 / factor, -offset / factor));
+        for other in followers.into_iter().filter(|other| *other != new) {
+            if let Some((_, own, own_offset)) = model.joints[other].mimic {
+                model.joints[other].mimic = Some((new, own / factor, own_offset - own * offset / factor));
+            }
+        }
+    }
+}
+
+/// Least factor of a joint that leads its mechanism: a slower one would need a large force.
+const LEAST_FACTOR: f64 = 0.2;
+
+/// The pairs of links in the `<disable_collisions>` of a text: an element of SRDF, which the URDF of a converted robot has.
+fn disabled_collisions(text: &str) -> impl Iterator<Item = [String; 2]> + '_ {
+    text.split("<disable_collisions ").skip(1).filter_map(|element| {
+        let element = element.split('>').next()?;
+        let attribute = |name: &str| {
+            let value = element.split(name).nth(1)?.trim_start().strip_prefix('=')?.trim_start();
+            let quote = value.chars().next().filter(|mark| ['"', '\''].contains(mark))?;
+            let value = value[1..].split(quote).next()?;
+            Some(value.replace("&quot;", "\"").replace("&lt;", "<").replace("&gt;", ">").replace("&amp;", "&"))
+        };
+        Some([attribute("link1")?, attribute("link2")?])
+    })
 }
 
 /// Density of links without `<inertial>`: that of water. Unit: kg/m³.

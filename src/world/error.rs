@@ -42,6 +42,12 @@ pub enum WorldError {
         /// The message.
         what: String,
     },
+    /// No joint carries the gripper.
+    #[error("{name}: no joint carries its gripper: it is a hand without an arm")]
+    Armless {
+        /// The URDF's path.
+        name: String,
+    },
     /// The scene has an invalid physics setting.
     #[error("{what}")]
     Scene {
@@ -67,6 +73,8 @@ impl WorldError {
                  fingertips, and its y axis, turned by `grasp_turned_rad`, must point from the right one to the left \
                  one",
             ),
+            Self::Armless { .. } => Diagnostic::error("W024", self.to_string())
+                .help("name a file with the arm and the hand on it, such as a xacro file that includes both"),
             Self::Scene { .. } => {
                 Diagnostic::error("W023", self.to_string()).help("see `[physics]` in the configuration")
             }

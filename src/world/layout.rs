@@ -59,13 +59,14 @@ impl Named {
     }
 
     /// Returns the pairs of links that pass through each other, with the smaller index first: those of the hand, but not
-    /// the two fingertips; and those of a wrist. Their convex shapes overlap where the real ones do not.
+    /// the two fingertips, and those of a wrist, because their convex shapes overlap where the real ones do not; and those
+    /// that the file names.
     pub(super) fn passing(&self, model: &RobotModel) -> BTreeSet<(usize, usize)> {
         let all = self.links_of_hand(model);
         let [left, right] = self.finger_links;
         let pairs = all.iter().flat_map(|first| all.range(first + 1..).map(|second| (*first, *second)));
         let of_gripper = pairs.filter(|pair| *pair != (left.min(right), left.max(right)));
-        of_gripper.chain(wrist::passing(model)).collect()
+        of_gripper.chain(wrist::passing(model)).chain(model.passing.iter().copied()).collect()
     }
 
     /// Returns the links of the gripper's mechanism, those that carry them, and the hand's other fingers.

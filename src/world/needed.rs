@@ -50,9 +50,10 @@ impl<'a> Needed<'a> {
         self.moving.is_some()
     }
 
-    /// Whether the simulation moves a joint.
+    /// Whether the simulation moves a joint. A coupling with the factor 0 holds it where it is.
     pub(super) fn contains(&self, joint: &urdf_rs::Joint) -> bool {
-        self.moving.as_ref().is_none_or(|moving| moving.contains(joint.name.as_str()))
+        let is_held = joint.mimic.as_ref().is_some_and(|mimic| mimic.multiplier == Some(0.0));
+        !is_held && self.moving.as_ref().is_none_or(|moving| moving.contains(joint.name.as_str()))
     }
 
     /// The position of a rigid joint: that of the profile, otherwise 0 or the limit nearest to it; by its coupling if it has

@@ -69,7 +69,7 @@ const CODES_W: &[Code] = &[
     ),
     code(
         "W024",
-        "the opening of the robot's gripper can't be measured, or is smaller than `max_opening_m`",
+        "the opening of the robot's gripper can't be measured, or is smaller than `max_opening_m`; or no arm carries it",
         "the grasp frame is not between the fingertips or is turned, or `finger_joints` or `finger_links` names others \
          than those that move",
         "follow the help: fingers open along the y axis of the grasp frame, whose origin is between the fingertips",

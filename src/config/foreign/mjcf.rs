@@ -1,15 +1,16 @@
 //! Converts a robot or an object in MJCF, MuJoCo's format, to URDF: bodies, joints, geoms, inertias, equalities of joints.
 //!
-//! Sites and cameras become links, so that a profile can name them. Tendons, contacts and options are not read.
+//! Sites and cameras become links, so that a profile can name them. Spatial tendons and options are not read.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 use std::rc::Rc;
 
-use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, Unit, UnitQuaternion, Vector3};
 
 use crate::foreign::mjcf_compiler::{Attributes, Compiler};
-use crate::foreign::mjcf_materials::collides;
+use crate::foreign::mjcf_couplings::{Couplings, elements};
+use crate::foreign::mjcf_materials::{Mask, collides};
 use crate::foreign::urdf::Materials;
 use crate::foreign::urdf_text::{Inertial, UrdfJoint, UrdfText, escaped};
 use crate::foreign::xml::{self, Bound, Node, Reader};
@@ -63,6 +64,9 @@ fn converted(
             Some(worldbody) => robot.children(worldbody, &world, &Isometry3::identity(), None, reader),
             None => reader.error("W033", root, "`<mujoco>` has no `<worldbody>`".to_owned(), "add the bodies"),
         }
+        if robot.materials.is_none() {
+            robot.write_passing(root);
+        }
         let name = root.attribute("model").unwrap_or("robot").to_owned();
         (Source::new(format!("{} (as URDF)", source.name), robot.out.finish(&name)), robot.materials)
     })
@@ -83,10 +87,11 @@ pub(super) fn with_robot<T>(
     let compiler = Compiler::read(root, &mut reader);
     let robot = Robot {
         out: UrdfText::default(),
-        mimics: mimics(root, &mut reader),
-        efforts: efforts(root, &compiler, &mut reader),
+        couplings: Rc::new(Couplings::read(root, &compiler, &mut reader)),
         compiler: Rc::new(compiler),
         names: BTreeMap::new(),
+        joint_names: BTreeMap::new(),
+        masks: BTreeMap::new(),
         materials: None,
     };
     let found = read(root, robot, &mut reader);
@@ -100,60 +105,22 @@ pub(super) fn unique(names: &mut BTreeMap<String, u32>, name: &str) -> String {
     if *count == 1 { name.to_owned() } else { format!("{name}_{count}") }
 }
 
-/// Joints that equalities couple to others, with the leader, factor and offset.
-fn mimics(root: Node, reader: &mut Reader) -> BTreeMap<String, (String, f64, f64)> {
-    let mut found = BTreeMap::new();
-    for joint in xml::children(root, "equality").flat_map(|all| xml::children(all, "joint").collect::<Vec<_>>()) {
-        let (Some(follower), Some(leader)) = (joint.attribute("joint1"), joint.attribute("joint2")) else { continue };
-        let mut known =
-            root.descendants().filter(|node| node.has_tag_name("joint")).filter_map(|node| node.attribute("name"));
-        if !known.any(|name| name == leader) {
-            let message = format!("there is no movable joint `{leader}` to mimic");
-            reader.error("W051", joint, message, "`joint2` names the joint that `joint1` follows");
-            continue;
-        }
-        let written = joint.attribute("polycoef").unwrap_or("0 1 0 0 0");
-        let numbers: Vec<f64> = written.split_whitespace().filter_map(|word| word.parse().ok()).collect();
-        let (offset, factor) = (numbers.first().copied().unwrap_or(0.0), numbers.get(1).copied().unwrap_or(1.0));
-        if numbers.iter().skip(2).any(|number| *number != 0.0) {
-            let message =
-                format!("the coupling of `{follower}` to `{leader}` is not linear: only its linear part is used");
-            reader.warning("W036", joint, message, "the joint then deviates from its mechanism");
-        }
-        found.insert(follower.to_owned(), (leader.to_owned(), factor, offset));
-    }
-    found
-}
-
-/// Largest effort of joints by the force limits of their actuators.
-fn efforts(root: Node, compiler: &Compiler, reader: &mut Reader) -> BTreeMap<String, f64> {
-    let mut found = BTreeMap::new();
-    for actuator in xml::children(root, "actuator").flat_map(|all| all.children().filter(Node::is_element)) {
-        let attributes = compiler.attributes(actuator, None);
-        let Some(joint) = actuator.attribute("joint") else { continue };
-        let is_motor = actuator.tag_name().name() == "motor";
-        let limits = attributes.get("forcerange").or(if is_motor { attributes.get("ctrlrange") } else { None });
-        let Some([lower, upper]) = limits.and_then(|text| reader.numbers(actuator, text, Bound::Finite)) else {
-            continue;
-        };
-        found.insert(joint.to_owned(), f64::max(-lower, upper));
-    }
-    found
-}
-
 pub(super) struct Robot {
     pub(super) out: UrdfText,
     compiler: Rc<Compiler>,
-    mimics: BTreeMap<String, (String, f64, f64)>,
-    efforts: BTreeMap<String, f64>,
-    /// Names in use, each with the number of its copies.
+    couplings: Rc<Couplings>,
+    /// Names of links in use, each with the number of its copies.
     names: BTreeMap<String, u32>,
+    /// The same for joints: a joint often has the name of its body.
+    joint_names: BTreeMap<String, u32>,
+    /// The masks of each body's colliding geoms.
+    masks: BTreeMap<String, Vec<Mask>>,
     /// Of an object; `None` for a robot.
     pub(super) materials: Option<Materials>,
 }
 
 impl Robot {
-    /// A name that no other link or joint has.
+    /// A name that no other link has.
     pub(super) fn unique(&mut self, name: &str) -> String {
         unique(&mut self.names, name)
     }
@@ -163,10 +130,34 @@ impl Robot {
         Self {
             out: UrdfText::default(),
             compiler: Rc::clone(&self.compiler),
-            mimics: self.mimics.clone(),
-            efforts: self.efforts.clone(),
+            couplings: Rc::clone(&self.couplings),
             names: BTreeMap::new(),
+            joint_names: BTreeMap::new(),
+            masks: BTreeMap::new(),
             materials: Some(Materials::default()),
+        }
+    }
+
+    /// Writes the pairs of bodies that pass through each other: those that `<exclude>` names, and those whose geoms never
+    /// collide with each other.
+    fn write_passing(&mut self, root: Node) {
+        let mut passing = BTreeSet::new();
+        let excludes = elements(root, "contact").filter(|contact| contact.has_tag_name("exclude"));
+        for exclude in excludes {
+            if let (Some(first), Some(second)) = (exclude.attribute("body1"), exclude.attribute("body2")) {
+                passing.insert([first.min(second), first.max(second)]);
+            }
+        }
+        let solid: Vec<(&String, &Vec<Mask>)> = self.masks.iter().filter(|(_, masks)| !masks.is_empty()).collect();
+        for (idx, (first, of_first)) in solid.iter().enumerate() {
+            for (second, of_second) in &solid[idx + 1..] {
+                if !of_first.iter().any(|mask| of_second.iter().any(|other| mask.meets(*other))) {
+                    passing.insert([first.as_str(), second.as_str()]);
+                }
+            }
+        }
+        for pair in passing.into_iter().filter(|pair| pair.iter().all(|body| self.names.contains_key(*body))) {
+            self.out.passing(pair);
         }
     }
 
@@ -186,6 +177,12 @@ impl Robot {
                     let turned = if child.tag_name().name() == "camera" { lens() } else { Isometry3::identity() };
                     let name = self.unique(name);
                     self.out.frame(&name, link, shift * pose * turned);
+                }
+                "attach" | "replicate" => {
+                    let message = format!("the bodies that `<{}>` adds are not read", child.tag_name().name());
+                    let help = "let MuJoCo write one file with all of them: \
+                                `mujoco.MjSpec.from_file(FILE)`, then `compile()` and `to_xml()`";
+                    reader.error("W035", child, message, help);
                 }
                 _ => {}
             }
@@ -225,10 +222,18 @@ impl Robot {
             }
         }
         if joints.is_empty() {
-            let fixed = self.unique(&format!("{name}_fixed"));
-            self.out.joint(&UrdfJoint::fixed(&fixed, parent, &name, at));
+            let free =
+                xml::child(body, "freejoint").is_some() || xml::children(body, "joint").any(|joint| is_free(&joint));
+            let (kind, ending) =
+                if free && self.materials.is_none() { ("floating", "free") } else { ("fixed", "fixed") };
+            let own = unique(&mut self.joint_names, &format!("{name}_{ending}"));
+            self.out.joint(&UrdfJoint { kind, ..UrdfJoint::fixed(&own, parent, &name, at) });
         }
         let solids = self.solids(body, &own, class, reader);
+        if self.materials.is_none() {
+            let geoms = xml::children(body, "geom").map(|geom| compiler.attributes(geom, class));
+            self.masks.insert(name.clone(), geoms.filter(collides).map(|geom| Mask::of(&geom)).collect());
+        }
         let inertial = match &mut self.materials {
             Some(materials) if xml::child(body, "inertial").is_none() => {
                 materials.add(&name, body, &compiler, class);
@@ -282,18 +287,27 @@ impl Robot {
             _ => range.is_some(),
         };
         let unit = if slides { 1.0 } else { self.compiler.angle };
-        let (kind, range) = match (range.filter(|_| limited), slides) {
-            (Some(range), _) => (kind, range.map(|end| end * unit)),
+        let range = range.filter(|_| limited).map(|range| range.map(|end| end * unit));
+        let (kind, range) = match (range.or(self.couplings.ranges.get(&name).copied()), slides) {
+            (Some(range), _) => (kind, range),
             (None, true) => (kind, [-SLIDES_M, SLIDES_M]),
             (None, false) => ("continuous", [0.0; 2]),
+        };
+        let start = self.couplings.start(&name);
+        let origin = match Unit::try_new(Vector3::from(axis), 1e-9).filter(|_| start != 0.0) {
+            Some(axis) if slides => origin * Translation3::from(axis.scale(-start)),
+            Some(axis) => origin * UnitQuaternion::from_axis_angle(&axis, -start),
+            None => origin,
         };
         let damping = attributes.get("damping").and_then(|text| text.split_whitespace().next()?.parse().ok());
         let friction = attributes.get("frictionloss").and_then(|text| text.parse().ok());
         let own_effort =
             attributes.get("actuatorfrcrange").and_then(|text| reader.numbers::<2>(joint, text, Bound::Finite));
-        let effort =
-            own_effort.map(|[lower, upper]| f64::max(-lower, upper)).or_else(|| self.efforts.get(&name).copied());
-        let unique = self.unique(&name);
+        let effort = own_effort
+            .map(|[lower, upper]| f64::max(-lower, upper))
+            .or_else(|| self.couplings.efforts.get(&name).copied());
+        let unstated = if self.couplings.is_passive(&name) { 0.0 } else { EFFORT };
+        let unique = unique(&mut self.joint_names, &name);
         self.out.joint(&UrdfJoint {
             name: &unique,
             kind,
@@ -302,12 +316,12 @@ impl Robot {
             origin,
             axis: Vector3::from(axis),
             range,
-            effort: effort.filter(|effort| *effort > 0.0).unwrap_or(EFFORT),
+            effort: effort.filter(|effort| *effort > 0.0).unwrap_or(unstated),
             velocity: VELOCITY[usize::from(slides)],
             damping: damping.unwrap_or(0.0),
             // Robots overcome it with their motors.
             friction: friction.filter(|_| self.materials.is_some()).unwrap_or(0.0),
-            mimic: self.mimics.get(&name).cloned(),
+            mimic: self.couplings.mimics.get(&name).cloned(),
         });
         Some(())
     }

@@ -1,4 +1,4 @@
-//! Masses and friction of objects in MJCF that URDF can't state.
+//! Masks of collisions of geoms in MJCF, and masses and friction of objects, which URDF can't state.
 
 use crate::foreign::mjcf::DENSITY;
 use crate::foreign::mjcf_compiler::{Attributes, Compiler};
@@ -8,6 +8,25 @@ use crate::foreign::xml::{self, Node};
 /// Whether a geom can touch others.
 pub(super) fn collides(attributes: &Attributes<'_>) -> bool {
     attributes.get("contype") != Some("0") || attributes.get("conaffinity") != Some("0")
+}
+
+/// The bits of a geom that decide about its collisions: `contype` and `conaffinity`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Mask {
+    kinds: u32,
+    with: u32,
+}
+
+impl Mask {
+    pub(super) fn of(attributes: &Attributes<'_>) -> Self {
+        let bits = |name: &str| attributes.get(name).and_then(|text| text.parse().ok()).unwrap_or(1);
+        Self { kinds: bits("contype"), with: bits("conaffinity") }
+    }
+
+    /// Whether two geoms collide.
+    pub(super) fn meets(self, other: Self) -> bool {
+        self.kinds & other.with != 0 || other.kinds & self.with != 0
+    }
 }
 
 impl Materials {

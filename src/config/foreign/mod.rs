@@ -13,6 +13,8 @@ mod lookup;
 mod mesh_file;
 pub(crate) mod mjcf;
 mod mjcf_compiler;
+mod mjcf_couplings;
+mod mjcf_loops;
 mod mjcf_materials;
 mod mjcf_world;
 mod nested;

@@ -74,7 +74,7 @@ impl UrdfText {
             escaped(joint.parent),
             escaped(joint.child),
         );
-        if *kind != "fixed" {
+        if !["fixed", "floating"].contains(kind) {
             let _ = writeln!(
                 self.text,
                 "    <axis xyz=\"{} {} {}\"/><limit lower=\"{lower}\" upper=\"{upper}\" effort=\"{effort}\" \
@@ -99,6 +99,12 @@ impl UrdfText {
     pub(crate) fn frame(&mut self, name: &str, parent: &str, pose: Isometry3<f64>) {
         self.link(name, None, &[]);
         self.joint(&UrdfJoint::fixed(&format!("{name}_fixed"), parent, name, pose));
+    }
+
+    /// Two links that pass through each other: the element of SRDF.
+    pub(crate) fn passing(&mut self, links: [&str; 2]) {
+        let [first, second] = links.map(escaped);
+        let _ = writeln!(self.text, "  <disable_collisions link1=\"{first}\" link2=\"{second}\"/>");
     }
 
     /// The whole text.

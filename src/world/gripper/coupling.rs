@@ -16,29 +16,16 @@ pub(super) struct Follower {
 pub(super) fn coupled(named: &[usize], model: &RobotModel) -> (Vec<usize>, Vec<Follower>) {
     let mut leaders: Vec<usize> = Vec::new();
     for joint in named {
-        let leader = lead(*joint, model).0;
+        let leader = model.leader_of(*joint).0;
         if !leaders.contains(&leader) {
             leaders.push(leader);
         }
     }
     let followers = (0..model.joints.len()).filter(|joint| model.joints[*joint].mimic.is_some()).filter_map(|joint| {
-        let (leader, factor, offset) = lead(joint, model);
+        let (leader, factor, offset) = model.leader_of(joint);
         let leader = leaders.iter().position(|known| *known == leader)?;
         Some(Follower { joint, leader, factor, offset })
     });
     let followers = followers.collect();
     (leaders, followers)
-}
-
-/// Returns the joint at the end of a chain of mimic joints, with the factor and the offset of the whole chain.
-fn lead(joint: usize, model: &RobotModel) -> (usize, f64, f64) {
-    let (mut at, mut factor, mut offset) = (joint, 1.0, 0.0);
-    // A chain that is longer than this is a circle.
-    for _ in 0..model.joints.len() {
-        let Some((leader, next_factor, next_offset)) = model.joints[at].mimic else { break };
-        offset += factor * next_offset;
-        factor *= next_factor;
-        at = leader;
-    }
-    (at, factor, offset)
 }

@@ -6,6 +6,9 @@ use crate::gripper::table::{Entry, interpolated};
 /// Largest speed of a fingertip. Unit: m/s. A finger that is faster throws the object away before the other arrives.
 const FASTEST_M_S: f64 = 0.1;
 
+/// Smallest factor of a coupled joint with a part of the rotors' inertia.
+const LEAST_FACTOR: f64 = 0.2;
+
 /// A joint that a motor of the gripper moves.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Leader {
@@ -52,6 +55,24 @@ impl Gripper {
     /// Returns whether a joint follows another of this gripper and has no motor.
     pub(crate) fn follows(&self, joint: usize) -> bool {
         self.followers.iter().any(|follower| follower.joint == joint)
+    }
+
+    /// Returns the inertia of the motors' rotors on a joint, with the inertia of a rotor at the fingertips in kilograms.
+    /// Each of the coupled joints has an equal part of it, which is the same for their common motion; but contacts of a
+    /// light link that only a coupling holds would converge slowly. Unit: kilograms or kg·m².
+    pub(crate) fn armature(&self, joint: usize, rotor_kg: f64) -> f64 {
+        let follower = self.followers.iter().find(|follower| follower.joint == joint);
+        let leads = |leader: &&Leader| leader.joint == joint;
+        let leader = follower.map(|own| own.leader).or_else(|| self.leaders.iter().position(|leader| leads(&leader)));
+        let Some((idx, leader)) = leader.and_then(|idx| Some((idx, self.leaders.get(idx)?))) else { return 0.0 };
+        let carries = |follower: &&Follower| follower.leader == idx && follower.factor.abs() > LEAST_FACTOR;
+        let n_coupled = 1 + self.followers.iter().filter(carries).count();
+        let share = rotor_kg * leader.lever_m * leader.lever_m / n_coupled as f64;
+        match follower {
+            None => share,
+            Some(follower) if carries(&follower) => share / (follower.factor * follower.factor),
+            Some(_) => 0.0,
+        }
     }
 
     /// Returns the joints with a motor, each with its lever: way of the fingertips per way of the joint.

@@ -15,8 +15,8 @@ use crate::kinematics::motion;
 use actcheck_data::RobotProfile;
 
 /// Words in the names of a gripper's joints and links.
-const WORDS: [&str; 11] =
-    ["finger", "grip", "jaw", "knuckle", "hand", "thumb", "claw", "driver", "distal", "proximal", "pad"];
+const WORDS: [&str; 12] =
+    ["finger", "fngr", "grip", "jaw", "knuckle", "hand", "thumb", "claw", "driver", "distal", "proximal", "pad"];
 /// Most pairs of fingers that are measured.
 const MOST_PAIRS: usize = 40;
 /// Opening at which a single moving finger is centred. Unit: metres. The width of a can.
@@ -150,7 +150,14 @@ fn groups(model: &RobotModel) -> BTreeMap<usize, BTreeSet<usize>> {
         let follows = |joint: &Joint| joint.mimic.is_some_and(|(leader, ..)| leader == idx);
         model.joints[idx].mimic.is_some() || model.joints.iter().any(follows)
     };
-    let named = |idx: usize| has_word(&model.joints[idx].name) || has_either(idx) && (is_coupled(idx) || !carries(idx));
+    let is_named =
+        |idx: usize| has_word(&model.joints[idx].name) || has_either(idx) && (is_coupled(idx) || !carries(idx));
+    // A mechanism that a gripper's motor moves belongs to the gripper, whatever its name.
+    let leads_named: BTreeSet<usize> = (0..model.joints.len())
+        .filter(|idx| is_coupled(*idx) && is_named(*idx))
+        .map(|idx| leader(model, idx))
+        .collect();
+    let named = |idx: usize| is_named(idx) || leads_named.contains(&leader(model, idx));
     let mut groups: BTreeMap<usize, BTreeSet<usize>> = BTreeMap::new();
     for idx in (0..model.joints.len()).filter(|idx| named(*idx)) {
         let path = chain(model, idx + 1);
@@ -232,7 +239,8 @@ fn measure(
     let mut notes = BTreeMap::new();
     if stated.joints.is_empty() {
         let named = alike(model, found.links).unwrap_or(found.named);
-        profile.finger_joints = named.iter().map(|idx| model.joints[*idx].name.clone()).collect();
+        let own = |idx: &usize| model.own_leaders.get(idx).copied().unwrap_or(*idx);
+        profile.finger_joints = named.iter().map(|idx| model.joints[own(idx)].name.clone()).collect();
         notes.insert("finger_joints", "their names, and the links that they move".to_owned());
     }
     if stated.links.is_none() {

@@ -90,6 +90,9 @@ fn find(partial: &RobotProfile, all: bool, wanted: Option<&str>) -> Result<Propo
         profile.arm_joints = joint_names(&body.arm);
         profile.arm_joints.retain(|joint| !profile.base_joints.iter().flatten().any(|of_base| of_base == joint));
     }
+    if profile.arm_joints.is_empty() {
+        return Err(WorldError::Armless { name });
+    }
     if profile.camera_link.is_empty() {
         (profile.camera_link, profile.camera_turned_rad) = (body.camera_link, body.camera_turned_rad);
     }

@@ -15,11 +15,15 @@ use actcheck_data::RobotProfile;
 
 /// Longest arm that is mounted on the surface. Unit: metres. In front of a table, an arm has a quarter of a metre before it.
 const SHORT_M: f64 = 0.65;
-/// Height of the hand that takes a small object from above, and how far it lifts it. Unit: metres.
+/// Heights of the hand that takes a small object from above, and one as tall as a can, and how far it lifts them. Unit:
+/// metres.
 const LOW_M: f64 = 0.03;
+const TALL_M: f64 = 0.1;
 const LIFT_M: f64 = 0.06;
 /// Downward pitches of a hand that takes an object from above. Unit: radians.
 const PITCHES_RAD: [f64; 12] = [FRAC_PI_2, 1.5, 1.4, 1.3, 1.2, 1.1, 1.0, 0.9, 0.8, 0.7, 0.6, 0.5];
+/// The same for a hand that takes a tall object, also level.
+const TALL_PITCHES_RAD: [f64; 6] = [FRAC_PI_2, 1.2, 0.9, 0.6, 0.3, 0.0];
 /// Spacing of the distances that are tried. Unit: metres.
 const STEP_M: f64 = 0.01;
 /// Random seeds for each distance, besides the postures of the profile.
@@ -61,7 +65,7 @@ pub(super) fn measure_reach(
     let standing = Standing::new(profile, model, grasp)?;
     let (mut search, _) = standing.search();
     profile.reach_m = distances(&mut search, &profile.postures);
-    notes.insert("reach_m", "where the hand points down, or down at a slant, and lifts an object".to_owned());
+    notes.insert("reach_m", "where the hand takes low objects from above and tall ones, and lifts them".to_owned());
     Ok(())
 }
 
@@ -73,8 +77,11 @@ fn distances(search: &mut Search<'_>, postures: &[Vec<f64>]) -> Option<[f64; 2]>
     let steps = std::iter::successors(Some(STEP_M), |at| Some(at + STEP_M)).take_while(|at| *at < length + shoulder.x);
     let taken: Vec<f64> = steps
         .filter(|ahead| {
-            let place = Point3::new(*ahead, shoulder.y, LOW_M);
-            PITCHES_RAD.iter().any(|pitch| seeds.iter().any(|seed| takes(search, seed, &place, *pitch)))
+            let place = |height_m| Point3::new(*ahead, shoulder.y, height_m);
+            let reaches = |place: Point3<f64>, pitches: &[f64]| {
+                pitches.iter().any(|pitch| seeds.iter().any(|seed| takes(search, seed, &place, *pitch)))
+            };
+            reaches(place(LOW_M), &PITCHES_RAD) && reaches(place(TALL_M), &TALL_PITCHES_RAD)
         })
         .collect();
     Some([*taken.first()?, *taken.last()?].map(|at| (at * 1e3).round() / 1e3))

@@ -50,7 +50,10 @@ impl Stated {
             true => None,
             false => Some([model.frame(left)?.0, model.frame(right)?.0]),
         };
-        let joints = profile.finger_joints.iter().map(|name| model.joint(name)).collect::<Result<Vec<_>, _>>()?;
+        let led_here =
+            |joint: usize| model.own_leaders.iter().find(|(_, own)| **own == joint).map_or(joint, |(new, _)| *new);
+        let named = profile.finger_joints.iter().map(|name| model.joint(name).map(led_here));
+        let joints = named.collect::<Result<Vec<_>, _>>()?;
         let grasp = match profile.grasp_link.is_empty() {
             true => None,
             false => Some(frame(model, &profile.grasp_link, profile.grasp_offset_m, profile.grasp_turned_rad)?),

@@ -1,0 +1,301 @@
+//! The actuators of an MJCF robot, and the equalities that couple its joints to others.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use crate::foreign::mjcf_compiler::{Attributes, Compiler};
+use crate::foreign::mjcf_loops::{self, Tree};
+use crate::foreign::xml::{self, Bound, Node, Reader};
+
+/// A joint that another one follows, with the factor and the offset of the coupling.
+pub(super) type Mimic = (String, f64, f64);
+
+/// Couplings and motors of a file, by names of joints.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Couplings {
+    /// Couplings of the joints that follow others.
+    pub(super) mimics: BTreeMap<String, Mimic>,
+    /// Largest efforts by the force limits of actuators. Units: newtons or newton metres.
+    pub(super) efforts: BTreeMap<String, f64>,
+    /// Ranges of position servos, for joints that have none of their own. Units: radians or metres.
+    pub(super) ranges: BTreeMap<String, [f64; 2]>,
+    /// Positions where the file's bodies are as it places them, of the joints for which these are not 0.
+    pub(super) starts: BTreeMap<String, f64>,
+    /// Joints with an actuator. `None` if the file has no actuators, and none are known.
+    pub(super) actuated: Option<BTreeSet<String>>,
+}
+
+impl Couplings {
+    pub(super) fn read(root: Node, compiler: &Compiler, reader: &mut Reader) -> Self {
+        let tendons = tendons(root);
+        let tree = Tree::read(root, compiler, reader);
+        let mut found = Self { starts: tree.starts(), ..Self::default() };
+        found.add_actuators(root, compiler, &tendons, reader);
+        found.add_equalities_of_joints(root, reader);
+        found.add_equalities_of_tendons(root, &tendons, &tree);
+        let loops = mjcf_loops::couplings(root, compiler, (tree, &found), reader);
+        found.mimics.extend(loops);
+        found
+    }
+
+    /// Returns whether only its links, springs or contacts move a joint.
+    pub(super) fn is_passive(&self, joint: &str) -> bool {
+        self.actuated.as_ref().is_some_and(|actuated| !actuated.contains(joint))
+    }
+
+    /// Returns the position of a joint where the bodies are as the file places them.
+    pub(super) fn start(&self, joint: &str) -> f64 {
+        self.starts.get(joint).copied().unwrap_or(0.0)
+    }
+
+    fn add_actuators(&mut self, root: Node, compiler: &Compiler, tendons: &Tendons, reader: &mut Reader) {
+        for actuator in elements(root, "actuator") {
+            let attributes = compiler.attributes(actuator, None);
+            let direct =
+                attributes.get("joint").or(attributes.get("jointinparent")).map(|joint| (joint.to_owned(), 1.0));
+            let by_tendon =
+                attributes.get("tendon").and_then(|name| tendons.get(name)).map(|tendon| tendon.joints.clone());
+            let moved: Vec<(String, f64)> = direct.into_iter().chain(by_tendon.into_iter().flatten()).collect();
+            self.actuated.get_or_insert_default().extend(moved.iter().map(|(joint, _)| joint.clone()));
+            if let Some(range) = servo_range(actuator, &attributes, reader) {
+                // A tendon is as long as the sum of its joints, which move alike.
+                let sum: f64 = moved.iter().map(|(_, share)| share.abs()).sum();
+                let ends = range.map(|end| end / sum);
+                let range_of = |share: f64| if share < 0.0 { [-ends[1], -ends[0]] } else { ends };
+                let ranges = moved.iter().filter(|_| sum > 0.0).map(|(joint, share)| (joint.clone(), range_of(*share)));
+                self.ranges.extend(ranges);
+            }
+            let is_motor = actuator.tag_name().name() == "motor";
+            let limits = attributes.get("forcerange").or(if is_motor { attributes.get("ctrlrange") } else { None });
+            let Some([lower, upper]) = limits.and_then(|text| reader.numbers(actuator, text, Bound::Finite)) else {
+                continue;
+            };
+            let gear = attributes.get("gear").and_then(|text| text.split_whitespace().next()?.parse::<f64>().ok());
+            let most = f64::max(-lower, upper) * gear.unwrap_or(1.0).abs();
+            self.efforts.extend(moved.into_iter().map(|(joint, share)| (joint, most * share.abs())));
+        }
+    }
+
+    fn add_equalities_of_joints(&mut self, root: Node, reader: &mut Reader) {
+        for joint in elements(root, "equality").filter(|equality| equality.has_tag_name("joint")) {
+            let (Some(follower), Some(leader)) = (joint.attribute("joint1"), joint.attribute("joint2")) else {
+                continue;
+            };
+            let mut known =
+                root.descendants().filter(|node| node.has_tag_name("joint")).filter_map(|node| node.attribute("name"));
+            if !known.any(|name| name == leader) {
+                let message = format!("there is no movable joint `{leader}` to mimic");
+                reader.error("W051", joint, message, "`joint2` names the joint that `joint1` follows");
+                continue;
+            }
+            let written = joint.attribute("polycoef").unwrap_or("0 1 0 0 0");
+            let numbers: Vec<f64> = written.split_whitespace().filter_map(|word| word.parse().ok()).collect();
+            let (offset, factor) = (numbers.first().copied().unwrap_or(0.0), numbers.get(1).copied().unwrap_or(1.0));
+            if numbers.iter().skip(2).any(|number| *number != 0.0) {
+                not_linear(joint, follower, leader, reader);
+            }
+            let offset = offset + self.start(follower) - factor * self.start(leader);
+            self.mimics.insert(follower.to_owned(), (leader.to_owned(), factor, offset));
+        }
+    }
+
+    /// Couples the two joints of each fixed tendon whose length an equality fixes: the joint without an actuator follows,
+    /// of two such joints the one that follows no other yet.
+    fn add_equalities_of_tendons(&mut self, root: Node, tendons: &Tendons, tree: &Tree) {
+        for equality in elements(root, "equality").filter(|equality| equality.has_tag_name("tendon")) {
+            let tendon = equality.attribute("tendon1").filter(|_| equality.attribute("tendon2").is_none());
+            let Some(Tendon { joints, spring }) = tendon.and_then(|name| tendons.get(name)) else { continue };
+            let [first, second] = joints.as_slice() else { continue };
+            let is_free = |joint: &str| self.is_passive(joint) && !self.mimics.contains_key(joint);
+            let (leader, follower) = match (is_free(&first.0), is_free(&second.0)) {
+                (true, false) => (second, first),
+                _ => (first, second),
+            };
+            if follower.1 == 0.0 || self.mimics.contains_key(&follower.0) {
+                continue;
+            }
+            let longer = equality.attribute("polycoef").and_then(|text| text.split_whitespace().next()?.parse().ok());
+            let factor = -leader.1 / follower.1;
+            let [of_leader, of_follower] = [leader, follower].map(|(joint, _)| tree.range(joint));
+            let as_placed =
+                longer.unwrap_or(0.0) / follower.1 + self.start(&follower.0) - factor * self.start(&leader.0);
+            // The limits of a joint are as strong as an equality, and the spring of the tendon decides where both disagree.
+            let offset = match (of_leader, of_follower, spring) {
+                (Some(from), Some([lower, upper]), Some(length)) => {
+                    let to = from.map(|end| factor * end + as_placed);
+                    let is_beyond = f64::max(to[0], to[1]) < lower || f64::min(to[0], to[1]) > upper;
+                    if is_beyond { length / follower.1 } else { as_placed }
+                }
+                _ => as_placed,
+            };
+            self.mimics.insert(follower.0.clone(), (leader.0.clone(), factor, offset));
+        }
+    }
+}
+
+/// The range of positions of a position servo, those of its joint or tendon. Returns `None` for other actuators.
+fn servo_range(actuator: Node, attributes: &Attributes<'_>, reader: &mut Reader) -> Option<[f64; 2]> {
+    let first = |name: &str, place: usize| attributes.get(name)?.split_whitespace().nth(place)?.parse::<f64>().ok();
+    let ratio = match actuator.tag_name().name() {
+        "position" => 1.0,
+        "general" if attributes.get("biastype") == Some("affine") => first("gainprm", 0)? / -first("biasprm", 1)?,
+        _ => return None,
+    };
+    let ends = reader.numbers::<2>(actuator, attributes.get("ctrlrange")?, Bound::Finite)?;
+    let range = ends.map(|end| end * ratio / first("gear", 0).unwrap_or(1.0));
+    (range[0] < range[1] && range.iter().all(|end| end.is_finite())).then_some(range)
+}
+
+/// Warns that a coupling is replaced by a linear one.
+pub(super) fn not_linear(node: Node, follower: &str, leader: &str, reader: &mut Reader) {
+    let message = format!("the coupling of `{follower}` to `{leader}` is not linear: only its linear part is used");
+    reader.warning("W036", node, message, "the joint then deviates from its mechanism");
+}
+
+/// A fixed tendon: a weighted sum of positions of joints.
+struct Tendon {
+    /// Joints, with their coefficients.
+    joints: Vec<(String, f64)>,
+    /// Length of its spring at rest, if it has one.
+    spring: Option<f64>,
+}
+
+type Tendons = BTreeMap<String, Tendon>;
+
+fn tendons(root: Node) -> Tendons {
+    let read = |tendon: Node| {
+        let number = |node: Node, name: &str| node.attribute(name)?.split_whitespace().next()?.parse::<f64>().ok();
+        let joint = |joint: Node| Some((joint.attribute("joint")?.to_owned(), number(joint, "coef")?));
+        let is_sprung = number(tendon, "stiffness").is_some_and(|stiffness| stiffness > 0.0);
+        let spring = number(tendon, "springlength").filter(|length| is_sprung && *length >= 0.0);
+        Tendon { joints: xml::children(tendon, "joint").filter_map(joint).collect(), spring }
+    };
+    let fixed = elements(root, "tendon").filter(|tendon| tendon.has_tag_name("fixed"));
+    fixed.filter_map(|tendon| Some((tendon.attribute("name")?.to_owned(), read(tendon)))).collect()
+}
+
+/// The elements in all sections of this name.
+pub(super) fn elements<'a>(root: Node<'a>, section: &str) -> impl Iterator<Item = Node<'a>> {
+    xml::children(root, section).flat_map(|all| all.children().filter(Node::is_element))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use actcheck_base::Source;
+
+    fn read(text: &str) -> (Couplings, String) {
+        let source = Source::new("robot.xml", text.to_owned());
+        let document = xml::parse_model(&source, &source.text).expect("it is XML");
+        let mut reader = Reader::new(&source);
+        let root = document.root_element();
+        let compiler = Compiler::read(root, &mut reader);
+        let couplings = Couplings::read(root, &compiler, &mut reader);
+        (couplings, reader.found.to_string())
+    }
+
+    /// A finger of a parallel gripper: `driver` carries `finger`, `bar` is parallel to the driver.
+    fn linkage(anchor: &str, of_bar: &str, more: &str) -> String {
+        format!(
+            "<mujoco><worldbody><body name=\"palm\">\
+             <body name=\"driver\" pos=\"0 0.035 0.06\"><joint name=\"driver\" axis=\"1 0 0\"/>\
+             <body name=\"finger\" pos=\"0 0.035 0.042\"><joint name=\"finger\" axis=\"-1 0 0\"/></body></body>\
+             <body name=\"bar\" pos=\"0 0.02 0.075\"><joint name=\"bar\" axis=\"1 0 0\" {of_bar}/></body></body></worldbody>\
+             <equality><connect body1=\"finger\" body2=\"bar\" anchor=\"{anchor}\"/>{more}</equality>\
+             <actuator><position joint=\"driver\" ctrlrange=\"0 0.8\"/></actuator></mujoco>"
+        )
+    }
+
+    /// `<connect>` couples the joints of a parallelogram with factors of exactly 1, on the range of the servo.
+    #[test]
+    fn closed_loops_couple_their_joints() {
+        let (found, said) = read(&linkage("0 -0.015 0.015", "", ""));
+        assert_eq!(found.ranges["driver"], [0.0, 0.8]);
+        assert_eq!(found.mimics["finger"], ("driver".to_owned(), 1.0, 0.0), "{said}");
+        assert_eq!(found.mimics["bar"], ("driver".to_owned(), 1.0, 0.0));
+        assert!(!said.contains("W036"), "{said}");
+    }
+
+    /// Bars of other lengths: the angles of Freudenstein's equation, and a warning because these are not on a line.
+    #[test]
+    fn a_four_bar_linkage_agrees_with_its_equation() {
+        // The ground is 0.04 m along y; crank 0.02, coupler 0.05, rocker 0.04 m; all turn about x.
+        let (ground, crank, coupler, rocker) = (0.04, 0.02, 0.05, 0.04);
+        let ks = [
+            ground / crank,
+            ground / rocker,
+            (crank * crank - coupler * coupler + rocker * rocker + ground * ground) / (2.0 * crank * rocker),
+        ];
+        let of_rocker = |crank_rad: f64| {
+            let (sin, cos) = (libm::sin(crank_rad), libm::cos(crank_rad));
+            let (a, b, c) = (cos - ks[0] - ks[1] * cos + ks[2], -2.0 * sin, ks[0] - (ks[1] + 1.0) * cos + ks[2]);
+            2.0 * libm::atan2(-b - libm::sqrt(b * b - 4.0 * a * c), 2.0 * a)
+        };
+        let (start, range) = (1.2, [-0.4, 0.4]);
+        let end = [crank * libm::cos(start), crank * libm::sin(start)];
+        let at = of_rocker(start);
+        let tip = [ground + rocker * libm::cos(at), rocker * libm::sin(at)];
+        let text = format!(
+            "<mujoco><compiler angle=\"radian\"/><worldbody><body name=\"palm\">\
+             <body name=\"crank\"><joint name=\"crank\" axis=\"1 0 0\" range=\"{} {}\"/>\
+             <body name=\"coupler\" pos=\"0 {} {}\"><joint name=\"coupler\" axis=\"1 0 0\"/></body></body>\
+             <body name=\"rocker\" pos=\"0 {ground} 0\"><joint name=\"rocker\" axis=\"1 0 0\"/></body></body></worldbody>\
+             <equality><connect body1=\"coupler\" body2=\"rocker\" anchor=\"0 {} {}\"/></equality>\
+             <actuator><motor joint=\"crank\"/></actuator></mujoco>",
+            range[0],
+            range[1],
+            end[0],
+            end[1],
+            tip[0] - end[0],
+            tip[1] - end[1],
+        );
+        let (found, said) = read(&text);
+        let (leader, factor, offset) = &found.mimics["rocker"];
+        assert_eq!(leader, "crank");
+        let expected: Vec<(f64, f64)> =
+            (-40..=40).map(|n| f64::from(n) / 100.0).map(|q| (q, of_rocker(start + q) - at)).collect();
+        let worst = expected.iter().map(|(q, to)| (factor * q + offset - to).abs()).fold(0.0, f64::max);
+        let slope = (expected[80].1 - expected[0].1) / 0.8;
+        assert!((factor - slope).abs() < 0.05 * slope.abs() && worst < 0.05, "{factor} {slope} {worst}");
+        assert!(said.contains("the coupling of `coupler` to `crank` is not linear") || said.is_empty(), "{said}");
+    }
+
+    /// A spring pushes one of two joints without a motor against its limit, where it stays.
+    #[test]
+    fn springs_decide_where_a_loop_leaves_a_choice() {
+        let text = linkage("0 -0.015 0.015", "stiffness=\"0.05\" springref=\"150\"", "")
+            .replace(
+                "<body name=\"finger\"",
+                "<body name=\"coupler\"><joint name=\"coupler\" axis=\"1 0 0\" range=\"-90 0\"/><body name=\"finger\"",
+            )
+            .replace("</body></body><body name=\"bar\"", "</body></body></body><body name=\"bar\"");
+        let (found, said) = read(&text);
+        let (_, factor, offset) = &found.mimics["coupler"];
+        assert!(factor.abs() < 1e-3 && offset.abs() < 1e-3, "{factor} {offset} {said}");
+        let (_, factor, offset) = &found.mimics["finger"];
+        assert!((factor - 1.0).abs() < 1e-2 && offset.abs() < 1e-2, "{factor} {offset}");
+    }
+
+    /// As robosuite writes the hands of Robotiq and Jaco: an equality fixes the length of a tendon.
+    #[test]
+    fn tendons_of_fixed_length_couple_their_joints() {
+        let text = |ends: &str| {
+            format!(
+                "<mujoco><compiler angle=\"radian\"/><worldbody><body name=\"palm\"><body name=\"a\">\
+             <joint name=\"first\" ref=\"1.1\" range=\"0 1.5\"/><body name=\"b\"><joint name=\"second\" ref=\"-0.5\" range=\"{ends}\"/>\
+             </body></body></body></worldbody>\
+             <tendon><fixed name=\"t\" stiffness=\"3\" springlength=\"0.2\"><joint joint=\"second\" coef=\"-0.4\"/>\
+             <joint joint=\"first\" coef=\"0.4\"/></fixed></tendon><equality><tendon tendon1=\"t\"/></equality>\
+             <actuator><motor joint=\"first\" ctrlrange=\"-2 1\" gear=\"5\"/></actuator></mujoco>"
+            )
+        };
+        let (found, _) = read(&text("-2 2"));
+        let (leader, factor, offset) = &found.mimics["second"];
+        assert_eq!((leader.as_str(), *factor), ("first", 1.0));
+        assert!((offset + 1.6).abs() < 1e-9, "{offset}");
+        assert_eq!(found.efforts["first"], 10.0);
+        assert!(found.is_passive("second") && !found.is_passive("first"));
+        // The length where the file places the bodies is beyond these limits: the spring decides.
+        let (found, _) = read(&text("0 2"));
+        assert!((found.mimics["second"].2 + 0.5).abs() < 1e-9, "{:?}", found.mimics);
+    }
+}
