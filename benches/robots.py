@@ -12,7 +12,8 @@ is the simulated time by CPU time of a pick, on one core: of the thing that the 
 none, of the thing, also a block or a peg, for which it moved longest. Nothing is edited by hand, but TIAGo's gripper
 comes from another package than its arm: `tiago_gripper.urdf.xacro` includes `tiago_no_hand.urdf` and
 `pal_gripper_description/urdf/gripper.urdf.xacro`, and calls `pal_gripper` with the parent `wrist_ft_tool_link` and
-the origin of `end_effector.urdf.xacro`. Folders that are packages themselves are named one by one.
+the origin of `end_effector.urdf.xacro`. `compose_robots.py` writes the robots of robosuite, and arms of MuJoCo's menagerie with
+hands of it. Folders that are packages themselves are named one by one.
 """
 
 import argparse
@@ -251,10 +252,11 @@ def surface_for(profile, mobile):
     """A surface as high as the arm works: a low one for an arm on a mount of that height or on the surface itself, and a
     workbench for an upright robot."""
     height = re.search(r"\nmount_height_m = ([\d.]+)", profile)
-    if mobile or not height and "\nmount " not in profile:
-        return "coffee_table"
-    if height and float(height[1]) > 1.0:
+    shoulder = re.search(r"([\d.]+) m above the floor", profile)
+    if shoulder and float(shoulder[1]) > 1.05:
         return "workbench"
+    if mobile or shoulder or not height and "\nmount " not in profile:
+        return "coffee_table"
     low = "\nmount " in profile or float(height[1]) == 0.4
     return "mini_coffee_table" if low else "coffee_table"
 

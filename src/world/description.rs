@@ -11,6 +11,7 @@ use crate::assumed::{assume_efforts, widen_followers};
 use crate::counterweight::{BalancedJoint, balance};
 use crate::gripper::Surface;
 use crate::kinematics::motion;
+use crate::mechanism::lead_with_carriers;
 use crate::needed::Needed;
 use actcheck_base::did_you_mean;
 use actcheck_data::{LEAST_LINK_KG, Part, Pose, RobotProfile, Shape, bounds};
@@ -133,19 +134,6 @@ impl RobotModel {
                 self.joints.iter().map(|known| &known.name).chain(&self.rigid).map(String::as_str),
             ),
         })
-    }
-
-    /// Returns the joint at the end of a joint's chain of couplings, with the factor and the offset of the whole chain.
-    pub(crate) fn leader_of(&self, joint: usize) -> (usize, f64, f64) {
-        let (mut at, mut factor, mut offset) = (joint, 1.0, 0.0);
-        // A chain that is longer than this is a circle.
-        for _ in 0..self.joints.len() {
-            let Some((leader, next_factor, next_offset)) = self.joints[at].mimic else { break };
-            offset += factor * next_offset;
-            factor *= next_factor;
-            at = leader;
-        }
-        (at, factor, offset)
     }
 
     /// All URDF links, each with the link that it was merged into and its pose in that link's frame, by name.
@@ -378,46 +366,6 @@ impl<'a> Folding<'a> {
         Ok(())
     }
 }
-
-/// Lets a joint that carries another one of its mechanism lead it, if the leading joint carries none: as the motor of a
-/// four-bar linkage, whose force arrives at the fingertips only through couplings.
-fn lead_with_carriers(model: &mut RobotModel) {
-    let carries = |model: &RobotModel, joint: usize, other: usize| {
-        let above = |idx: &usize| model.joints[*idx].parent.checked_sub(1);
-        joint != other && std::iter::successors(Some(other), above).any(|idx| idx == joint)
-    };
-    for leader in 0..model.joints.len() {
-        let followers: Vec<usize> = (0..model.joints.len())
-            .filter(|idx| model.joints[*idx].mimic.is_some_and(|(leads, ..)| leads == leader))
-            .collect();
-        if followers.iter().any(|other| carries(model, leader, *other)) {
-            continue;
-        }
-        let leads = |idx: &usize| {
-            let joint = &model.joints[*idx];
-            let is_strong = joint.mimic.is_some_and(|(_, factor, _)| factor.abs() > LEAST_FACTOR);
-            let is_alike = joint.kind == model.joints[leader].kind;
-            is_strong && is_alike && followers.iter().any(|other| carries(model, *idx, *other))
-        };
-        let Some(new) = followers.iter().copied().find(leads) else { continue };
-        let Some((_, factor, offset)) = model.joints[new].mimic.take() else { continue };
-        let Joint { lower, upper, effort, velocity, .. } = model.joints[leader];
-        let ends = [lower, upper].map(|end| factor * end + offset);
-        let joint = &mut model.joints[new];
-        (joint.lower, joint.upper) = (ends[0].min(ends[1]), ends[0].max(ends[1]));
-        (joint.effort, joint.velocity) = (effort / factor.abs(), velocity * factor.abs());
-        model.own_leaders.insert(new, leader);
-        model.joints[leader].mimic = Some((new, 1.0 / factor, -offset / factor));
-        for other in followers.into_iter().filter(|other| *other != new) {
-            if let Some((_, own, own_offset)) = model.joints[other].mimic {
-                model.joints[other].mimic = Some((new, own / factor, own_offset - own * offset / factor));
-            }
-        }
-    }
-}
-
-/// Least factor of a joint that leads its mechanism: a slower one would need a large force.
-const LEAST_FACTOR: f64 = 0.2;
 
 /// The pairs of links in the `<disable_collisions>` of a text: an element of SRDF, which the URDF of a converted robot has.
 fn disabled_collisions(text: &str) -> impl Iterator<Item = [String; 2]> + '_ {

@@ -30,6 +30,7 @@ mod kinematics;
 mod layout;
 mod link_depth;
 mod link_pairs;
+mod mechanism;
 mod motion;
 mod motor;
 mod needed;

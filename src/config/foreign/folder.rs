@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use nalgebra::Isometry3;
 
+use crate::foreign::footprint::turned;
 use crate::foreign::lenient::repaired;
 use crate::foreign::lookup::Lookup;
 use crate::foreign::nested::Role;
@@ -59,8 +60,10 @@ pub(crate) struct Read {
 /// solid shape (W038), or an included model that is missing or has faults (W040).
 pub(crate) fn read(found: &Found, lookup: &Lookup) -> Result<Read, Diagnostics> {
     let (sdf, warnings) = read_sdf_model(found, lookup, Role::Object, 0)?;
-    let has_pose = sdf.pose != Isometry3::identity();
-    Ok(Read { model: sdf.body.into_model(&found.name, sdf.digest, &sdf.pose), has_pose, warnings })
+    let turn = sdf.body.turn_of_footprint(&sdf.pose);
+    let pose = if turn == 0.0 { sdf.pose } else { turned(turn) * sdf.pose };
+    let has_pose = pose != Isometry3::identity();
+    Ok(Read { model: sdf.body.into_model(&found.name, sdf.digest, &pose), has_pose, warnings })
 }
 
 /// Reads a model that `depth` others include, as a body. Also returns warnings.

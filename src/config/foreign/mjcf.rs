@@ -6,13 +6,13 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 use std::rc::Rc;
 
-use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, Unit, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, Unit, UnitQuaternion, Vector3};
 
 use crate::foreign::mjcf_compiler::{Attributes, Compiler};
 use crate::foreign::mjcf_couplings::{Couplings, elements};
 use crate::foreign::mjcf_materials::{Mask, collides};
 use crate::foreign::urdf::Materials;
-use crate::foreign::urdf_text::{Inertial, UrdfJoint, UrdfText, escaped};
+use crate::foreign::urdf_text::{Inertial, UrdfJoint, UrdfText};
 use crate::foreign::xml::{self, Bound, Node, Reader};
 use actcheck_base::{Diagnostics, Source};
 
@@ -107,7 +107,7 @@ pub(super) fn unique(names: &mut BTreeMap<String, u32>, name: &str) -> String {
 
 pub(super) struct Robot {
     pub(super) out: UrdfText,
-    compiler: Rc<Compiler>,
+    pub(super) compiler: Rc<Compiler>,
     couplings: Rc<Couplings>,
     /// Names of links in use, each with the number of its copies.
     names: BTreeMap<String, u32>,
@@ -326,111 +326,6 @@ impl Robot {
         Some(())
     }
 
-    /// Returns the colliding geoms of a body, each with its mass if its volume is known.
-    fn solids(
-        &self,
-        body: Node,
-        own: &Isometry3<f64>,
-        class: Option<&str>,
-        reader: &mut Reader,
-    ) -> Vec<(Isometry3<f64>, String, Option<f64>)> {
-        xml::children(body, "geom").filter_map(|geom| self.solid(geom, own, class, reader)).collect()
-    }
-
-    /// Returns a geom if it collides, with its mass if its volume is known.
-    pub(super) fn solid(
-        &self,
-        geom: Node,
-        own: &Isometry3<f64>,
-        class: Option<&str>,
-        reader: &mut Reader,
-    ) -> Option<(Isometry3<f64>, String, Option<f64>)> {
-        let attributes = self.compiler.attributes(geom, class);
-        if !collides(&attributes) {
-            return None;
-        }
-        let pose = own * self.compiler.pose(&attributes, geom, reader);
-        let (moved, shape, volume) = self.shape(geom, &attributes, reader)?;
-        let density = attributes.get("density").and_then(|text| text.parse().ok()).unwrap_or(DENSITY);
-        let stated = attributes.get("mass").and_then(|text| text.parse().ok());
-        // An end-to-end geom has its pose from its ends.
-        let pose = moved.map_or(pose, |moved| own * moved);
-        Some((pose, shape, stated.or(volume.map(|volume| volume * density))))
-    }
-
-    /// The pose of a geom that is given by its ends, its element of a `<geometry>`, and its volume if it is known.
-    fn shape(
-        &self,
-        geom: Node,
-        attributes: &Attributes<'_>,
-        reader: &mut Reader,
-    ) -> Option<(Option<Isometry3<f64>>, String, Option<f64>)> {
-        use std::f64::consts::PI;
-        let kind = attributes.get("type").unwrap_or(if attributes.get("mesh").is_some() { "mesh" } else { "sphere" });
-        if kind == "mesh" {
-            let name = attributes.get("mesh").unwrap_or_default();
-            let Some((file, scale)) = self.compiler.meshes.get(name) else {
-                let message = format!("there is no mesh `{name}` in `<asset>`");
-                reader.error("W035", geom, message, "add `<mesh name=\"…\" file=\"…\"/>` to `<asset>`");
-                return None;
-            };
-            let file = escaped(file);
-            return Some((None, format!("<mesh filename=\"{file}\" scale=\"{scale}\"/>"), None));
-        }
-        if !["sphere", "box", "cylinder", "capsule", "ellipsoid"].contains(&kind) {
-            // A plane or a height field does not belong to a robot or an object.
-            return None;
-        }
-        let size: Vec<f64> = attributes
-            .get("size")
-            .unwrap_or_default()
-            .split_whitespace()
-            .filter_map(|word| word.parse().ok())
-            .collect();
-        let ends = match attributes.get("fromto") {
-            Some(text) => Some(reader.numbers::<6>(geom, text, Bound::Finite)?),
-            None => None,
-        };
-        let (moved, half_length) = match ends {
-            Some([ax, ay, az, bx, by, bz]) => {
-                let (a, b) = (Point3::new(ax, ay, az), Point3::new(bx, by, bz));
-                let turned = UnitQuaternion::rotation_between(&Vector3::z(), &(b - a))
-                    .unwrap_or_else(|| UnitQuaternion::from_axis_angle(&Vector3::x_axis(), PI));
-                let middle = nalgebra::center(&a, &b);
-                (Some(Isometry3::from_parts(Translation3::from(middle.coords), turned)), Some((b - a).norm() / 2.0))
-            }
-            None => (None, size.get(1).copied()),
-        };
-        let wanted = match (kind, ends) {
-            ("sphere", _) | ("cylinder" | "capsule", Some(_)) => 1,
-            ("cylinder" | "capsule", None) => 2,
-            _ => 3,
-        };
-        if size.len() < wanted || size.iter().any(|number| !(number.is_finite() && *number >= 0.0)) {
-            let message = format!("a geom of the type {kind} needs {wanted} positive numbers in `size`");
-            reader.error("W034", geom, message, "sizes are radii and half lengths in metres");
-            return None;
-        }
-        let (r, half) = (size[0], half_length.unwrap_or(0.0));
-        let (shape, volume) = match kind {
-            "sphere" => (format!("<sphere radius=\"{r}\"/>"), 4.0 / 3.0 * PI * r.powi(3)),
-            "cylinder" => (format!("<cylinder radius=\"{r}\" length=\"{}\"/>", 2.0 * half), 2.0 * PI * r * r * half),
-            "capsule" => (
-                format!("<capsule radius=\"{r}\" length=\"{}\"/>", 2.0 * half),
-                2.0 * PI * r * r * half + 4.0 / 3.0 * PI * r.powi(3),
-            ),
-            "ellipsoid" if self.materials.is_some() => {
-                let [x, y, z] = [size[0], size[1], size[2]];
-                (format!("<ellipsoid radii=\"{x} {y} {z}\"/>"), 4.0 / 3.0 * PI * x * y * z)
-            }
-            _ => {
-                let [x, y, z] = [size[0], size[1], size[2]].map(|extent| 2.0 * extent);
-                (format!("<box size=\"{x} {y} {z}\"/>"), x * y * z)
-            }
-        };
-        Some((moved, shape, Some(volume)))
-    }
-
     /// The inertia of a body: stated, or that of its geoms as points with the inertia of small cubes.
     fn inertial(
         &self,
@@ -486,4 +381,56 @@ fn lens() -> Isometry3<f64> {
     let axes = Matrix3::from_columns(&[-Vector3::z(), -Vector3::x(), Vector3::y()]);
     let turned = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(axes));
     Isometry3::from_parts(Translation3::identity(), turned)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use actcheck_base::Files;
+
+    fn converted(bodies: &str, more: &str) -> Result<String, String> {
+        let text = format!("<mujoco><compiler angle=\"radian\"/><worldbody>{bodies}</worldbody>{more}</mujoco>");
+        let path = Path::new("robot.xml");
+        let found = to_urdf(&Source::new("robot.xml", text), path, &Files::Shipped);
+        found.map(|urdf| urdf.text.to_string()).map_err(|faults| faults.to_string())
+    }
+
+    const BALL: &str = "<geom size=\"0.1\"/>";
+
+    /// MuJoCo leaves out the contacts of pairs that the file excludes, and of geoms whose masks don't meet.
+    #[test]
+    fn bodies_that_never_collide_are_named() {
+        let bodies = format!(
+            "<body name=\"a\">{BALL}<body name=\"b\">{BALL}</body></body><body name=\"c\">{BALL}</body>\
+             <body name=\"d\"><geom size=\"0.1\" contype=\"2\" conaffinity=\"4\"/></body>"
+        );
+        let urdf = converted(&bodies, "<contact><exclude body1=\"c\" body2=\"a\"/></contact>").expect("it is valid");
+        let pairs: Vec<&str> = urdf.lines().filter(|line| line.contains("disable_collisions")).map(str::trim).collect();
+        let pair = |a: &str, b: &str| format!("<disable_collisions link1=\"{a}\" link2=\"{b}\"/>");
+        assert_eq!(pairs, [pair("a", "c"), pair("a", "d"), pair("b", "d"), pair("c", "d")]);
+    }
+
+    /// Names of bodies and joints don't exclude each other; only a whole robot may move freely; `ref` is the position at
+    /// which the body is where the file puts it.
+    #[test]
+    fn joints_keep_their_names_and_positions() {
+        let bodies = format!(
+            "<body name=\"base\"><freejoint/>{BALL}<body name=\"jaw\" pos=\"0 0 1\">\
+             <joint name=\"jaw\" axis=\"1 0 0\" ref=\"0.5\" range=\"0 1\"/>{BALL}</body></body>"
+        );
+        let urdf = converted(&bodies, "").expect("it is valid");
+        assert!(urdf.contains("<joint name=\"base_free\" type=\"floating\">"), "{urdf}");
+        assert!(
+            urdf.contains("<joint name=\"jaw\" type=\"revolute\"><origin xyz=\"0 0 1\" rpy=\"-0.5 0 0\"/>"),
+            "{urdf}"
+        );
+    }
+
+    /// A part that would be missing without a word.
+    #[test]
+    fn bodies_that_are_attached_are_refused() {
+        let said = converted("<body name=\"a\"><attach model=\"hand\" body=\"palm\" prefix=\"h_\"/></body>", "");
+        let said = said.expect_err("a hand is missing");
+        assert!(said.contains("W035") && said.contains("the bodies that `<attach>` adds are not read"), "{said}");
+    }
 }

@@ -77,7 +77,7 @@ pub(super) fn couplings(
     let is_passive = |hinge: &usize| !follows(hinge) && known.is_passive(&tree.hinges[*hinge].name);
     let closures: Vec<Closure<'_>> =
         elements(root, "equality").filter_map(|node| tree.closure(node, compiler, reader)).collect();
-    for group in together(closures, &is_passive) {
+    for group in together(closures, is_passive) {
         let hinges: BTreeSet<usize> = group.iter().flat_map(|closure| closure.hinges.iter().copied()).collect();
         let mut passive: Vec<usize> = hinges.iter().copied().filter(is_passive).collect();
         let mut leaders: Vec<usize> = hinges.iter().copied().filter(|hinge| !is_passive(hinge)).collect();

@@ -271,3 +271,25 @@ fn joints_without_a_role_are_rigid() {
     profile.other_joints = vec!["mast".to_owned()];
     assert_eq!(names(&profile), ["left", "lift", "mast", "right"]);
 }
+
+/// Coupled joints have the rotors' inertia together: as much as a single one would have for their common motion.
+#[test]
+fn coupled_joints_share_the_inertia_of_the_rotors() {
+    let (left, right) = (turning(0.0, 0.6), turning(-0.6, 0.0));
+    let of = |profile: &RobotProfile| {
+        let model = RobotModel::read(profile).expect("it is a URDF");
+        Named::find(profile, &model).expect("it has a gripper").layout.gripper
+    };
+    let alone = of(&hand(&left, FIXED, &["left"]));
+    let coupled = of(&hand(&left, &format!("{right}{MIMIC}"), &["left"]));
+    let inertia = |gripper: &crate::Gripper, factors: &[f64]| -> f64 {
+        gripper.joints().zip(factors).map(|(joint, factor)| gripper.armature(joint, 0.05) * factor * factor).sum()
+    };
+    for (gripper, factors) in [(&alone, &[1.0][..]), (&coupled, &[1.0, -1.0])] {
+        let (_, lever_m) = gripper.motors().next().expect("it has a motor");
+        assert!((inertia(gripper, factors) - 0.05 * lever_m * lever_m).abs() < 1e-12);
+    }
+    let shares: Vec<f64> = coupled.joints().map(|joint| coupled.armature(joint, 0.05)).collect();
+    assert_eq!(shares.len(), 2);
+    assert!((shares[0] - shares[1]).abs() < 1e-15, "{shares:?}");
+}

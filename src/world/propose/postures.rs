@@ -24,6 +24,11 @@ const ALWAYS: f64 = 0.8;
 const PITCHES_RAD: [f64; 3] = [0.0, 0.95, std::f64::consts::FRAC_PI_2];
 /// Heights of the hand above the floor, for a mobile robot. Unit: metres.
 const HEIGHTS_M: [f64; 2] = [0.55, 0.8];
+/// The same for a fixed robot whose arm begins higher than [`HIGH_M`].
+const HIGH_TABLE_M: [f64; 2] = [0.9, 1.1];
+const HIGH_M: f64 = 1.05;
+/// Root of a fixed robot that is higher than this stands on the floor: no table is so high. Unit: metres.
+const ROOT_OF_STANDING_M: f64 = 0.6;
 /// Heights of the hand above the root, for a fixed arm. Unit: metres.
 const ABOVE_M: [f64; 2] = [0.15, 0.35];
 /// Distances of the hand from the first joint, as shares of the arm's length.
@@ -43,6 +48,8 @@ pub(super) struct Standing {
     arm: Vec<usize>,
     base: Vec<usize>,
     start: Vec<f64>,
+    /// Whether a joint lets the robot move freely.
+    floats: bool,
 }
 
 impl Standing {
@@ -56,14 +63,16 @@ impl Standing {
         let base: Vec<usize> = named.layout.base.iter().flatten().copied().collect();
         let mut start: Vec<f64> = model.joints.iter().map(|joint| 0.0_f64.clamp(joint.lower, joint.upper)).collect();
         named.layout.gripper.set(&mut start, profile.max_opening_m / 2.0);
-        Ok(Self { kinematics, arm, base, start })
+        Ok(Self { kinematics, arm, base, start, floats: model.floats })
     }
 
     /// A search for its postures, with random ones that it drew.
     pub(super) fn search(&self) -> (Search<'_>, Vec<Vec<f64>>) {
         let (start, arm, base) = (self.start.clone(), self.arm.clone(), self.base.clone());
         let kinematics = &self.kinematics;
-        let mut search = Search { kinematics, start, arm, base, contact: None, near: None, n_drawn: 0 };
+        let root_m = kinematics.links(&start)[0].translation.vector.z;
+        let stands = base.is_empty() && (self.floats || root_m > ROOT_OF_STANDING_M);
+        let mut search = Search { kinematics, start, arm, base, contact: None, stands, near: None, n_drawn: 0 };
         let samples: Vec<Vec<f64>> = (0..N_SAMPLES).map(|_| search.random()).collect();
         search.contact = Some(contact(kinematics, &samples));
         (search, samples)
@@ -82,7 +91,11 @@ pub(super) fn find(
     let aside = if profile.base_joints.is_none() { search.aside() } else { None };
     search.near.clone_from(&aside);
     if let Some(note) = notes.get_mut("arm_joints") {
-        let _ = write!(note, "; it reaches {:.2} m", search.arm_reach().1);
+        let (shoulder, length) = search.arm_reach();
+        let _ = write!(note, "; it reaches {length:.2} m");
+        if search.stands {
+            let _ = write!(note, " from its first joint, {:.2} m above the floor", shoulder.z);
+        }
     }
     let targets = search.targets();
     let postures: Vec<Vec<f64>> = targets.iter().filter_map(|target| search.reach(target)).collect();
@@ -135,6 +148,8 @@ pub(super) struct Search<'a> {
     arm: Vec<usize>,
     base: Vec<usize>,
     contact: Option<SelfContact>,
+    /// Whether it is a fixed robot that stands on the floor, rather than an arm on a table.
+    stands: bool,
     /// A posture that others should be close to.
     near: Option<Vec<f64>>,
     n_drawn: u64,
@@ -174,8 +189,11 @@ impl Search<'_> {
     fn targets(&self) -> Vec<Isometry3<f64>> {
         let (shoulder, length) = self.arm_reach();
         let root = self.kinematics.links(&self.start)[0].translation.vector.z;
-        let heights =
-            if self.base.is_empty() { ABOVE_M.map(|above| root + above.min(0.5 * length)) } else { HEIGHTS_M };
+        let heights = match (self.base.is_empty(), self.stands) {
+            (true, false) => ABOVE_M.map(|above| root + above.min(0.5 * length)),
+            (true, true) if shoulder.z > HIGH_M => HIGH_TABLE_M,
+            _ => HEIGHTS_M,
+        };
         let mut targets = Vec::new();
         for pitch in self.pitches() {
             for (share, height) in SHARES.into_iter().zip(heights).chain(SHARES.into_iter().rev().zip(heights)) {
