@@ -89,6 +89,15 @@ ROBOTS = [
     ("Sawyer, 2F-85 (menagerie)", "menagerie_hands/sawyer.xml", [], []),
     ("FR3, 2F-85 (menagerie)", "menagerie_hands/fr3.xml", [], []),
     ("FR3, Franka hand (menagerie)", "menagerie_hands/fr3_hand.xml", [], []),
+    ("Gen3, 2F-85 (ros_kortex)", "kortex_description/robots/gen3_robotiq_2f_85.xacro", [], []),
+    ("Gen3, 2F-140 (ros_kortex)", "kortex_description/robots/gen3_robotiq_2f_140.xacro", [], []),
+    ("Gen3 lite (ros_kortex)", "kortex_description/robots/gen3_lite_gen3_lite_2f.xacro", [], []),
+    ("Jaco 2 (kinova-ros)", "kinova_description/urdf/j2n6s300_standalone.xacro", [], []),
+    ("Mico, two fingers (kinova-ros)", "kinova_description/urdf/m1n6s200_standalone.xacro", [], []),
+    ("xArm7 (xarm_ros)", "xarm_description/urdf/xarm_device.urdf.xacro", ["--xacro-arg", "add_gripper:=true"], []),
+    ("OpenMANIPULATOR-X (open_manipulator)", "open_manipulator_x/open_manipulator_x.urdf.xacro", [], []),
+    ("OMY-F3M (open_manipulator)", "omy_f3m/omy_f3m.urdf.xacro", [], []),
+    ("Ned 2 (ned_ros)", "ned2/niryo_ned2_gripper1_n_camera.urdf.xacro", [], []),
 ]
 
 CUBE = """category = "act:Box"

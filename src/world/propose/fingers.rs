@@ -34,6 +34,9 @@ const UNLIKE: f64 = 0.1;
 const FROM_PALM: f64 = 0.9;
 /// Fewest joints that carry a hand of an arm.
 const FEWEST_ARM_JOINTS: usize = 4;
+/// Fewest joints before a link whose branches may be fingers without such names, and most joints of such a finger.
+const FEWEST_BEFORE_BRANCHES: usize = 3;
+const LONGEST_FINGER: usize = 3;
 /// Openings wider than this are worth no more. Unit: metres.
 const WIDE_M: f64 = 0.12;
 
@@ -95,7 +98,10 @@ pub(super) fn find(partial: &RobotProfile, model: &RobotModel, wanted: Option<&s
     let light = RobotProfile { meshes: BTreeMap::new(), ..partial.clone() };
     let best = rated.iter().find_map(|(_, palm, joints)| measure(&light, model, &stated, *palm, joints));
     let others_than = |own: usize| {
-        let others = groups.keys().filter(|palm| **palm != own && chain(model, **palm).len() >= FEWEST_ARM_JOINTS);
+        // A link on the way to this hand is a wrist that is named after it.
+        let inner = chain(model, own);
+        let is_elsewhere = |palm: &&usize| **palm != own && palm.checked_sub(1).is_none_or(|idx| !inner.contains(&idx));
+        let others = groups.keys().filter(is_elsewhere).filter(|palm| chain(model, **palm).len() >= FEWEST_ARM_JOINTS);
         others.map(|palm| model.links[*palm].name.clone()).collect()
     };
     let best = best.map(|hand| Hand {
@@ -172,7 +178,25 @@ fn groups(model: &RobotModel) -> BTreeMap<usize, BTreeSet<usize>> {
         }
         hands.entry(palm).or_default().extend(joints);
     }
+    let known: BTreeSet<usize> = hands.values().flatten().copied().collect();
+    let nameless = (1..model.links.len()).filter_map(|palm| Some((palm, short_branches(model, palm)?)));
+    hands.extend(nameless.filter(|(_, joints)| joints.is_disjoint(&known)).collect::<Vec<_>>());
     hands
+}
+
+/// The joints beyond a link at the end of an arm on which several short chains branch off, as fingers do, whatever their
+/// names. Returns `None` if it is no such link.
+fn short_branches(model: &RobotModel, palm: usize) -> Option<BTreeSet<usize>> {
+    let n_inner = chain(model, palm).len();
+    if n_inner < FEWEST_BEFORE_BRANCHES {
+        return None;
+    }
+    let chains = (0..model.joints.len()).map(|joint| chain(model, joint + 1));
+    let beyond: Vec<Vec<usize>> =
+        chains.filter(|path| path.get(n_inner).is_some_and(|first| model.joints[*first].parent == palm)).collect();
+    let branches: BTreeSet<usize> = beyond.iter().map(|path| path[n_inner]).collect();
+    let are_short = beyond.iter().all(|path| path.len() - n_inner <= LONGEST_FINGER);
+    (branches.len() >= 2 && are_short).then(|| beyond.iter().filter_map(|path| path.last().copied()).collect())
 }
 
 /// The joint of a group that carries all others, if these are on several branches: a wrist that is named after the gripper
@@ -466,7 +490,7 @@ fn rate(
     // At the width of a can, where the fingers hold most objects.
     gripper.set(&mut positions, CENTRED_AT_M.min(gripper.widest_m()));
     let flat = probe.flat_share(&positions);
-    let widest_m = gripper.widest_m();
+    let widest_m = Some(gripper.widest_m()).filter(|widest_m| *widest_m > LEAST_CHANGE_M)?;
     let closes_m = gripper.travel_m();
     let off_m = gap.middle_m().abs();
     // Fingertips are alike; a fingertip and a knuckle are not.
