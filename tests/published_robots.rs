@@ -256,3 +256,44 @@ fn a_slow_lift_is_not_proposed_for_the_arm() {
     assert!(arm.contains("wrist_roll_joint") && !arm.contains("lift_joint"), "{text}");
     assert!(text.contains("but not `lift_joint`, which takes 24 s from end to end and stays at 0"), "{text}");
 }
+
+/// The gripper of an OMY-F3M has joints `rh_l1` and `rh_r1`; that of a Piper has `joint7` and `joint8`.
+#[test]
+fn fingers_without_such_names_are_found_where_short_chains_branch_off() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut urdf = fixed_arm();
+    for (name, nameless) in [("finger_left", "l7"), ("finger_right", "l8"), ("palm", "l6")] {
+        urdf = urdf.replace(name, nameless);
+    }
+    assert!(!urdf.contains("\"finger") && !urdf.contains("\"hand"), "{urdf}");
+    std::fs::write(folder.path().join("arm.urdf"), urdf).unwrap();
+    let written = actcheck(folder.path(), &["new", "robot", "arm.urdf"]);
+    assert!(written.status.success(), "{}", stderr(&written));
+    let profile = std::fs::read_to_string(folder.path().join("arm.toml")).unwrap();
+    for link in ["l7_link", "l8_link"] {
+        assert!(profile.lines().any(|line| line.starts_with("finger_links") && line.contains(link)), "{profile}");
+    }
+}
+
+/// The file of a gripper alone is refused, not proposed as a robot.
+#[test]
+fn a_hand_without_an_arm_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let finger = |name: &str, y: f64| {
+        format!(
+            "<body name=\"{name}\" pos=\"0 {y} 0.05\"><joint name=\"{name}\" type=\"slide\" axis=\"0 {} 0\" range=\"0 0.04\"/>\
+             <geom type=\"box\" size=\"0.01 0.005 0.04\" pos=\"0 0 0.04\"/></body>",
+            1.0_f64.copysign(y)
+        )
+    };
+    let text = format!(
+        "<mujoco><worldbody><body name=\"palm\"><geom type=\"box\" size=\"0.03 0.05 0.02\"/>{}{}</body></worldbody></mujoco>",
+        finger("left_finger", 0.006),
+        finger("right_finger", -0.006),
+    );
+    std::fs::write(folder.path().join("hand.xml"), text).unwrap();
+    let refused = actcheck(folder.path(), &["new", "robot", "hand.xml"]);
+    assert_eq!(refused.status.code(), Some(2));
+    let said = stderr(&refused);
+    assert!(said.contains("W024") && said.contains("it is a hand"), "{said}");
+}

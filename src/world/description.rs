@@ -85,7 +85,7 @@ pub struct RobotModel {
     pub joints: Vec<Joint>,
     /// For every URDF link: the index of the link that it was merged into, and its pose in that link's frame.
     frames: BTreeMap<String, (usize, Isometry3<f64>)>,
-    /// Whether a joint lets the whole robot move freely: it stands on the floor.
+    /// Whether a joint lets the whole robot move freely: its legs or wheels are on the floor.
     pub(crate) floats: bool,
     /// The joint that the file lets lead a mechanism, by the joint that leads it here.
     pub(crate) own_leaders: BTreeMap<usize, usize>,

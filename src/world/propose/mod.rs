@@ -8,6 +8,7 @@ mod body;
 mod cup;
 mod fingers;
 mod frames;
+mod hands;
 mod postures;
 mod short_arm;
 mod stated;

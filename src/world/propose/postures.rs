@@ -27,7 +27,7 @@ const HEIGHTS_M: [f64; 2] = [0.55, 0.8];
 /// The same for a fixed robot whose arm begins higher than [`HIGH_M`].
 const HIGH_TABLE_M: [f64; 2] = [0.9, 1.1];
 const HIGH_M: f64 = 1.05;
-/// Root of a fixed robot that is higher than this stands on the floor: no table is so high. Unit: metres.
+/// Root of a fixed robot that is higher than this is on the floor: no table is so high. Unit: metres.
 const ROOT_OF_STANDING_M: f64 = 0.6;
 /// Heights of the hand above the root, for a fixed arm. Unit: metres.
 const ABOVE_M: [f64; 2] = [0.15, 0.35];
@@ -148,7 +148,7 @@ pub(super) struct Search<'a> {
     arm: Vec<usize>,
     base: Vec<usize>,
     contact: Option<SelfContact>,
-    /// Whether it is a fixed robot that stands on the floor, rather than an arm on a table.
+    /// Whether it is a fixed robot on the floor, rather than an arm on a table.
     stands: bool,
     /// A posture that others should be close to.
     near: Option<Vec<f64>>,
