@@ -74,8 +74,8 @@ pub(super) fn find(
     let others: Vec<usize> = arm.iter().copied().chain(own_base.into_iter().flatten()).chain(torso).collect();
     let head = head(model, camera, &others);
     let lowest_m = lowest(model);
-    let stands = model.floats || lowest_m < -PEDESTAL_M;
-    let mount_height_m = match (drives, stands) {
+    let on_floor = model.floats || lowest_m < -PEDESTAL_M;
+    let mount_height_m = match (drives, on_floor) {
         (true, _) => (-lowest_m).clamp(0.0, 3.0),
         (false, true) => {
             notes.insert("mount_height_m", "its lowest shape is then on the floor".to_owned());
@@ -87,7 +87,7 @@ pub(super) fn find(
         }
     };
     let mount_height_m = (mount_height_m * 1000.0).round() / 1000.0;
-    let is_table_top = !drives && !stands;
+    let is_table_top = !drives && !on_floor;
     Body { arm, head, own_base, drives, mount_height_m, lowest_m, is_table_top, camera_link, camera_turned_rad }
 }
 

@@ -28,7 +28,7 @@ const HEIGHTS_M: [f64; 2] = [0.55, 0.8];
 const HIGH_TABLE_M: [f64; 2] = [0.9, 1.1];
 const HIGH_M: f64 = 1.05;
 /// Root of a fixed robot that is higher than this is on the floor: no table is so high. Unit: metres.
-const ROOT_OF_STANDING_M: f64 = 0.6;
+const ROOT_ON_FLOOR_M: f64 = 0.6;
 /// Heights of the hand above the root, for a fixed arm. Unit: metres.
 const ABOVE_M: [f64; 2] = [0.15, 0.35];
 /// Distances of the hand from the first joint, as shares of the arm's length.
@@ -71,8 +71,8 @@ impl Standing {
         let (start, arm, base) = (self.start.clone(), self.arm.clone(), self.base.clone());
         let kinematics = &self.kinematics;
         let root_m = kinematics.links(&start)[0].translation.vector.z;
-        let stands = base.is_empty() && (self.floats || root_m > ROOT_OF_STANDING_M);
-        let mut search = Search { kinematics, start, arm, base, contact: None, stands, near: None, n_drawn: 0 };
+        let on_floor = base.is_empty() && (self.floats || root_m > ROOT_ON_FLOOR_M);
+        let mut search = Search { kinematics, start, arm, base, contact: None, on_floor, near: None, n_drawn: 0 };
         let samples: Vec<Vec<f64>> = (0..N_SAMPLES).map(|_| search.random()).collect();
         search.contact = Some(contact(kinematics, &samples));
         (search, samples)
@@ -93,7 +93,7 @@ pub(super) fn find(
     if let Some(note) = notes.get_mut("arm_joints") {
         let (shoulder, length) = search.arm_reach();
         let _ = write!(note, "; it reaches {length:.2} m");
-        if search.stands {
+        if search.on_floor {
             let _ = write!(note, " from its first joint, {:.2} m above the floor", shoulder.z);
         }
     }
@@ -149,7 +149,7 @@ pub(super) struct Search<'a> {
     base: Vec<usize>,
     contact: Option<SelfContact>,
     /// Whether it is a fixed robot on the floor, rather than an arm on a table.
-    stands: bool,
+    on_floor: bool,
     /// A posture that others should be close to.
     near: Option<Vec<f64>>,
     n_drawn: u64,
@@ -189,7 +189,7 @@ impl Search<'_> {
     fn targets(&self) -> Vec<Isometry3<f64>> {
         let (shoulder, length) = self.arm_reach();
         let root = self.kinematics.links(&self.start)[0].translation.vector.z;
-        let heights = match (self.base.is_empty(), self.stands) {
+        let heights = match (self.base.is_empty(), self.on_floor) {
             (true, false) => ABOVE_M.map(|above| root + above.min(0.5 * length)),
             (true, true) if shoulder.z > HIGH_M => HIGH_TABLE_M,
             _ => HEIGHTS_M,
