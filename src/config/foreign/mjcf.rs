@@ -26,6 +26,8 @@ const UNKNOWN_M: f64 = 0.05;
 const EFFORT: f64 = 100.0;
 /// Largest velocity of joints, which MJCF does not have. Units: rad/s and m/s.
 const VELOCITY: [f64; 2] = [2.0, 0.5];
+/// Most bodies whose pairs are compared.
+const MOST_BODIES: usize = 1_000;
 /// Range of an unlimited sliding joint. Unit: metres.
 const SLIDES_M: f64 = 10.0;
 
@@ -114,7 +116,7 @@ pub(super) struct Robot {
     /// The same for joints: a joint often has the name of its body.
     joint_names: BTreeMap<String, u32>,
     /// The masks of each body's colliding geoms.
-    masks: BTreeMap<String, Vec<Mask>>,
+    masks: BTreeMap<String, BTreeSet<Mask>>,
     /// Of an object; `None` for a robot.
     pub(super) materials: Option<Materials>,
 }
@@ -148,7 +150,9 @@ impl Robot {
                 passing.insert([first.min(second), first.max(second)]);
             }
         }
-        let solid: Vec<(&String, &Vec<Mask>)> = self.masks.iter().filter(|(_, masks)| !masks.is_empty()).collect();
+        let solid: Vec<(&String, &BTreeSet<Mask>)> = self.masks.iter().filter(|(_, masks)| !masks.is_empty()).collect();
+        // More links are refused when the text is read.
+        let solid = if solid.len() > MOST_BODIES { Vec::new() } else { solid };
         for (idx, (first, of_first)) in solid.iter().enumerate() {
             for (second, of_second) in &solid[idx + 1..] {
                 if !of_first.iter().any(|mask| of_second.iter().any(|other| mask.meets(*other))) {

@@ -15,6 +15,9 @@ use crate::foreign::xml::{self, Bound, Node, Reader};
 const SAMPLES: usize = 40;
 /// Most steps of a solution.
 const MOST_STEPS: usize = 30;
+/// Most loops of a file that are closed, and most joints without a motor in one mechanism: a gripper has a tenth of them.
+const MOST_LOOPS: usize = 200;
+const MOST_PASSIVE: usize = 12;
 /// Weight of the distance between two points that a loop connects, against 1 for the position of the stiffest spring.
 /// Unit: 1/m.
 const CLOSED: f64 = 1e5;
@@ -75,8 +78,8 @@ pub(super) fn couplings(
     }
     let follows = |hinge: &usize| known.mimics.contains_key(&tree.hinges[*hinge].name);
     let is_passive = |hinge: &usize| !follows(hinge) && known.is_passive(&tree.hinges[*hinge].name);
-    let closures: Vec<Closure<'_>> =
-        elements(root, "equality").filter_map(|node| tree.closure(node, compiler, reader)).collect();
+    let closures = elements(root, "equality").filter_map(|node| tree.closure(node, compiler, reader));
+    let closures: Vec<Closure<'_>> = closures.filter(|closure| !closure.hinges.is_empty()).take(MOST_LOOPS).collect();
     for group in together(closures, is_passive) {
         let hinges: BTreeSet<usize> = group.iter().flat_map(|closure| closure.hinges.iter().copied()).collect();
         let mut passive: Vec<usize> = hinges.iter().copied().filter(is_passive).collect();
@@ -89,7 +92,10 @@ pub(super) fn couplings(
         let ([leader], false) = (leaders.as_slice(), passive.is_empty()) else {
             continue;
         };
-        let ways = Loop { tree: &tree, closures: &group, leader: *leader, passive: &passive }.ways();
+        let ways = match passive.len() {
+            0..=MOST_PASSIVE => Loop { tree: &tree, closures: &group, leader: *leader, passive: &passive }.ways(),
+            _ => Vec::new(),
+        };
         let leads = &tree.hinges[*leader].name;
         if ways.len() < SAMPLES / 2 {
             let message = format!("the loop of links that `{leads}` moves can't be closed: it is left open");

@@ -11,7 +11,7 @@ pub(super) fn collides(attributes: &Attributes<'_>) -> bool {
 }
 
 /// The bits of a geom that decide about its collisions: `contype` and `conaffinity`.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) struct Mask {
     kinds: u32,
     with: u32,
