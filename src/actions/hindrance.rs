@@ -16,6 +16,8 @@ pub enum Hindrance {
     Dearer,
     /// No joint positions bring the hand there.
     OutOfReach,
+    /// The open hand would come down on the object.
+    OnObject,
     /// The arm can't move the hand straight to the object or up from it.
     NoLift,
     /// The arm would collide with the robot. `links` are the two that come too close, if the postures were found.
@@ -34,6 +36,7 @@ impl Hindrance {
         match self {
             Self::Dearer => (0, 0.0),
             Self::OutOfReach => (1, 0.0),
+            Self::OnObject => (1, 1.0),
             Self::NoLift => (2, 0.0),
             Self::Itself { links } => (3, if links.is_some() { 1.0 } else { 0.0 }),
             Self::NoRoute => (4, 0.0),
@@ -45,27 +48,33 @@ impl Hindrance {
 
 /// The hindrance of the grasp that came nearest to a plan.
 #[derive(Debug, Default)]
-pub struct Nearest(Option<Hindrance>);
+pub struct Nearest {
+    kept: Option<Hindrance>,
+    /// Whether the open hand of any grasp would come down on the object.
+    pub(super) any_on_object: bool,
+}
 
 impl Nearest {
     /// Keeps the hindrance if its grasp came nearer to a plan than the others so far.
     pub fn note(&mut self, hindrance: Hindrance) {
-        let is_nearer = self.0.as_ref().is_none_or(|kept| kept.progress() < hindrance.progress());
+        self.any_on_object |= hindrance == Hindrance::OnObject;
+        let is_nearer = self.kept.as_ref().is_none_or(|kept| kept.progress() < hindrance.progress());
         if is_nearer {
-            self.0 = Some(hindrance);
+            self.kept = Some(hindrance);
         }
     }
 
     /// Whether no posture brought the hand to the object.
     pub fn is_out_of_reach(&self) -> bool {
-        matches!(self.0, None | Some(Hindrance::Dearer | Hindrance::OutOfReach))
+        matches!(self.kept, None | Some(Hindrance::Dearer | Hindrance::OutOfReach))
     }
 
     /// The reason for the action's report.
     pub fn reason(&self, thing: Option<&Sighting>, around: &Surroundings<'_>) -> String {
-        let why = match &self.0 {
+        let why = match &self.kept {
             None | Some(Hindrance::Dearer) => return NO_WAY.to_owned(),
             Some(Hindrance::OutOfReach) => out_of_reach(thing, around.furniture),
+            Some(Hindrance::OnObject) => "the open hand would come down on it".to_owned(),
             Some(Hindrance::NoLift) => "the arm reaches it but can't lift it straight up".to_owned(),
             Some(Hindrance::Itself { links: None }) => "the arm would collide with the robot".to_owned(),
             Some(Hindrance::Itself { links: Some((first, second)) }) => {

@@ -407,7 +407,8 @@ impl<'a> Planner<'a> {
     /// The base's path to its pose in `to`, with the arm's initial posture. The head is turned as in `to`.
     fn drive(&self, to: &[f64]) -> Option<Vec<Vec<f64>>> {
         let head: Vec<f64> = self.layout.head.iter().map(|joint| to[*joint]).collect();
-        if !self.keeps_off_itself(&self.start, &self.with_head(&self.start, &head)) {
+        let turned = self.with_head(&self.start, &head);
+        if turned != self.start && !self.keeps_off_itself(&self.start, &turned) {
             return None;
         }
         let [x, y, heading] = self.base;

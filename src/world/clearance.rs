@@ -78,7 +78,8 @@ impl World {
         distances.fold(f64::INFINITY, f64::min)
     }
 
-    fn boxed(&self, body: RigidBodyHandle) -> impl Iterator<Item = (&Collider, Aabb)> {
+    /// Returns the colliders of a body with their boxes.
+    pub(super) fn boxed(&self, body: RigidBodyHandle) -> impl Iterator<Item = (&Collider, Aabb)> {
         self.colliders_of(body).map(|collider| (collider, collider.compute_aabb()))
     }
 }

@@ -13,6 +13,7 @@ use crate::gripper::Surface;
 use crate::kinematics::motion;
 use crate::mechanism::lead_with_carriers;
 use crate::needed::Needed;
+use crate::self_contact::Form;
 use actcheck_base::did_you_mean;
 use actcheck_data::{LEAST_LINK_KG, Part, Pose, RobotProfile, Shape, bounds};
 
@@ -67,12 +68,19 @@ pub struct Link {
     pub solids: Vec<Part>,
     /// The same shapes for measurements, built when they are first needed.
     surface: OnceLock<Arc<Surface>>,
+    /// The same shapes for collisions with other links.
+    form: OnceLock<Arc<Form>>,
 }
 
 impl Link {
     /// Returns its shapes for measurements.
     pub(crate) fn surface(&self) -> Arc<Surface> {
         Arc::clone(self.surface.get_or_init(|| Arc::new(Surface::of(&self.solids))))
+    }
+
+    /// Returns its shapes for collisions with other links.
+    pub(crate) fn form(&self) -> Arc<Form> {
+        Arc::clone(self.form.get_or_init(|| Arc::new(Form::new(&self.solids))))
     }
 }
 
@@ -430,6 +438,7 @@ fn empty_link(name: &str) -> Link {
         inertia: Matrix3::zeros(),
         solids: Vec::new(),
         surface: OnceLock::new(),
+        form: OnceLock::new(),
     }
 }
 

@@ -6,7 +6,8 @@ use std::sync::Arc;
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3, Vector6};
 
 use crate::Gripper;
-use crate::description::{Joint, JointKind, RobotModel};
+use crate::description::{Joint, JointKind, Link, RobotModel};
+use crate::self_contact::Form;
 use crate::surface::spread;
 use actcheck_data::{Part, Shape};
 
@@ -184,6 +185,11 @@ impl Kinematics {
             }
         }
         None
+    }
+
+    /// Returns the shapes of each link for collisions with other links.
+    pub(crate) fn forms(&self) -> impl Iterator<Item = Arc<Form>> {
+        self.model.links.iter().map(Link::form)
     }
 
     /// Returns the collision shapes of each link, in its frame.

@@ -31,6 +31,8 @@ const OVERSHOOT: f64 = 1.25;
 
 /// Largest force of contacts on a hand that the engine moves alone: a loaded arm gives way. Unit: newtons.
 const MOST_PUSH: f64 = 20.0;
+/// Objects slower than this can't pass through anything in a step. Unit: m/s.
+const SLOW_M_S: f64 = 0.05;
 /// Ticks for which the engine moves the whole robot after a larger push.
 const WHOLE_TICKS: u32 = 30;
 
@@ -74,6 +76,8 @@ pub(super) struct Room {
     between: Vec<[Vec<usize>; 2]>,
     /// The things that the robot could touch in the last tick.
     pub(super) reach: Reach,
+    /// Whether something fast can meet something fixed: the engine then sweeps all fast shapes, which takes long.
+    pub(super) sweeps: bool,
     /// Ticks for which the engine still moves the whole robot.
     whole_ticks: u32,
     /// The shortcuts that may be taken.
@@ -195,7 +199,9 @@ impl World {
     /// Returns the reach of the robot, with its links at these poses, in the next tick.
     pub(super) fn find_room(&mut self, poses: Vec<Isometry3<f64>>) -> Reach {
         let mut room = std::mem::take(&mut self.room);
+        room.sweeps = true;
         let reach = if room.shortcuts == Shortcuts::NONE { Reach::All } else { self.reach(&mut room, poses) };
+        self.engine.integration_parameters.max_ccd_substeps = usize::from(room.sweeps);
         room.reach = room.shortcuts.limit(reach);
         room.ticks[room.reach as usize] += 1;
         self.room = room;
@@ -232,10 +238,16 @@ impl World {
         let mut reach = if rest.iter().all(|rests| *rests) { Reach::Nothing } else { Reach::Apart };
         room.rest = rest;
         for link in 0..n_links {
-            reach = reach.max(self.reach_of_link(room, link, &now));
-            if reach == Reach::All {
-                return reach;
+            if !self.is_clear_of_fixed(room, link, &now) {
+                return Reach::All;
             }
+            if reach < Reach::All {
+                reach = reach.max(self.reach_of_link(room, link, &now));
+            }
+        }
+        room.sweeps = self.fast_objects_meet_fixed(&room.rest);
+        if reach == Reach::All {
+            return reach;
         }
         if room.between.is_empty() {
             room.between = self.link_pairs.iter().map(|(first, second)| self.joints_between(first, second)).collect();
@@ -253,22 +265,20 @@ impl World {
         self.engine.bodies.get(object.body).is_none_or(|body| body.is_fixed() || body.is_sleeping())
     }
 
+    /// Returns whether a link can't meet the floor or a static object in the tick.
+    fn is_clear_of_fixed(&self, room: &mut Room, link: usize, now: &Moment) -> bool {
+        let Some(ball) = self.robot.balls[link] else { return true };
+        let measure = || self.gap_of_link(link, &|object| object.fixed, true);
+        has_room(&mut room.fixed[link], measure, &ball, (&now.poses[link], self.ahead(link, &ball, now)))
+    }
+
     fn reach_of_link(&self, room: &mut Room, link: usize, now: &Moment) -> Reach {
         let Some(ball) = self.robot.balls[link] else { return Reach::Nothing };
-        let pose = now.poses[link];
-        let ahead = self.robot.joints_to(link).map(|joint| self.way(joint, link, &ball, now)).sum::<f64>();
-        let has_room = |known: &mut Option<Measured>, measure: &dyn Fn() -> f64| {
-            if known.is_none_or(|known| known.left(&pose, &ball) - ahead < LEFT_M) {
-                *known = Some(Measured { gap_m: measure(), pose });
-            }
-            known.is_some_and(|known| known.left(&pose, &ball) - ahead >= LEFT_M)
-        };
-        if !has_room(&mut room.fixed[link], &|| self.gap_of_link(link, &|object| object.fixed, true)) {
-            return Reach::All;
-        }
+        let ahead = self.ahead(link, &ball, now);
         let rest = &room.rest;
         let rests = |object: &Object| !object.fixed && self.is_in(object, rest);
-        let clear = has_room(&mut room.resting[link], &|| self.gap_of_link(link, &rests, false))
+        let measure = || self.gap_of_link(link, &rests, false);
+        let clear = has_room(&mut room.resting[link], measure, &ball, (&now.poses[link], ahead))
             && self.is_clear_of_moving(link, rest, ahead);
         match (clear, &self.robot.hand) {
             (true, _) => Reach::Nothing,
@@ -277,19 +287,48 @@ impl World {
         }
     }
 
+    /// Returns how far a link can move in the tick. Unit: metres.
+    fn ahead(&self, link: usize, ball: &Ball, now: &Moment) -> f64 {
+        self.robot.joints_to(link).map(|joint| self.way(joint, link, ball, now)).sum()
+    }
+
+    /// Returns whether an object that is not slow can meet the floor or a static object in the tick.
+    fn fast_objects_meet_fixed(&self, rest: &[bool]) -> bool {
+        let moving = self.objects.iter().zip(rest).filter(|(_, rests)| !**rests);
+        moving.filter_map(|(object, _)| Some((object, self.speed_of(object)?))).any(|(object, speed)| {
+            let needed = self.way_of_object(speed) + LEFT_M;
+            speed > SLOW_M_S
+                && self.boxed(object.body).any(|(_, its_box)| {
+                    let fixed = self.objects.iter().filter(|other| other.fixed);
+                    f64::from(its_box.mins.z) < needed
+                        || fixed
+                            .flat_map(|other| self.colliders_of(other.body))
+                            .any(|other| gap(&its_box, &other.compute_aabb()) < needed)
+                })
+        })
+    }
+
+    /// Returns the largest speed of an object's points. Unit: m/s.
+    fn speed_of(&self, object: &Object) -> Option<f64> {
+        let body = self.engine.bodies.get(object.body)?;
+        let size = Vector3::from(object.model.size_m).norm();
+        Some(from_vector(body.linvel()).norm() + from_vector(body.angvel()).norm() * size)
+    }
+
+    /// Returns how far an object of this speed can move in the tick. Unit: metres.
+    fn way_of_object(&self, speed: f64) -> f64 {
+        let secs = self.tick_secs();
+        OVERSHOOT * speed * secs + GRAVITY * secs * secs
+    }
+
     /// Returns whether a link that moves this far can't meet any moving object in the tick.
     fn is_clear_of_moving(&self, link: usize, rest: &[bool], ahead: f64) -> bool {
-        let secs = self.tick_secs();
         let moving = self.objects.iter().zip(rest).filter(|(_, rests)| !**rests);
-        moving.filter_map(|(object, _)| Some((object, self.engine.bodies.get(object.body)?))).all(|(object, body)| {
-            let size = Vector3::from(object.model.size_m).norm();
-            let speed = from_vector(body.linvel()).norm() + from_vector(body.angvel()).norm() * size;
-            let falls = GRAVITY * secs * secs;
-            let needed = ahead + OVERSHOOT * speed * secs + falls + LEFT_M;
-            self.colliders_of(self.robot.bodies[link]).all(|solid| {
-                let its_box = solid.compute_aabb();
-                self.colliders_of(object.body).all(|other| apart(solid, &its_box, other, needed) >= needed)
-            })
+        moving.filter_map(|(object, _)| Some((object, self.speed_of(object)?))).all(|(object, speed)| {
+            let needed = ahead + self.way_of_object(speed) + LEFT_M;
+            let others = self.boxed(object.body).collect::<Vec<_>>();
+            self.boxed(self.robot.bodies[link])
+                .all(|solid| others.iter().all(|other| apart(&solid, other, needed) >= needed))
         })
     }
 
@@ -345,36 +384,44 @@ impl World {
     /// Measures the distance of a link from these objects, and from the floor. Unit: metres.
     fn gap_of_link(&self, link: usize, these: &dyn Fn(&Object) -> bool, floor: bool) -> f64 {
         let mut nearest = RANGE_M;
-        for solid in self.colliders_of(self.robot.bodies[link]) {
-            let its_box = solid.compute_aabb();
+        let these = self.objects.iter().filter(|object| these(object));
+        let others: Vec<_> = these.flat_map(|object| self.boxed(object.body)).collect();
+        for solid in self.boxed(self.robot.bodies[link]) {
             if floor && !self.robot.off_floor[link] {
                 // The distance from the top of so large a slab would be inexact.
-                nearest = nearest.min(f64::from(its_box.mins.z));
+                nearest = nearest.min(f64::from(solid.1.mins.z));
             }
-            for object in self.objects.iter().filter(|object| these(object)) {
-                for other in self.colliders_of(object.body) {
-                    nearest = nearest.min(apart(solid, &its_box, other, nearest));
-                }
-            }
+            nearest = others.iter().fold(nearest, |nearest, other| nearest.min(apart(&solid, other, nearest)));
         }
         nearest
     }
 
     fn gap_of_links(&self, first: usize, second: usize) -> f64 {
-        let mut nearest = RANGE_M;
-        for solid in self.colliders_of(self.robot.bodies[first]) {
-            let its_box = solid.compute_aabb();
-            for other in self.colliders_of(self.robot.bodies[second]) {
-                nearest = nearest.min(apart(solid, &its_box, other, nearest));
-            }
-        }
-        nearest
+        let others: Vec<_> = self.boxed(self.robot.bodies[second]).collect();
+        self.boxed(self.robot.bodies[first]).fold(RANGE_M, |nearest, solid| {
+            others.iter().fold(nearest, |nearest, other| nearest.min(apart(&solid, other, nearest)))
+        })
     }
 }
 
-/// Returns the distance of two colliders, or `most` if it is larger. Unit: metres.
-fn apart(one: &Collider, its_box: &Aabb, other: &Collider, most: f64) -> f64 {
-    if gap(its_box, &other.compute_aabb()) >= most {
+/// Returns whether more of a distance is left than a link at a pose can move in the tick. It is measured again if the known
+/// one does not suffice.
+fn has_room(
+    known: &mut Option<Measured>,
+    measure: impl Fn() -> f64,
+    ball: &Ball,
+    (pose, ahead): (&Isometry3<f64>, f64),
+) -> bool {
+    let suffices = |known: Measured| known.left(pose, ball) - ahead >= LEFT_M;
+    if !known.is_some_and(suffices) {
+        *known = Some(Measured { gap_m: measure(), pose: *pose });
+    }
+    known.is_some_and(suffices)
+}
+
+/// Returns the distance of two colliders with their boxes, or `most` if it is larger. Unit: metres.
+fn apart((one, its_box): &(&Collider, Aabb), (other, other_box): &(&Collider, Aabb), most: f64) -> f64 {
+    if gap(its_box, other_box) >= most {
         return most;
     }
     let found = distance(one.position(), one.shape(), other.position(), other.shape());

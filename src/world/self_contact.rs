@@ -1,6 +1,7 @@
 //! Detects postures in which links of the robot are too close to each other, for motion planning.
 
 use std::cell::Cell;
+use std::sync::Arc;
 
 use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
 use parry3d::query::distance;
@@ -19,6 +20,9 @@ const CLEAR_M: f64 = 0.01;
 /// Share of their distance in a valid posture that links keep if that distance is smaller.
 const KEPT_SHARE: f64 = 0.9;
 
+/// The same share for a link and that before its neighbour: a compact joint brings them closer, but not its error of tracking.
+const KEPT_BY_NEXT: f64 = 0.3;
+
 /// Error of distances in 32 bits. Unit: metres.
 const ROUNDING_M: f64 = 1e-4;
 
@@ -28,7 +32,7 @@ const MANY_SOLIDS: usize = 64;
 /// The shapes of a robot's links, and the pairs of links that could collide.
 #[derive(Clone)]
 pub struct SelfContact {
-    links: Vec<Form>,
+    links: Vec<Arc<Form>>,
     pairs: Vec<Pair>,
     /// For each pair, the directions in which its solids were apart last.
     apart: Vec<Directions>,
@@ -64,7 +68,7 @@ struct Pair {
 }
 
 /// A convex solid with the ball and the box around it, in its link's frame.
-#[derive(Clone)]
+#[derive(Debug)]
 struct Solid {
     pose: EnginePose,
     shape: SharedShape,
@@ -74,8 +78,8 @@ struct Solid {
 }
 
 /// The convex solids of one link, in its frame.
-#[derive(Clone)]
-struct Form {
+#[derive(Debug)]
+pub(crate) struct Form {
     solids: Vec<Solid>,
     /// Centre of their bounding sphere and bounding box.
     middle: Point3<f64>,
@@ -90,18 +94,20 @@ impl SelfContact {
     /// to be valid, such as the one for driving.
     /// Pairs that are close in one of these may come as close in others.
     pub fn new(kinematics: &Kinematics, right: &[Vec<f64>]) -> Self {
-        let links: Vec<Form> = kinematics.solids_of_links().map(Form::new).collect();
+        let links: Vec<Arc<Form>> = kinematics.forms().collect();
         let right: Vec<Vec<Isometry3<f64>>> = right.iter().map(|posture| kinematics.links(posture)).collect();
         let is_solid = |link: &usize| !links[*link].solids.is_empty();
         let mut pairs = Vec::new();
         for second in (0..links.len()).filter(is_solid) {
             let neighbour = kinematics.solid_parent(second);
+            let next = neighbour.and_then(|link| kinematics.solid_parent(link));
             let passes = |first: usize| kinematics.pass(first, second) || kinematics.are_of_hand(first, second);
             let others = (0..second).filter(is_solid).filter(|first| neighbour != Some(*first) && !passes(*first));
             for first in others {
                 let pair = Pair { links: (first, second), clear_m: CLEAR_M };
                 let nearest = right.iter().map(|poses| gap(&links, pair, poses)).fold(CLEAR_M, f64::min);
-                let clear_m = if nearest < CLEAR_M { nearest * KEPT_SHARE } else { CLEAR_M };
+                let kept = if next == Some(first) { KEPT_BY_NEXT } else { KEPT_SHARE };
+                let clear_m = if nearest < CLEAR_M { nearest * kept } else { CLEAR_M };
                 if clear_m > 0.0 {
                     pairs.push(Pair { clear_m, ..pair });
                 }
@@ -110,7 +116,7 @@ impl SelfContact {
         Self::of(links, pairs)
     }
 
-    fn of(links: Vec<Form>, pairs: Vec<Pair>) -> Self {
+    fn of(links: Vec<Arc<Form>>, pairs: Vec<Pair>) -> Self {
         let n_solids: usize = links.iter().map(|link| link.solids.len()).sum();
         let remembered = n_solids >= MANY_SOLIDS;
         let of_pair = |pair: &Pair| Directions::new([&links[pair.links.0], &links[pair.links.1]], remembered);
@@ -143,11 +149,11 @@ impl SelfContact {
 }
 
 /// Two links alone, for measurements at many poses.
-pub(crate) struct TwoLinks([Form; 2]);
+pub(crate) struct TwoLinks([Arc<Form>; 2]);
 
 impl TwoLinks {
     pub(crate) fn new(solids: [&[Part]; 2]) -> Self {
-        Self(solids.map(Form::new))
+        Self(solids.map(|solids| Arc::new(Form::new(solids))))
     }
 
     /// Whether they overlap with the first one at the origin and the second one at a pose.
@@ -157,7 +163,7 @@ impl TwoLinks {
 }
 
 /// Returns the distance of two links at these link poses, or their clearance if they are farther apart. Unit: metres.
-fn gap(links: &[Form], pair: Pair, poses: &[Isometry3<f64>]) -> f64 {
+fn gap(links: &[Arc<Form>], pair: Pair, poses: &[Isometry3<f64>]) -> f64 {
     nearest(links, pair, poses, |[a, b], b_in_a, _, _| {
         let found = distance(&EnginePose::IDENTITY, a.shape.as_ref(), b_in_a, b.shape.as_ref());
         // Convex solids are always supported; an unsupported pair would count as a collision.
@@ -167,7 +173,7 @@ fn gap(links: &[Form], pair: Pair, poses: &[Isometry3<f64>]) -> f64 {
 
 /// Whether two links are closer than their clearance at these link poses. This takes less than half of the time of [`gap`]:
 /// a direction in which the solids are far enough apart suffices.
-fn is_closer(links: &[Form], pair: Pair, poses: &[Isometry3<f64>], apart: &Directions) -> bool {
+fn is_closer(links: &[Arc<Form>], pair: Pair, poses: &[Isometry3<f64>], apart: &Directions) -> bool {
     let clear_m = pair.clear_m;
     let found = nearest(links, pair, poses, |solids, b_in_a, towards_b, indices| {
         if are_closer(solids, b_in_a, towards_b, clear_m, apart.of(indices)) { 0.0 } else { clear_m }
@@ -184,9 +190,12 @@ fn are_closer(
     clear_m: f64,
     last: Option<&Cell<EngineVector>>,
 ) -> bool {
-    let (Some(shape_a), Some(shape_b)) = (a.shape.as_support_map(), b.shape.as_support_map()) else {
+    let measured = || {
         let found = distance(&EnginePose::IDENTITY, a.shape.as_ref(), b_in_a, b.shape.as_ref());
-        return !found.is_ok_and(|found| f64::from(found.distance) >= clear_m);
+        !found.is_ok_and(|found| f64::from(found.distance) >= clear_m)
+    };
+    let (Some(shape_a), Some(shape_b)) = (a.shape.as_support_map(), b.shape.as_support_map()) else {
+        return measured();
     };
     let is_apart = |direction: EngineVector| {
         -direction.dot(CsoPoint::from_shapes(b_in_a, shape_a, shape_b, direction).point) > to_real(clear_m)
@@ -203,9 +212,9 @@ fn are_closer(
             last.inspect(|last| last.set(direction));
             false
         }
-        // The search also ends with this direction if it does not converge: it counts only if they are apart in it.
-        GJKResult::NoIntersection(direction) => !is_apart(direction),
-        _ => true,
+        GJKResult::NoIntersection(direction) if is_apart(direction) => false,
+        // The search also ends so if it does not converge.
+        _ => measured(),
     }
 }
 
@@ -213,7 +222,7 @@ fn are_closer(
 /// apart. Unit: metres. `measure` gets the pose of the second solid and the direction of its middle in the frame of the first,
 /// and the indices of both.
 fn nearest(
-    links: &[Form],
+    links: &[Arc<Form>],
     Pair { links: (first, second), clear_m }: Pair,
     poses: &[Isometry3<f64>],
     measure: impl Fn([&Solid; 2], &EnginePose, EngineVector, [usize; 2]) -> f64,
@@ -308,7 +317,7 @@ impl Ball {
 }
 
 impl Form {
-    fn new(solids: &[actcheck_data::Part]) -> Self {
+    pub(crate) fn new(solids: &[actcheck_data::Part]) -> Self {
         let around = Ball::around(solids).unwrap_or(Ball { middle: Point3::origin(), radius: 0.0 });
         let forms = solids.iter().filter_map(|solid| {
             let form = collider(solid, Owner::Floor, 0.0, 0.0)?;

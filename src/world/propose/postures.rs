@@ -7,6 +7,7 @@ use std::sync::Arc;
 use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
 
 use super::GraspFrame;
+use super::beyond_body;
 use super::body::FULL_ARM;
 use crate::description::{JointKind, RobotModel};
 use crate::ik::{self, Reach};
@@ -98,7 +99,8 @@ pub(super) fn find(
         }
     }
     let targets = search.targets();
-    let postures: Vec<Vec<f64>> = targets.iter().filter_map(|target| search.reach(target)).collect();
+    let mut postures: Vec<Vec<f64>> = targets.iter().filter_map(|target| search.reach(target)).collect();
+    beyond_body::add(&mut search, &targets, &mut postures);
     let home = match profile.base_joints {
         Some(_) => search.compact(samples, &postures),
         None => aside.or_else(|| postures.first().cloned()),
@@ -143,10 +145,10 @@ fn contact(kinematics: &Kinematics, samples: &[Vec<f64>]) -> SelfContact {
 
 /// A search for postures.
 pub(super) struct Search<'a> {
-    kinematics: &'a Kinematics,
+    pub(super) kinematics: &'a Kinematics,
     start: Vec<f64>,
-    arm: Vec<usize>,
-    base: Vec<usize>,
+    pub(super) arm: Vec<usize>,
+    pub(super) base: Vec<usize>,
     contact: Option<SelfContact>,
     /// Whether it is a fixed robot on the floor, rather than an arm on a table.
     on_floor: bool,
