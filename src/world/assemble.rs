@@ -10,7 +10,7 @@ use crate::WorldError;
 use crate::convert::{to_pose, to_real, to_vector};
 use crate::description::{Joint, JointKind, RobotModel};
 use crate::drive::Law;
-use crate::engine::{Owner, collider, off_floor};
+use crate::engine::{Owner, off_floor, same_shape};
 use crate::layout::{Layout, Named};
 use crate::motor::Motor;
 use actcheck_data::RobotProfile;
@@ -87,12 +87,11 @@ pub(super) fn insert_links(
         let body = engine.insert_body(builder.pose(to_pose(pose)).additional_mass_properties(mass).can_sleep(false));
         let is_finger = named.finger_links.contains(&idx);
         let friction = if is_finger { profile.finger_friction } else { LINK_FRICTION };
-        for solid in &link.solids {
-            if let Some(collider) = collider(solid, Owner::Link(idx), friction, 0.0) {
-                let groups = if on_floor[idx] { off_floor() } else { InteractionGroups::all() };
-                let collider = collider.active_hooks(ActiveHooks::FILTER_CONTACT_PAIRS);
-                engine.insert_collider(collider.density(0.0).collision_groups(groups), Some(body));
-            }
+        for (shape, pose) in link.form().shapes() {
+            let collider = same_shape(shape, pose, Owner::Link(idx), friction);
+            let groups = if on_floor[idx] { off_floor() } else { InteractionGroups::all() };
+            let collider = collider.active_hooks(ActiveHooks::FILTER_CONTACT_PAIRS);
+            engine.insert_collider(collider.density(0.0).collision_groups(groups), Some(body));
         }
         bodies.push(body);
     }

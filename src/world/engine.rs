@@ -1,9 +1,10 @@
 //! Configures the physics engine: gravity, solver, shapes, and the owners of colliders.
 
 use nalgebra::Vector3;
+use rapier3d::math::Pose;
 use rapier3d::prelude::{
     CoefficientCombineRule, ColliderBuilder, Group, IntegrationParameters, InteractionGroups, InteractionTestMode,
-    PhysicsWorld, SpringCoefficients,
+    PhysicsWorld, SharedShape, SpringCoefficients,
 };
 
 use crate::convert::{to_pose, to_real, to_vector};
@@ -136,14 +137,19 @@ pub fn collider(solid: &Part, owner: Owner, friction: f64, restitution: f64) -> 
         Shape::Mesh { mesh } => hull(&mesh.vertices)?,
         Shape::Tube { .. } => return None,
     };
-    Some(
-        builder
-            .position(to_pose(&pose))
-            .friction(to_real(friction))
-            .restitution(to_real(restitution))
-            .friction_combine_rule(CoefficientCombineRule::GeometricMean)
-            .user_data(owner.to_tag()),
-    )
+    Some(with_surface(builder.position(to_pose(&pose)).restitution(to_real(restitution)), owner, friction))
+}
+
+/// Returns the collider of a shape that another one has already, at the same pose.
+pub fn same_shape(shape: &SharedShape, pose: &Pose, owner: Owner, friction: f64) -> ColliderBuilder {
+    with_surface(ColliderBuilder::new(shape.clone()).position(*pose).restitution(0.0), owner, friction)
+}
+
+fn with_surface(builder: ColliderBuilder, owner: Owner, friction: f64) -> ColliderBuilder {
+    builder
+        .friction(to_real(friction))
+        .friction_combine_rule(CoefficientCombineRule::GeometricMean)
+        .user_data(owner.to_tag())
 }
 
 /// Returns the convex hull of points, or `None` if they lie in a plane.

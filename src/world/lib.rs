@@ -42,6 +42,7 @@ mod propose;
 mod quality;
 mod rays;
 mod recorder;
+mod resolved;
 mod robot;
 mod robot_course;
 mod room;

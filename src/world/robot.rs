@@ -10,8 +10,9 @@ use crate::description::{Joint, RobotModel};
 use crate::drive::Law;
 use crate::free_motion::Equations;
 use crate::inertia::Twist;
-use crate::layout::{Layout, Named};
+use crate::layout::Layout;
 use crate::motor::Motor;
+use crate::resolved::{Resolved, resolved};
 use crate::room::Ball;
 use crate::share::{Hand, Share};
 use crate::{Kinematics, WorldError};
@@ -57,15 +58,14 @@ pub struct Robot {
 /// # Errors
 /// [`WorldError`] if profile and URDF don't match.
 pub fn geometry(start: &RobotStart) -> Result<(Kinematics, Layout, Vec<f64>), WorldError> {
-    let model = Arc::new(RobotModel::read(&start.profile)?);
-    let named = Named::find(&start.profile, &model)?;
-    let positions = home(&start.profile, &model, &named, start.base);
+    let resolved = resolved(&start.profile)?;
+    let Resolved { model, named, passing, hand } = resolved.as_ref();
+    let positions = home(&start.profile, model, named, start.base);
     let root = root_of(start, &named.layout);
-    let (passing, hand) = (named.passing(&model), named.links_of_hand(&model));
-    let kinematics = Kinematics::new(model, root, named.grasp, named.camera)
-        .with_passing(passing, hand)
+    let kinematics = Kinematics::new(Arc::clone(model), root, named.grasp, named.camera)
+        .with_passing(passing.clone(), hand.clone())
         .with_followers(&named.layout.gripper);
-    Ok((kinematics, named.layout, positions))
+    Ok((kinematics, named.layout.clone(), positions))
 }
 
 /// Pose of the root link. Frame: world.
@@ -85,25 +85,20 @@ impl Robot {
     /// [`WorldError`] if profile and URDF don't match.
     pub fn insert(engine: &mut PhysicsWorld, start: &RobotStart) -> Result<Self, WorldError> {
         let profile = start.profile.clone();
-        let model = Arc::new(RobotModel::read(&profile)?);
-        let named = Named::find(&profile, &model)?;
-        let positions = home(&profile, &model, &named, start.base);
-        let root = root_of(start, &named.layout);
-        let (passing, links_of_hand) = (named.passing(&model), named.links_of_hand(&model));
-        let kinematics = Kinematics::new(model.clone(), root, named.grasp, named.camera)
-            .with_passing(passing, links_of_hand)
-            .with_followers(&named.layout.gripper);
-        let bodies = insert_links(engine, &model, &kinematics.links(&positions), &named, &profile);
-        let motors = insert_joints(engine, &model, &bodies, &named, &profile)?;
-        let off_floor = links_on_floor(&model, &named, &profile);
+        let resolved = resolved(&profile)?;
+        let Resolved { model, named, .. } = resolved.as_ref();
+        let (kinematics, _, positions) = geometry(start)?;
+        let bodies = insert_links(engine, model, &kinematics.links(&positions), named, &profile);
+        let motors = insert_joints(engine, model, &bodies, named, &profile)?;
+        let off_floor = links_on_floor(model, named, &profile);
         let balls = model.links.iter().map(|link| Ball::around(&link.solids)).collect();
-        let hand = Hand::of(&model, &named.layout.gripper);
+        let hand = Hand::of(model, &named.layout.gripper);
         let mut robot = Self {
+            model: Arc::clone(model),
+            layout: named.layout.clone(),
             profile,
-            model,
             kinematics,
             bodies,
-            layout: named.layout,
             finger_links: named.finger_links,
             motors,
             off_floor,

@@ -317,6 +317,11 @@ impl Ball {
 }
 
 impl Form {
+    /// Returns the shapes with their poses in the link's frame.
+    pub(crate) fn shapes(&self) -> impl Iterator<Item = (&SharedShape, &EnginePose)> {
+        self.solids.iter().map(|solid| (&solid.shape, &solid.pose))
+    }
+
     pub(crate) fn new(solids: &[actcheck_data::Part]) -> Self {
         let around = Ball::around(solids).unwrap_or(Ball { middle: Point3::origin(), radius: 0.0 });
         let forms = solids.iter().filter_map(|solid| {

@@ -1,0 +1,45 @@
+//! A robot as its profile and its file describe it, resolved once for many simulations.
+
+use std::cell::RefCell;
+use std::collections::BTreeSet;
+use std::sync::Arc;
+
+use crate::WorldError;
+use crate::description::RobotModel;
+use crate::layout::Named;
+use actcheck_data::RobotProfile;
+
+/// The links and joints of a robot, with their roles.
+pub(super) struct Resolved {
+    pub(super) model: Arc<RobotModel>,
+    pub(super) named: Named,
+    /// The pairs of links that pass through each other.
+    pub(super) passing: BTreeSet<(usize, usize)>,
+    /// The links of its hand.
+    pub(super) hand: BTreeSet<usize>,
+}
+
+thread_local! {
+    /// The robot of the last simulation in this thread: a campaign has only one.
+    static LAST: RefCell<Option<(Arc<RobotProfile>, Arc<Resolved>)>> = const { RefCell::new(None) };
+}
+
+/// Resolves a profile, or returns what the same profile gave in the last simulation.
+///
+/// # Errors
+/// [`WorldError`] if profile and URDF don't match.
+pub(super) fn resolved(profile: &Arc<RobotProfile>) -> Result<Arc<Resolved>, WorldError> {
+    let known = LAST.with_borrow(|last| match last {
+        Some((of, known)) if Arc::ptr_eq(of, profile) => Some(Arc::clone(known)),
+        _ => None,
+    });
+    if let Some(known) = known {
+        return Ok(known);
+    }
+    let model = Arc::new(RobotModel::read(profile)?);
+    let named = Named::find(profile, &model)?;
+    let (passing, hand) = (named.passing(&model), named.links_of_hand(&model));
+    let found = Arc::new(Resolved { model, named, passing, hand });
+    LAST.set(Some((Arc::clone(profile), Arc::clone(&found))));
+    Ok(found)
+}
