@@ -56,6 +56,50 @@ fn a_hand_alone_grasps_and_holds_like_the_whole_robot() {
     assert!(depth_alone < depth + 2e-4, "penetrates by {depth_alone} m instead of {depth} m");
 }
 
+/// Shapes are swept only where something fast can meet something fixed: a pick without sweeps is the same bit by bit.
+#[test]
+fn a_pick_is_the_same_without_needless_sweeps() {
+    let model = block([0.06, 0.06, 0.15]);
+    let of = |few_sweeps: bool| {
+        let (trace, world) = picked(&model, Shortcuts { few_sweeps, ..Shortcuts::ALL });
+        (format!("{trace:?}"), world.swept())
+    };
+    let [(always, swept), (seldom, swept_at_last)] = [of(false), of(true)];
+    assert_eq!(always, seldom);
+    assert_eq!((swept, swept_at_last), (true, false), "the thing hangs in the hand");
+}
+
+/// A plate of 2 mm that falls on the floor moves 4 cm in each step.
+#[test]
+fn a_fast_thing_does_not_pass_through_the_floor() {
+    let mut found = Vec::new();
+    for few_sweeps in [false, true] {
+        let mut dropped = scene(vec![object(
+            "plate_1",
+            block([0.2, 0.2, 0.002]),
+            Role::Other,
+            Pose::upright([2.0, 0.0, 4.0], 0.0),
+            0.2,
+            0.5,
+        )]);
+        dropped.robot.base = [0.0, 0.0, 0.0];
+        let mut world = build(&dropped).expect("the scene is right");
+        world.take_shortcuts(Shortcuts { few_sweeps, ..Shortcuts::ALL });
+        let hold = world.hold();
+        let mut n_swept = 0;
+        for _ in 0..120 {
+            world.step(&hold);
+            n_swept += usize::from(world.swept());
+        }
+        assert_eq!(world.fault(), None);
+        let height = body(&world, "plate_1").pose.position[2];
+        assert!(height > -0.01, "it is at {height} m");
+        found.push((body(&world, "plate_1").pose, n_swept));
+    }
+    assert_eq!(found[0].0, found[1].0);
+    assert!(found[0].1 == 120 && (1..100).contains(&found[1].1), "swept in {} and {} ticks", found[0].1, found[1].1);
+}
+
 /// The arm stretched forwards, with a level hand: lift, flexion, roll, flexion and roll of the wrist.
 const LEVEL: [f64; 5] = [0.3, -1.25, 0.0, -0.32, 0.0];
 /// Gap between this hand and a block under it. Unit: metres.

@@ -167,6 +167,6 @@ mod tests {
         for hindrance in [Hindrance::NoLift, blocked(0.03), Hindrance::OutOfReach, blocked(0.01), blocked(0.02)] {
             nearest.note(hindrance);
         }
-        assert_eq!(nearest.0, Some(blocked(0.01)));
+        assert_eq!(nearest.kept, Some(blocked(0.01)));
     }
 }

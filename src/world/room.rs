@@ -99,15 +99,29 @@ pub struct Shortcuts {
     pub shells: bool,
     /// Half of the substeps where the engine moves the hand alone, and where the robot touches nothing.
     pub few_substeps: bool,
+    /// No sweeps of fast shapes where nothing fast can meet something fixed.
+    pub few_sweeps: bool,
 }
 
 impl Shortcuts {
     /// All that keep the quality of a grasp.
-    pub const ALL: Self =
-        Self { free_motion: true, robot_apart: true, hand_alone: true, shells: true, few_substeps: true };
+    pub const ALL: Self = Self {
+        free_motion: true,
+        robot_apart: true,
+        hand_alone: true,
+        shells: true,
+        few_substeps: true,
+        few_sweeps: true,
+    };
     /// None: the engine simulates everything in every tick.
-    pub const NONE: Self =
-        Self { free_motion: false, robot_apart: false, hand_alone: false, shells: false, few_substeps: false };
+    pub const NONE: Self = Self {
+        free_motion: false,
+        robot_apart: false,
+        hand_alone: false,
+        shells: false,
+        few_substeps: false,
+        few_sweeps: false,
+    };
 
     /// Returns the reach for which the engine must prepare, given that of the robot.
     fn limit(self, reach: Reach) -> Reach {
@@ -196,12 +210,17 @@ impl World {
         self.room.reach == Reach::Hand
     }
 
+    /// Returns whether the engine swept fast shapes in the last tick, so that they pass through nothing fixed.
+    pub fn swept(&self) -> bool {
+        self.engine.integration_parameters.max_ccd_substeps > 0
+    }
+
     /// Returns the reach of the robot, with its links at these poses, in the next tick.
     pub(super) fn find_room(&mut self, poses: Vec<Isometry3<f64>>) -> Reach {
         let mut room = std::mem::take(&mut self.room);
         room.sweeps = true;
         let reach = if room.shortcuts == Shortcuts::NONE { Reach::All } else { self.reach(&mut room, poses) };
-        self.engine.integration_parameters.max_ccd_substeps = usize::from(room.sweeps);
+        self.engine.integration_parameters.max_ccd_substeps = usize::from(room.sweeps || !room.shortcuts.few_sweeps);
         room.reach = room.shortcuts.limit(reach);
         room.ticks[room.reach as usize] += 1;
         self.room = room;
