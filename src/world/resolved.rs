@@ -24,7 +24,7 @@ thread_local! {
     static LAST: RefCell<Option<(Arc<RobotProfile>, Arc<Resolved>)>> = const { RefCell::new(None) };
 }
 
-/// Resolves a profile, or returns what the same profile gave in the last simulation.
+/// Resolves a profile, or returns the result for the same profile in the last simulation.
 ///
 /// # Errors
 /// [`WorldError`] if profile and URDF don't match.
