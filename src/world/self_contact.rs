@@ -20,9 +20,6 @@ const CLEAR_M: f64 = 0.01;
 /// Share of their distance in a valid posture that links keep if that distance is smaller.
 const KEPT_SHARE: f64 = 0.9;
 
-/// The same share for a link and that before its neighbour: a compact joint brings them closer, but not its error of tracking.
-const KEPT_BY_NEXT: f64 = 0.3;
-
 /// Error of distances in 32 bits. Unit: metres.
 const ROUNDING_M: f64 = 1e-4;
 
@@ -100,14 +97,12 @@ impl SelfContact {
         let mut pairs = Vec::new();
         for second in (0..links.len()).filter(is_solid) {
             let neighbour = kinematics.solid_parent(second);
-            let next = neighbour.and_then(|link| kinematics.solid_parent(link));
             let passes = |first: usize| kinematics.pass(first, second) || kinematics.are_of_hand(first, second);
             let others = (0..second).filter(is_solid).filter(|first| neighbour != Some(*first) && !passes(*first));
             for first in others {
                 let pair = Pair { links: (first, second), clear_m: CLEAR_M };
                 let nearest = right.iter().map(|poses| gap(&links, pair, poses)).fold(CLEAR_M, f64::min);
-                let kept = if next == Some(first) { KEPT_BY_NEXT } else { KEPT_SHARE };
-                let clear_m = if nearest < CLEAR_M { nearest * kept } else { CLEAR_M };
+                let clear_m = if nearest < CLEAR_M { nearest * KEPT_SHARE } else { CLEAR_M };
                 if clear_m > 0.0 {
                     pairs.push(Pair { clear_m, ..pair });
                 }
