@@ -144,6 +144,24 @@ fn joints_without_an_effort_get_one_and_check_says_so() {
     assert!(passed >= 3, "{passed} of 4 picks passed");
 }
 
+/// With the speeds of 0 that some files have, every action would run out of time.
+#[test]
+fn joints_without_a_speed_get_one_and_check_says_so() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut urdf = String::new();
+    for part in fixed_arm().split_inclusive("velocity=\"") {
+        let rest =
+            if urdf.ends_with("velocity=\"") { part.split_once('"').map_or(part, |(_, rest)| rest) } else { part };
+        urdf += if rest.len() < part.len() { "0\"" } else { "" };
+        urdf += rest;
+    }
+    assert!(urdf.contains("velocity=\"0\""), "{urdf}");
+    let (said, passed) = check_and_run(folder.path(), &urdf, "");
+    assert!(said.contains("S075") && said.contains("the largest `velocity` of `"), "{said}");
+    assert!(said.contains("1 rad/s or 0.25 m/s is used"), "{said}");
+    assert!(passed >= 3, "{passed} of 4 picks passed");
+}
+
 /// A joint that moves the whole robot over the floor or through the air; elsewhere it is a fault.
 #[test]
 fn a_floating_joint_at_the_root_is_fixed() {

@@ -31,7 +31,7 @@ impl Env {
         if !matches!(campaign.launcher, Launcher::Reference) || campaign.case.is_some() {
             return found;
         }
-        found.extend(self.unknown_efforts().into_iter().chain(self.too_weak()).collect());
+        found.extend(self.unknown_efforts().into_iter().chain(self.unknown_speeds()).chain(self.too_weak()).collect());
         let scenes = self.nominal_scenes();
         if let Some(test) = self.test_with("PerceivePlane") {
             self.foresee_views(&scenes, test, &mut found);
@@ -103,6 +103,20 @@ impl Env {
             robot.name,
         );
         let help = "write the largest force or torque of each joint into `<limit effort=\"…\">` of the URDF";
+        Some(self.campaign.warning("S075", "robot.profile", message).help(help))
+    }
+
+    /// S075 if joints with a role have no known speed.
+    fn unknown_speeds(&self) -> Option<Diagnostic> {
+        let robot = &self.campaign.robot;
+        let (joints, [turning, sliding]) =
+            world::assumed_speeds(robot).ok().filter(|(joints, _)| !joints.is_empty())?;
+        let message = format!(
+            "the largest `velocity` of `{}` of {} is 0, and so unknown: {turning} rad/s or {sliding} m/s is used",
+            joints.join("`, `"),
+            robot.name,
+        );
+        let help = "write the largest speed of each joint into `<limit velocity=\"…\">` of the URDF";
         Some(self.campaign.warning("S075", "robot.profile", message).help(help))
     }
 

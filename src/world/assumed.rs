@@ -1,9 +1,12 @@
 //! Limits of joints that a simulation can't use as a URDF states them.
 
-use crate::description::Joint;
+use crate::description::{Joint, JointKind};
 
 /// Largest effort of joints for which it is unknown, as for those of MJCF and SDF. Units: newtons or newton metres.
 pub(super) const UNKNOWN_EFFORT: f64 = 100.0;
+
+/// Largest speeds of joints for which they are unknown. Units: rad/s, m/s. Those of a slow arm.
+pub(super) const UNKNOWN_SPEEDS: [f64; 2] = [1.0, 0.25];
 
 /// Widens the limits of joints that mimic others to the range of their couplings. A mechanism moves its links together:
 /// limits that contradict the coupling, such as those of a mirrored joint that are not mirrored, would block the leader.
@@ -31,6 +34,18 @@ pub(super) fn assume_efforts(joints: &mut [Joint]) -> Vec<String> {
     let mut assumed = Vec::new();
     for joint in joints.iter_mut().filter(|joint| joint.effort == 0.0) {
         joint.effort = UNKNOWN_EFFORT;
+        if joint.mimic.is_none() {
+            assumed.push(joint.name.clone());
+        }
+    }
+    assumed
+}
+
+/// As [`assume_efforts`], for joints whose largest speed is 0.
+pub(super) fn assume_speeds(joints: &mut [Joint]) -> Vec<String> {
+    let mut assumed = Vec::new();
+    for joint in joints.iter_mut().filter(|joint| joint.velocity == 0.0) {
+        joint.velocity = UNKNOWN_SPEEDS[usize::from(joint.kind == JointKind::Prismatic)];
         if joint.mimic.is_none() {
             assumed.push(joint.name.clone());
         }

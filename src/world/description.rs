@@ -7,7 +7,7 @@ use std::sync::{Arc, OnceLock};
 use nalgebra::{Isometry3, Matrix3, Translation3, Unit, UnitQuaternion, Vector3};
 
 use crate::WorldError;
-use crate::assumed::{assume_efforts, widen_followers};
+use crate::assumed::{assume_efforts, assume_speeds, widen_followers};
 use crate::counterweight::{BalancedJoint, balance};
 use crate::gripper::Surface;
 use crate::kinematics::motion;
@@ -105,6 +105,8 @@ pub struct RobotModel {
     pub(crate) balanced: Vec<BalancedJoint>,
     /// Names of joints with a role whose largest effort is unknown.
     pub(crate) assumed: Vec<String>,
+    /// The same for those whose largest speed is 0.
+    pub(crate) assumed_speeds: Vec<String>,
     /// The URDF's name, for messages.
     name: String,
 }
@@ -199,6 +201,7 @@ impl<'a> Folding<'a> {
             rigid: Vec::new(),
             balanced: Vec::new(),
             assumed: Vec::new(),
+            assumed_speeds: Vec::new(),
             name,
         };
         Ok(Self { robot, links, children, meshes, out })
@@ -251,6 +254,7 @@ impl<'a> Folding<'a> {
         }
         if needed.is_chosen() {
             self.out.assumed = assume_efforts(&mut self.out.joints);
+            self.out.assumed_speeds = assume_speeds(&mut self.out.joints);
         }
         balance(&mut self.out, &profile.arm_joints);
         Ok(self.out)

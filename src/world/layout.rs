@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
-use crate::assumed::UNKNOWN_EFFORT;
+use crate::assumed::{UNKNOWN_EFFORT, UNKNOWN_SPEEDS};
 use crate::description::RobotModel;
 use crate::kinematics::Mount;
 use crate::wrist;
@@ -161,6 +161,14 @@ pub fn balanced_joints(profile: &RobotProfile) -> Result<Vec<BalancedJoint>, Wor
 /// [`WorldError`] if the URDF can't be read.
 pub fn assumed_efforts(profile: &RobotProfile) -> Result<(Vec<String>, f64), WorldError> {
     RobotModel::read(profile).map(|model| (model.assumed, UNKNOWN_EFFORT))
+}
+
+/// As [`assumed_efforts`], for joints whose largest speed is 0. Units: rad/s for those that turn, m/s for those that slide.
+///
+/// # Errors
+/// [`WorldError`] if the URDF can't be read.
+pub fn assumed_speeds(profile: &RobotProfile) -> Result<(Vec<String>, [f64; 2]), WorldError> {
+    RobotModel::read(profile).map(|model| (model.assumed_speeds, UNKNOWN_SPEEDS))
 }
 
 /// Checks that a profile matches its URDF, without simulating.

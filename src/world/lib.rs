@@ -68,7 +68,7 @@ pub use error::WorldError;
 pub use fault::{Fault, Perturbation, Poison};
 pub use gripper::Gripper;
 pub use kinematics::{GRAVITY, Kinematics};
-pub use layout::{Layout, assumed_efforts, balanced_joints, check_robot, grip_limit_n, wedge};
+pub use layout::{Layout, assumed_efforts, assumed_speeds, balanced_joints, check_robot, grip_limit_n, wedge};
 pub use propose::{Proposal, complete, is_incomplete, propose};
 pub use recorder::{Contact, Course, Record, Tracks};
 pub use robot::geometry;

@@ -198,8 +198,8 @@ const CODES_S: &[Code] = &[
     ),
     code(
         "S075",
-        "the effort of joints is unknown",
-        "the URDF limits the effort of joints with a role to 0, with which they could not move",
-        "write the largest force or torque of each joint into the URDF",
+        "the effort or the speed of joints is unknown",
+        "the URDF limits the effort or the velocity of joints with a role to 0, with which they could not move",
+        "write the largest force or torque and the largest speed of each joint into the URDF",
     ),
 ];

@@ -6,10 +6,12 @@ use std::path::Path;
 use nalgebra::{Isometry3, Matrix3, Quaternion, Rotation3, Translation3, Unit, UnitQuaternion, Vector3};
 
 use crate::foreign::xml::{self, Bound, Node, Reader};
-use actcheck_base::{Diagnostic, Diagnostics, Files, Source};
+use actcheck_base::{Diagnostic, Diagnostics, Files, Source, did_you_mean};
 
 /// Deepest inclusion of files: deeper ones include themselves.
 const DEEPEST: usize = 8;
+/// Types of geoms.
+const GEOMS: [&str; 9] = ["plane", "hfield", "sphere", "capsule", "ellipsoid", "cylinder", "box", "mesh", "sdf"];
 /// The class of elements without one.
 const MAIN: &str = "main";
 
@@ -76,7 +78,29 @@ impl Compiler {
             let file = format!("{folder}{file}");
             compiler.meshes.insert(name, (file, scale));
         }
+        compiler.check_names(root, reader);
         compiler
+    }
+
+    /// Reports classes without defaults, and types of geoms that don't exist: with other defaults or another shape than meant,
+    /// verdicts would be wrong.
+    fn check_names(&self, root: Node, reader: &mut Reader) {
+        let inside = |node: &Node| {
+            !(node.has_tag_name("default") || node.ancestors().any(|above| above.has_tag_name("default")))
+        };
+        for node in root.descendants().filter(Node::is_element) {
+            let classes =
+                ["class", "childclass"].into_iter().filter_map(|key| node.attribute(key)).filter(|_| inside(&node));
+            for class in classes.filter(|class| *class != MAIN && !self.defaults.contains_key(*class)) {
+                let help = did_you_mean(class, self.defaults.keys().map(String::as_str));
+                reader.error("W051", node, format!("there is no class `{class}` in `<default>`"), help);
+            }
+            if let Some(kind) = node.attribute("type").filter(|kind| node.has_tag_name("geom") && !GEOMS.contains(kind))
+            {
+                let help = did_you_mean(kind, GEOMS);
+                reader.error("W035", node, format!("there is no geom of the type `{kind}`"), help);
+            }
+        }
     }
 
     /// Adds a class and those in it, which inherit its defaults.
