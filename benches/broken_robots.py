@@ -52,7 +52,7 @@ FAULTS = [
     ("axis of length 0", "urdf", first(r'<axis\s+xyz="[^"]*"', '<axis xyz="0 0 0"')),
     ("axis of two numbers", "urdf", first(r'<axis\s+xyz="[^"]*"', '<axis xyz="0 1"')),
     ("limits exchanged", "urdf", first(r'lower="[^"]*"(.*?)upper="[^"]*"', r'lower="2"\1upper="-2"')),
-    ("limit is no number", "urdf", first(r'upper="[^"]*"', 'upper="wide"')),
+    ("limit is not a number", "urdf", first(r'upper="[^"]*"', 'upper="wide"')),
     ("effort is negative", "urdf", first(r'effort="[^"]*"', 'effort="-5"')),
     ("speed is 0", "urdf", every(r'velocity="[^"]*"', 'velocity="0"')),
     ("mass is negative", "urdf", first(r'<mass\s+value="[^"]*"', '<mass value="-1"')),
