@@ -16,8 +16,6 @@ pub enum Hindrance {
     Dearer,
     /// No joint positions bring the hand there.
     OutOfReach,
-    /// The open hand would come down on the object.
-    OnObject,
     /// The arm can't move the hand straight to the object or up from it.
     NoLift,
     /// The arm would collide with the robot. `links` are the two that come too close, if the postures were found.
@@ -36,7 +34,6 @@ impl Hindrance {
         match self {
             Self::Dearer => (0, 0.0),
             Self::OutOfReach => (1, 0.0),
-            Self::OnObject => (1, 1.0),
             Self::NoLift => (2, 0.0),
             Self::Itself { links } => (3, if links.is_some() { 1.0 } else { 0.0 }),
             Self::NoRoute => (4, 0.0),
@@ -48,33 +45,27 @@ impl Hindrance {
 
 /// The hindrance of the grasp that came nearest to a plan.
 #[derive(Debug, Default)]
-pub struct Nearest {
-    kept: Option<Hindrance>,
-    /// Whether the open hand of any grasp would come down on the object.
-    pub(super) any_on_object: bool,
-}
+pub struct Nearest(Option<Hindrance>);
 
 impl Nearest {
     /// Keeps the hindrance if its grasp came nearer to a plan than the others so far.
     pub fn note(&mut self, hindrance: Hindrance) {
-        self.any_on_object |= hindrance == Hindrance::OnObject;
-        let is_nearer = self.kept.as_ref().is_none_or(|kept| kept.progress() < hindrance.progress());
+        let is_nearer = self.0.as_ref().is_none_or(|kept| kept.progress() < hindrance.progress());
         if is_nearer {
-            self.kept = Some(hindrance);
+            self.0 = Some(hindrance);
         }
     }
 
     /// Whether no posture brought the hand to the object.
     pub fn is_out_of_reach(&self) -> bool {
-        matches!(self.kept, None | Some(Hindrance::Dearer | Hindrance::OutOfReach))
+        matches!(self.0, None | Some(Hindrance::Dearer | Hindrance::OutOfReach))
     }
 
     /// The reason for the action's report.
     pub fn reason(&self, thing: Option<&Sighting>, around: &Surroundings<'_>) -> String {
-        let why = match &self.kept {
+        let why = match &self.0 {
             None | Some(Hindrance::Dearer) => return NO_WAY.to_owned(),
             Some(Hindrance::OutOfReach) => out_of_reach(thing, around.furniture),
-            Some(Hindrance::OnObject) => "the open hand would come down on it".to_owned(),
             Some(Hindrance::NoLift) => "the arm reaches it but can't lift it straight up".to_owned(),
             Some(Hindrance::Itself { links: None }) => "the arm would collide with the robot".to_owned(),
             Some(Hindrance::Itself { links: Some((first, second)) }) => {
@@ -167,6 +158,6 @@ mod tests {
         for hindrance in [Hindrance::NoLift, blocked(0.03), Hindrance::OutOfReach, blocked(0.01), blocked(0.02)] {
             nearest.note(hindrance);
         }
-        assert_eq!(nearest.kept, Some(blocked(0.01)));
+        assert_eq!(nearest.0, Some(blocked(0.01)));
     }
 }

@@ -19,8 +19,6 @@ const TURNED_PITCHES_RAD: [f64; 4] = [FRAC_PI_2, 1.2, 0.9, 0.6];
 const CLEAR_M: f64 = FURNITURE_CLEAR_M + 0.0015;
 /// Distance of the hand from the object before the fingers close. Unit: metres.
 const BESIDE_M: f64 = 0.003;
-/// Overlap of hand and object that is a rounding of their shapes. Unit: metres.
-const OVERLAP_M: f64 = 0.004;
 /// Number of hand headings, the first along the object.
 const N_HEADINGS: u32 = 24;
 /// Penalty per radian between the hand and the vertical.
@@ -79,23 +77,13 @@ impl Hand {
 
     /// Whether the hand at a pose is clear of the object, also on the way straight down to it.
     fn is_beside(&self, pose: &Isometry3<f64>, thing: &Sighting) -> bool {
-        self.keeps_off(pose, thing, BESIDE_M)
-    }
-
-    /// Whether the open hand in a posture that the arm reaches comes down beside the object, up to the rounding of shapes.
-    pub(crate) fn comes_beside(&self, at_thing: &Isometry3<f64>, thing: &Sighting) -> bool {
-        self.keeps_off(at_thing, thing, -OVERLAP_M)
-    }
-
-    /// Whether the open hand at a pose, and on the way straight down to it, is this far from the object. Unit: metres.
-    fn keeps_off(&self, pose: &Isometry3<f64>, thing: &Sighting, by_m: f64) -> bool {
         let from_world = thing.pose.to_isometry().inverse() * pose;
         let [width, depth, height] = thing.size_m;
         let is_over = |point: &Point3<f64>| match is_round(thing) {
-            true => point.x * point.x + point.y * point.y < (width.max(depth) / 2.0 + by_m).powi(2),
-            false => point.x.abs() < width / 2.0 + by_m && point.y.abs() < depth / 2.0 + by_m,
+            true => point.x * point.x + point.y * point.y < (width.max(depth) / 2.0 + BESIDE_M).powi(2),
+            false => point.x.abs() < width / 2.0 + BESIDE_M && point.y.abs() < depth / 2.0 + BESIDE_M,
         };
-        self.open.iter().map(|point| from_world * point).all(|point| point.z > height + by_m || !is_over(&point))
+        self.open.iter().map(|point| from_world * point).all(|point| point.z > height + BESIDE_M || !is_over(&point))
     }
 }
 

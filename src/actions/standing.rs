@@ -63,7 +63,6 @@ pub fn plan(operator: &mut Operator<'_>, wanted: PlanRequest<'_>, others: &[Sigh
     if let Some(thing) = wanted.taken {
         // The fingers close no further than to the object.
         let narrowest_m = thing.size_m[0].min(thing.size_m[1]);
-        arm.taken = Some((thing, Hand::new(operator)));
         arm.closing_m.extend(slant::closing_m(operator).into_iter().filter(|opening_m| *opening_m > narrowest_m));
     }
     let all = if wanted.all.is_empty() { wanted.grasps } else { wanted.all };
@@ -73,12 +72,6 @@ pub fn plan(operator: &mut Operator<'_>, wanted: PlanRequest<'_>, others: &[Sigh
         let mut next = |grasps: &[Grasp]| best(&arm, grasps, &mut samples, &mut nearest);
         let slants = slant::ahead(thing, &Hand::new(operator), operator);
         found = next(&rolled(all)).or_else(|| next(&slants)).or_else(|| next(&rolled(&slants)));
-    }
-    if found.is_none() && nearest.any_on_object {
-        // A finger that comes down on the edge of an object pushes it aside, or slides off it.
-        arm.taken = None;
-        found = best(&arm, all, &mut samples, &mut nearest);
-        found = found.or_else(|| best(&arm, &rolled(all), &mut samples, &mut nearest));
     }
     found.ok_or_else(|| nearest.reason(wanted.taken, &arm.meanwhile.surroundings()))
 }
@@ -124,8 +117,6 @@ struct Arm<'a> {
     approach_m: f64,
     /// Openings at which fingers that turn have to clear the surface. Unit: metres.
     closing_m: Vec<f64>,
-    /// The object to grasp, and the hand that must not come down on it.
-    taken: Option<(&'a Sighting, Hand)>,
     span: Span,
 }
 
@@ -173,18 +164,10 @@ impl<'a> Arm<'a> {
         let space = |right: &[Vec<f64>]| ArmSpace::new(kinematics, layout, furniture, things, right);
         let mut opened = start.clone();
         layout.gripper.set(&mut opened, operator.profile().max_opening_m);
-        // The postures of the profile are valid too.
-        let of_profile = postures.iter().map(|posture| {
-            let mut positions = start.clone();
-            layout.arm.iter().zip(posture).for_each(|(idx, value)| positions[*idx] = *value);
-            positions
-        });
-        let mut right: Vec<Vec<f64>> = std::iter::once(start.clone()).chain(of_profile).collect();
-        let mut before = space(&right);
+        let mut before = space(std::slice::from_ref(&start));
         if !before.room(&opened).1 {
             // Fingers that turn wide open come close to the wrist, wherever the arm is.
-            right.push(opened);
-            before = space(&right);
+            before = space(&[start.clone(), opened]);
         }
         let meanwhile = before.among(others);
         let span = Span::of(kinematics, &layout.arm, &start);
@@ -202,7 +185,6 @@ impl<'a> Arm<'a> {
             lifts_m,
             approach_m,
             closing_m: Vec::new(),
-            taken: None,
             span,
         }
     }
@@ -257,11 +239,6 @@ impl<'a> Arm<'a> {
         samples: &mut Samples,
     ) -> Result<Plan, Hindrance> {
         let (at_thing, turn) = self.solve_turned(seed, &grasp.pose, LARGEST_TURN_RAD).ok_or(Hindrance::OutOfReach)?;
-        if let (Approach::Top, Some((thing, hand))) = (grasp.approach, &self.taken)
-            && !hand.comes_beside(&self.kinematics.grasp(&at_thing), thing)
-        {
-            return Err(Hindrance::OnObject);
-        }
         let lift = self.lifts_m.iter().find_map(|height| self.straight(&at_thing, &(Vector3::z() * *height)));
         let lift = lift.ok_or(Hindrance::NoLift)?;
         let heading = grasp.heading + turn;

@@ -75,6 +75,7 @@ pub fn load_text(source: Source, folder: &Path, overrides: &Overrides) -> Result
     }
     // Taken before the tables of designators, which may have any name.
     let case = table.table("case");
+    places.extend(library.profile_at.clone().map(|span| ("robot.profile".to_owned(), span)));
     let designators = designators::read(&mut table, &mut library, &mut places, &mut found);
     let case = case.map(|table| case::read(table, &designators, &mut places, &mut found));
     let Designators { candidates, other_counts, lying, nav_obstacles, nav_obstacle_count, nav_may_block } = designators;

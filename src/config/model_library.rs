@@ -7,7 +7,7 @@ use std::sync::Arc;
 use crate::foreign::{self, Lookup};
 use crate::paths::resolve_path;
 use crate::{Furniture, Located, Table, WorldMap, model, robot, world_map};
-use actcheck_base::{Diagnostic, Diagnostics, Files, Severity, did_you_mean};
+use actcheck_base::{Diagnostic, Diagnostics, Files, Severity, Span, did_you_mean};
 use actcheck_data::{ObjectModel, Range, RobotProfile};
 
 /// Folder of the models embedded in the program.
@@ -34,6 +34,8 @@ pub(crate) struct ModelLibrary {
     pub(crate) worlds: BTreeMap<String, Arc<WorldMap>>,
     /// Ranges of the base's initial x, y and heading.
     pub(crate) start: Option<[Range; 3]>,
+    /// Where `profile` of the table `[robot]` is.
+    pub(crate) profile_at: Option<Span>,
     /// Warnings about ignored parts of the worlds.
     warnings: Diagnostics,
 }
@@ -62,6 +64,7 @@ pub(crate) fn read(table: &mut Table, folder: &Path, found: &mut Diagnostics) ->
         uncategorised: BTreeSet::new(),
         worlds: BTreeMap::new(),
         start: None,
+        profile_at: None,
         warnings: Diagnostics::new(),
     };
     for path in library.toml_files("objects") {
@@ -357,6 +360,7 @@ impl ModelLibrary {
     ) -> Option<(Files, PathBuf, Vec<PathBuf>)> {
         let mut table = root.table("robot");
         let written = table.as_mut().and_then(|table| table.string("profile"));
+        self.profile_at = written.as_ref().map(|written| written.span.clone());
         let name = written.as_ref().map_or(DEFAULT_ROBOT, |written| &written.value);
         let place = match &written {
             Some(path) if path.value.ends_with(".toml") => {
