@@ -3,10 +3,11 @@
 
     python3 benches/broken_robots.py --program ./actcheck --work /tmp/broken panda.urdf fetch.urdf panda.xml model.sdf
 
-Breaks each file in the ways below that apply to it, reads it with `actcheck new robot` and `actcheck check` (robots) or with
-`actcheck check` alone (objects, files that end with `.sdf`), and prints one line for each: the code, whether the place is in the broken file, and whether there is
-help. A fault that only leaves less, such as a joint whose limits are exchanged, may be a warning. A crash, an exit code of 0 without
-a warning, or a diagnostic without a place or help is printed as WRONG, and the exit code is then 1.
+Breaks each file in the ways below that apply to it, and reads it as a user would: robots with `actcheck new robot` and
+`actcheck check`, objects (SDF) with `actcheck check` alone. Prints one line for each: the exit code, the code and the message.
+A fault that a robot can be simulated with, such as a speed of 0, may be a warning. A crash, no diagnostic, or one without a
+file and help is printed as WRONG, and the exit code is then 1. A broken robot is written beside the original, so that its
+meshes are found, and removed again.
 """
 
 import argparse
@@ -105,7 +106,7 @@ def kind_of(path):
 
 
 def read_broken(args, path, kind, text, folder):
-    """Reads the broken file as a user would; returns the exit code, the output and the file's name."""
+    """Reads the broken file as a user would; returns the exit code and the output."""
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
     if kind == "sdf":
@@ -116,18 +117,20 @@ def read_broken(args, path, kind, text, folder):
         (folder / "c.toml").write_text(CHECK)
         command = ["check", "c.toml"]
     else:
-        # Beside the original, so that its meshes are found.
         broken = path.with_name(f"broken_{path.name}")
         broken.write_text(text)
         command = ["new", "robot", str(broken), "--out", str(folder / "robot.toml")]
         for package in args.packages:
             command += ["--packages", package]
-    done = run(args, folder, command)
-    if kind != "sdf":
-        if done.returncode == 0:
-            (folder / "c.toml").write_text(CHECK.replace("thing", "can").replace("model_dir", "# ") + ROBOT)
+    try:
+        done = run(args, folder, command)
+        if kind != "sdf" and done.returncode == 0:
+            shipped = CHECK.replace('model_dir = "models"\n', "").replace("thing", "can")
+            (folder / "c.toml").write_text(shipped + ROBOT)
             done = run(args, folder, ["check", "c.toml"])
-        broken.unlink()
+    finally:
+        if kind != "sdf":
+            broken.unlink()
     return done.returncode, done.stdout + done.stderr
 
 

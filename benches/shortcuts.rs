@@ -31,13 +31,14 @@ const DEFAULTS: [u32; 2] = [12, 3];
 /// Time for which a robot holds its object still. Unit: seconds.
 const HOLD_SECS: f64 = 10.0;
 
-const VARIANTS: [(&str, Shortcuts); 8] = [
+const VARIANTS: [(&str, Shortcuts); 9] = [
     ("none: the whole robot in the engine", Shortcuts::NONE),
     ("free motion without the engine", Shortcuts { free_motion: true, ..Shortcuts::NONE }),
     ("objects that move without the robot", Shortcuts { robot_apart: true, ..Shortcuts::NONE }),
     ("the hand alone", Shortcuts { hand_alone: true, ..Shortcuts::NONE }),
     ("the hand alone, half the substeps", Shortcuts { hand_alone: true, few_substeps: true, ..Shortcuts::NONE }),
     ("closed shells", Shortcuts { shells: true, ..Shortcuts::NONE }),
+    ("all, with sweeps in every step", Shortcuts { few_sweeps: false, ..Shortcuts::ALL }),
     ("all, without half the substeps", Shortcuts { few_substeps: false, ..Shortcuts::ALL }),
     ("all that a campaign takes", Shortcuts::ALL),
 ];

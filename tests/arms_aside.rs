@@ -3,8 +3,7 @@
 use crate::support::urdf::{joint, link};
 use crate::support::{actcheck, stderr, stdout};
 
-/// A square base, a mast with a lift, a telescope that extends to the right, a wrist of three
-/// joints, and two fingers that slide.
+/// A square base, a lift, a telescope that extends to the right, a wrist of three joints, and two fingers that slide.
 fn helper() -> String {
     let mut text = "<robot name=\"helper\">\n".to_owned();
     text += &link("base", [0.34, 0.34, 0.15], [0.0, 0.0, 0.085], 20.0);
@@ -34,9 +33,10 @@ fn helper() -> String {
             [0.0, 0.0, 0.0],
             0.2,
         ),
+        ("pitch", "wrist", "revolute", [0.0, -0.03, 0.0], "1 0 0", [-0.6, 1.6], [0.03; 3], [0.0, -0.01, 0.0], 0.2),
         (
             "palm",
-            "wrist",
+            "pitch",
             "revolute",
             [0.0, -0.05, 0.0],
             "0 1 0",

@@ -18,7 +18,7 @@ const HISTORY: &str = ".actcheck";
 /// `actcheck new robot`
 #[derive(Debug, Args)]
 pub struct NewRobotArgs {
-    /// The robot's model: URDF, xacro (FILE.xacro), MJCF or SDF.
+    /// The robot's model: URDF, xacro (FILE.xacro), MJCF or SDF
     #[arg(value_name = "FILE")]
     pub model: PathBuf,
     /// Folders in which `package://NAME` and `$(find NAME)` look for packages, besides those around the model

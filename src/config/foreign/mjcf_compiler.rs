@@ -85,20 +85,20 @@ impl Compiler {
     /// Reports classes without defaults, and types of geoms that don't exist: with other defaults or another shape than meant,
     /// verdicts would be wrong.
     fn check_names(&self, root: Node, reader: &mut Reader) {
-        let inside = |node: &Node| {
-            !(node.has_tag_name("default") || node.ancestors().any(|above| above.has_tag_name("default")))
-        };
+        let in_defaults = |node: Node| node.ancestors().any(|above| above.has_tag_name("default"));
         for node in root.descendants().filter(Node::is_element) {
-            let classes =
-                ["class", "childclass"].into_iter().filter_map(|key| node.attribute(key)).filter(|_| inside(&node));
+            let classes = ["class", "childclass"]
+                .into_iter()
+                .filter_map(|key| node.attribute(key))
+                .filter(|_| !in_defaults(node));
             for class in classes.filter(|class| *class != MAIN && !self.defaults.contains_key(*class)) {
                 let help = did_you_mean(class, self.defaults.keys().map(String::as_str));
-                reader.error("W051", node, format!("there is no class `{class}` in `<default>`"), help);
+                reader.error("W051", node, format!("`<default>` does not define the class `{class}`"), help);
             }
             if let Some(kind) = node.attribute("type").filter(|kind| node.has_tag_name("geom") && !GEOMS.contains(kind))
             {
                 let help = did_you_mean(kind, GEOMS);
-                reader.error("W035", node, format!("there is no geom of the type `{kind}`"), help);
+                reader.error("W035", node, format!("the geom type `{kind}` does not exist"), help);
             }
         }
     }
