@@ -20,9 +20,6 @@ use nalgebra::{Isometry3, Matrix3, Translation3, UnitQuaternion, Vector3};
 use rapier3d::prelude as engine;
 use serde_json::{Value, json};
 
-#[path = "../src/world/fresh.rs"]
-mod fresh;
-
 /// Steps of one measurement: two seconds of simulated time.
 const STEPS: u32 = 480;
 /// Measurements of each kind, alternating; the fastest counts.
@@ -131,7 +128,7 @@ impl ByHand {
             gravity,
             integration_parameters: parameters,
             // Contacts must be discarded in the same way as in actcheck.
-            narrow_phase: fresh::narrow_phase(),
+            narrow_phase: world::narrow_phase(),
             ..engine::PhysicsWorld::default()
         };
         let floor = engine::ColliderBuilder::cuboid(20.0, 20.0, 0.5)

@@ -40,6 +40,8 @@ pub(crate) const TOP_DEPTH_M: f64 = 0.03;
 const TOP_LOWEST_M: f64 = 0.0275;
 /// Total room that the widest opening must leave beside an object, both sides together. Unit: metres.
 pub(crate) const LEAST_ROOM_M: f64 = 0.01;
+/// Room that a turning jaw leaves beside an object on its way there. Unit: metres.
+const JAW_ROOM_M: f64 = 0.045;
 /// Objects whose sides differ by less are treated as round. Unit: metres. Perceived sizes are off by some millimetres.
 const ROUND_M: f64 = 0.015;
 /// Downward pitch of a slanted hand, used where a hand that points straight down is out of reach. Unit: radians. Steep
@@ -53,6 +55,17 @@ const UNUSUAL_PENALTY: f64 = 0.1;
 const SIDE_ABOVE_M: f64 = 0.01;
 /// Number of headings tried around an object.
 const N_HEADINGS: u32 = 24;
+
+/// How wide the hand opens before an object. Unit: metres. A jaw that turns against a fixed one swings far out, and needs no
+/// more than some room; other hands open as wide as they can.
+pub(crate) fn widest_m(thing: &Sighting, robot: &Operator<'_>) -> f64 {
+    let most_m = robot.profile().max_opening_m;
+    let [width, depth, _] = thing.size_m;
+    match robot.layout().gripper.has_fixed_jaw() {
+        true => most_m.min(width.max(depth) + JAW_ROOM_M),
+        false => most_m,
+    }
+}
 
 /// All usual grasps of an object for a gripper with this opening. Empty if the object is too wide in every direction.
 pub fn grasps(thing: &Sighting, max_opening_m: f64) -> Vec<Grasp> {

@@ -16,6 +16,8 @@ pub enum Hindrance {
     Dearer,
     /// No joint positions bring the hand there.
     OutOfReach,
+    /// The open hand would touch the object before it closes. The planner then looks for other grasps.
+    Touches,
     /// The arm can't move the hand straight to the object or up from it.
     NoLift,
     /// The arm would collide with the robot. `links` are the two that come too close, if the postures were found.
@@ -34,6 +36,7 @@ impl Hindrance {
         match self {
             Self::Dearer => (0, 0.0),
             Self::OutOfReach => (1, 0.0),
+            Self::Touches => (0, 1.0),
             Self::NoLift => (2, 0.0),
             Self::Itself { links } => (3, if links.is_some() { 1.0 } else { 0.0 }),
             Self::NoRoute => (4, 0.0),
@@ -58,13 +61,13 @@ impl Nearest {
 
     /// Whether no posture brought the hand to the object.
     pub fn is_out_of_reach(&self) -> bool {
-        matches!(self.0, None | Some(Hindrance::Dearer | Hindrance::OutOfReach))
+        matches!(self.0, None | Some(Hindrance::Dearer | Hindrance::Touches | Hindrance::OutOfReach))
     }
 
     /// The reason for the action's report.
     pub fn reason(&self, thing: Option<&Sighting>, around: &Surroundings<'_>) -> String {
         let why = match &self.0 {
-            None | Some(Hindrance::Dearer) => return NO_WAY.to_owned(),
+            None | Some(Hindrance::Dearer | Hindrance::Touches) => return NO_WAY.to_owned(),
             Some(Hindrance::OutOfReach) => out_of_reach(thing, around.furniture),
             Some(Hindrance::NoLift) => "the arm reaches it but can't lift it straight up".to_owned(),
             Some(Hindrance::Itself { links: None }) => "the arm would collide with the robot".to_owned(),

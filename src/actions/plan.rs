@@ -106,7 +106,7 @@ pub fn plan(operator: &mut Operator<'_>, wanted: PlanRequest<'_>, others: &[Sigh
         let mut straight =
             |planner: &Planner<'_>, grasps: &[Grasp]| best(planner, grasps, &mut Samples::new(0.0, 0), &mut nearest);
         found = straight(&planner, &rolled(&all));
-        let hand = Hand::new(operator);
+        let hand = Hand::new(thing, operator);
         planner.heading_mobility = TURNED_MOBILITY;
         let slants = if found.is_none() { slant::ahead(thing, &hand, operator) } else { Vec::new() };
         found = found.or_else(|| straight(&planner, &slants)).or_else(|| straight(&planner, &rolled(&slants)));

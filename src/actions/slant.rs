@@ -5,7 +5,7 @@ use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, TAU};
 
 use nalgebra::{Isometry3, Point3, Translation3};
 
-use crate::grasp::{Approach, Grasp, LEAST_ROOM_M, TOP_DEPTH_M, centred, hand, is_round, width_across};
+use crate::grasp::{Approach, Grasp, LEAST_ROOM_M, TOP_DEPTH_M, centred, hand, is_round, widest_m, width_across};
 use crate::motion::moved_links;
 use crate::operator::Operator;
 use crate::plan::FURNITURE_CLEAR_M;
@@ -51,7 +51,7 @@ pub(crate) struct Hand {
 
 impl Hand {
     /// The hand of a robot.
-    pub(crate) fn new(robot: &Operator<'_>) -> Self {
+    pub(crate) fn new(thing: &Sighting, robot: &Operator<'_>) -> Self {
         let (kinematics, layout) = (robot.kinematics(), robot.layout());
         let is_hand = moved_links(kinematics, layout.arm.last().copied().as_slice());
         let mut points = kinematics.surface_points(SPACING_M);
@@ -63,7 +63,7 @@ impl Hand {
             let from_world = kinematics.grasp(&posture).inverse();
             points.iter().map(|(link, point)| from_world * links[*link] * point).collect()
         };
-        let open = at(robot.profile().max_opening_m);
+        let open = at(widest_m(thing, robot));
         let closing = closing_m(robot).into_iter().flat_map(at);
         Self { swept: open.iter().copied().chain(closing).collect(), open }
     }
@@ -76,7 +76,7 @@ impl Hand {
     }
 
     /// Whether the hand at a pose is clear of the object, also on the way straight down to it.
-    fn is_beside(&self, pose: &Isometry3<f64>, thing: &Sighting) -> bool {
+    pub(crate) fn is_beside(&self, pose: &Isometry3<f64>, thing: &Sighting) -> bool {
         let from_world = thing.pose.to_isometry().inverse() * pose;
         let [width, depth, height] = thing.size_m;
         let is_over = |point: &Point3<f64>| match is_round(thing) {
@@ -117,7 +117,7 @@ fn all(thing: &Sighting, hand: &Hand, robot: &Operator<'_>, (pitches, turns): (&
     let mut found = Vec::new();
     for idx in 0..N_HEADINGS {
         let heading = along + TAU * f64::from(idx) / f64::from(N_HEADINGS);
-        if width_across(thing, heading) + LEAST_ROOM_M > robot.profile().max_opening_m {
+        if width_across(thing, heading) + LEAST_ROOM_M > widest_m(thing, robot) {
             continue;
         }
         for pitch in pitches {
@@ -150,6 +150,6 @@ fn at(thing: &Sighting, shape: &Hand, robot: &Operator<'_>, (heading, pitch): (f
     let slant_cost = if is_flat { FLAT_SLANT_COST } else { SLANT_COST };
     let penalty = slant_cost * (FRAC_PI_2 - pitch) + CORNER_COST * askew + SHIFT_COST * back_m;
     let pose = pose(back_m);
-    let opening_m = robot.profile().max_opening_m;
+    let opening_m = widest_m(thing, robot);
     Some(Grasp { approach: Approach::Top, pose, heading, opening_m, penalty })
 }

@@ -1,6 +1,6 @@
 //! Grasp planning for an arm with a fixed base.
 
-use nalgebra::{Isometry3, Point3, Vector3};
+use nalgebra::{Isometry3, Point3, Translation3, Vector3};
 
 use crate::grasp::{Approach, Grasp, rolled};
 use crate::hindrance::{Hindrance, Nearest};
@@ -42,6 +42,8 @@ const LARGEST_TURN_RAD: f64 = 0.2;
 /// Lift heights of an arm on the surface, which is short, and the length of its level approach. Unit: metres.
 const SHORT_LIFTS_M: [f64; 3] = [0.12, 0.09, 0.06];
 const SHORT_APPROACH_M: f64 = 0.08;
+/// How far a hand whose fingers would touch the object is moved across, in order of preference. Unit: metres.
+const ASIDE_M: [f64; 5] = [0.0, 0.006, -0.006, 0.012, -0.012];
 /// Distances to retreat with the object, in order of preference. Unit: metres.
 const RETREATS_M: [f64; 2] = [0.1, 0.05];
 
@@ -59,6 +61,9 @@ pub fn plan(operator: &mut Operator<'_>, wanted: PlanRequest<'_>, others: &[Sigh
     let mut things: Vec<Pillar> = wanted.taken.iter().map(|thing| Pillar::new(thing)).collect();
     let n_taken = things.len();
     things.extend(others.iter().filter(|seen| !seen.furniture).map(Pillar::new));
+    // An arm of few joints turns its hand, whose fingers may then come down on the object.
+    let taken = wanted.taken.filter(|_| operator.layout().arm.len() < FULL_ARM);
+    let hand = taken.map(|thing| Hand::new(thing, operator));
     let mut arm = Arm::new(operator, &furniture, (&things, &things[n_taken..]));
     if let Some(thing) = wanted.taken {
         // The fingers close no further than to the object.
@@ -67,13 +72,32 @@ pub fn plan(operator: &mut Operator<'_>, wanted: PlanRequest<'_>, others: &[Sigh
     }
     let all = if wanted.all.is_empty() { wanted.grasps } else { wanted.all };
     let mut nearest = Nearest::default();
-    let mut found = best(&arm, all, &mut samples, &mut nearest);
-    if let (None, Some(thing)) = (&found, wanted.taken) {
-        let mut next = |grasps: &[Grasp]| best(&arm, grasps, &mut samples, &mut nearest);
-        let slants = slant::ahead(thing, &Hand::new(operator), operator);
-        found = next(&rolled(all)).or_else(|| next(&slants)).or_else(|| next(&rolled(&slants)));
+    let mut next = |arm: &Arm<'_>, grasps: &[Grasp]| best(arm, grasps, &mut samples, &mut nearest);
+    let Some(thing) = wanted.taken else {
+        let found = next(&arm, all);
+        return found.ok_or_else(|| nearest.reason(None, &arm.meanwhile.surroundings()));
+    };
+    let mut found = None;
+    if let Some(hand) = &hand {
+        arm.beside = Some((hand, thing));
+        found = any(|grasps| next(&arm, grasps), all, || slant::ahead(thing, hand, operator));
+        arm.beside = None;
     }
+    let slants = || slant::ahead(thing, &Hand::new(thing, operator), operator);
+    found = found.or_else(|| any(|grasps| next(&arm, grasps), all, slants));
     found.ok_or_else(|| nearest.reason(wanted.taken, &arm.meanwhile.surroundings()))
+}
+
+/// The first plan for these grasps, then for those with the hand turned over, then for hands at many slants.
+fn any(
+    mut plan: impl FnMut(&[Grasp]) -> Option<Plan>,
+    all: &[Grasp],
+    slants: impl FnOnce() -> Vec<Grasp>,
+) -> Option<Plan> {
+    plan(all).or_else(|| plan(&rolled(all))).or_else(|| {
+        let slants = slants();
+        plan(&slants).or_else(|| plan(&rolled(&slants)))
+    })
 }
 
 /// The best plan among these grasps.
@@ -118,6 +142,8 @@ struct Arm<'a> {
     /// Openings at which fingers that turn have to clear the surface. Unit: metres.
     closing_m: Vec<f64>,
     span: Span,
+    /// If given, the open hand may not touch the object when it is there, nor on the way down.
+    beside: Option<(&'a Hand, &'a Sighting)>,
 }
 
 /// The length of an arm, from its first joint to its last. Poses beyond it need no search for joint positions.
@@ -186,6 +212,7 @@ impl<'a> Arm<'a> {
             approach_m,
             closing_m: Vec::new(),
             span,
+            beside: None,
         }
     }
 
@@ -238,7 +265,7 @@ impl<'a> Arm<'a> {
         (least, bound): (f64, f64),
         samples: &mut Samples,
     ) -> Result<Plan, Hindrance> {
-        let (at_thing, turn) = self.solve_turned(seed, &grasp.pose, LARGEST_TURN_RAD).ok_or(Hindrance::OutOfReach)?;
+        let (at_thing, turn) = self.at_thing(seed, grasp)?;
         let lift = self.lifts_m.iter().find_map(|height| self.straight(&at_thing, &(Vector3::z() * *height)));
         let lift = lift.ok_or(Hindrance::NoLift)?;
         let heading = grasp.heading + turn;
@@ -283,6 +310,26 @@ impl<'a> Arm<'a> {
         let (drive, reach) = (Vec::new(), Vec::new());
         let plan = Plan { drive, reach, near: way, approach, lift, retreat, cost };
         if cost < bound { Ok(plan) } else { Err(Hindrance::Dearer) }
+    }
+
+    /// The posture with the hand at the object, and by how much the hand is turned from the grasp.
+    ///
+    /// # Errors
+    /// The hindrance if there is none, or if the open hand would touch the object and may not.
+    fn at_thing(&self, seed: &[f64], grasp: &Grasp) -> Result<(Vec<f64>, f64), Hindrance> {
+        let mut hindrance = Hindrance::OutOfReach;
+        let aside: &[f64] = if self.beside.is_some() { &ASIDE_M } else { &[0.0] };
+        for aside_m in aside.iter().copied() {
+            let pose = grasp.pose * Translation3::new(0.0, aside_m, 0.0);
+            let Some(found) = self.solve_turned(seed, &pose, LARGEST_TURN_RAD) else { continue };
+            // An arm of few joints turns the hand: the pose is another than the grasp's.
+            let touches = |(hand, thing): (&Hand, &Sighting)| !hand.is_beside(&self.kinematics.grasp(&found.0), thing);
+            if !self.beside.is_some_and(touches) {
+                return Ok(found);
+            }
+            hindrance = Hindrance::Touches;
+        }
+        Err(hindrance)
     }
 
     /// A path from the current posture to another.

@@ -182,7 +182,7 @@ impl Env {
     fn squeezed_out(&self, key: &str, model: &ObjectModel) -> Option<Diagnostic> {
         let (robot, [width, depth, _]) = (&self.campaign.robot, model.size_m);
         let width_m = width.min(depth);
-        let steepness = world::wedge(robot, width_m).ok()? / 2.0;
+        let steepness = world::outward_push(robot, width_m).ok()??;
         let friction = (robot.finger_friction * model.friction).sqrt();
         if steepness < friction {
             return None;
@@ -197,8 +197,8 @@ impl Env {
             2.0 * degrees(steepness),
             2.0 * degrees(friction),
         );
-        let help = "most picks of it will fail: name a narrower object or one with more friction, or set `grasp_offset_m` in the \
-             robot's profile nearer to the fingertips, where the fingers are less far apart";
+        let help = "most picks of it will fail: name a narrower object or one with more friction, or move `grasp_offset_m` in the \
+             robot's profile along the fingers, to where they squeeze it out less";
         Some(self.campaign.warning("S072", key, message).help(help))
     }
 

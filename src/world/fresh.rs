@@ -15,6 +15,9 @@ use parry3d::query::{
 use parry3d::shape::{PackedFeatureId, PolygonalFeature, Shape};
 use rapier3d::prelude::{ContactData, ContactManifoldData, NarrowPhase};
 
+use crate::convert::{from_vector, to_real, to_vector};
+use crate::separation::{Found, Separation, Solids};
+
 /// Creates a narrow phase that does not reuse contact points from the previous step, and corrects those that are too deep.
 pub fn narrow_phase() -> NarrowPhase {
     NarrowPhase::with_query_dispatcher(RecomputeContacts.chain(DefaultQueryDispatcher))
@@ -79,12 +82,10 @@ impl PersistentQueryDispatcher<ContactManifoldData, ContactData> for RecomputeCo
         for manifold in manifolds.iter_mut() {
             manifold.mark_shapes_deformed();
         }
-        let last = manifolds.first().map(|manifold| manifold.local_n1);
-        DefaultQueryDispatcher.contact_manifolds(pos12, shape1, shape2, prediction, manifolds, workspace)?;
-        if let (Some(last), [manifold]) = (last, manifolds.as_mut_slice()) {
-            keep_shallow(pos12, [shape1, shape2], last, manifold);
+        if between_solids(pos12, [shape1, shape2], prediction, manifolds) {
+            return Ok(());
         }
-        Ok(())
+        DefaultQueryDispatcher.contact_manifolds(pos12, shape1, shape2, prediction, manifolds, workspace)
     }
 
     fn contact_manifold_convex_convex(
@@ -102,43 +103,49 @@ impl PersistentQueryDispatcher<ContactManifoldData, ContactData> for RecomputeCo
     }
 }
 
-/// Penetration from which it is checked. Unit: metres.
-const DEEP_M: Real = 1e-3;
-
-/// Builds a contact anew with its last normal if the bodies overlap less along this than along the one found now.
-///
-/// The penetration of two bodies is their smallest overlap along any direction. The library searches for it from the
-/// outside inwards and can end at a larger one: a cylinder that touched the edge of a thin stave was pushed out along the
-/// stave, 44 mm deep, with 133 N.
-fn keep_shallow(
+/// Finds the contact of two convex solids with corners, in 64 bits (see `separation.rs`). Returns whether it did so: other
+/// shapes, boxes, and solids for which the search fails are left to the library.
+fn between_solids(
     pos12: &Pose,
     shapes: [&dyn Shape; 2],
-    last: Vector,
-    manifold: &mut ContactManifold<ContactManifoldData, ContactData>,
-) {
-    let Some(deepest) = manifold.find_deepest_contact().map(|point| -point.dist).filter(|depth| *depth > DEEP_M) else {
-        return;
-    };
-    let [Some((one, 0.0)), Some((other, 0.0))] = shapes.map(Shape::as_polygonal_feature_map) else { return };
-    let Some(normal) = last.try_normalize() else { return };
-    let there = pos12.rotation.inverse() * -normal;
-    let (point1, point2) = (one.local_support_point(normal), other.local_support_point(there));
-    let overlap = (point1 - *pos12 * point2).dot(normal);
-    if overlap > deepest - DEEP_M {
-        return;
+    prediction: Real,
+    manifolds: &mut Vec<ContactManifold<ContactManifoldData, ContactData>>,
+) -> bool {
+    let [Some((first, 0.0)), Some((second, 0.0))] = shapes.map(Shape::as_polygonal_feature_map) else { return false };
+    let [Some(one), Some(other)] = shapes.map(Shape::as_support_map) else { return false };
+    if shapes.iter().all(|shape| shape.as_cuboid().is_some()) {
+        return false;
     }
-    let (mut feature1, mut feature2) = (PolygonalFeature::default(), PolygonalFeature::default());
-    one.local_support_feature_toward(normal, point1, &mut feature1);
-    other.local_support_feature_toward(there, point2, &mut feature2);
-    let known = manifold.points.clone();
-    manifold.clear();
-    PolygonalFeature::contacts(pos12, &pos12.inverse(), normal, there, &feature1, &feature2, manifold, false);
-    if manifold.points.is_empty() {
-        let feature = PackedFeatureId::UNKNOWN;
-        manifold.points.push(TrackedContact::new(point1, point2, feature, feature, -overlap));
+    if manifolds.is_empty() {
+        manifolds.push(ContactManifold::new());
     }
-    (manifold.local_n1, manifold.local_n2) = (normal, there);
-    manifold.match_contacts(&known);
+    let [manifold] = manifolds.as_mut_slice() else { return false };
+    let last = manifold.local_n1.try_normalize().or(pos12.translation.try_normalize()).unwrap_or(Vector::X);
+    let solids = Solids::new(pos12, one, other);
+    match solids.separation(from_vector(last), f64::from(prediction)) {
+        Found::Nothing => return false,
+        Found::Far(normal) => {
+            manifold.clear();
+            // The next search begins with it.
+            manifold.local_n1 = to_vector(&normal);
+        }
+        Found::Near(Separation { distance_m, normal, points }) => {
+            let known = manifold.points.clone();
+            manifold.clear();
+            let [point, there] = points.map(|point| to_vector(&point));
+            let (normal, back) = (to_vector(&normal), pos12.rotation.inverse() * -to_vector(&normal));
+            let there = pos12.inverse_transform_point(there);
+            let (mut feature, mut other) = (PolygonalFeature::default(), PolygonalFeature::default());
+            first.local_support_feature_toward(normal, point, &mut feature);
+            second.local_support_feature_toward(back, there, &mut other);
+            PolygonalFeature::contacts(pos12, &pos12.inverse(), normal, back, &feature, &other, manifold, false);
+            let unknown = PackedFeatureId::UNKNOWN;
+            manifold.points.push(TrackedContact::new(point, there, unknown, unknown, to_real(distance_m)));
+            (manifold.local_n1, manifold.local_n2) = (normal, back);
+            manifold.match_contacts(&known);
+        }
+    }
+    true
 }
 
 #[cfg(test)]

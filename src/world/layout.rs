@@ -11,9 +11,6 @@ use crate::wrist;
 use crate::{BalancedJoint, Gripper, WorldError};
 use actcheck_data::RobotProfile;
 
-/// Distance from the grasp frame towards the fingertips at which the gap between the fingers is compared. Unit: metres.
-const AHEAD_M: f64 = 0.01;
-
 /// Indices of the robot's joints by their role.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Layout {
@@ -130,20 +127,16 @@ pub fn grip_limit_n(profile: &RobotProfile) -> Result<f64, WorldError> {
     Ok(gripper.motors().map(of).fold(f64::INFINITY, f64::min))
 }
 
-/// Returns how much the gap between the fingers of a robot's gripper widens from the grasp frame towards their tips, when it
-/// is this wide at the grasp frame: fingers that turn are a wedge around an object. Units: metres; metres per metre.
+/// Returns the force along the fingers of a robot's gripper, relative to that across them, with which they push a round object
+/// of this diameter out of the hand: fingers that turn are a wedge around it. Negative if they push it towards the palm.
+/// Friction with a greater coefficient holds the object. Returns `None` if they can't be closed on it. Unit: metres.
 ///
 /// # Errors
-/// As [`check_robot`]; there are no fingers ahead of the grasp frame.
-pub fn wedge(profile: &RobotProfile, opening_m: f64) -> Result<f64, WorldError> {
+/// As [`check_robot`].
+pub fn outward_push(profile: &RobotProfile, diameter_m: f64) -> Result<Option<f64>, WorldError> {
     let model = RobotModel::read(profile)?;
     let named = Named::find(profile, &model)?;
-    let mut positions: Vec<f64> = model.joints.iter().map(|joint| 0.0_f64.clamp(joint.lower, joint.upper)).collect();
-    named.layout.gripper.set(&mut positions, opening_m);
-    let (link, grasp) = named.grasp;
-    let ahead = grasp * Translation3::new(AHEAD_M, 0.0, 0.0);
-    let there = Gripper::find(profile, &model, named.finger_links, (link, ahead))?;
-    Ok((there.opening_m(&positions) - named.layout.gripper.opening_m(&positions)) / AHEAD_M)
+    Ok(crate::gripper::outward_push(&model, &named.layout.gripper, named.finger_links, named.grasp, diameter_m))
 }
 
 /// Returns the joints of a robot's arm that can't hold its weight by their motors alone. They are simulated as balanced.

@@ -49,6 +49,7 @@ mod room;
 mod samples;
 mod self_contact;
 mod sense;
+mod separation;
 mod settle;
 mod share;
 mod shell;
@@ -66,9 +67,10 @@ pub use decompose::{decompose, decomposition_key, sheet, simplified};
 pub use description::{Joint, JointKind};
 pub use error::WorldError;
 pub use fault::{Fault, Perturbation, Poison};
+pub use fresh::narrow_phase;
 pub use gripper::Gripper;
 pub use kinematics::{GRAVITY, Kinematics};
-pub use layout::{Layout, assumed_efforts, assumed_speeds, balanced_joints, check_robot, grip_limit_n, wedge};
+pub use layout::{Layout, assumed_efforts, assumed_speeds, balanced_joints, check_robot, grip_limit_n, outward_push};
 pub use propose::{Proposal, complete, is_incomplete, propose};
 pub use recorder::{Contact, Course, Record, Tracks};
 pub use robot::geometry;
@@ -82,4 +84,4 @@ pub use views::robot_views;
 
 /// Version of the physics: the same scene and commands give the same bits only with the same version. It rises with each
 /// change of these bits.
-pub const PHYSICS_VERSION: u32 = 9;
+pub const PHYSICS_VERSION: u32 = 10;

@@ -10,9 +10,10 @@ use rapier3d::math::{Pose as EnginePose, Vector as EngineVector};
 use rapier3d::prelude::SharedShape;
 
 use crate::Kinematics;
-use crate::convert::{to_pose, to_real, to_vector};
+use crate::convert::{from_vector, to_pose, to_real, to_vector};
 use crate::engine::{Owner, collider};
 use crate::room::Ball;
+use crate::separation::{Found, Solids};
 use actcheck_data::Part;
 
 /// Distance that links keep from each other. Unit: metres. The tracking error of a moving arm.
@@ -159,11 +160,7 @@ impl TwoLinks {
 
 /// Returns the distance of two links at these link poses, or their clearance if they are farther apart. Unit: metres.
 fn gap(links: &[Arc<Form>], pair: Pair, poses: &[Isometry3<f64>]) -> f64 {
-    nearest(links, pair, poses, |[a, b], b_in_a, _, _| {
-        let found = distance(&EnginePose::IDENTITY, a.shape.as_ref(), b_in_a, b.shape.as_ref());
-        // Convex solids are always supported; an unsupported pair would count as a collision.
-        found.map_or(0.0, |found| f64::from(found.distance))
-    })
+    nearest(links, pair, poses, |solids, b_in_a, towards_b, _| distance_m(solids, b_in_a, towards_b, pair.clear_m))
 }
 
 /// Whether two links are closer than their clearance at these link poses. This takes less than half of the time of [`gap`]:
@@ -205,10 +202,25 @@ fn are_closer(
             false
         }
         // The search also ends with this direction if it does not converge: it counts only if they are apart in it.
-        GJKResult::NoIntersection(direction) => !is_apart(direction),
-        // If it does not converge otherwise, the engine may find contacts of these solids that are not there: such postures
-        // would hold the robot back.
-        _ => true,
+        GJKResult::NoIntersection(direction) if is_apart(direction) => false,
+        // Nor is it exact in 32 bits.
+        _ => distance_m([a, b], b_in_a, towards_b, clear_m) < clear_m,
+    }
+}
+
+/// Distance of two solids, 0 if they overlap, or `far_m` if they are farther apart. Unit: metres. Other arguments as for
+/// [`are_closer`].
+fn distance_m([a, b]: [&Solid; 2], b_in_a: &EnginePose, towards_b: EngineVector, far_m: f64) -> f64 {
+    let (Some(shape_a), Some(shape_b)) = (a.shape.as_support_map(), b.shape.as_support_map()) else {
+        let found = distance(&EnginePose::IDENTITY, a.shape.as_ref(), b_in_a, b.shape.as_ref());
+        // An unsupported pair counts as a collision.
+        return found.map_or(0.0, |found| f64::from(found.distance));
+    };
+    let start = from_vector(towards_b.try_normalize().unwrap_or(EngineVector::X));
+    match Solids::new(b_in_a, shape_a, shape_b).separation(start, far_m) {
+        Found::Far(_) => far_m,
+        Found::Near(found) => found.distance_m.max(0.0),
+        Found::Nothing => 0.0,
     }
 }
 

@@ -198,6 +198,12 @@ impl<'a> Probe<'a> {
         hits.map(f64::from).min_by(f64::total_cmp)
     }
 
+    /// A finger: its link, and the link's pose in the grasp frame at these joint positions.
+    pub(crate) fn finger(&self, side: usize, positions: &[f64]) -> (usize, Isometry3<f64>) {
+        let grasp = self.pose(self.grasp.0, positions) * self.grasp.1;
+        (self.links[side], grasp.inverse() * self.pose(self.links[side], positions))
+    }
+
     /// Pose of a link in the frame of the root, with the other joints at 0.
     fn pose(&self, link: usize, positions: &[f64]) -> Isometry3<f64> {
         let mut pose = Isometry3::identity();

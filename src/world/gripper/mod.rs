@@ -11,9 +11,11 @@ mod gap;
 mod measure;
 mod opening;
 mod sliding;
+mod squeeze;
 mod table;
 #[cfg(test)]
 mod tests;
 
 pub(crate) use gap::{Probe, Surface};
 pub use opening::Gripper;
+pub(crate) use squeeze::outward_push;

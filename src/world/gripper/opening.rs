@@ -9,6 +9,9 @@ const FASTEST_M_S: f64 = 0.1;
 /// Smallest factor of a coupled joint with a part of the rotors' inertia.
 const LEAST_FACTOR: f64 = 0.2;
 
+/// A finger that moves less than this is fixed. Unit: metres.
+const FIXED_M: f64 = 1e-3;
+
 /// A joint that a motor of the gripper moves.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Leader {
@@ -166,6 +169,17 @@ impl Gripper {
             true => 0.0,
             false => interpolated(&self.table, |entry| entry.share, self.share(opening_m)).1.middle_m(),
         }
+    }
+
+    /// Returns whether only one of its fingers moves.
+    pub fn has_fixed_jaw(&self) -> bool {
+        let travel = |side: fn(&Entry) -> f64| {
+            let ends = self.table.iter().map(side);
+            let (low, high) =
+                ends.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), at| (low.min(at), high.max(at)));
+            high - low
+        };
+        !self.table.is_empty() && travel(|entry| entry.gap.left_m).min(travel(|entry| entry.gap.right_m)) < FIXED_M
     }
 
     /// The share of the way from closed to open at an opening. Nothing closes the fingers completely.

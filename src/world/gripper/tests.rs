@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use crate::description::RobotModel;
-use crate::layout::{Named, check_robot, grip_limit_n};
+use crate::layout::{Named, check_robot, grip_limit_n, outward_push};
 use crate::robot::tests::alone;
 use crate::{Joint, SelfContact, World, ik};
 use actcheck_base::{Files, Source};
@@ -109,6 +109,31 @@ fn one_moving_finger_has_its_middle_beside_the_grasp_frame() {
     let middle_m = world.layout().gripper.middle_m(0.02 + turned(0.3));
     let expected = f64::midpoint(turned(0.3), -0.02);
     assert!((middle_m - expected).abs() < 2e-5, "{middle_m} m instead of {expected} m");
+}
+
+/// A cylinder between two faces that are inclined by an angle to each other is pushed out with the tangent of half of it.
+#[test]
+fn fingers_that_turn_push_a_cylinder_out_as_calculated() {
+    let angle = 0.3;
+    let (sin, cos) = (libm::sin(angle), libm::cos(angle));
+    let both = 2.0 * (0.1 * sin + 0.02 * cos);
+    let one = 2.0 * (0.1 * sin + 0.04 * cos) / (1.0 + cos);
+    let slides = 0.06;
+    let cases = [(0, both, angle), (1, both, angle), (3, one, angle / 2.0), (4, slides, 0.0)];
+    for (idx, diameter_m, half_angle) in cases {
+        let found = outward_push(&hands().swap_remove(idx).0, diameter_m).expect("the hand is valid");
+        let expected = libm::tan(half_angle);
+        assert!(found.is_some_and(|found| (found - expected).abs() < 1e-3), "hand {idx}: {found:?}, not {expected}");
+    }
+    let too_wide = outward_push(&hands().swap_remove(4).0, 0.2).expect("the hand is valid");
+    assert_eq!(too_wide, None);
+}
+
+#[test]
+fn one_of_the_hands_has_a_fixed_jaw() {
+    let are_fixed: Vec<bool> =
+        hands().into_iter().map(|(profile, ..)| alone(profile).layout().gripper.has_fixed_jaw()).collect();
+    assert_eq!(are_fixed, [false, false, false, true, false]);
 }
 
 /// Motors and couplings bring the fingers to the commanded opening.

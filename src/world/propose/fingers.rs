@@ -8,6 +8,7 @@ use super::body::chain;
 use super::cup;
 use super::frames::{Pair, Root, likely};
 use super::hands::groups;
+use super::seat;
 use super::stated::{NoHand, Stated};
 use crate::Gripper;
 use crate::description::{JointKind, RobotModel};
@@ -34,6 +35,9 @@ const FROM_PALM: f64 = 0.9;
 const FEWEST_ARM_JOINTS: usize = 4;
 /// Openings wider than this are worth no more. Unit: metres.
 const WIDE_M: f64 = 0.12;
+
+/// How much of its widest opening a gripper must keep where its frame is moved to.
+const LEAST_SHARE: f64 = 0.8;
 
 /// A gripper, as a profile without other roles.
 pub(super) struct Hand {
@@ -179,8 +183,10 @@ fn measure(
         }
     }
     let mut found = best?;
+    let mut deeper = false;
     if stated.grasp.is_none() {
         centre(bare, model, palm, &mut found);
+        deeper = seat(bare, model, palm, &mut found);
         found.frame = as_written(&found.frame);
     }
     if let Some(gripper) = gripper(bare, model, palm, (found.links, &found.named, found.frame)) {
@@ -203,7 +209,11 @@ fn measure(
         profile.grasp_offset_m = rounded(found.frame.translation.vector.into());
         let (roll, pitch, yaw) = found.frame.rotation.euler_angles();
         profile.grasp_turned_rad = rounded([roll, pitch, yaw]);
-        notes.insert("grasp_offset_m", "between the fingertips, 2.5 cm before their ends".to_owned());
+        let place = match deeper {
+            true => "between the fingers, where they don't squeeze a can out",
+            false => "between the fingertips, 2.5 cm before their ends",
+        };
+        notes.insert("grasp_offset_m", place.to_owned());
         notes.insert("grasp_turned_rad", "x along the fingers, y from the right to the left one".to_owned());
     }
     if profile.max_opening_m == 0.0 {
@@ -438,7 +448,20 @@ fn centre(bare: &RobotProfile, model: &RobotModel, palm: usize, found: &mut Foun
     let Some(now) = of(found.frame) else { return };
     let middle_m = now.middle_m(CENTRED_AT_M.min(now.widest_m()));
     let moved = found.frame * Translation3::new(0.0, middle_m, 0.0);
-    if let Some(moved_gripper) = of(moved).filter(|moved| moved.widest_m() > 0.8 * now.widest_m()) {
+    if let Some(moved_gripper) = of(moved).filter(|moved| moved.widest_m() > LEAST_SHARE * now.widest_m()) {
         (found.frame, found.widest_m) = (moved, moved_gripper.widest_m());
     }
+}
+
+/// Moves the frame deeper between fingers that would squeeze a can out. Returns whether it did.
+fn seat(bare: &RobotProfile, model: &RobotModel, palm: usize, found: &mut Found) -> bool {
+    let deeper = |depth_m: f64| found.frame * Translation3::new(-depth_m, 0.0, 0.0);
+    let at = |depth_m: f64| gripper(bare, model, palm, (found.links, &found.named, deeper(depth_m)));
+    let depth_m = seat::deeper_m(model, found.links, (palm, found.frame), at);
+    let moved = deeper(depth_m);
+    let is_wide = at(depth_m).is_some_and(|gripper| gripper.widest_m() > LEAST_SHARE * found.widest_m);
+    if depth_m > 0.0 && is_wide {
+        found.frame = moved;
+    }
+    depth_m > 0.0 && is_wide
 }
