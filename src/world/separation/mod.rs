@@ -63,10 +63,17 @@ impl<'a> Solids<'a> {
         Self { first, second, turn, shift: from_vector(pose.translation) }
     }
 
-    /// Finds their distance if it is less than `far_m`, or how much they overlap. The search begins with this direction.
+    /// Finds their distance if it is less than `far_m`, or how much they overlap. The search begins with the direction `start`, of
+    /// length 1.
     pub(crate) fn separation(&self, start: Vector3<f64>, far_m: f64) -> Found {
-        let mut simplex = Simplex::new(self.corner(start));
-        let mut best = (f64::NEG_INFINITY, start);
+        let corner = self.corner(start);
+        let apart_m = -corner.point.dot(&start);
+        // Solids that were far apart along a direction a moment ago still are.
+        if apart_m >= far_m {
+            return Found::Far(start);
+        }
+        let mut simplex = Simplex::new(corner);
+        let mut best = (apart_m, start);
         let mut last_m = f64::INFINITY;
         for _ in 0..N_STEPS {
             let length_m = simplex.nearest().norm();
