@@ -40,7 +40,7 @@ pub(crate) const TOP_DEPTH_M: f64 = 0.03;
 const TOP_LOWEST_M: f64 = 0.0275;
 /// Total room that the widest opening must leave beside an object, both sides together. Unit: metres.
 pub(crate) const LEAST_ROOM_M: f64 = 0.01;
-/// Room that a turning jaw leaves beside an object on its way there. Unit: metres.
+/// Room that a jaw that moves against a fixed one leaves beside an object on its way there. Unit: metres.
 const JAW_ROOM_M: f64 = 0.045;
 /// Objects whose sides differ by less are treated as round. Unit: metres. Perceived sizes are off by some millimetres.
 const ROUND_M: f64 = 0.015;
@@ -56,9 +56,9 @@ const SIDE_ABOVE_M: f64 = 0.01;
 /// Number of headings tried around an object.
 const N_HEADINGS: u32 = 24;
 
-/// How wide the hand opens before an object. Unit: metres. A jaw that turns against a fixed one swings far out, and needs no
+/// How wide the hand opens before an object. Unit: metres. A jaw that moves against a fixed one swings far out, and needs no
 /// more than some room; other hands open as wide as they can.
-pub(crate) fn widest_m(thing: &Sighting, robot: &Operator<'_>) -> f64 {
+pub(crate) fn opening_before_m(thing: &Sighting, robot: &Operator<'_>) -> f64 {
     let most_m = robot.profile().max_opening_m;
     let [width, depth, _] = thing.size_m;
     match robot.layout().gripper.has_fixed_jaw() {

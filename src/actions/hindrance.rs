@@ -35,8 +35,9 @@ impl Hindrance {
     fn progress(&self) -> (u8, f64) {
         match self {
             Self::Dearer => (0, 0.0),
-            Self::OutOfReach => (1, 0.0),
+            // Says nothing about the object: other grasps are tried, and then this one again.
             Self::Touches => (0, 1.0),
+            Self::OutOfReach => (1, 0.0),
             Self::NoLift => (2, 0.0),
             Self::Itself { links } => (3, if links.is_some() { 1.0 } else { 0.0 }),
             Self::NoRoute => (4, 0.0),
@@ -61,7 +62,7 @@ impl Nearest {
 
     /// Whether no posture brought the hand to the object.
     pub fn is_out_of_reach(&self) -> bool {
-        matches!(self.0, None | Some(Hindrance::Dearer | Hindrance::Touches | Hindrance::OutOfReach))
+        matches!(self.0, None | Some(Hindrance::Dearer | Hindrance::OutOfReach))
     }
 
     /// The reason for the action's report.

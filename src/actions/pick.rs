@@ -42,7 +42,7 @@ pub fn pick(call: &ActionCall, robot: &mut Operator<'_>) -> Result<ActionReport,
     robot.begin("drive");
     robot.follow(&way.drive, 0.0)?;
     robot.begin("reach");
-    let (widest_m, rim) = (grasp::widest_m(&seen, robot), rim_of(&seen, robot));
+    let (widest_m, rim) = (grasp::opening_before_m(&seen, robot), rim_of(&seen, robot));
     robot.set_opening(rim.and_then(|rim| rim::opening_m(&rim, widest_m)).unwrap_or(widest_m));
     robot.follow(&way.reach, 0.0)?;
     robot.begin("approach");
@@ -83,7 +83,7 @@ pub(super) fn planned(seen: &Sighting, others: &[Sighting], robot: &mut Operator
         let wanted = PlanRequest { grasps: &grasps, all: &all, taken: Some(seen) };
         return plan::plan(robot, wanted, others).map_err(|reason| format!("{}: {reason}", seen.id));
     }
-    let max_opening_m = grasp::widest_m(seen, robot);
+    let max_opening_m = grasp::opening_before_m(seen, robot);
     let (grasps, all) = (grasp::grasps(seen, max_opening_m), grasp::all_grasps(seen, max_opening_m));
     let (grasps, all) = (grasp::centred(grasps, seen, robot), grasp::centred(all, seen, robot));
     let (grasps, all) = match rim_of(seen, robot) {

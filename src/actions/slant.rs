@@ -5,7 +5,9 @@ use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, TAU};
 
 use nalgebra::{Isometry3, Point3, Translation3};
 
-use crate::grasp::{Approach, Grasp, LEAST_ROOM_M, TOP_DEPTH_M, centred, hand, is_round, widest_m, width_across};
+use crate::grasp::{
+    Approach, Grasp, LEAST_ROOM_M, TOP_DEPTH_M, centred, hand, is_round, opening_before_m, width_across,
+};
 use crate::motion::moved_links;
 use crate::operator::Operator;
 use crate::plan::FURNITURE_CLEAR_M;
@@ -50,7 +52,7 @@ pub(crate) struct Hand {
 }
 
 impl Hand {
-    /// The hand of a robot.
+    /// The hand of a robot, open for an object.
     pub(crate) fn new(thing: &Sighting, robot: &Operator<'_>) -> Self {
         let (kinematics, layout) = (robot.kinematics(), robot.layout());
         let is_hand = moved_links(kinematics, layout.arm.last().copied().as_slice());
@@ -63,7 +65,7 @@ impl Hand {
             let from_world = kinematics.grasp(&posture).inverse();
             points.iter().map(|(link, point)| from_world * links[*link] * point).collect()
         };
-        let open = at(widest_m(thing, robot));
+        let open = at(opening_before_m(thing, robot));
         let closing = closing_m(robot).into_iter().flat_map(at);
         Self { swept: open.iter().copied().chain(closing).collect(), open }
     }
@@ -117,7 +119,7 @@ fn all(thing: &Sighting, hand: &Hand, robot: &Operator<'_>, (pitches, turns): (&
     let mut found = Vec::new();
     for idx in 0..N_HEADINGS {
         let heading = along + TAU * f64::from(idx) / f64::from(N_HEADINGS);
-        if width_across(thing, heading) + LEAST_ROOM_M > widest_m(thing, robot) {
+        if width_across(thing, heading) + LEAST_ROOM_M > opening_before_m(thing, robot) {
             continue;
         }
         for pitch in pitches {
@@ -150,6 +152,6 @@ fn at(thing: &Sighting, shape: &Hand, robot: &Operator<'_>, (heading, pitch): (f
     let slant_cost = if is_flat { FLAT_SLANT_COST } else { SLANT_COST };
     let penalty = slant_cost * (FRAC_PI_2 - pitch) + CORNER_COST * askew + SHIFT_COST * back_m;
     let pose = pose(back_m);
-    let opening_m = widest_m(thing, robot);
+    let opening_m = opening_before_m(thing, robot);
     Some(Grasp { approach: Approach::Top, pose, heading, opening_m, penalty })
 }

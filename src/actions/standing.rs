@@ -80,16 +80,16 @@ pub fn plan(operator: &mut Operator<'_>, wanted: PlanRequest<'_>, others: &[Sigh
     let mut found = None;
     if let Some(hand) = &hand {
         arm.beside = Some((hand, thing));
-        found = any(|grasps| next(&arm, grasps), all, || slant::ahead(thing, hand, operator));
+        found = first_plan(|grasps| next(&arm, grasps), all, || slant::ahead(thing, hand, operator));
         arm.beside = None;
     }
     let slants = || slant::ahead(thing, &Hand::new(thing, operator), operator);
-    found = found.or_else(|| any(|grasps| next(&arm, grasps), all, slants));
+    found = found.or_else(|| first_plan(|grasps| next(&arm, grasps), all, slants));
     found.ok_or_else(|| nearest.reason(wanted.taken, &arm.meanwhile.surroundings()))
 }
 
 /// The first plan for these grasps, then for those with the hand turned over, then for hands at many slants.
-fn any(
+fn first_plan(
     mut plan: impl FnMut(&[Grasp]) -> Option<Plan>,
     all: &[Grasp],
     slants: impl FnOnce() -> Vec<Grasp>,

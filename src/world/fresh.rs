@@ -1,4 +1,4 @@
-//! Recomputes contacts in every step, and corrects those that are too deep.
+//! Recomputes contacts in every step, those of hulls and cylinders in 64 bits.
 //!
 //! By default the engine keeps contact points until they have moved by about a millimetre or the normal has turned by a
 //! degree. On a rolling rim, the kept point lags behind the true one; the contact force then acts behind the point of
@@ -18,7 +18,8 @@ use rapier3d::prelude::{ContactData, ContactManifoldData, NarrowPhase};
 use crate::convert::{from_vector, to_real, to_vector};
 use crate::separation::{Found, Separation, Solids};
 
-/// Creates a narrow phase that does not reuse contact points from the previous step, and corrects those that are too deep.
+/// Creates a narrow phase that does not reuse contact points from the previous step, and computes those of hulls and cylinders in
+/// 64 bits.
 pub fn narrow_phase() -> NarrowPhase {
     NarrowPhase::with_query_dispatcher(RecomputeContacts.chain(DefaultQueryDispatcher))
 }
@@ -103,7 +104,7 @@ impl PersistentQueryDispatcher<ContactManifoldData, ContactData> for RecomputeCo
     }
 }
 
-/// Finds the contact of two convex solids with corners, in 64 bits (see `separation.rs`). Returns whether it did so: other
+/// Finds the contact of two convex solids with corners, in 64 bits (see `separation/mod.rs`). Returns whether it did so: other
 /// shapes, boxes, and solids for which the search fails are left to the library.
 fn between_solids(
     pos12: &Pose,
@@ -135,10 +136,10 @@ fn between_solids(
             let [point, there] = points.map(|point| to_vector(&point));
             let (normal, back) = (to_vector(&normal), pos12.rotation.inverse() * -to_vector(&normal));
             let there = pos12.inverse_transform_point(there);
-            let (mut feature, mut other) = (PolygonalFeature::default(), PolygonalFeature::default());
+            let (mut feature, mut facing) = (PolygonalFeature::default(), PolygonalFeature::default());
             first.local_support_feature_toward(normal, point, &mut feature);
-            second.local_support_feature_toward(back, there, &mut other);
-            PolygonalFeature::contacts(pos12, &pos12.inverse(), normal, back, &feature, &other, manifold, false);
+            second.local_support_feature_toward(back, there, &mut facing);
+            PolygonalFeature::contacts(pos12, &pos12.inverse(), normal, back, &feature, &facing, manifold, false);
             let unknown = PackedFeatureId::UNKNOWN;
             manifold.points.push(TrackedContact::new(point, there, unknown, unknown, to_real(distance_m)));
             (manifold.local_n1, manifold.local_n2) = (normal, back);

@@ -9,7 +9,7 @@ use crate::convert::{from_pose, to_pose, to_real};
 use crate::description::RobotModel;
 use crate::separation::{Found, Separation, Solids};
 
-/// Half of the height of the object: more than the width of fingers. Unit: metres.
+/// Half of the height of the part of the object between the fingertips: most are at least this wide. Unit: metres.
 const HALF_HEIGHT_M: f32 = 0.008;
 /// Steps in which the fingers close, and halvings for their last step and for the place of the object.
 const N_STEPS: u32 = 40;

@@ -35,7 +35,7 @@ pub(crate) enum Found {
     /// They are farther apart than asked for, along this direction.
     Far(Vector3<f64>),
     Near(Separation),
-    /// They overlap, but the search failed for rounding errors.
+    /// They overlap, but the search failed because of rounding errors.
     Nothing,
 }
 
@@ -200,7 +200,6 @@ mod tests {
             let dist = by_library.ok().flatten().map_or(f64::INFINITY, |contact| f64::from(contact.dist));
             wrong += usize::from((dist - found.distance_m).abs() > 1e-4);
         }
-        println!("{apart} apart, {deep} deep, {wrong} wrong");
         assert!(apart > 50 && deep > 50 && wrong > 0, "{apart} apart, {deep} deep, {wrong} wrong in the library");
     }
 }
