@@ -24,6 +24,9 @@ const REQUIRED: [&str; 1] = ["urdf"];
 const USUAL: [&str; 7] =
     ["arm_joints", "finger_joints", "finger_links", "grasp_link", "camera_link", "max_opening_m", "home"];
 
+/// Most joints whose motors move the fingers.
+const MOST_FINGER_JOINTS: usize = 8;
+
 /// Keys that depend on another key.
 const DEPENDENT: [(&str, &str); 10] = [
     ("suction_force_n", "suction_radius_m"),
@@ -381,13 +384,14 @@ fn values(list: Vec<Located<String>>) -> Vec<String> {
     list.into_iter().map(|name| name.value).collect()
 }
 
-/// Reads the one or two joints whose motors move the fingers.
+/// Reads the joints whose motors move the fingers.
 fn finger_joints(table: &mut Table, roles: &mut Roles) -> Option<Vec<String>> {
     let span = table.key_span("finger_joints")?;
     let list = table.strings("finger_joints")?;
     roles.joints.push(("finger_joints", list.clone()));
-    if !(1..=2).contains(&list.len()) {
-        let message = format!("`finger_joints` must list 1 or 2 names, but this list has {}", list.len());
+    if !(1..=MOST_FINGER_JOINTS).contains(&list.len()) {
+        let message =
+            format!("`finger_joints` must list 1 to {MOST_FINGER_JOINTS} names, but this list has {}", list.len());
         let help = "name the joints with motors; joints that mimic them follow without being named";
         table.fault("W011", span, message, help);
         return None;
@@ -448,7 +452,7 @@ mod tests {
         let source = Source::new(
             "r.toml",
             "name = \"r\"\nurdf = \"r.urdf\"\narm_joints = [\"a\", \"b\"]\nhome = [0]\n\
-            finger_joints = [\"left\", \"right\", \"third\"]\n",
+            finger_joints = []\n",
         );
         let mut table = Table::parse(&source).expect("it is TOML");
         let mut found = Diagnostics::new();

@@ -34,7 +34,7 @@ pub struct RobotProfile {
     /// Joints that position the hand (lift and arm), from the base outwards.
     pub arm_joints: Vec<String>,
     /// Joints with motors that move the fingers: left then right, or one for both or for the only finger that moves.
-    /// Joints that mimic them follow.
+    /// Further ones close further fingers with these. Joints that mimic them follow.
     pub finger_joints: Vec<String>,
     /// Head joints, pan then tilt; empty if the head does not move.
     pub head_joints: Vec<String>,

@@ -85,7 +85,9 @@ pub(super) fn insert_links(
         ]);
         let mass = MassProperties::with_inertia_matrix(to_vector(&link.com), to_real(link.mass), matrix);
         let body = engine.insert_body(builder.pose(to_pose(pose)).additional_mass_properties(mass).can_sleep(false));
-        let is_finger = named.finger_links.contains(&idx);
+        let own_joint = idx.checked_sub(1);
+        let is_further = own_joint.is_some_and(|joint| named.layout.gripper.moves_further_finger(joint));
+        let is_finger = is_further || named.finger_links.contains(&idx);
         let friction = if is_finger { profile.finger_friction } else { LINK_FRICTION };
         for (shape, pose) in link.form().shapes() {
             let collider = same_shape(shape, pose, Owner::Link(idx), friction);
@@ -147,10 +149,10 @@ pub(super) fn insert_joints(
         let gripper = &named.layout.gripper;
         let saturation = if joint.kind == JointKind::Prismatic { SATURATION_M } else { SATURATION_RAD };
         let armature = gripper.armature(idx, ROTOR_KG);
-        let (saturation, max_effort, damping_secs) = match gripper.lever_m(idx) {
-            Some(lever_m) => {
-                let force_n = profile.grip_force_n * lever_m;
-                (SATURATION_M / lever_m, joint.effort.min(force_n), FINGER_DAMPING_SECS)
+        let (saturation, max_effort, damping_secs) = match gripper.lever_m(idx).zip(gripper.effort_per_n(idx)) {
+            Some((lever_m, effort_per_n)) => {
+                let effort = joint.effort.min(profile.grip_force_n * effort_per_n);
+                (SATURATION_M / lever_m, effort, FINGER_DAMPING_SECS)
             }
             // The coupling moves it.
             None if gripper.follows(idx) => (saturation, 0.0, DAMPING_SECS),

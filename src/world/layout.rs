@@ -123,7 +123,7 @@ fn moved(offset_m: [f64; 3], [roll, pitch, yaw]: [f64; 3]) -> Isometry3<f64> {
 pub fn grip_limit_n(profile: &RobotProfile) -> Result<f64, WorldError> {
     let model = RobotModel::read(profile)?;
     let gripper = Named::find(profile, &model)?.layout.gripper;
-    let of = |(joint, lever_m): (usize, f64)| model.joints[joint].effort / lever_m;
+    let of = |(joint, effort_per_n): (usize, f64)| model.joints[joint].effort / effort_per_n;
     Ok(gripper.motors().map(of).fold(f64::INFINITY, f64::min))
 }
 

@@ -143,13 +143,13 @@ impl Robot {
 
     /// Returns the force of each finger's motor by its control law; positive closes; 0 for a suction cup. Unit: newtons.
     pub fn finger_efforts(&self) -> [f64; 2] {
-        let effort_of = |(idx, sign, lever_m): (usize, f64, f64)| {
+        let force_of = |(idx, effort_per_n): (usize, f64)| {
             let (motor, position) = (&self.motors[idx], self.positions[idx]);
             let effort = motor.stiffness * (position - motor.setpoint)
                 + motor.damping * (self.velocities[idx] - motor.setpoint_velocity);
-            effort.clamp(-motor.max_effort, motor.max_effort) * sign / lever_m
+            effort.clamp(-motor.max_effort, motor.max_effort) / effort_per_n
         };
-        self.layout.gripper.sides().map_or([0.0; 2], |sides| sides.map(effort_of))
+        self.layout.gripper.sides().map_or([0.0; 2], |sides| sides.map(force_of))
     }
 
     /// Returns the effort that each joint's motor gave in the last control tick, within its limit and without gravity
@@ -225,8 +225,8 @@ impl Robot {
 
     /// Limits the force of both fingers. Unit: newtons.
     pub fn limit_grip(&mut self, force: f64) {
-        for (idx, lever_m) in self.layout.gripper.motors() {
-            self.motors[idx].max_effort = (force * lever_m).clamp(0.0, self.model.joints[idx].effort);
+        for (idx, effort_per_n) in self.layout.gripper.motors() {
+            self.motors[idx].max_effort = (force * effort_per_n).clamp(0.0, self.model.joints[idx].effort);
         }
     }
 

@@ -12,8 +12,8 @@ pub(super) struct Follower {
     pub(super) offset: f64,
 }
 
-/// Returns the joints that lead the named ones, and all that follow these.
-pub(super) fn coupled(named: &[usize], model: &RobotModel) -> (Vec<usize>, Vec<Follower>) {
+/// Returns the joints that lead the named ones, each once.
+pub(super) fn leaders(named: &[usize], model: &RobotModel) -> Vec<usize> {
     let mut leaders: Vec<usize> = Vec::new();
     for joint in named {
         let leader = model.leader_of(*joint).0;
@@ -21,11 +21,15 @@ pub(super) fn coupled(named: &[usize], model: &RobotModel) -> (Vec<usize>, Vec<F
             leaders.push(leader);
         }
     }
+    leaders
+}
+
+/// Returns the joints that follow these leaders.
+pub(super) fn followers(leaders: &[usize], model: &RobotModel) -> Vec<Follower> {
     let followers = (0..model.joints.len()).filter(|joint| model.joints[*joint].mimic.is_some()).filter_map(|joint| {
         let (leader, factor, offset) = model.leader_of(joint);
         let leader = leaders.iter().position(|known| *known == leader)?;
         Some(Follower { joint, leader, factor, offset })
     });
-    let followers = followers.collect();
-    (leaders, followers)
+    followers.collect()
 }

@@ -204,6 +204,21 @@ impl<'a> Probe<'a> {
         (self.links[side], grasp.inverse() * self.pose(self.links[side], positions))
     }
 
+    /// Returns the point of a link that is nearest to the origin of the grasp frame, in that frame; `None` if the link has no
+    /// shape. Unit: metres.
+    pub(super) fn nearest(&self, link: usize, positions: &[f64]) -> Option<Vector3<f64>> {
+        let grasp = self.pose(self.grasp.0, positions) * self.grasp.1;
+        let from_grasp = grasp.inverse() * self.pose(link, positions);
+        let origin = to_vector(&from_grasp.inverse().translation.vector);
+        let surface = self.model.links[link].surface();
+        let nearest = |solid: &Solid| {
+            let shape = solid.collider.shape();
+            let at = shape.project_point(solid.collider.position(), origin, true).point;
+            (from_grasp * Point3::new(f64::from(at.x), f64::from(at.y), f64::from(at.z))).coords
+        };
+        surface.solids.iter().map(nearest).min_by(|a, b| a.norm().total_cmp(&b.norm()))
+    }
+
     /// Pose of a link in the frame of the root, with the other joints at 0.
     fn pose(&self, link: usize, positions: &[f64]) -> Isometry3<f64> {
         let mut pose = Isometry3::identity();

@@ -6,7 +6,8 @@ use nalgebra::Isometry3;
 
 use crate::WorldError;
 use crate::description::{Joint, JointKind, RobotModel};
-use crate::gripper::coupling::{Follower, coupled};
+use crate::gripper::coupling::{Follower, followers, leaders};
+use crate::gripper::further::Further;
 use crate::gripper::gap::{Gap, Probe};
 use crate::gripper::opening::{Gripper, Leader};
 use crate::gripper::sliding::sliding;
@@ -103,7 +104,11 @@ fn measured(named: &[usize], model: &RobotModel, probe: &Probe<'_>, n_intervals:
 /// The joints that move the fingers.
 struct Drive<'a> {
     model: &'a RobotModel,
+    /// Those that move the left or the right finger.
     leaders: Vec<usize>,
+    /// Those of further fingers.
+    further: Vec<Further>,
+    /// Joints that follow a leader, or a further joint, which are counted after the leaders.
     followers: Vec<Follower>,
     /// Index of the leader that moves the left and the right finger.
     sides: [usize; 2],
@@ -111,32 +116,39 @@ struct Drive<'a> {
 
 impl<'a> Drive<'a> {
     fn find(named: &[usize], model: &'a RobotModel, probe: &Probe<'_>) -> Result<Self, String> {
-        let (mut leaders, followers) = coupled(named, model);
-        let all: Vec<usize> = leaders.iter().copied().chain(followers.iter().map(|own| own.joint)).collect();
-        let moving = probe.moving(&all);
+        let all = leaders(named, model);
+        let coupled = followers(&all, model);
+        let joints: Vec<usize> = all.iter().copied().chain(coupled.iter().map(|own| own.joint)).collect();
+        let moving = probe.moving(&joints);
         if moving.grasp_frame {
             return Err("its fingers can't be measured: the joints in `finger_joints` move the `grasp_link`".to_owned());
         }
-        let leader_of = |joint: &usize| {
-            let followed = followers.iter().find(|own| own.joint == *joint).map(|own| own.leader);
-            followed.or_else(|| leaders.iter().position(|leader| leader == joint))
+        let leader_of = |joint: usize| {
+            let followed = coupled.iter().find(|own| own.joint == joint).map(|own| all[own.leader]);
+            followed.unwrap_or(joint)
         };
-        let sides = match moving.fingers.each_ref().map(|joints| joints.iter().find_map(leader_of)) {
+        let by_finger = moving.fingers.map(|joints| joints.into_iter().map(leader_of).collect::<Vec<_>>());
+        let (leaders, others): (Vec<usize>, Vec<usize>) =
+            all.iter().partition(|joint| by_finger.iter().any(|of_finger| of_finger.contains(joint)));
+        // The outermost joint of a finger.
+        let side = |joints: &Vec<usize>| joints.first().and_then(|own| leaders.iter().position(|other| other == own));
+        let sides = match by_finger.each_ref().map(side) {
             [Some(left), Some(right)] => [left, right],
             [Some(only), None] | [None, Some(only)] => [only; 2],
             [None, None] => return Err("none of its `finger_joints` moves one of its `finger_links`".to_owned()),
         };
-        // Joints that move neither finger stay where they are.
-        leaders.truncate(sides[0].max(sides[1]) + 1);
         let unlimited = |joint: &&usize| !model.joints[**joint].upper.is_finite();
-        if let Some(joint) = leaders.iter().find(unlimited) {
+        if let Some(joint) = all.iter().find(unlimited) {
             let name = &model.joints[*joint].name;
             return Err(format!("the opening of its gripper can't be measured: `{name}` has no limits"));
         }
-        Ok(Self { model, leaders, followers, sides })
+        let further = others.iter().map(|joint| Further::find(*joint, model, probe)).collect();
+        let followers = followers(&[leaders.clone(), others].concat(), model);
+        Ok(Self { model, leaders, further, followers, sides })
     }
 
-    /// Returns the ways on which the gripper may open: the first and the last position of each leader.
+    /// Returns the ways on which the gripper may open: the first and the last position of each leader, then of each further
+    /// joint.
     fn ways(&self) -> Vec<Vec<(f64, f64)>> {
         let limits = |joint: &usize| {
             let Joint { kind, lower, upper, .. } = self.model.joints[*joint];
@@ -146,48 +158,67 @@ impl<'a> Drive<'a> {
                 _ => (lower, upper),
             }
         };
-        let rising: Vec<(f64, f64)> = self.leaders.iter().map(limits).collect();
-        let falling = |(from, to): (f64, f64)| (to, from);
-        let mut ways = vec![rising.clone(), rising.iter().copied().map(falling).collect()];
-        // Two joints may open in opposite directions.
-        if let [first, second] = rising[..] {
-            ways.extend([vec![first, falling(second)], vec![falling(first), second]]);
-        }
-        ways
+        let turned = |(from, to): (f64, f64), falls: bool| if falls { (to, from) } else { (from, to) };
+        // Joints may open in opposite directions. Bit n: the leader n falls.
+        let all_fall = (1_usize << self.leaders.len()) - 1;
+        let ways = [0, all_fall].into_iter().chain((1..all_fall).rev());
+        let further = || self.further.iter().map(|own| turned(limits(&own.joint), own.falls));
+        let of = |way: usize| {
+            let leaders = self.leaders.iter().enumerate().map(|(idx, joint)| turned(limits(joint), way >> idx & 1 == 1));
+            leaders.chain(further()).collect()
+        };
+        ways.map(of).collect()
+    }
+
+    /// All joints with motors.
+    fn motors(&self) -> Vec<usize> {
+        self.leaders.iter().copied().chain(self.further.iter().map(|own| own.joint)).collect()
     }
 
     /// Returns the positions of all joints at a share of a way.
     fn posture(&self, ends: &[(f64, f64)], share: f64) -> Vec<f64> {
         let mut positions = vec![0.0; self.model.joints.len()];
-        for (leader, (from, to)) in self.leaders.iter().zip(ends) {
-            positions[*leader] = from + share * (to - from);
+        let motors = self.motors();
+        for (motor, (from, to)) in motors.iter().zip(ends) {
+            positions[*motor] = from + share * (to - from);
         }
         for Follower { joint, leader, factor, offset } in &self.followers {
-            if let Some(leader) = self.leaders.get(*leader) {
-                positions[*joint] = factor * positions[*leader] + offset;
-            }
+            positions[*joint] = factor * positions[motors[*leader]] + offset;
         }
         positions
     }
 
     /// The gripper with this table, on a way with these ends.
-    fn gripper(mut self, table: &[Entry], ends: &[(f64, f64)]) -> Gripper {
+    fn gripper(self, table: &[Entry], ends: &[(f64, f64)]) -> Gripper {
         let first = table.first().map_or(0.0, |entry| entry.share);
         let last = table.last().map_or(1.0, |entry| entry.share);
         let gap_of = |entry: Option<&Entry>| entry.map_or(Gap::default(), |entry| entry.gap);
         let (closed, open) = (gap_of(table.first()), gap_of(table.last()));
         let travels = [open.left_m - closed.left_m, closed.right_m - open.right_m];
-        let leaders = self.leaders.iter().zip(ends).enumerate().map(|(idx, (joint, (from, to)))| {
-            let moved: f64 = (0..2).filter(|side| self.sides[*side] == idx).map(|side| travels[side]).sum();
+        let n_measured = self.leaders.len();
+        // Fingers on the same side of an object share the force with which the other side presses.
+        let n_on = [0, 1].map(|side| 1 + self.further.iter().filter(|own| own.side == side).count());
+        let motors = self.motors();
+        let leaders = motors.iter().zip(ends).enumerate().map(|(idx, (joint, (from, to)))| {
+            let side_of = |idx: usize| self.further.get(idx - n_measured).map_or(0, |own| own.side);
+            let sides: Vec<usize> = match idx < n_measured {
+                true => (0..2).filter(|side| self.sides[*side] == idx).collect(),
+                false => vec![side_of(idx)],
+            };
+            let moved: f64 = sides.iter().map(|side| travels[*side]).sum();
             let at = |share: f64| from + share * (to - from);
             let lever_m = (moved / (at(last) - at(first))).abs().max(LEAST_LEVER_M);
-            Leader { joint: *joint, closed: at(first), open: at(last), lever_m }
+            let force_share = match sides[..] {
+                [side] => 1.0 / n_on[side] as f64,
+                _ => 1.0,
+            };
+            Leader { joint: *joint, closed: at(first), open: at(last), lever_m, force_share }
         });
         let leaders: Vec<Leader> = leaders.collect();
-        self.followers.retain(|follower| follower.leader < leaders.len());
         let shared = |entry: &Entry| Entry { share: (entry.share - first) / (last - first), gap: entry.gap };
         Gripper {
             leaders,
+            n_measured,
             followers: self.followers,
             sides: self.sides,
             table: table.iter().map(shared).collect(),

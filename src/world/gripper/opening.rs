@@ -22,12 +22,29 @@ pub(super) struct Leader {
     pub(super) open: f64,
     /// Way of the fingertips per way of the joint, on average. Unit: 1, or metres per radian.
     pub(super) lever_m: f64,
+    /// Share of the force on its side of the object: the others there give the rest.
+    pub(super) force_share: f64,
+}
+
+impl Leader {
+    /// The motor's effort per force on its side of the object. Unit: 1, or newton metres per newton.
+    fn effort_per_n(&self) -> f64 {
+        self.lever_m * self.force_share
+    }
+
+    /// 1 if its positive direction opens the finger, otherwise -1.
+    fn opens(&self) -> f64 {
+        (self.open - self.closed).signum()
+    }
 }
 
 /// The opening of a gripper as a function of its joints.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Gripper {
+    /// Those that move the left and the right finger, then those of further fingers.
     pub(super) leaders: Vec<Leader>,
+    /// Number of leaders that move the left and the right finger: only these determine the opening.
+    pub(super) n_measured: usize,
     /// Joints that mimic a leader, without a motor of their own.
     pub(super) followers: Vec<Follower>,
     /// Index of the leader that moves the left and the right finger. A finger that does not move has the other's.
@@ -41,7 +58,14 @@ pub struct Gripper {
 impl Gripper {
     /// A suction cup of this diameter, which has no joints. Unit: metres.
     pub(super) fn cup(diameter_m: f64) -> Self {
-        Self { leaders: Vec::new(), followers: Vec::new(), sides: [0, 0], table: Vec::new(), widest_m: diameter_m }
+        Self {
+            leaders: Vec::new(),
+            n_measured: 0,
+            followers: Vec::new(),
+            sides: [0, 0],
+            table: Vec::new(),
+            widest_m: diameter_m,
+        }
     }
 
     /// Returns all joints that move the fingers, those with a motor first.
@@ -58,6 +82,13 @@ impl Gripper {
     /// Returns whether a joint follows another of this gripper and has no motor.
     pub(crate) fn follows(&self, joint: usize) -> bool {
         self.followers.iter().any(|follower| follower.joint == joint)
+    }
+
+    /// Returns whether a joint moves a finger beside the two whose gap is the opening.
+    pub(crate) fn moves_further_finger(&self, joint: usize) -> bool {
+        let follower = self.followers.iter().find(|follower| follower.joint == joint).map(|own| own.leader);
+        let leader = follower.or_else(|| self.leaders.iter().position(|leader| leader.joint == joint));
+        leader.is_some_and(|idx| idx >= self.n_measured)
     }
 
     /// Returns the inertia of the motors' rotors on a joint, with the inertia of a rotor at the fingertips in kilograms.
@@ -78,14 +109,19 @@ impl Gripper {
         }
     }
 
-    /// Returns the joints with a motor, each with its lever: way of the fingertips per way of the joint.
+    /// Returns the joints with a motor, each with the motor's effort per newton of the grip's force.
     pub(crate) fn motors(&self) -> impl Iterator<Item = (usize, f64)> + '_ {
-        self.leaders.iter().map(|leader| (leader.joint, leader.lever_m))
+        self.leaders.iter().map(|leader| (leader.joint, leader.effort_per_n()))
     }
 
-    /// Returns the lever of a joint with a motor.
+    /// Returns the motor's effort per newton of the grip's force, for a joint with a motor.
+    pub(crate) fn effort_per_n(&self, joint: usize) -> Option<f64> {
+        self.motors().find(|(own, _)| *own == joint).map(|(_, effort_per_n)| effort_per_n)
+    }
+
+    /// Returns the lever of a joint with a motor: way of the fingertips per way of the joint.
     pub(crate) fn lever_m(&self, joint: usize) -> Option<f64> {
-        self.motors().find(|(own, _)| *own == joint).map(|(_, lever_m)| lever_m)
+        self.leaders.iter().find(|leader| leader.joint == joint).map(|leader| leader.lever_m)
     }
 
     /// Returns the largest speed of a joint, given that of its URDF; fingers that were measured are slowed down.
@@ -96,12 +132,12 @@ impl Gripper {
         }
     }
 
-    /// For the left and the right finger: the joint that moves it, 1 or -1 for the direction of the joint in which the
-    /// finger opens, and the joint's lever. Returns `None` for a suction cup.
-    pub(crate) fn sides(&self) -> Option<[(usize, f64, f64); 2]> {
+    /// For the left and the right finger: the joint that moves it, and the motor's effort per newton of the grip's force,
+    /// which is negative if the finger opens in the joint's negative direction. Returns `None` for a suction cup.
+    pub(crate) fn sides(&self) -> Option<[(usize, f64); 2]> {
         let of = |side: usize| {
-            let Leader { joint, closed, open, lever_m } = *self.leaders.get(side)?;
-            Some((joint, (open - closed).signum(), lever_m))
+            let leader = self.leaders.get(side)?;
+            Some((leader.joint, leader.effort_per_n() * leader.opens()))
         };
         let [left, right] = self.sides;
         Some([of(left)?, of(right)?])
@@ -109,8 +145,8 @@ impl Gripper {
 
     /// Returns the speeds of the left and the right fingertip; 0 for a suction cup. Unit: m/s; positive opens.
     pub fn speeds(&self, velocities: &[f64]) -> [f64; 2] {
-        let speed = |(joint, sign, lever_m): (usize, f64, f64)| velocities[joint] * sign * lever_m;
-        self.sides().map_or([0.0; 2], |sides| sides.map(speed))
+        let speed = |leader: &Leader| velocities[leader.joint] * leader.opens() * leader.lever_m;
+        self.sides.map(|side| self.leaders.get(side).map_or(0.0, speed))
     }
 
     /// Returns the widest opening. Unit: metres.
@@ -128,15 +164,16 @@ impl Gripper {
 
     /// Returns the gap between the fingers at these joint positions. Unit: metres.
     pub fn opening_m(&self, positions: &[f64]) -> f64 {
+        let measured = &self.leaders[..self.n_measured];
         if self.table.is_empty() {
-            return self.leaders.iter().map(|leader| positions[leader.joint]).sum();
+            return measured.iter().map(|leader| positions[leader.joint]).sum();
         }
-        let shares = self.leaders.iter().map(|leader| {
+        let shares = measured.iter().map(|leader| {
             let Leader { joint, closed, open, .. } = *leader;
             (positions[joint] - closed) / (open - closed)
         });
         let gaps: f64 = shares.map(|share| interpolated(&self.table, |entry| entry.share, share).1.width_m()).sum();
-        (gaps / self.leaders.len() as f64).max(0.0)
+        (gaps / measured.len() as f64).max(0.0)
     }
 
     /// Returns the position of one of its joints at an opening, or `None` for any other joint.

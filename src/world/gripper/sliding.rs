@@ -29,10 +29,11 @@ pub(super) fn sliding(named: &[usize], model: &RobotModel, probe: &Probe<'_>) ->
     }
     let leaders = [left, right].map(|idx| {
         let joint = &model.joints[idx];
-        Leader { joint: idx, closed: joint.lower, open: joint.upper, lever_m: 1.0 }
+        Leader { joint: idx, closed: joint.lower, open: joint.upper, lever_m: 1.0, force_share: 1.0 }
     });
     Some(Gripper {
         leaders: leaders.to_vec(),
+        n_measured: 2,
         followers: Vec::new(),
         sides: [0, 1],
         table: Vec::new(),

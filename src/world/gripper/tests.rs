@@ -261,6 +261,47 @@ fn the_grip_is_as_strong_as_its_motors() {
     assert!((unknown - strong).abs() < 1e-9 && strong > 100.0, "{unknown} N, {strong} N");
 }
 
+/// A hand with a third finger beside the right one, whose joint turns in the other direction.
+fn three_fingers(finger_joints: &[&str]) -> RobotProfile {
+    let mut profile = hand(&turning(0.0, 0.6), &turning(-0.6, 0.0), finger_joints);
+    let third = "<link name=\"third_finger\"><inertial><mass value=\"0.1\"/><inertia ixx=\"1e-4\" ixy=\"0\" ixz=\"0\" \
+                 iyy=\"1e-4\" iyz=\"0\" izz=\"1e-4\"/></inertial><collision><origin xyz=\"0.06 -0.005 0\"/><geometry>\
+                 <box size=\"0.1 0.01 0.03\"/></geometry></collision></link><joint name=\"third\" type=\"revolute\">\
+                 <parent link=\"palm\"/><child link=\"third_finger\"/><origin xyz=\"0 -0.02 0.04\"/><axis xyz=\"0 0 -1\"/>\
+                 <limit lower=\"0\" upper=\"0.6\" effort=\"20\" velocity=\"2\"/></joint></robot>";
+    profile.urdf = Source::new("hand.urdf", profile.urdf.text.replace("</robot>", third));
+    profile
+}
+
+/// A third finger closes with the one beside it, and both share the force of their side, in whatever order they are named.
+#[test]
+fn a_third_finger_moves_with_the_others() {
+    for names in [["left", "right", "third"], ["third", "right", "left"]] {
+        let mut world = alone(three_fingers(&names));
+        let at = |world: &World, name: &str| {
+            world.kinematics().joints().iter().position(|joint| joint.name == name).expect("it has this joint")
+        };
+        let joints = ["left", "right", "third"].map(|name| at(&world, name));
+        let gripper = world.layout().gripper.clone();
+        let mut set = vec![0.6; world.kinematics().joints().len()];
+        gripper.set(&mut set, 2.0 * turned(0.3));
+        let found = joints.map(|joint| set[joint]);
+        for (found, wanted) in found.iter().zip([0.3, -0.3, 0.3]) {
+            assert!((found - wanted).abs() < 2e-4, "{names:?}: {found} instead of {wanted}");
+        }
+        assert!((gripper.opening_m(&set) - 2.0 * turned(0.3)).abs() < 2e-5, "{names:?}");
+        let [left, right, third] = joints.map(|joint| gripper.effort_per_n(joint).expect("it has a motor"));
+        assert!((right / left - 0.5).abs() < 1e-6 && (third / left - 0.5).abs() < 1e-6, "{left} {right} {third}");
+        let mut command = world.hold();
+        for opening_m in [0.07, 0.06] {
+            command.gripper_opening_m = opening_m;
+            (0..120).for_each(|_| world.step(&command));
+            let (is, wanted) = (world.observe().positions[joints[2]], gripper.target(joints[2], opening_m));
+            assert!(wanted.is_some_and(|wanted| (is - wanted).abs() < 5e-3), "{names:?}: {is} instead of {wanted:?}");
+        }
+    }
+}
+
 /// The convex shapes of knuckles overlap where the real ones do not; those of fingertips meet.
 #[test]
 fn the_links_of_a_gripper_pass_through_each_other_but_its_fingertips_do_not() {

@@ -36,6 +36,9 @@ const FEWEST_ARM_JOINTS: usize = 4;
 /// Openings wider than this are worth no more. Unit: metres.
 const WIDE_M: f64 = 0.12;
 
+/// Limits of joints that differ by less than this are the same. Units: metres or radians.
+const LIMIT_SLACK: f64 = 1e-3;
+
 /// How much of its widest opening a gripper must keep where its frame is moved to.
 const LEAST_SHARE: f64 = 0.8;
 
@@ -195,7 +198,8 @@ fn measure(
     let mut profile = bare.clone();
     let mut notes = BTreeMap::new();
     if stated.joints.is_empty() {
-        let named = alike(model, found.links).unwrap_or(found.named);
+        let named = alike(model, found.links)
+            .unwrap_or_else(|| [found.named.clone(), beside(model, &found, joints, palm)].concat());
         let own = |idx: &usize| model.own_leaders.get(idx).copied().unwrap_or(*idx);
         profile.finger_joints = named.iter().map(|idx| model.joints[own(idx)].name.clone()).collect();
         notes.insert("finger_joints", "their names, and the links that they move".to_owned());
@@ -239,6 +243,26 @@ fn alike(model: &RobotModel, links: [usize; 2]) -> Option<Vec<usize>> {
     };
     let is_alike = slides(left) && slides(right) && (follows(left, right) || follows(right, left));
     is_alike.then(|| vec![left, right])
+}
+
+/// The joints that move further fingers: they are on the same link as one of the named joints, with the same limits, and move
+/// neither of the two fingers.
+fn beside(model: &RobotModel, found: &Found, joints: &BTreeSet<usize>, palm: usize) -> Vec<usize> {
+    let inner = chain(model, palm);
+    let in_use: BTreeSet<usize> =
+        found.links.iter().flat_map(|link| chain(model, *link)).map(|joint| leader(model, joint)).collect();
+    let is_like = |joint: usize, other: usize| {
+        let (a, b) = (&model.joints[joint], &model.joints[other]);
+        a.parent == b.parent
+            && a.kind == b.kind
+            && (a.lower - b.lower).abs() + (a.upper - b.upper).abs() < LIMIT_SLACK
+            && (a.effort > 0.0) == (b.effort > 0.0)
+    };
+    let is_further = |joint: &usize| {
+        let other = leader(model, *joint) == *joint && !in_use.contains(joint) && !inner.contains(joint);
+        other && found.named.iter().any(|named| is_like(*joint, *named))
+    };
+    joints.iter().copied().filter(is_further).collect()
 }
 
 /// The frame with the numbers that a profile has.
