@@ -136,6 +136,7 @@ pub fn build(scene: &Scene) -> Result<World, WorldError> {
     };
     world.link_pairs = world.find_link_pairs();
     world.link_pairs.wholes = world.wholes();
+    world.link_pairs.step_secs = world.engine.integration_parameters.dt;
     world.group_links();
     Ok(world)
 }
