@@ -32,8 +32,6 @@ const FINGER_DAMPING_SECS: f64 = 0.1;
 const ROTOR_KG: f64 = 0.05;
 /// Friction of the robot's links other than the fingers: painted metal and plastic.
 const LINK_FRICTION: f64 = 0.4;
-/// Links of at least so many pieces have more contacts than the engine can solve fast: `LinkPairs` drops those that can't close.
-const MANY_PIECES: usize = 4;
 /// Natural frequency of the joint limits. Unit: hertz. The engine's default limits make a loaded joint bounce back.
 pub(super) const STOP_FREQUENCY_HZ: f32 = 60.0;
 /// Damping ratio of the joint limits.
@@ -92,7 +90,8 @@ pub(super) fn insert_links(
         let is_finger = is_further || named.finger_links.contains(&idx);
         let friction = if is_finger { profile.finger_friction } else { LINK_FRICTION };
         let mut hooks = ActiveHooks::FILTER_CONTACT_PAIRS;
-        if link.form().shapes().count() >= MANY_PIECES {
+        // Its contacts are more than the engine can solve fast.
+        if link.has_many_pieces() {
             hooks |= ActiveHooks::MODIFY_SOLVER_CONTACTS;
         }
         for (shape, pose) in link.form().shapes() {

@@ -9,8 +9,8 @@ use rapier3d::prelude::{
 
 use crate::World;
 use crate::engine::{FLOOR_GROUP, Owner};
-use parry3d::math::Vector;
 use crate::robot_course::TOUCH_M;
+use parry3d::math::Vector;
 
 /// Number of collision groups for links.
 const LINK_GROUPS: u32 = 30;
@@ -75,11 +75,13 @@ impl PhysicsHooks for LinkPairs {
     /// Drops the contacts of links that can't close in this step. The engine prepares all within 2 cm, and those of links
     /// take most of its time: fingers of several pieces have a hundred that never touch.
     fn modify_solver_contacts(&self, context: &mut ContactModificationContext<'_>) {
-        let bodies = [context.rigid_body1, context.rigid_body2].map(|handle| handle.and_then(|it| context.bodies.get(it)));
+        let bodies =
+            [context.rigid_body1, context.rigid_body2].map(|handle| handle.and_then(|it| context.bodies.get(it)));
         let ModifiableContacts::Rigid(found) = &mut context.contacts else { return };
         let normal = *found.normal;
         let closes = |points: [Vector; 2]| {
-            let [first, second] = [0, 1].map(|side| bodies[side].map_or(Vector::ZERO, |body| body.velocity_at_point(points[side])));
+            let [first, second] =
+                [0, 1].map(|side| bodies[side].map_or(Vector::ZERO, |body| body.velocity_at_point(points[side])));
             (first - second).dot(normal).max(0.0)
         };
         found.solver_contacts.retain(|contact| {

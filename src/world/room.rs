@@ -78,6 +78,8 @@ pub(super) struct Room {
     pub(super) reach: Reach,
     /// Whether something fast can meet something fixed: the engine then sweeps all fast shapes, which takes long.
     pub(super) sweeps: bool,
+    /// Whether links of many pieces in the hand can touch each other.
+    pieces_meet: bool,
     /// Ticks for which the engine still moves the whole robot.
     whole_ticks: u32,
     /// The shortcuts that may be taken.
@@ -188,7 +190,9 @@ impl World {
     /// Sets the engine's substeps for a tick.
     pub(super) fn set_substeps(&mut self, reach: Reach) {
         let substeps = match reach {
-            Reach::Nothing | Reach::Hand if self.room.shortcuts.few_substeps => self.substeps.div_ceil(2),
+            Reach::Nothing if self.room.shortcuts.few_substeps => self.substeps.div_ceil(2),
+            // Light fingers whose many pieces press on each other would fly apart.
+            Reach::Hand if self.room.shortcuts.few_substeps && !self.room.pieces_meet => self.substeps.div_ceil(2),
             _ => self.substeps,
         };
         self.engine.integration_parameters.num_solver_iterations = substeps;
@@ -271,7 +275,7 @@ impl World {
         if room.between.is_empty() {
             room.between = self.link_pairs.iter().map(|(first, second)| self.joints_between(first, second)).collect();
         }
-        reach = reach.max(self.reach_between_links(&mut room.pairs, &room.between, &now));
+        reach = reach.max(self.reach_between_links(room, &now));
         if reach == Reach::Hand && room.whole_ticks > 0 {
             room.whole_ticks -= 1;
             return Reach::All;
@@ -287,6 +291,10 @@ impl World {
     /// Returns whether a link can't meet the floor or a static object in the tick.
     fn is_clear_of_fixed(&self, room: &mut Room, link: usize, now: &Moment) -> bool {
         let Some(ball) = self.robot.balls[link] else { return true };
+        // The root of a fixed robot stands on something that is fixed too.
+        if self.robot.joints_to(link).next().is_none() {
+            return true;
+        }
         let measure = || self.gap_of_link(link, &|object| object.fixed, true);
         has_room(&mut room.fixed[link], measure, &ball, (&now.poses[link], self.ahead(link, &ball, now)))
     }
@@ -364,12 +372,13 @@ impl World {
         })
     }
 
-    fn reach_between_links(&self, known: &mut [Option<Measured>], between: &[[Vec<usize>; 2]], now: &Moment) -> Reach {
+    fn reach_between_links(&self, room: &mut Room, now: &Moment) -> Reach {
+        room.pieces_meet = false;
         if self.link_pairs.pass {
             return Reach::Nothing;
         }
         let mut reach = Reach::Nothing;
-        for (((first, second), known), joints) in self.link_pairs.iter().zip(known).zip(between) {
+        for (((first, second), known), joints) in self.link_pairs.iter().zip(&mut room.pairs).zip(&room.between) {
             let (Some(one), Some(other)) = (self.robot.balls[first], self.robot.balls[second]) else { continue };
             let pose = now.poses[first].inverse() * now.poses[second];
             let mut ahead = 0.0;
@@ -384,6 +393,8 @@ impl World {
             }
             let in_hand = self.robot.hand.as_ref().is_some_and(|hand| hand.has(first) && hand.has(second));
             reach = reach.max(if in_hand { Reach::Hand } else { Reach::All });
+            room.pieces_meet |=
+                in_hand && [first, second].iter().any(|link| self.robot.model.links[*link].has_many_pieces());
         }
         reach
     }

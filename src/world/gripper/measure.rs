@@ -164,7 +164,8 @@ impl<'a> Drive<'a> {
         let ways = [0, all_fall].into_iter().chain((1..all_fall).rev());
         let further = || self.further.iter().map(|own| turned(limits(&own.joint), own.falls));
         let of = |way: usize| {
-            let leaders = self.leaders.iter().enumerate().map(|(idx, joint)| turned(limits(joint), way >> idx & 1 == 1));
+            let leaders =
+                self.leaders.iter().enumerate().map(|(idx, joint)| turned(limits(joint), way >> idx & 1 == 1));
             leaders.chain(further()).collect()
         };
         ways.map(of).collect()
