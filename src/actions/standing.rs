@@ -321,7 +321,8 @@ impl<'a> Arm<'a> {
         let aside: &[f64] = if self.beside.is_some() { &ASIDE_M } else { &[0.0] };
         for aside_m in aside.iter().copied() {
             let pose = grasp.pose * Translation3::new(0.0, aside_m, 0.0);
-            let Some(found) = self.solve_turned(seed, &pose, LARGEST_TURN_RAD) else { continue };
+            // Out of reach here is out of reach a centimetre beside it.
+            let found = self.solve_turned(seed, &pose, LARGEST_TURN_RAD).ok_or(hindrance.clone())?;
             // An arm of few joints turns the hand: the pose is another than the grasp's.
             let touches = |(hand, thing): (&Hand, &Sighting)| !hand.is_beside(&self.kinematics.grasp(&found.0), thing);
             if !self.beside.is_some_and(touches) {

@@ -22,6 +22,13 @@ const DAMPING: f64 = 0.03;
 const MOST_ITERATIONS: usize = 80;
 /// Iterations in which an arm of few joints keeps the heading of its target if it can.
 const HEADED_ITERATIONS: usize = 30;
+/// Fewest of these, after which a heading that follows no further is let go.
+const FEW_ITERATIONS: usize = 5;
+/// A heading that changes by less in an iteration follows no further. Unit: radians.
+const FOLLOWS_RAD: f64 = 2e-3;
+/// The search ends without a solution if the error stays above this factor of the least one for so many iterations.
+const LEAST_PROGRESS: f64 = 0.99;
+const MOST_WITHOUT_PROGRESS: usize = 12;
 /// Weight of the heading in these.
 const HEADING_WEIGHT: f64 = 0.2;
 /// Largest change of a joint in one iteration. Units: metres or radians.
@@ -50,22 +57,49 @@ pub fn solve(kinematics: &Kinematics, seed: &[f64], reach: &Reach) -> Option<Vec
 pub fn solve_turned(kinematics: &Kinematics, seed: &[f64], reach: &Reach, most_rad: f64) -> Option<(Vec<f64>, f64)> {
     let mut positions = started(kinematics, seed);
     let mut jacobian = vec![Vector6::zeros(); positions.len()];
+    // At first the target pulls the heading along: a joint that turns the hand alone follows.
+    let (mut pulls, mut last_turn) = (true, f64::INFINITY);
+    let mut progress = Progress::default();
     for iteration in 0..MOST_ITERATIONS {
         let grasp = kinematics.fill_jacobian(&positions, &mut jacobian);
         let turn = heading_of(&(grasp.rotation * reach.target.rotation.inverse()));
         let target = turned(&reach.target, turn);
         let mut error = pose_error(&grasp, &target);
-        if is_reached(&error) && (iteration > HEADED_ITERATIONS || turn.abs() < REACHED_RAD) {
+        if is_reached(&error) && (!pulls || turn.abs() < REACHED_RAD) {
             return (turn.abs() <= most_rad).then_some((positions, turn));
         }
-        // At first the target pulls the heading along: a joint that turns the hand alone follows.
-        let weight = if iteration < HEADED_ITERATIONS { HEADING_WEIGHT } else { 0.0 };
+        let follows = (turn - last_turn).abs() > FOLLOWS_RAD;
+        pulls = pulls && iteration < HEADED_ITERATIONS && (follows || iteration < FEW_ITERATIONS);
+        last_turn = turn;
+        if !pulls && progress.has_ended(&error) {
+            return None;
+        }
+        let weight = if pulls { HEADING_WEIGHT } else { 0.0 };
         error[5] = (error[5] - turn) * weight;
         jacobian.iter_mut().for_each(|column| column[5] *= weight);
         step(kinematics, &mut positions, &jacobian, &error, &reach.mobility);
         kinematics.follow(&mut positions);
     }
     None
+}
+
+/// The least error so far, and since when.
+#[derive(Default)]
+struct Progress {
+    least: Option<f64>,
+    n_without: usize,
+}
+
+impl Progress {
+    /// Whether the error has not become notably smaller for some iterations.
+    fn has_ended(&mut self, error: &Vector6<f64>) -> bool {
+        let now = error.norm();
+        match self.least {
+            Some(least) if now > least * LEAST_PROGRESS => self.n_without += 1,
+            _ => (self.least, self.n_without) = (Some(now), 0),
+        }
+        self.n_without >= MOST_WITHOUT_PROGRESS
+    }
 }
 
 /// A target that is turned about the vertical through its place.
