@@ -2,9 +2,9 @@
 //! them.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::sync::{Arc, OnceLock};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
-use nalgebra::{Isometry3, Matrix3, Translation3, Unit, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Matrix3, Point3, Translation3, Unit, UnitQuaternion, Vector3};
 
 use crate::WorldError;
 use crate::assumed::{assume_efforts, assume_speeds, widen_followers};
@@ -14,6 +14,7 @@ use crate::kinematics::motion;
 use crate::mechanism::lead_with_carriers;
 use crate::needed::Needed;
 use crate::self_contact::Form;
+use crate::surface::spread;
 use actcheck_base::did_you_mean;
 use actcheck_data::{LEAST_LINK_KG, Part, Pose, RobotProfile, Shape, bounds};
 
@@ -70,9 +71,21 @@ pub struct Link {
     surface: OnceLock<Arc<Surface>>,
     /// The same shapes for collisions with other links.
     form: OnceLock<Arc<Form>>,
+    /// Points on the same shapes, by the bits of their spacing: plans ask for the same few spacings again and again.
+    points: Arc<Mutex<BTreeMap<u64, Arc<[Point3<f64>]>>>>,
 }
 
 impl Link {
+    /// Returns points on its shapes, at most about `spacing` apart, in the link's frame. Unit: metres.
+    pub(crate) fn points(&self, spacing: f64) -> Arc<[Point3<f64>]> {
+        let of = |solid: &Part| {
+            let pose = solid.pose.to_isometry();
+            spread(&solid.shape, spacing).into_iter().map(move |point| pose * point)
+        };
+        let mut known = self.points.lock().unwrap_or_else(PoisonError::into_inner);
+        Arc::clone(known.entry(spacing.to_bits()).or_insert_with(|| self.solids.iter().flat_map(of).collect()))
+    }
+
     /// Returns its shapes for measurements.
     pub(crate) fn surface(&self) -> Arc<Surface> {
         Arc::clone(self.surface.get_or_init(|| Arc::new(Surface::of(&self.solids))))
@@ -451,6 +464,7 @@ fn empty_link(name: &str) -> Link {
         solids: Vec::new(),
         surface: OnceLock::new(),
         form: OnceLock::new(),
+        points: Arc::default(),
     }
 }
 

@@ -8,7 +8,6 @@ use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3, Vector6
 use crate::Gripper;
 use crate::description::{Joint, JointKind, Link, RobotModel};
 use crate::self_contact::Form;
-use crate::surface::spread;
 use actcheck_data::{Part, Shape};
 
 /// Gravitational acceleration. Unit: m/s².
@@ -119,14 +118,10 @@ impl Kinematics {
     /// Samples points on the robot's collision shapes, at most about `spacing` apart. Returns each with the index of
     /// its link, in the link's frame. Unit: metres.
     pub fn surface_points(&self, spacing: f64) -> Vec<(usize, Point3<f64>)> {
-        let mut points = Vec::new();
-        for (idx, link) in self.model.links.iter().enumerate() {
-            for solid in &link.solids {
-                let pose = solid.pose.to_isometry();
-                points.extend(spread(&solid.shape, spacing).into_iter().map(|point| (idx, pose * point)));
-            }
-        }
-        points
+        let links = self.model.links.iter().enumerate();
+        links
+            .flat_map(|(idx, link)| link.points(spacing).iter().map(|point| (idx, *point)).collect::<Vec<_>>())
+            .collect()
     }
 
     /// Returns the poses of all links. Shape: one more than `positions`.

@@ -21,7 +21,7 @@ use crate::share::Share;
 
 /// Distances are measured up to this. Unit: metres.
 const RANGE_M: f64 = 0.25;
-/// Distance that remains after a free tick: that at which the engine prepares contacts, and the errors of its 32-bit
+/// Distance that remains after a free tick: the engine finds contacts before they close, in spite of the errors of its 32-bit
 /// distances. Unit: metres.
 const LEFT_M: f64 = 4e-3;
 /// As [`LEFT_M`], between two links of the robot. Unit: metres.

@@ -146,8 +146,8 @@ pub fn build(scene: &Scene) -> Result<World, WorldError> {
     Ok(world)
 }
 
-/// Distance below which contacts of a robot with links of many pieces are prepared: as far as a fast object comes in a step. The
-/// default of 2 cm would prepare hundreds between its fingers. Unit: metres.
+/// Distance below which contacts are prepared in a world whose robot has links of many pieces: about as far as an object comes in
+/// a step after a fall of 10 cm. The default of 2 cm would prepare hundreds of contacts between its fingers. Unit: metres.
 const PREDICTION_M: f32 = 0.006;
 
 /// Returns the bodies that can move with their names in traces: objects, then links with shapes.
