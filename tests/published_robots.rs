@@ -293,6 +293,36 @@ fn fingers_without_such_names_are_found_where_short_chains_branch_off() {
     }
 }
 
+/// The Jaco's hand has two fingers against a third one: all three close on the object, and the two share the force of their
+/// side. A finger that stays where it is would be in the way.
+#[test]
+fn further_fingers_open_and_close_with_the_two_that_face_each_other() {
+    let folder = tempfile::tempdir().unwrap();
+    let urdf = fixed_arm();
+    let mimic = "    <mimic joint=\"finger_left_joint\" multiplier=\"1\" offset=\"0\"/>\n";
+    let (from, to) =
+        (urdf.find("  <joint name=\"finger_right_joint\"").unwrap(), urdf.find("  <!-- x points along").unwrap());
+    let right = urdf[from..to].replace(mimic, "").replace("xyz=\"0 0 0.06\"", "xyz=\"0.015 0 0.06\"");
+    let third = right.replace("finger_right", "finger_third").replace("xyz=\"0.015 0 0.06\"", "xyz=\"-0.015 0 0.06\"");
+    assert!(!right.contains("mimic") && third.contains("xyz=\"-0.015 0 0.06\""));
+    let urdf = urdf.replace(&urdf[from..to], &format!("{right}{third}"));
+    std::fs::write(folder.path().join("robot.urdf"), &urdf).unwrap();
+    let made = actcheck(folder.path(), &["new", "robot", "robot.urdf", "--out", "proposed.toml"]);
+    assert!(made.status.success(), "{}", stderr(&made));
+    let proposed = std::fs::read_to_string(folder.path().join("proposed.toml")).unwrap();
+    let line = proposed.lines().find(|line| line.starts_with("finger_joints")).unwrap_or_default();
+    assert!(["left", "right", "third"].iter().all(|name| line.contains(&format!("finger_{name}_joint"))), "{proposed}");
+    let joints = |names: &str| {
+        format!("finger_joints = [{names}]\nfinger_links = [\"finger_left_link\", \"finger_right_link\"]\n")
+    };
+    let two = "\"finger_left_joint\", \"finger_right_joint\"";
+    let (said, passed) = check_and_run(folder.path(), &urdf, &joints(&format!("{two}, \"finger_third_joint\"")));
+    assert!(passed >= 3, "{passed} of 4 picks passed: {said}");
+    std::fs::remove_dir_all(folder.path().join("h")).unwrap();
+    let (_, passed) = check_and_run(folder.path(), &urdf, &joints(two));
+    assert!(passed <= 1, "{passed} of 4 picks passed with a finger that does not move");
+}
+
 /// The file of a gripper alone is refused, not proposed as a robot.
 #[test]
 fn a_hand_without_an_arm_is_refused() {

@@ -14,7 +14,7 @@ use parry3d::math::Vector;
 
 /// Number of collision groups for links.
 const LINK_GROUPS: u32 = 30;
-/// Contacts this near are kept at any speed: a link that was at rest can't come nearer in a step. Unit: metres.
+/// Contacts nearer than this are kept at any speed: a link at rest can't move farther in a step. Unit: metres.
 const SURE_M: Real = 1.5e-3;
 /// Factor on the present speed, which motors change within the step.
 const OVERSHOOT: Real = 2.0;
