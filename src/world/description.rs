@@ -71,9 +71,12 @@ pub struct Link {
     surface: OnceLock<Arc<Surface>>,
     /// The same shapes for collisions with other links.
     form: OnceLock<Arc<Form>>,
-    /// Points on the same shapes, by the bits of their spacing: plans ask for the same few spacings again and again.
-    points: Arc<Mutex<BTreeMap<u64, Arc<[Point3<f64>]>>>>,
+    /// Points on the same shapes.
+    points: Arc<Mutex<PointsBySpacing>>,
 }
+
+/// Points on a link, by the bits of their spacing: plans ask for the same few spacings again and again.
+type PointsBySpacing = BTreeMap<u64, Arc<[Point3<f64>]>>;
 
 impl Link {
     /// Returns points on its shapes, at most about `spacing` apart, in the link's frame. Unit: metres.
