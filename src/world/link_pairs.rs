@@ -72,8 +72,8 @@ impl PhysicsHooks for LinkPairs {
         collide.then_some(SolverFlags::COMPUTE_RIGID_IMPULSES)
     }
 
-    /// Drops the contacts of links that can't close in this step. The engine prepares all within 2 cm, and those of links
-    /// take most of its time: fingers of several pieces have a hundred that never touch.
+    /// Drops the contacts of links that can't close in this step: the engine prepares all within some millimetres, and fingers
+    /// of many pieces have dozens that never close.
     fn modify_solver_contacts(&self, context: &mut ContactModificationContext<'_>) {
         let bodies =
             [context.rigid_body1, context.rigid_body2].map(|handle| handle.and_then(|it| context.bodies.get(it)));
