@@ -291,7 +291,7 @@ impl World {
     /// Returns whether a link can't meet the floor or a static object in the tick.
     fn is_clear_of_fixed(&self, room: &mut Room, link: usize, now: &Moment) -> bool {
         let Some(ball) = self.robot.balls[link] else { return true };
-        // The root of a fixed robot stands on something that is fixed too.
+        // A link that never moves may touch other fixed things.
         if self.robot.joints_to(link).next().is_none() {
             return true;
         }
