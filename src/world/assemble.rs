@@ -90,7 +90,7 @@ pub(super) fn insert_links(
         let is_finger = is_further || named.finger_links.contains(&idx);
         let friction = if is_finger { profile.finger_friction } else { LINK_FRICTION };
         let mut hooks = ActiveHooks::FILTER_CONTACT_PAIRS;
-        // Its contacts are more than the engine can solve fast.
+        // `LinkPairs` then drops contacts that can't close: solving all of them takes long.
         if link.has_many_pieces() {
             hooks |= ActiveHooks::MODIFY_SOLVER_CONTACTS;
         }
