@@ -174,6 +174,8 @@ min_range_m = 0.3
 action_secs = 180
 """
 
+# Height of the workbench's top.
+WORKBENCH_M = 0.9
 # The place of the target, no farther from the base than this.
 WITHIN = """@prefix act: <http://actions#> .
 @prefix w: <https://w3id.org/actcheck/world#> .
@@ -270,6 +272,12 @@ def surface_for(profile, mobile):
     return "mini_coffee_table" if low else "coffee_table"
 
 
+def below_shoulder(profile):
+    """How far an upright robot's arm must reach down to a thing of 12 cm on the workbench; 0 for others. Unit: metres."""
+    shoulder = re.search(r"([\d.]+) m above the floor", profile)
+    return max(float(shoulder[1]) - WORKBENCH_M - 0.06, 0.0) if shoulder and float(shoulder[1]) > 1.05 else 0.0
+
+
 def measure(args, name, model, arguments, start, packages):
     folder = args.work / re.sub(r"\W+", "_", name)
     folder.mkdir(parents=True, exist_ok=True)
@@ -288,7 +296,8 @@ def measure(args, name, model, arguments, start, packages):
     reach = re.search(r"reaches ([\d.]+) m", text)
     require = ""
     if not mobile and reach and "\nreach_m" not in text:
-        (folder / "within.rls").write_text(WITHIN.format(squared=round((0.8 * float(reach[1])) ** 2, 4)))
+        squared = (0.8 * float(reach[1])) ** 2 - below_shoulder(text) ** 2
+        (folder / "within.rls").write_text(WITHIN.format(squared=round(max(squared, 0.01), 4)))
         require = '[scene]\nrequire = "within.rls"'
     models = folder / "models" / "objects"
     if not models.exists():

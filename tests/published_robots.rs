@@ -323,6 +323,62 @@ fn further_fingers_open_and_close_with_the_two_that_face_each_other() {
     assert!(passed <= 1, "{passed} of 4 picks passed with a finger that does not move");
 }
 
+/// The hand of a GR1 has four fingers in a row, and a thumb that closes along the row unless its first joint turns it.
+#[test]
+fn a_thumb_is_parked_opposite_the_fingers() {
+    let folder = tempfile::tempdir().unwrap();
+    let urdf = fixed_arm();
+    let (from, to) =
+        (urdf.find("  <!-- Position: distance of the pad").unwrap(), urdf.find("  <!-- x points along").unwrap());
+    let link = |name: &str, mass: f64| {
+        format!(
+            "<link name=\"{name}_link\"><inertial><origin xyz=\"0 0 0.05\"/><mass value=\"{mass}\"/><inertia ixx=\"7e-5\" ixy=\"0\" \
+             ixz=\"0\" iyy=\"7e-5\" iyz=\"0\" izz=\"5e-6\"/></inertial>"
+        )
+    };
+    let pad =
+        "<collision><origin xyz=\"0 0 0.05\"/><geometry><box size=\"0.016 0.012 0.1\"/></geometry></collision></link>";
+    let joint = |name: &str, parent: &str, at: &str, axis: &str, upper: f64| {
+        format!(
+            "<joint name=\"{name}_joint\" type=\"revolute\"><parent link=\"{parent}\"/><child link=\"{name}_link\"/>\
+             <origin xyz=\"{at}\"/><axis xyz=\"{axis}\"/><limit lower=\"0\" upper=\"{upper}\" effort=\"10\" velocity=\"2\"/></joint>"
+        )
+    };
+    let finger = |name: &str, x: f64| {
+        let name = format!("finger_{name}");
+        joint(&name, "palm_link", &format!("{x} 0.05 0.06"), "1 0 0", 1.4) + &link(&name, 0.08) + pad
+    };
+    let hand = [
+        finger("index", -0.022),
+        finger("middle", 0.0),
+        finger("ring", 0.022),
+        joint("thumb_turn", "palm_link", "0 -0.05 0.06", "0 0 1", 1.74),
+        link("thumb_turn", 0.05) + "</link>",
+        joint("thumb_bend", "thumb_turn_link", "0 0 0", "0 1 0", 1.2),
+        link("thumb_bend", 0.08) + pad,
+    ];
+    let urdf = urdf.replace(&urdf[from..to], &hand.concat());
+    std::fs::write(folder.path().join("robot.urdf"), &urdf).unwrap();
+    let made = actcheck(folder.path(), &["new", "robot", "robot.urdf", "--out", "proposed.toml"]);
+    assert!(made.status.success(), "{}", stderr(&made));
+    let proposed = std::fs::read_to_string(folder.path().join("proposed.toml")).unwrap();
+    assert!(proposed.contains("parked_joints = [\"thumb_turn_joint\"]\nparked = [1.566]"), "{proposed}");
+    assert!(proposed.contains("`thumb_turn_joint` turns the thumb opposite the fingers"), "{proposed}");
+    let line = |key: &str| proposed.lines().find(|line| line.starts_with(key)).unwrap_or_default().to_owned();
+    let all = ["finger_index_joint", "finger_middle_joint", "finger_ring_joint", "thumb_bend_joint"];
+    assert!(all.iter().all(|name| line("finger_joints").contains(name)), "{proposed}");
+    let facing = ["finger_middle_link", "thumb_bend_link"];
+    assert!(facing.iter().all(|name| line("finger_links").contains(name)), "{proposed}");
+    // Keys before the first table.
+    let profile: Vec<&str> = proposed.lines().filter(|line| !line.starts_with("urdf")).collect();
+    let (said, passed) = check_and_run(folder.path(), &urdf, &profile.join("\n"));
+    assert!(passed >= 3, "{passed} of 4 picks passed: {said}");
+    std::fs::remove_dir_all(folder.path().join("h")).unwrap();
+    let unparked = profile.iter().filter(|line| !line.starts_with("parked")).copied().collect::<Vec<_>>().join("\n");
+    let (_, passed) = check_and_run(folder.path(), &urdf, &unparked);
+    assert!(passed <= 1, "{passed} of 4 picks passed with a thumb that closes along the row");
+}
+
 /// The file of a gripper alone is refused, not proposed as a robot.
 #[test]
 fn a_hand_without_an_arm_is_refused() {

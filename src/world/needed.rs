@@ -8,7 +8,7 @@ use actcheck_data::RobotProfile;
 
 /// The movable joints of a robot, and the positions of the others.
 pub(super) struct Needed<'a> {
-    /// `None` if the profile has no roles yet: all joints move.
+    /// `None` if the profile has no roles yet: all joints move, but those that it parks.
     moving: Option<BTreeSet<&'a str>>,
     joints: BTreeMap<&'a str, &'a urdf_rs::Joint>,
     /// Positions of rigid joints that the profile gives.
@@ -53,7 +53,8 @@ impl<'a> Needed<'a> {
     /// Whether the simulation moves a joint. A coupling with the factor 0 holds it where it is.
     pub(super) fn contains(&self, joint: &urdf_rs::Joint) -> bool {
         let is_held = joint.mimic.as_ref().is_some_and(|mimic| mimic.multiplier == Some(0.0));
-        !is_held && self.moving.as_ref().is_none_or(|moving| moving.contains(joint.name.as_str()))
+        let name = joint.name.as_str();
+        !is_held && self.moving.as_ref().map_or(!self.parked.contains_key(name), |moving| moving.contains(name))
     }
 
     /// The position of a rigid joint: that of the profile, otherwise 0 or the limit nearest to it; by its coupling if it has

@@ -3,7 +3,8 @@
 use std::sync::Arc;
 
 use nalgebra::Isometry3;
-use rapier3d::prelude::{MultibodyJointHandle, PhysicsWorld, RigidBodyHandle};
+use parry3d::bounding_volume::BoundingSphere;
+use rapier3d::prelude::{MultibodyJointHandle, PhysicsWorld, RigidBody, RigidBodyHandle};
 
 use crate::assemble::{home, insert_joints, insert_links, links_on_floor};
 use crate::description::{Joint, RobotModel};
@@ -37,6 +38,8 @@ pub struct Robot {
     pub(super) off_floor: Vec<bool>,
     /// The bounding ball of each link's shapes, in its frame; `None` for links without shapes.
     pub(super) balls: Vec<Option<Ball>>,
+    /// The bounding balls of each link's shapes, one by one, each in the frame of its shape, in the order of its colliders.
+    pub(super) balls_of_shapes: Vec<Vec<BoundingSphere>>,
     /// Positions of the joints.
     pub(super) positions: Vec<f64>,
     /// Velocities of the joints.
@@ -68,6 +71,12 @@ pub fn geometry(start: &RobotStart) -> Result<(Kinematics, Layout, Vec<f64>), Wo
     Ok((kinematics, named.layout.clone(), positions))
 }
 
+fn balls_of_shapes(engine: &PhysicsWorld, body: RigidBodyHandle) -> Vec<BoundingSphere> {
+    let handles = engine.bodies.get(body).map(RigidBody::colliders).unwrap_or_default();
+    let colliders = handles.iter().filter_map(|handle| engine.colliders.get(*handle));
+    colliders.map(|collider| collider.shape().compute_local_bounding_sphere()).collect()
+}
+
 /// Pose of the root link. Frame: world.
 fn root_of(start: &RobotStart, layout: &Layout) -> Isometry3<f64> {
     let [x, y, heading] = start.base;
@@ -92,6 +101,7 @@ impl Robot {
         let motors = insert_joints(engine, model, &bodies, named, &profile)?;
         let off_floor = links_on_floor(model, named, &profile);
         let balls = model.links.iter().map(|link| Ball::around(&link.solids)).collect();
+        let balls_of_shapes = bodies.iter().map(|body| balls_of_shapes(engine, *body)).collect();
         let hand = Hand::of(model, &named.layout.gripper);
         let mut robot = Self {
             model: Arc::clone(model),
@@ -103,6 +113,7 @@ impl Robot {
             motors,
             off_floor,
             balls,
+            balls_of_shapes,
             velocities: vec![0.0; positions.len()],
             positions,
             share: Share::Whole,

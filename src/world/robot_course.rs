@@ -7,6 +7,7 @@ use actcheck_data::{HeldCourse, JointCourse, Pose, RobotCourse, SelfCollision};
 use std::collections::BTreeMap;
 
 use nalgebra::{Isometry3, Point3};
+use parry3d::bounding_volume::BoundingSphere;
 use parry3d::query::contact;
 use rapier3d::prelude::{Collider, RigidBodyHandle};
 
@@ -144,7 +145,10 @@ impl World {
         if self.are_links_apart(first, second) {
             return 0.0;
         }
-        let balls = |idx: usize| self.colliders_of(self.robot.bodies[idx]).map(|solid| (ball(solid), solid));
+        let balls = |idx: usize| {
+            let solids = self.colliders_of(self.robot.bodies[idx]);
+            solids.zip(&self.robot.balls_of_shapes[idx]).map(|(solid, around)| (placed(around, solid), solid))
+        };
         let of_second: Vec<((Point3<f64>, f64), &Collider)> = balls(second).collect();
         let mut deepest = 0.0f64;
         for ((middle, radius), a) in balls(first) {
@@ -178,9 +182,8 @@ impl World {
     }
 }
 
-/// Returns centre and radius of a solid's bounding sphere. Frame: world. Unit: metres.
-fn ball(solid: &Collider) -> (Point3<f64>, f64) {
-    let around = solid.shape().compute_local_bounding_sphere();
+/// Returns centre and radius of a solid's bounding ball, which is in the solid's frame. Frame: world. Unit: metres.
+fn placed(around: &BoundingSphere, solid: &Collider) -> (Point3<f64>, f64) {
     let pose: Isometry3<f64> = from_pose(solid.position());
     (pose * Point3::from(from_vector(around.center)), f64::from(around.radius))
 }

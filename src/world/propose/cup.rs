@@ -65,7 +65,7 @@ pub(super) fn find(partial: &RobotProfile, model: &RobotModel, wanted: Option<&s
         ("suction_radius_m", "half of the width of the shapes there".to_owned()),
         ("suction_force_n", "the area of the lip at 0.6 bar below the air's pressure".to_owned()),
     ]);
-    Some(Hand { profile, palm: *palm, notes, others: Vec::new() })
+    Some(Hand { profile, palm: *palm, notes, others: Vec::new(), score: 0.0 })
 }
 
 /// The axis of a link's frame, as a vector in it, that points away from the joint before the link.

@@ -26,6 +26,8 @@ const LEAST_CHANGE_M: f64 = 0.008;
 const CARRIER: f64 = 0.3;
 /// Weight of a joint whose largest effort is 0.
 const WITHOUT_MOTOR: f64 = 0.2;
+/// Weight of a finger at the end of a row that closes together.
+const AT_THE_END: f64 = 0.7;
 /// Weight of two links whose volumes differ by more than the share [`UNLIKE`].
 const UNALIKE: f64 = 0.7;
 const UNLIKE: f64 = 0.1;
@@ -50,6 +52,8 @@ pub(super) struct Hand {
     pub(super) notes: BTreeMap<&'static str, String>,
     /// Names of the links that carry other hands.
     pub(super) others: Vec<String>,
+    /// How good it is, to compare hands of the same robot; 0 if the profile names its parts.
+    pub(super) score: f64,
 }
 
 /// Finds the best gripper, and keeps the parts that the profile names. Of several hands, only those with `wanted` in a
@@ -60,14 +64,14 @@ pub(super) struct Hand {
 pub(super) fn find(partial: &RobotProfile, model: &RobotModel, wanted: Option<&str>) -> Result<Hand, NoHand> {
     let stated = Stated::of(partial, model)?;
     if let (Some(_), Some((palm, _))) = (partial.suction, stated.grasp) {
-        return Ok(Hand { profile: partial.clone(), palm, notes: BTreeMap::new(), others: Vec::new() });
+        return Ok(Hand { profile: partial.clone(), palm, notes: BTreeMap::new(), others: Vec::new(), score: 0.0 });
     }
     if let (Some(links), [_, ..], Some(grasp)) = (stated.links, stated.joints.as_slice(), stated.grasp) {
         let mut profile = partial.clone();
         if profile.max_opening_m == 0.0 {
             profile.max_opening_m = as_opening(Gripper::find(partial, model, links, grasp)?.widest_m());
         }
-        return Ok(Hand { profile, palm: grasp.0, notes: BTreeMap::new(), others: Vec::new() });
+        return Ok(Hand { profile, palm: grasp.0, notes: BTreeMap::new(), others: Vec::new(), score: 0.0 });
     }
     let groups = stated.groups(model).unwrap_or_else(|| groups(model));
     if groups.is_empty() {
@@ -177,8 +181,9 @@ fn measure(
             };
             for (weight, frame) in all {
                 let Some(found) = rate(bare, model, palm, links, &named, frame) else { continue };
-                let weight = weight * powered(model, &named, joints);
-                let found = Found { score: found.score * weight * tips(model, links, joints), ..found };
+                let weight = weight * powered(model, &named, joints) * tips(model, links, joints);
+                let weight = weight * amid(model, &found, &beside(model, &found, joints, palm));
+                let found = Found { score: found.score * weight, ..found };
                 if best.as_ref().is_none_or(|best| found.score > best.score + 1e-9) {
                     best = Some(found);
                 }
@@ -224,7 +229,7 @@ fn measure(
         profile.max_opening_m = as_opening(found.widest_m);
         notes.insert("max_opening_m", "measured at that place".to_owned());
     }
-    Some(Hand { profile, palm, notes, others: Vec::new() })
+    Some(Hand { profile, palm, notes, others: Vec::new(), score: found.score })
 }
 
 /// Not wider than measured, up to the rounding of limits. Unit: metres.
@@ -263,6 +268,16 @@ fn beside(model: &RobotModel, found: &Found, joints: &BTreeSet<usize>, palm: usi
         other && found.named.iter().any(|named| is_like(*joint, *named))
     };
     joints.iter().copied().filter(is_further).collect()
+}
+
+/// Weight of a finger's place among those that close with it: in their middle, an object does not tip out of the hand.
+fn amid(model: &RobotModel, found: &Found, further: &[usize]) -> f64 {
+    let knuckle = |joint: usize| model.joints[joint].origin.translation.vector;
+    let is_amid = |named: &usize| {
+        let ways: Vec<_> = further.iter().map(|joint| knuckle(*joint) - knuckle(*named)).collect();
+        ways.iter().any(|way| ways.iter().any(|other| way.dot(other) < 0.0))
+    };
+    if further.len() < 2 || found.named.iter().any(is_amid) { 1.0 } else { AT_THE_END }
 }
 
 /// The frame with the numbers that a profile has.

@@ -14,6 +14,7 @@ mod postures;
 mod seat;
 mod short_arm;
 mod stated;
+mod thumb;
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -71,10 +72,7 @@ pub fn complete(partial: &RobotProfile) -> Result<Proposal, WorldError> {
 /// Finds the roles that a profile leaves out; its base, mount and head too if `all`.
 fn find(partial: &RobotProfile, all: bool, wanted: Option<&str>) -> Result<Proposal, WorldError> {
     let name = partial.urdf.name.to_string();
-    // All joints move in the model of a profile without roles.
-    let bare = RobotProfile { arm_joints: Vec::new(), planar_base: false, ..partial.clone() };
-    let model = RobotModel::read(&bare)?;
-    let hand = fingers::find(partial, &model, wanted).map_err(|error| error.named(&name))?;
+    let (model, hand) = thumb::find(partial, wanted).map_err(|error| error.named(&name))?;
     let mut notes = hand.notes;
     let mut profile = hand.profile;
     let body = body::find(&model, hand.palm, &hand.others, &mut notes);
@@ -109,7 +107,8 @@ fn find(partial: &RobotProfile, all: bool, wanted: Option<&str>) -> Result<Propo
         short_arm::measure_reach(&mut profile, &model, grasp, &mut notes)?;
     }
     if all {
-        profile.parked = parked(partial, &profile, &hand.others, &mut notes);
+        let others = parked(partial, &profile, &hand.others, &mut notes);
+        profile.parked.extend(others);
     }
     // Joints without a role are rigid from now on: a finger that no named joint moves may narrow the opening.
     let narrower = Named::find(&profile, &RobotModel::read(&profile)?)?.layout.gripper.widest_m();
@@ -146,14 +145,15 @@ fn parked(
         [hand] => format!("the arm of the hand {hand} at its own home"),
         several => format!("the arms of the hands {} at their own homes", several.join(", ")),
     };
-    notes.insert("parked_joints", note);
+    let thumb = notes.remove("parked_joints");
+    notes.insert("parked_joints", thumb.into_iter().chain([note]).collect::<Vec<_>>().join("; "));
     parked
 }
 
 /// A profile for the hand at a link, without one for the other hands.
 fn home_of(bare: &RobotProfile, palm: &str) -> Result<RobotProfile, WorldError> {
     let name = bare.urdf.name.to_string();
-    let model = RobotModel::read(&RobotProfile { arm_joints: Vec::new(), planar_base: false, ..bare.clone() })?;
+    let model = thumb::without_roles(bare).map_err(|error| error.named(&name))?;
     let hand = fingers::find(bare, &model, Some(palm)).map_err(|error| error.named(&name))?;
     let mut notes = BTreeMap::new();
     let body = body::find(&model, hand.palm, &hand.others, &mut notes);
