@@ -46,6 +46,7 @@ mod kills;
 mod last_failed;
 mod launch;
 mod low_objects;
+mod many_pieces;
 mod many_runs;
 mod margins;
 mod merge;

@@ -336,7 +336,7 @@ impl World {
     }
 
     /// Returns the largest speed of an object's points. Unit: m/s.
-    fn speed_of(&self, object: &Object) -> Option<f64> {
+    pub(super) fn speed_of(&self, object: &Object) -> Option<f64> {
         let body = self.engine.bodies.get(object.body)?;
         let size = Vector3::from(object.model.size_m).norm();
         Some(from_vector(body.linvel()).norm() + from_vector(body.angvel()).norm() * size)

@@ -9,8 +9,7 @@ use rapier3d::prelude::{PhysicsWorld, RigidBodyHandle};
 
 use crate::attach::attach;
 use crate::convert::{from_pose, from_vector, to_vector};
-use crate::description::Link;
-use crate::engine::{LENGTH_UNIT, add_floor, engine};
+use crate::engine::{add_floor, engine};
 use crate::furniture::Sliding;
 use crate::link_pairs::LinkPairs;
 use crate::object::{self, Object};
@@ -105,9 +104,6 @@ pub fn build(scene: &Scene) -> Result<World, WorldError> {
     let mut engine = engine(&scene.physics)?;
     add_floor(&mut engine);
     let robot = Robot::insert(&mut engine, &scene.robot)?;
-    if robot.model.links.iter().any(Link::has_many_pieces) {
-        engine.integration_parameters.normalized_prediction_distance = PREDICTION_M / LENGTH_UNIT;
-    }
     let mut objects: Vec<Object> =
         scene.objects.iter().enumerate().map(|(idx, object)| object::insert(&mut engine, idx, object)).collect();
     attach(&mut engine, &scene.objects, &mut objects);
@@ -144,10 +140,6 @@ pub fn build(scene: &Scene) -> Result<World, WorldError> {
     world.group_links();
     Ok(world)
 }
-
-/// Distance below which contacts are prepared in a world whose robot has links of many pieces: about as far as an object comes in
-/// a step after a fall of 10 cm. The default of 2 cm would prepare hundreds of contacts between its fingers. Unit: metres.
-const PREDICTION_M: f32 = 0.006;
 
 /// Returns the bodies that can move with their names in traces: objects, then links with shapes.
 fn tracks(objects: &[Object], robot: &Robot) -> Vec<(String, RigidBodyHandle)> {
@@ -230,6 +222,7 @@ impl World {
     fn step_all(&mut self, mut reach: Reach, holding: &[f64]) {
         let dt = 1.0 / f64::from(self.steps_per_second);
         self.robot.begin_tick();
+        self.prepare_contacts();
         for step in 0..self.steps_per_tick {
             if reach == Reach::Hand && self.is_pushed_hard() {
                 self.need_whole();

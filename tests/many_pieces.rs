@@ -1,0 +1,109 @@
+//! Robots whose links have many convex pieces, as split meshes have: fewer contacts are prepared and solved for them.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use actcheck::actions::perform;
+use actcheck::base::{Files, Source};
+use actcheck::data::{Budget, Choices, Pose, Role, Scene};
+use actcheck::world::{World, build};
+
+use crate::physics::{block, body, call, object, on_table, scene};
+
+/// The scene with each finger of the robot cut into five boxes, which have the same surface together.
+fn with_pieces(mut scene: Scene) -> Scene {
+    let mut profile = (*scene.robot.profile).clone();
+    let mut text = profile.urdf.text.to_string();
+    for y in ["0.006", "-0.006"] {
+        let whole = format!(
+            "<collision><origin xyz=\"0 {y} 0.0475\" rpy=\"0 0 0\"/><geometry><box size=\"0.024 0.012 0.095\"/></geometry></collision>"
+        );
+        let piece = |idx: u32| {
+            let z = 0.0095 + 0.019 * f64::from(idx);
+            format!(
+                "<collision><origin xyz=\"0 {y} {z}\"/><geometry><box size=\"0.024 0.012 0.019\"/></geometry></collision>"
+            )
+        };
+        assert!(text.contains(&whole));
+        text = text.replace(&whole, &(0..5).map(piece).collect::<String>());
+    }
+    profile.urdf = Source::new("pieces.urdf", text);
+    scene.robot.profile = Arc::new(profile);
+    scene
+}
+
+/// Contacts that can't close in a step are dropped, and others are prepared later: a grasp holds as without that.
+#[test]
+fn fingers_of_many_pieces_hold_like_those_of_one() {
+    let table = || on_table(block([0.06, 0.06, 0.15]), 0.3, 0.5);
+    let [whole, pieces] = [table(), with_pieces(table())].map(|scene| {
+        let mut world = build(&scene).expect("the scene is right");
+        assert!(world.settle().settled);
+        let budget = Budget { action_secs: 60.0 };
+        let trace = perform(&[call("Pick")], &mut world, &mut Choices::random(1, 0), &budget);
+        let report = trace.actions[0].report.as_ref().expect("the skill reports");
+        assert!(report.succeeded, "{}", report.message);
+        let mut hold = world.hold();
+        hold.gripper_opening_m = 0.0;
+        (0..60).for_each(|_| world.step(&hold));
+        let before = in_hand(&world);
+        (0..600).for_each(|_| world.step(&hold));
+        let slip = (in_hand(&world).translation.vector - before.translation.vector).norm();
+        (body(&world, "thing_1").pose.position[2], slip, world.quality().deepest_penetration_m)
+    });
+    assert!((whole.0 - pieces.0).abs() < 2e-3, "{whole:?} {pieces:?}");
+    assert!(pieces.1 < whole.1 + 1e-4, "slipped by {} m instead of {} m", pieces.1, whole.1);
+    assert!(pieces.2 < whole.2 + 3e-4, "penetrates by {} m instead of {} m", pieces.2, whole.2);
+}
+
+/// Returns the pose of the thing in the frame of the hand.
+fn in_hand(world: &World) -> nalgebra::Isometry3<f64> {
+    let hand = world.snapshot().robot.gripper.to_isometry();
+    hand.inverse() * body(world, "thing_1").pose.to_isometry()
+}
+
+/// A bar from 2 m moves farther in a step than the distance within which contacts with slow objects are prepared: it enters the
+/// robot no deeper all the same.
+#[test]
+fn a_fast_object_does_not_enter_fingers_of_many_pieces_deeper() {
+    let falling = |pieces: bool, height: f64| {
+        let mut scene = scene(Vec::new());
+        scene.robot.base = [0.0, 0.0, 0.0];
+        let world = build(&scene).expect("the scene is right");
+        let [x, y, z] = world.snapshot().robot.gripper.position;
+        let pose = Pose::upright([x + 0.02, y, z + height], 0.0);
+        scene.objects = vec![object("thing_1", block([0.04, 0.4, 0.04]), Role::Target, pose, 0.5, 0.5)];
+        let mut world = build(&if pieces { with_pieces(scene) } else { scene }).expect("the scene is right");
+        let hold = world.hold();
+        world.begin_record();
+        (0..90).for_each(|_| world.step(&hold));
+        let depth_m = world.quality().deepest_penetration_m;
+        let contacts = world.end_record().contacts;
+        let is_of_robot = |pair: &[String; 2]| pair[0].starts_with("robot/") && pair[1] == "thing_1";
+        assert!(contacts.iter().any(|contact| is_of_robot(&contact.pair)), "{contacts:?}");
+        depth_m
+    };
+    for height in [0.3, 0.6, 1.0, 2.0] {
+        let [whole, pieces] = [false, true].map(|pieces| falling(pieces, height));
+        assert!(pieces < whole + 5e-4, "from {height} m, it enters by {pieces} m instead of {whole} m");
+    }
+}
+
+/// A fixed robot on a table touches it with its root all the time. Its arm moves without the engine all the same.
+#[test]
+fn the_root_of_a_fixed_robot_may_touch_the_table() {
+    let path = Path::new("models/robots/fixed_arm.toml");
+    let profile = actcheck::config::robot::read(&Files::Shipped, path).expect("the shipped robot is right");
+    let mut scene = on_table(block([0.06, 0.06, 0.15]), 0.3, 0.5);
+    scene.robot.profile = Arc::new(profile);
+    (scene.robot.base, scene.robot.root_height_m) = ([0.3, 0.0, 0.0], 0.69);
+    let mut world = build(&scene).expect("the scene is right");
+    assert!(world.settle().settled);
+    let mut command = world.hold();
+    let pan = world.layout().arm[0];
+    command.positions[pan] += 0.2;
+    (0..60).for_each(|_| world.step(&command));
+    let [free, .., whole] = world.ticks_by_reach();
+    assert!(free > 0 && whole == 0, "{:?}", world.ticks_by_reach());
+    assert!((world.observe().positions[pan] - command.positions[pan]).abs() < 0.01);
+}
