@@ -5,6 +5,8 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use rayon::prelude::*;
+
 use actcheck_base::{Diagnostic, Diagnostics, Digest, Files};
 use actcheck_config::Campaign;
 use actcheck_data::{Mesh, ObjectModel, Part, RobotProfile, Shape};
@@ -27,6 +29,8 @@ struct HullCache {
 pub(super) fn decompose_meshes(campaign: &mut Campaign, faults: &mut Diagnostics) {
     let mut cache = HullCache { folder: campaign.history.join(FOLDER), known: BTreeMap::new() };
     let used = campaign.used_models();
+    let models = campaign.models.iter().filter(|(name, _)| used.contains(*name)).map(|(_, model)| model.as_ref());
+    cache.fill(models.flat_map(shapes_of).chain(campaign.robot.meshes.values().flatten()));
     for (name, model) in campaign.models.iter_mut().filter(|(name, _)| used.contains(*name)) {
         let moving = 0..model.moving.len();
         decompose_model(name, model, &mut cache, faults);
@@ -35,6 +39,12 @@ pub(super) fn decompose_meshes(campaign: &mut Campaign, faults: &mut Diagnostics
         }
     }
     decompose_with(&mut cache, Arc::make_mut(&mut campaign.robot), faults);
+}
+
+/// The shapes of a model and of its moving parts.
+fn shapes_of(model: &ObjectModel) -> impl Iterator<Item = &Shape> {
+    let moving = model.moving.iter().flat_map(|part| &part.model.parts);
+    model.parts.iter().chain(moving).map(|part| &part.shape)
 }
 
 fn has_mesh(model: &ObjectModel) -> bool {
@@ -63,6 +73,7 @@ pub fn proposed_robot(
 ) -> Result<world::Proposal, Diagnostics> {
     let mut cache = HullCache { folder: history.join(FOLDER), known: BTreeMap::new() };
     let mut faults = Diagnostics::new();
+    cache.fill(robot.meshes.values().flatten());
     decompose_with(&mut cache, &mut robot, &mut faults);
     faults.or(())?;
     Ok(world::propose(&robot, hand).map_err(|error| error.diagnostic())?)
@@ -107,6 +118,17 @@ fn solid_parts(model: &ObjectModel, cache: &mut HullCache) -> Result<Vec<Part>, 
 }
 
 impl HullCache {
+    /// Decomposes meshes side by side: a robot has dozens, and some take seconds.
+    fn fill<'a>(&mut self, shapes: impl Iterator<Item = &'a Shape>) {
+        let meshes = shapes.filter_map(|shape| match shape {
+            Shape::Mesh { mesh } => Some((world::decomposition_key(mesh), mesh)),
+            _ => None,
+        });
+        let meshes: BTreeMap<String, &Mesh> = meshes.collect();
+        let solids: Vec<_> = meshes.par_iter().map(|(key, mesh)| self.cached_or_new(key, mesh)).collect();
+        self.known.extend(meshes.into_keys().zip(solids));
+    }
+
     /// Returns the convex hulls of a mesh, or any other shape unchanged.
     fn solids(&mut self, shape: &Shape) -> Result<Vec<Shape>, String> {
         let Shape::Mesh { mesh } = shape else { return Ok(vec![shape.clone()]) };

@@ -15,6 +15,10 @@ const PARALLEL: f64 = 1e-12;
 /// Points this near to a plane are in it. Unit: metres. More than the rounding error.
 const PLANE_M: f64 = 1e-12;
 
+/// A whole polytope has about half as many faces after the last step. If there are more, rounding errors have torn it, and
+/// their number doubles with each step.
+const MOST_FACES: usize = 4 * N_STEPS;
+
 /// A triangle of the polytope.
 struct Face {
     corners: [usize; 3],
@@ -94,6 +98,9 @@ pub(super) fn depth(solids: &Solids<'_>, simplex: &Simplex) -> Option<Separation
         // The edges of the hole belong to one face that was seen.
         let rim = edges.iter().filter(|[from, to]| !edges.contains(&[*to, *from]));
         faces.extend(rim.filter_map(|[from, to]| Face::new(&all, [*from, *to, new])));
+        if faces.len() > MOST_FACES {
+            return None;
+        }
     }
     None
 }

@@ -202,4 +202,52 @@ mod tests {
         }
         assert!(apart > 50 && deep > 50 && wrong > 0, "{apart} apart, {deep} deep, {wrong} wrong in the library");
     }
+
+    /// Corners of a piece of a finger of the Z1 in the package `example-robot-data`. Unit: metres.
+    const FINGER: [[f32; 3]; 28] = [
+        [0.058619052, 0.029, -0.007873807],
+        [0.058619052, 0.028, 0.031029738],
+        [0.068457074, 0.029, -0.007873807],
+        [0.0805177, 0.028, -0.007873807],
+        [0.08053078, -0.019952381, -0.007873807],
+        [0.078463405, -0.019952381, -0.007873807],
+        [0.058619052, -0.016, -0.007873807],
+        [0.058619052, -0.019952381, 0.028934136],
+        [0.07580366, 0.028, 0.018379707],
+        [0.077632405, -0.019952381, 0.015376182],
+        [0.07860654, 0.028, 0.013405322],
+        [0.0707983, 0.028, 0.024105689],
+        [0.06624331, 0.028, 0.02754847],
+        [0.07107899, -0.019952381, 0.02384857],
+        [0.08014518, -0.019952381, 0.0092840865],
+        [0.06290158, 0.028, 0.029376797],
+        [0.062278073, -0.019952381, 0.029663078],
+        [0.07621755, -0.019952381, 0.017759578],
+        [0.08121735, 0.028, 0.004276989],
+        [0.080823205, -0.019952381, 0.0065965657],
+        [0.081499696, -0.019952381, 4.140804e-5],
+        [0.059702437, -0.019952381, 0.030687068],
+        [0.058619052, -0.019952381, 0.031041319],
+        [0.081076786, -0.019952381, -0.005216082],
+        [0.08146865, 0.028, -0.0014271765],
+        [0.07997167, 0.028, 0.009849146],
+        [0.058619052, -0.015471666, 0.031041827],
+        [0.08107865, 0.028, -0.0052163517],
+    ];
+
+    /// Many corners of the differences of a cylinder and this finger are in one plane, where rounding errors tear the polytope.
+    /// Without a limit, the number of its faces doubles with each step, and the search takes seconds.
+    #[test]
+    fn a_search_with_a_torn_polytope_ends() {
+        let points = FINGER.map(|[x, y, z]| parry3d::math::Vector::new(x, y, z));
+        let hull = ConvexPolyhedron::from_convex_hull(&points).expect("a finger is not flat");
+        let cylinder = Cylinder::new(0.008, 0.033);
+        let pose = Pose {
+            rotation: parry3d::math::Rotation::from_xyzw(1.2443363e-10, -0.41314983, -2.7427602e-10, 0.91066307),
+            translation: parry3d::math::Vector::new(0.08137189, 9.995261e-11, 0.034244776),
+            ..Pose::IDENTITY
+        };
+        let found = Solids::new(&pose, &hull, &cylinder).separation(Vector3::x(), 0.5);
+        assert!(matches!(found, Found::Nothing));
+    }
 }
