@@ -8,6 +8,7 @@ use super::body::chain;
 use super::cup;
 use super::frames::{Pair, Root, likely};
 use super::hands::groups;
+use super::row::{amid, beside};
 use super::seat;
 use super::stated::{NoHand, Stated};
 use crate::Gripper;
@@ -26,8 +27,6 @@ const LEAST_CHANGE_M: f64 = 0.008;
 const CARRIER: f64 = 0.3;
 /// Weight of a joint whose largest effort is 0.
 const WITHOUT_MOTOR: f64 = 0.2;
-/// Weight of a finger at the end of a row that closes together.
-const AT_THE_END: f64 = 0.7;
 /// Weight of two links whose volumes differ by more than the share [`UNLIKE`].
 const UNALIKE: f64 = 0.7;
 const UNLIKE: f64 = 0.1;
@@ -37,9 +36,6 @@ const FROM_PALM: f64 = 0.9;
 const FEWEST_ARM_JOINTS: usize = 4;
 /// Openings wider than this are worth no more. Unit: metres.
 const WIDE_M: f64 = 0.12;
-
-/// Limits of joints that differ by less than this are the same. Units: metres or radians.
-const LIMIT_SLACK: f64 = 1e-3;
 
 /// How much of its widest opening a gripper must keep where its frame is moved to.
 const LEAST_SHARE: f64 = 0.8;
@@ -182,7 +178,8 @@ fn measure(
             for (weight, frame) in all {
                 let Some(found) = rate(bare, model, palm, links, &named, frame) else { continue };
                 let weight = weight * powered(model, &named, joints) * tips(model, links, joints);
-                let weight = weight * amid(model, &found, &beside(model, &found, joints, palm));
+                let weight =
+                    weight * amid(model, &found.named, &beside(model, (found.links, &found.named), joints, palm));
                 let found = Found { score: found.score * weight, ..found };
                 if best.as_ref().is_none_or(|best| found.score > best.score + 1e-9) {
                     best = Some(found);
@@ -203,8 +200,9 @@ fn measure(
     let mut profile = bare.clone();
     let mut notes = BTreeMap::new();
     if stated.joints.is_empty() {
-        let named = alike(model, found.links)
-            .unwrap_or_else(|| [found.named.clone(), beside(model, &found, joints, palm)].concat());
+        let named = alike(model, found.links).unwrap_or_else(|| {
+            [found.named.clone(), beside(model, (found.links, &found.named), joints, palm)].concat()
+        });
         let own = |idx: &usize| model.own_leaders.get(idx).copied().unwrap_or(*idx);
         profile.finger_joints = named.iter().map(|idx| model.joints[own(idx)].name.clone()).collect();
         notes.insert("finger_joints", "their names, and the links that they move".to_owned());
@@ -248,36 +246,6 @@ fn alike(model: &RobotModel, links: [usize; 2]) -> Option<Vec<usize>> {
     };
     let is_alike = slides(left) && slides(right) && (follows(left, right) || follows(right, left));
     is_alike.then(|| vec![left, right])
-}
-
-/// The joints that move further fingers: they are on the same link as one of the named joints, with the same limits, and move
-/// neither of the two fingers.
-fn beside(model: &RobotModel, found: &Found, joints: &BTreeSet<usize>, palm: usize) -> Vec<usize> {
-    let inner = chain(model, palm);
-    let in_use: BTreeSet<usize> =
-        found.links.iter().flat_map(|link| chain(model, *link)).map(|joint| leader(model, joint)).collect();
-    let is_like = |joint: usize, other: usize| {
-        let (a, b) = (&model.joints[joint], &model.joints[other]);
-        a.parent == b.parent
-            && a.kind == b.kind
-            && (a.lower - b.lower).abs() + (a.upper - b.upper).abs() < LIMIT_SLACK
-            && (a.effort > 0.0) == (b.effort > 0.0)
-    };
-    let is_further = |joint: &usize| {
-        let other = leader(model, *joint) == *joint && !in_use.contains(joint) && !inner.contains(joint);
-        other && found.named.iter().any(|named| is_like(*joint, *named))
-    };
-    joints.iter().copied().filter(is_further).collect()
-}
-
-/// Weight of a finger's place among those that close with it: in their middle, an object does not tip out of the hand.
-fn amid(model: &RobotModel, found: &Found, further: &[usize]) -> f64 {
-    let knuckle = |joint: usize| model.joints[joint].origin.translation.vector;
-    let is_amid = |named: &usize| {
-        let ways: Vec<_> = further.iter().map(|joint| knuckle(*joint) - knuckle(*named)).collect();
-        ways.iter().any(|way| ways.iter().any(|other| way.dot(other) < 0.0))
-    };
-    if further.len() < 2 || found.named.iter().any(is_amid) { 1.0 } else { AT_THE_END }
 }
 
 /// The frame with the numbers that a profile has.

@@ -11,6 +11,7 @@ mod fingers;
 mod frames;
 mod hands;
 mod postures;
+mod row;
 mod seat;
 mod short_arm;
 mod stated;

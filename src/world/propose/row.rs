@@ -1,0 +1,47 @@
+//! Further fingers in a row with one of the two that face each other, which close together with it.
+
+use std::collections::BTreeSet;
+
+use super::body::chain;
+use super::fingers::leader;
+use crate::description::RobotModel;
+
+/// Limits of joints that differ by less than this are the same. Units: metres or radians.
+const LIMIT_SLACK: f64 = 1e-3;
+/// Weight of a finger at the end of a row that closes together.
+const AT_THE_END: f64 = 0.7;
+
+/// The joints that move further fingers: they are on the same link as one of the named joints, with the same limits, and move
+/// neither of the two fingers.
+pub(super) fn beside(
+    model: &RobotModel,
+    (links, named): ([usize; 2], &[usize]),
+    joints: &BTreeSet<usize>,
+    palm: usize,
+) -> Vec<usize> {
+    let inner = chain(model, palm);
+    let in_use: BTreeSet<usize> =
+        links.iter().flat_map(|link| chain(model, *link)).map(|joint| leader(model, joint)).collect();
+    let is_like = |joint: usize, other: usize| {
+        let (a, b) = (&model.joints[joint], &model.joints[other]);
+        a.parent == b.parent
+            && a.kind == b.kind
+            && (a.lower - b.lower).abs() + (a.upper - b.upper).abs() < LIMIT_SLACK
+            && (a.effort > 0.0) == (b.effort > 0.0)
+    };
+    let is_further = |joint: &usize| {
+        let other = leader(model, *joint) == *joint && !in_use.contains(joint) && !inner.contains(joint);
+        other && named.iter().any(|named| is_like(*joint, *named))
+    };
+    joints.iter().copied().filter(is_further).collect()
+}
+
+/// Weight of a finger's place among those that close with it: in their middle, an object does not tip out of the hand.
+pub(super) fn amid(model: &RobotModel, named: &[usize], further: &[usize]) -> f64 {
+    let knuckle = |joint: usize| model.joints[joint].origin.translation.vector;
+    let is_amid = |named: &usize| {
+        let ways: Vec<_> = further.iter().map(|joint| knuckle(*joint) - knuckle(*named)).collect();
+        ways.iter().any(|way| ways.iter().any(|other| way.dot(other) < 0.0))
+    };
+    if further.len() < 2 || named.iter().any(is_amid) { 1.0 } else { AT_THE_END }
+}
