@@ -369,7 +369,6 @@ fn a_thumb_is_parked_opposite_the_fingers() {
     assert!(all.iter().all(|name| line("finger_joints").contains(name)), "{proposed}");
     let facing = ["finger_middle_link", "thumb_bend_link"];
     assert!(facing.iter().all(|name| line("finger_links").contains(name)), "{proposed}");
-    // Keys before the first table.
     let profile: Vec<&str> = proposed.lines().filter(|line| !line.starts_with("urdf")).collect();
     let (said, passed) = check_and_run(folder.path(), &urdf, &profile.join("\n"));
     assert!(passed >= 3, "{passed} of 4 picks passed: {said}");
