@@ -9,7 +9,7 @@ use rapier3d::prelude::{
 };
 
 use crate::World;
-use crate::convert::from_vector;
+use crate::convert::{from_vector, to_real};
 use crate::description::Link;
 use crate::engine::{FLOOR_GROUP, LENGTH_UNIT, Owner};
 use crate::object::Object;
@@ -97,7 +97,7 @@ impl PhysicsHooks for LinkPairs {
 
 /// Distance below which contacts are prepared in a world whose robot has links of many pieces. The default of 2 cm would prepare
 /// hundreds of contacts between its fingers. Unit: metres.
-const PREDICTION_M: f32 = 0.006;
+pub(super) const PREDICTION_M: f64 = 0.006;
 /// In a tick that begins with a faster object or link, contacts are prepared at the engine's own distance: it would enter
 /// others before its contact is found. Unit: m/s.
 const FAST_M_S: f64 = 1.0;
@@ -113,7 +113,7 @@ impl World {
         let is_link_fast = links.map(|body| from_vector(body.linvel()).norm()).any(|speed| speed > FAST_M_S);
         let distance = match is_link_fast || self.objects.iter().any(is_fast) {
             true => IntegrationParameters::default().normalized_prediction_distance / LENGTH_UNIT,
-            false => PREDICTION_M / LENGTH_UNIT,
+            false => to_real(PREDICTION_M) / LENGTH_UNIT,
         };
         self.engine.integration_parameters.normalized_prediction_distance = distance;
     }

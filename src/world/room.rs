@@ -16,6 +16,7 @@ use crate::clearance::gap;
 use crate::convert::from_vector;
 use crate::description::JointKind;
 use crate::kinematics::{GRAVITY, axis_in_world};
+use crate::link_pairs::PREDICTION_M;
 use crate::object::Object;
 use crate::share::Share;
 
@@ -24,8 +25,10 @@ const RANGE_M: f64 = 0.25;
 /// Distance that remains after a free tick: the engine finds contacts before they close, in spite of the errors of its 32-bit
 /// distances. Unit: metres.
 const LEFT_M: f64 = 4e-3;
-/// As [`LEFT_M`], between two links of the robot. Unit: metres.
+/// As [`LEFT_M`], between two links of the robot; the smaller one for links that are hardly further apart from the beginning, as
+/// the base of a thumb and the wrist. Unit: metres.
 const LEFT_OF_LINKS_M: f64 = 1e-3;
+const LEAST_LEFT_OF_LINKS_M: f64 = 1e-4;
 /// Factor on the present and the commanded speeds of joints, because joints overshoot.
 const OVERSHOOT: f64 = 1.25;
 
@@ -74,6 +77,8 @@ pub(super) struct Room {
     pairs: Vec<Option<Measured>>,
     /// The joints that move only the first of each pair, and those that move only the second.
     between: Vec<[Vec<usize>; 2]>,
+    /// The distance that has to remain between each pair. Unit: metres.
+    kept_m: Vec<f64>,
     /// The things that the robot could touch in the last tick.
     pub(super) reach: Reach,
     /// Whether something fast can meet something fixed: the engine then sweeps all fast shapes, which takes long.
@@ -260,20 +265,22 @@ impl World {
         let now = Moment { poses, axes, spans };
         let mut reach = if rest.iter().all(|rests| *rests) { Reach::Nothing } else { Reach::Apart };
         room.rest = rest;
+        room.sweeps = self.fast_objects_meet_fixed(&room.rest);
         for link in 0..n_links {
             if !self.is_clear_of_fixed(room, link, &now) {
+                room.sweeps |= self.links_outrun_contacts(&now);
                 return Reach::All;
             }
             if reach < Reach::All {
                 reach = reach.max(self.reach_of_link(room, link, &now));
             }
         }
-        room.sweeps = self.fast_objects_meet_fixed(&room.rest);
         if reach == Reach::All {
             return reach;
         }
         if room.between.is_empty() {
             room.between = self.link_pairs.iter().map(|(first, second)| self.joints_between(first, second)).collect();
+            room.kept_m = self.link_pairs.iter().map(|(first, second)| self.kept_m(first, second)).collect();
         }
         reach = reach.max(self.reach_between_links(room, &now));
         if reach == Reach::Hand && room.whole_ticks > 0 {
@@ -297,6 +304,14 @@ impl World {
         }
         let measure = || self.gap_of_link(link, &|object| object.fixed, true);
         has_room(&mut room.fixed[link], measure, &ball, (&now.poses[link], self.ahead(link, &ball, now)))
+    }
+
+    /// Returns whether a link can move further in a step than the least distance at which the engine prepares contacts: it would
+    /// pass through something thin without a sweep.
+    fn links_outrun_contacts(&self, now: &Moment) -> bool {
+        let most = PREDICTION_M * f64::from(self.steps_per_tick);
+        let links = self.robot.balls.iter().enumerate();
+        links.filter_map(|(link, ball)| Some(self.ahead(link, ball.as_ref()?, now))).any(|ahead| ahead > most)
     }
 
     fn reach_of_link(&self, room: &mut Room, link: usize, now: &Moment) -> Reach {
@@ -372,23 +387,29 @@ impl World {
         })
     }
 
+    /// Returns the distance that has to remain between two links: half of that at the beginning, if they are near. Unit: metres.
+    fn kept_m(&self, first: usize, second: usize) -> f64 {
+        (self.gap_of_links(first, second) / 2.0).clamp(LEAST_LEFT_OF_LINKS_M, LEFT_OF_LINKS_M)
+    }
+
     fn reach_between_links(&self, room: &mut Room, now: &Moment) -> Reach {
         room.pieces_meet = false;
         if self.link_pairs.pass {
             return Reach::Nothing;
         }
         let mut reach = Reach::Nothing;
-        for (((first, second), known), joints) in self.link_pairs.iter().zip(&mut room.pairs).zip(&room.between) {
+        let pairs = self.link_pairs.iter().zip(&mut room.pairs).zip(&room.between).zip(&room.kept_m);
+        for ((((first, second), known), joints), kept_m) in pairs {
             let (Some(one), Some(other)) = (self.robot.balls[first], self.robot.balls[second]) else { continue };
             let pose = now.poses[first].inverse() * now.poses[second];
             let mut ahead = 0.0;
             for (link, ball, joints) in [(first, &one, &joints[0]), (second, &other, &joints[1])] {
                 ahead += joints.iter().map(|joint| self.way(*joint, link, ball, now)).sum::<f64>();
             }
-            if known.is_none_or(|known| known.left(&pose, &other) - ahead < LEFT_OF_LINKS_M) {
+            if known.is_none_or(|known| known.left(&pose, &other) - ahead < *kept_m) {
                 *known = Some(Measured { gap_m: self.gap_of_links(first, second), pose });
             }
-            if known.is_some_and(|known| known.left(&pose, &other) - ahead >= LEFT_OF_LINKS_M) {
+            if known.is_some_and(|known| known.left(&pose, &other) - ahead >= *kept_m) {
                 continue;
             }
             let in_hand = self.robot.hand.as_ref().is_some_and(|hand| hand.has(first) && hand.has(second));

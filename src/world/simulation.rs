@@ -81,7 +81,7 @@ pub struct World {
     pub(super) has_map: bool,
     plan: FloorPlan,
     n_steps: u64,
-    steps_per_tick: u32,
+    pub(super) steps_per_tick: u32,
     steps_per_second: u32,
     /// The engine's substeps in each step of the whole robot.
     pub(super) substeps: usize,
