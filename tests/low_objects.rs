@@ -62,6 +62,25 @@ fn a_bowl_is_taken_at_its_rim() {
     }
 }
 
+/// The profile of the shipped arm with fingers that open less. Unit: metres.
+fn narrow(folder: &Path, opening_m: &str) {
+    let robots = folder.join("models/robots");
+    let profile = std::fs::read_to_string(robots.join("fixed_arm.toml")).unwrap();
+    let opens = format!("max_opening_m = {opening_m}");
+    std::fs::write(robots.join("narrow.toml"), profile.replace("max_opening_m = 0.14", &opens)).unwrap();
+}
+
+/// The can is 6.6 cm across: each finger passes it at a distance of 2 mm.
+#[test]
+fn a_can_that_hardly_fits_between_the_fingers_is_picked() {
+    let project = project();
+    narrow(project.path(), "0.07");
+    let (said, passed) = run(project.path(), ("narrow", "coffee_table", "can"), "4");
+    assert_eq!(passed, 4, "{said}");
+    let checked = check(project.path(), &configuration("narrow", "coffee_table", "can"), &[]);
+    assert!(!checked.contains("S070"), "{checked}");
+}
+
 #[test]
 fn a_failed_plan_names_the_obstacle_or_the_distance() {
     let project = project();
@@ -82,13 +101,10 @@ fn check(folder: &Path, text: &str, arguments: &[&str]) -> String {
 #[test]
 fn check_predicts_the_limits_of_gripper_arm_and_camera() {
     let project = project();
-    let robots = project.path().join("models/robots");
-    let profile = std::fs::read_to_string(robots.join("fixed_arm.toml")).unwrap();
-    std::fs::write(robots.join("narrow.toml"), profile.replace("max_opening_m = 0.14", "max_opening_m = 0.07"))
-        .unwrap();
+    narrow(project.path(), "0.065");
     let said = check(project.path(), &configuration("narrow", "coffee_table", "can"), &[]);
-    assert!(said.contains("S070") && said.contains("6.6 cm × 6.6 cm across and needs 7.6 cm"), "{said}");
-    assert!(said.contains("open 7.0 cm") && said.contains("c.toml:17"), "{said}");
+    assert!(said.contains("S070") && said.contains("6.6 cm × 6.6 cm across and needs 6.9 cm"), "{said}");
+    assert!(said.contains("open 6.5 cm") && said.contains("c.toml:17"), "{said}");
 
     let said = check(project.path(), &configuration("mobile_manipulator", "high_shelf", "cube"), &[]);
     assert!(said.contains("S071") && said.contains("of 3 places on `high_shelf`"), "{said}");

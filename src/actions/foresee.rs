@@ -5,7 +5,7 @@
 use nalgebra::{Point3, Vector3};
 
 use crate::cut::Cut;
-use crate::grasp::LEAST_ROOM_M;
+use crate::grasp::TIGHT_ROOM_M;
 use crate::memory::Memory;
 use crate::operator::Operator;
 use crate::perceive::towards;
@@ -37,9 +37,9 @@ pub struct ForeseenView {
     pub off_rad: [f64; 2],
 }
 
-/// Width that the gripper needs for an object of this width. Unit: metres.
+/// Least width that the gripper needs for an object of this width. Unit: metres.
 pub fn needed_opening_m(width_m: f64) -> f64 {
-    width_m + LEAST_ROOM_M
+    width_m + TIGHT_ROOM_M
 }
 
 /// Whether a gripper that opens this wide takes a vessel at its rim. Unit: metres.

@@ -38,8 +38,10 @@ const SIDE_HEIGHT_M: (f64, f64) = (0.055, 0.11);
 pub(crate) const TOP_DEPTH_M: f64 = 0.03;
 /// Lowest position of the grasp link from above: the fingers reach 2.5 cm further. Unit: metres.
 const TOP_LOWEST_M: f64 = 0.0275;
-/// Total room that the widest opening must leave beside an object, both sides together. Unit: metres.
-pub(crate) const LEAST_ROOM_M: f64 = 0.01;
+/// Total room that the widest opening leaves beside an object, both sides together. Unit: metres. The smaller one is for objects
+/// that are too wide for the other in every direction: an error of the percept by half of it lets a finger come down on them.
+const LEAST_ROOM_M: f64 = 0.01;
+pub(crate) const TIGHT_ROOM_M: f64 = 0.0025;
 /// Room that a jaw that moves against a fixed one leaves beside an object on its way there. Unit: metres.
 const JAW_ROOM_M: f64 = 0.045;
 /// Objects whose sides differ by less are treated as round. Unit: metres. Perceived sizes are off by some millimetres.
@@ -65,6 +67,18 @@ pub(crate) fn opening_before_m(thing: &Sighting, robot: &Operator<'_>) -> f64 {
         true => most_m.min(width.max(depth) + JAW_ROOM_M),
         false => most_m,
     }
+}
+
+/// The least room that a gripper with this opening leaves beside an object. Unit: metres.
+pub(crate) fn room_m(thing: &Sighting, max_opening_m: f64) -> f64 {
+    if is_tight(thing, max_opening_m) { TIGHT_ROOM_M } else { LEAST_ROOM_M }
+}
+
+/// Whether an object is nearly as wide in every direction as the gripper opens, or wider.
+pub(crate) fn is_tight(thing: &Sighting, max_opening_m: f64) -> bool {
+    let [width, depth, _] = thing.size_m;
+    let narrowest_m = if is_round(thing) { width.max(depth) } else { width.min(depth) };
+    narrowest_m + LEAST_ROOM_M > max_opening_m
 }
 
 /// All usual grasps of an object for a gripper with this opening. Empty if the object is too wide in every direction.
@@ -120,7 +134,8 @@ pub fn centred(grasps: Vec<Grasp>, thing: &Sighting, robot: &Operator<'_>) -> Ve
 
 /// The grasps for which the gripper opens wide enough.
 fn fitting(thing: &Sighting, max_opening_m: f64, ways: impl Iterator<Item = (f64, Grasp)>) -> Vec<Grasp> {
-    ways.filter(|(across, _)| width_across(thing, *across) + LEAST_ROOM_M <= max_opening_m)
+    let room_m = room_m(thing, max_opening_m);
+    ways.filter(|(across, _)| width_across(thing, *across) + room_m <= max_opening_m)
         .map(|(_, grasp)| Grasp { opening_m: max_opening_m, ..grasp })
         .collect()
 }
@@ -211,6 +226,17 @@ mod tests {
         assert_eq!(of([0.08, 0.08, 0.085], Approach::Top), (48, 0.0));
         // Too flat for a level hand.
         assert_eq!(of([0.08, 0.08, 0.02], Approach::Side).0, 0);
+    }
+
+    #[test]
+    fn an_object_that_hardly_fits_is_grasped_with_less_room() {
+        let (can, opening_m) = (thing([0.066, 0.066, 0.12]), 0.069);
+        assert_eq!(grasps(&can, opening_m).len(), 24);
+        assert_eq!(all_grasps(&can, opening_m).len(), 72);
+        assert_eq!(grasps(&can, 0.068), []);
+        // Wider across its corners, it is grasped only where the usual room is left.
+        let block = thing([0.05, 0.075, 0.12]);
+        assert!(grasps(&block, 0.069).len() < grasps(&block, 0.085).len());
     }
 
     #[test]

@@ -102,7 +102,7 @@ pub(super) fn planned(seen: &Sighting, others: &[Sighting], robot: &mut Operator
 
 /// The rim of an upright vessel that is too wide for the hand, as the robot knows its kind.
 fn rim_of(seen: &Sighting, robot: &Operator<'_>) -> Option<Rim> {
-    let is_too_wide = grasp::grasps(seen, robot.profile().max_opening_m).is_empty();
+    let is_too_wide = grasp::is_tight(seen, robot.profile().max_opening_m);
     let name = robot.kind_of(&seen.id).filter(|_| is_too_wide && !robot.has_cup())?.name;
     let rim = robot.known_kinds().iter().find(|kind| kind.name == name)?.rim;
     rim.filter(|rim| (seen.size_m[2] - rim.top_m).abs() < UPRIGHT_M)

@@ -5,9 +5,7 @@ use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, TAU};
 
 use nalgebra::{Isometry3, Point3, Translation3};
 
-use crate::grasp::{
-    Approach, Grasp, LEAST_ROOM_M, TOP_DEPTH_M, centred, hand, is_round, opening_before_m, width_across,
-};
+use crate::grasp::{Approach, Grasp, TOP_DEPTH_M, centred, hand, is_round, opening_before_m, room_m, width_across};
 use crate::motion::moved_links;
 use crate::operator::Operator;
 use crate::plan::FURNITURE_CLEAR_M;
@@ -116,10 +114,10 @@ fn all(thing: &Sighting, hand: &Hand, robot: &Operator<'_>, (pitches, turns): (&
     let along = thing.pose.yaw();
     let only = robot.kinematics().only_pitch(&robot.layout().arm, robot.commanded());
     let pitches = only.as_ref().map_or(pitches, std::slice::from_ref);
-    let mut found = Vec::new();
+    let (mut found, opening_m) = (Vec::new(), opening_before_m(thing, robot));
     for idx in 0..N_HEADINGS {
         let heading = along + TAU * f64::from(idx) / f64::from(N_HEADINGS);
-        if width_across(thing, heading) + LEAST_ROOM_M > opening_before_m(thing, robot) {
+        if width_across(thing, heading) + room_m(thing, opening_m) > opening_m {
             continue;
         }
         for pitch in pitches {

@@ -167,7 +167,7 @@ const CODES_S: &[Code] = &[
     code(
         "S070",
         "an object is too wide for the gripper, or has no flat place for its suction cup",
-        "its narrower side and a room of 1.0 cm are wider than `max_opening_m` and it has no rim to be taken at, or its \
+        "its narrower side and a room of 2.5 mm are wider than `max_opening_m` and it has no rim to be taken at, or its \
          top and sides are curved, hollow or narrower than the cup",
         "name a narrower or flatter object, or a robot whose gripper opens wider or whose cup is smaller",
     ),
