@@ -53,6 +53,7 @@ fn robot() -> Arc<RobotProfile> {
         head_joints: Vec::new(),
         other_joints: Vec::new(),
         parked: Vec::new(),
+        no_collision_links: Vec::new(),
         grasp_link: String::new(),
         grasp_turned_rad: [0.0; 3],
         camera_turned_rad: [0.0; 3],

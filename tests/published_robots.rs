@@ -378,6 +378,30 @@ fn a_thumb_is_parked_opposite_the_fingers() {
     assert!(passed <= 1, "{passed} of 4 picks passed with a thumb that closes along the row");
 }
 
+/// The Stretch 4 marks the middle of its grasp with a box of 5 mm that collides.
+#[test]
+fn a_marker_between_the_fingers_is_left_out() {
+    let folder = tempfile::tempdir().unwrap();
+    let marker =
+        "<collision><origin xyz=\"0.022 0 0\"/><geometry><box size=\"0.005 0.005 0.005\"/></geometry></collision>";
+    let urdf =
+        fixed_arm().replace("<link name=\"grasp_link\"/>", &format!("<link name=\"grasp_link\">{marker}</link>"));
+    assert!(urdf.contains(marker));
+    std::fs::write(folder.path().join("robot.urdf"), &urdf).unwrap();
+    let made = actcheck(folder.path(), &["new", "robot", "robot.urdf", "--out", "proposed.toml"]);
+    assert!(made.status.success(), "{}", stderr(&made));
+    let proposed = std::fs::read_to_string(folder.path().join("proposed.toml")).unwrap();
+    assert!(proposed.contains("held.\nno_collision_links = [\"grasp_link\"]\n"), "{proposed}");
+    let profile: Vec<&str> = proposed.lines().filter(|line| !line.starts_with("urdf")).collect();
+    let (said, passed) = check_and_run(folder.path(), &urdf, &profile.join("\n"));
+    assert!(passed >= 3 && !said.contains("S076"), "{passed} of 4 picks passed: {said}");
+    std::fs::remove_dir_all(folder.path().join("h")).unwrap();
+    let with_marker = profile.iter().filter(|line| !line.starts_with("no_collision")).copied().collect::<Vec<_>>();
+    let (said, passed) = check_and_run(folder.path(), &urdf, &with_marker.join("\n"));
+    assert!(passed <= 1, "{passed} of 4 picks passed with a marker between the fingers");
+    assert!(said.contains("S076") && said.contains("no_collision_links = [\"grasp_link\"]"), "{said}");
+}
+
 /// The file of a gripper alone is refused, not proposed as a robot.
 #[test]
 fn a_hand_without_an_arm_is_refused() {

@@ -24,7 +24,8 @@ const IN_VIEW: f64 = 0.5;
 impl Env {
     /// Predicts which objects and surfaces the robot can't handle, as warnings with numbers: the gripper is too narrow
     /// or its cup does not seal (S070), objects are out of reach (S071) or too heavy (S072), the camera does not see a
-    /// surface (S073), the arm's motors can't hold its own weight (S074), or efforts are unknown (S075).
+    /// surface (S073), the arm's motors can't hold its own weight (S074), efforts are unknown (S075), or
+    /// a shape is between the fingers (S076).
     pub fn forecast(&self) -> Diagnostics {
         let mut found = Diagnostics::new();
         let campaign = &self.campaign;
@@ -32,6 +33,7 @@ impl Env {
             return found;
         }
         found.extend(self.unknown_efforts().into_iter().chain(self.unknown_speeds()).chain(self.too_weak()).collect());
+        found.extend(self.obstructed().into_iter().collect());
         let scenes = self.nominal_scenes();
         if let Some(test) = self.test_with("PerceivePlane") {
             self.foresee_views(&scenes, test, &mut found);
@@ -91,6 +93,24 @@ impl Env {
 
     fn draw(&self, values: &BTreeMap<ChoiceName, Vec<ChoiceValue>>, test: usize) -> Option<Scene> {
         scenario::draw(&self.space, test, &mut Choices::named(values)).ok()
+    }
+
+    /// S076 if a shape floats between the fingers.
+    fn obstructed(&self) -> Option<Diagnostic> {
+        let robot = &self.campaign.robot;
+        if robot.suction.is_some() {
+            return None;
+        }
+        let links = world::shapes_between_fingers(robot).ok().filter(|links| !links.is_empty())?;
+        let names = links.join("`, `");
+        let message = format!(
+            "the shape of `{names}` floats between the fingers of {}: it keeps every object out of the hand",
+            robot.name,
+        );
+        let quoted = links.iter().map(|link| format!("\"{link}\"")).collect::<Vec<_>>().join(", ");
+        let help =
+            format!("if it only marks a place, write `no_collision_links = [{quoted}]` into the robot's profile");
+        Some(self.campaign.warning("S076", "robot.profile", message).help(help))
     }
 
     /// S075 if joints with a role have no known effort.

@@ -142,6 +142,9 @@ fn stated(profile: &RobotProfile, args: &NewRobotArgs, folder: &Path) -> Vec<(&'
         keys.push(("parked_joints", list(&joints)));
         keys.push(("parked", numbers(&positions)));
     }
+    if !profile.no_collision_links.is_empty() {
+        keys.push(("no_collision_links", list(&profile.no_collision_links)));
+    }
     keys
 }
 

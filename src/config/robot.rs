@@ -220,6 +220,7 @@ pub fn bare(
         head_joints: Vec::new(),
         other_joints: Vec::new(),
         parked: Vec::new(),
+        no_collision_links: Vec::new(),
         grasp_link: none(),
         grasp_turned_rad: [0.0; 3],
         grasp_offset_m: [0.0; 3],
@@ -308,6 +309,8 @@ fn read_table(
         let message = "`parked_joints` needs `parked`: the position of each of them".to_owned();
         table.fault("W011", span, message, "give one position for each joint, in metres or radians");
     }
+    let no_collision_links = table.strings("no_collision_links").unwrap_or_default();
+    roles.links.push(no_collision_links.clone());
     let (grasp_link, camera_link) = (table.string("grasp_link"), table.string("camera_link"));
     // A camera that is fixed in the world is on no link.
     let in_world = camera_link.as_ref().is_some_and(|link| link.value == RobotProfile::MAP);
@@ -358,6 +361,7 @@ fn read_table(
         head_joints: values(head_joints),
         other_joints: values(other_joints),
         parked: values(parked_joints).into_iter().zip(parked).collect(),
+        no_collision_links: values(no_collision_links),
         grasp_link: grasp_link.map(|link| link.value).unwrap_or_default(),
         grasp_turned_rad,
         grasp_offset_m,

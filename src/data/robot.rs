@@ -43,6 +43,8 @@ pub struct RobotProfile {
     /// Positions of rigid joints, such as those of a second arm; all others are at 0 or at the limit nearest to it. Units:
     /// metres or radians.
     pub parked: Vec<(String, f64)>,
+    /// Links whose collision shapes are left out, such as markers between the fingers.
+    pub no_collision_links: Vec<String>,
     /// Link between the fingertips; its x axis points along the fingers, its y axis across them.
     pub grasp_link: String,
     /// Rotation of the grasp frame relative to that link, if the link's axes differ: about its fixed x, y and z axes,

@@ -2,6 +2,7 @@
 //! them.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::ops::Range;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use nalgebra::{Isometry3, Matrix3, Point3, Translation3, Unit, UnitQuaternion, Vector3};
@@ -117,6 +118,8 @@ pub struct RobotModel {
     pub joints: Vec<Joint>,
     /// For every URDF link: the index of the link that it was merged into, and its pose in that link's frame.
     frames: BTreeMap<String, (usize, Isometry3<f64>)>,
+    /// For every URDF link with shapes: the link that it was merged into, and its solids there.
+    shapes: BTreeMap<String, (usize, Range<usize>)>,
     /// Whether a joint lets the whole robot move freely: its legs or wheels are on the floor.
     pub(crate) floats: bool,
     /// The joint that the file lets lead a mechanism, by the joint that leads it here.
@@ -175,6 +178,11 @@ impl RobotModel {
         self.frames.iter().map(|(name, frame)| (name.as_str(), frame))
     }
 
+    /// All URDF links with shapes, each with the link that it was merged into and its solids there, by name.
+    pub(crate) fn shapes_of_links(&self) -> impl Iterator<Item = (&str, usize, Range<usize>)> {
+        self.shapes.iter().map(|(name, (link, solids))| (name.as_str(), *link, solids.clone()))
+    }
+
     /// Returns the index of the link that a URDF link was merged into, and its pose in that link's frame.
     ///
     /// # Errors
@@ -219,6 +227,7 @@ impl<'a> Folding<'a> {
             links: Vec::new(),
             joints: Vec::new(),
             frames: BTreeMap::new(),
+            shapes: BTreeMap::new(),
             floats: robot.joints.iter().any(|joint| joint.joint_type == urdf_rs::JointType::Floating),
             own_leaders: BTreeMap::new(),
             passing: BTreeSet::new(),
@@ -247,7 +256,7 @@ impl<'a> Folding<'a> {
         // Links whose children are still to be visited, with the merged link that they belong to.
         let mut open = vec![(*root, self.out.links.len() - 1, Isometry3::identity())];
         while let Some((name, into, at)) = open.pop() {
-            self.merge(name, into, &at)?;
+            self.merge(name, into, &at, !profile.no_collision_links.iter().any(|without| without == name))?;
             for joint in self.children.get(name).cloned().unwrap_or_default().into_iter().rev() {
                 let origin = at * isometry(&joint.origin);
                 if is_rigid(joint) {
@@ -306,8 +315,8 @@ impl<'a> Folding<'a> {
         }
     }
 
-    /// Merges a URDF link into a movable link: mass, inertia (by the parallel axis theorem) and shapes.
-    fn merge(&mut self, name: &str, into: usize, at: &Isometry3<f64>) -> Result<(), WorldError> {
+    /// Merges a URDF link into a movable link: mass, inertia (by the parallel axis theorem) and shapes, if it has them.
+    fn merge(&mut self, name: &str, into: usize, at: &Isometry3<f64>, has_shapes: bool) -> Result<(), WorldError> {
         self.out.frames.insert(name.to_owned(), (into, *at));
         let Some(source) = self.links.get(name) else {
             let reason = format!("a joint refers to a missing link `{name}`");
@@ -323,7 +332,7 @@ impl<'a> Folding<'a> {
             },
         };
         let mut solids: Vec<Part> = Vec::new();
-        for collision in &source.collision {
+        for collision in source.collision.iter().filter(|_| has_shapes) {
             let pose = Pose::from_isometry(&(at * isometry(&collision.origin)));
             let shapes = self.shapes(&collision.geometry, name)?;
             solids.extend(shapes.into_iter().map(|shape| Part { pose, shape }));
@@ -331,7 +340,11 @@ impl<'a> Folding<'a> {
         let link = &mut self.out.links[into];
         let sum = Mass { mass: link.mass, com: link.com, inertia: link.inertia }.plus(&added);
         (link.mass, link.com, link.inertia) = (sum.mass, sum.com, sum.inertia);
+        let first = link.solids.len();
         link.solids.extend(solids);
+        if link.solids.len() > first {
+            self.out.shapes.insert(name.to_owned(), (into, first..link.solids.len()));
+        }
         Ok(())
     }
 

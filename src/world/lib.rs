@@ -70,7 +70,10 @@ pub use fault::{Fault, Perturbation, Poison};
 pub use fresh::narrow_phase;
 pub use gripper::Gripper;
 pub use kinematics::{GRAVITY, Kinematics};
-pub use layout::{Layout, assumed_efforts, assumed_speeds, balanced_joints, check_robot, grip_limit_n, outward_push};
+pub use layout::{
+    Layout, assumed_efforts, assumed_speeds, balanced_joints, check_robot, grip_limit_n, outward_push,
+    shapes_between_fingers,
+};
 pub use propose::{Proposal, complete, is_incomplete, propose};
 pub use recorder::{Contact, Course, Record, Tracks};
 pub use robot::geometry;

@@ -202,4 +202,10 @@ const CODES_S: &[Code] = &[
         "the URDF limits the effort or the velocity of joints with a role to 0, with which they could not move",
         "write the largest force or torque and the largest speed of each joint into the URDF",
     ),
+    code(
+        "S076",
+        "a collision shape floats between the fingers of the robot",
+        "the URDF marks the middle of the grasp with a small link that collides: objects meet it before the fingers close",
+        "name the link in `no_collision_links` of the robot's profile",
+    ),
 ];

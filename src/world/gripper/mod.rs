@@ -7,6 +7,7 @@
 //!
 //! Never: knows the engine's state, or decides how wide to open.
 
+mod afloat;
 mod coupling;
 mod further;
 mod gap;
@@ -18,6 +19,7 @@ mod table;
 #[cfg(test)]
 mod tests;
 
+pub(crate) use afloat::afloat;
 pub(crate) use gap::{Probe, Surface};
 pub use opening::Gripper;
 pub(crate) use squeeze::outward_push;

@@ -24,6 +24,7 @@ use nalgebra::Isometry3;
 
 use crate::WorldError;
 use crate::description::RobotModel;
+use crate::gripper::afloat;
 use crate::layout::{Named, frame};
 use actcheck_data::RobotProfile;
 
@@ -98,7 +99,14 @@ fn find(partial: &RobotProfile, all: bool, wanted: Option<&str>) -> Result<Propo
     if profile.camera_link.is_empty() {
         (profile.camera_link, profile.camera_turned_rad) = (body.camera_link, body.camera_turned_rad);
     }
-    let (model, grasp) = with_grasp(&profile)?;
+    let (mut model, grasp) = with_grasp(&profile)?;
+    let markers = if all && profile.suction.is_none() { afloat(&model, grasp) } else { Vec::new() };
+    if !markers.is_empty() {
+        let note = "their shapes float between the fingers, where objects are held".to_owned();
+        notes.insert("no_collision_links", note);
+        profile.no_collision_links.extend(markers);
+        model = with_grasp(&profile)?.0;
+    }
     let is_short =
         all && body.is_table_top && short_arm::put_on_surface(&mut profile, &model, grasp, body.lowest_m, &mut notes)?;
     if profile.home.is_empty() {
