@@ -11,7 +11,7 @@ use actcheck_data::bounds;
 /// Greatest distance of a marker from the grasp frame, and its greatest size. Units: metres.
 const NEAR_M: f64 = 0.05;
 const SMALL_M: f64 = 0.03;
-/// What is this far from all other shapes of its body is not attached to it. Unit: metres.
+/// A shape this far from all others of its body is not attached to it. Unit: metres.
 const APART_M: f32 = 0.002;
 
 /// Returns the URDF links whose shapes are small, near the grasp frame, and attached to nothing.
