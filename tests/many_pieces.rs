@@ -89,15 +89,47 @@ fn a_fast_object_does_not_enter_fingers_of_many_pieces_deeper() {
     }
 }
 
-/// A fixed robot on a table touches it with its root all the time. Its arm moves without the engine all the same.
-#[test]
-fn the_root_of_a_fixed_robot_may_touch_the_table() {
+/// The shipped arm with its root on the table.
+fn arm_on_a_table() -> Scene {
     let path = Path::new("models/robots/fixed_arm.toml");
     let profile = actcheck::config::robot::read(&Files::Shipped, path).expect("the shipped robot is right");
     let mut scene = on_table(block([0.06, 0.06, 0.15]), 0.3, 0.5);
     scene.robot.profile = Arc::new(profile);
     (scene.robot.base, scene.robot.root_height_m) = ([0.3, 0.0, 0.0], 0.69);
+    scene
+}
+
+/// A bar on the wrist is 0.9 mm beside the fingers: at rest, they are as good as apart, but the bar stops them when they turn.
+#[test]
+fn links_that_are_hardly_apart_leave_only_their_motion_to_the_engine() {
+    let mut scene = arm_on_a_table();
+    let mut profile = (*scene.robot.profile).clone();
+    let bar = "<collision><origin xyz=\"0.0179 0 0.2\"/><geometry><box size=\"0.01 0.3 0.01\"/></geometry></collision>";
+    let text = profile
+        .urdf
+        .text
+        .replace("<link name=\"wrist_pitch_link\">", &format!("<link name=\"wrist_pitch_link\">{bar}"));
+    assert!(text.contains(bar));
+    profile.urdf = Source::new("bar.urdf", text);
+    scene.robot.profile = Arc::new(profile);
     let mut world = build(&scene).expect("the scene is right");
+    assert!(world.settle().settled);
+    let mut command = world.hold();
+    (0..30).for_each(|_| world.step(&command));
+    let [free, .., whole] = world.ticks_by_reach();
+    assert!(free > 0 && whole == 0, "{:?}", world.ticks_by_reach());
+    let roll = world.layout().arm.last().copied().expect("the arm has joints");
+    let before = world.observe().positions[roll];
+    command.positions[roll] += 0.5;
+    (0..60).for_each(|_| world.step(&command));
+    let turned = world.observe().positions[roll] - before;
+    assert!(turned < 0.1 && world.ticks_by_reach()[3] > 0, "turned by {turned} rad: {:?}", world.ticks_by_reach());
+}
+
+/// A fixed robot on a table touches it with its root all the time. Its arm moves without the engine all the same.
+#[test]
+fn the_root_of_a_fixed_robot_may_touch_the_table() {
+    let mut world = build(&arm_on_a_table()).expect("the scene is right");
     assert!(world.settle().settled);
     let mut command = world.hold();
     let pan = world.layout().arm[0];

@@ -24,8 +24,8 @@ const IN_VIEW: f64 = 0.5;
 impl Env {
     /// Predicts which objects and surfaces the robot can't handle, as warnings with numbers: the gripper is too narrow
     /// or its cup does not seal (S070), objects are out of reach (S071) or too heavy (S072), the camera does not see a
-    /// surface (S073), the arm's motors can't hold its own weight (S074), efforts are unknown (S075), or
-    /// a shape is between the fingers (S076).
+    /// surface (S073), the arm's motors can't hold its own weight (S074), efforts are unknown (S075), or a
+    /// shape is between the fingers (S076).
     pub fn forecast(&self) -> Diagnostics {
         let mut found = Diagnostics::new();
         let campaign = &self.campaign;
