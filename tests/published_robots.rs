@@ -7,15 +7,20 @@ use serde_json::Value;
 
 use crate::support::{actcheck, root, stderr, stdout};
 
-/// Four picks of a lone can.
+/// Four picks of a lone object, whose name is to follow.
 const PICKS: &str = "tests = [[\"Pick\"]]\ntest_count = 4\nseed = 5\n[robot]\nprofile = \"robot.toml\"\n\
-    [pickObject]\nmodel_list = [\"can\"]\n[objectSurface]\nobject_surfaces = [\"coffee_table\"]\n";
+    [objectSurface]\nobject_surfaces = [\"coffee_table\"]\n[pickObject]\nmodel_list = ";
 
-/// The words that `check` prints, and the number of picks that pass.
+/// The words that `check` prints, and the number of picks of a can that pass.
 fn check_and_run(folder: &Path, urdf: &str, profile: &str) -> (String, u64) {
+    check_and_run_with("can", folder, urdf, profile)
+}
+
+/// The words that `check` prints, and the number of picks of an object that pass.
+fn check_and_run_with(object: &str, folder: &Path, urdf: &str, profile: &str) -> (String, u64) {
     std::fs::write(folder.join("robot.urdf"), urdf).unwrap();
     std::fs::write(folder.join("robot.toml"), format!("urdf = \"robot.urdf\"\n{profile}")).unwrap();
-    std::fs::write(folder.join("c.toml"), PICKS).unwrap();
+    std::fs::write(folder.join("c.toml"), format!("{PICKS}[\"{object}\"]\n")).unwrap();
     let checked = actcheck(folder, &["check", "c.toml"]);
     let said = format!("{}{}", stdout(&checked), stderr(&checked)).replace('│', " ");
     let output = actcheck(folder, &["run", "c.toml", "--history", "h", "--format", "json"]);
@@ -189,7 +194,7 @@ fn meshes_with_an_absolute_path_are_found_beside_the_model() {
         ("<box size=\"0.12 0.48 0.02\"/>", "<mesh filename=\"/meshes/top.stl\" scale=\"0.1 0.1 0.1\"/>");
     std::fs::write(folder.path().join("robot.urdf"), fixed_arm().replace(solid, mesh)).unwrap();
     std::fs::write(folder.path().join("robot.toml"), "urdf = \"robot.urdf\"\n").unwrap();
-    std::fs::write(folder.path().join("c.toml"), PICKS).unwrap();
+    std::fs::write(folder.path().join("c.toml"), format!("{PICKS}[\"can\"]\n")).unwrap();
     let checked = actcheck(folder.path(), &["check", "c.toml"]);
     assert!(checked.status.success(), "{}", stderr(&checked));
     std::fs::remove_file(meshes.join("top.stl")).unwrap();
@@ -400,6 +405,45 @@ fn a_marker_between_the_fingers_is_left_out() {
     let (said, passed) = check_and_run(folder.path(), &urdf, &with_marker.join("\n"));
     assert!(passed <= 1, "{passed} of 4 picks passed with a marker between the fingers");
     assert!(said.contains("S076") && said.contains("no_collision_links = [\"grasp_link\"]"), "{said}");
+}
+
+/// The jaw of a Z1 opens by a right angle from a fixed one: halfway between is far from both around an object.
+#[test]
+fn a_hand_with_a_fixed_jaw_points_between_both_jaws() {
+    let folder = tempfile::tempdir().unwrap();
+    let jaw = |y: f64, z: f64, long: f64| {
+        format!(
+            "<collision><origin xyz=\"0 {y} {z}\"/><geometry><box size=\"0.03 0.03 {long}\"/></geometry></collision></link>"
+        )
+    };
+    let urdf = fixed_arm();
+    let (palm, fingers, rest) = (
+        urdf.find("<link name=\"palm_link\">").unwrap(),
+        urdf.find("  <!-- Position: distance of the pad").unwrap(),
+        urdf.find("  <!-- x points along").unwrap(),
+    );
+    let with_fixed_jaw = urdf[palm..fingers].replacen("</link>", &jaw(-0.06, 0.11, 0.1), 1);
+    let moving_jaw =
+        "<link name=\"jaw_link\"><inertial><origin xyz=\"0 0.006 0.05\"/><mass value=\"0.08\"/><inertia ixx=\"7e-5\" \
+        ixy=\"0\" ixz=\"0\" iyy=\"7e-5\" iyz=\"0\" izz=\"5e-6\"/></inertial>"
+            .to_owned()
+            + &jaw(0.015, 0.0475, 0.09)
+            + "<joint name=\"jaw_joint\" type=\"revolute\"><parent link=\"palm_link\"/><child link=\"jaw_link\"/><origin xyz=\"0 -0.043 \
+           0.065\"/><axis xyz=\"-1 0 0\"/><limit lower=\"0\" upper=\"1.2\" effort=\"10\" velocity=\"2\"/></joint>\n";
+    let urdf = format!("{}{with_fixed_jaw}{moving_jaw}{}", &urdf[..palm], &urdf[rest..]);
+    std::fs::write(folder.path().join("robot.urdf"), &urdf).unwrap();
+    let made = actcheck(folder.path(), &["new", "robot", "robot.urdf", "--out", "proposed.toml"]);
+    assert!(made.status.success(), "{}", stderr(&made));
+    let proposed = std::fs::read_to_string(folder.path().join("proposed.toml")).unwrap();
+    let profile: Vec<&str> = proposed.lines().filter(|line| !line.starts_with("urdf")).collect();
+    let profile = profile.join("\n");
+    let (said, passed) = check_and_run_with("salt_shaker", folder.path(), &urdf, &profile);
+    assert!(passed >= 3, "{passed} of 4 picks passed: {said}");
+    std::fs::remove_dir_all(folder.path().join("h")).unwrap();
+    let aside = "\ngrasp_link = \"wrist_roll_link\"\ngrasp_offset_m = [0, -0.0136, 0.1517]\n\
+        grasp_turned_rad = [-1.5708, -1.1218, -1.5708]\n";
+    let (_, passed) = check_and_run_with("salt_shaker", folder.path(), &urdf, &format!("{profile}{aside}"));
+    assert!(passed <= 1, "{passed} of 4 picks passed with a hand that points aside");
 }
 
 /// The file of a gripper alone is refused, not proposed as a robot.

@@ -22,4 +22,4 @@ mod tests;
 pub(crate) use afloat::afloat;
 pub(crate) use gap::{Probe, Surface};
 pub use opening::Gripper;
-pub(crate) use squeeze::outward_push;
+pub(crate) use squeeze::{outward_push, pushes};

@@ -46,6 +46,21 @@ pub(crate) fn outward_push(
     grasp: (usize, Isometry3<f64>),
     diameter_m: f64,
 ) -> Option<f64> {
+    let [left, right] = pushes(model, gripper, links, grasp, diameter_m)?;
+    let across = right.y - left.y;
+    (across > 0.0).then(|| (left.x + right.x) / across)
+}
+
+/// Returns the directions in which the left and the right finger push a cylinder of this diameter when they close on it, as unit
+/// vectors. Frame: that of the grasp. The cylinder is parallel to its z axis. Unit of the diameter: metres. Returns `None` if
+/// they don't touch it from both sides.
+pub(crate) fn pushes(
+    model: &RobotModel,
+    gripper: &Gripper,
+    links: [usize; 2],
+    grasp: (usize, Isometry3<f64>),
+    diameter_m: f64,
+) -> Option<[Vector3<f64>; 2]> {
     let mut probe = Probe::new(model, links, grasp);
     let mut positions = vec![0.0; model.joints.len()];
     gripper.set(&mut positions, gripper.widest_m());
@@ -65,10 +80,7 @@ pub(crate) fn outward_push(
         let middle = f64::midpoint(closed, open);
         if apart(middle) { open = middle } else { closed = middle }
     }
-    let touch = closing.touch(open)?;
-    let [left, right] = touch.pushes;
-    let across = right.y - left.y;
-    (across > 0.0).then(|| (left.x + right.x) / across)
+    closing.touch(open).map(|touch| touch.pushes)
 }
 
 impl Closing<'_> {

@@ -4,12 +4,12 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion};
 
+use super::between::{Between, CENTRED_AT_M, driven};
 use super::body::chain;
 use super::cup;
 use super::frames::{Pair, Root, likely};
 use super::hands::groups;
 use super::row::{amid, beside};
-use super::seat;
 use super::stated::{NoHand, Stated};
 use crate::Gripper;
 use crate::description::{JointKind, RobotModel};
@@ -19,8 +19,6 @@ use actcheck_data::RobotProfile;
 
 /// Most pairs of fingers that are measured.
 const MOST_PAIRS: usize = 40;
-/// Opening at which a single moving finger is centred. Unit: metres. The width of a can.
-const CENTRED_AT_M: f64 = 0.06;
 /// Least change of the gap between two fingers. Unit: metres.
 const LEAST_CHANGE_M: f64 = 0.008;
 /// Weight of a link that carries another one of the gripper: a knuckle rather than a fingertip.
@@ -36,9 +34,6 @@ const FROM_PALM: f64 = 0.9;
 const FEWEST_ARM_JOINTS: usize = 4;
 /// Openings wider than this are worth no more. Unit: metres.
 const WIDE_M: f64 = 0.12;
-
-/// How much of its widest opening a gripper must keep where its frame is moved to.
-const LEAST_SHARE: f64 = 0.8;
 
 /// A gripper, as a profile without other roles.
 pub(super) struct Hand {
@@ -189,12 +184,15 @@ fn measure(
     }
     let mut found = best?;
     let mut deeper = false;
+    let between = Between { bare, model, palm, links: found.links, named: &found.named };
     if stated.grasp.is_none() {
-        centre(bare, model, palm, &mut found);
-        deeper = seat(bare, model, palm, &mut found);
-        found.frame = as_written(&found.frame);
+        let turned = if found.links.contains(&palm) { between.turned(found.frame) } else { found.frame };
+        let centred = between.centred(turned);
+        let seated = between.seated(centred);
+        deeper = seated.is_some();
+        found.frame = as_written(&seated.unwrap_or(centred));
     }
-    if let Some(gripper) = gripper(bare, model, palm, (found.links, &found.named, found.frame)) {
+    if let Some(gripper) = between.gripper(found.frame) {
         found.widest_m = gripper.widest_m();
     }
     let mut profile = bare.clone();
@@ -400,21 +398,6 @@ fn poses(model: &RobotModel, positions: &[f64]) -> Vec<Isometry3<f64>> {
     poses
 }
 
-fn gripper(
-    bare: &RobotProfile,
-    model: &RobotModel,
-    palm: usize,
-    (links, named, frame): ([usize; 2], &[usize], Isometry3<f64>),
-) -> Option<Gripper> {
-    Gripper::find(&driven(bare, model, named), model, links, (palm, frame)).ok()
-}
-
-/// The profile with these joints as those of its fingers.
-fn driven(bare: &RobotProfile, model: &RobotModel, named: &[usize]) -> RobotProfile {
-    let finger_joints = named.iter().map(|idx| model.joints[*idx].name.clone()).collect();
-    RobotProfile { finger_joints, ..bare.clone() }
-}
-
 /// Rates a candidate: how far its fingers open and close, and how far it is from the palm.
 fn rate(
     bare: &RobotProfile,
@@ -447,28 +430,4 @@ fn rate(
     let reach_m = frame.translation.vector.norm().min(0.3);
     let score = (0.3 + flat) * both * closes_m.min(WIDE_M) * (0.05 + reach_m) / (1.0 + 10.0 * off_m);
     Some(Found { score, named: named.to_vec(), links, frame, widest_m })
-}
-
-/// Moves the frame into the middle between the fingers at the width of a can.
-fn centre(bare: &RobotProfile, model: &RobotModel, palm: usize, found: &mut Found) {
-    let of = |frame| gripper(bare, model, palm, (found.links, &found.named, frame));
-    let Some(now) = of(found.frame) else { return };
-    let middle_m = now.middle_m(CENTRED_AT_M.min(now.widest_m()));
-    let moved = found.frame * Translation3::new(0.0, middle_m, 0.0);
-    if let Some(moved_gripper) = of(moved).filter(|moved| moved.widest_m() > LEAST_SHARE * now.widest_m()) {
-        (found.frame, found.widest_m) = (moved, moved_gripper.widest_m());
-    }
-}
-
-/// Moves the frame deeper between fingers that would squeeze a can out. Returns whether it did.
-fn seat(bare: &RobotProfile, model: &RobotModel, palm: usize, found: &mut Found) -> bool {
-    let deeper = |depth_m: f64| found.frame * Translation3::new(-depth_m, 0.0, 0.0);
-    let at = |depth_m: f64| gripper(bare, model, palm, (found.links, &found.named, deeper(depth_m)));
-    let depth_m = seat::deeper_m(model, found.links, (palm, found.frame), at);
-    let moved = deeper(depth_m);
-    let is_wide = at(depth_m).is_some_and(|gripper| gripper.widest_m() > LEAST_SHARE * found.widest_m);
-    if depth_m > 0.0 && is_wide {
-        found.frame = moved;
-    }
-    depth_m > 0.0 && is_wide
 }

@@ -4,6 +4,7 @@
 //! The gripper is measured: of all pairs of fingers and all likely grasp frames, the one that opens and closes best is
 //! proposed. Postures come from inverse kinematics, and have no overlapping links.
 
+mod between;
 mod beyond_body;
 mod body;
 mod cup;
