@@ -89,6 +89,32 @@ fn a_fast_object_does_not_enter_fingers_of_many_pieces_deeper() {
     }
 }
 
+/// Shapes are swept beside such fingers only where something outruns the contacts that are prepared.
+#[test]
+fn only_fast_things_are_swept_beside_fingers_of_many_pieces() {
+    let swept = |height: f64, ticks: u32| {
+        let pose = Pose::upright([2.0, 0.0, height], 0.0);
+        let mut scene = scene(vec![object("plate_1", block([0.2, 0.2, 0.002]), Role::Other, pose, 0.2, 0.5)]);
+        scene.robot.base = [0.0, 0.0, 0.0];
+        let mut world = build(&with_pieces(scene)).expect("the scene is right");
+        let hold = world.hold();
+        let mut n_swept = 0;
+        for _ in 0..ticks {
+            world.step(&hold);
+            n_swept += u32::from(world.swept());
+        }
+        assert_eq!(world.fault(), None);
+        let height = body(&world, "plate_1").pose.position[2];
+        assert!(height > -1e-3, "it is at {height} m");
+        n_swept
+    };
+    // It arrives at 0.3 m/s.
+    assert_eq!(swept(0.006, 30), 0);
+    // It moves 4 cm in each step at last.
+    let n_swept = swept(4.0, 120);
+    assert!((1..60).contains(&n_swept), "swept in {n_swept} ticks");
+}
+
 /// The shipped arm with its root on the table.
 fn arm_on_a_table() -> Scene {
     let path = Path::new("models/robots/fixed_arm.toml");

@@ -40,13 +40,14 @@ const LARGEST_STEP: f64 = 0.3;
 pub fn solve(kinematics: &Kinematics, seed: &[f64], reach: &Reach) -> Option<Vec<f64>> {
     let mut positions = started(kinematics, seed);
     let mut jacobian = vec![Vector6::zeros(); positions.len()];
+    let mobile = mobile(&reach.mobility);
     for _ in 0..MOST_ITERATIONS {
         let grasp = kinematics.fill_jacobian(&positions, &mut jacobian);
         let error = pose_error(&grasp, &reach.target);
         if is_reached(&error) {
             return Some(positions);
         }
-        step(kinematics, &mut positions, &jacobian, &error, &reach.mobility);
+        step(kinematics, &mut positions, &jacobian, &error, &mobile);
         kinematics.follow(&mut positions);
     }
     None
@@ -57,6 +58,7 @@ pub fn solve(kinematics: &Kinematics, seed: &[f64], reach: &Reach) -> Option<Vec
 pub fn solve_turned(kinematics: &Kinematics, seed: &[f64], reach: &Reach, most_rad: f64) -> Option<(Vec<f64>, f64)> {
     let mut positions = started(kinematics, seed);
     let mut jacobian = vec![Vector6::zeros(); positions.len()];
+    let mobile = mobile(&reach.mobility);
     // At first the target pulls the heading along: a joint that turns the hand alone follows.
     let (mut pulls, mut last_turn) = (true, f64::INFINITY);
     let mut progress = Progress::default();
@@ -77,7 +79,7 @@ pub fn solve_turned(kinematics: &Kinematics, seed: &[f64], reach: &Reach, most_r
         let weight = if pulls { HEADING_WEIGHT } else { 0.0 };
         error[5] = (error[5] - turn) * weight;
         jacobian.iter_mut().for_each(|column| column[5] *= weight);
-        step(kinematics, &mut positions, &jacobian, &error, &reach.mobility);
+        step(kinematics, &mut positions, &jacobian, &error, &mobile);
         kinematics.follow(&mut positions);
     }
     None
@@ -128,29 +130,36 @@ fn is_reached(error: &Vector6<f64>) -> bool {
     error.fixed_rows::<3>(0).norm() < REACHED_M && error.fixed_rows::<3>(3).norm() < REACHED_RAD
 }
 
-/// Performs one iteration. Joints that would pass a limit stop at it, and the others compensate.
+/// The joints that may move, with their mobility: few of a robot with many joints.
+fn mobile(mobility: &[f64]) -> Vec<(usize, f64)> {
+    mobility.iter().copied().enumerate().filter(|(_, weight)| *weight != 0.0).collect()
+}
+
+/// Performs one iteration. Joints that would pass a limit stop at it, and the others compensate. `mobile`: the joints that may
+/// move, with their mobility.
 fn step(
     kinematics: &Kinematics,
     positions: &mut [f64],
     jacobian: &[Vector6<f64>],
     error: &Vector6<f64>,
-    mobility: &[f64],
+    mobile: &[(usize, f64)],
 ) {
-    let mut free = mobility.to_vec();
-    for _ in 0..positions.len() {
+    let mut free = mobile.to_vec();
+    loop {
         let change = least_squares(jacobian, error, &free);
         let mut held_one = false;
-        for (idx, joint) in kinematics.joints().iter().enumerate() {
-            let wanted = positions[idx] + change[idx];
+        for ((idx, weight), change) in free.iter_mut().zip(&change) {
+            let (joint, wanted) = (&kinematics.joints()[*idx], positions[*idx] + change);
             let outside = wanted < joint.lower - 1e-9 || wanted > joint.upper + 1e-9;
-            if free[idx] > 0.0 && outside && at_limit(positions[idx], wanted, joint.lower, joint.upper) {
-                free[idx] = 0.0;
+            if *weight > 0.0 && outside && at_limit(positions[*idx], wanted, joint.lower, joint.upper) {
+                *weight = 0.0;
                 held_one = true;
             }
         }
         if !held_one {
-            for (idx, joint) in kinematics.joints().iter().enumerate() {
-                positions[idx] = (positions[idx] + change[idx]).clamp(joint.lower, joint.upper);
+            for ((idx, _), change) in free.iter().zip(&change) {
+                let joint = &kinematics.joints()[*idx];
+                positions[*idx] = (positions[*idx] + change).clamp(joint.lower, joint.upper);
             }
             return;
         }
@@ -163,22 +172,23 @@ fn at_limit(position: f64, wanted: f64, lower: f64, upper: f64) -> bool {
 }
 
 /// Computes W·Jᵀ·(J·W·Jᵀ + λ²·I)⁻¹·e, scaled down so that no component exceeds the largest step. `jacobian`: its columns,
-/// one for each joint.
+/// one for each joint. Returns the changes of the `free` joints.
 ///
 /// Sums are in a fixed order: products of matrices whose size is only known at run time use other instructions, which round
 /// differently, on other processors.
-fn least_squares(jacobian: &[Vector6<f64>], error: &Vector6<f64>, mobility: &[f64]) -> Vec<f64> {
+fn least_squares(jacobian: &[Vector6<f64>], error: &Vector6<f64>, free: &[(usize, f64)]) -> Vec<f64> {
     let mut square = Matrix6::identity() * (DAMPING * DAMPING);
-    for (column, weight) in jacobian.iter().zip(mobility).filter(|(_, weight)| **weight != 0.0) {
+    for (idx, weight) in free.iter().filter(|(_, weight)| *weight != 0.0) {
+        let column = &jacobian[*idx];
         square += column * (column * *weight).transpose();
     }
-    let Some(factors) = square.cholesky() else { return vec![0.0; mobility.len()] };
+    let Some(factors) = square.cholesky() else { return vec![0.0; free.len()] };
     let solved = factors.solve(error);
-    let of_joint = |(column, weight): (&Vector6<f64>, &f64)| match *weight == 0.0 {
+    let of_joint = |(idx, weight): &(usize, f64)| match *weight == 0.0 {
         true => 0.0,
-        false => weight * column.dot(&solved),
+        false => weight * jacobian[*idx].dot(&solved),
     };
-    let mut change: Vec<f64> = jacobian.iter().zip(mobility).map(of_joint).collect();
+    let mut change: Vec<f64> = free.iter().map(of_joint).collect();
     let largest = change.iter().fold(0.0, |largest: f64, change| largest.max(change.abs()));
     if largest > LARGEST_STEP {
         change.iter_mut().for_each(|change| *change *= LARGEST_STEP / largest);

@@ -25,7 +25,7 @@ const OVERLOAD_SHARE: f64 = 0.99;
 /// Links that penetrate each other by no more than this only touch. Unit: metres.
 pub(super) const TOUCH_M: f64 = 1e-4;
 /// Error of positions in 32 bits. Unit: metres.
-const ROUNDING_M: f64 = 1e-4;
+pub(super) const ROUNDING_M: f64 = 1e-4;
 
 /// Measures a [`RobotCourse`].
 #[derive(Default)]

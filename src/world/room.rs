@@ -14,10 +14,11 @@ use rapier3d::prelude::Collider;
 use crate::World;
 use crate::clearance::gap;
 use crate::convert::from_vector;
-use crate::description::JointKind;
+use crate::description::{JointKind, Link};
 use crate::kinematics::{GRAVITY, axis_in_world};
 use crate::link_pairs::PREDICTION_M;
 use crate::object::Object;
+use crate::robot_course::ROUNDING_M;
 use crate::share::Share;
 
 /// Distances are measured up to this. Unit: metres.
@@ -280,7 +281,7 @@ impl World {
         }
         if room.between.is_empty() {
             room.between = self.link_pairs.iter().map(|(first, second)| self.joints_between(first, second)).collect();
-            room.kept_m = self.link_pairs.iter().map(|(first, second)| self.kept_m(first, second)).collect();
+            room.kept_m = self.link_pairs.iter().map(|pair| self.kept_m(pair, &now.poses)).collect();
         }
         reach = reach.max(self.reach_between_links(room, &now));
         if reach == Reach::Hand && room.whole_ticks > 0 {
@@ -306,12 +307,34 @@ impl World {
         has_room(&mut room.fixed[link], measure, &ball, (&now.poses[link], self.ahead(link, &ball, now)))
     }
 
-    /// Returns whether a link can move further in a step than the least distance at which the engine prepares contacts: it would
-    /// pass through something thin without a sweep.
+    /// Returns whether a link is so fast that it could pass through something thin without a sweep.
     fn links_outrun_contacts(&self, now: &Moment) -> bool {
-        let most = PREDICTION_M * f64::from(self.steps_per_tick);
-        let links = self.robot.balls.iter().enumerate();
-        links.filter_map(|(link, ball)| Some(self.ahead(link, ball.as_ref()?, now))).any(|ahead| ahead > most)
+        let speeds = (0..self.robot.bodies.len()).filter_map(|link| self.speed_of_link(link, now));
+        speeds.fold(0.0, f64::max) > self.outruns_m_s()
+    }
+
+    /// Returns the speed at which half of the least distance at which the engine prepares contacts is passed in a step: the rest
+    /// is for the change of speed within the tick. Unit: m/s.
+    fn outruns_m_s(&self) -> f64 {
+        PREDICTION_M / 2.0 * f64::from(self.steps_per_tick) / self.tick_secs()
+    }
+
+    /// Returns a bound of the present speed of a link's points; `None` without shapes. Unit: m/s.
+    fn speed_of_link(&self, link: usize, now: &Moment) -> Option<f64> {
+        let ball = self.robot.balls[link].as_ref()?;
+        let middle = (now.poses[link] * ball.middle).coords;
+        let (mut linear, mut angular) = (Vector3::zeros(), Vector3::zeros());
+        for joint in self.robot.joints_to(link) {
+            let ((axis, point), speed) = (now.axes[joint], self.robot.velocities[joint]);
+            match self.robot.model.joints[joint].kind {
+                JointKind::Prismatic => linear += axis * speed,
+                JointKind::Revolute => {
+                    linear += axis.cross(&(middle - point)) * speed;
+                    angular += axis * speed;
+                }
+            }
+        }
+        Some(linear.norm() + angular.norm() * ball.radius)
     }
 
     fn reach_of_link(&self, room: &mut Room, link: usize, now: &Moment) -> Reach {
@@ -337,9 +360,12 @@ impl World {
     /// Returns whether an object that is not slow can meet the floor or a static object in the tick.
     fn fast_objects_meet_fixed(&self, rest: &[bool]) -> bool {
         let moving = self.objects.iter().zip(rest).filter(|(_, rests)| !**rests);
+        // Sweeps take longest with the many pieces of such links, of which the thinnest decides which link is swept.
+        let has_many_pieces = self.robot.model.links.iter().any(Link::has_many_pieces);
+        let slow_m_s = if has_many_pieces { self.outruns_m_s() } else { SLOW_M_S };
         moving.filter_map(|(object, _)| Some((object, self.speed_of(object)?))).any(|(object, speed)| {
             let needed = self.way_of_object(speed) + LEFT_M;
-            speed > SLOW_M_S
+            speed > slow_m_s
                 && self.boxed(object.body).any(|(_, its_box)| {
                     let fixed = self.objects.iter().filter(|other| other.fixed);
                     f64::from(its_box.mins.z) < needed
@@ -388,8 +414,19 @@ impl World {
     }
 
     /// Returns the distance that has to remain between two links: half of that at the beginning, if they are near. Unit: metres.
-    fn kept_m(&self, first: usize, second: usize) -> f64 {
+    fn kept_m(&self, (first, second): (usize, usize), poses: &[Isometry3<f64>]) -> f64 {
+        let far = |balls_m: f64| balls_m >= 2.0 * LEFT_OF_LINKS_M;
+        if self.gap_of_balls(first, second, &(poses[first].inverse() * poses[second])).is_some_and(far) {
+            return LEFT_OF_LINKS_M;
+        }
         (self.gap_of_links(first, second) / 2.0).clamp(LEAST_LEFT_OF_LINKS_M, LEFT_OF_LINKS_M)
+    }
+
+    /// Returns the distance of the balls around two links, less rounding errors; `None` if one has no shape. `pose` is that of the
+    /// second in the frame of the first. Unit: metres.
+    fn gap_of_balls(&self, first: usize, second: usize, pose: &Isometry3<f64>) -> Option<f64> {
+        let (one, other) = (self.robot.balls[first].as_ref()?, self.robot.balls[second].as_ref()?);
+        Some((pose * other.middle - one.middle).norm() - one.radius - other.radius - ROUNDING_M)
     }
 
     fn reach_between_links(&self, room: &mut Room, now: &Moment) -> Reach {
@@ -405,6 +442,9 @@ impl World {
             let mut ahead = 0.0;
             for (link, ball, joints) in [(first, &one, &joints[0]), (second, &other, &joints[1])] {
                 ahead += joints.iter().map(|joint| self.way(*joint, link, ball, now)).sum::<f64>();
+            }
+            if self.gap_of_balls(first, second, &pose).is_some_and(|balls_m| balls_m - ahead >= *kept_m) {
+                continue;
             }
             if known.is_none_or(|known| known.left(&pose, &other) - ahead < *kept_m) {
                 *known = Some(Measured { gap_m: self.gap_of_links(first, second), pose });
