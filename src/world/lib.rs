@@ -41,6 +41,7 @@ mod perturbation;
 mod propose;
 mod quality;
 mod rays;
+mod reach;
 mod recorder;
 mod resolved;
 mod robot;
@@ -75,9 +76,9 @@ pub use layout::{
     shapes_between_fingers,
 };
 pub use propose::{Proposal, complete, is_incomplete, propose};
+pub use reach::Shortcuts;
 pub use recorder::{Contact, Course, Record, Tracks};
 pub use robot::geometry;
-pub use room::Shortcuts;
 pub use self_contact::SelfContact;
 pub use sense::Sighting;
 pub use settle::Settling;

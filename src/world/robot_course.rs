@@ -15,7 +15,7 @@ use crate::World;
 use crate::contacts::Touch;
 use crate::convert::{from_pose, from_vector};
 use crate::engine::{Owner, SHELL};
-use crate::room::Reach;
+use crate::reach::Reach;
 
 /// Control ticks between two self-collision checks. At 60 ticks per second, that is 20 checks per second: a link at 1
 /// m/s moves 5 cm between them.

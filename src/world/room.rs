@@ -18,8 +18,8 @@ use crate::description::{JointKind, Link};
 use crate::kinematics::{GRAVITY, axis_in_world};
 use crate::link_pairs::PREDICTION_M;
 use crate::object::Object;
+use crate::reach::{Reach, Shortcuts};
 use crate::robot_course::ROUNDING_M;
-use crate::share::Share;
 
 /// Distances are measured up to this. Unit: metres.
 const RANGE_M: f64 = 0.25;
@@ -39,31 +39,6 @@ const MOST_PUSH: f64 = 20.0;
 const SLOW_M_S: f64 = 0.05;
 /// Ticks for which the engine moves the whole robot after a larger push.
 const WHOLE_TICKS: u32 = 30;
-
-/// The things that the robot can touch in a tick.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]
-pub(super) enum Reach {
-    /// Nothing, and everything else is at rest.
-    Nothing,
-    /// Nothing, but objects move.
-    Apart,
-    /// Its hand can touch movable objects.
-    Hand,
-    /// Everything.
-    #[default]
-    All,
-}
-
-impl Reach {
-    /// Returns the part of the robot that the engine moves.
-    pub(super) fn share(self) -> Share {
-        match self {
-            Self::Nothing | Self::Apart => Share::Nothing,
-            Self::Hand => Share::Hand,
-            Self::All => Share::Whole,
-        }
-    }
-}
 
 /// The distances of the robot's links from everything.
 #[derive(Default)]
@@ -92,60 +67,6 @@ pub(super) struct Room {
     pub(super) shortcuts: Shortcuts,
     /// Number of ticks so far with each reach.
     ticks: [u64; 4],
-}
-
-/// The ticks in which less is simulated than the whole robot in the engine, because the rest has no effect.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Shortcuts {
-    /// No engine where the robot touches nothing and everything else is at rest.
-    pub free_motion: bool,
-    /// No robot in the engine where objects move out of its reach.
-    pub robot_apart: bool,
-    /// Only the hand in the engine where only the hand can touch something, and only movable objects.
-    pub hand_alone: bool,
-    /// A closed surface instead of the staves of a hollow object while nothing is at its mouth.
-    pub shells: bool,
-    /// Half of the substeps where the engine moves the hand alone, and where the robot touches nothing.
-    pub few_substeps: bool,
-    /// No sweeps of fast shapes where nothing fast can meet something fixed.
-    pub few_sweeps: bool,
-}
-
-impl Shortcuts {
-    /// All that keep the quality of a grasp.
-    pub const ALL: Self = Self {
-        free_motion: true,
-        robot_apart: true,
-        hand_alone: true,
-        shells: true,
-        few_substeps: true,
-        few_sweeps: true,
-    };
-    /// None: the engine simulates everything in every tick.
-    pub const NONE: Self = Self {
-        free_motion: false,
-        robot_apart: false,
-        hand_alone: false,
-        shells: false,
-        few_substeps: false,
-        few_sweeps: false,
-    };
-
-    /// Returns the reach for which the engine must prepare, given that of the robot.
-    fn limit(self, reach: Reach) -> Reach {
-        match reach {
-            Reach::Nothing if self.free_motion => Reach::Nothing,
-            Reach::Nothing | Reach::Apart if self.robot_apart => Reach::Apart,
-            Reach::Hand if self.hand_alone => Reach::Hand,
-            _ => Reach::All,
-        }
-    }
-}
-
-impl Default for Shortcuts {
-    fn default() -> Self {
-        Self::ALL
-    }
 }
 
 /// A distance, and where the link was when it was measured: in the world, or in the frame of the other link.

@@ -326,8 +326,8 @@ fn axes_along(turn: &Vector3<f64>, shift: &Vector3<f64>) -> UnitQuaternion<f64> 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::reach::Reach;
     use crate::robot::tests::lonely;
-    use crate::room::Reach;
 
     #[test]
     fn the_hand_is_the_link_that_carries_both_fingers() {

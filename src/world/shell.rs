@@ -13,7 +13,7 @@ use rapier3d::prelude::{Collider, ColliderBuilder, ColliderHandle, Pose, RigidBo
 use crate::World;
 use crate::convert::{from_pose, from_vector, to_pose, to_real};
 use crate::engine::SHELL;
-use crate::room::Reach;
+use crate::reach::Reach;
 use actcheck_data::{Part, Pose as PartPose, Shape};
 
 /// Largest change of a tube's radius for its height. In wider cones the staves differ from their shell.
