@@ -281,7 +281,8 @@ impl World {
     /// Returns whether an object that is not slow can meet the floor or a static object in the tick.
     fn fast_objects_meet_fixed(&self, rest: &[bool]) -> bool {
         let moving = self.objects.iter().zip(rest).filter(|(_, rests)| !**rests);
-        // Sweeps take longest with the many pieces of such links, of which the thinnest decides which link is swept.
+        // Sweeps of objects bring sweeps of links, which the engine makes for links that outrun half of their thinnest piece: of
+        // many thin pieces, nearly always.
         let has_many_pieces = self.robot.model.links.iter().any(Link::has_many_pieces);
         let slow_m_s = if has_many_pieces { self.outruns_m_s() } else { SLOW_M_S };
         moving.filter_map(|(object, _)| Some((object, self.speed_of(object)?))).any(|(object, speed)| {
