@@ -263,6 +263,30 @@ fn decomposed_meshes_are_cached_beside_the_history() {
     assert!(kept.iter().all(|file| std::fs::read(file).unwrap().len() > 100));
 }
 
+/// Regression: a label on a cup, or a carpet on the floor, made the model or the whole world unusable.
+#[test]
+fn a_flat_part_of_a_model_becomes_a_sheet() {
+    let (folder, path) = project(&USED.replace("paper_cup", "tag"));
+    let tag = folder.path().join("models/tag");
+    fs::create_dir(&tag).unwrap();
+    fs::write(tag.join("model.config"), "<model><name>tag</name><sdf>model.sdf</sdf></model>").unwrap();
+    let collision =
+        |name: &str, geometry: &str| format!("<collision name=\"{name}\"><geometry>{geometry}</geometry></collision>");
+    let label = collision("label", "<mesh><uri>label.obj</uri></mesh>");
+    let body = collision("body", "<box><size>0.05 0.05 0.05</size></box>");
+    let model = format!("<sdf version=\"1.6\"><model name=\"tag\"><link name=\"l\">{body}{label}</link></model></sdf>");
+    fs::write(tag.join("model.sdf"), model).unwrap();
+    let corners = [[-0.02, -0.01], [0.02, -0.01], [0.02, 0.01], [-0.02, 0.01]];
+    let corners: String = corners.iter().map(|[x, y]| format!("v {x} {y} 0.025\n")).collect();
+    fs::write(tag.join("label.obj"), format!("{corners}f 1 2 3 4\n")).unwrap();
+    let env = Env::prepare_within(&path, &Overrides::default(), Budget::default()).unwrap();
+    let parts = &env.campaign.models["tag"].parts;
+    let [_, label] = parts.as_slice() else { panic!("{parts:?}") };
+    let (low, high) = label.bounds();
+    let sizes = [0, 1, 2].map(|axis| high[axis] - low[axis]);
+    assert!(sizes.iter().zip([0.04, 0.02, 0.001]).all(|(size, expected)| (size - expected).abs() < 1e-6), "{sizes:?}");
+}
+
 /// A model's name gives its category, `[categories]` overrides it, and the default is an object.
 #[test]
 fn model_categories_come_from_names_and_the_configuration() {

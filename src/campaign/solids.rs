@@ -96,7 +96,7 @@ pub(super) fn complete_robot(campaign: &mut Campaign) -> Result<(), world::World
 
 fn decompose_with(cache: &mut HullCache, robot: &mut RobotProfile, faults: &mut Diagnostics) {
     for (file, shapes) in &mut robot.meshes {
-        let apart: Result<Vec<Vec<Shape>>, String> = shapes.iter().map(|shape| cache.solids_of_link(shape)).collect();
+        let apart: Result<Vec<Vec<Shape>>, String> = shapes.iter().map(|shape| cache.solids_or_sheet(shape)).collect();
         match apart {
             Ok(apart) => *shapes = apart.concat().iter().map(world::simplified).collect(),
             Err(reason) => faults.push(unusable(&format!("the robot's mesh {file}"), &reason)),
@@ -112,7 +112,7 @@ fn unusable(what: &str, reason: &str) -> Diagnostic {
 fn solid_parts(model: &ObjectModel, cache: &mut HullCache) -> Result<Vec<Part>, String> {
     let mut parts = Vec::new();
     for part in &model.parts {
-        parts.extend(cache.solids(&part.shape)?.into_iter().map(|shape| Part { pose: part.pose, shape }));
+        parts.extend(cache.solids_or_sheet(&part.shape)?.into_iter().map(|shape| Part { pose: part.pose, shape }));
     }
     Ok(parts)
 }
@@ -141,8 +141,8 @@ impl HullCache {
         solids
     }
 
-    /// As [`HullCache::solids`]; a flat mesh of a robot becomes a thin solid.
-    fn solids_of_link(&mut self, shape: &Shape) -> Result<Vec<Shape>, String> {
+    /// As [`HullCache::solids`]; a flat mesh, such as a carpet or a marker on a robot, becomes a thin solid.
+    fn solids_or_sheet(&mut self, shape: &Shape) -> Result<Vec<Shape>, String> {
         self.solids(shape).or_else(|reason| match shape {
             Shape::Mesh { mesh } => world::sheet(mesh).map(|sheet| vec![sheet]).ok_or(reason),
             _ => Err(reason),

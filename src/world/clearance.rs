@@ -46,13 +46,21 @@ impl World {
     /// Records the current distances.
     pub(super) fn record_clearance(&mut self) {
         let mut smallest = std::mem::take(&mut self.recorder.clearance.smallest_m);
-        let links: Vec<(&Collider, Aabb)> = self.robot.bodies.iter().flat_map(|body| self.boxed(*body)).collect();
+        // The boxes of a link are needed only beside an object.
+        let mut boxes: Vec<Option<Vec<(&Collider, Aabb)>>> = vec![None; self.robot.bodies.len()];
         for (object, smallest) in self.objects.iter().zip(&mut smallest) {
-            for (solid, its_box) in self.boxed(object.body) {
-                for (link, link_box) in &links {
-                    if *smallest > 0.0 && gap(&its_box, link_box) < *smallest {
-                        let found = distance(solid.position(), solid.shape(), link.position(), link.shape());
-                        *smallest = smallest.min(found.map_or(f64::INFINITY, |found| f64::from(found.distance)));
+            let solids: Vec<(&Collider, Aabb)> = self.boxed(object.body).collect();
+            for (link, boxes) in boxes.iter_mut().enumerate() {
+                if *smallest <= 0.0 || self.are_balls_apart(link, object, *smallest) {
+                    continue;
+                }
+                let boxes = boxes.get_or_insert_with(|| self.boxed(self.robot.bodies[link]).collect());
+                for (solid, its_box) in &solids {
+                    for (link, link_box) in boxes.iter() {
+                        if *smallest > 0.0 && gap(its_box, link_box) < *smallest {
+                            let found = distance(solid.position(), solid.shape(), link.position(), link.shape());
+                            *smallest = smallest.min(found.map_or(f64::INFINITY, |found| f64::from(found.distance)));
+                        }
                     }
                 }
             }

@@ -8,6 +8,7 @@ use rapier3d::prelude::{
 };
 
 use crate::convert::{to_pose, to_real, to_vector};
+use crate::hull::Hull;
 use crate::kinematics::GRAVITY;
 use crate::{WorldError, fault, fresh};
 use actcheck_data::{Part, Physics, Shape};
@@ -155,7 +156,7 @@ fn with_surface(builder: ColliderBuilder, owner: Owner, friction: f64) -> Collid
 /// Returns the convex hull of points, or `None` if they lie in a plane.
 fn hull(points: &[[f64; 3]]) -> Option<ColliderBuilder> {
     let points: Vec<_> = points.iter().map(|point| to_vector(&Vector3::from(*point))).collect();
-    ColliderBuilder::convex_hull(&points)
+    Some(ColliderBuilder::new(SharedShape::new(Hull::of(&points)?)))
 }
 
 #[cfg(test)]

@@ -36,16 +36,21 @@ const LARGEST_STEP: f64 = 0.3;
 
 /// Returns joint positions near `seed` that reach the target, or `None` if the solver does not converge.
 ///
-/// Uses damped least squares; a joint that reaches its limit is held there and the others are solved again.
+/// Uses damped least squares; a joint that reaches its limit is held there and the others are solved again. Most targets that are
+/// tried are out of reach: the search ends when it gets no nearer.
 pub fn solve(kinematics: &Kinematics, seed: &[f64], reach: &Reach) -> Option<Vec<f64>> {
     let mut positions = started(kinematics, seed);
     let mut jacobian = vec![Vector6::zeros(); positions.len()];
     let mobile = mobile(&reach.mobility);
+    let mut progress = Progress::default();
     for _ in 0..MOST_ITERATIONS {
         let grasp = kinematics.fill_jacobian(&positions, &mut jacobian);
         let error = pose_error(&grasp, &reach.target);
         if is_reached(&error) {
             return Some(positions);
+        }
+        if progress.has_ended(&error) {
+            return None;
         }
         step(kinematics, &mut positions, &jacobian, &error, &mobile);
         kinematics.follow(&mut positions);

@@ -24,6 +24,7 @@ mod free_motion;
 mod fresh;
 mod furniture;
 mod gripper;
+mod hull;
 pub mod ik;
 mod inertia;
 mod kinematics;

@@ -142,16 +142,22 @@ impl World {
 
     /// Returns the penetration depth of two links; 0 if they are apart. Unit: metres.
     pub(super) fn depth_of(&self, first: usize, second: usize) -> f64 {
-        if self.are_links_apart(first, second) {
+        let (one, other) = (self.ball_of(first), self.ball_of(second));
+        let far = |(middle, radius): (Point3<f64>, f64), around: Option<(Point3<f64>, f64)>| {
+            around.is_some_and(|(other, its_radius)| (middle - other).norm() > radius + its_radius + ROUNDING_M)
+        };
+        if one.is_some_and(|one| far(one, other)) {
             return 0.0;
         }
-        let balls = |idx: usize| {
-            let solids = self.colliders_of(self.robot.bodies[idx]);
-            solids.zip(&self.robot.balls_of_shapes[idx]).map(|(solid, around)| (placed(around, solid), solid))
+        // Most shapes of a link are far from the other link.
+        let near = |idx: usize, around: Option<(Point3<f64>, f64)>| {
+            let solids = self.colliders_of(self.robot.bodies[idx]).zip(&self.robot.balls_of_shapes[idx]);
+            let balls = solids.map(|(solid, ball)| (placed(ball, solid), solid));
+            balls.filter(move |(ball, _)| !far(*ball, around))
         };
-        let of_second: Vec<((Point3<f64>, f64), &Collider)> = balls(second).collect();
+        let of_second: Vec<((Point3<f64>, f64), &Collider)> = near(second, one).collect();
         let mut deepest = 0.0f64;
-        for ((middle, radius), a) in balls(first) {
+        for ((middle, radius), a) in near(first, other) {
             for ((other, other_radius), b) in &of_second {
                 if (middle - other).norm() > radius + other_radius {
                     continue;
@@ -163,15 +169,11 @@ impl World {
         deepest
     }
 
-    /// Whether the balls around all shapes of two links are apart.
-    fn are_links_apart(&self, first: usize, second: usize) -> bool {
-        let ball = |idx: usize| {
-            let ball = self.robot.balls[idx].as_ref()?;
-            let body = self.engine.bodies.get(self.robot.bodies[idx])?;
-            Some((from_pose(body.position()) * ball.middle, ball.radius))
-        };
-        let (Some((one, radius)), Some((other, other_radius))) = (ball(first), ball(second)) else { return false };
-        (one - other).norm() > radius + other_radius + ROUNDING_M
+    /// Returns the centre and the radius of the ball around a link; `None` without shapes. Frame: world. Unit: metres.
+    fn ball_of(&self, link: usize) -> Option<(Point3<f64>, f64)> {
+        let ball = self.robot.balls[link].as_ref()?;
+        let body = self.engine.bodies.get(self.robot.bodies[link])?;
+        Some((from_pose(body.position()) * ball.middle, ball.radius))
     }
 
     /// Returns the colliders of a body, without shells.

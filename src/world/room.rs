@@ -13,7 +13,7 @@ use rapier3d::prelude::Collider;
 
 use crate::World;
 use crate::clearance::gap;
-use crate::convert::from_vector;
+use crate::convert::{from_pose, from_vector};
 use crate::description::{JointKind, Link};
 use crate::kinematics::{GRAVITY, axis_in_world};
 use crate::link_pairs::PREDICTION_M;
@@ -316,10 +316,21 @@ impl World {
         let moving = self.objects.iter().zip(rest).filter(|(_, rests)| !**rests);
         moving.filter_map(|(object, _)| Some((object, self.speed_of(object)?))).all(|(object, speed)| {
             let needed = ahead + self.way_of_object(speed) + LEFT_M;
+            if self.are_balls_apart(link, object, needed) {
+                return true;
+            }
             let others = self.boxed(object.body).collect::<Vec<_>>();
             self.boxed(self.robot.bodies[link])
                 .all(|solid| others.iter().all(|other| apart(&solid, other, needed) >= needed))
         })
+    }
+
+    /// Returns whether the balls around a link and an object are farther apart than this. Unit: metres.
+    pub(super) fn are_balls_apart(&self, link: usize, object: &Object, needed: f64) -> bool {
+        let Some(ball) = &self.robot.balls[link] else { return true };
+        let Some(body) = self.engine.bodies.get(self.robot.bodies[link]) else { return false };
+        let way = from_pose(body.position()) * ball.middle - Point3::from(self.pose_of(object).translation.vector);
+        way.norm() - ball.radius - Vector3::from(object.model.size_m).norm() >= needed + ROUNDING_M
     }
 
     /// Returns whether an object is among those that this list, in scene order, marks.

@@ -10,6 +10,7 @@ use parry3d::shape::ConvexPolyhedron;
 use crate::convert::{to_real, to_vector};
 use crate::description::RobotModel;
 use crate::engine::{Owner, collider};
+use crate::hull::Hull;
 use crate::kinematics::motion;
 use actcheck_data::Part;
 use rapier3d::math::{Real, Vector as EngineVector};
@@ -96,7 +97,7 @@ impl Solid {
             let along = hull.points().iter().map(|point| outwards.dot(*point));
             Face { outwards, offset: along.fold(Real::NEG_INFINITY, Real::max) }
         };
-        let hull = collider.shape().as_convex_polyhedron();
+        let hull = collider.shape().as_shape::<Hull>().map(Hull::polyhedron);
         let faces = hull.map(|hull| hull.faces().iter().map(|one| face(hull, one.normal)).collect());
         Self { around: collider.compute_aabb().loosened(BOX_SLACK_M), faces, collider }
     }

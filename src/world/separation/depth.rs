@@ -70,6 +70,7 @@ pub(super) fn depth(solids: &Solids<'_>, simplex: &Simplex) -> Option<Separation
         .into_iter()
         .filter_map(|corners| Face::new(&all, corners))
         .collect();
+    let mut edges: Vec<[usize; 2]> = Vec::new();
     for _ in 0..N_STEPS {
         let nearest = faces.iter().min_by(|a, b| a.far_m.total_cmp(&b.far_m))?;
         let corner = solids.corner(nearest.normal);
@@ -86,15 +87,16 @@ pub(super) fn depth(solids: &Solids<'_>, simplex: &Simplex) -> Option<Separation
         if all.iter().any(|known| known.point == corner.point) {
             return None;
         }
-        let (seen, kept): (Vec<Face>, Vec<Face>) =
-            faces.into_iter().partition(|face| face.is_seen_from(&all, &corner.point));
-        faces = kept;
+        edges.clear();
+        faces.retain(|face| {
+            let is_seen = face.is_seen_from(&all, &corner.point);
+            if is_seen {
+                edges.extend((0..3).map(|side| [face.corners[side], face.corners[(side + 1) % 3]]));
+            }
+            !is_seen
+        });
         all.push(corner);
         let new = all.len() - 1;
-        let edges: Vec<[usize; 2]> = seen
-            .iter()
-            .flat_map(|face| (0..3).map(|side| [face.corners[side], face.corners[(side + 1) % 3]]))
-            .collect();
         // The edges of the hole belong to one face that was seen.
         let rim = edges.iter().filter(|[from, to]| !edges.contains(&[*to, *from]));
         faces.extend(rim.filter_map(|[from, to]| Face::new(&all, [*from, *to, new])));
