@@ -101,6 +101,69 @@ pub(super) fn gap(a: &Aabb, b: &Aabb) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::object;
+    use crate::robot::tests::lonely;
+    use actcheck_data::{Choices, ObjectModel, Part, Pose, Role, SceneObject, Shape};
+    use nalgebra::{Isometry3, Vector3};
+    use std::sync::Arc;
+
+    /// A box of 10 cm, half a metre aside of the origin of its body, as a drawer may be.
+    fn aside(pose: &Isometry3<f64>) -> SceneObject {
+        let at = Isometry3::translation(0.5, 0.0, 0.0);
+        let part = Part { pose: Pose::from_isometry(&at), shape: Shape::Box { size: [0.1; 3] } };
+        let model = ObjectModel {
+            name: "drawer".to_owned(),
+            category: String::new(),
+            mass_kg: 1.0,
+            friction: 0.5,
+            restitution: 0.0,
+            origin_m: [0.0; 3],
+            size_m: [0.1; 3],
+            parts: vec![part],
+            fixed: false,
+            inertia: None,
+            surface: None,
+            moving: Vec::new(),
+            digest: String::new(),
+        };
+        SceneObject {
+            id: "drawer_1".to_owned(),
+            model: Arc::new(model),
+            role: Role::Target,
+            pose: Pose::from_isometry(pose),
+            mass_kg: 1.0,
+            friction: 0.5,
+            restitution: 0.0,
+            attached: None,
+        }
+    }
+
+    #[test]
+    fn distances_are_those_of_all_shapes() {
+        let mut choices = Choices::random(4, 0);
+        let mut n_near = 0;
+        for trial in 0..40 {
+            let mut world = lonely();
+            let mut number = |most: f64| choices.real("at".into(), -most, most, 0.0);
+            let place = Vector3::new(number(1.0) - 1.0, number(1.0), 0.7 + number(0.7));
+            let pose = Isometry3::new(place, Vector3::new(number(3.0), number(3.0), number(3.0)));
+            let object = object::insert(&mut world.engine, 0, &aside(&pose));
+            world.objects.push(object);
+            world.begin_clearance();
+            let links = world.robot.bodies.iter().flat_map(|body| world.colliders_of(*body));
+            let solids: Vec<&Collider> = world.colliders_of(world.objects[0].body).collect();
+            let all = links.flat_map(|link| solids.iter().map(move |solid| (link, *solid)));
+            let nearest = all.map(|(link, solid)| {
+                let found = distance(solid.position(), solid.shape(), link.position(), link.shape());
+                found.map_or(f64::INFINITY, |found| f64::from(found.distance))
+            });
+            let nearest = nearest.fold(RANGE_M, f64::min);
+            let found = world.recorder.clearance.smallest_m[0];
+            assert!((found - nearest).abs() < 1e-6, "trial {trial}: {found} instead of {nearest}");
+            n_near += usize::from(nearest < RANGE_M);
+        }
+        assert!(n_near > 10, "{n_near} near");
+    }
 
     #[test]
     fn the_gap_of_two_boxes_is_the_distance_of_their_nearest_points() {

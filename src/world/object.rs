@@ -11,6 +11,7 @@ use crate::attach::Attachment;
 use crate::convert::{to_pose, to_real, to_vector};
 use crate::engine::{LENGTH_UNIT, Owner, collider};
 use crate::furniture::slides;
+use crate::room::Ball;
 use crate::shell::{Hollow, hollows_of};
 use actcheck_data::{Inertia, ObjectModel, Part, Role, SceneObject};
 
@@ -30,6 +31,8 @@ pub(super) struct Object {
     /// Whether it is on the robot's floor plan, like furniture and unlike other objects.
     pub(super) on_map: bool,
     pub(super) body: RigidBodyHandle,
+    /// The ball around its shapes, in its frame.
+    pub(super) ball: Option<Ball>,
     pub(super) mass_kg: f64,
     pub(super) friction: f64,
     pub(super) restitution: f64,
@@ -79,6 +82,7 @@ pub(super) fn insert(engine: &mut PhysicsWorld, idx: usize, object: &SceneObject
         slides: slides(object.role, object.model.fixed),
         on_map: object.role == Role::Platform,
         body,
+        ball: Ball::around(&object.model.parts),
         mass_kg: object.mass_kg,
         friction: object.friction,
         restitution: object.restitution,

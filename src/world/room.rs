@@ -328,9 +328,11 @@ impl World {
     /// Returns whether the balls around a link and an object are farther apart than this. Unit: metres.
     pub(super) fn are_balls_apart(&self, link: usize, object: &Object, needed: f64) -> bool {
         let Some(ball) = &self.robot.balls[link] else { return true };
-        let Some(body) = self.engine.bodies.get(self.robot.bodies[link]) else { return false };
-        let way = from_pose(body.position()) * ball.middle - Point3::from(self.pose_of(object).translation.vector);
-        way.norm() - ball.radius - Vector3::from(object.model.size_m).norm() >= needed + ROUNDING_M
+        let (Some(around), Some(body)) = (&object.ball, self.engine.bodies.get(self.robot.bodies[link])) else {
+            return false;
+        };
+        let way = from_pose(body.position()) * ball.middle - self.pose_of(object) * around.middle;
+        way.norm() - ball.radius - around.radius >= needed + ROUNDING_M
     }
 
     /// Returns whether an object is among those that this list, in scene order, marks.
