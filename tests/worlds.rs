@@ -82,6 +82,59 @@ fn shipped_worlds_have_free_space() {
     }
 }
 
+/// A project with a configuration for `MoveTo`, prepared to draw its scenes.
+fn driving(folder: &Path, text: &str) -> Env {
+    let path = folder.join("c.toml");
+    std::fs::write(&path, format!("tests = [[\"MoveTo\"]]\ntest_count = 2\n{text}")).unwrap();
+    Env::prepare_within(&path, &Overrides::default(), Budget::default()).unwrap_or_else(|found| panic!("{found}"))
+}
+
+/// Regression: without a surface for objects, locations in front of furniture were never chosen, and each drive failed: "no place
+/// was named to drive to".
+#[test]
+fn a_robot_is_sent_to_any_of_the_locations_if_no_surface_is_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let names = ["dining_table_front", "side_table_front"];
+    let text = format!("[world]\nworlds = [\"apartment\"]\n[objectLocation]\nlocation_list = {names:?}\n");
+    let env = driving(folder.path(), &text);
+    let sent: std::collections::BTreeSet<String> =
+        scenes(&env, 20).iter().map(|scene| scene.designators["objectLocation"][0].clone()).collect();
+    assert_eq!(sent.into_iter().collect::<Vec<_>>(), names);
+}
+
+/// A robot drives over a carpet: as a piece of furniture, it would be in the way.
+#[test]
+fn carpets_are_part_of_the_floor() {
+    let folder = tempfile::tempdir().unwrap();
+    let worlds = folder.path().join("models/worlds");
+    std::fs::create_dir_all(&worlds).unwrap();
+    let corners = "v -1 -1 0\nv 1 -1 0\nv 1 1 0.0005\nv -1 1 0.0005\nf 1 2 3 4\n";
+    std::fs::write(worlds.join("carpet.obj"), corners).unwrap();
+    let model = |name: &str, at: &str, geometry: &str| {
+        format!(
+            "<model name=\"{name}\"><static>true</static><pose>{at} 0 0 0</pose><link name=\"l\"><collision name=\"c\">\
+             <geometry>{geometry}</geometry></collision></link></model>"
+        )
+    };
+    let pieces = [
+        model("carpet", "2 0 0.001", "<mesh><uri>carpet.obj</uri></mesh>"),
+        model("marking", "0 2 0.001", "<box><size>1 0.1 0.002</size></box>"),
+        model("table", "4 0 0.3", "<box><size>0.8 0.8 0.6</size></box>"),
+    ];
+    let text = format!("<sdf version=\"1.6\"><world name=\"house\">{}</world></sdf>", pieces.concat());
+    std::fs::write(worlds.join("house.world"), text).unwrap();
+    let text =
+        "model_dir = \"models\"\n[world]\nworlds = [\"house\"]\n[objectLocation]\nlocation_list = [\"table_front\"]\n";
+    let env = driving(folder.path(), text);
+    let said = env.campaign.warnings.to_string();
+    for name in ["carpet", "marking"] {
+        assert!(said.contains(&format!("`{name}` rises less than 5 mm")), "{said}");
+    }
+    let scene = draw(&env.space, 0, &mut Choices::recorded(&[])).unwrap();
+    let ids: Vec<&str> = scene.objects.iter().map(|object| object.id.as_str()).collect();
+    assert_eq!(ids, ["table"]);
+}
+
 /// Objects are on the drawn surface, anywhere in the world, and the robot faces it.
 #[test]
 fn scenes_match_their_world() {

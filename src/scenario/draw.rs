@@ -176,14 +176,16 @@ impl<'a> SceneBuilder<'a> {
     }
 
     /// Chooses one of the world's locations that the configuration names, either in front of the surface or of no
-    /// surface.
+    /// surface; any of them if the scene has no surface for objects.
     fn choose_location(&mut self, world: &Surroundings, surface: Option<&str>) {
         let named = self.space.names.get("objectLocation").into_iter().flatten();
         let there = named.filter(|name| {
             let location = world.map.locations.iter().find(|location| location.name == **name);
             // If the world has no locations, the names are the robot's own.
             world.map.locations.is_empty()
-                || location.is_some_and(|location| location.surface.as_deref().is_none_or(|of| Some(of) == surface))
+                || location.is_some_and(|location| {
+                    location.surface.as_deref().is_none_or(|of| surface.is_none_or(|surface| of == surface))
+                })
         });
         let there: Vec<String> = there.cloned().collect();
         if !there.is_empty() {

@@ -64,6 +64,8 @@ pub(crate) struct Included<'a> {
 
 /// Shortest length and width of a model that may be around the robot. Unit: metres.
 const ROOM_M: f64 = 2.5;
+/// Lower things are part of the floor: a robot drives over them. Unit: metres.
+const LOW_M: f64 = 5e-3;
 /// Largest number of solids of a building that become pieces of their own: each is perceived on its own.
 const MOST_PIECES: usize = 200;
 
@@ -120,6 +122,14 @@ impl Gathering<'_> {
             Some(idx) => Some(&self.world.models[idx]),
             None => self.included.models.get(&piece.model).map(|model| &**model),
         };
+        if model.is_some_and(|model| piece.pose.position[2] + model.size_m[2] < LOW_M) {
+            let message = format!("`{}` rises less than 5 mm above the floor, and is left out", piece.name);
+            self.reader.warning("W036", node, message, "robots drive over carpets and markings");
+            if let Some(idx) = own {
+                self.world.models.remove(idx);
+            }
+            return;
+        }
         if let Some(building) = model.filter(|model| is_building(model)).cloned() {
             if let Some(idx) = own {
                 self.world.models.remove(idx);
