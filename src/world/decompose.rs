@@ -53,8 +53,8 @@ pub fn decompose(mesh: &Mesh) -> Result<Vec<Shape>, String> {
 /// Thickness of a sheet. Unit: metres. That of a sticker or a pane.
 const SHEET_M: f64 = 1e-3;
 
-/// Returns a thin solid for a mesh whose points lie in a plane, such as a carpet or a marker on a robot. Returns `None` if they lie on
-/// a line.
+/// Returns a thin solid for a mesh whose points lie in a plane, such as a carpet or a marker on a robot. Returns `None` if they
+/// lie on a line.
 pub fn sheet(mesh: &Mesh) -> Option<Shape> {
     let count = mesh.vertices.len().max(1) as f64;
     let points: Vec<Vector3<f64>> = mesh.vertices.iter().map(|vertex| Vector3::from(*vertex)).collect();

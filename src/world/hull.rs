@@ -15,6 +15,7 @@ use parry3d::shape::{
 
 /// Number of corners that are looked at together.
 const LANES: usize = 8;
+/// Half of them.
 const HALF: usize = LANES / 2;
 
 /// A convex hull.
@@ -188,7 +189,7 @@ mod tests {
     use actcheck_data::Choices;
     use rapier3d::math::Rotation;
 
-    /// Hulls of 4 to 60 points, some with corners in a plane, as boxes have.
+    /// Hulls of up to 60 points, some with corners in a plane, as boxes have.
     fn hull(choices: &mut Choices, trial: usize) -> Hull {
         let n_points = 8 + trial % 53;
         let mut number = || choices.real("at".into(), -1.0, 1.0, 0.0);
