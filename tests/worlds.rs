@@ -2,6 +2,7 @@
 //!
 //! A wrong world is a case of `WRONG` below: a text, and its diagnostics.
 
+use std::f64::consts::PI;
 use std::path::Path;
 
 use actcheck::base::{Diagnostics, Source, Term, names};
@@ -9,7 +10,7 @@ use actcheck::campaign::Env;
 use actcheck::config::{self, Campaign, Overrides};
 use actcheck::data::{Choices, Part, Pose, Role, Scene, bounds};
 use actcheck::rules::Budget;
-use actcheck::scenario::{Solid, draw};
+use actcheck::scenario::{FloorPlan, Solid, draw};
 
 use crate::support::{actcheck, root, stderr};
 
@@ -133,6 +134,80 @@ fn carpets_are_part_of_the_floor() {
     let scene = draw(&env.space, 0, &mut Choices::recorded(&[])).unwrap();
     let ids: Vec<&str> = scene.objects.iter().map(|object| object.id.as_str()).collect();
     assert_eq!(ids, ["table"]);
+}
+
+/// The walls of a house as one mesh: 8 m by 4 m, 0.2 m thick and 2.5 m high, with a gap of 1 m in the south wall.
+fn house_mesh() -> String {
+    let outer = [[0.5, -2.0], [4.0, -2.0], [4.0, 2.0], [-4.0, 2.0], [-4.0, -2.0], [-0.5, -2.0]];
+    let inner = [[-0.5, -1.8], [-3.8, -1.8], [-3.8, 1.8], [3.8, 1.8], [3.8, -1.8], [0.5, -1.8]];
+    let corners = [outer, inner].concat();
+    let vertices = [0.0, 2.5].map(|z| corners.iter().map(|[x, y]| format!("v {x} {y} {z}\n")).collect::<String>());
+    let tops = [[0, 1, 10, 11], [1, 2, 9, 10], [2, 3, 8, 9], [3, 4, 7, 8], [4, 5, 6, 7]];
+    let above = tops.iter().map(|ring| ring.map(|idx| idx + 12));
+    let below = tops.iter().map(|[a, b, c, d]| [*d, *c, *b, *a]);
+    let sides = (0..12).map(|idx| [idx, (idx + 1) % 12, (idx + 1) % 12 + 12, idx + 12]);
+    let faces =
+        above.chain(below).chain(sides).map(|[a, b, c, d]| format!("f {} {} {} {}\n", a + 1, b + 1, c + 1, d + 1));
+    vertices.concat() + &faces.collect::<String>()
+}
+
+/// Regression: the box around the house was an obstacle, and each drive inside failed: "there is no free path". So did its ceiling, and
+/// its floor, which is a slab.
+#[test]
+fn a_robot_drives_in_a_house_of_one_mesh() {
+    let folder = tempfile::tempdir().unwrap();
+    let worlds = folder.path().join("models/worlds");
+    std::fs::create_dir_all(&worlds).unwrap();
+    std::fs::write(worlds.join("walls.obj"), house_mesh()).unwrap();
+    let model = |name: &str, at: &str, geometry: &str| {
+        format!(
+            "<model name=\"{name}\"><static>true</static><pose>{at} 0 0 0</pose><link name=\"l\"><collision name=\"c\">\
+             <geometry>{geometry}</geometry></collision></link></model>"
+        )
+    };
+    let pieces = [
+        model("slab", "0 0 0.02", "<box><size>10 6 0.06</size></box>"),
+        model("house", "0 0 0.05", "<mesh><uri>file://models/worlds/walls.obj</uri></mesh>"),
+        model("ceiling", "0 0 2.6", "<box><size>8 4 0.1</size></box>"),
+        model("table", "-3.3 0 0.35", "<box><size>0.8 0.8 0.6</size></box>"),
+        model("niche", "3.4 1.4 0.35", "<box><size>0.8 0.8 0.6</size></box>"),
+        model("lost", "0 0 34358.2", "<box><size>0.8 0.8 0.6</size></box>"),
+    ];
+    let text = format!("<sdf version=\"1.6\"><world name=\"home\">{}</world></sdf>", pieces.concat());
+    std::fs::write(worlds.join("home.world"), text).unwrap();
+    let text = "model_dir = \"models\"\n[world]\nworlds = [\"home\"]\n[objectLocation]\n\
+                location_list = [\"table_front\"]\n";
+    let env = driving(folder.path(), text);
+    let said = env.campaign.warnings.to_string();
+    for expected in [
+        "`slab` is the floor: the world is moved down by 5.0 cm",
+        "`lost` at (0.0, 0.0, 34357.8) is",
+        "no location: `niche`\n",
+    ] {
+        assert!(said.contains(expected), "{said}");
+    }
+    for scene in scenes(&env, 5) {
+        let plan = FloorPlan::of(&scene);
+        let is_free = |x: f64, y: f64| {
+            plan.outlines.iter().all(|outline| {
+                let local = outline.pose.to_isometry().inverse() * nalgebra::Point3::new(x, y, 0.0);
+                (0..2).any(|axis| local[axis].abs() > outline.size_m[axis] / 2.0 + 0.36)
+            })
+        };
+        assert!(
+            is_free(0.0, -1.9) && is_free(2.0, 0.0) && is_free(0.0, 0.0) && !is_free(2.0, -1.9) && !is_free(-3.9, 0.0)
+        );
+        let location = plan.locations.iter().find(|location| location.name == "table_front").unwrap();
+        let [x, y, heading] = location.at;
+        assert!(
+            (x + 3.3 - 0.4 - 0.69).abs() < 1e-6 && y.abs() < 1e-6 && (heading.abs() - PI).abs() < 1e-6,
+            "{location:?}"
+        );
+        let table = scene.objects.iter().find(|object| object.id == "table").unwrap();
+        assert!(table.pose.position[2].abs() < 1e-6, "{table:?}");
+    }
+    let done = actcheck(folder.path(), &["run", "c.toml", "--history", "h"]);
+    assert_eq!(done.status.code(), Some(0), "{}", stderr(&done));
 }
 
 /// Objects are on the drawn surface, anywhere in the world, and the robot faces it.

@@ -221,6 +221,9 @@ fn perform(
     if !settling.left.is_empty() {
         return Err(Failure::Discard(format!("fell from its initial position: {}", settling.left.join(", "))));
     }
+    if let Some(fault) = world.fault() {
+        return Err(Failure::Discard(fault.to_string()));
+    }
     if !settling.settled {
         return Err(Failure::Discard(format!("did not come to rest: {}", settling.unsettled.join(", "))));
     }

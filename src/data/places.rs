@@ -2,6 +2,10 @@
 
 use serde::{Deserialize, Serialize};
 
+/// Robots drive below furniture that begins higher above the floor, such as lintels, lamps and ceilings. Unit: metres. The height
+/// of a door, less rounding.
+pub const OVERHEAD_M: f64 = 1.99;
+
 /// A named pose on the floor.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Location {

@@ -7,7 +7,7 @@ use nalgebra::Point3;
 
 use crate::draw::{Discard, SceneBuilder, TRIES};
 use crate::floor_plan::{FRONT_GAP_M, Outline, front_of};
-use crate::kept_free::KeptFree;
+use crate::kept_free::{FloorAround, KeptFree};
 use crate::overlap::Solid;
 use crate::placement::Reach;
 use crate::surroundings::Surroundings;
@@ -127,32 +127,40 @@ impl SceneBuilder<'_> {
 
     fn start_within(&mut self, ranges: [(f64, f64); 3]) -> Result<[f64; 3], Discard> {
         let middles = ranges.map(|(low, high)| (low + high) / 2.0);
-        self.start_about(ranges, middles, |_| true)
+        self.start_about(ranges, middles, |_| true, |_| true)
     }
 
-    /// Draws a free place within the ranges that satisfies `serves`.
+    /// Draws a free place within the ranges that satisfies `serves` and, unless it is given, `leads`.
     fn start_about(
         &mut self,
         ranges: [(f64, f64); 3],
         nominal: [f64; 3],
         serves: impl Fn(&[f64; 3]) -> bool,
+        leads: impl Fn(&[f64; 3]) -> bool,
     ) -> Result<[f64; 3], Discard> {
         for _ in 0..TRIES {
+            let n_made = self.choices.made().len();
+            let is_given =
+                [StartAxis::X, StartAxis::Y].into_iter().any(|axis| self.choices.is_recorded(&ChoiceName::Robot(axis)));
             let mut draw = |name: StartAxis, axis: usize| {
                 let (low, high) = ranges[axis];
                 self.choices.real(ChoiceName::Robot(name), low, high, nominal[axis])
             };
             let base = [draw(StartAxis::X, 0), draw(StartAxis::Y, 1), draw(StartAxis::Heading, 2)];
-            if serves(&base) && self.is_free(&self.own_room(base)) {
+            if !serves(&base) || !self.is_free(&self.own_room(base)) {
+                continue;
+            }
+            if is_given || leads(&base) {
                 return Ok(base);
             }
+            self.choices.forget_after(n_made);
         }
         Err(Discard { model: "robot".to_owned(), name: "robot".to_owned(), tries: TRIES })
     }
 
     /// Draws the start of a base that has to drive first: in the ranges of the configuration if it has any, else
-    /// anywhere in the world except near the goal, with any heading. Nominal: a short distance from the goal, with the
-    /// heading of the goal.
+    /// anywhere in the world except near the goal, with any heading, if a path on the map leads from there to the goal. Nominal: a
+    /// short distance from the goal, with the heading of the goal.
     pub(super) fn start_elsewhere(&mut self, world: Option<&Surroundings>) -> Result<[f64; 3], Discard> {
         if let Some(ranges) = self.space.start {
             return self.start_within(ranges);
@@ -161,14 +169,22 @@ impl SceneBuilder<'_> {
         let (low, high) = rooms.map_or_else(|| self.arena(world), inside);
         let goal = self.goal(world);
         let ranges = [(low[0], high[0]), (low[1], high[1]), (-PI, PI)];
-        let nominal = goal.map_or([0.0; 3], |goal| self.nominal_start(goal, (low, high)));
+        let rooms = world.map_or(&[][..], |world| &world.map.rooms);
+        let around = goal.map(|goal| FloorAround::new(&self.objects, rooms, goal));
+        let leads = |base: &[f64; 3]| around.as_ref().is_none_or(|around| around.leads_from(base));
+        let nominal = goal.map_or([0.0; 3], |goal| self.nominal_start(goal, (low, high), &leads));
         let is_far =
             |base: &[f64; 3]| goal.is_none_or(|goal| libm::hypot(base[0] - goal[0], base[1] - goal[1]) >= DRIVE_M);
-        self.start_about(ranges, nominal, is_far)
+        self.start_about(ranges, nominal, is_far, leads)
     }
 
     /// The first free place around the goal, beginning straight behind it.
-    fn nominal_start(&self, goal: [f64; 3], (low, high): ([f64; 2], [f64; 2])) -> [f64; 3] {
+    fn nominal_start(
+        &self,
+        goal: [f64; 3],
+        (low, high): ([f64; 2], [f64; 2]),
+        leads: impl Fn(&[f64; 3]) -> bool,
+    ) -> [f64; 3] {
         let around = [4.0, 3.0, 5.0, 2.0, 6.0, 1.0, 7.0, 0.0].map(|eighths: f64| {
             let angle = goal[2] + eighths * PI / 4.0;
             let (x, y) = (goal[0] + NOMINAL_DRIVE_M * libm::cos(angle), goal[1] + NOMINAL_DRIVE_M * libm::sin(angle));
@@ -176,7 +192,7 @@ impl SceneBuilder<'_> {
         });
         let serves = |base: &&[f64; 3]| {
             let inside = (low[0]..=high[0]).contains(&base[0]) && (low[1]..=high[1]).contains(&base[1]);
-            inside && self.is_free(&self.own_room(**base))
+            inside && self.is_free(&self.own_room(**base)) && leads(base)
         };
         around.iter().find(serves).copied().unwrap_or(around[0])
     }

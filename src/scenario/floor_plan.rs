@@ -4,7 +4,7 @@
 
 use nalgebra::Point3;
 
-use actcheck_data::{Location, ObjectModel, Pose, Role, Room, Scene, SceneObject};
+use actcheck_data::{Location, OVERHEAD_M, ObjectModel, Pose, Role, Room, Scene, SceneObject};
 
 /// Gap between a surface's edge and the centre of a base in front of it. Unit: metres.
 pub(super) const FRONT_GAP_M: f64 = 0.69;
@@ -34,10 +34,9 @@ pub struct Outline {
 impl FloorPlan {
     /// The map of a scene's world.
     pub fn of(scene: &Scene) -> Self {
-        let standing = || scene.objects.iter().filter(|object| object.role == Role::Platform);
-        let surfaces = standing().filter(|object| object.model.surface.is_some());
+        let surfaces = furniture(&scene.objects).filter(|object| object.model.surface.is_some());
         Self {
-            outlines: standing().map(|object| Outline::below(&object.model, &object.pose)).collect(),
+            outlines: outlines(&scene.objects).collect(),
             locations: scene.map.locations.clone(),
             rooms: scene.map.rooms.clone(),
             fronts: surfaces.map(|object| (object.id.clone(), front_of(object))).collect(),
@@ -50,6 +49,16 @@ impl FloorPlan {
         let location = self.locations.iter().find(|location| location.name == name).map(|location| location.at);
         location.or_else(|| self.fronts.iter().find(|(id, _)| id == name).map(|(_, at)| *at))
     }
+}
+
+fn furniture(objects: &[SceneObject]) -> impl Iterator<Item = &SceneObject> {
+    objects.iter().filter(|object| object.role == Role::Platform)
+}
+
+/// The outlines of walls and furniture that a robot can't drive below.
+pub(super) fn outlines(objects: &[SceneObject]) -> impl Iterator<Item = Outline> {
+    let in_the_way = furniture(objects).filter(|object| object.pose.position[2] < OVERHEAD_M);
+    in_the_way.map(|object| Outline::below(&object.model, &object.pose))
 }
 
 impl Outline {

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use nalgebra::{Isometry2, Point2, Vector2};
 
-use crate::floor_plan::{Outline, front_of};
+use crate::floor_plan::{Outline, front_of, outlines};
 use actcheck_data::{Role, Room, Scene, SceneMap, SceneObject};
 
 /// Distance of obstacles from the locations of a world. Unit: metres. A slim mobile manipulator can stop there.
@@ -61,8 +61,7 @@ impl KeptFree {
         let stops: Vec<Point2<f64>> = stops.map(on_floor).collect();
         let locations = map.locations.iter().map(|location| (on_floor(location.at), LOCATION_ROOM_M));
         let places = locations.chain(stops.iter().map(|stop| (*stop, STOP_ROOM_M))).collect();
-        let furniture: Vec<Rectangle> =
-            platforms().map(|object| Rectangle::new(&Outline::below(&object.model, &object.pose))).collect();
+        let furniture: Vec<Rectangle> = outlines(objects).map(|outline| Rectangle::new(&outline)).collect();
         Self { places, paths: Paths::new(&furniture, &map.rooms, &stops) }
     }
 
@@ -72,6 +71,29 @@ impl KeptFree {
         let obstacles: Vec<Rectangle> = obstacles.iter().map(Rectangle::new).collect();
         let is_clear = |(place, room): &(Point2<f64>, f64)| obstacles.iter().all(|one| one.distance(place) >= *room);
         self.places.iter().all(is_clear) && self.paths.stay_open(&obstacles)
+    }
+}
+
+/// The floor from which a path leads to a goal.
+pub(super) struct FloorAround {
+    paths: Paths,
+    /// Cells from which a path leads to the goal.
+    open: Vec<bool>,
+}
+
+impl FloorAround {
+    pub(super) fn new(objects: &[SceneObject], rooms: &[Room], goal: [f64; 3]) -> Self {
+        let furniture: Vec<Rectangle> = outlines(objects).map(|outline| Rectangle::new(&outline)).collect();
+        let paths = Paths::new(&furniture, rooms, &[on_floor(goal)]);
+        let open = paths.connected(&paths.free);
+        Self { paths, open }
+    }
+
+    /// Whether a path leads from a base to the goal. A goal beside an obstacle or in it can be reached from nowhere: whether the
+    /// robot says so is part of the test.
+    pub(super) fn leads_from(&self, base: &[f64; 3]) -> bool {
+        let place = on_floor(*base);
+        !self.open.contains(&true) || self.paths.ends(&place).any(|cell| self.open[cell])
     }
 }
 

@@ -424,11 +424,12 @@ impl World {
     }
 
     fn find_fault(&self) -> Option<Fault> {
-        let objects = self.objects.iter().map(|object| (object.id.as_str(), object.body));
-        let links =
-            self.robot.model.links.iter().zip(&self.robot.bodies).map(|(link, body)| (link.name.as_str(), *body));
+        // Static bodies may reach far below the floor, as foundations do.
+        let objects = self.objects.iter().map(|object| (object.id.as_str(), object.body, !object.fixed));
+        let links = self.robot.model.links.iter().zip(&self.robot.bodies);
+        let links = links.map(|(link, body)| (link.name.as_str(), *body, true));
         let quarantined = self.engine.quarantine().bodies();
-        for (id, handle) in objects.chain(links) {
+        for (id, handle, moves) in objects.chain(links) {
             let Some(body) = self.engine.bodies.get(handle) else { continue };
             let finite = body.position().is_finite() && body.linvel().is_finite() && body.angvel().is_finite();
             if !finite || quarantined.contains(&handle) {
@@ -436,7 +437,7 @@ impl World {
             }
             let position = from_vector(body.translation());
             let outside = position.xy().norm() > fault::WORLD_RADIUS_M || position.z < -fault::WORLD_DEPTH_M;
-            if outside || position.z > fault::WORLD_RADIUS_M {
+            if moves && (outside || position.z > fault::WORLD_RADIUS_M) {
                 return Some(Fault::LeftWorld { id: id.to_owned(), position: position.into() });
             }
         }

@@ -24,7 +24,7 @@ impl Lookup<'_> {
                 let is_elsewhere = uri.starts_with('/') && !self.exists(Path::new(uri)) && self.exists(&inside);
                 Ok(if is_elsewhere { inside } else { beside.join(uri) })
             }
-            Some(("file", path)) => Ok(PathBuf::from(path)),
+            Some(("file", path)) => Ok(self.find_beside(Path::new(path)).unwrap_or_else(|| PathBuf::from(path))),
             Some(("model" | "package", path)) => self.find(path).ok_or_else(|| {
                 let folders: Vec<String> = self.folders.iter().map(|folder| folder.display().to_string()).collect();
                 format!("there is no `{path}` in {}", folders.join(" or "))
@@ -39,6 +39,15 @@ impl Lookup<'_> {
             .into_iter()
             .find(|place| self.exists(place))
             .or_else(|| self.find_in_package(path).filter(|place| self.exists(place)))
+    }
+
+    /// A relative path in a folder of models or beside it: Gazebo has a list of folders for such paths.
+    fn find_beside(&self, path: &Path) -> Option<PathBuf> {
+        if path.is_absolute() || self.exists(path) {
+            return None;
+        }
+        let around = self.folders.iter().flat_map(|folder| [Some(folder.as_path()), folder.parent()]);
+        around.flatten().map(|folder| folder.join(path)).find(|place| self.exists(place))
     }
 
     fn exists(&self, place: &Path) -> bool {

@@ -5,9 +5,11 @@
 
 mod assembly;
 mod body;
+mod building;
 mod collada;
 mod folder;
 mod footprint;
+mod fronts;
 mod geometry;
 pub(crate) mod lenient;
 mod lookup;

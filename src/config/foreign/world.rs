@@ -7,6 +7,7 @@ use std::sync::Arc;
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 
 use crate::foreign::body::Body;
+use crate::foreign::building::{self, Solid, Split};
 use crate::foreign::geometry::Shapes;
 use crate::foreign::lenient::repaired;
 use crate::foreign::lookup::Lookup;
@@ -14,10 +15,10 @@ use crate::foreign::nested::Role;
 use crate::foreign::sdf::check_version;
 use crate::foreign::sdf_pose::pose;
 use crate::foreign::xml::{self, Node, Reader};
-use crate::foreign::{folder, mjcf_world, sdf, urdf};
+use crate::foreign::{folder, fronts, mjcf_world, sdf, urdf};
 use crate::{Furniture, WorldMap};
-use actcheck_base::{Diagnostics, Severity, Source, digest_of};
-use actcheck_data::{Location, ObjectModel, Part, Pose};
+use actcheck_base::{Diagnostics, Severity, Source, Span, digest_of};
+use actcheck_data::{ObjectModel, Pose};
 
 /// Elements of a world that are read, or that do not affect its geometry: light, Gazebo's display and time steps.
 const KNOWN: [&str; 16] = [
@@ -40,8 +41,6 @@ const KNOWN: [&str; 16] = [
 ];
 /// Included models to skip: every world already has a floor and light.
 const ALWAYS_THERE: [&str; 2] = ["ground_plane", "sun"];
-/// Distance between the edge of a surface and the middle of the base of a robot working at it. Unit: metres.
-const FRONT_GAP_M: f64 = 0.69;
 /// A model that is tilted by more than this gets a model of its own. Unit: cosine.
 const UPRIGHT_COSINE: f64 = 0.999;
 
@@ -62,12 +61,13 @@ pub(crate) struct Included<'a> {
     pub(crate) lookup: &'a Lookup<'a>,
 }
 
-/// Shortest length and width of a model that may be around the robot. Unit: metres.
-const ROOM_M: f64 = 2.5;
 /// Lower things are part of the floor: a robot drives over them. Unit: metres.
-const LOW_M: f64 = 5e-3;
-/// Largest number of solids of a building that become pieces of their own: each is perceived on its own.
-const MOST_PIECES: usize = 200;
+pub(super) const LOW_M: f64 = 5e-3;
+/// A higher slab is furniture, such as a stage, and not the floor. Unit: metres.
+const SLAB_M: f64 = 0.3;
+
+/// Farther things are left out. Unit: metres. The radius of the floor, less that of furniture.
+const FARTHEST_M: f64 = 14.0;
 
 /// Reads a world in SDF or MJCF. It is `None` if there are errors.
 ///
@@ -82,8 +82,9 @@ pub(crate) fn read(name: &str, source: &Source, path: &Path, included: &Included
         Err(faults) => return (None, faults),
     };
     let map = WorldMap { digest: digest_of(&source.text), ..WorldMap::floor_only(name) };
+    let world = World { map, models: Vec::new() };
     let mut gathering =
-        Gathering { path, included, world: World { map, models: Vec::new() }, reader: Reader::new(source) };
+        Gathering { path, included, world, pieces: Vec::new(), whole: Vec::new(), reader: Reader::new(source) };
     let root = document.root_element();
     if root.has_tag_name("mujoco") {
         gathering.bodies(root, source);
@@ -97,11 +98,11 @@ pub(crate) fn read(name: &str, source: &Source, path: &Path, included: &Included
                 "include" => gathering.include(child),
                 _ => None,
             };
-            if let Some(piece) = piece {
-                gathering.add(piece, child);
-            }
+            gathering.pieces.extend(piece.map(|piece| (piece, xml::span(child))));
         }
     }
+    gathering.add_all();
+    gathering.add_fronts();
     let found = gathering.reader.found;
     let complete = !found.has_errors();
     (complete.then_some(gathering.world), found)
@@ -112,11 +113,59 @@ struct Gathering<'a> {
     path: &'a Path,
     included: &'a Included<'a>,
     world: World,
+    /// All models of the world, before buildings are split and floors are left out, with their elements in the text.
+    pieces: Vec<(Furniture, Span)>,
+    /// Furniture other than the solids of buildings: its index, and its element in the text.
+    whole: Vec<(usize, Span)>,
     reader: Reader<'a>,
 }
 
 impl Gathering<'_> {
-    fn add(&mut self, piece: Furniture, node: Node) {
+    /// Adds all models. If a slab is the floor of the world, everything is moved down until its top is at height 0.
+    fn add_all(&mut self) {
+        let pieces = std::mem::take(&mut self.pieces);
+        let floor =
+            pieces.iter().enumerate().filter_map(|(idx, (piece, _))| Some((idx, self.top_of_floor(piece, &pieces)?)));
+        let floor = floor.max_by(|one, other| one.1.total_cmp(&other.1));
+        for (idx, (mut piece, span)) in pieces.into_iter().enumerate() {
+            match floor {
+                Some((slab, top_m)) if slab == idx => {
+                    let message =
+                        format!("`{}` is the floor: the world is moved down by {:.1} cm", piece.name, 100.0 * top_m);
+                    self.reader.warning_at("W036", span, message, "the floor of every world is at the height 0");
+                    self.world.models.retain(|model| model.name != piece.model);
+                }
+                _ => {
+                    piece.pose.position[2] -= floor.map_or(0.0, |(_, top_m)| top_m);
+                    self.add(piece, span);
+                }
+            }
+        }
+    }
+
+    /// The height of a slab on which at least half of the other models are; `None` if it is none.
+    fn top_of_floor(&self, piece: &Furniture, pieces: &[(Furniture, Span)]) -> Option<f64> {
+        let model = self.model_of(&piece.model)?;
+        let foot_m = piece.pose.position[2];
+        let top_m = foot_m + model.size_m[2];
+        if !building::is_large(model) || foot_m > LOW_M || !(LOW_M..SLAB_M).contains(&top_m) {
+            return None;
+        }
+        let from_world = piece.pose.to_isometry().inverse();
+        let is_on_it = |(other, _): &&(Furniture, Span)| {
+            let at = from_world * Point3::from(other.pose.position);
+            (0..2).all(|axis| at[axis].abs() <= model.size_m[axis] / 2.0)
+        };
+        // It is itself one of those on it.
+        (2 * pieces.iter().filter(is_on_it).count() > pieces.len()).then_some(top_m)
+    }
+
+    fn model_of(&self, name: &str) -> Option<&ObjectModel> {
+        let own = self.world.models.iter().find(|model| model.name == name);
+        own.or_else(|| self.included.models.get(name).map(|model| &**model))
+    }
+
+    fn add(&mut self, piece: Furniture, span: Span) {
         let own = self.world.models.iter().position(|model| model.name == piece.model);
         let model = match own {
             Some(idx) => Some(&self.world.models[idx]),
@@ -124,47 +173,79 @@ impl Gathering<'_> {
         };
         if model.is_some_and(|model| piece.pose.position[2] + model.size_m[2] < LOW_M) {
             let message = format!("`{}` rises less than 5 mm above the floor, and is left out", piece.name);
-            self.reader.warning("W036", node, message, "robots drive over carpets and markings");
+            self.reader.warning_at("W036", span, message, "robots drive over carpets and markings");
             if let Some(idx) = own {
                 self.world.models.remove(idx);
             }
             return;
         }
-        if let Some(building) = model.filter(|model| is_building(model)).cloned() {
-            if let Some(idx) = own {
-                self.world.models.remove(idx);
-            }
-            return self.add_solids(&piece, building, node);
+        let [x, y, z] = piece.pose.position;
+        if libm::hypot(x, y).max(z) > FARTHEST_M && !model.is_some_and(building::is_large) {
+            return self.leave_out_distant(&piece, own, span);
         }
-        self.world.map.locations.extend(front(&piece, model));
-        self.add_piece(piece, node);
+        match model.map(|model| building::solids(model, &piece.pose.to_isometry())) {
+            Some(Split::Solids(solids)) => {
+                let Some(building) = model.cloned() else { return };
+                if let Some(idx) = own {
+                    self.world.models.remove(idx);
+                }
+                return self.add_solids(&piece, &building, solids, &span);
+            }
+            Some(Split::TooMany(count)) => {
+                let message = format!("`{}` is one obstacle: no drive leads into the box around it", piece.name);
+                let help = format!(
+                    "give it a collision mesh of fewer flat faces; it has {count}, and at most {} become obstacles of their own",
+                    building::MOST_SOLIDS
+                );
+                self.reader.warning_at("W036", span.clone(), message, help);
+            }
+            Some(Split::Whole) | None => {}
+        }
+        self.whole.push((self.world.map.furniture.len(), span.clone()));
+        self.add_piece(piece, span);
     }
 
-    fn add_piece(&mut self, piece: Furniture, node: Node) {
+    fn leave_out_distant(&mut self, piece: &Furniture, own: Option<usize>, span: Span) {
+        let [x, y, z] = piece.pose.position;
+        let message =
+            format!("`{}` at ({x:.1}, {y:.1}, {z:.1}) is beyond the end of the floor, and is left out", piece.name);
+        self.reader.warning_at("W036", span, message, "the floor ends 14 m from the origin");
+        if let Some(idx) = own {
+            self.world.models.remove(idx);
+        }
+    }
+
+    /// Adds the locations, once all furniture is known.
+    fn add_fronts(&mut self) {
+        let pieces = self.whole.iter().map(|(idx, _)| *idx);
+        let without = fronts::add_fronts(&mut self.world, self.included.models, pieces);
+        let place = self.whole.iter().find(|(idx, _)| without.contains(idx)).map(|(_, span)| span.clone());
+        if let Some(span) = place {
+            let names: Vec<String> =
+                without.iter().map(|idx| format!("`{}`", self.world.map.furniture[*idx].name)).collect();
+            let message = format!("no side with room for a robot, and therefore no location: {}", names.join(", "));
+            let help = "a place 0.69 m from the surface must be 0.4 m away from all other furniture";
+            self.reader.warning_at("W036", span, message, help);
+        }
+    }
+
+    fn add_piece(&mut self, piece: Furniture, span: Span) {
         if self.world.map.furniture.iter().any(|other| other.name == piece.name) {
             let message = format!("there are two `{}`", piece.name);
-            self.reader.error("W041", node, message, "give one of them another name");
+            self.reader.error_at("W041", span, message, "give one of them another name");
         }
         self.world.map.furniture.push(piece);
     }
 
     /// Adds each solid of a building as a piece of its own: the robot's map has a box for each piece, and the box of a
     /// whole building would be around the robot.
-    fn add_solids(&mut self, piece: &Furniture, building: ObjectModel, node: Node) {
-        let at = piece.pose.to_isometry();
-        // The doors of a building stay as in the file.
-        let moving = building.moving.iter().flat_map(|part| {
-            let at = part.pose.to_isometry();
-            let placed = move |solid: &Part| Pose::from_isometry(&(at * solid.pose.to_isometry()));
-            part.model.parts.iter().map(move |solid| Part { pose: placed(solid), ..solid.clone() })
-        });
-        let parts: Vec<Part> = building.parts.iter().cloned().chain(moving).collect();
-        for (number, part) in (1..).zip(parts) {
+    fn add_solids(&mut self, piece: &Furniture, building: &ObjectModel, solids: Vec<Solid>, span: &Span) {
+        for (number, solid) in (1..).zip(solids) {
             let (friction, restitution) = (Some(building.friction), Some(building.restitution));
-            let body = Body { parts: vec![part], friction, restitution, fixed: true, ..Body::default() };
+            let body = Body { parts: vec![solid.part], friction, restitution, fixed: true, ..Body::default() };
             let digest = digest_of(&format!("{} {number}", building.digest));
-            let solid = self.place(body, digest, &at, &format!("{}_{number}", piece.name));
-            self.add_piece(solid, node);
+            let placed = self.place(body, digest, &solid.at, &format!("{}_{number}", piece.name));
+            self.add_piece(placed, span.clone());
         }
     }
 
@@ -236,7 +317,7 @@ impl Gathering<'_> {
             self.warn_if_movable(!piece.moves, &piece.name, root);
             model.body.fixed = true;
             let furniture = self.place(model.body, model.digest, &Isometry3::identity(), &piece.name);
-            self.add(furniture, root);
+            self.pieces.push((furniture, xml::span(root)));
         }
     }
 
@@ -261,22 +342,6 @@ impl Gathering<'_> {
     }
 }
 
-/// Whether a model is so large that it may be around the robot, and consists of several solids.
-fn is_building(model: &ObjectModel) -> bool {
-    model.size_m[..2].iter().all(|extent| *extent > ROOM_M) && (2..=MOST_PIECES).contains(&model.parts.len())
-}
-
 fn upright(at: &Isometry3<f64>, foot: Point3<f64>) -> Pose {
     Pose::upright([foot.x, foot.y, foot.z], Pose::from_isometry(at).yaw())
-}
-
-/// Returns the location in front of a surface, from which a robot can work on it.
-fn front(piece: &Furniture, model: Option<&ObjectModel>) -> Option<Location> {
-    let surface = model?.surface?;
-    let at = piece.pose.to_isometry() * Point3::new(-surface.size_m[0] / 2.0 - FRONT_GAP_M, 0.0, 0.0);
-    Some(Location {
-        name: format!("{}_front", piece.name),
-        at: [at.x, at.y, piece.pose.yaw()],
-        surface: Some(piece.name.clone()),
-    })
 }

@@ -138,17 +138,27 @@ impl<'a> Reader<'a> {
 
     /// Records an error of an element. Those after the first 200 are dropped, as are warnings.
     pub(crate) fn error(&mut self, code: &'static str, node: Node, message: String, help: impl Into<String>) {
+        self.error_at(code, span(node), message, help);
+    }
+
+    /// Records an error about a place in the text.
+    pub(crate) fn error_at(&mut self, code: &'static str, span: Span, message: String, help: impl Into<String>) {
         self.n_errors += 1;
         if self.n_errors <= MOST_FAULTS {
-            self.found.push(Diagnostic::error(code, message).at(self.source, span(node)).help(help));
+            self.found.push(Diagnostic::error(code, message).at(self.source, span).help(help));
         }
     }
 
     /// Records a warning about an element, usually that it is ignored.
     pub(crate) fn warning(&mut self, code: &'static str, node: Node, message: String, help: impl Into<String>) {
+        self.warning_at(code, span(node), message, help);
+    }
+
+    /// Records a warning about a place in the text.
+    pub(crate) fn warning_at(&mut self, code: &'static str, span: Span, message: String, help: impl Into<String>) {
         self.n_warnings += 1;
         if self.n_warnings <= MOST_FAULTS {
-            self.found.push(Diagnostic::warning(code, message).at(self.source, span(node)).help(help));
+            self.found.push(Diagnostic::warning(code, message).at(self.source, span).help(help));
         }
     }
 
