@@ -2,11 +2,11 @@
 
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 
-use crate::foreign::world::LOW_M;
+use crate::foreign::world::{FARTHEST_M, LOW_M};
 use actcheck_data::{Face, Mesh, ObjectModel, Part, Pose, Shape};
 
 /// Largest number of solids of a building that become pieces of their own: each is perceived on its own.
-pub(super) const MOST_SOLIDS: usize = 400;
+pub(super) const MOST_SOLIDS: usize = 600;
 /// Shortest length and width of a model that may be around the robot. Unit: metres.
 const ROOM_M: f64 = 2.5;
 /// Shortest length and width of a part of a building that may be around the robot, or around a passage. Unit: metres.
@@ -19,6 +19,9 @@ const CEILING_M: f64 = 2.6;
 const THICKNESS_M: f64 = 0.02;
 /// Narrower faces are left out. Unit: metres. The faces beside them are as thick as that.
 const SLIVER_M: f64 = 0.01;
+/// A component of a smaller volume, as a share of that of a cube with its longest side, is a sheet or a line. A strip of 10 m by 5 cm by
+/// 2 cm is thicker.
+const THIN: f64 = 1e-5;
 /// Meshes with more triangles are not split: scanned surfaces.
 const MOST_TRIANGLES: usize = 20_000;
 
@@ -70,6 +73,22 @@ pub(super) fn is_large(model: &ObjectModel) -> bool {
     model.size_m[..2].iter().all(|extent| *extent > ROOM_M)
 }
 
+/// Whether at least half of a model's top is level, as that of a floor is.
+pub(super) fn is_level(model: &ObjectModel) -> bool {
+    let [length, width, height] = model.size_m;
+    let area = |part: &Part| match mesh_of(&part.shape) {
+        Some(mesh) => {
+            let at = part.pose.to_isometry();
+            mesh.top(height, LOW_M, |point| (at * Point3::from(*point)).coords).area
+        }
+        None => {
+            let (low, high) = part.bounds();
+            if high[2] >= height - LOW_M { (high[0] - low[0]) * (high[1] - low[1]) } else { 0.0 }
+        }
+    };
+    model.parts.iter().map(area).sum::<f64>() >= length * width / 2.0
+}
+
 fn mesh_of(shape: &Shape) -> Option<&Mesh> {
     match shape {
         Shape::Mesh { mesh } => Some(mesh),
@@ -86,14 +105,24 @@ fn split(part: Part, at: &Isometry3<f64>) -> Vec<Solid> {
         .flat_map(|mesh| {
             let whole = Part { pose: part.pose, shape: Shape::Mesh { mesh: mesh.clone() } };
             let (low, high) = whole.bounds();
-            let is_open = [0, 1].iter().all(|axis| high[*axis] - low[*axis] > NICHE_M);
-            if !is_open || mesh.is_convex() {
+            let sides = [0, 1, 2].map(|axis| high[axis] - low[axis]);
+            let is_thin = volume_within(&mesh) < THIN * sides.iter().fold(0.0, |most, side| side.max(most)).powi(3);
+            let is_open = [0, 1].iter().all(|axis| sides[*axis] > NICHE_M);
+            if !is_thin && (!is_open || mesh.is_convex()) {
                 vec![Solid { part: whole, at: *at }]
             } else {
                 plates(&mesh, &from_mesh, at)
             }
         })
         .collect()
+}
+
+/// Volume of a mesh that may be open: of the pyramids from its middle to its triangles. 0 if it is flat. Unit: cubic metres.
+fn volume_within(mesh: &Mesh) -> f64 {
+    let points = || mesh.vertices.iter().map(|vertex| Vector3::from(*vertex));
+    let middle = points().sum::<Vector3<f64>>() / mesh.vertices.len().max(1) as f64;
+    let vertices = points().map(|point| (point - middle).into()).collect();
+    Mesh { vertices, triangles: mesh.triangles.clone() }.volume()
 }
 
 /// The faces of a mesh as plates.
@@ -103,15 +132,18 @@ fn plates(mesh: &Mesh, from_mesh: &Isometry3<f64>, at: &Isometry3<f64>) -> Vec<S
         normal: from_mesh * face.normal,
     });
     let pieces = faces.flat_map(|face| face.cut(DOOR_M)).flatten();
-    let heights = |face: &Face| {
-        face.corners
-            .iter()
-            .map(|corner| corner.z)
-            .fold((f64::MAX, f64::MIN), |(low, high), z| (low.min(z), high.max(z)))
-    };
-    let relevant =
-        pieces.filter(|face| face.width() >= SLIVER_M && heights(face).0 < CEILING_M && heights(face).1 >= LOW_M);
+    let relevant = pieces.filter(|face| face.width() >= SLIVER_M && is_within_reach(face));
     relevant.map(|face| plate(&face, at)).collect()
+}
+
+/// Whether a robot can get to a face: it is above the floor, below the ceiling, and not beyond the end of the floor.
+fn is_within_reach(face: &Face) -> bool {
+    let (mut low, mut high) = (face.corners[0], face.corners[0]);
+    for corner in &face.corners {
+        (low, high) = (low.inf(corner), high.sup(corner));
+    }
+    let nearest = Vector3::zeros().sup(&low).inf(&high);
+    low.z < CEILING_M && high.z >= LOW_M && libm::hypot(nearest.x, nearest.y) < FARTHEST_M
 }
 
 /// A face as a plate, in a frame whose x axis is horizontal and across it: its box on the map is thin.

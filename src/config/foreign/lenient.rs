@@ -6,13 +6,17 @@
 use std::borrow::Cow;
 use std::collections::BTreeSet;
 
-/// Returns the text with three kinds of faults replaced: `--` in comments, an XML declaration after comments, and names
-/// with an undeclared prefix (`gz:resolution` becomes `gz_resolution`).
+/// Returns the text with four kinds of faults replaced: `--` in comments, an XML declaration after comments, names
+/// with an undeclared prefix (`gz:resolution` becomes `gz_resolution`), and `&` that begins no reference, which becomes `+`.
 pub(crate) fn repaired(text: &str) -> Cow<'_, str> {
     let mut bytes = text.as_bytes().to_vec();
     let mut prefixes = Prefixes::default();
     let mut is_before_elements = true;
     let mut at = 0;
+    let replace_ampersands = |bytes: &mut [u8], from: usize, to: usize| {
+        let bare = text[from..to].match_indices('&').filter(|(offset, _)| !is_reference(&text[from + offset + 1..to]));
+        bare.for_each(|(offset, _)| bytes[from + offset] = b'+');
+    };
     while let Some(start) = text[at..].find('<').map(|offset| at + offset) {
         is_before_elements &= text[at..start].trim_start_matches('\u{feff}').trim().is_empty();
         let rest = &text[start..];
@@ -33,8 +37,11 @@ pub(crate) fn repaired(text: &str) -> Cow<'_, str> {
             end
         } else {
             is_before_elements = false;
-            prefixes.read_tag(rest, start)
+            let end = prefixes.read_tag(rest, start);
+            replace_ampersands(&mut bytes, start, start + end);
+            end
         };
+        replace_ampersands(&mut bytes, at, start);
         at = start + end;
     }
     for colon in prefixes.undeclared() {
@@ -45,6 +52,12 @@ pub(crate) fn repaired(text: &str) -> Cow<'_, str> {
     }
     // Only whole comments, whole declarations and single ASCII characters were replaced.
     String::from_utf8(bytes).map_or(Cow::Borrowed(text), Cow::Owned)
+}
+
+/// Whether a text continues a reference after its `&`: `amp;` or `#38;`.
+fn is_reference(text: &str) -> bool {
+    let name = text.split_once(';').map_or("", |(name, _)| name);
+    !name.is_empty() && name.chars().all(|letter| letter.is_alphanumeric() || "#_.-".contains(letter))
 }
 
 /// Returns the position after `end` in a text, searched from a position; that of the text's end if there is none.
@@ -113,13 +126,14 @@ mod tests {
             ("<a><!--x--->\n</a>", "<a>         \n</a>"),
             ("<!-- by me -->\n<?xml version=\"1.0\"?><a/>", "<!-- by me -->\n                     <a/>"),
             ("<a gz:b='c:d'><gz:e>f:g</gz:e></a>", "<a gz_b='c:d'><gz_e>f:g</gz_e></a>"),
+            ("<a b='c & d;'>e & f &amp; g&#38;&h</a>", "<a b='c + d;'>e + f &amp; g&#38;+h</a>"),
             ("<a xmlns:gz='u'><gz:e/><ign:f/></a>", "<a xmlns:gz='u'><gz:e/><ign_f/></a>"),
         ] {
             assert_eq!(repaired(text), expected);
             roxmltree::Document::parse(expected).expect("it is XML now");
         }
         for text in [
-            "<?xml version=\"1.0\"?><a xml:b=\"c\"><!-- d - e --><![CDATA[<!-- x -- y -->]]></a>",
+            "<?xml version=\"1.0\"?><a xml:b=\"c\"><!-- d - e --><![CDATA[<!-- x & y -->]]></a>",
             "<a>b < c</a>",
             "<a",
             "<!--",

@@ -67,7 +67,7 @@ pub(super) const LOW_M: f64 = 5e-3;
 const SLAB_M: f64 = 0.3;
 
 /// Farther things are left out. Unit: metres. The radius of the floor, less that of furniture.
-const FARTHEST_M: f64 = 14.0;
+pub(super) const FARTHEST_M: f64 = 14.0;
 
 /// Reads a world in SDF or MJCF. It is `None` if there are errors.
 ///
@@ -148,7 +148,11 @@ impl Gathering<'_> {
         let model = self.model_of(&piece.model)?;
         let foot_m = piece.pose.position[2];
         let top_m = foot_m + model.size_m[2];
-        if !building::is_large(model) || foot_m > LOW_M || !(LOW_M..SLAB_M).contains(&top_m) {
+        if !building::is_large(model)
+            || foot_m > LOW_M
+            || !(LOW_M..SLAB_M).contains(&top_m)
+            || !building::is_level(model)
+        {
             return None;
         }
         let from_world = piece.pose.to_isometry().inverse();
