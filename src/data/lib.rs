@@ -36,7 +36,7 @@ pub use mesh::{Mesh, Top};
 pub use model::{Inertia, MovingPart, ObjectModel, Rim, Surface};
 pub use motion::{JointMoment, Motion, MotionRow};
 pub use part_joint::PartJoint;
-pub use places::{Location, OVERHEAD_M, Room};
+pub use places::{FLOOR_M, Location, OVERHEAD_M, Room};
 pub use pose::Pose;
 pub use quality::Quality;
 pub use robot::{LEAST_LINK_KG, RobotProfile, RobotView, Suction};

@@ -2,6 +2,9 @@
 
 use serde::{Deserialize, Serialize};
 
+/// Radius of the floor on which a base can be. Unit: metres. Frame: world. A body that is a metre farther out has left the world.
+pub const FLOOR_M: f64 = 13.0;
+
 /// Robots drive below furniture that begins higher above the floor, such as lintels, lamps and ceilings. Unit: metres. The height
 /// of a door, less rounding.
 pub const OVERHEAD_M: f64 = 1.99;

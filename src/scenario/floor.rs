@@ -12,8 +12,8 @@ use crate::overlap::Solid;
 use crate::placement::Reach;
 use crate::surroundings::Surroundings;
 use actcheck_data::{
-    ChoiceName, Location, ObjectAxis, ObjectModel, Part, PlacedObject, Pose, Role, SceneMap, SceneObject, Shape,
-    StartAxis, Surface,
+    ChoiceName, FLOOR_M, Location, ObjectAxis, ObjectModel, Part, PlacedObject, Pose, Role, SceneMap, SceneObject,
+    Shape, StartAxis, Surface,
 };
 
 /// Gap between the surface's edge and the centre of the robot's base. Unit: metres. Shape: minimum, nominal, maximum.
@@ -172,10 +172,12 @@ impl SceneBuilder<'_> {
         let rooms = world.map_or(&[][..], |world| &world.map.rooms);
         let around = goal.map(|goal| FloorAround::new(&self.objects, rooms, goal));
         let leads = |base: &[f64; 3]| around.as_ref().is_none_or(|around| around.leads_from(base));
-        let nominal = goal.map_or([0.0; 3], |goal| self.nominal_start(goal, (low, high), &leads));
-        let is_far =
-            |base: &[f64; 3]| goal.is_none_or(|goal| libm::hypot(base[0] - goal[0], base[1] - goal[1]) >= DRIVE_M);
-        self.start_about(ranges, nominal, is_far, leads)
+        let nominal = goal.map_or([0.0; 3], |goal| self.nominal_start(goal, (low, high), leads));
+        let serves = |base: &[f64; 3]| {
+            let is_far = goal.is_none_or(|goal| libm::hypot(base[0] - goal[0], base[1] - goal[1]) >= DRIVE_M);
+            is_far && libm::hypot(base[0], base[1]) <= FLOOR_M
+        };
+        self.start_about(ranges, nominal, serves, leads)
     }
 
     /// The first free place around the goal, beginning straight behind it.

@@ -4,14 +4,14 @@ use nalgebra::{Isometry3, Point3};
 
 use crate::memory::Standing;
 use crate::route::length;
-use actcheck_data::Room;
+use actcheck_data::{FLOOR_M, Room};
 use actcheck_scenario::{FloorPlan, Outline};
 
 /// Edge of a cell. Unit: metres.
 pub const CELL_M: f64 = 0.05;
 /// Width of the floor around the map that belongs to the grid. Unit: metres.
 const AROUND_M: f64 = 2.0;
-/// Longest side of a grid. Unit: cells. Worlds are 24 m wide.
+/// Longest side of a grid. Unit: cells. That of the whole floor is 600.
 const MOST_CELLS: usize = 640;
 /// Number of points in a cell from which one picture counts it as occupied: fewer are noise.
 const HITS: u16 = 3;
@@ -81,6 +81,8 @@ impl Grid {
                 high[axis] = high[axis].max(point[axis] + AROUND_M);
             }
         }
+        // Furniture may be beyond the end of the floor.
+        (low, high) = (low.map(|end| end.max(-FLOOR_M - AROUND_M)), high.map(|end| end.min(FLOOR_M + AROUND_M)));
         let [columns, rows] = [0, 1].map(|axis| {
             #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a few hundred cells")]
             let count = ((high[axis] - low[axis]) / CELL_M).ceil().clamp(1.0, MOST_CELLS as f64) as usize;

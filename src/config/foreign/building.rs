@@ -35,7 +35,7 @@ pub(super) struct Solid {
 
 /// The result of splitting.
 pub(super) enum Split {
-    /// It is not a building: too small, or one convex solid.
+    /// Too small for a building, or one convex solid.
     Whole,
     Solids(Vec<Solid>),
     /// A building of too many solids, and how many.
@@ -60,12 +60,13 @@ pub(super) fn solids(model: &ObjectModel, at: &Isometry3<f64>) -> Split {
     if n_triangles > MOST_TRIANGLES {
         return Split::TooMany(n_triangles);
     }
-    let solids: Vec<Solid> = parts.into_iter().flat_map(|part| split(part, at)).collect();
-    match solids.len() {
-        0 | 1 => Split::Whole,
-        count if count > MOST_SOLIDS => Split::TooMany(count),
-        _ => Split::Solids(solids),
+    if let [only] = &parts[..]
+        && mesh_of(&only.shape).is_none_or(|mesh| mesh.components().len() == 1 && mesh.is_convex())
+    {
+        return Split::Whole;
     }
+    let solids: Vec<Solid> = parts.into_iter().flat_map(|part| split(part, at)).collect();
+    if solids.len() > MOST_SOLIDS { Split::TooMany(solids.len()) } else { Split::Solids(solids) }
 }
 
 /// Whether a model may be around the robot, or below it.

@@ -9,7 +9,7 @@ use nalgebra::{Isometry3, Matrix3, Point3, Translation3, UnitQuaternion, Vector3
 use crate::Furniture;
 use crate::foreign::world::{LOW_M, World};
 use actcheck_base::digest_of;
-use actcheck_data::{Inertia, Location, OVERHEAD_M, ObjectModel, Part, Pose, Surface, bounds};
+use actcheck_data::{FLOOR_M, Inertia, Location, OVERHEAD_M, ObjectModel, Part, Pose, Surface, bounds};
 
 /// Distance between the edge of a surface and the middle of the base of a robot working at it. Unit: metres.
 const FRONT_GAP_M: f64 = 0.69;
@@ -84,12 +84,15 @@ fn has_room<'a, I: Iterator<Item = &'a Obstacle>>(
     let at = |gap_m: f64| pose.to_isometry() * Point3::from(out * (edge_m + gap_m));
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a few dozen steps")]
     let n_steps = (FRONT_GAP_M / STEP_M) as u32;
+    let place = at(FRONT_GAP_M);
+    if libm::hypot(place.x, place.y) > FLOOR_M {
+        return false;
+    }
     let is_open = |other: &Obstacle| {
-        other.distance(&at(FRONT_GAP_M)) >= ROOM_M
-            && (1..n_steps).all(|step| other.distance(&at(f64::from(step) * STEP_M)) > 0.0)
+        other.distance(&place) >= ROOM_M && (1..n_steps).all(|step| other.distance(&at(f64::from(step) * STEP_M)) > 0.0)
     };
     // A model may be wider below its surface, or have a back.
-    own.is_none_or(|own| own.distance(&at(FRONT_GAP_M)) >= ROOM_M) && others().all(is_open)
+    own.is_none_or(|own| own.distance(&place) >= ROOM_M) && others().all(is_open)
 }
 
 fn quarter_turn(turns: u8) -> UnitQuaternion<f64> {

@@ -121,47 +121,50 @@ struct Gathering<'a> {
 }
 
 impl Gathering<'_> {
-    /// Adds all models. If a slab is the floor of the world, everything is moved down until its top is at height 0.
+    /// Adds all models. If slabs are the floor of the world, everything is moved down until their tops are at height 0.
     fn add_all(&mut self) {
         let pieces = std::mem::take(&mut self.pieces);
-        let floor =
-            pieces.iter().enumerate().filter_map(|(idx, (piece, _))| Some((idx, self.top_of_floor(piece, &pieces)?)));
-        let floor = floor.max_by(|one, other| one.1.total_cmp(&other.1));
-        for (idx, (mut piece, span)) in pieces.into_iter().enumerate() {
-            match floor {
-                Some((slab, top_m)) if slab == idx => {
-                    let message =
-                        format!("`{}` is the floor: the world is moved down by {:.1} cm", piece.name, 100.0 * top_m);
-                    self.reader.warning_at("W036", span, message, "the floor of every world is at the height 0");
-                    self.world.models.retain(|model| model.name != piece.model);
-                }
-                _ => {
-                    piece.pose.position[2] -= floor.map_or(0.0, |(_, top_m)| top_m);
-                    self.add(piece, span);
-                }
-            }
+        let tops: Vec<Option<f64>> = pieces.iter().map(|(piece, _)| self.top_of_slab(piece)).collect();
+        let floor_m = self.height_of_floor(&pieces, &tops);
+        if let Some((top_m, (piece, span))) = floor_m.and_then(|top_m| {
+            let slab = tops.iter().position(|top| *top == Some(top_m))?;
+            Some((top_m, &pieces[slab]))
+        }) {
+            let message = format!("`{}` is the floor: the world is moved down by {:.1} cm", piece.name, 100.0 * top_m);
+            self.reader.warning_at("W036", span.clone(), message, "the floor of every world is at the height 0");
+        }
+        for (mut piece, span) in pieces {
+            piece.pose.position[2] -= floor_m.unwrap_or(0.0);
+            self.add(piece, span);
         }
     }
 
-    /// The height of a slab on which at least half of the other models are; `None` if it is none.
-    fn top_of_floor(&self, piece: &Furniture, pieces: &[(Furniture, Span)]) -> Option<f64> {
-        let model = self.model_of(&piece.model)?;
+    /// The height of a slab that may be a floor; `None` for other models.
+    fn top_of_slab(&self, piece: &Furniture) -> Option<f64> {
+        let model = self.model_of(&piece.model).filter(|model| building::is_large(model))?;
         let foot_m = piece.pose.position[2];
         let top_m = foot_m + model.size_m[2];
-        if !building::is_large(model)
-            || foot_m > LOW_M
-            || !(LOW_M..SLAB_M).contains(&top_m)
-            || !building::is_level(model)
-        {
-            return None;
-        }
-        let from_world = piece.pose.to_isometry().inverse();
-        let is_on_it = |(other, _): &&(Furniture, Span)| {
-            let at = from_world * Point3::from(other.pose.position);
-            (0..2).all(|axis| at[axis].abs() <= model.size_m[axis] / 2.0)
+        (foot_m <= LOW_M && (LOW_M..SLAB_M).contains(&top_m) && building::is_level(model)).then_some(top_m)
+    }
+
+    /// The height of slabs on which more than half of the models around the origin are, if there are such slabs.
+    fn height_of_floor(&self, pieces: &[(Furniture, Span)], tops: &[Option<f64>]) -> Option<f64> {
+        let is_on = |at: [f64; 3], slab: &Furniture| {
+            let local = slab.pose.to_isometry().inverse() * Point3::from(at);
+            let size = self.model_of(&slab.model).map_or([0.0; 3], |model| model.size_m);
+            (0..2).all(|axis| local[axis].abs() <= size[axis] / 2.0)
         };
-        // It is itself one of those on it.
-        (2 * pieces.iter().filter(is_on_it).count() > pieces.len()).then_some(top_m)
+        let places: Vec<[f64; 3]> = pieces.iter().map(|(piece, _)| piece.pose.position).collect();
+        let near: Vec<&[f64; 3]> = places.iter().filter(|[x, y, _]| libm::hypot(*x, *y) <= FARTHEST_M).collect();
+        let n_on = |top_m: f64| {
+            let slabs =
+                || pieces.iter().zip(tops).filter(|(_, top)| top.is_some_and(|top| (top - top_m).abs() < LOW_M));
+            near.iter().filter(|at| slabs().any(|((slab, _), _)| is_on(***at, slab))).count()
+        };
+        let counted = tops.iter().flatten().map(|top_m| (n_on(*top_m), *top_m));
+        let best = counted.max_by(|one, other| one.0.cmp(&other.0).then(one.1.total_cmp(&other.1)));
+        // The slabs are among those on them.
+        best.filter(|(count, _)| 2 * count > near.len()).map(|(_, top_m)| top_m)
     }
 
     fn model_of(&self, name: &str) -> Option<&ObjectModel> {
