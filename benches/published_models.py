@@ -91,6 +91,23 @@ def check_world(args, world, number):
     return (reason(errors), "") if errors else ("", "")
 
 
+def prepare(args):
+    """Empties the folder to work in, and collects the models by name. Returns the `model.config` files of each folder."""
+    args.program = str(Path(args.program).resolve())
+    args.work = args.work.resolve()
+    shutil.rmtree(args.work, ignore_errors=True)
+    configs = {folder.resolve(): sorted(folder.resolve().rglob("model.config")) for folder in args.folders}
+    args.models = {}
+    for model in (config.parent for found in configs.values() for config in found):
+        args.models.setdefault(model.name, []).append(model)
+    return configs
+
+
+def worlds_below(folder):
+    """The files with a world."""
+    return [path for kind in ("*.world", "*.sdf") for path in sorted(folder.rglob(kind)) if has_world(path)]
+
+
 def has_world(path):
     return "<world" in path.read_text(errors="replace")
 
@@ -102,19 +119,13 @@ def main():
     parser.add_argument("--work", required=True, type=Path)
     parser.add_argument("--jobs", type=int, default=2)
     args = parser.parse_args()
-    args.program = str(Path(args.program).resolve())
-    args.work = args.work.resolve()
-    shutil.rmtree(args.work, ignore_errors=True)
-    folders = [folder.resolve() for folder in args.folders]
-    configs = {folder: sorted(folder.rglob("model.config")) for folder in folders}
-    args.models = {}
-    for model in (config.parent for found in configs.values() for config in found):
-        args.models.setdefault(model.name, []).append(model)
+    configs = prepare(args)
+    folders = list(configs)
     pool = ThreadPoolExecutor(args.jobs)
     number = 0
     for folder in folders:
         models = [config.parent for config in configs[folder]]
-        worlds = [path for kind in ("*.world", "*.sdf") for path in sorted(folder.rglob(kind)) if has_world(path)]
+        worlds = worlds_below(folder)
         refusals = list(pool.map(lambda item: check_model(args, *item), zip(models, range(number, number + len(models)))))
         number += len(models)
         for model, refusal in zip(models, refusals):

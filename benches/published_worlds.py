@@ -80,16 +80,8 @@ def main():
     parser.add_argument("--only", default="", help="regular expression of the names of worlds")
     parser.add_argument("--jobs", type=int, default=2)
     args = parser.parse_args()
-    args.program = str(Path(args.program).resolve())
-    args.work = args.work.resolve()
-    shutil.rmtree(args.work, ignore_errors=True)
-    folders = [folder.resolve() for folder in args.folders]
-    args.models = {}
-    for folder in folders:
-        for config in sorted(folder.rglob("model.config")):
-            args.models.setdefault(config.parent.name, []).append(config.parent)
-    worlds = [path for folder in folders for kind in ("*.world", "*.sdf") for path in sorted(folder.rglob(kind))
-              if published_models.has_world(path) and re.search(args.only, path.name)]
+    folders = published_models.prepare(args)
+    worlds = [path for folder in folders for path in published_models.worlds_below(folder) if re.search(args.only, path.name)]
     total = Counter()
 
     def report(item):

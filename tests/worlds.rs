@@ -151,8 +151,8 @@ fn house_mesh() -> String {
     vertices.concat() + &faces.collect::<String>()
 }
 
-/// Regression: the box around the house was an obstacle, and each drive inside failed: "there is no free path". So did its ceiling, and
-/// its floor, which is a slab.
+/// Regression: the box around the house was an obstacle, and each drive inside failed: "there is no free path". The ceiling and the
+/// slab below the house were obstacles, too.
 #[test]
 fn a_robot_drives_in_a_house_of_one_mesh() {
     let folder = tempfile::tempdir().unwrap();
