@@ -1,7 +1,8 @@
 //! Third-party models: folders in Gazebo's layout, SDF, URDF, and their mesh files.
 //!
 //! An element that the simulation does not support is an error if it changes the model, and a warning if the model
-//! works without it. Never: ignores an element silently, decomposes a mesh, or guesses a category.
+//! works without it. The faces of a building become plates. Never: ignores an element silently, decomposes a mesh by its volume, or
+//! guesses a category.
 
 mod assembly;
 mod body;

@@ -18,7 +18,7 @@ use crate::foreign::xml::{self, Node, Reader};
 use crate::foreign::{folder, fronts, mjcf_world, sdf, urdf};
 use crate::{Furniture, WorldMap};
 use actcheck_base::{Diagnostics, Severity, Source, Span, digest_of};
-use actcheck_data::{ObjectModel, Pose};
+use actcheck_data::{FLOOR_M, ObjectModel, Pose};
 
 /// Elements of a world that are read, or that do not affect its geometry: light, Gazebo's display and time steps.
 const KNOWN: [&str; 16] = [
@@ -66,8 +66,8 @@ pub(super) const LOW_M: f64 = 5e-3;
 /// A higher slab is furniture, such as a stage, and not the floor. Unit: metres.
 const SLAB_M: f64 = 0.3;
 
-/// Farther things are left out. Unit: metres. The radius of the floor, less that of furniture.
-pub(super) const FARTHEST_M: f64 = 14.0;
+/// Farther things are left out: bodies there have left the world. Unit: metres.
+pub(super) const FARTHEST_M: f64 = FLOOR_M + 1.0;
 
 /// Reads a world in SDF or MJCF. It is `None` if there are errors.
 ///
