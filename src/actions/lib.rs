@@ -18,6 +18,7 @@ mod misperception;
 mod motion;
 mod navigate;
 mod operator;
+mod pace;
 mod perceive;
 mod perform;
 mod pick;

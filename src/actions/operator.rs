@@ -5,6 +5,7 @@ use nalgebra::Isometry3;
 use crate::controls::Drives;
 use crate::grip::GripWatch;
 use crate::memory::{Held, Memory, Standing};
+use crate::pace::Course;
 use crate::place::carried_n;
 use crate::sabotage::IDLE_SECS;
 use crate::{Cut, ExternalFault, Saboteur};
@@ -30,11 +31,6 @@ pub enum Interrupt {
     /// A fault of the external skill.
     ExternalSkill(ExternalFault),
 }
-
-/// Share of a joint's velocity limit that skills use, so that the controller can catch up.
-const SPEED_SHARE: f64 = 0.9;
-/// Peak over mean speed of a motion that starts and ends at rest (of 3s² − 2s³).
-const PEAK_OVER_MEAN: f64 = 1.5;
 
 /// A joint this far behind its target is held back. Unit: metres. Three times the lag of a joint that carries a load.
 const HELD_BACK_M: f64 = 0.03;
@@ -350,15 +346,13 @@ impl<'a> Operator<'a> {
     ) -> Result<bool, Interrupt> {
         let mut course = vec![self.command.positions.clone()];
         course.extend_from_slice(path);
-        let legs: Vec<f64> = course.windows(2).map(|pair| self.leg_secs(&pair[0], &pair[1])).collect();
-        let shortest: f64 = legs.iter().sum();
-        let secs = (shortest * PEAK_OVER_MEAN / SPEED_SHARE).max(least_secs);
         let tick = self.world.tick_secs();
+        let course = Course::new(course, self.kinematics());
+        let secs = course.secs(self.kinematics(), &self.layout().arm, least_secs, tick);
         let (mut time, mut behind_secs) = (0.0, 0.0);
         while time < secs {
             time += tick;
-            let s = (time / secs).min(1.0);
-            self.command.positions = along(&course, &legs, shortest * s * s * (3.0 - 2.0 * s));
+            self.command.positions = course.at(time, secs);
             self.tick()?;
             let positions = self.observe().positions;
             if let Some(behind) = self.held_back(&positions, self.layout().arm.iter()) {
@@ -483,22 +477,4 @@ impl<'a> Operator<'a> {
         }
         Ok(())
     }
-
-    /// Shortest time between two postures at the joints' velocity limits. Unit: seconds.
-    fn leg_secs(&self, from: &[f64], to: &[f64]) -> f64 {
-        let joints = self.kinematics().joints().iter().zip(from.iter().zip(to));
-        joints.map(|(joint, (a, b))| (b - a).abs() / joint.velocity.max(1e-3)).fold(0.0, f64::max)
-    }
-}
-
-/// The posture at a time along a path whose legs take the given times at full speed.
-fn along(course: &[Vec<f64>], legs: &[f64], mut time: f64) -> Vec<f64> {
-    for (pair, leg) in course.windows(2).zip(legs) {
-        if time <= *leg && *leg > 0.0 {
-            let share = time / leg;
-            return pair[0].iter().zip(&pair[1]).map(|(a, b)| a + (b - a) * share).collect();
-        }
-        time -= leg;
-    }
-    course.last().cloned().unwrap_or_default()
 }

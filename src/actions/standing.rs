@@ -44,6 +44,8 @@ const SHORT_LIFTS_M: [f64; 3] = [0.12, 0.09, 0.06];
 const SHORT_APPROACH_M: f64 = 0.08;
 /// How far a hand whose fingers would touch the object is moved across, in order of preference. Unit: metres.
 const ASIDE_M: [f64; 5] = [0.0, 0.006, -0.006, 0.012, -0.012];
+/// Clearances at the object and on the way from it.
+const LEAST_ROOM: Room = Room { furniture_m: FURNITURE_CLEAR_M, things_m: LEAST_CLEAR_M };
 /// Distances to retreat with the object, in order of preference. Unit: metres.
 const RETREATS_M: [f64; 2] = [0.1, 0.05];
 
@@ -290,9 +292,8 @@ impl<'a> Arm<'a> {
             if !clear_of_itself {
                 return Err(Hindrance::Itself { links: self.meanwhile.touching(&posture) });
             }
-            let lack_m = (FURNITURE_CLEAR_M - room.furniture_m).max(LEAST_CLEAR_M - room.things_m);
-            let is_free = room.furniture_m >= FURNITURE_CLEAR_M && room.things_m >= LEAST_CLEAR_M;
-            if !is_free {
+            let lack_m = (LEAST_ROOM.furniture_m - room.furniture_m).max(LEAST_ROOM.things_m - room.things_m);
+            if !room.holds(LEAST_ROOM) {
                 return Err(Hindrance::Blocked { posture, lack_m });
             }
             nearest = nearest.min(room.things_m);
@@ -306,7 +307,9 @@ impl<'a> Arm<'a> {
             std::iter::once(&self.start).chain(&way).zip(&way).map(|(from, to)| self.before.span(from, to)).sum();
         let cost = cost + length * WAY_COST;
         let lifted = lift.last().ok_or(Hindrance::NoLift)?;
-        let retreat = RETREATS_M.iter().find_map(|way| self.straight(lifted, &(back * *way))).unwrap_or_default();
+        let is_free = |path: &Vec<Vec<f64>>| path.iter().all(|posture| self.meanwhile.is_free(posture, LEAST_ROOM));
+        let retreats = RETREATS_M.iter().filter_map(|way| self.straight(lifted, &(back * *way)));
+        let retreat = retreats.into_iter().find(is_free).unwrap_or_default();
         let (drive, reach) = (Vec::new(), Vec::new());
         let plan = Plan { drive, reach, near: way, approach, lift, retreat, cost };
         if cost < bound { Ok(plan) } else { Err(Hindrance::Dearer) }

@@ -95,7 +95,7 @@ impl Env {
         scenario::draw(&self.space, test, &mut Choices::named(values)).ok()
     }
 
-    /// S076 if a shape floats between the fingers.
+    /// S076 if a shape is between the fingers.
     fn obstructed(&self) -> Option<Diagnostic> {
         let robot = &self.campaign.robot;
         if robot.suction.is_some() {
@@ -104,12 +104,12 @@ impl Env {
         let links = world::shapes_between_fingers(robot).ok().filter(|links| !links.is_empty())?;
         let names = links.join("`, `");
         let message = format!(
-            "the shape of `{names}` floats between the fingers of {}: it keeps every object out of the hand",
+            "the shape of `{names}` is between the fingers of {}: it keeps every object out of the hand",
             robot.name,
         );
         let quoted = links.iter().map(|link| format!("\"{link}\"")).collect::<Vec<_>>().join(", ");
         let help =
-            format!("if it only marks a place, write `no_collision_links = [{quoted}]` into the robot's profile");
+            format!("if no real part is there, write `no_collision_links = [{quoted}]` into the robot's profile");
         Some(self.campaign.warning("S076", "robot.profile", message).help(help))
     }
 

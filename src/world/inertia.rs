@@ -6,7 +6,7 @@ use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
 
 use crate::description::{JointKind, RobotModel};
 use crate::factor::Factor;
-use crate::kinematics::{GRAVITY, axis_in_world};
+use crate::kinematics::{GRAVITY, axis_in_world, holding_efforts};
 
 /// The robot's dynamics at one moment.
 pub(super) struct Inertias {
@@ -49,6 +49,36 @@ impl Inertias {
         unit[joint] = 1.0;
         self.factor.get_or_init(|| Factor::new(self.mass.clone(), unit.len())).solve(&mut unit);
         1.0 / unit[joint]
+    }
+}
+
+/// The efforts that a motion needs, at one moment of it. Units: newtons or newton metres.
+pub struct Dynamics {
+    inertias: Inertias,
+    /// Against gravity alone.
+    holding: Vec<f64>,
+}
+
+impl Dynamics {
+    /// Returns the dynamics with the links at these poses and the joints at these velocities.
+    pub(crate) fn new(model: &RobotModel, poses: &[Isometry3<f64>], velocities: &[f64]) -> Self {
+        Self { inertias: inertias(model, poses, velocities), holding: holding_efforts(model, poses) }
+    }
+
+    /// Returns the effort of a joint that accelerates all joints. Units of the accelerations: m/s² or rad/s².
+    pub fn effort_to_accelerate(&self, joint: usize, accelerations: &[f64]) -> f64 {
+        let row = &self.inertias.mass[joint * accelerations.len()..];
+        row.iter().zip(accelerations).map(|(inertia, acceleration)| inertia * acceleration).sum()
+    }
+
+    /// Returns the effort of a joint against centrifugal and Coriolis forces. It grows with the square of the speed.
+    pub fn effort_of_velocity(&self, joint: usize) -> f64 {
+        self.inertias.bias[joint] - self.holding[joint]
+    }
+
+    /// Returns the effort of a joint that carries the weight of its links.
+    pub fn holding_effort(&self, joint: usize) -> f64 {
+        self.holding[joint]
     }
 }
 

@@ -7,6 +7,7 @@ use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3, Vector6
 
 use crate::Gripper;
 use crate::description::{Joint, JointKind, Link, RobotModel};
+use crate::inertia::Dynamics;
 use crate::self_contact::Form;
 use actcheck_data::{Part, Shape};
 
@@ -257,6 +258,11 @@ impl Kinematics {
     /// Returns the forces and torques that compensate gravity. Units: newtons or newton metres. Shape: one per joint.
     pub fn holding_efforts(&self, positions: &[f64]) -> Vec<f64> {
         self.holding_efforts_at(&self.links(positions))
+    }
+
+    /// Returns the efforts that a motion needs with the joints at these positions and velocities.
+    pub fn dynamics(&self, positions: &[f64], velocities: &[f64]) -> Dynamics {
+        Dynamics::new(&self.model, &self.links(positions), velocities)
     }
 
     /// As [`Kinematics::holding_efforts`], with the links at these poses.

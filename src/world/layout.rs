@@ -139,14 +139,14 @@ pub fn outward_push(profile: &RobotProfile, diameter_m: f64) -> Result<Option<f6
     Ok(crate::gripper::outward_push(&model, &named.layout.gripper, named.finger_links, named.grasp, diameter_m))
 }
 
-/// Returns the links of a robot whose collision shapes float between its fingers: nothing can be grasped there.
+/// Returns the links of a robot whose collision shapes are between its fingers: nothing can be grasped there.
 ///
 /// # Errors
 /// As [`check_robot`].
 pub fn shapes_between_fingers(profile: &RobotProfile) -> Result<Vec<String>, WorldError> {
     let model = RobotModel::read(profile)?;
     let named = Named::find(profile, &model)?;
-    Ok(crate::gripper::afloat(&model, named.grasp))
+    Ok(crate::gripper::between_fingers(&model, named.finger_links, named.grasp))
 }
 
 /// Returns the joints of a robot's arm that can't hold its weight by their motors alone. They are simulated as balanced.

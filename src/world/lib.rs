@@ -71,6 +71,7 @@ pub use error::WorldError;
 pub use fault::{Fault, Perturbation, Poison};
 pub use fresh::narrow_phase;
 pub use gripper::Gripper;
+pub use inertia::Dynamics;
 pub use kinematics::{GRAVITY, Kinematics};
 pub use layout::{
     Layout, assumed_efforts, assumed_speeds, balanced_joints, check_robot, grip_limit_n, outward_push,

@@ -31,7 +31,7 @@ impl Room {
     }
 
     /// Whether both clearances are at least these.
-    fn holds(self, least: Self) -> bool {
+    pub fn holds(self, least: Self) -> bool {
         self.furniture_m >= least.furniture_m && self.things_m >= least.things_m
     }
 }

@@ -204,8 +204,9 @@ const CODES_S: &[Code] = &[
     ),
     code(
         "S076",
-        "a collision shape floats between the fingers of the robot",
-        "the URDF marks the middle of the grasp with a small link that collides: objects meet it before the fingers close",
+        "a collision shape is between the fingers of the robot",
+        "the URDF marks the middle of the grasp with a small link that collides, or a coarse shape of another link includes the fingers: \
+         objects meet it before the fingers close",
         "name the link in `no_collision_links` of the robot's profile",
     ),
 ];

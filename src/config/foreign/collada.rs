@@ -23,9 +23,6 @@ const LARGEST_OFFSET: usize = 255;
 /// Longest text of a transform, which is read again for every instance. Unit: bytes.
 const LONGEST_TRANSFORM: usize = 1_000;
 
-/// Unsupported elements with a surface. Lines and points have none, so they are ignored.
-const UNREAD: [&str; 3] = ["trifans", "tristrips", "polygons"];
-
 /// Reads the geometry of a file's scene as one mesh.
 ///
 /// # Errors
@@ -183,10 +180,10 @@ impl<'a> Gathering<'a> {
         let mut geometry = Geometry { positions: Vec::new(), triangles: Vec::new() };
         let Some(mesh) = xml::child(node, "mesh") else { return Ok(geometry) };
         for primitive in mesh.children().filter(|child| child.is_element()) {
+            // Lines and points have no surface.
             match primitive.tag_name().name() {
-                "triangles" | "polylist" => self.primitive(primitive, &mut geometry)?,
-                unread if UNREAD.contains(&unread) => {
-                    return Err((primitive, format!("`<{unread}>` is not supported")));
+                "triangles" | "polylist" | "polygons" | "trifans" | "tristrips" => {
+                    self.primitive(primitive, &mut geometry)?;
                 }
                 _ => {}
             }
@@ -194,39 +191,45 @@ impl<'a> Gathering<'a> {
         Ok(geometry)
     }
 
-    /// Adds triangles, or polygons split into triangle fans.
+    /// Adds triangles, or polygons, fans and strips as triangles.
     fn primitive(&self, primitive: Node<'a>, geometry: &mut Geometry) -> Result<(), Fault<'a>> {
+        if let Some(holes) = xml::child(primitive, "ph") {
+            return Err((holes, "polygons with holes are not supported".to_owned()));
+        }
         let inputs: Vec<Node> = xml::children(primitive, "input").collect();
         let offsets = inputs.iter().map(|input| offset(*input)).collect::<Result<Vec<usize>, _>>()?;
         let stride = offsets.iter().max().map_or(1, |last| last + 1);
         let vertex = inputs.iter().zip(&offsets).find(|(input, _)| input.attribute("semantic") == Some("VERTEX"));
         let (vertex, offset) = vertex.ok_or_else(|| (primitive, "it has no input VERTEX".to_owned()))?;
         let positions = self.positions(*vertex)?;
-        let indices: Vec<usize> = list(xml::child(primitive, "p").unwrap_or(primitive), "p")?;
-        let corners: Vec<usize> = indices.chunks_exact(stride).filter_map(|all| all.get(*offset).copied()).collect();
-        if corners.iter().any(|corner| *corner >= positions.len()) {
-            return Err((primitive, "it refers to a missing vertex".to_owned()));
-        }
+        let corners_of = |node: Node<'a>| -> Result<Vec<usize>, Fault<'a>> {
+            let indices: Vec<usize> = list(node, "p")?;
+            let corners: Vec<usize> = indices.chunks_exact(stride).filter_map(|all| all.get(*offset).copied()).collect();
+            if corners.iter().any(|corner| *corner >= positions.len()) {
+                return Err((primitive, "it refers to a missing vertex".to_owned()));
+            }
+            Ok(corners)
+        };
+        let lists = xml::children(primitive, "p").map(corners_of).collect::<Result<Vec<_>, _>>()?;
         let before = geometry.positions.len();
         if before + positions.len() > MOST_VERTICES {
             return Err((primitive, format!("it has more than {MOST_VERTICES} vertices")));
         }
         geometry.positions.extend(positions);
-        let counts: Vec<usize> = match xml::child(primitive, "vcount") {
-            Some(counts) => list(counts, "vcount")?,
-            None => vec![3; corners.len() / 3],
-        };
-        let mut rest = corners.as_slice();
-        for count in counts {
-            let Some((polygon, behind)) = rest.split_at_checked(count) else {
-                return Err((primitive, "`<vcount>` counts more corners than `<p>` lists".to_owned()));
-            };
-            rest = behind;
-            for pair in polygon.get(1..).unwrap_or_default().windows(2) {
+        let pieces = pieces(primitive, &lists)?;
+        let is_strip = primitive.tag_name().name() == "tristrips";
+        for piece in pieces {
+            for (idx, pair) in piece.get(1..).unwrap_or_default().windows(2).enumerate() {
                 if geometry.triangles.len() >= MOST_TRIANGLES {
                     return Err((primitive, format!("it has more than {MOST_TRIANGLES} triangles")));
                 }
-                geometry.triangles.push([polygon[0], pair[0], pair[1]].map(|corner| corner + before));
+                // Each triangle of a strip begins with the next corner, and every other one is the other way round.
+                let triangle = match is_strip {
+                    false => [piece[0], pair[0], pair[1]],
+                    true if idx % 2 == 0 => [piece[idx], pair[0], pair[1]],
+                    true => [piece[idx], pair[1], pair[0]],
+                };
+                geometry.triangles.push(triangle.map(|corner| corner + before));
             }
         }
         Ok(())
@@ -246,6 +249,25 @@ impl<'a> Gathering<'a> {
         let places = numbers.chunks_exact(stride.max(3)).map(|place| Point3::new(place[0], place[1], place[2]));
         Ok(places.collect())
     }
+}
+
+/// Returns the corners of each polygon, fan or strip of a primitive with these lists `<p>`: one list of all triangles, one of all
+/// polygons with their numbers of corners, or one for each piece.
+fn pieces<'l, 'a>(primitive: Node<'a>, lists: &'l [Vec<usize>]) -> Result<Vec<&'l [usize]>, Fault<'a>> {
+    let kind = primitive.tag_name().name();
+    let (true, Some(corners)) = (matches!(kind, "triangles" | "polylist"), lists.first()) else {
+        return Ok(lists.iter().map(Vec::as_slice).collect());
+    };
+    let Some(counts) = xml::child(primitive, "vcount") else { return Ok(corners.chunks_exact(3).collect()) };
+    let (mut pieces, mut rest) = (Vec::new(), corners.as_slice());
+    for count in list::<usize>(counts, "vcount")? {
+        let Some((piece, behind)) = rest.split_at_checked(count) else {
+            return Err((primitive, "`<vcount>` counts more corners than `<p>` lists".to_owned()));
+        };
+        pieces.push(piece);
+        rest = behind;
+    }
+    Ok(pieces)
 }
 
 /// Returns the position of an input among the indices of a corner; 0 if it is not written.

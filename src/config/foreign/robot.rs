@@ -23,7 +23,7 @@ pub(crate) struct RobotText {
     pub(crate) tree: Option<Tree>,
     /// Proposed changes of impossible moments of inertia.
     pub(crate) mends: Vec<Mend>,
-    /// Collision shapes for the links of the gripper, if they have none, and removals of unreadable colours.
+    /// Collision shapes for the links of the gripper, if they have none, and repairs.
     pub(crate) edits: Vec<Edit>,
 }
 
@@ -54,11 +54,11 @@ pub(crate) fn read(source: &Source, path: &Path, lookup: &Lookup, found: &mut Di
         None
     };
     for link in xml::children(root, "link") {
-        for collision in xml::children(link, "collision") {
+        for collision in xml::children(link, "collision").filter(|one| robot_text::placeholder(*one).is_none()) {
             read_collision(collision, &mut shapes, &mut meshes, &mut reader);
         }
     }
-    let mut edits = robot_text::wrong_colours(root, &mut reader);
+    let mut edits = robot_text::repairs(root, &mut reader);
     for change in robot_shapes::of_gripper(root, &mut reader) {
         if let Some(seen) = change.seen {
             read_collision(seen, &mut shapes, &mut meshes, &mut reader);

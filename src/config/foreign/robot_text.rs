@@ -11,6 +11,12 @@ pub(crate) struct Edit {
     pub(crate) text: String,
 }
 
+impl Edit {
+    fn removal(node: Node) -> Self {
+        Self { span: node.range(), text: String::new() }
+    }
+}
+
 /// Returns the text of a URDF with these changes, none of which overlap.
 pub(crate) fn with(text: &str, mut edits: Vec<Edit>) -> String {
     // From the last place to the first, so that the others stay valid.
@@ -22,11 +28,23 @@ pub(crate) fn with(text: &str, mut edits: Vec<Edit>) -> String {
     text
 }
 
-/// Returns the removals of colours that are not four numbers, which the library for URDFs refuses. Reports each (W036).
-pub(crate) fn wrong_colours(root: Node, reader: &mut Reader) -> Vec<Edit> {
+/// Returns the changes without which the library for URDFs refuses files that other programs load.
+pub(crate) fn repairs(root: Node, reader: &mut Reader) -> Vec<Edit> {
+    let mut edits = wrong_colours(root, reader);
+    edits.extend(nameless_materials(root));
+    edits.extend(placeholders(root, reader));
+    for joint in xml::children(root, "joint") {
+        edits.extend(repeated(joint, reader));
+        edits.extend(unlimited(joint));
+    }
+    edits
+}
+
+/// Returns the removals of colours that are not four numbers. Reports each (W036).
+fn wrong_colours(root: Node, reader: &mut Reader) -> Vec<Edit> {
     let colours = root.descendants().filter(|node| {
-        let is_of_material = node.parent_element().is_some_and(|parent| parent.tag_name().name() == "material");
-        node.is_element() && node.tag_name().name() == "color" && is_of_material
+        let parent = node.parent_element().filter(|parent| parent.has_tag_name("material"));
+        node.has_tag_name("color") && parent.is_some_and(|material| material.has_attribute("name"))
     });
     let mut edits = Vec::new();
     for colour in colours {
@@ -37,7 +55,70 @@ pub(crate) fn wrong_colours(root: Node, reader: &mut Reader) -> Vec<Edit> {
         }
         let message = format!("`<color>` is ignored: `rgba` must be four numbers, but is `{}`", xml::short(numbers));
         reader.warning("W036", colour, message, "colours have no effect on the simulation");
-        edits.push(Edit { span: colour.range(), text: String::new() });
+        edits.push(Edit::removal(colour));
     }
     edits
+}
+
+/// Returns the removals of materials without names. They have no effect on the simulation.
+fn nameless_materials(root: Node) -> impl Iterator<Item = Edit> {
+    root.descendants().filter(|node| node.has_tag_name("material") && !node.has_attribute("name")).map(Edit::removal)
+}
+
+/// Returns the shape of a `<collision>` if all its sizes are 0: it stands for no shape.
+pub(crate) fn placeholder<'n>(collision: Node<'n>) -> Option<Node<'n>> {
+    let shape = xml::child(collision, "geometry")?.first_element_child()?;
+    let keys: &[&str] = match shape.tag_name().name() {
+        "box" => &["size"],
+        "cylinder" | "capsule" => &["radius", "length"],
+        "sphere" => &["radius"],
+        _ => return None,
+    };
+    let is_zero = |key: &&str| {
+        let numbers = shape.attribute(*key).unwrap_or_default();
+        !numbers.is_empty() && numbers.split_whitespace().all(|number| number.parse() == Ok(0.0))
+    };
+    keys.iter().all(is_zero).then_some(shape)
+}
+
+/// Returns the removals of collision shapes without a size. Reports each (W036).
+fn placeholders(root: Node, reader: &mut Reader) -> Vec<Edit> {
+    let mut edits = Vec::new();
+    for collision in xml::children(root, "link").flat_map(|link| xml::children(link, "collision")) {
+        if let Some(shape) = placeholder(collision) {
+            let message = format!("this `<{}>` has no size: it is left out", shape.tag_name().name());
+            reader.warning("W036", shape, message, "remove its `<collision>`, or write its size in metres");
+            edits.push(Edit::removal(collision));
+        }
+    }
+    edits
+}
+
+/// Elements of a joint of which there is one.
+const SINGLE: [&str; 8] = ["origin", "parent", "child", "axis", "limit", "dynamics", "mimic", "safety_controller"];
+
+/// Returns the removals of elements that a joint has already. Reports each (W036).
+fn repeated(joint: Node, reader: &mut Reader) -> Vec<Edit> {
+    let name = joint.attribute("name").unwrap_or_default();
+    let mut edits = Vec::new();
+    for key in SINGLE {
+        for further in xml::children(joint, key).skip(1) {
+            let message = format!("the joint `{name}` has more than one `<{key}>`: the first counts");
+            reader.warning("W036", further, message, "remove the others");
+            edits.push(Edit::removal(further));
+        }
+    }
+    edits
+}
+
+/// Returns the changes of a joint's limits of -1 to 0, which means here that they are unknown.
+fn unlimited(joint: Node) -> impl Iterator<Item = Edit> {
+    let limits = xml::child(joint, "limit").into_iter().flat_map(|limit| limit.attributes());
+    let unlimited = limits.filter(|limit| matches!(limit.name(), "effort" | "velocity") && is_unlimited(limit.value()));
+    unlimited.map(|limit| Edit { span: limit.range_value(), text: "0".to_owned() })
+}
+
+/// Whether an effort or a velocity is written as the -1 that stands for no limit, as in SDF.
+pub(crate) fn is_unlimited(written: &str) -> bool {
+    written.trim().parse() == Ok(-1.0)
 }

@@ -2,6 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use crate::foreign::robot_text::is_unlimited;
 use crate::foreign::xml::{self, Bound, Node, Reader};
 use actcheck_base::did_you_mean;
 
@@ -137,6 +138,9 @@ fn read_joint(root: Node, joint: Node, name: &str, reader: &mut Reader) -> Optio
             (None, "lower" | "upper") => "0",
             _ => reader.attribute(limit, key)?,
         };
+        if bound == Bound::NotNegative && is_unlimited(written) {
+            return None;
+        }
         reader.numbers::<1>(limit, written, bound).map(|[number]| number)
     };
     let (lower, upper) = (number("lower", Bound::Finite), number("upper", Bound::Finite));

@@ -7,7 +7,7 @@
 //!
 //! Never: knows the engine's state, or decides how wide to open.
 
-mod afloat;
+mod between_fingers;
 mod coupling;
 mod further;
 mod gap;
@@ -19,7 +19,7 @@ mod table;
 #[cfg(test)]
 mod tests;
 
-pub(crate) use afloat::afloat;
+pub(crate) use between_fingers::between_fingers;
 pub(crate) use gap::{Probe, Surface};
 pub use opening::Gripper;
 pub(crate) use squeeze::{outward_push, pushes};

@@ -17,6 +17,8 @@ pub(super) const FULL_ARM: usize = 6;
 const TABLE_M: f64 = 0.4;
 /// A root with shapes further below it than this is on its own pedestal. Unit: metres.
 const PEDESTAL_M: f64 = 0.15;
+/// An arm that begins this far above the lowest shape hangs from a body of its own. Unit: metres.
+const SHOULDER_M: f64 = 0.6;
 /// Rotation of a camera's frame in a link whose z axis points forwards and y axis down. Unit: radians.
 const Z_FORWARDS_RAD: [f64; 3] = [std::f64::consts::FRAC_PI_2, -std::f64::consts::FRAC_PI_2, 0.0];
 
@@ -74,7 +76,8 @@ pub(super) fn find(
     let others: Vec<usize> = arm.iter().copied().chain(own_base.into_iter().flatten()).chain(torso).collect();
     let head = head(model, camera, &others);
     let lowest_m = lowest(model);
-    let on_floor = model.floats || lowest_m < -PEDESTAL_M;
+    let shoulder_m = arm.first().map_or(0.0, |first| poses_at_zero(model)[first + 1].translation.z);
+    let on_floor = model.floats || lowest_m < -PEDESTAL_M || shoulder_m - lowest_m > SHOULDER_M;
     let mount_height_m = match (drives, on_floor) {
         (true, _) => (-lowest_m).clamp(0.0, 3.0),
         (false, true) => {

@@ -9,7 +9,7 @@ use super::body::chain;
 use super::cup;
 use super::frames::{Pair, Root, likely};
 use super::hands::groups;
-use super::row::{amid, beside};
+use super::row::{across, amid, beside};
 use super::stated::{NoHand, Stated};
 use crate::Gripper;
 use crate::description::{JointKind, RobotModel};
@@ -28,6 +28,9 @@ const WITHOUT_MOTOR: f64 = 0.2;
 /// Weight of two links whose volumes differ by more than the share [`UNLIKE`].
 const UNALIKE: f64 = 0.7;
 const UNLIKE: f64 = 0.1;
+/// Weight of two links with another link of the gripper between them, and how far this is inside. Unit: metres.
+const OUTSIDE: f64 = 0.2;
+const LEAST_INSIDE_M: f64 = 0.001;
 /// Weight of a direction from the palm's origin: its frame may be anywhere.
 const FROM_PALM: f64 = 0.9;
 /// Fewest joints that carry a hand of an arm.
@@ -173,10 +176,17 @@ fn measure(
             for (weight, frame) in all {
                 let Some(found) = rate(bare, model, palm, links, &named, frame) else { continue };
                 let weight = weight * powered(model, &named, joints) * tips(model, links, joints);
-                let weight =
-                    weight * amid(model, &found.named, &beside(model, (found.links, &found.named), joints, palm));
+                let further = beside(model, (found.links, &found.named), joints, palm);
+                let weight = weight * amid(model, &found.named, &further) * across(model, &found.named, &further);
+                let is_better =
+                    |found: &Found, best: &Option<Found>| best.as_ref().is_none_or(|best| found.score > best.score + 1e-9);
                 let found = Found { score: found.score * weight, ..found };
-                if best.as_ref().is_none_or(|best| found.score > best.score + 1e-9) {
+                // Rays are cast only for candidates that could be the best.
+                if !is_better(&found, &best) {
+                    continue;
+                }
+                let found = Found { score: found.score * innermost(bare, model, (palm, joints), &found), ..found };
+                if is_better(&found, &best) {
                     best = Some(found);
                 }
             }
@@ -320,6 +330,26 @@ fn tips(model: &RobotModel, links: [usize; 2], joints: &BTreeSet<usize>) -> f64 
     let [left, right] = links.map(|link| model.links[link].solids.iter().map(|part| part.shape.volume()).sum::<f64>());
     let are_alike = (left - right).abs() < UNLIKE * left.max(right);
     CARRIER.powi(i32::try_from(n_carriers).unwrap_or(2)) * if are_alike { 1.0 } else { UNALIKE }
+}
+
+/// Weight of two links between which no other link of the gripper moves: of a finger of several bars, an object touches the
+/// innermost first.
+fn innermost(bare: &RobotProfile, model: &RobotModel, (palm, joints): (usize, &BTreeSet<usize>), found: &Found) -> f64 {
+    let profile = driven(bare, model, &found.named);
+    let Ok(gripper) = Gripper::find_coarse(&profile, model, found.links, (palm, found.frame)) else { return 1.0 };
+    let mut positions = vec![0.0; model.joints.len()];
+    gripper.set(&mut positions, gripper.widest_m());
+    let gap = |links| Probe::new(model, links, (palm, found.frame)).gap(&positions);
+    let Some(own) = gap(found.links) else { return 1.0 };
+    let is_between = |joint: &usize| {
+        let link = joint + 1;
+        // Of one link, the lowest and the highest point along y.
+        let other = Some(link).filter(|link| !found.links.contains(link)).and_then(|link| gap([link, link]));
+        other.is_some_and(|other| {
+            other.left_m > own.right_m + LEAST_INSIDE_M && other.right_m < own.left_m - LEAST_INSIDE_M
+        })
+    };
+    if joints.iter().any(is_between) { OUTSIDE } else { 1.0 }
 }
 
 /// Likely grasp frames of a pair, in the palm's frame, with weights: those at which both fingers have surfaces at several

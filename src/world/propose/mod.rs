@@ -25,7 +25,7 @@ use nalgebra::Isometry3;
 
 use crate::WorldError;
 use crate::description::RobotModel;
-use crate::gripper::afloat;
+use crate::gripper::between_fingers;
 use crate::layout::{Named, frame};
 use actcheck_data::RobotProfile;
 
@@ -101,9 +101,11 @@ fn find(partial: &RobotProfile, all: bool, wanted: Option<&str>) -> Result<Propo
         (profile.camera_link, profile.camera_turned_rad) = (body.camera_link, body.camera_turned_rad);
     }
     let (mut model, grasp) = with_grasp(&profile)?;
-    let markers = if all && profile.suction.is_none() { afloat(&model, grasp) } else { Vec::new() };
+    let fingers = profile.finger_links.clone().map(|name| model.frame(&name).map_or(grasp.0, |(link, _)| link));
+    let markers =
+        if all && profile.suction.is_none() { between_fingers(&model, fingers, grasp) } else { Vec::new() };
     if !markers.is_empty() {
-        let note = "their shapes float between the fingers, where objects are held".to_owned();
+        let note = "their shapes are between the fingers, where objects are held".to_owned();
         notes.insert("no_collision_links", note);
         profile.no_collision_links.extend(markers);
         model = with_grasp(&profile)?.0;

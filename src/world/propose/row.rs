@@ -4,12 +4,27 @@ use std::collections::BTreeSet;
 
 use super::body::chain;
 use super::fingers::leader;
-use crate::description::RobotModel;
+use crate::description::{JointKind, RobotModel};
 
 /// Limits of joints that differ by less than this are the same. Units: metres or radians.
 const LIMIT_SLACK: f64 = 1e-3;
 /// Weight of a finger at the end of a row that closes together.
 const AT_THE_END: f64 = 0.7;
+
+/// Weight of two fingers of a row of three or more, which curl side by side rather than against each other.
+const IN_A_ROW: f64 = 0.2;
+/// Least cosine between the axes of the fingers of a row.
+const PARALLEL: f64 = 0.9;
+
+/// Weight of two fingers against each other: not both of a row, as the fingers of a human hand without its thumb.
+pub(super) fn across(model: &RobotModel, named: &[usize], further: &[usize]) -> f64 {
+    let axis = |joint: usize| model.joints[joint].origin.rotation * model.joints[joint].axis.into_inner();
+    let curl_alike = |one: usize, other: usize| is_like(model, one, other) && axis(one).dot(&axis(other)) > PARALLEL;
+    let &[one, other] = named else { return 1.0 };
+    let turns = model.joints[one].kind == JointKind::Revolute;
+    let has_third = || further.iter().any(|third| curl_alike(one, *third));
+    if turns && curl_alike(one, other) && has_third() { IN_A_ROW } else { 1.0 }
+}
 
 /// The joints that move further fingers: they are on the same link as one of the named joints, with the same limits, and move
 /// neither of the two fingers.
@@ -22,18 +37,20 @@ pub(super) fn beside(
     let inner = chain(model, palm);
     let in_use: BTreeSet<usize> =
         links.iter().flat_map(|link| chain(model, *link)).map(|joint| leader(model, joint)).collect();
-    let is_like = |joint: usize, other: usize| {
-        let (a, b) = (&model.joints[joint], &model.joints[other]);
-        a.parent == b.parent
-            && a.kind == b.kind
-            && (a.lower - b.lower).abs() + (a.upper - b.upper).abs() < LIMIT_SLACK
-            && (a.effort > 0.0) == (b.effort > 0.0)
-    };
     let is_further = |joint: &usize| {
         let other = leader(model, *joint) == *joint && !in_use.contains(joint) && !inner.contains(joint);
-        other && named.iter().any(|named| is_like(*joint, *named))
+        other && named.iter().any(|named| is_like(model, *joint, *named))
     };
     joints.iter().copied().filter(is_further).collect()
+}
+
+/// Whether two joints are on the same link, with the same limits, and have motors both or neither.
+fn is_like(model: &RobotModel, joint: usize, other: usize) -> bool {
+    let (a, b) = (&model.joints[joint], &model.joints[other]);
+    a.parent == b.parent
+        && a.kind == b.kind
+        && (a.lower - b.lower).abs() + (a.upper - b.upper).abs() < LIMIT_SLACK
+        && (a.effort > 0.0) == (b.effort > 0.0)
 }
 
 /// Weight of a finger's place among those that close with it: in their middle, an object does not tip out of the hand.
