@@ -68,6 +68,19 @@ fn fingers_without_collision_shapes_have_those_to_be_seen() {
     assert!(passed >= 3, "{passed} of 4 picks passed");
 }
 
+/// Motors of many arms, as those of an OpenArm and a G1, reach 20 rad/s and more, which their efforts can't accelerate the arm to.
+#[test]
+fn an_arm_with_fast_motors_moves_no_faster_than_their_efforts_allow() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut urdf = fixed_arm();
+    for speed in ["1.7", "2.2", "2.6"] {
+        urdf = urdf.replace(&format!("velocity=\"{speed}\""), "velocity=\"25\"");
+    }
+    assert_eq!(urdf.matches("velocity=\"25\"").count(), 7);
+    let (said, passed) = check_and_run(folder.path(), &urdf, "");
+    assert!(passed >= 3, "{passed} of 4 picks passed: {said}");
+}
+
 /// Stretch 4's URDF has a colour of five numbers.
 #[test]
 fn a_colour_that_is_not_four_numbers_is_ignored() {
@@ -79,6 +92,31 @@ fn a_colour_that_is_not_four_numbers_is_ignored() {
     let (said, passed) = check_and_run(folder.path(), &urdf, "");
     assert!(said.contains("W036") && said.contains("`rgba` must be four numbers, but is `0.5 0.5 0.5 0 1`"), "{said}");
     assert!(passed >= 3, "{passed} of 4 picks passed");
+}
+
+/// The H1 has materials without names, the youBot two limits of each joint, the AR4 efforts of -1, and the Reachy cylinders without a
+/// size: other programs load them.
+#[test]
+fn faults_that_other_programs_overlook_are_repaired() {
+    let folder = tempfile::tempdir().unwrap();
+    let limit = "<limit lower=\"-2.9\" upper=\"2.9\" effort=\"120\" velocity=\"1.7\"/>";
+    let twice = format!(
+        "{}<limit lower=\"-0.1\" upper=\"0.1\" effort=\"1\" velocity=\"1\"/>",
+        limit.replace("\"120\"", "\"-1\"")
+    );
+    let seen = "<visual><geometry><sphere radius=\"0.01\"/></geometry><material><color rgba=\"1 1 1 1\"/></material></visual>\
+        <collision><geometry><cylinder radius=\"0.0\" length=\"0\"/></geometry></collision>";
+    let urdf = fixed_arm().replacen(limit, &twice, 1).replacen("<collision>", &format!("{seen}<collision>"), 1);
+    assert!(urdf.contains(&twice) && urdf.contains(seen));
+    let (said, passed) = check_and_run(folder.path(), &urdf, "");
+    assert!(said.contains("the joint `shoulder_yaw_joint` has more than one `<limit>`: the first counts"), "{said}");
+    assert!(said.contains("this `<cylinder>` has no size: it is left out"), "{said}");
+    assert!(said.contains("S075") && said.contains("`shoulder_yaw_joint` of robot is 0 or -1"), "{said}");
+    assert!(passed >= 3, "{passed} of 4 picks passed: {said}");
+    let negative = fixed_arm().replacen("effort=\"120\"", "effort=\"-120\"", 1);
+    std::fs::write(folder.path().join("robot.urdf"), negative).unwrap();
+    let said = stderr(&actcheck(folder.path(), &["check", "c.toml"]));
+    assert!(said.contains("W034") && said.contains("`-120`"), "{said}");
 }
 
 /// The PR2 of a public package has a linkage whose coupling turns it backwards, although its limits only allow the other
@@ -405,6 +443,29 @@ fn a_marker_between_the_fingers_is_left_out() {
     let (said, passed) = check_and_run(folder.path(), &urdf, &with_marker.join("\n"));
     assert!(passed <= 1, "{passed} of 4 picks passed with a marker between the fingers");
     assert!(said.contains("S076") && said.contains("no_collision_links = [\"grasp_link\"]"), "{said}");
+}
+
+/// The forearm of an RB-Y1 has a capsule around its whole hand.
+#[test]
+fn a_shape_around_the_fingers_is_left_out() {
+    let folder = tempfile::tempdir().unwrap();
+    let capsule = "<collision><origin xyz=\"0 0 0.2\"/><geometry><capsule radius=\"0.07\" length=\"0.2\"/>\
+        </geometry></collision>";
+    let link = "<link name=\"wrist_pitch_link\">";
+    let urdf = fixed_arm().replace(link, &format!("{link}{capsule}"));
+    assert!(urdf.contains(capsule));
+    std::fs::write(folder.path().join("robot.urdf"), &urdf).unwrap();
+    let made = actcheck(folder.path(), &["new", "robot", "robot.urdf", "--out", "proposed.toml"]);
+    assert!(made.status.success(), "{}", stderr(&made));
+    let proposed = std::fs::read_to_string(folder.path().join("proposed.toml")).unwrap();
+    assert!(proposed.contains("held.\nno_collision_links = [\"wrist_pitch_link\"]\n"), "{proposed}");
+    let profile: Vec<&str> = proposed.lines().filter(|line| !line.starts_with("urdf")).collect();
+    let (said, passed) = check_and_run(folder.path(), &urdf, &profile.join("\n"));
+    assert!(passed >= 3 && !said.contains("S076"), "{passed} of 4 picks passed: {said}");
+    std::fs::remove_dir_all(folder.path().join("h")).unwrap();
+    let (said, passed) = check_and_run(folder.path(), &urdf, "");
+    assert!(passed <= 1, "{passed} of 4 picks passed with a capsule around the fingers");
+    assert!(said.contains("S076") && said.contains("no_collision_links = [\"wrist_pitch_link\"]"), "{said}");
 }
 
 /// The jaw of a Z1 opens by a right angle from a fixed one: halfway between is far from both around an object.

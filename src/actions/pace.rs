@@ -98,7 +98,8 @@ impl Course {
                 .collect();
             for idx in joints {
                 let limit = kinematics.joints()[*idx].effort;
-                let needed = dynamics.effort_to_accelerate(*idx, &accelerations) + slower * dynamics.effort_of_velocity(*idx);
+                let needed =
+                    dynamics.effort_to_accelerate(*idx, &accelerations) + slower * dynamics.effort_of_velocity(*idx);
                 let free = (limit - dynamics.holding_effort(*idx).abs()).max(LEAST_LEFT * limit);
                 most = most.max(needed.abs() / (EFFORT_SHARE * free));
             }
@@ -137,7 +138,9 @@ fn share_of(idx: usize) -> f64 {
 /// Shortest time between two postures at the joints' velocity limits. Unit: seconds.
 fn leg_secs(kinematics: &Kinematics, from: &[f64], to: &[f64]) -> f64 {
     let joints = kinematics.joints().iter().zip(from.iter().zip(to));
-    joints.map(|(joint, (a, b))| (b - a).abs() / joint.velocity.clamp(1e-3, of_kind(MOST_SPEEDS, joint))).fold(0.0, f64::max)
+    joints
+        .map(|(joint, (a, b))| (b - a).abs() / joint.velocity.clamp(1e-3, of_kind(MOST_SPEEDS, joint)))
+        .fold(0.0, f64::max)
 }
 
 /// The value for a joint that slides, or that for one that turns.
@@ -155,4 +158,70 @@ fn along(course: &[Vec<f64>], legs: &[f64], mut time: f64) -> Vec<f64> {
         time -= leg;
     }
     course.last().cloned().unwrap_or_default()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use actcheck_base::{Files, Source};
+    use actcheck_data::RobotStart;
+    use actcheck_world::{Layout, geometry};
+    use std::path::Path;
+    use std::sync::Arc;
+
+    const TICK_SECS: f64 = 1.0 / 60.0;
+
+    /// The fixed arm; if `is_fast`, with fast motors, and a weak one for its first joint.
+    fn arm(is_fast: bool) -> (Kinematics, Layout, Vec<f64>) {
+        let path = Path::new("models/robots/fixed_arm.toml");
+        let mut profile = actcheck_config::robot::read(&Files::Shipped, path).expect("the shipped robot is valid");
+        if is_fast {
+            let fast = ["1.7", "2.2", "2.6"].iter().fold(profile.urdf.text.to_string(), |text, speed| {
+                text.replace(&format!("velocity=\"{speed}\""), "velocity=\"25\"")
+            });
+            profile.urdf = Source::new("fast.urdf", fast.replacen("effort=\"120\"", "effort=\"10\"", 1));
+        }
+        let start = RobotStart { profile: Arc::new(profile), base: [0.0; 3], root_height_m: 0.0, knows: Arc::new([]) };
+        geometry(&start).expect("the robot is valid")
+    }
+
+    /// The path whose arm joints turn by these angles from home, one after the other.
+    fn course(kinematics: &Kinematics, layout: &Layout, home: &[f64], turns: &[(usize, f64)]) -> Course {
+        let mut postures = vec![home.to_vec()];
+        for (joint, turn) in turns {
+            let mut next = postures.last().cloned().unwrap_or_default();
+            next[layout.arm[*joint]] += turn;
+            postures.push(next);
+        }
+        Course::new(postures, kinematics)
+    }
+
+    #[test]
+    fn strong_motors_are_limited_by_their_speeds_alone() {
+        let (kinematics, layout, home) = arm(false);
+        let way = course(&kinematics, &layout, &home, &[(0, 0.8), (1, 0.3), (3, -0.4)]);
+        let secs = way.secs(&kinematics, &layout.arm, 0.0, TICK_SECS);
+        assert!((secs - (0.8 + 0.3 + 0.4) / 1.7 * 1.5 / 0.9).abs() < 1e-9, "{secs}");
+        assert!((way.secs(&kinematics, &layout.arm, 5.0, TICK_SECS) - 5.0).abs() < 1e-9);
+    }
+
+    /// A turn by an angle A from rest to rest in the time T accelerates by at most 6 A / T², at its ends.
+    #[test]
+    fn fast_motors_are_limited_by_their_efforts() {
+        let (kinematics, layout, home) = arm(true);
+        let yaw = layout.arm[0];
+        let still = vec![0.0; home.len()];
+        let mut unit = still.clone();
+        unit[yaw] = 1.0;
+        let inertia = kinematics.dynamics(&home, &still).effort_to_accelerate(yaw, &unit);
+        let effort = kinematics.joints()[yaw].effort;
+        let expected = (6.0 * 0.3 * inertia / (EFFORT_SHARE * effort)).sqrt();
+        let way = course(&kinematics, &layout, &home, &[(0, 0.3)]);
+        let secs = way.secs(&kinematics, &layout.arm, 0.0, TICK_SECS);
+        assert!((secs / expected - 1.0).abs() < 0.15, "{secs} s instead of {expected}");
+        // A corner takes its time, too.
+        let [one, both] = [&[(0, 0.3)][..], &[(0, 0.3), (1, 0.3)]]
+            .map(|turns| course(&kinematics, &layout, &home, turns).secs(&kinematics, &layout.arm, 0.0, TICK_SECS));
+        assert!(both > 1.5 * one, "{both} s instead of {one}");
+    }
 }

@@ -307,12 +307,17 @@ impl<'a> Arm<'a> {
             std::iter::once(&self.start).chain(&way).zip(&way).map(|(from, to)| self.before.span(from, to)).sum();
         let cost = cost + length * WAY_COST;
         let lifted = lift.last().ok_or(Hindrance::NoLift)?;
-        let is_free = |path: &Vec<Vec<f64>>| path.iter().all(|posture| self.meanwhile.is_free(posture, LEAST_ROOM));
-        let retreats = RETREATS_M.iter().filter_map(|way| self.straight(lifted, &(back * *way)));
-        let retreat = retreats.into_iter().find(is_free).unwrap_or_default();
+        let retreat = self.retreat(lifted, &back);
         let (drive, reach) = (Vec::new(), Vec::new());
         let plan = Plan { drive, reach, near: way, approach, lift, retreat, cost };
         if cost < bound { Ok(plan) } else { Err(Hindrance::Dearer) }
+    }
+
+    /// The way back with the object, in this direction; empty if there is no free one.
+    fn retreat(&self, lifted: &[f64], back: &Vector3<f64>) -> Vec<Vec<f64>> {
+        let is_free = |path: &Vec<Vec<f64>>| path.iter().all(|posture| self.meanwhile.is_free(posture, LEAST_ROOM));
+        let mut ways = RETREATS_M.iter().filter_map(|way| self.straight(lifted, &(back * *way)));
+        ways.find(is_free).unwrap_or_default()
     }
 
     /// The posture with the hand at the object, and by how much the hand is turned from the grasp.
@@ -385,5 +390,60 @@ impl<'a> Arm<'a> {
             path.push(next);
         }
         Some(path)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use actcheck_base::Files;
+    use actcheck_data::{Pose, RobotStart};
+    use actcheck_world::geometry;
+    use std::path::Path;
+    use std::sync::Arc;
+
+    /// A hand with an object before it, and a wall at several distances behind it.
+    #[test]
+    fn an_arm_retreats_only_as_far_as_the_way_is_free() {
+        let path = Path::new("models/robots/fixed_arm.toml");
+        let profile = actcheck_config::robot::read(&Files::Shipped, path).expect("the shipped robot is valid");
+        let start = RobotStart { profile: Arc::new(profile), base: [0.0; 3], root_height_m: 0.0, knows: Arc::new([]) };
+        let (kinematics, layout, home) = geometry(&start).expect("the shipped robot is valid");
+        let mut lifted = home.clone();
+        for (idx, value) in layout.arm.iter().zip([0.0, 0.7, 0.0, 1.59, 0.0, 0.85, 0.0]) {
+            lifted[*idx] = value;
+        }
+        let hand = kinematics.grasp(&lifted).translation.vector;
+        let way_m = |behind_m: f64| {
+            // As high as the hand, so that the arm is above it.
+            let (position, size_m) = ([hand.x - behind_m - 0.05, 0.0, 0.0], [0.1, 1.0, hand.z]);
+            let pose = Pose::upright(position, 0.0);
+            let wall = Sighting { id: "wall".to_owned(), pose, size_m, furniture: true };
+            let wall = [Block::new(&wall)];
+            let space = || ArmSpace::new(&kinematics, &layout, &wall, &[], std::slice::from_ref(&home));
+            let arm = Arm {
+                kinematics: &kinematics,
+                layout: &layout,
+                start: home.clone(),
+                postures: Vec::new(),
+                before: space(),
+                meanwhile: space(),
+                lifts_m: &LIFTS_M,
+                approach_m: APPROACH_M,
+                closing_m: Vec::new(),
+                span: Span::of(&kinematics, &layout.arm, &home),
+                beside: None,
+            };
+            let last = arm.retreat(&lifted, &-Vector3::x()).pop();
+            last.map(|posture| (kinematics.grasp(&posture).translation.vector - hand).norm())
+        };
+        assert_eq!(way_m(0.05), None);
+        for (behind_m, expected_m) in [(0.1, 0.05), (0.2, 0.1)] {
+            assert!(
+                way_m(behind_m).is_some_and(|way_m| (way_m - expected_m).abs() < 1e-3),
+                "{behind_m}: {:?}",
+                way_m(behind_m)
+            );
+        }
     }
 }

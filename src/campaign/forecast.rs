@@ -118,7 +118,7 @@ impl Env {
         let robot = &self.campaign.robot;
         let (joints, effort) = world::assumed_efforts(robot).ok().filter(|(joints, _)| !joints.is_empty())?;
         let message = format!(
-            "the `effort` of `{}` of {} is 0, and so unknown: {effort} N or N·m is used",
+            "the `effort` of `{}` of {} is 0 or -1, and so unknown: {effort} N or N·m is used",
             joints.join("`, `"),
             robot.name,
         );
@@ -132,7 +132,7 @@ impl Env {
         let (joints, [turning, sliding]) =
             world::assumed_speeds(robot).ok().filter(|(joints, _)| !joints.is_empty())?;
         let message = format!(
-            "the largest `velocity` of `{}` of {} is 0, and so unknown: {turning} rad/s or {sliding} m/s is used",
+            "the largest `velocity` of `{}` of {} is 0 or -1, and so unknown: {turning} rad/s or {sliding} m/s is used",
             joints.join("`, `"),
             robot.name,
         );

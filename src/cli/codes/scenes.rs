@@ -199,7 +199,8 @@ const CODES_S: &[Code] = &[
     code(
         "S075",
         "the effort or the speed of joints is unknown",
-        "the URDF limits the effort or the velocity of joints with a role to 0, with which they could not move",
+        "the URDF limits the effort or the velocity of joints with a role to 0, with which they could not move, or to -1, which means no \
+         limit",
         "write the largest force or torque and the largest speed of each joint into the URDF",
     ),
     code(

@@ -204,7 +204,8 @@ impl<'a> Gathering<'a> {
         let positions = self.positions(*vertex)?;
         let corners_of = |node: Node<'a>| -> Result<Vec<usize>, Fault<'a>> {
             let indices: Vec<usize> = list(node, "p")?;
-            let corners: Vec<usize> = indices.chunks_exact(stride).filter_map(|all| all.get(*offset).copied()).collect();
+            let corners: Vec<usize> =
+                indices.chunks_exact(stride).filter_map(|all| all.get(*offset).copied()).collect();
             if corners.iter().any(|corner| *corner >= positions.len()) {
                 return Err((primitive, "it refers to a missing vertex".to_owned()));
             }
@@ -331,6 +332,44 @@ fn list<'a, T: std::str::FromStr>(node: Node<'a>, what: &str) -> Result<Vec<T>, 
 mod tests {
     use super::*;
     use nalgebra::Vector4;
+
+    /// A square as each kind of primitive: all have two triangles with the same way round.
+    #[test]
+    fn polygons_fans_and_strips_become_triangles() {
+        let read_as = |primitive: &str| {
+            let input = "<input semantic=\"VERTEX\" source=\"#v\" offset=\"0\"/><input semantic=\"NORMAL\" source=\"#n\" offset=\"1\"/>";
+            let text = format!(
+                "<COLLADA><library_geometries><geometry id=\"g\"><mesh>\
+                 <source id=\"p\"><float_array>0 0 0 1 0 0 1 1 0 0 1 0</float_array></source>\
+                 <vertices id=\"v\"><input semantic=\"POSITION\" source=\"#p\"/></vertices>{}</mesh></geometry></library_geometries>\
+                 <library_visual_scenes><visual_scene id=\"s\"><node><instance_geometry url=\"#g\"/></node></visual_scene>\
+                 </library_visual_scenes><scene><instance_visual_scene url=\"#s\"/></scene></COLLADA>",
+                primitive.replace("INPUT", input),
+            );
+            let source = Source::new("square.dae".to_owned(), text);
+            let mesh = read(&source, &mut Diagnostics::new()).map_err(|found| found.to_string())?;
+            let corner = |idx: u32| mesh.vertices[idx as usize];
+            Ok::<_, String>(mesh.triangles.iter().map(|triangle| triangle.map(corner)).collect::<Vec<_>>())
+        };
+        let squares = [
+            "<triangles>INPUT<p>0 0 1 0 2 0 0 0 2 0 3 0</p></triangles>",
+            "<polylist>INPUT<vcount>4</vcount><p>0 0 1 0 2 0 3 0</p></polylist>",
+            "<polygons>INPUT<p>0 0 1 0 2 0 3 0</p></polygons>",
+            "<polygons>INPUT<p>0 0 1 0 2 0</p><p>0 0 2 0 3 0</p></polygons>",
+            "<trifans>INPUT<p>0 0 1 0 2 0 3 0</p></trifans>",
+            "<tristrips>INPUT<p>0 0 1 0 3 0 2 0</p></tristrips>",
+        ];
+        for square in squares {
+            let triangles = read_as(square).expect("it is a square");
+            assert_eq!(triangles.len(), 2, "{square}");
+            for [a, b, c] in triangles {
+                let [a, b, c] = [a, b, c].map(Vector3::from);
+                assert!((b - a).cross(&(c - a)).z > 0.9, "{square}: {a} {b} {c}");
+            }
+        }
+        let holes = "<polygons>INPUT<ph><p>0 0 1 0 2 0 3 0</p><h>0 0 1 0 2 0</h></ph></polygons>";
+        assert!(read_as(holes).is_err_and(|said| said.contains("polygons with holes are not supported")));
+    }
 
     #[test]
     fn a_node_looks_along_its_own_axis() {

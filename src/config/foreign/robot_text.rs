@@ -65,7 +65,7 @@ fn nameless_materials(root: Node) -> impl Iterator<Item = Edit> {
     root.descendants().filter(|node| node.has_tag_name("material") && !node.has_attribute("name")).map(Edit::removal)
 }
 
-/// Returns the shape of a `<collision>` if all its sizes are 0: it stands for no shape.
+/// Returns the shape of a `<collision>` if all its sizes are 0: it is only a placeholder.
 pub(crate) fn placeholder<'n>(collision: Node<'n>) -> Option<Node<'n>> {
     let shape = xml::child(collision, "geometry")?.first_element_child()?;
     let keys: &[&str] = match shape.tag_name().name() {
@@ -118,7 +118,7 @@ fn unlimited(joint: Node) -> impl Iterator<Item = Edit> {
     unlimited.map(|limit| Edit { span: limit.range_value(), text: "0".to_owned() })
 }
 
-/// Whether an effort or a velocity is written as the -1 that stands for no limit, as in SDF.
+/// Whether an effort or a velocity is written as -1, which means no limit, as in SDF.
 pub(crate) fn is_unlimited(written: &str) -> bool {
     written.trim().parse() == Ok(-1.0)
 }

@@ -178,8 +178,9 @@ fn measure(
                 let weight = weight * powered(model, &named, joints) * tips(model, links, joints);
                 let further = beside(model, (found.links, &found.named), joints, palm);
                 let weight = weight * amid(model, &found.named, &further) * across(model, &found.named, &further);
-                let is_better =
-                    |found: &Found, best: &Option<Found>| best.as_ref().is_none_or(|best| found.score > best.score + 1e-9);
+                let is_better = |found: &Found, best: &Option<Found>| {
+                    best.as_ref().is_none_or(|best| found.score > best.score + 1e-9)
+                };
                 let found = Found { score: found.score * weight, ..found };
                 // Rays are cast only for candidates that could be the best.
                 if !is_better(&found, &best) {
@@ -460,4 +461,51 @@ fn rate(
     let reach_m = frame.translation.vector.norm().min(0.3);
     let score = (0.3 + flat) * both * closes_m.min(WIDE_M) * (0.05 + reach_m) / (1.0 + 10.0 * off_m);
     Some(Found { score, named: named.to_vec(), links, frame, widest_m })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use actcheck_base::{Files, Source};
+    use std::path::Path;
+
+    /// Each finger has a pad and a bar outside of it, which opens wider; both slide with the same motor.
+    #[test]
+    fn the_innermost_links_are_the_fingertips() {
+        let path = Path::new("models/robots/fixed_arm.toml");
+        let shipped = actcheck_config::robot::read(&Files::Shipped, path).expect("the shipped robot is valid");
+        let inertial = "<inertial><mass value=\"0.1\"/>\
+                        <inertia ixx=\"1e-4\" ixy=\"0\" ixz=\"0\" iyy=\"1e-4\" iyz=\"0\" izz=\"1e-4\"/></inertial>";
+        let finger = |name: &str, y: f64, factor: f64| {
+            let mimic = if name == "finger_pad_left" { "" } else { "<mimic joint=\"finger_pad_left\"/>" };
+            let mimic = mimic.replace("/>", &format!(" multiplier=\"{factor}\"/>"));
+            format!(
+                "<link name=\"{name}\">{inertial}<collision><origin xyz=\"0.06 0 0\"/><geometry><box size=\"0.1 0.008 0.03\"/></geometry></collision>\
+                 </link><joint name=\"{name}\" type=\"prismatic\"><parent link=\"palm\"/><child link=\"{name}\"/><origin xyz=\"0 {y} 0\"/>\
+                 <axis xyz=\"0 1 0\"/><limit lower=\"-0.1\" upper=\"0.1\" effort=\"9\" velocity=\"1\"/>{mimic}</joint>"
+            )
+            .replacen("lower=\"-0.1\" upper=\"0.1\"", if factor > 0.0 { "lower=\"0\" upper=\"0.04\"" } else { "lower=\"-0.04\" upper=\"0\"" }, 1)
+        };
+        let fingers = [
+            finger("finger_bar_left", 0.04, 1.0),
+            finger("finger_bar_right", -0.04, -1.0),
+            finger("finger_pad_left", 0.006, 1.0),
+            finger("finger_pad_right", -0.006, -1.0),
+        ];
+        let text = format!("<robot name=\"hand\"><link name=\"palm\">{inertial}</link>{}</robot>", fingers.concat());
+        let profile = RobotProfile {
+            urdf: Source::new("hand.urdf", text),
+            arm_joints: Vec::new(),
+            finger_joints: Vec::new(),
+            finger_links: [String::new(), String::new()],
+            grasp_link: String::new(),
+            max_opening_m: 0.0,
+            ..shipped
+        };
+        let model = RobotModel::read(&profile).expect("the hand is valid");
+        let mut found = find(&profile, &model, None).unwrap_or_else(|_| panic!("there is a hand")).profile;
+        found.finger_links.sort();
+        assert_eq!(found.finger_links, ["finger_pad_left", "finger_pad_right"]);
+        assert!((found.max_opening_m - 0.084).abs() < 1e-3, "{}", found.max_opening_m);
+    }
 }

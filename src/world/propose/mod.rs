@@ -102,8 +102,7 @@ fn find(partial: &RobotProfile, all: bool, wanted: Option<&str>) -> Result<Propo
     }
     let (mut model, grasp) = with_grasp(&profile)?;
     let fingers = profile.finger_links.clone().map(|name| model.frame(&name).map_or(grasp.0, |(link, _)| link));
-    let markers =
-        if all && profile.suction.is_none() { between_fingers(&model, fingers, grasp) } else { Vec::new() };
+    let markers = if all && profile.suction.is_none() { between_fingers(&model, fingers, grasp) } else { Vec::new() };
     if !markers.is_empty() {
         let note = "their shapes are between the fingers, where objects are held".to_owned();
         notes.insert("no_collision_links", note);

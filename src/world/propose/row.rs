@@ -62,3 +62,49 @@ pub(super) fn amid(model: &RobotModel, named: &[usize], further: &[usize]) -> f6
     };
     if further.len() < 2 || named.iter().any(is_amid) { 1.0 } else { AT_THE_END }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use actcheck_base::{Files, Source};
+    use std::path::Path;
+
+    /// A palm with fingers that turn about these axes, with the same limits.
+    fn hand(axes: &[[f64; 3]]) -> RobotModel {
+        let path = Path::new("models/robots/fixed_arm.toml");
+        let mut profile = actcheck_config::robot::read(&Files::Shipped, path).expect("the shipped robot is valid");
+        let inertial = "<inertial><mass value=\"0.1\"/>\
+                        <inertia ixx=\"1e-4\" ixy=\"0\" ixz=\"0\" iyy=\"1e-4\" iyz=\"0\" izz=\"1e-4\"/></inertial>";
+        let finger = |(idx, [x, y, z]): (usize, &[f64; 3])| {
+            format!(
+                "<link name=\"finger_{idx}\">{inertial}</link><joint name=\"finger_{idx}\" type=\"revolute\"><parent link=\"palm\"/>\
+                 <child link=\"finger_{idx}\"/><axis xyz=\"{x} {y} {z}\"/><limit lower=\"0\" upper=\"1.5\" effort=\"1\" velocity=\"1\"/></joint>"
+            )
+        };
+        let fingers: String = axes.iter().enumerate().map(finger).collect();
+        profile.urdf = Source::new(
+            "hand.urdf",
+            format!("<robot name=\"hand\"><link name=\"palm\">{inertial}</link>{fingers}</robot>"),
+        );
+        profile.arm_joints.clear();
+        profile.finger_joints.clear();
+        RobotModel::read(&profile).expect("the hand is valid")
+    }
+
+    #[test]
+    fn fingers_of_a_row_are_not_against_each_other() {
+        let of = |model: &RobotModel, fingers: [usize; 2]| {
+            let named = fingers.map(|idx| model.joint(&format!("finger_{idx}")).expect("it is a joint"));
+            let further: Vec<usize> = (0..model.joints.len()).filter(|joint| !named.contains(joint)).collect();
+            across(model, &named, &further)
+        };
+        // Three fingers and a thumb that turns the other way.
+        let human = hand(&[[0.0, 0.0, 1.0], [0.0, 0.0, 1.0], [0.0, 0.1, 1.0], [0.0, 0.0, -1.0]]);
+        assert!(of(&human, [0, 1]) < 1.0 && of(&human, [0, 2]) < 1.0);
+        assert_eq!(of(&human, [0, 3]), 1.0);
+        // Three fingers around a palm, and two that turn about parallel axes.
+        let round = hand(&[[1.0, 0.0, 0.0], [-0.5, 0.87, 0.0], [-0.5, -0.87, 0.0]]);
+        assert_eq!(of(&round, [0, 1]), 1.0);
+        assert_eq!(of(&hand(&[[0.0, 0.0, 1.0], [0.0, 0.0, 1.0]]), [0, 1]), 1.0);
+    }
+}
