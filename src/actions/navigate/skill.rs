@@ -19,6 +19,9 @@ const PLACES: [&str; 2] = ["objectLocation", "objectSurface"];
 const MARGIN_M: f64 = 0.04;
 /// Share of the joints' velocity limits that is used, so that the controller can catch up.
 const SPEED_SHARE: f64 = 0.9;
+/// Speeds that drives don't exceed however fast the base is, among people and furniture. Units: m/s, rad/s.
+const MOST_SPEED_M_S: f64 = 0.5;
+const MOST_TURN_RAD_S: f64 = 1.0;
 /// Unit: m/s². At full speed the robot stops within 10 cm.
 const ACCELERATION: f64 = 0.3;
 /// Unit: rad/s².
@@ -103,9 +106,9 @@ impl<'r, 'o> Drive<'r, 'o> {
         let at = base.map(|joint| robot.commanded()[joint]);
         let fastest = |joint: usize| SPEED_SHARE * robot.kinematics().joints()[joint].velocity;
         let limits = Limits {
-            speed: fastest(base[0]).min(fastest(base[1])),
+            speed: fastest(base[0]).min(fastest(base[1])).min(MOST_SPEED_M_S),
             acceleration: ACCELERATION,
-            turn_speed: fastest(base[2]),
+            turn_speed: fastest(base[2]).min(MOST_TURN_RAD_S),
             turn_acceleration: TURN_ACCELERATION,
         };
         let mut grid = Grid::new(robot.floor_plan(), &[[at[0], at[1]], [goal[0], goal[1]]]);
