@@ -100,6 +100,41 @@ ROBOTS = [
     ("Ned 2 (ned_ros)", "ned2/niryo_ned2_gripper1_n_camera.urdf.xacro", [], []),
 ]
 
+HAND = ["--xacro-arg", "hand:=true"]
+# Robots that were tried after those above, with `--others`.
+OTHERS = [
+    ("FR3 (franka_description)", "robots/fr3/fr3.urdf.xacro", HAND, []),
+    ("FER (franka_description)", "robots/fer/fer.urdf.xacro", HAND, []),
+    ("FP3 (franka_description)", "robots/fp3/fp3.urdf.xacro", HAND, []),
+    ("FR3 Duo (franka_description)", "robots/fr3_duo/fr3_duo.urdf.xacro", HAND, []),
+    ("OpenArm (openarm_description)", "urdf/robot/v10.urdf.xacro", HAND, []),
+    ("OpenArm, two arms (openarm_description)", "urdf/robot/v10.urdf.xacro", [*HAND, "--xacro-arg", "bimanual:=true"], []),
+    ("RB-Y1 1.0 (rby1-sdk)", "models/rby1a/urdf/model.urdf", [], []),
+    ("RB-Y1 1.2 (rby1-sdk)", "models/rby1a/urdf/model_v1.2.urdf", [], []),
+    ("WXAI follower (trossen_arm_description)", "generated/wxai/wxai_follower.urdf", [], []),
+    ("WXAI base (trossen_arm_description)", "generated/wxai/wxai_base.urdf", [], []),
+    ("Mobile AI (trossen_arm_description)", "generated/mobile_ai.urdf", [], []),
+    ("uxArm6 (interbotix_ros_manipulators)", "interbotix_uxarm_descriptions/urdf/uxarm6.urdf.xacro", [], []),
+    ("ReactorX 150 (interbotix_ros_manipulators)", "urdf/rx150.urdf.xacro", ["--xacro-arg", "robot_name:=rx150"], []),
+    ("ReactorX 200 (interbotix_ros_manipulators)", "urdf/rx200.urdf.xacro", ["--xacro-arg", "robot_name:=rx200"], []),
+    ("WidowX 200 (interbotix_ros_manipulators)", "urdf/wx200.urdf.xacro", [], []),
+    ("ViperX 250 (interbotix_ros_manipulators)", "urdf/vx250.urdf.xacro", [], []),
+    ("LoCoBot's WidowX 250 (interbotix_ros_manipulators)", "urdf/mobile_wx250s.urdf.xacro", [], []),
+    ("Z1 (unitree_ros)", "z1_description/xacro/robot.xacro", ["--xacro-arg", "UnitreeGripper:=true"], []),
+    ("G1, Dex1 (unitree_ros)", "g1_description/g1_29dof_mode_15_with_dex1_1.urdf", [], []),
+    ("G1, Dex3 (unitree_ros)", "g1_description/g1_29dof_with_hand_rev_1_0.urdf", [], []),
+    ("G1, Dex3, MJCF (unitree_ros)", "g1_description/g1_29dof_with_hand.xml", [], []),
+    ("G1, Inspire hand (unitree_ros)", "g1_description/g1_29dof_rev_1_0_with_inspire_hand_DFQ.urdf", [], []),
+    ("G1, BrainCo hand (unitree_ros)", "g1_with_brainco_hand/g1_29dof_mode_15_brainco_hand.urdf", [], []),
+    ("H1, Inspire hand (unitree_ros)", "h1_description/urdf/h1_with_hand.urdf", [], []),
+    ("H1-2, Inspire hand (unitree_ros)", "h1_2_description/h1_2.urdf", [], []),
+    ("AR4 (ar4_ros_driver)", "annin_ar4_description/urdf/ar.urdf.xacro", ["--xacro-arg", "include_gripper:=True"], []),
+    ("youBot (youbot_description)", "robots/youbot.urdf.xacro", [], []),
+    ("youBot's arm (youbot_description)", "robots/youbot_arm_only.urdf.xacro", [], []),
+    ("youBot, two arms (youbot_description)", "robots/youbot_dual_arm.urdf.xacro", [], []),
+    ("Gen3 lite (ros2_kortex)", "kortex_description/robots/gen3_lite.urdf", [], []),
+]
+
 CUBE = """category = "act:Box"
 mass_kg = 0.1
 friction = 0.5
@@ -372,6 +407,7 @@ def main():
     parser.add_argument("--work", type=Path, required=True)
     parser.add_argument("--runs", type=int, default=15)
     parser.add_argument("--only", default="")
+    parser.add_argument("--others", action="store_true", help="the robots that were tried afterwards")
     parser.add_argument("--things", nargs="*", default=["can", "cube", "box"])
     parser.add_argument("--check", action="store_true", help="also measure `check`, which plans picks everywhere")
     parser.add_argument("--place", action="store_true")
@@ -380,7 +416,7 @@ def main():
     args.program = str(Path(args.program).resolve())
     args.work = args.work.resolve()
     folders = [folder.resolve() for folder in args.folders]
-    for name, path, arguments, start in ROBOTS:
+    for name, path, arguments, start in OTHERS if args.others else ROBOTS:
         if args.only.lower() not in name.lower():
             continue
         model = find(folders, path)

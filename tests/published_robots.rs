@@ -240,6 +240,28 @@ fn meshes_with_an_absolute_path_are_found_beside_the_model() {
     assert!(stderr(&refused).contains("cannot read the mesh /meshes/top.stl"), "{}", stderr(&refused));
 }
 
+/// A Gen3 in a public package was expanded by xacro on another machine.
+#[test]
+fn meshes_with_paths_of_another_machine_are_found_in_their_package() {
+    let folder = tempfile::tempdir().unwrap();
+    let meshes = folder.path().join("robots/table_top/meshes");
+    std::fs::create_dir_all(&meshes).unwrap();
+    std::fs::copy(root().join("tests/models/gazebo/cafe_table/meshes/top.stl"), meshes.join("top.stl")).unwrap();
+    let solid = "<box size=\"0.12 0.48 0.02\"/>";
+    for path in ["file:///else/where/share/table_top/meshes/top.stl", "/else/where/share/table_top/meshes/top.stl"] {
+        let mesh = format!("<mesh filename=\"{path}\" scale=\"0.1 0.1 0.1\"/>");
+        std::fs::write(folder.path().join("robot.urdf"), fixed_arm().replace(solid, &mesh)).unwrap();
+        std::fs::write(folder.path().join("c.toml"), format!("{PICKS}[\"can\"]\n")).unwrap();
+        std::fs::write(folder.path().join("robot.toml"), "urdf = \"robot.urdf\"\npackage_dirs = [\"robots\"]\n")
+            .unwrap();
+        let checked = actcheck(folder.path(), &["check", "c.toml"]);
+        assert!(checked.status.success(), "{}", stderr(&checked));
+        std::fs::write(folder.path().join("robot.toml"), "urdf = \"robot.urdf\"\n").unwrap();
+        let refused = actcheck(folder.path(), &["check", "c.toml"]);
+        assert!(stderr(&refused).contains("cannot read the mesh"), "{}", stderr(&refused));
+    }
+}
+
 /// The hand of Stretch RE1 points down by 30 degrees, and its arm only rises, extends and turns: level hands and hands
 /// that point straight down are out of the question.
 #[test]

@@ -22,9 +22,12 @@ impl Lookup<'_> {
                 // PyBullet's models write paths from the folder of the file as if they were absolute.
                 let inside = beside.join(uri.trim_start_matches('/'));
                 let is_elsewhere = uri.starts_with('/') && !self.exists(Path::new(uri)) && self.exists(&inside);
-                Ok(if is_elsewhere { inside } else { beside.join(uri) })
+                Ok(if is_elsewhere { inside } else { self.find_end(uri).unwrap_or_else(|| beside.join(uri)) })
             }
-            Some(("file", path)) => Ok(self.find_beside(Path::new(path)).unwrap_or_else(|| PathBuf::from(path))),
+            Some(("file", path)) => {
+                let found = self.find_beside(Path::new(path)).or_else(|| self.find_end(path));
+                Ok(found.unwrap_or_else(|| PathBuf::from(path)))
+            }
             Some(("model" | "package", path)) => self.find(path).ok_or_else(|| {
                 let folders: Vec<String> = self.folders.iter().map(|folder| folder.display().to_string()).collect();
                 format!("there is no `{path}` in {}", folders.join(" or "))
@@ -48,6 +51,16 @@ impl Lookup<'_> {
         }
         let around = self.folders.iter().flat_map(|folder| [Some(folder.as_path()), folder.parent()]);
         around.flatten().map(|folder| folder.join(path)).find(|place| self.exists(place))
+    }
+
+    /// The end of an absolute path, from the name of a package on, if there is no such file: a model that was expanded on another
+    /// machine has the paths of that one.
+    fn find_end(&self, path: &str) -> Option<PathBuf> {
+        if !path.starts_with('/') || self.exists(Path::new(path)) {
+            return None;
+        }
+        let ends = path.match_indices('/').map(|(at, _)| &path[at + 1..]);
+        ends.filter(|end| end.contains('/')).find_map(|end| self.find(end))
     }
 
     fn exists(&self, place: &Path) -> bool {
