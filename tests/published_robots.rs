@@ -1,5 +1,6 @@
-//! Robots as others publish them: weak or unknown motors, fingers without collision shapes, hands and linkages in the way
-//! of their fingers, joints of the whole robot, paths of meshes without their folder, and hands that can't be tilted. Each is a shipped or a small robot changed so.
+//! Robots as others publish them: weak, fast or unknown motors, fingers without collision shapes, hands and linkages in the way of
+//! their fingers, joints of the whole robot, paths of meshes without their folder, and hands that can't be tilted. Each is a
+//! shipped or a small robot changed so.
 
 use std::path::Path;
 

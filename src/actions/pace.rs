@@ -4,8 +4,8 @@ use actcheck_world::{Dynamics, Joint, JointKind, Kinematics};
 
 /// Share of a joint's velocity limit that skills use, so that the controller can catch up.
 const SPEED_SHARE: f64 = 0.9;
-/// Speeds that skills don't exceed however fast the motors are, as arms of industry: a joint that goes farther in a control tick than it
-/// may fall behind can't be watched. Units: m/s, rad/s.
+/// Speeds that skills don't exceed however fast the motors are: those of fast industrial arms. In a control tick, a joint then
+/// moves less than the lag at which it counts as held back. Units: m/s, rad/s.
 const MOST_SPEEDS: [f64; 2] = [1.0, 3.5];
 /// Peak over mean speed of a motion that starts and ends at rest (of 3s² − 2s³).
 const PEAK_OVER_MEAN: f64 = 1.5;
@@ -13,10 +13,9 @@ const PEAK_OVER_MEAN: f64 = 1.5;
 const LAGS: [f64; 2] = [0.01, 0.03];
 /// Moments of a motion at which its efforts are calculated.
 const N_MOMENTS: usize = 24;
-/// Share of the effort beyond that for the weight of the arm that a motion may need: the rest is for the controller, which corrects
-/// errors.
+/// Share of the effort that the weight of the arm leaves, for the motion: the rest is for the controller, which corrects errors.
 const EFFORT_SHARE: f64 = 0.4;
-/// Least share of a joint's largest effort that counts as left by the weight that it holds.
+/// Least share of a joint's largest effort that counts as left by the weight of the arm.
 const LEAST_LEFT: f64 = 0.2;
 /// Factors by which a motion that needs too much effort is slowed down, again and again.
 const LEAST_SLOWING: f64 = 1.05;

@@ -199,15 +199,15 @@ const CODES_S: &[Code] = &[
     code(
         "S075",
         "the effort or the speed of joints is unknown",
-        "the URDF limits the effort or the velocity of joints with a role to 0, with which they could not move, or to -1, which means no \
-         limit",
+        "the URDF limits the effort or the velocity of joints with a role to 0, with which they could not move, or to -1, \
+         which means no limit",
         "write the largest force or torque and the largest speed of each joint into the URDF",
     ),
     code(
         "S076",
         "a collision shape is between the fingers of the robot",
-        "the URDF marks the middle of the grasp with a small link that collides, or a coarse shape of another link includes the fingers: \
-         objects meet it before the fingers close",
+        "the URDF marks the middle of the grasp with a small link that collides, or a coarse shape of another link includes \
+         the fingers: objects meet it before the fingers close",
         "name the link in `no_collision_links` of the robot's profile",
     ),
 ];

@@ -337,11 +337,13 @@ mod tests {
     #[test]
     fn polygons_fans_and_strips_become_triangles() {
         let read_as = |primitive: &str| {
-            let input = "<input semantic=\"VERTEX\" source=\"#v\" offset=\"0\"/><input semantic=\"NORMAL\" source=\"#n\" offset=\"1\"/>";
+            let input = "<input semantic=\"VERTEX\" source=\"#v\" offset=\"0\"/>\
+                         <input semantic=\"NORMAL\" source=\"#n\" offset=\"1\"/>";
             let text = format!(
                 "<COLLADA><library_geometries><geometry id=\"g\"><mesh>\
                  <source id=\"p\"><float_array>0 0 0 1 0 0 1 1 0 0 1 0</float_array></source>\
-                 <vertices id=\"v\"><input semantic=\"POSITION\" source=\"#p\"/></vertices>{}</mesh></geometry></library_geometries>\
+                 <vertices id=\"v\"><input semantic=\"POSITION\" source=\"#p\"/></vertices>{}\
+                 </mesh></geometry></library_geometries>\
                  <library_visual_scenes><visual_scene id=\"s\"><node><instance_geometry url=\"#g\"/></node></visual_scene>\
                  </library_visual_scenes><scene><instance_visual_scene url=\"#s\"/></scene></COLLADA>",
                 primitive.replace("INPUT", input),

@@ -1,5 +1,5 @@
-//! Shapes between the fingers, which would keep every object out: markers of the middle of a grasp, and shapes that are so coarse that
-//! they include the fingers.
+//! Shapes between the fingers, which would keep every object out: markers of the middle of a grasp, and coarse shapes that include
+//! the fingers.
 
 use std::ops::Range;
 
@@ -19,10 +19,11 @@ const SMALL_M: f64 = 0.03;
 /// A shape this far from all others of its body is not attached to it. Unit: metres.
 const APART_M: f32 = 0.002;
 
-/// Returns the URDF links with shapes between the fingers, `links`, by name.
-pub(crate) fn between_fingers(model: &RobotModel, links: [usize; 2], grasp: (usize, Isometry3<f64>)) -> Vec<String> {
+/// Returns the names of the URDF links with shapes between the two fingers.
+pub(crate) fn between_fingers(model: &RobotModel, fingers: [usize; 2], grasp: (usize, Isometry3<f64>)) -> Vec<String> {
     let mut found = afloat(model, grasp);
-    found.extend(around(model, links, grasp).into_iter().filter(|name| !found.contains(name)).collect::<Vec<_>>());
+    let around = around(model, fingers, grasp).into_iter().filter(|name| !found.contains(name));
+    found.extend(around.collect::<Vec<_>>());
     found
 }
 

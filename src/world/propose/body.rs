@@ -17,7 +17,7 @@ pub(super) const FULL_ARM: usize = 6;
 const TABLE_M: f64 = 0.4;
 /// A root with shapes further below it than this is on its own pedestal. Unit: metres.
 const PEDESTAL_M: f64 = 0.15;
-/// An arm that begins this far above the lowest shape hangs from a body of its own. Unit: metres.
+/// An arm whose first joint is this far above the lowest shape is on a body of its own. Unit: metres.
 const SHOULDER_M: f64 = 0.6;
 /// Rotation of a camera's frame in a link whose z axis points forwards and y axis down. Unit: radians.
 const Z_FORWARDS_RAD: [f64; 3] = [std::f64::consts::FRAC_PI_2, -std::f64::consts::FRAC_PI_2, 0.0];

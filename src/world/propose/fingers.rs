@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion};
+use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 
 use super::between::{Between, CENTRED_AT_M, driven};
 use super::body::chain;
@@ -35,6 +35,8 @@ const LEAST_INSIDE_M: f64 = 0.001;
 const FROM_PALM: f64 = 0.9;
 /// Fewest joints that carry a hand of an arm.
 const FEWEST_ARM_JOINTS: usize = 4;
+/// Weight of fingers that point back to the palm: the joints of some fingers are at their tips.
+const BACKWARDS: f64 = 0.2;
 /// Openings wider than this are worth no more. Unit: metres.
 const WIDE_M: f64 = 0.12;
 
@@ -361,7 +363,7 @@ fn frames(model: &RobotModel, palm: usize, links: [usize; 2], named: &[usize]) -
     let joints = links.map(|link| chain(model, link).into_iter().find(|joint| !inner.contains(joint)));
     let origins: Vec<Point3<f64>> =
         joints.iter().flatten().map(|joint| Point3::from(model.joints[*joint].origin.translation.vector)).collect();
-    let middle = origins.iter().map(|at| at.coords).sum::<nalgebra::Vector3<f64>>() / origins.len().max(1) as f64;
+    let middle = origins.iter().map(|at| at.coords).sum::<Vector3<f64>>() / origins.len().max(1) as f64;
     let roots = [
         (1.0, Root { from: Point3::from(middle), sides: joints.map(|joint| joint.is_some()) }),
         (FROM_PALM, Root { from: Point3::origin(), sides: [true; 2] }),
@@ -459,6 +461,8 @@ fn rate(
         (false, false) => 0.4,
     };
     let reach_m = frame.translation.vector.norm().min(0.3);
+    let points_back = (frame.rotation * Vector3::x()).dot(&frame.translation.vector) < 0.0;
+    let both = both * if points_back { BACKWARDS } else { 1.0 };
     let score = (0.3 + flat) * both * closes_m.min(WIDE_M) * (0.05 + reach_m) / (1.0 + 10.0 * off_m);
     Some(Found { score, named: named.to_vec(), links, frame, widest_m })
 }
@@ -477,14 +481,18 @@ mod tests {
         let inertial = "<inertial><mass value=\"0.1\"/>\
                         <inertia ixx=\"1e-4\" ixy=\"0\" ixz=\"0\" iyy=\"1e-4\" iyz=\"0\" izz=\"1e-4\"/></inertial>";
         let finger = |name: &str, y: f64, factor: f64| {
-            let mimic = if name == "finger_pad_left" { "" } else { "<mimic joint=\"finger_pad_left\"/>" };
-            let mimic = mimic.replace("/>", &format!(" multiplier=\"{factor}\"/>"));
+            let mimic = match name {
+                "finger_pad_left" => String::new(),
+                _ => format!("<mimic joint=\"finger_pad_left\" multiplier=\"{factor}\"/>"),
+            };
+            let (lower, upper) = if factor > 0.0 { (0.0, 0.04) } else { (-0.04, 0.0) };
             format!(
-                "<link name=\"{name}\">{inertial}<collision><origin xyz=\"0.06 0 0\"/><geometry><box size=\"0.1 0.008 0.03\"/></geometry></collision>\
-                 </link><joint name=\"{name}\" type=\"prismatic\"><parent link=\"palm\"/><child link=\"{name}\"/><origin xyz=\"0 {y} 0\"/>\
-                 <axis xyz=\"0 1 0\"/><limit lower=\"-0.1\" upper=\"0.1\" effort=\"9\" velocity=\"1\"/>{mimic}</joint>"
+                "<link name=\"{name}\">{inertial}<collision><origin xyz=\"0.06 0 0\"/>\
+                 <geometry><box size=\"0.1 0.008 0.03\"/></geometry></collision></link>\
+                 <joint name=\"{name}\" type=\"prismatic\"><parent link=\"palm\"/><child link=\"{name}\"/>\
+                 <origin xyz=\"0 {y} 0\"/><axis xyz=\"0 1 0\"/>\
+                 <limit lower=\"{lower}\" upper=\"{upper}\" effort=\"9\" velocity=\"1\"/>{mimic}</joint>"
             )
-            .replacen("lower=\"-0.1\" upper=\"0.1\"", if factor > 0.0 { "lower=\"0\" upper=\"0.04\"" } else { "lower=\"-0.04\" upper=\"0\"" }, 1)
         };
         let fingers = [
             finger("finger_bar_left", 0.04, 1.0),

@@ -77,8 +77,9 @@ mod tests {
                         <inertia ixx=\"1e-4\" ixy=\"0\" ixz=\"0\" iyy=\"1e-4\" iyz=\"0\" izz=\"1e-4\"/></inertial>";
         let finger = |(idx, [x, y, z]): (usize, &[f64; 3])| {
             format!(
-                "<link name=\"finger_{idx}\">{inertial}</link><joint name=\"finger_{idx}\" type=\"revolute\"><parent link=\"palm\"/>\
-                 <child link=\"finger_{idx}\"/><axis xyz=\"{x} {y} {z}\"/><limit lower=\"0\" upper=\"1.5\" effort=\"1\" velocity=\"1\"/></joint>"
+                "<link name=\"finger_{idx}\">{inertial}</link><joint name=\"finger_{idx}\" type=\"revolute\">\
+                 <parent link=\"palm\"/><child link=\"finger_{idx}\"/><axis xyz=\"{x} {y} {z}\"/>\
+                 <limit lower=\"0\" upper=\"1.5\" effort=\"1\" velocity=\"1\"/></joint>"
             )
         };
         let fingers: String = axes.iter().enumerate().map(finger).collect();
