@@ -132,6 +132,9 @@ OTHERS = [
     ("youBot (youbot_description)", "robots/youbot.urdf.xacro", [], []),
     ("youBot's arm (youbot_description)", "robots/youbot_arm_only.urdf.xacro", [], []),
     ("youBot, two arms (youbot_description)", "robots/youbot_dual_arm.urdf.xacro", [], []),
+    ("Piper (Piper_ros)", "piper_description/urdf/piper_description.urdf", [], []),
+    ("R5 (ARX_Model)", "R5/R5a/urdf/R5a.urdf", [], []),
+    ("AI Worker (ai_worker)", "ffw_bg2_rev4_follower/ffw_bg2_follower.urdf", [], []),
     ("Gen3 lite (ros2_kortex)", "kortex_description/robots/gen3_lite.urdf", [], []),
 ]
 

@@ -49,6 +49,20 @@ fn low_objects_are_picked_from_high_and_wide_surfaces() {
     }
 }
 
+/// A cube of 5 cm is 7 cm wide across its corners: between fingers that open 6 cm, it was treated as round, and they came down on it.
+#[test]
+fn a_narrow_gripper_takes_a_cube_across_its_sides() {
+    let project = project();
+    let robots = project.path().join("models/robots");
+    let urdf = std::fs::read_to_string(robots.join("fixed_arm.urdf")).unwrap();
+    let narrow = urdf.replace("lower=\"0\" upper=\"0.07\"", "lower=\"0\" upper=\"0.03\"");
+    assert_eq!(narrow.matches("upper=\"0.03\"").count(), 2);
+    std::fs::write(robots.join("narrow.urdf"), narrow).unwrap();
+    std::fs::write(robots.join("narrow_arm.toml"), "urdf = \"narrow.urdf\"\n").unwrap();
+    let (said, passed) = run(project.path(), ("narrow_arm", "coffee_table", "cube"), "6");
+    assert!(passed >= 5, "{passed} of 6: {said}");
+}
+
 /// A bowl is wider than any hand here: one finger goes inside, and the wall turns until it lies between both.
 #[test]
 fn a_bowl_is_taken_at_its_rim() {

@@ -73,7 +73,7 @@ pub fn grasps(thing: &Sighting, cup: &Suction) -> Result<Vec<Grasp>, String> {
 /// The poses of a lip on the middle of the top and of each side of an upright object of this size, if they are as wide as
 /// the cup. Frame: the object's, with the origin at its foot.
 pub fn lips_on(size_m: [f64; 3], cup: &Suction) -> Vec<Pose> {
-    let thing = Sighting { id: String::new(), pose: Pose::IDENTITY, size_m, furniture: false };
+    let thing = Sighting { id: String::new(), pose: Pose::IDENTITY, size_m, furniture: false, angular: false };
     let mut found: Vec<Grasp> = grasps(&thing, cup).unwrap_or_default();
     // The headings of a lip on the top make no difference.
     let first_top = found.iter().position(|grasp| grasp.approach == Approach::Top);
@@ -174,7 +174,13 @@ mod tests {
     const CUP: Suction = Suction { force_n: 40.0, radius_m: 0.02, friction: 0.5 };
 
     fn thing(size_m: [f64; 3]) -> Sighting {
-        Sighting { id: "t".to_owned(), pose: Pose::upright([1.0, 0.5, 0.7], 0.4), size_m, furniture: false }
+        Sighting {
+            id: "t".to_owned(),
+            pose: Pose::upright([1.0, 0.5, 0.7], 0.4),
+            size_m,
+            furniture: false,
+            angular: false,
+        }
     }
 
     #[test]

@@ -83,19 +83,17 @@ pub(crate) fn is_tight(thing: &Sighting, max_opening_m: f64) -> bool {
 
 /// All usual grasps of an object for a gripper with this opening. Empty if the object is too wide in every direction.
 pub fn grasps(thing: &Sighting, max_opening_m: f64) -> Vec<Grasp> {
-    let headings = (0..N_HEADINGS).map(|idx| std::f64::consts::TAU * f64::from(idx) / f64::from(N_HEADINGS));
     let tall = thing.size_m[2] >= TALL_M;
-    let ways =
-        headings.flat_map(|heading| if tall { vec![from_side(thing, heading)] } else { from_above(thing, heading) });
+    let ways = headings(thing)
+        .flat_map(|heading| if tall { vec![from_side(thing, heading)] } else { from_above(thing, heading) });
     fitting(thing, max_opening_m, ways)
 }
 
 /// Grasps from the side, from above and slanted, regardless of the object's height: for fixed arms, and for cases where
 /// the usual grasps are not free. The fingers close across the heading.
 pub fn all_grasps(thing: &Sighting, max_opening_m: f64) -> Vec<Grasp> {
-    let headings = (0..N_HEADINGS).map(|idx| std::f64::consts::TAU * f64::from(idx) / f64::from(N_HEADINGS));
     let tall = thing.size_m[2] >= TALL_M;
-    let ways = headings.flat_map(|heading| {
+    let ways = headings(thing).flat_map(|heading| {
         let mut ways = vec![straight_down(thing, heading), slanted(thing, heading)];
         if thing.size_m[2] >= SIDE_HEIGHT_M.0 + SIDE_ABOVE_M {
             ways.push(from_side(thing, heading));
@@ -107,6 +105,12 @@ pub fn all_grasps(thing: &Sighting, max_opening_m: f64) -> Vec<Grasp> {
         ways
     });
     fitting(thing, max_opening_m, ways)
+}
+
+/// The headings tried around an object; around one with corners, those along its sides are among them.
+fn headings(thing: &Sighting) -> impl Iterator<Item = f64> {
+    let first = if thing.angular { thing.pose.yaw() } else { 0.0 };
+    (0..N_HEADINGS).map(move |idx| first + std::f64::consts::TAU * f64::from(idx) / f64::from(N_HEADINGS))
 }
 
 /// The same grasps with the hand turned over: rolled by half a turn, which is the same for the object, but not for the
@@ -181,10 +185,17 @@ pub(crate) fn hand(thing: &Sighting, height: f64, heading: f64, pitch: f64) -> I
     Isometry3::from_parts(Translation3::new(x, y, z + height), rotation)
 }
 
-/// Whether an object is treated as round: its sides are about equally long.
+/// Whether an object is treated as round: its sides are about equally long, and its corners fit between the fingers.
 pub(crate) fn is_round(thing: &Sighting) -> bool {
     let [width, depth, _] = thing.size_m;
-    (width - depth).abs() < ROUND_M
+    !thing.angular && (width - depth).abs() < ROUND_M
+}
+
+/// Whether an object that the robot knows as a box has corners that don't fit between the fingers.
+pub(crate) fn is_angular(thing: &Sighting, robot: &Operator<'_>) -> bool {
+    let [width, depth, _] = thing.size_m;
+    let fits = width.hypot(depth) + LEAST_ROOM_M <= robot.profile().max_opening_m;
+    !fits && robot.kind_of(&thing.id).is_some_and(|kind| kind.is_box)
 }
 
 /// Width of an object across the fingers of a hand with this heading. Unit: metres.
@@ -203,7 +214,13 @@ mod tests {
     use actcheck_data::Pose;
 
     fn thing(size_m: [f64; 3]) -> Sighting {
-        Sighting { id: "t".to_owned(), pose: Pose::upright([1.0, 0.0, 0.7], 0.4), size_m, furniture: false }
+        Sighting {
+            id: "t".to_owned(),
+            pose: Pose::upright([1.0, 0.0, 0.7], 0.4),
+            size_m,
+            furniture: false,
+            angular: false,
+        }
     }
 
     #[test]
@@ -237,6 +254,19 @@ mod tests {
         // Wider across its corners, it is grasped only where the usual room is left.
         let block = thing([0.05, 0.075, 0.12]);
         assert!(grasps(&block, 0.069).len() < grasps(&block, 0.085).len());
+    }
+
+    #[test]
+    fn a_cube_whose_corners_do_not_fit_is_grasped_across_its_sides() {
+        let cube = thing([0.05, 0.05, 0.05]);
+        assert!(grasps(&cube, 0.06).len() > 24, "a round object is grasped from everywhere");
+        let found = grasps(&Sighting { angular: true, ..cube }, 0.06);
+        assert!(found.len() >= 4);
+        for grasp in found {
+            let across = grasp.pose.rotation * Vector3::y();
+            let turn = libm::atan2(-across.x, across.y) - 0.4;
+            assert!(libm::sin(2.0 * turn).abs() < 1e-6, "the fingers close {turn} rad aside of a side");
+        }
     }
 
     #[test]

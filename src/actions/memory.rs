@@ -107,7 +107,7 @@ pub fn furniture(id: &str, plane: &PerceivedPlane) -> Sighting {
     let [x, y, height] = plane.pose.position;
     let [width, depth] = plane.size_m;
     let pose = Pose::upright([x, y, 0.0], plane.pose.yaw());
-    Sighting { id: id.to_owned(), pose, size_m: [width, depth, height], furniture: true }
+    Sighting { id: id.to_owned(), pose, size_m: [width, depth, height], furniture: true, angular: false }
 }
 
 /// Edge of the squares that floor cells are merged into. Unit: metres. Two cells of a grid.
@@ -125,14 +125,20 @@ pub fn obstacles(floor: &[Standing]) -> Vec<Sighting> {
     let piece = |(number, (square, top)): (usize, ([i64; 2], f64))| {
         let [x, y] = square.map(|along| (along as f64 + 0.5) * PIECE_M);
         let pose = Pose::upright([x, y, 0.0], 0.0);
-        Sighting { id: format!("obstacle_{}", number + 1), pose, size_m: [PIECE_M, PIECE_M, top], furniture: false }
+        Sighting {
+            id: format!("obstacle_{}", number + 1),
+            pose,
+            size_m: [PIECE_M, PIECE_M, top],
+            furniture: false,
+            angular: false,
+        }
     };
     tops.into_iter().enumerate().map(piece).collect()
 }
 
 /// Converts a percept to a sighting, the format of the abstract detector.
 pub fn sighting(id: String, thing: &PerceivedThing) -> Sighting {
-    Sighting { id, pose: thing.pose, size_m: thing.size_m, furniture: false }
+    Sighting { id, pose: thing.pose, size_m: thing.size_m, furniture: false, angular: false }
 }
 
 #[cfg(test)]
@@ -148,7 +154,13 @@ mod tests {
 
     fn recalled(things: Vec<PerceivedThing>) -> Result<(Sighting, Vec<Sighting>), String> {
         let plane = PerceivedPlane { pose: Pose::upright([1.0, 0.0, 0.7], 0.3), size_m: [0.6, 0.5] };
-        let kind = KnownKind { name: "glass".into(), category: GLASS.into(), size_m: [0.088, 0.088, 0.146], rim: None };
+        let kind = KnownKind {
+            name: "glass".into(),
+            category: GLASS.into(),
+            size_m: [0.088, 0.088, 0.146],
+            rim: None,
+            is_box: false,
+        };
         recall(&Perceived { plane: Some(plane), things, look: None }, "glass_1", &kind, &Vector3::zeros())
     }
 
@@ -170,6 +182,7 @@ mod tests {
             pose: Pose::upright([x, 0.0, 0.0], 0.3),
             size_m: [0.6, 0.5, 0.7],
             furniture: true,
+            angular: false,
         };
         let plane = PerceivedPlane { pose: Pose::upright([1.0, 0.0, 0.7], 0.3), size_m: [0.6, 0.5] };
         let perceived = Perceived { plane: Some(plane), things: Vec::new(), look: None };

@@ -66,6 +66,7 @@ mod tests {
             category: name.into(),
             size_m: [side; 3],
             rim: None,
+            is_box: false,
         };
         let kinds = [kind("can", 0.1), kind("glass", 0.12), kind("bowl", 0.3)];
         let mut things = vec![thing(None, 0.0), thing(Some("can"), 1.0)];

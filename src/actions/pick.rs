@@ -32,7 +32,7 @@ pub fn pick(call: &ActionCall, robot: &mut Operator<'_>) -> Result<ActionReport,
     robot.begin("perceive");
     robot.wait(LOOK_SECS)?;
     let (seen, others) = match find(target, robot) {
-        Ok(found) => found,
+        Ok((seen, others)) => (Sighting { angular: grasp::is_angular(&seen, robot), ..seen }, others),
         Err(reason) => return Ok(failed(reason)),
     };
     let way = match planned(&seen, &others, robot) {

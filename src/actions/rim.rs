@@ -83,6 +83,7 @@ mod tests {
             pose: Pose::upright([1.0, 0.5, 0.4], 0.0),
             size_m: [0.16, 0.16, 0.065],
             furniture: false,
+            angular: false,
         };
         let all = grasps(&thing, &BOWL, 0.135);
         assert_eq!(all.len(), 240);

@@ -190,7 +190,7 @@ mod tests {
 
     fn table() -> Block {
         let pose = Pose::IDENTITY;
-        Block::new(&Sighting { id: "t".to_owned(), pose, size_m: [0.6, 0.6, 0.7], furniture: true })
+        Block::new(&Sighting { id: "t".to_owned(), pose, size_m: [0.6, 0.6, 0.7], furniture: true, angular: false })
     }
 
     #[test]
@@ -200,6 +200,7 @@ mod tests {
             pose: Pose::IDENTITY,
             size_m: [size, size, height],
             furniture: true,
+            angular: false,
         };
         let others = [seen(8.0, 2.5), seen(0.6, 0.7)];
         let blocks = |base| Block::around(&Point3::from(base), &others).len();

@@ -418,7 +418,7 @@ mod tests {
             // As high as the hand, so that the arm is above it.
             let (position, size_m) = ([hand.x - behind_m - 0.05, 0.0, 0.0], [0.1, 1.0, hand.z]);
             let pose = Pose::upright(position, 0.0);
-            let wall = Sighting { id: "wall".to_owned(), pose, size_m, furniture: true };
+            let wall = Sighting { id: "wall".to_owned(), pose, size_m, furniture: true, angular: false };
             let wall = [Block::new(&wall)];
             let space = || ArmSpace::new(&kinematics, &layout, &wall, &[], std::slice::from_ref(&home));
             let arm = Arm {

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use crate::{MovingPart, ObjectModel, PartJoint, Physics, Pose, Rim, RobotProfile, SceneMap, Sensing};
+use crate::{MovingPart, ObjectModel, Part, PartJoint, Physics, Pose, Rim, RobotProfile, SceneMap, Sensing, Shape};
 
 /// A sampled scene. Frame of all poses: world; z up; the floor at 0.
 #[derive(Debug, Clone)]
@@ -159,11 +159,19 @@ pub struct KnownKind {
     pub size_m: [f64; 3],
     /// The wall of an open vessel, which a hand can take at its rim.
     pub rim: Option<Rim>,
+    /// Whether it is a box.
+    pub is_box: bool,
 }
 
 impl KnownKind {
     /// Returns the knowledge about a model.
     pub fn of(model: &ObjectModel) -> Self {
-        Self { name: model.name.clone(), category: model.category.clone(), size_m: model.size_m, rim: model.rim() }
+        Self {
+            name: model.name.clone(),
+            category: model.category.clone(),
+            size_m: model.size_m,
+            rim: model.rim(),
+            is_box: matches!(model.parts.as_slice(), [Part { shape: Shape::Box { .. }, .. }]),
+        }
     }
 }

@@ -24,6 +24,8 @@ pub struct Sighting {
     pub size_m: [f64; 3],
     /// Whether it is furniture, which is static and on the robot's map.
     pub furniture: bool,
+    /// Whether the hand can take it only across its sides, because it is a box whose corners don't fit between the fingers.
+    pub angular: bool,
 }
 
 impl World {
@@ -48,6 +50,7 @@ impl World {
             pose: Pose::from_isometry(&self.pose_of(object)),
             size_m: object.model.size_m,
             furniture: object.fixed,
+            angular: false,
         });
         objects.collect()
     }
@@ -63,7 +66,13 @@ impl World {
         let on_map = self.objects.iter().filter(|object| object.on_map);
         let as_built = on_map.map(|object| {
             let (foot, size_m) = self.foot(object, &object.placed);
-            Sighting { id: object.id.clone(), pose: Pose::from_isometry(&foot), size_m, furniture: true }
+            Sighting {
+                id: object.id.clone(),
+                pose: Pose::from_isometry(&foot),
+                size_m,
+                furniture: true,
+                angular: false,
+            }
         });
         as_built.collect()
     }
@@ -97,7 +106,7 @@ impl World {
             *size = (*size + noise).max(SMALLEST_M);
         }
         let pose = Pose::from_isometry(&(self.believed_from_true * seen));
-        Some(Sighting { id: id.to_owned(), pose, size_m, furniture: object.on_map })
+        Some(Sighting { id: id.to_owned(), pose, size_m, furniture: object.on_map, angular: false })
     }
 
     /// Returns the gap between the fingers, measured with noise. Unit: metres.

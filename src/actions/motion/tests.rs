@@ -19,7 +19,7 @@ fn arm() -> (Kinematics, Layout, Vec<f64>) {
 }
 
 fn seen(position: [f64; 3], size_m: [f64; 3], furniture: bool) -> Sighting {
-    Sighting { id: "x".to_owned(), pose: Pose::upright(position, 0.0), size_m, furniture }
+    Sighting { id: "x".to_owned(), pose: Pose::upright(position, 0.0), size_m, furniture, angular: false }
 }
 
 #[test]

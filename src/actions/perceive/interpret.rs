@@ -151,8 +151,13 @@ mod tests {
     const EYE: Point3<f64> = Point3::new(-1.0, 0.0, 1.4);
 
     fn kinds() -> Vec<KnownKind> {
-        let kind =
-            |name: &str, size_m| KnownKind { name: name.to_owned(), category: name.to_owned(), size_m, rim: None };
+        let kind = |name: &str, size_m| KnownKind {
+            name: name.to_owned(),
+            category: name.to_owned(),
+            size_m,
+            rim: None,
+            is_box: false,
+        };
         vec![kind("box", [0.1, 0.06, 0.15]), kind("can", [0.066, 0.066, 0.115])]
     }
 

@@ -52,8 +52,13 @@ mod tests {
     use super::*;
 
     fn kinds() -> Vec<KnownKind> {
-        let kind =
-            |name: &str, size_m| KnownKind { name: name.to_owned(), category: name.to_owned(), size_m, rim: None };
+        let kind = |name: &str, size_m| KnownKind {
+            name: name.to_owned(),
+            category: name.to_owned(),
+            size_m,
+            rim: None,
+            is_box: false,
+        };
         vec![kind("box", [0.1, 0.06, 0.15]), kind("can", [0.066, 0.066, 0.115]), kind("glass", [0.088, 0.088, 0.146])]
     }
 

@@ -110,7 +110,7 @@ mod tests {
     #[test]
     fn points_beside_or_far_below_a_table_top_are_not_part_of_it() {
         let pose = Pose::upright([1.0, 0.0, 0.0], std::f64::consts::FRAC_PI_2);
-        let table = Sighting { id: "t".to_owned(), pose, size_m: [1.2, 0.8, 0.74], furniture: true };
+        let table = Sighting { id: "t".to_owned(), pose, size_m: [1.2, 0.8, 0.74], furniture: true, angular: false };
         // Turned by 90 degrees, it is 0.8 m long along x and 1.2 m along y.
         let points = [[1.5, 0.7, 0.7], [1.0, 0.0, 0.88], [1.6, 0.0, 0.74], [1.0, 0.8, 0.74], [1.0, 0.0, 0.5]];
         let kept = near(&points.map(Point3::from), &table);

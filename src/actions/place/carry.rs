@@ -265,7 +265,7 @@ mod tests {
     #[test]
     fn the_base_poses_face_each_side_of_the_table() {
         let pose = Pose::upright([2.0, 1.0, 0.0], std::f64::consts::FRAC_PI_2);
-        let shelf = Sighting { id: "s".to_owned(), pose, size_m: [0.4, 1.0, 0.8], furniture: true };
+        let shelf = Sighting { id: "s".to_owned(), pose, size_m: [0.4, 1.0, 0.8], furniture: true, angular: false };
         for ([x, y, heading], across) in stands(&shelf).into_iter().zip([0.4, 1.0, 1.0, 0.4]) {
             let (dx, dy) = (2.0 - x, 1.0 - y);
             assert!((dx.hypot(dy) - across / 2.0 - GAP_M).abs() < 1e-9);

@@ -122,7 +122,7 @@ mod tests {
     }
 
     fn thing(position: [f64; 3], size_m: [f64; 3]) -> Sighting {
-        Sighting { id: "t".to_owned(), pose: Pose::upright(position, 0.0), size_m, furniture: false }
+        Sighting { id: "t".to_owned(), pose: Pose::upright(position, 0.0), size_m, furniture: false, angular: false }
     }
 
     #[test]

@@ -342,7 +342,7 @@ fn innermost(bare: &RobotProfile, model: &RobotModel, (palm, joints): (usize, &B
     let Ok(gripper) = Gripper::find_coarse(&profile, model, found.links, (palm, found.frame)) else { return 1.0 };
     let mut positions = vec![0.0; model.joints.len()];
     gripper.set(&mut positions, gripper.widest_m());
-    let gap = |links| Probe::new(model, links, (palm, found.frame)).gap(&positions);
+    let gap = |links| Probe::facing(model, links, (palm, found.frame), &positions).gap(&positions);
     let Some(own) = gap(found.links) else { return 1.0 };
     let is_between = |joint: &usize| {
         let link = joint + 1;
@@ -473,34 +473,31 @@ mod tests {
     use actcheck_base::{Files, Source};
     use std::path::Path;
 
-    /// Each finger has a pad and a bar outside of it, which opens wider; both slide with the same motor.
-    #[test]
-    fn the_innermost_links_are_the_fingertips() {
+    const INERTIAL: &str = "<inertial><mass value=\"0.1\"/>\
+        <inertia ixx=\"1e-4\" ixy=\"0\" ixz=\"0\" iyy=\"1e-4\" iyz=\"0\" izz=\"1e-4\"/></inertial>";
+
+    /// A finger that slides by 4 cm along y, with its shape ahead of its joint along x, and the share by which it follows the joint
+    /// `finger_pad_left`.
+    fn finger(name: &str, [x, y]: [f64; 2], ahead_m: f64, share: f64) -> String {
+        let mimic = match name {
+            "finger_pad_left" => String::new(),
+            _ => format!("<mimic joint=\"finger_pad_left\" multiplier=\"{share}\"/>"),
+        };
+        let (lower, upper) = if share > 0.0 { (0.0, 0.04) } else { (-0.04, 0.0) };
+        format!(
+            "<link name=\"{name}\">{INERTIAL}<collision><origin xyz=\"{ahead_m} 0 0\"/>\
+             <geometry><box size=\"0.1 0.008 0.03\"/></geometry></collision></link>\
+             <joint name=\"{name}\" type=\"prismatic\"><parent link=\"palm\"/><child link=\"{name}\"/>\
+             <origin xyz=\"{x} {y} 0\"/><axis xyz=\"0 1 0\"/>\
+             <limit lower=\"{lower}\" upper=\"{upper}\" effort=\"9\" velocity=\"1\"/>{mimic}</joint>"
+        )
+    }
+
+    /// The hand that is found on a palm with these fingers.
+    fn found(fingers: &[String]) -> RobotProfile {
         let path = Path::new("models/robots/fixed_arm.toml");
         let shipped = actcheck_config::robot::read(&Files::Shipped, path).expect("the shipped robot is valid");
-        let inertial = "<inertial><mass value=\"0.1\"/>\
-                        <inertia ixx=\"1e-4\" ixy=\"0\" ixz=\"0\" iyy=\"1e-4\" iyz=\"0\" izz=\"1e-4\"/></inertial>";
-        let finger = |name: &str, y: f64, factor: f64| {
-            let mimic = match name {
-                "finger_pad_left" => String::new(),
-                _ => format!("<mimic joint=\"finger_pad_left\" multiplier=\"{factor}\"/>"),
-            };
-            let (lower, upper) = if factor > 0.0 { (0.0, 0.04) } else { (-0.04, 0.0) };
-            format!(
-                "<link name=\"{name}\">{inertial}<collision><origin xyz=\"0.06 0 0\"/>\
-                 <geometry><box size=\"0.1 0.008 0.03\"/></geometry></collision></link>\
-                 <joint name=\"{name}\" type=\"prismatic\"><parent link=\"palm\"/><child link=\"{name}\"/>\
-                 <origin xyz=\"0 {y} 0\"/><axis xyz=\"0 1 0\"/>\
-                 <limit lower=\"{lower}\" upper=\"{upper}\" effort=\"9\" velocity=\"1\"/>{mimic}</joint>"
-            )
-        };
-        let fingers = [
-            finger("finger_bar_left", 0.04, 1.0),
-            finger("finger_bar_right", -0.04, -1.0),
-            finger("finger_pad_left", 0.006, 1.0),
-            finger("finger_pad_right", -0.006, -1.0),
-        ];
-        let text = format!("<robot name=\"hand\"><link name=\"palm\">{inertial}</link>{}</robot>", fingers.concat());
+        let text = format!("<robot name=\"hand\"><link name=\"palm\">{INERTIAL}</link>{}</robot>", fingers.concat());
         let profile = RobotProfile {
             urdf: Source::new("hand.urdf", text),
             arm_joints: Vec::new(),
@@ -511,9 +508,36 @@ mod tests {
             ..shipped
         };
         let model = RobotModel::read(&profile).expect("the hand is valid");
-        let mut found = find(&profile, &model, None).unwrap_or_else(|_| panic!("there is a hand")).profile;
+        find(&profile, &model, None).unwrap_or_else(|_| panic!("there is a hand")).profile
+    }
+
+    /// Each finger has a pad and a bar outside of it, which opens wider; both slide with the same motor.
+    #[test]
+    fn the_innermost_links_are_the_fingertips() {
+        let mut found = found(&[
+            finger("finger_bar_left", [0.0, 0.04], 0.06, 1.0),
+            finger("finger_bar_right", [0.0, -0.04], 0.06, -1.0),
+            finger("finger_pad_left", [0.0, 0.006], 0.06, 1.0),
+            finger("finger_pad_right", [0.0, -0.006], 0.06, -1.0),
+        ]);
         found.finger_links.sort();
         assert_eq!(found.finger_links, ["finger_pad_left", "finger_pad_right"]);
         assert!((found.max_opening_m - 0.084).abs() < 1e-3, "{}", found.max_opening_m);
+    }
+
+    /// The joints of the fingers of a Piper are at their tips.
+    #[test]
+    fn fingers_point_away_from_the_palm_wherever_their_joints_are() {
+        for (joint_m, ahead_m) in [(0.03, 0.06), (0.14, -0.05)] {
+            let found = found(&[
+                finger("finger_pad_left", [joint_m, 0.006], ahead_m, 1.0),
+                finger("finger_pad_right", [joint_m, -0.006], ahead_m, -1.0),
+            ]);
+            let [roll, pitch, yaw] = found.grasp_turned_rad;
+            let ahead = UnitQuaternion::from_euler_angles(roll, pitch, yaw) * Vector3::x();
+            assert!(ahead.x > 0.99, "{ahead}");
+            let before_tip_m = joint_m + ahead_m + 0.05 - found.grasp_offset_m[0];
+            assert!((0.01..0.046).contains(&before_tip_m), "{:?}", found.grasp_offset_m);
+        }
     }
 }
