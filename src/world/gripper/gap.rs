@@ -140,19 +140,6 @@ impl<'a> Probe<'a> {
         Self { model, links, grasp, surfaces: links.map(|link| model.links[link].surface()) }
     }
 
-    /// The probe of two links in the order in which their gap is wider at these joint positions: some robots name their fingers
-    /// as seen from the front.
-    pub(crate) fn facing(
-        model: &'a RobotModel,
-        [left, right]: [usize; 2],
-        grasp: (usize, Isometry3<f64>),
-        positions: &[f64],
-    ) -> Self {
-        let [usual, swapped] = [[left, right], [right, left]].map(|links| Self::new(model, links, grasp));
-        let width_m = |probe: &Self| probe.gap(positions).map_or(f64::NEG_INFINITY, |gap| gap.width_m());
-        if width_m(&swapped) > width_m(&usual) { swapped } else { usual }
-    }
-
     /// Returns the parts that these joints move.
     pub(crate) fn moving(&self, joints: &[usize]) -> Moving {
         let above = |link: usize| -> Vec<usize> {

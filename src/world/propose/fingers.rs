@@ -342,7 +342,7 @@ fn innermost(bare: &RobotProfile, model: &RobotModel, (palm, joints): (usize, &B
     let Ok(gripper) = Gripper::find_coarse(&profile, model, found.links, (palm, found.frame)) else { return 1.0 };
     let mut positions = vec![0.0; model.joints.len()];
     gripper.set(&mut positions, gripper.widest_m());
-    let gap = |links| Probe::facing(model, links, (palm, found.frame), &positions).gap(&positions);
+    let gap = |links| Probe::new(model, links, (palm, found.frame)).gap(&positions);
     let Some(own) = gap(found.links) else { return 1.0 };
     let is_between = |joint: &usize| {
         let link = joint + 1;
