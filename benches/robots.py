@@ -101,6 +101,7 @@ ROBOTS = [
 ]
 
 HAND = ["--xacro-arg", "hand:=true"]
+AR4 = ["--xacro-arg", "ar_model:=mk3", "--xacro-arg", "include_gripper:=True"]
 # Robots that were tried after those above, with `--others`.
 OTHERS = [
     ("FR3 (franka_description)", "robots/fr3/fr3.urdf.xacro", HAND, []),
@@ -128,10 +129,10 @@ OTHERS = [
     ("G1, BrainCo hand (unitree_ros)", "g1_with_brainco_hand/g1_29dof_mode_15_brainco_hand.urdf", [], []),
     ("H1, Inspire hand (unitree_ros)", "h1_description/urdf/h1_with_hand.urdf", [], []),
     ("H1-2, Inspire hand (unitree_ros)", "h1_2_description/h1_2.urdf", [], []),
-    ("AR4 (ar4_ros_driver)", "annin_ar4_description/urdf/ar.urdf.xacro", ["--xacro-arg", "include_gripper:=True"], []),
-    ("youBot (youbot_description)", "robots/youbot.urdf.xacro", [], []),
-    ("youBot's arm (youbot_description)", "robots/youbot_arm_only.urdf.xacro", [], []),
-    ("youBot, two arms (youbot_description)", "robots/youbot_dual_arm.urdf.xacro", [], []),
+    ("AR4 (ar4_ros_driver)", "annin_ar4_description/urdf/ar.urdf.xacro", AR4, []),
+    ("youBot (mas-group's youbot_description)", "robots/youbot.urdf.xacro", [], []),
+    ("youBot's arm (mas-group's youbot_description)", "robots/youbot_arm_only.urdf.xacro", [], []),
+    ("youBot, two arms (mas-group's youbot_description)", "robots/youbot_dual_arm.urdf.xacro", [], []),
     ("Piper (Piper_ros)", "piper_description/urdf/piper_description.urdf", [], []),
     ("R5 (ARX_Model)", "R5/R5a/urdf/R5a.urdf", [], []),
     ("AI Worker (ai_worker)", "ffw_bg2_rev4_follower/ffw_bg2_follower.urdf", [], []),
