@@ -8,7 +8,8 @@
 
 Sends the shipped robot to the locations of each `.world` or `.sdf` below the folders, without noise and with five minutes for each
 drive. Prints one line for each world: the drives that reach their goal, that fail, and that do not end as planned, with the reasons.
-Worlds without a location, and those that `check` refuses before it lists any, are not listed: `published_models.py` counts them. Needs the folders of models as `published_models.py` does.
+Worlds without a location, and those that `check` refuses before it lists any, are not listed: `published_models.py` counts
+them. Needs the folders of models as `published_models.py` does.
 """
 
 import argparse

@@ -71,6 +71,8 @@ fn a_proposed_profile_is_complete() {
         let shipped = parsed(&std::fs::read_to_string(root().join("models/robots").join(&name)).unwrap());
         let (short, full) = (parsed(&text), parsed(&uncommented(&text)));
         assert!((4..=10).contains(&short.len()), "{text}");
+        // Both have bodies of their own.
+        assert!(!short.contains_key("mount_height_m"), "{text}");
         for key in ["base_joints", "arm_joints", "head_joints"] {
             assert_eq!(short.get(key), shipped.get(key), "{key} of {robot}");
         }

@@ -313,7 +313,7 @@ impl<'a> Arm<'a> {
         if cost < bound { Ok(plan) } else { Err(Hindrance::Dearer) }
     }
 
-    /// The way back with the object, in this direction; empty if there is no free one.
+    /// The path on which the object is drawn back in this direction; empty if something blocks it.
     fn retreat(&self, lifted: &[f64], back: &Vector3<f64>) -> Vec<Vec<f64>> {
         let is_free = |path: &Vec<Vec<f64>>| path.iter().all(|posture| self.meanwhile.is_free(posture, LEAST_ROOM));
         let mut ways = RETREATS_M.iter().filter_map(|way| self.straight(lifted, &(back * *way)));

@@ -53,8 +53,8 @@ impl Lookup<'_> {
         around.flatten().map(|folder| folder.join(path)).find(|place| self.exists(place))
     }
 
-    /// The end of an absolute path, from the name of a package on, if there is no such file: a model that was expanded on another
-    /// machine has the paths of that one.
+    /// The file of an absolute path that does not exist here: its end, which begins with the name of a package, is looked up. A
+    /// model that xacro wrote on another machine has the paths of that machine.
     fn find_end(&self, path: &str) -> Option<PathBuf> {
         if !path.starts_with('/') || self.exists(Path::new(path)) {
             return None;

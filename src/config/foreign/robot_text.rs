@@ -17,15 +17,19 @@ impl Edit {
     }
 }
 
-/// Returns the text of a URDF with these changes, none of which overlap.
+/// Returns the text of a URDF with these changes. One inside of another has no effect: both may remove the same element.
 pub(crate) fn with(text: &str, mut edits: Vec<Edit>) -> String {
-    // From the last place to the first, so that the others stay valid.
-    edits.sort_by_key(|edit| std::cmp::Reverse(edit.span.start));
-    let mut text = text.to_owned();
+    // A text is inserted before an element that is removed at the same place.
+    edits.sort_by_key(|edit| (edit.span.start, edit.span.end));
+    let (mut changed, mut done) = (String::with_capacity(text.len()), 0);
     for edit in edits {
-        text.replace_range(edit.span, &edit.text);
+        if edit.span.start >= done {
+            changed += &text[done..edit.span.start];
+            changed += &edit.text;
+            done = edit.span.end;
+        }
     }
-    text
+    changed + &text[done..]
 }
 
 /// Returns the changes without which the library for URDFs refuses files that other programs load.
@@ -121,4 +125,18 @@ fn unlimited(joint: Node) -> impl Iterator<Item = Edit> {
 /// Whether an effort or a velocity is written as -1, which means no limit, as in SDF.
 pub(crate) fn is_unlimited(written: &str) -> bool {
     written.trim().parse() == Ok(-1.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn changes_inside_of_others_have_no_effect() {
+        let edit = |span: Span, text: &str| Edit { span, text: text.to_owned() };
+        let removed = || edit(2..6, "");
+        assert_eq!(with("ab1234cd", vec![edit(3..5, "x"), removed(), removed(), edit(6..6, "+")]), "ab+cd");
+        assert_eq!(with("ab1234cd", vec![removed(), edit(2..2, "-")]), "ab-cd");
+        assert_eq!(with("abcd", vec![edit(4..4, "e"), edit(0..1, "A")]), "Abcde");
+    }
 }

@@ -17,6 +17,7 @@ mod seat;
 mod short_arm;
 mod stated;
 mod thumb;
+mod weights;
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
