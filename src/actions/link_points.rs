@@ -2,6 +2,8 @@
 
 use nalgebra::{Isometry3, Point3};
 
+use actcheck_world::{Cluster, Sphere, sphere_tree};
+
 /// Margin for rounding when a link is skipped by its bounding sphere. Unit: metres.
 const ROUNDING_M: f64 = 1e-9;
 
@@ -13,49 +15,14 @@ const CLUSTER: usize = 6;
 pub struct LinkPoints {
     /// The link's index.
     pub link: usize,
-    /// Unit: metres.
+    /// In the order of their clusters. Unit: metres.
     pub points: Vec<Point3<f64>>,
-    around: Sphere,
-    /// The same points in clusters of neighbours.
-    clusters: Vec<(Sphere, Vec<Point3<f64>>)>,
+    clusters: Vec<Cluster>,
 }
 
-/// A bounding sphere. Unit: metres.
-#[derive(Debug, Clone, Copy, PartialEq)]
-struct Sphere {
-    centre: Point3<f64>,
-    radius: f64,
-}
-
-impl Sphere {
-    /// The sphere around points with its centre at their mean.
-    fn around(points: &[Point3<f64>]) -> Self {
-        let sum = points.iter().fold(Point3::origin(), |sum, point| sum + point.coords);
-        let centre = sum / points.len().max(1) as f64;
-        Self { centre, radius: points.iter().map(|point| (point - centre).norm()).fold(0.0, f64::max) }
-    }
-
-    /// Whether all points in it are farther than `least` from an obstacle. Unit: metres.
-    fn is_beyond(&self, pose: &Isometry3<f64>, least: f64, distance: impl Fn(&Point3<f64>) -> f64) -> bool {
-        distance(&(pose * self.centre)) - self.radius - ROUNDING_M > least
-    }
-}
-
-/// Splits points along the longest side of their box until each cluster is small.
-fn clusters(mut points: Vec<Point3<f64>>, found: &mut Vec<(Sphere, Vec<Point3<f64>>)>) {
-    if points.len() <= CLUSTER {
-        found.push((Sphere::around(&points), points));
-        return;
-    }
-    let side = |axis: &usize| {
-        let along = || points.iter().map(|point| point[*axis]);
-        along().fold(f64::NEG_INFINITY, f64::max) - along().fold(f64::INFINITY, f64::min)
-    };
-    let longest = (0..3).max_by(|a, b| side(a).total_cmp(&side(b))).unwrap_or(0);
-    points.sort_by(|a, b| a[longest].total_cmp(&b[longest]));
-    let upper = points.split_off(points.len() / 2);
-    clusters(points, found);
-    clusters(upper, found);
+/// Whether all points in a sphere are farther than `least` from an obstacle. Unit: metres.
+fn is_beyond(around: &Sphere, pose: &Isometry3<f64>, least: f64, distance: impl Fn(&Point3<f64>) -> f64) -> bool {
+    distance(&(pose * around.middle)) - around.radius - ROUNDING_M > least
 }
 
 impl LinkPoints {
@@ -68,10 +35,9 @@ impl LinkPoints {
                 None => grouped.push((*link, vec![*point])),
             }
         }
-        let of_link = |(link, points): (usize, Vec<Point3<f64>>)| {
-            let mut found = Vec::new();
-            clusters(points.clone(), &mut found);
-            Self { link, around: Sphere::around(&points), clusters: found, points }
+        let of_link = |(link, mut points): (usize, Vec<Point3<f64>>)| {
+            let clusters = sphere_tree(&mut points, CLUSTER, |point| Sphere { middle: *point, radius: 0.0 });
+            Self { link, points, clusters }
         };
         grouped.into_iter().map(of_link).collect()
     }
@@ -80,14 +46,33 @@ impl LinkPoints {
     ///
     /// `distance` is the signed distance to the obstacle, which must not change by more than the point moves: the
     /// points in a bounding sphere that is farther than `least` are skipped.
-    pub fn nearest(&self, pose: &Isometry3<f64>, least: f64, distance: impl Fn(&Point3<f64>) -> f64) -> f64 {
-        if self.around.is_beyond(pose, least, &distance) {
-            return least;
+    pub fn nearest(&self, pose: &Isometry3<f64>, mut least: f64, distance: impl Fn(&Point3<f64>) -> f64) -> f64 {
+        let mut idx = 0;
+        while let Some(cluster) = self.clusters.get(idx) {
+            if is_beyond(&cluster.around, pose, least, &distance) {
+                idx = cluster.next;
+            } else {
+                let points = &self.points[cluster.things.clone()];
+                least = points.iter().fold(least, |least, point| least.min(distance(&(pose * point))));
+                idx += 1;
+            }
         }
-        self.clusters.iter().fold(least, |least, (around, points)| match around.is_beyond(pose, least, &distance) {
-            true => least,
-            false => points.iter().fold(least, |least, point| least.min(distance(&(pose * point)))),
-        })
+        least
+    }
+
+    /// Whether any point is nearer to the obstacle than this. Unit: metres. See [`LinkPoints::nearest`].
+    pub fn is_nearer(&self, pose: &Isometry3<f64>, least: f64, distance: impl Fn(&Point3<f64>) -> f64) -> bool {
+        let mut idx = 0;
+        while let Some(cluster) = self.clusters.get(idx) {
+            if is_beyond(&cluster.around, pose, least, &distance) {
+                idx = cluster.next;
+            } else if self.points[cluster.things.clone()].iter().any(|point| distance(&(pose * point)) < least) {
+                return true;
+            } else {
+                idx += 1;
+            }
+        }
+        false
     }
 }
 
@@ -108,8 +93,13 @@ mod tests {
             let most = 1.5 + at(trial + 3);
             let links = LinkPoints::grouped(&points);
             let fast = links.iter().fold(most, |least, link| link.nearest(&pose, least, distance));
-            let plain = points.iter().fold(most, |least: f64, (_, point)| least.min(distance(&(pose * point))));
-            assert_eq!(fast.to_bits(), plain.to_bits(), "trial {trial}");
+            let all = points.iter().map(|(_, point)| distance(&(pose * point)));
+            let plain = all.fold(f64::INFINITY, f64::min);
+            assert_eq!(fast.to_bits(), plain.min(most).to_bits(), "trial {trial}");
+            for least in [most, plain + 1e-6, plain] {
+                let is_nearer = links.iter().any(|link| link.is_nearer(&pose, least, distance));
+                assert_eq!(is_nearer, plain < least, "trial {trial}");
+            }
         }
     }
 }

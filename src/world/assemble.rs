@@ -95,7 +95,7 @@ pub(super) fn insert_links(
             hooks |= ActiveHooks::MODIFY_SOLVER_CONTACTS;
         }
         for (shape, pose) in link.form().shapes() {
-            let collider = same_shape(shape, pose, Owner::Link(idx), friction);
+            let collider = same_shape(shape, pose, Owner::Link(idx), friction, link.has_many_pieces());
             let groups = if on_floor[idx] { off_floor() } else { InteractionGroups::all() };
             let collider = collider.active_hooks(hooks);
             engine.insert_collider(collider.density(0.0).collision_groups(groups), Some(body));

@@ -99,15 +99,7 @@ impl Link {
     pub(crate) fn form(&self) -> Arc<Form> {
         Arc::clone(self.form.get_or_init(|| Arc::new(Form::new(&self.solids))))
     }
-
-    /// Returns whether it has many collision shapes, as one whose mesh was split into convex pieces.
-    pub(crate) fn has_many_pieces(&self) -> bool {
-        self.solids.len() >= MANY_PIECES
-    }
 }
-
-/// Fewest shapes of a link of many pieces.
-const MANY_PIECES: usize = 4;
 
 /// The robot's links and joints. Parents come before their children.
 #[derive(Debug, Clone)]

@@ -141,9 +141,15 @@ pub fn collider(solid: &Part, owner: Owner, friction: f64, restitution: f64) -> 
     Some(with_surface(builder.position(to_pose(&pose)).restitution(to_real(restitution)), owner, friction))
 }
 
-/// Returns the collider of a shape that another one has already, at the same pose.
-pub fn same_shape(shape: &SharedShape, pose: &Pose, owner: Owner, friction: f64) -> ColliderBuilder {
-    with_surface(ColliderBuilder::new(shape.clone()).position(*pose).restitution(0.0), owner, friction)
+/// Returns the collider of a shape that another one has already, at the same pose. A hull `with_memory` remembers the shapes
+/// around it.
+pub fn same_shape(shape: &SharedShape, pose: &Pose, owner: Owner, friction: f64, with_memory: bool) -> ColliderBuilder {
+    // Hulls remember boxes and shapes around them, which are others in each simulation.
+    let own = match shape.as_shape::<Hull>().filter(|_| with_memory) {
+        Some(hull) => SharedShape::new(hull.with_memory()),
+        None => SharedShape(shape.clone_dyn().into()),
+    };
+    with_surface(ColliderBuilder::new(own).position(*pose).restitution(0.0), owner, friction)
 }
 
 fn with_surface(builder: ColliderBuilder, owner: Owner, friction: f64) -> ColliderBuilder {

@@ -16,6 +16,8 @@ use parry3d::shape::{PackedFeatureId, PolygonalFeature, Shape};
 use rapier3d::prelude::{ContactData, ContactManifoldData, NarrowPhase};
 
 use crate::convert::{from_vector, to_real, to_vector};
+use crate::hull::Hull;
+use crate::neighbours::Neighbours;
 use crate::separation::{Found, Separation, Solids};
 
 /// Creates a narrow phase that does not reuse contact points from the previous step, and computes those of hulls and cylinders in
@@ -117,13 +119,32 @@ fn between_solids(
     if shapes.iter().all(|shape| shape.as_cuboid().is_some()) {
         return false;
     }
+    let memory = memory_of(shapes);
     if manifolds.is_empty() {
         manifolds.push(ContactManifold::new());
+        memory.inspect(|(known, other)| known.forget(*other));
     }
     let [manifold] = manifolds.as_mut_slice() else { return false };
+    let mut corners = match memory.map(|(known, around)| known.look(around, shapes[1], pos12)) {
+        Some(Ok(())) => {
+            manifold.clear();
+            return true;
+        }
+        Some(Err(corners)) => corners,
+        None => Vec::new(),
+    };
     let last = manifold.local_n1.try_normalize().or(pos12.translation.try_normalize()).unwrap_or(Vector::X);
     let solids = Solids::new(pos12, one, other);
-    match solids.separation(from_vector(last), f64::from(prediction)) {
+    let found = solids.separation_near(from_vector(last), f64::from(prediction), &mut corners);
+    if let Some((known, around)) = memory {
+        let gap = match &found {
+            Found::Nothing => 0.0,
+            Found::Far(_) => prediction,
+            Found::Near(found) => to_real(found.distance_m),
+        };
+        known.note(around, pos12, gap, corners);
+    }
+    match found {
         Found::Nothing => return false,
         Found::Far(normal) => {
             manifold.clear();
@@ -147,6 +168,15 @@ fn between_solids(
         }
     }
     true
+}
+
+/// Returns the memory of the first shape that has one, and the other shape.
+fn memory_of<'a>([one, other]: [&'a dyn Shape; 2]) -> Option<(&'a Neighbours, &'a dyn Shape)> {
+    memory(one).map(|known| (known, other)).or_else(|| memory(other).map(|known| (known, one)))
+}
+
+fn memory(shape: &dyn Shape) -> Option<&Neighbours> {
+    shape.as_shape::<Hull>()?.neighbours.as_ref()
 }
 
 #[cfg(test)]
@@ -177,5 +207,50 @@ mod tests {
         let mut mended = vec![known];
         let found = RecomputeContacts.contact_manifolds(&pos12, &stave, &bottle, 0.02, &mut mended, &mut None);
         assert!(found.is_ok() && deepest(&mended) < 1e-3, "{} m deep", deepest(&mended));
+    }
+
+    /// A can moves slowly around a piece of a finger, in and out of contact. The hull that remembers finds the same nearest contact
+    /// as one that does not, whenever it is near enough to be solved, and searches less often.
+    #[test]
+    fn a_hull_with_a_memory_finds_the_same_contacts() {
+        use super::*;
+        use actcheck_data::Choices;
+        use parry3d::shape::Cylinder;
+        use rapier3d::prelude::Rotation;
+
+        use crate::link_pairs::SURE_M;
+
+        let mut choices = Choices::random(21, 0);
+        let mut number = |most: f64| to_real(choices.real("at".into(), -most, most, 0.0));
+        let (mut near, mut skipped) = (0, 0);
+        for _ in 0..20 {
+            let corners: Vec<Vector> =
+                (0..24).map(|_| Vector::new(number(0.01), number(0.02), number(0.008))).collect();
+            let plain = Hull::of(&corners).expect("the corners are not in a plane");
+            let (known, can) = (plain.with_memory(), Cylinder::new(0.06, 0.033));
+            let (mut by_plain, mut by_known) = (Vec::new(), Vec::new());
+            let (from, turn) =
+                (Vector::new(0.06, number(0.02), number(0.02)), Vector::new(number(1.0), 0.0, number(1.0)));
+            for step in 0..400_u16 {
+                let share = Real::from(step) / 400.0;
+                let way = Vector::new(0.035 * (share * std::f32::consts::PI).sin(), 0.01 * share, 0.0);
+                let pos12 = Pose::from_parts(from - way, Rotation::from_scaled_axis(turn * (1.0 + 0.1 * share)));
+                assert!(between_solids(&pos12, [&plain, &can], 0.006, &mut by_plain));
+                assert!(between_solids(&pos12, [&known, &can], 0.006, &mut by_known));
+                let nearest = |manifolds: &[ContactManifold<ContactManifoldData, ContactData>]| {
+                    let points = manifolds.iter().flat_map(|manifold| &manifold.points);
+                    points.map(|point| point.dist).fold(Real::INFINITY, Real::min)
+                };
+                let (one, other) = (nearest(&by_plain), nearest(&by_known));
+                if one < SURE_M {
+                    near += 1;
+                    assert!((one - other).abs() < 5e-6, "{one} m and {other} m in step {step}");
+                    assert!(by_plain[0].local_n1.dot(by_known[0].local_n1) > 0.999, "step {step}");
+                } else if one.is_finite() && !other.is_finite() {
+                    skipped += 1;
+                }
+            }
+        }
+        assert!(near > 1000 && skipped > 200, "{near} near, {skipped} skipped");
     }
 }

@@ -35,10 +35,12 @@ mod mechanism;
 mod motion;
 mod motor;
 mod needed;
+mod neighbours;
 mod object;
 mod observe;
 mod odometry;
 mod perturbation;
+mod pieces;
 mod propose;
 mod quality;
 mod rays;
@@ -57,6 +59,7 @@ mod share;
 mod shell;
 mod silhouette;
 mod simulation;
+mod sphere_tree;
 mod suction;
 mod surface;
 mod views;
@@ -85,9 +88,10 @@ pub use self_contact::SelfContact;
 pub use sense::Sighting;
 pub use settle::Settling;
 pub use simulation::{Command, Observation, World, build};
+pub use sphere_tree::{Cluster, Sphere, sphere_tree};
 pub use suction::would_seal;
 pub use views::robot_views;
 
 /// Version of the physics: the same scene and commands give the same bits only with the same version. It rises with each
 /// change of these bits.
-pub const PHYSICS_VERSION: u32 = 14;
+pub const PHYSICS_VERSION: u32 = 15;

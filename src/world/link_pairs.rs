@@ -10,7 +10,6 @@ use rapier3d::prelude::{
 
 use crate::World;
 use crate::convert::{from_vector, to_real};
-use crate::description::Link;
 use crate::engine::{FLOOR_GROUP, LENGTH_UNIT, Owner};
 use crate::object::Object;
 use crate::robot_course::TOUCH_M;
@@ -19,7 +18,7 @@ use parry3d::math::Vector;
 /// Number of collision groups for links.
 const LINK_GROUPS: u32 = 30;
 /// Contacts nearer than this are kept at any speed: a link at rest can't move farther in a step. Unit: metres.
-const SURE_M: Real = 1.5e-3;
+pub(super) const SURE_M: Real = 1.5e-3;
 /// Factor on the present speed, which motors change within the step.
 const OVERSHOOT: Real = 2.0;
 /// A collision group without links: objects are in all groups, and links collide with this one.
@@ -105,7 +104,7 @@ const FAST_M_S: f64 = 1.0;
 impl World {
     /// Sets the distance below which the engine prepares contacts in this tick.
     pub(super) fn prepare_contacts(&mut self) {
-        if !self.robot.model.links.iter().any(Link::has_many_pieces) {
+        if !self.robot.model.has_many_pieces() {
             return;
         }
         let is_fast = |object: &Object| self.speed_of(object).is_some_and(|speed| speed > FAST_M_S);

@@ -74,6 +74,13 @@ impl Motor {
         self.setpoint_velocity = self.setpoint_velocity.clamp(-fastest - catching_up, fastest - catching_up);
     }
 
+    /// Returns how far the joint can catch up with its setpoint in a time: a finger that is blocked lags far behind its setpoint,
+    /// but its damping lets it move only slowly.
+    pub(super) fn lag(&self, position: f64, secs: f64) -> f64 {
+        let lag = (self.setpoint - position).abs();
+        if self.damping > 0.0 && secs.is_finite() { lag.min(lag * secs * self.stiffness / self.damping) } else { lag }
+    }
+
     /// Applies an effort for a step: a velocity motor with the target speed `top` and `effort` as its limit gives this
     /// effort until it reaches that speed. Also resets the setpoint, so that position control later resumes at the
     /// current position.
@@ -106,4 +113,31 @@ fn limit_if_near(data: &mut GenericJoint, axis: JointAxis, joint: &Joint, positi
     }
     let room = (position - joint.lower).min(joint.upper - position);
     data.limit_axes.set(axis.into(), room < STOP_RANGE + 2.0 * largest);
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::robot::tests::lonely;
+
+    /// A joint without inertia is the fastest: it follows its law at once.
+    #[test]
+    fn no_joint_catches_up_by_more_than_said() {
+        let world = lonely();
+        let (tick_secs, finger) = (world.tick_secs(), world.layout().gripper.joints().next().expect("it has fingers"));
+        for joint in [world.layout().arm[0], finger] {
+            let motor = &world.robot.motors[joint];
+            for lag in [1e-4, 0.01, 0.3] {
+                let motor = crate::motor::Motor { setpoint: lag, setpoint_velocity: 0.0, ..motor.clone() };
+                let (n_substeps, mut position) = (16, 0.0);
+                let secs = tick_secs / f64::from(n_substeps);
+                for _ in 0..n_substeps {
+                    let catching_up = motor.stiffness * (lag - position) / (motor.damping + motor.stiffness * secs);
+                    position += catching_up * secs;
+                }
+                let most = motor.lag(0.0, tick_secs);
+                assert!(position <= most && most <= lag, "{position} of {most}, {lag} behind");
+                assert!(joint != finger || most < 0.2 * lag, "{most} of {lag}");
+            }
+        }
+    }
 }

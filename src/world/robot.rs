@@ -276,13 +276,15 @@ impl Robot {
     pub(super) fn spans(&self, positions: &[f64], velocities: &[f64], tick_secs: f64, overshoot: f64) -> Vec<f64> {
         let state = positions.iter().zip(velocities);
         let motors = self.motors.iter().zip(&self.model.joints).zip(state);
+        let has_many_pieces = self.model.has_many_pieces();
         motors
             .map(|((motor, joint), (position, velocity))| {
                 let (told, lag) = match motor.push {
                     Some(_) => (joint.velocity, 0.0),
                     None => {
                         let told = (motor.target - motor.setpoint).abs() / tick_secs;
-                        (told.min(joint.velocity), (motor.setpoint - position).abs())
+                        let lag_secs = if has_many_pieces { tick_secs } else { f64::INFINITY };
+                        (told.min(joint.velocity), motor.lag(*position, lag_secs))
                     }
                 };
                 overshoot * velocity.abs().max(told) * tick_secs + lag

@@ -14,7 +14,7 @@ use rapier3d::prelude::Collider;
 use crate::World;
 use crate::clearance::gap;
 use crate::convert::{from_pose, from_vector};
-use crate::description::{JointKind, Link};
+use crate::description::JointKind;
 use crate::kinematics::{GRAVITY, axis_in_world};
 use crate::link_pairs::PREDICTION_M;
 use crate::object::Object;
@@ -202,7 +202,12 @@ impl World {
         }
         if room.between.is_empty() {
             room.between = self.link_pairs.iter().map(|(first, second)| self.joints_between(first, second)).collect();
-            room.kept_m = self.link_pairs.iter().map(|pair| self.kept_m(pair, &now.poses)).collect();
+            room.kept_m = self
+                .link_pairs
+                .iter()
+                .zip(&mut room.pairs)
+                .map(|(pair, known)| self.kept_m(pair, known, &now.poses))
+                .collect();
         }
         reach = reach.max(self.reach_between_links(room, &now));
         if reach == Reach::Hand && room.whole_ticks > 0 {
@@ -283,8 +288,7 @@ impl World {
         let moving = self.objects.iter().zip(rest).filter(|(_, rests)| !**rests);
         // Sweeps of objects bring sweeps of links, which the engine makes for links that outrun half of their thinnest piece: of
         // many thin pieces, nearly always.
-        let has_many_pieces = self.robot.model.links.iter().any(Link::has_many_pieces);
-        let slow_m_s = if has_many_pieces { self.outruns_m_s() } else { SLOW_M_S };
+        let slow_m_s = if self.robot.model.has_many_pieces() { self.outruns_m_s() } else { SLOW_M_S };
         moving.filter_map(|(object, _)| Some((object, self.speed_of(object)?))).any(|(object, speed)| {
             let needed = self.way_of_object(speed) + LEFT_M;
             speed > slow_m_s
@@ -349,12 +353,15 @@ impl World {
     }
 
     /// Returns the distance that has to remain between two links: half of that at the beginning, if they are near. Unit: metres.
-    fn kept_m(&self, (first, second): (usize, usize), poses: &[Isometry3<f64>]) -> f64 {
+    fn kept_m(&self, (first, second): (usize, usize), known: &mut Option<Measured>, poses: &[Isometry3<f64>]) -> f64 {
         let far = |balls_m: f64| balls_m >= 2.0 * LEFT_OF_LINKS_M;
-        if self.gap_of_balls(first, second, &(poses[first].inverse() * poses[second])).is_some_and(far) {
+        let pose = poses[first].inverse() * poses[second];
+        if self.gap_of_balls(first, second, &pose).is_some_and(far) {
             return LEFT_OF_LINKS_M;
         }
-        (self.gap_of_links(first, second) / 2.0).clamp(LEAST_LEFT_OF_LINKS_M, LEFT_OF_LINKS_M)
+        let gap_m = self.gap_of_links(first, second);
+        *known = Some(Measured { gap_m, pose });
+        (gap_m / 2.0).clamp(LEAST_LEFT_OF_LINKS_M, LEFT_OF_LINKS_M)
     }
 
     /// Returns the distance of the balls around two links, less rounding errors; `None` if one has no shape. `pose` is that of the

@@ -14,6 +14,7 @@ use crate::convert::{from_vector, to_pose, to_real, to_vector};
 use crate::engine::{Owner, collider};
 use crate::room::Ball;
 use crate::separation::{Found, Solids};
+use crate::sphere_tree::{Cluster, Sphere, sphere_tree};
 use actcheck_data::Part;
 
 /// Distance that links keep from each other. Unit: metres. The tracking error of a moving arm.
@@ -23,6 +24,9 @@ const KEPT_SHARE: f64 = 0.9;
 
 /// Error of distances in 32 bits. Unit: metres.
 const ROUNDING_M: f64 = 1e-4;
+
+/// Most solids of a cluster without halves.
+const CLUSTER: usize = 4;
 
 /// Robots with at least as many solids remember the directions in which they were apart. Below, it is not worth the memory.
 const MANY_SOLIDS: usize = 64;
@@ -79,6 +83,9 @@ struct Solid {
 #[derive(Debug)]
 pub(crate) struct Form {
     solids: Vec<Solid>,
+    /// Their indices, those of neighbours next to each other, and the clusters of these.
+    order: Vec<usize>,
+    clusters: Vec<Cluster>,
     /// Centre of their bounding sphere and bounding box.
     middle: Point3<f64>,
     /// Half extents of that box. Unit: metres.
@@ -246,14 +253,22 @@ fn nearest(
     if turned.boxes_apart(middle_b - a.middle, [&a.half, &b.half]) > clear_m + ROUNDING_M {
         return clear_m;
     }
-    let of_b = b.solids.iter().enumerate().map(|(idx, solid)| (idx, solid, b_in_a * solid.ball.middle));
+    let far = clear_m + ROUNDING_M;
+    let is_far_from_a = |of_b: &Sphere| is_beyond(b_in_a * of_b.middle - a.middle, a.radius + of_b.radius + far);
+    let near_b = b.near(is_far_from_a).into_iter();
+    let of_b = near_b.map(|idx| (idx, &b.solids[idx], b_in_a * b.solids[idx].ball.middle));
     let near_a = |(_, solid, middle): &(usize, &Solid, Point3<f64>)| {
-        let (way, far) = (middle - a.middle, clear_m + ROUNDING_M);
+        let way = middle - a.middle;
         !is_beyond(way, a.radius + solid.ball.radius + far) && turned.boxes_apart(way, [&a.half, &solid.half]) <= far
     };
     let of_b: Vec<(usize, &Solid, Point3<f64>)> = of_b.filter(near_a).collect();
+    if of_b.is_empty() {
+        return clear_m;
+    }
     let placed = to_pose(&b_in_a);
-    for (idx_a, solid_a) in a.solids.iter().enumerate() {
+    let is_far_from_b = |of_a: &Sphere| is_beyond(middle_b - of_a.middle, of_a.radius + b.radius + far);
+    for idx_a in a.near(is_far_from_b) {
+        let solid_a = &a.solids[idx_a];
         let (way, far) = (middle_b - solid_a.ball.middle, nearest + ROUNDING_M);
         if is_beyond(way, solid_a.ball.radius + b.radius + far)
             || turned.boxes_apart(way, [&solid_a.half, &b.half]) > far
@@ -343,7 +358,26 @@ impl Form {
             (pick(f64::min, low, lower), pick(f64::max, high, upper))
         });
         let half = ends.map_or(Vector3::zeros(), |(low, high)| (Vector3::from(high) - Vector3::from(low)) / 2.0);
-        Self { solids: forms.collect(), middle: around.middle, half, radius: around.radius }
+        let solids: Vec<Solid> = forms.collect();
+        let mut order: Vec<usize> = (0..solids.len()).collect();
+        let sphere = |idx: &usize| Sphere { middle: solids[*idx].ball.middle, radius: solids[*idx].ball.radius };
+        let clusters = sphere_tree(&mut order, CLUSTER, sphere);
+        Self { solids, order, clusters, middle: around.middle, half, radius: around.radius }
+    }
+
+    /// Returns the indices of the solids, in their order, but not all of those for which the sphere around them `is_far`.
+    fn near(&self, is_far: impl Fn(&Sphere) -> bool) -> Vec<usize> {
+        let (mut found, mut idx) = (Vec::new(), 0);
+        while let Some(cluster) = self.clusters.get(idx) {
+            if is_far(&cluster.around) {
+                idx = cluster.next;
+            } else {
+                found.extend(&self.order[cluster.things.clone()]);
+                idx += 1;
+            }
+        }
+        found.sort_unstable();
+        found
     }
 }
 

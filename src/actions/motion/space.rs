@@ -133,8 +133,7 @@ impl<'a> ArmSpace<'a> {
     /// The clearances of a posture, and whether it is free of self-collisions.
     pub fn room(&self, positions: &[f64]) -> (Room, bool) {
         let links = self.kinematics.links(positions);
-        let endless = Room { furniture_m: f64::INFINITY, things_m: f64::INFINITY };
-        (self.room_of(&links, endless), !self.itself.touches(&links))
+        (self.room_of(&links), !self.itself.touches(&links))
     }
 
     /// The first two links of the robot that come too close to each other in a posture.
@@ -142,12 +141,12 @@ impl<'a> ArmSpace<'a> {
         self.itself.touching(&self.kinematics.links(positions))
     }
 
-    /// The clearances at these link poses, but at most these.
-    fn room_of(&self, links: &[Isometry3<f64>], most: Room) -> Room {
-        let mut room = most;
+    /// The clearances at these link poses.
+    fn room_of(&self, links: &[Isometry3<f64>]) -> Room {
+        let mut room = Room { furniture_m: f64::INFINITY, things_m: f64::INFINITY };
         for points in &self.points {
             let pose = &links[points.link];
-            let farther_m = if self.is_hand[points.link] { 0.0 } else { self.arm_farther_m };
+            let farther_m = self.farther_m(points);
             room.furniture_m = points.nearest(pose, room.furniture_m, |point| point.z);
             for block in self.furniture {
                 room.furniture_m = points.nearest(pose, room.furniture_m, |point| block.distance(point) - farther_m);
@@ -159,11 +158,27 @@ impl<'a> ArmSpace<'a> {
         room
     }
 
+    /// Whether all clearances at these link poses are at least these: less work than [`ArmSpace::room_of`].
+    fn has_room(&self, links: &[Isometry3<f64>], Room { furniture_m, things_m }: Room) -> bool {
+        self.points.iter().all(|points| {
+            let pose = &links[points.link];
+            let farther_m = self.farther_m(points);
+            let is_near = |block: &Block| points.is_nearer(pose, furniture_m, |at| block.distance(at) - farther_m);
+            !points.is_nearer(pose, furniture_m, |at| at.z)
+                && !self.furniture.iter().any(is_near)
+                && !self.things.iter().any(|pillar| points.is_nearer(pose, things_m, |at| pillar.distance(at)))
+        })
+    }
+
+    /// How much farther these points have to be from furniture. Unit: metres.
+    fn farther_m(&self, points: &LinkPoints) -> f64 {
+        if self.is_hand[points.link] { 0.0 } else { self.arm_farther_m }
+    }
+
     /// Whether a posture is free of collisions and keeps these clearances.
     pub fn is_free(&self, positions: &[f64], least: Room) -> bool {
         let links = self.kinematics.links(positions);
-        // Points farther away need no look.
-        self.room_of(&links, least).holds(least) && !self.itself.touches(&links)
+        self.has_room(&links, least) && !self.itself.touches(&links)
     }
 
     /// Whether the straight path between two postures is free, not counting its first end.

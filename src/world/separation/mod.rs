@@ -66,13 +66,25 @@ impl<'a> Solids<'a> {
     /// Finds their distance if it is less than `far_m`, or how much they overlap. The search begins with the direction `start`, of
     /// length 1.
     pub(crate) fn separation(&self, start: Vector3<f64>, far_m: f64) -> Found {
+        self.separation_near(start, far_m, &mut Vec::new())
+    }
+
+    /// As [`Solids::separation`]. The search begins with these points of both solids, each in the frame of its solid, if there are
+    /// any, and leaves those with which it ended; none if they overlap.
+    pub(crate) fn separation_near(
+        &self,
+        start: Vector3<f64>,
+        far_m: f64,
+        corners: &mut Vec<[Vector3<f64>; 2]>,
+    ) -> Found {
         let corner = self.corner(start);
         let apart_m = -corner.point.dot(&start);
         // Solids that were far apart along a direction a moment ago still are.
         if apart_m >= far_m {
             return Found::Far(start);
         }
-        let mut simplex = Simplex::new(corner);
+        let mut simplex = self.begun(corner, corners);
+        corners.clear();
         let mut best = (apart_m, start);
         let mut last_m = f64::INFINITY;
         for _ in 0..N_STEPS {
@@ -93,6 +105,7 @@ impl<'a> Solids<'a> {
             // Rounding leaves nothing to gain: the points found are the nearest ones.
             let stuck = length_m >= last_m || simplex.has(&corner);
             if converged || stuck {
+                corners.extend(simplex.corners().iter().map(|corner| self.apart(corner)));
                 return Found::Near(Separation { distance_m: length_m, normal, points: simplex.points() });
             }
             last_m = length_m;
@@ -105,6 +118,23 @@ impl<'a> Solids<'a> {
             return Found::Near(Separation { distance_m: best.0.max(0.0), normal: best.1, points: simplex.points() });
         }
         depth::depth(self, &simplex).map_or(Found::Nothing, Found::Near)
+    }
+
+    /// The simplex of some points of both solids, each in the frame of its solid, or of a corner if there are none.
+    fn begun(&self, corner: Corner, points: &[[Vector3<f64>; 2]]) -> Simplex {
+        let mut corners = points.iter().map(|[first, second]| {
+            let second = self.turn * second + self.shift;
+            Corner { point: first - second, of: [*first, second] }
+        });
+        let mut simplex = Simplex::new(corners.next().unwrap_or(corner));
+        corners.for_each(|corner| simplex.add(corner));
+        simplex
+    }
+
+    /// The two points of a corner, each in the frame of its solid.
+    fn apart(&self, corner: &Corner) -> [Vector3<f64>; 2] {
+        let [first, second] = corner.of;
+        [first, self.turn.tr_mul(&(second - self.shift))]
     }
 
     /// The point of the differences that is farthest along a direction.
