@@ -1,4 +1,4 @@
-//! What a hull remembers of the shapes around it, from one step to the next.
+//! The shapes around a hull that it remembers from one step to the next.
 //!
 //! Between the fingers of a hand of many pieces and an object there are dozens of pairs of hulls. Most of them are
 //! millimetres apart, and their contacts would be dropped (`link_pairs.rs`): they are not searched again until they may
