@@ -59,6 +59,7 @@ mod share;
 mod shell;
 mod silhouette;
 mod simulation;
+mod spans;
 mod sphere_tree;
 mod suction;
 mod surface;

@@ -74,11 +74,9 @@ impl Motor {
         self.setpoint_velocity = self.setpoint_velocity.clamp(-fastest - catching_up, fastest - catching_up);
     }
 
-    /// Returns how far the joint can catch up with its setpoint in a time: a finger that is blocked lags far behind its setpoint,
-    /// but its damping lets it move only slowly.
-    pub(super) fn lag(&self, position: f64, secs: f64) -> f64 {
-        let lag = (self.setpoint - position).abs();
-        if self.damping > 0.0 && secs.is_finite() { lag.min(lag * secs * self.stiffness / self.damping) } else { lag }
+    /// Returns how far a joint that is this far behind its setpoint can approach it in a time.
+    pub(super) fn catches_up(&self, lag: f64, secs: f64) -> f64 {
+        if self.damping > 0.0 { lag.min(lag * secs * self.stiffness / self.damping) } else { lag }
     }
 
     /// Applies an effort for a step: a velocity motor with the target speed `top` and `effort` as its limit gives this
@@ -134,7 +132,7 @@ mod tests {
                     let catching_up = motor.stiffness * (lag - position) / (motor.damping + motor.stiffness * secs);
                     position += catching_up * secs;
                 }
-                let most = motor.lag(0.0, tick_secs);
+                let most = motor.catches_up(lag, tick_secs);
                 assert!(position <= most && most <= lag, "{position} of {most}, {lag} behind");
                 assert!(joint != finger || most < 0.2 * lag, "{most} of {lag}");
             }

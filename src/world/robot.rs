@@ -271,27 +271,6 @@ impl Robot {
         }
     }
 
-    /// Returns how far each joint can move in a control tick: at its speed now or at that of its setpoint, and to its
-    /// setpoint. Units: metres or radians.
-    pub(super) fn spans(&self, positions: &[f64], velocities: &[f64], tick_secs: f64, overshoot: f64) -> Vec<f64> {
-        let state = positions.iter().zip(velocities);
-        let motors = self.motors.iter().zip(&self.model.joints).zip(state);
-        let has_many_pieces = self.model.has_many_pieces();
-        motors
-            .map(|((motor, joint), (position, velocity))| {
-                let (told, lag) = match motor.push {
-                    Some(_) => (joint.velocity, 0.0),
-                    None => {
-                        let told = (motor.target - motor.setpoint).abs() / tick_secs;
-                        let lag_secs = if has_many_pieces { tick_secs } else { f64::INFINITY };
-                        (told.min(joint.velocity), motor.lag(*position, lag_secs))
-                    }
-                };
-                overshoot * velocity.abs().max(told) * tick_secs + lag
-            })
-            .collect()
-    }
-
     /// Returns the joints between the root and a link.
     pub(super) fn joints_to(&self, link: usize) -> impl Iterator<Item = usize> {
         let parent = |joint: &usize| self.model.joints[*joint].parent.checked_sub(1);
