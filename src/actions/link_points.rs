@@ -16,7 +16,7 @@ pub struct LinkPoints {
     /// The link's index.
     pub link: usize,
     /// In the order of their clusters. Unit: metres.
-    pub points: Vec<Point3<f64>>,
+    points: Vec<Point3<f64>>,
     clusters: Vec<Cluster>,
 }
 

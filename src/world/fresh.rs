@@ -171,7 +171,7 @@ fn between_solids(
 }
 
 /// Returns the memory of the first shape that has one, and the other shape.
-fn memory_of<'a>([one, other]: [&'a dyn Shape; 2]) -> Option<(&'a Neighbours, &'a dyn Shape)> {
+fn memory_of([one, other]: [&dyn Shape; 2]) -> Option<(&Neighbours, &dyn Shape)> {
     memory(one).map(|known| (known, other)).or_else(|| memory(other).map(|known| (known, one)))
 }
 

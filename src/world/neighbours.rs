@@ -14,8 +14,8 @@ use parry3d::shape::Shape;
 
 use crate::link_pairs::SURE_M;
 
-/// Pairs of shapes that move by more than this share of their distance in a step are searched.
-const SHARE_OF_STEP: Real = 3.0;
+/// Steps of the present speed for which a pair has to stay apart: it may become faster.
+const STEPS_AHEAD: Real = 3.0;
 /// Error of the way between two poses in 32 bits. Unit: metres.
 const ROUNDING_M: Real = 1e-6;
 
@@ -49,7 +49,7 @@ impl Neighbours {
         let step = way(second, &known.last, pose);
         known.last = *pose;
         let left = known.gap - way(second, &known.searched, pose) - ROUNDING_M;
-        if left > SURE_M + SHARE_OF_STEP * step { Ok(()) } else { Err(std::mem::take(&mut known.corners)) }
+        if left > SURE_M + STEPS_AHEAD * step { Ok(()) } else { Err(std::mem::take(&mut known.corners)) }
     }
 
     /// Remembers the result of a search: the pair is at least this far apart. Unit: metres.

@@ -102,8 +102,8 @@ impl Solid {
         Self { around: collider.compute_aabb().loosened(BOX_SLACK_M), faces, collider }
     }
 
-    /// Distance along a ray in the frame of the link to this solid: 0 inside. The ray is cut off at each face of a hull,
-    /// which takes a tenth of the time of the library's search.
+    /// Distance along a ray in the frame of the link to this solid, if it is less than `most`: 0 inside. The ray is cut off at
+    /// each face of a hull, which takes a tenth of the time of the library's search.
     fn hit(&self, ray: &Ray, most: Real) -> Option<Real> {
         if !self.around.intersects_local_ray(ray, most) {
             return None;
@@ -156,8 +156,7 @@ impl<'a> Probe<'a> {
             // The left finger's inner surface is its lowest along y, the right finger's its highest.
             let sign = if side == 0 { 1.0 } else { -1.0 };
             let from_grasp = self.pose(self.links[side], positions).inverse() * grasp;
-            let nearest = Self::rays(&from_grasp, sign).filter_map(|ray| self.hit(side, &ray));
-            nearest.min_by(f64::total_cmp).map(|along| sign * (along - AWAY_M))
+            self.nearest_hit(side, Self::rays(&from_grasp, sign)).map(|along| sign * (along - AWAY_M))
         });
         Some(Gap { left_m: left?, right_m: right? })
     }
@@ -171,8 +170,7 @@ impl<'a> Probe<'a> {
                 let sign = if side == 0 { 1.0 } else { -1.0 };
                 let from_grasp = self.pose(self.links[side], positions).inverse() * grasp;
                 let rays = Self::rays(&from_grasp, sign).skip(row * ACROSS_M.len()).take(ACROSS_M.len());
-                let nearest = rays.filter_map(|ray| self.hit(side, &ray)).min_by(f64::total_cmp);
-                nearest.map(|along| along - AWAY_M)
+                self.nearest_hit(side, rays).map(|along| along - AWAY_M)
             });
             Some(left? + right?)
         };
@@ -192,11 +190,15 @@ impl<'a> Probe<'a> {
         })
     }
 
-    /// Distance to a finger's surface along a ray in the frame of its link.
-    fn hit(&self, side: usize, ray: &Ray) -> Option<f64> {
-        let most = to_real(2.0 * AWAY_M);
-        let hits = self.surfaces[side].solids.iter().filter_map(|solid| solid.hit(ray, most));
-        hits.map(f64::from).min_by(f64::total_cmp)
+    /// The least distance to a finger's surface along one of these rays in the frame of its link.
+    fn nearest_hit(&self, side: usize, rays: impl Iterator<Item = Ray>) -> Option<f64> {
+        let farthest = to_real(2.0 * AWAY_M);
+        let solids = || self.surfaces[side].solids.iter();
+        // Solids whose box begins beyond the nearest one so far need no look.
+        let nearest = rays.fold(farthest, |nearest, ray| {
+            solids().fold(nearest, |nearest, solid| solid.hit(&ray, nearest).unwrap_or(nearest).min(nearest))
+        });
+        (nearest < farthest).then_some(f64::from(nearest))
     }
 
     /// A finger: its link, and the link's pose in the grasp frame at these joint positions.
