@@ -25,8 +25,8 @@ const OVERSHOOT: Real = 2.0;
 const OTHERS: Group = Group::GROUP_31;
 
 /// Pairs of links, each with the smaller index first. All other links pass through each other: neighbours, whose shapes
-/// overlap at their joint, the links of a gripper's mechanism, and links that overlap in the initial posture, which is
-/// known to be valid.
+/// overlap at their joint, the links of a gripper's mechanism, and links that overlap or touch in the initial posture, which
+/// is known to be valid.
 #[derive(Debug, Default)]
 pub(super) struct LinkPairs {
     pairs: BTreeSet<(usize, usize)>,
@@ -129,8 +129,15 @@ impl World {
             .iter()
             .flat_map(|first| solid.iter().filter(move |second| *second > first).map(move |second| (*first, *second)));
         let passes = |pair: &(usize, usize)| neighbours.contains(pair) || self.robot.kinematics.pass(pair.0, pair.1);
-        let apart = |pair: &(usize, usize)| !passes(pair) && self.depth_of(pair.0, pair.1) <= TOUCH_M;
+        let apart = |pair: &(usize, usize)| !passes(pair) && !self.meet(pair.0, pair.1);
         LinkPairs { pairs: pairs.filter(apart).collect(), ..LinkPairs::default() }
+    }
+
+    /// Returns whether two links overlap now, or touch each other and are not both of the hand, whose fingers may be closed. With
+    /// links that touch from the beginning, no tick would be free.
+    fn meet(&self, first: usize, second: usize) -> bool {
+        let in_hand = self.robot.kinematics.are_of_hand(first, second);
+        self.depth_of(first, second) > TOUCH_M || !in_hand && self.gap_of_links(first, second) <= TOUCH_M
     }
 
     /// Puts links that pass through each other into collision groups that do, as far as there are groups. The engine then
@@ -158,6 +165,41 @@ impl World {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::gripper::tests::{hand, turning};
+    use crate::robot::tests::alone;
+    use actcheck_base::Source;
+
+    /// The hand is 60 cm above the robot's root: on a block that reaches up to its fingers, or 1 mm below them.
+    #[test]
+    fn links_that_touch_in_the_initial_posture_pass_through_each_other() {
+        for (gap_m, collide) in [(0.0, false), (0.001, true)] {
+            let mut profile = hand(&turning(0.0, 0.6), &turning(-0.6, 0.0), &["left", "right"]);
+            let top_m = 0.6 - 0.015 - gap_m;
+            let block = format!(
+                "<link name=\"base\"><collision><origin xyz=\"0 0 {}\"/><geometry><box size=\"0.5 0.5 {top_m}\"/>\
+                 </geometry></collision></link>",
+                top_m / 2.0
+            );
+            let palm = "<link name=\"palm\"><collision><geometry><sphere radius=\"0.01\"/></geometry></collision>";
+            let text = profile.urdf.text.replace("<link name=\"base\"/>", &block).replace("<link name=\"palm\">", palm);
+            profile.urdf = Source::new("hand.urdf", text);
+            let mut world = alone(profile);
+            let links = world.robot.model.links.iter();
+            let names: Vec<&str> = links.map(|link| link.name.as_str()).collect();
+            let collides = |one: &str, other: &str| {
+                let mut pairs = world.link_pairs.iter().map(|(one, other)| [names[one], names[other]]);
+                pairs.any(|pair| pair == [one, other] || pair == [other, one])
+            };
+            assert!(
+                ["left_finger", "right_finger"].iter().all(|finger| collides("base", finger) == collide),
+                "{gap_m}"
+            );
+            assert!(collides("left_finger", "right_finger"), "fingers do not pass through each other");
+            let hold = world.hold();
+            (0..30).for_each(|_| world.step(&hold));
+            assert!(world.moved_freely(), "{gap_m}: {:?}", world.ticks_by_reach());
+        }
+    }
 
     #[test]
     fn links_with_the_same_partners_share_a_group_and_no_others_do() {

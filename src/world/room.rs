@@ -429,7 +429,8 @@ impl World {
         nearest
     }
 
-    fn gap_of_links(&self, first: usize, second: usize) -> f64 {
+    /// Returns the distance of two links, or [`RANGE_M`] if it is larger. Unit: metres.
+    pub(super) fn gap_of_links(&self, first: usize, second: usize) -> f64 {
         let others: Vec<_> = self.boxed(self.robot.bodies[second]).collect();
         self.boxed(self.robot.bodies[first]).fold(RANGE_M, |nearest, solid| {
             others.iter().fold(nearest, |nearest, other| nearest.min(apart(&solid, other, nearest)))

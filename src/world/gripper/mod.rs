@@ -17,7 +17,7 @@ mod sliding;
 mod squeeze;
 mod table;
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;
 
 pub(crate) use between_fingers::between_fingers;
 pub(crate) use gap::{Probe, Surface};

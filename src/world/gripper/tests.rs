@@ -11,7 +11,7 @@ use actcheck_data::RobotProfile;
 
 /// A hand with fingers of 10 cm whose inner faces are 2 cm off its middle at position 0. The grasp frame is 10 cm
 /// from the hinges. `left` and `right` are the types and limits of the finger joints.
-fn hand(left: &str, right: &str, finger_joints: &[&str]) -> RobotProfile {
+pub(crate) fn hand(left: &str, right: &str, finger_joints: &[&str]) -> RobotProfile {
     let path = Path::new("models/robots/mobile_manipulator.toml");
     let mut profile = actcheck_config::robot::read(&Files::Shipped, path).expect("the shipped robot is valid");
     let inertial = "<inertial><mass value=\"0.1\"/>\
@@ -49,7 +49,8 @@ fn hand(left: &str, right: &str, finger_joints: &[&str]) -> RobotProfile {
     profile
 }
 
-fn turning(lower: f64, upper: f64) -> String {
+/// Returns the type, axis and limits of a joint that turns about z. Unit: radians.
+pub(crate) fn turning(lower: f64, upper: f64) -> String {
     format!(
         "type=\"revolute\"><axis xyz=\"0 0 1\"/>\
          <limit lower=\"{lower}\" upper=\"{upper}\" effort=\"20\" velocity=\"2\"/>"
