@@ -3,13 +3,13 @@
 
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, TAU};
 
-use nalgebra::{Isometry3, Point3, Translation3};
+use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 
 use crate::grasp::{Approach, Grasp, TOP_DEPTH_M, centred, hand, is_round, opening_before_m, room_m, width_across};
 use crate::motion::moved_links;
 use crate::operator::Operator;
 use crate::plan::FURNITURE_CLEAR_M;
-use actcheck_world::{JointKind, Sighting};
+use actcheck_world::{Cluster, JointKind, Sighting, Sphere, sphere_tree};
 
 /// Downward pitches of the hand, from straight down to nearly level. Unit: radians.
 const PITCHES_RAD: [f64; 7] = [FRAC_PI_2, 1.3, 1.1, 0.95, 0.75, 0.55, 0.4];
@@ -41,12 +41,48 @@ const SPACING_M: f64 = 0.02;
 /// Openings at which turning fingers are looked at while they close: their tips swing out. Shares of the widest.
 const CLOSING: [f64; 4] = [0.8, 0.6, 0.4, 0.2];
 
+/// Number of points that are looked at together.
+const CLUSTER: usize = 8;
+/// Rounding error of heights. Unit: metres.
+const ROUNDING_M: f64 = 1e-9;
+
 /// Points on the hand, in the frame of the grasp.
 pub(crate) struct Hand {
     /// Of the open hand.
     open: Vec<Point3<f64>>,
     /// The same, and those of fingers that turn while they close.
-    swept: Vec<Point3<f64>>,
+    swept: Swept,
+}
+
+/// Points in clusters, each with its place in the list that they were made from.
+struct Swept {
+    points: Vec<(usize, Point3<f64>)>,
+    clusters: Vec<Cluster>,
+}
+
+impl Swept {
+    fn new(points: impl Iterator<Item = Point3<f64>>) -> Self {
+        let mut points: Vec<(usize, Point3<f64>)> = points.enumerate().collect();
+        let clusters = sphere_tree(&mut points, CLUSTER, |(_, point)| Sphere { middle: *point, radius: 0.0 });
+        Self { points, clusters }
+    }
+
+    /// The lowest point with the hand turned like this: the first one of equally low ones.
+    fn lowest(&self, turn: &UnitQuaternion<f64>) -> Vector3<f64> {
+        let mut lowest: Option<(usize, Vector3<f64>)> = None;
+        let mut idx = 0;
+        while let Some(cluster) = self.clusters.get(idx) {
+            let least_m = (turn * cluster.around.middle.coords).z - cluster.around.radius - ROUNDING_M;
+            if lowest.is_some_and(|(_, lowest)| least_m > lowest.z) {
+                idx = cluster.next;
+                continue;
+            }
+            let turned = self.points[cluster.things.clone()].iter().map(|(place, point)| (*place, turn * point.coords));
+            lowest = lowest.into_iter().chain(turned).min_by(|a, b| a.1.z.total_cmp(&b.1.z).then(a.0.cmp(&b.0)));
+            idx += 1;
+        }
+        lowest.map(|(_, point)| point).unwrap_or_default()
+    }
 }
 
 impl Hand {
@@ -65,13 +101,12 @@ impl Hand {
         };
         let open = at(opening_before_m(thing, robot));
         let closing = closing_m(robot).into_iter().flat_map(at);
-        Self { swept: open.iter().copied().chain(closing).collect(), open }
+        Self { swept: Swept::new(open.iter().copied().chain(closing)), open }
     }
 
     /// Height of the grasp frame above the lowest point of a hand, and how far ahead of it that point is. Unit: metres.
-    fn lowest(&self, turned: &Isometry3<f64>, ahead: &nalgebra::Vector3<f64>) -> (f64, f64) {
-        let points = self.swept.iter().map(|point| turned.rotation * point.coords);
-        let lowest = points.min_by(|a, b| a.z.total_cmp(&b.z)).unwrap_or_default();
+    fn lowest(&self, turned: &Isometry3<f64>, ahead: &Vector3<f64>) -> (f64, f64) {
+        let lowest = self.swept.lowest(&turned.rotation);
         (-lowest.z, lowest.dot(ahead))
     }
 
@@ -135,7 +170,7 @@ fn all(thing: &Sighting, hand: &Hand, robot: &Operator<'_>, (pitches, turns): (&
 /// The grasp with this heading and downward pitch of the hand; `None` if the hand would touch the object.
 fn at(thing: &Sighting, shape: &Hand, robot: &Operator<'_>, (heading, pitch): (f64, f64)) -> Option<Grasp> {
     let level = hand(thing, 0.0, heading, pitch);
-    let forward = nalgebra::Vector3::new(libm::cos(heading), libm::sin(heading), 0.0);
+    let forward = Vector3::new(libm::cos(heading), libm::sin(heading), 0.0);
     let (lowest_m, ahead_m) = shape.lowest(&level, &forward);
     let top = thing.size_m[2];
     let height = (top - TOP_DEPTH_M).max(lowest_m + CLEAR_M);
@@ -152,4 +187,26 @@ fn at(thing: &Sighting, shape: &Hand, robot: &Operator<'_>, (heading, pitch): (f
     let pose = pose(back_m);
     let opening_m = opening_before_m(thing, robot);
     Some(Grasp { approach: Approach::Top, pose, heading, opening_m, penalty })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Clusters never change which point is found, also if several are equally low.
+    #[test]
+    fn the_lowest_point_is_the_first_of_the_lowest() {
+        let at = |n: u32| libm::sin(f64::from(n * n) * 12.9898);
+        for trial in 0..200 {
+            let of = |n: u32| Point3::new(at(n), at(n + 50), (at(n + 99) * 4.0).round() / 4.0) * 0.1;
+            let points: Vec<Point3<f64>> = (trial..2 * trial).map(of).collect();
+            let turn = match trial % 3 {
+                0 => UnitQuaternion::identity(),
+                _ => UnitQuaternion::from_euler_angles(at(trial), 1.5 * at(trial + 1), at(trial + 2)),
+            };
+            let all = points.iter().map(|point| turn * point.coords);
+            let plain = all.min_by(|a, b| a.z.total_cmp(&b.z)).unwrap_or_default();
+            assert_eq!(Swept::new(points.iter().copied()).lowest(&turn), plain, "trial {trial}");
+        }
+    }
 }

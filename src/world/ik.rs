@@ -41,7 +41,7 @@ const LARGEST_STEP: f64 = 0.3;
 pub fn solve(kinematics: &Kinematics, seed: &[f64], reach: &Reach) -> Option<Vec<f64>> {
     let mut positions = started(kinematics, seed);
     let mut jacobian = vec![Vector6::zeros(); positions.len()];
-    let mobile = mobile(&reach.mobility);
+    let mut joints = Mobile::new(&reach.mobility);
     let mut progress = Progress::default();
     for _ in 0..MOST_ITERATIONS {
         let grasp = kinematics.fill_jacobian(&positions, &mut jacobian);
@@ -52,7 +52,7 @@ pub fn solve(kinematics: &Kinematics, seed: &[f64], reach: &Reach) -> Option<Vec
         if progress.has_ended(&error) {
             return None;
         }
-        step(kinematics, &mut positions, &jacobian, &error, &mobile);
+        joints.step(kinematics, &mut positions, &jacobian, &error);
         kinematics.follow(&mut positions);
     }
     None
@@ -63,7 +63,7 @@ pub fn solve(kinematics: &Kinematics, seed: &[f64], reach: &Reach) -> Option<Vec
 pub fn solve_turned(kinematics: &Kinematics, seed: &[f64], reach: &Reach, most_rad: f64) -> Option<(Vec<f64>, f64)> {
     let mut positions = started(kinematics, seed);
     let mut jacobian = vec![Vector6::zeros(); positions.len()];
-    let mobile = mobile(&reach.mobility);
+    let mut joints = Mobile::new(&reach.mobility);
     // At first the target pulls the heading along: a joint that turns the hand alone follows.
     let (mut pulls, mut last_turn) = (true, f64::INFINITY);
     let mut progress = Progress::default();
@@ -84,7 +84,7 @@ pub fn solve_turned(kinematics: &Kinematics, seed: &[f64], reach: &Reach, most_r
         let weight = if pulls { HEADING_WEIGHT } else { 0.0 };
         error[5] = (error[5] - turn) * weight;
         jacobian.iter_mut().for_each(|column| column[5] *= weight);
-        step(kinematics, &mut positions, &jacobian, &error, &mobile);
+        joints.step(kinematics, &mut positions, &jacobian, &error);
         kinematics.follow(&mut positions);
     }
     None
@@ -135,38 +135,50 @@ fn is_reached(error: &Vector6<f64>) -> bool {
     error.fixed_rows::<3>(0).norm() < REACHED_M && error.fixed_rows::<3>(3).norm() < REACHED_RAD
 }
 
-/// The joints that may move, with their mobility: few of a robot with many joints.
-fn mobile(mobility: &[f64]) -> Vec<(usize, f64)> {
-    mobility.iter().copied().enumerate().filter(|(_, weight)| *weight != 0.0).collect()
+/// The joints that may move: few of a robot with many joints.
+struct Mobile {
+    /// Their indices and mobility.
+    joints: Vec<(usize, f64)>,
+    /// The same in the present iteration: 0 for those that are held at a limit.
+    free: Vec<(usize, f64)>,
+    /// Their changes. Units: metres or radians.
+    change: Vec<f64>,
 }
 
-/// Performs one iteration. Joints that would pass a limit stop at it, and the others compensate. `mobile`: the joints that may
-/// move, with their mobility.
-fn step(
-    kinematics: &Kinematics,
-    positions: &mut [f64],
-    jacobian: &[Vector6<f64>],
-    error: &Vector6<f64>,
-    mobile: &[(usize, f64)],
-) {
-    let mut free = mobile.to_vec();
-    loop {
-        let change = least_squares(jacobian, error, &free);
-        let mut held_one = false;
-        for ((idx, weight), change) in free.iter_mut().zip(&change) {
-            let (joint, wanted) = (&kinematics.joints()[*idx], positions[*idx] + change);
-            let outside = wanted < joint.lower - 1e-9 || wanted > joint.upper + 1e-9;
-            if *weight > 0.0 && outside && at_limit(positions[*idx], wanted, joint.lower, joint.upper) {
-                *weight = 0.0;
-                held_one = true;
+impl Mobile {
+    fn new(mobility: &[f64]) -> Self {
+        let weights = mobility.iter().copied().enumerate();
+        let joints: Vec<(usize, f64)> = weights.filter(|(_, weight)| *weight != 0.0).collect();
+        Self { free: Vec::with_capacity(joints.len()), change: Vec::with_capacity(joints.len()), joints }
+    }
+
+    /// Performs one iteration. Joints that would pass a limit stop at it, and the others compensate.
+    fn step(
+        &mut self,
+        kinematics: &Kinematics,
+        positions: &mut [f64],
+        jacobian: &[Vector6<f64>],
+        error: &Vector6<f64>,
+    ) {
+        self.free.clone_from(&self.joints);
+        loop {
+            least_squares(jacobian, error, &self.free, &mut self.change);
+            let mut held_one = false;
+            for ((idx, weight), change) in self.free.iter_mut().zip(&self.change) {
+                let (joint, wanted) = (&kinematics.joints()[*idx], positions[*idx] + change);
+                let outside = wanted < joint.lower - 1e-9 || wanted > joint.upper + 1e-9;
+                if *weight > 0.0 && outside && at_limit(positions[*idx], wanted, joint.lower, joint.upper) {
+                    *weight = 0.0;
+                    held_one = true;
+                }
             }
-        }
-        if !held_one {
-            for ((idx, _), change) in free.iter().zip(&change) {
-                let joint = &kinematics.joints()[*idx];
-                positions[*idx] = (positions[*idx] + change).clamp(joint.lower, joint.upper);
+            if !held_one {
+                for ((idx, _), change) in self.free.iter().zip(&self.change) {
+                    let joint = &kinematics.joints()[*idx];
+                    positions[*idx] = (positions[*idx] + change).clamp(joint.lower, joint.upper);
+                }
+                return;
             }
-            return;
         }
     }
 }
@@ -177,28 +189,31 @@ fn at_limit(position: f64, wanted: f64, lower: f64, upper: f64) -> bool {
 }
 
 /// Computes W·Jᵀ·(J·W·Jᵀ + λ²·I)⁻¹·e, scaled down so that no component exceeds the largest step. `jacobian`: its columns,
-/// one for each joint. Returns the changes of the `free` joints.
+/// one for each joint. Writes the changes of the `free` joints.
 ///
 /// Sums are in a fixed order: products of matrices whose size is only known at run time use other instructions, which round
 /// differently, on other processors.
-fn least_squares(jacobian: &[Vector6<f64>], error: &Vector6<f64>, free: &[(usize, f64)]) -> Vec<f64> {
+fn least_squares(jacobian: &[Vector6<f64>], error: &Vector6<f64>, free: &[(usize, f64)], change: &mut Vec<f64>) {
+    change.clear();
     let mut square = Matrix6::identity() * (DAMPING * DAMPING);
     for (idx, weight) in free.iter().filter(|(_, weight)| *weight != 0.0) {
         let column = &jacobian[*idx];
         square += column * (column * *weight).transpose();
     }
-    let Some(factors) = square.cholesky() else { return vec![0.0; free.len()] };
+    let Some(factors) = square.cholesky() else {
+        change.resize(free.len(), 0.0);
+        return;
+    };
     let solved = factors.solve(error);
     let of_joint = |(idx, weight): &(usize, f64)| match *weight == 0.0 {
         true => 0.0,
         false => weight * jacobian[*idx].dot(&solved),
     };
-    let mut change: Vec<f64> = free.iter().map(of_joint).collect();
+    change.extend(free.iter().map(of_joint));
     let largest = change.iter().fold(0.0, |largest: f64, change| largest.max(change.abs()));
     if largest > LARGEST_STEP {
         change.iter_mut().for_each(|change| *change *= LARGEST_STEP / largest);
     }
-    change
 }
 
 /// Returns the difference between two poses: linear part (metres) above angular part (radians).

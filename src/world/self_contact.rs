@@ -367,7 +367,7 @@ impl Form {
 
     /// Returns the indices of the solids, in their order, but not all of those for which the sphere around them `is_far`.
     fn near(&self, is_far: impl Fn(&Sphere) -> bool) -> Vec<usize> {
-        let (mut found, mut idx) = (Vec::new(), 0);
+        let (mut found, mut idx) = (Vec::with_capacity(self.solids.len()), 0);
         while let Some(cluster) = self.clusters.get(idx) {
             if is_far(&cluster.around) {
                 idx = cluster.next;
