@@ -152,16 +152,22 @@ fn links_that_are_hardly_apart_leave_only_their_motion_to_the_engine() {
     assert!(turned < 0.1 && world.ticks_by_reach()[3] > 0, "turned by {turned} rad: {:?}", world.ticks_by_reach());
 }
 
-/// A fixed robot on a table touches it with its root all the time. Its arm moves without the engine all the same.
+/// A fixed robot on a table touches it with its root all the time, and an object beside the root is as near. Its arm moves
+/// without the engine all the same.
 #[test]
-fn the_root_of_a_fixed_robot_may_touch_the_table() {
-    let mut world = build(&arm_on_a_table()).expect("the scene is right");
-    assert!(world.settle().settled);
-    let mut command = world.hold();
-    let pan = world.layout().arm[0];
-    command.positions[pan] += 0.2;
-    (0..60).for_each(|_| world.step(&command));
-    let [free, .., whole] = world.ticks_by_reach();
-    assert!(free > 0 && whole == 0, "{:?}", world.ticks_by_reach());
-    assert!((world.observe().positions[pan] - command.positions[pan]).abs() < 0.01);
+fn the_root_of_a_fixed_robot_may_touch_things() {
+    for beside_m in [0.2, 0.001] {
+        let mut scene = arm_on_a_table();
+        // The root is 24 cm wide, and the object 6 cm.
+        scene.objects[1].pose.position = [0.3 - 0.12 - 0.03 - beside_m, 0.0, 0.706];
+        let mut world = build(&scene).expect("the scene is right");
+        assert!(world.settle().settled);
+        let mut command = world.hold();
+        let pan = world.layout().arm[0];
+        command.positions[pan] += 0.2;
+        (0..60).for_each(|_| world.step(&command));
+        let [free, .., whole] = world.ticks_by_reach();
+        assert!(free > 0 && whole == 0, "{beside_m} m: {:?}", world.ticks_by_reach());
+        assert!((world.observe().positions[pan] - command.positions[pan]).abs() < 0.01);
+    }
 }

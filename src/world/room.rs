@@ -265,6 +265,10 @@ impl World {
 
     fn reach_of_link(&self, room: &mut Room, link: usize, now: &Moment) -> Reach {
         let Some(ball) = self.robot.balls[link] else { return Reach::Nothing };
+        // The engine knows a link that never moves in every tick, as it knows a table.
+        if self.robot.joints_to(link).next().is_none() {
+            return Reach::Nothing;
+        }
         let ahead = self.ahead(link, &ball, now);
         let rest = &room.rest;
         let rests = |object: &Object| !object.fixed && self.is_in(object, rest);
