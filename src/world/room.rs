@@ -164,7 +164,7 @@ impl World {
     /// Returns whether contacts push a hand that moves alone harder than its arm would hold unmoved.
     pub(super) fn is_pushed_hard(&self) -> bool {
         let push = self.robot.push_on_hand.shift;
-        // Down, it is the weight of what the hand holds.
+        // Down, it is the weight of a held object.
         let without_weight = Vector3::new(push.x, push.y, push.z.max(0.0));
         let is_light = self.robot.model.has_many_pieces();
         push.norm() > MOST_PUSH || is_light && without_weight.norm() > MOST_PUSH_ON_LIGHT
@@ -480,7 +480,7 @@ mod tests {
     use actcheck_base::Source;
     use nalgebra::{Point3, Vector3};
 
-    /// A light arm gives way to fingers that push sideways, but carries what it holds.
+    /// A light arm gives way to fingers that push sideways, but carries a held object.
     #[test]
     fn a_small_push_on_a_hand_of_many_pieces_moves_its_arm() {
         let hand = hand(&turning(0.0, 0.6), &turning(-0.6, 0.0), &["left", "right"]);
