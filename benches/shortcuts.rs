@@ -11,8 +11,7 @@
 //! After the actions, a robot that holds an object keeps still for ten seconds. The slip is the way of the object's
 //! middle in the hand in this time; the tilt, the largest change of its attitude there. Penetration and energy are the
 //! worst of all runs. The last column counts the runs whose actions the robot reports as without shortcuts: as done or as failed.
-//! Try it with robots of others too, and with `steps_per_second = 960` in `[physics]`: light arms in the engine may not have converged at
-//! 240, so that the reports without shortcuts are the wrong ones.
+//! Try it with robots of others too: arms that are lighter than the shipped ones give way to less.
 
 mod support;
 

@@ -42,6 +42,9 @@ impl Touch {
 
 /// Largest force of contacts on a hand that the engine moves alone: a loaded arm gives way. Unit: newtons.
 const MOST_PUSH: f64 = 20.0;
+/// The same without the weight of a held object, for robots of many pieces, whose arms may be light. With 20 N, a GR1 picked 8 of 15
+/// cans and an SO-100 14, instead of the 4 and 10 that they pick with the whole robot in the engine, and an SO-101 4 instead of 13.
+const MOST_PUSH_OF_PIECES: f64 = 1.0;
 
 impl World {
     /// Returns all contacts above [`CONTACT_FLOOR_NEWTONS`] and the seal of a suction cup, by ordered pair of owners.
@@ -83,9 +86,13 @@ impl World {
         push
     }
 
-    /// Returns whether contacts push a hand that moves alone so hard that the engine needs its arm.
+    /// Returns whether contacts push a hand that moves alone harder than its arm would hold unmoved.
     pub(super) fn is_pushed_hard(&self) -> bool {
-        self.robot.push_on_hand.shift.norm() > MOST_PUSH
+        let push = self.robot.push_on_hand.shift;
+        // Down, it is the weight of a held object.
+        let without_weight = Vector3::new(push.x, push.y, push.z.max(0.0));
+        let has_many_pieces = self.robot.model.has_many_pieces();
+        push.norm() > MOST_PUSH || has_many_pieces && without_weight.norm() > MOST_PUSH_OF_PIECES
     }
 }
 
@@ -140,4 +147,39 @@ fn touches(engine: &PhysicsWorld) -> BTreeMap<(Owner, Owner), Touch> {
     }
     found.retain(|_, touch| touch.normal_n > CONTACT_FLOOR_NEWTONS);
     found
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::gripper::tests::{hand, turning};
+    use crate::inertia::Twist;
+    use crate::robot::tests::alone;
+    use actcheck_base::Source;
+    use nalgebra::{Point3, Vector3};
+
+    /// A light arm gives way to fingers that push sideways, but carries a held object.
+    #[test]
+    fn a_small_push_on_a_hand_of_many_pieces_moves_its_arm() {
+        let hand = hand(&turning(0.0, 0.6), &turning(-0.6, 0.0), &["left", "right"]);
+        let mut pieces = hand.clone();
+        let piece =
+            "<collision><origin xyz=\"0.06 0.005 0\"/><geometry><box size=\"0.1 0.01 0.03\"/></geometry></collision>";
+        assert!(hand.urdf.text.contains(piece));
+        pieces.urdf = Source::new("pieces.urdf", hand.urdf.text.replace(piece, &piece.repeat(4)));
+        let [mut few, mut many] = [hand, pieces].map(alone);
+        let pushes = [
+            (2.0, 0.0, [false, true]),
+            (0.5, -10.0, [false, false]),
+            (0.0, 2.0, [false, true]),
+            (0.0, -21.0, [true; 2]),
+        ];
+        for (aside_n, up_n, expected) in pushes {
+            let push = Twist::by_force(&Vector3::new(aside_n, 0.0, up_n), &Point3::origin());
+            let found = [&mut few, &mut many].map(|world| {
+                world.robot.push_on_hand = push;
+                world.is_pushed_hard()
+            });
+            assert_eq!(found, expected, "{aside_n} N aside, {up_n} N up");
+        }
+    }
 }

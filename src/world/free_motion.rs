@@ -54,7 +54,7 @@ impl Equations {
                 && known.iter().zip(&self.drives).all(|(known, drive)| *known == (drive.joint, gain(drive)))
         };
         let at = self.factors.iter().position(is_of).unwrap_or_else(|| {
-            let size = self.added.len();
+            let size = self.momenta.len();
             let mut matrix = self.matrix.clone();
             for drive in self.drives.iter().filter(|drive| drive.at.is_none()) {
                 matrix[drive.joint * size + drive.joint] += drive.gain;
@@ -65,16 +65,6 @@ impl Equations {
             0
         });
         &self.factors[at].1
-    }
-
-    /// Returns the change of a link's motion by an impulse on it. `joints` are those that move the link.
-    pub(super) fn answer(&mut self, joints: &[usize], impulse: &Twist) -> Twist {
-        let mut changes = vec![0.0; self.inertias.bias.len()];
-        for joint in joints {
-            changes[*joint] = self.inertias.effort_of(*joint, impulse);
-        }
-        self.factor().solve(&mut changes);
-        joints.iter().fold(Twist::ZERO, |sum, joint| sum.plus(self.inertias.motion_of(*joint), changes[*joint]))
     }
 }
 
@@ -94,14 +84,6 @@ impl Robot {
                 *position += velocity * step.secs;
             }
         }
-        self.equations = Some(step);
-    }
-
-    /// Finds the equations for the present state, with substeps of this length and no motor at its bound.
-    pub(super) fn hold_equations(&mut self, secs: f64) {
-        let mut step = self.equations(secs);
-        self.begin_step(&mut step);
-        self.set_drives(&mut step);
         self.equations = Some(step);
     }
 

@@ -43,11 +43,6 @@ impl Inertias {
         self.axes[joint].dot(force)
     }
 
-    /// Returns the motion of the links that a joint moves, at unit velocity.
-    pub(super) fn motion_of(&self, joint: usize) -> Twist {
-        self.axes[joint]
-    }
-
     /// Returns the inertia of one joint while all others are free to move.
     pub(super) fn apparent(&self, joint: usize) -> f64 {
         let mut unit = vec![0.0; self.bias.len()];

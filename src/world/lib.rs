@@ -65,7 +65,6 @@ mod suction;
 mod surface;
 mod views;
 mod wrist;
-mod yielding;
 
 pub use body::RobotBody;
 pub use camera::DepthImage;
@@ -96,4 +95,4 @@ pub use views::robot_views;
 
 /// Version of the physics: the same scene and commands give the same bits only with the same version. It rises with each
 /// change of these bits.
-pub const PHYSICS_VERSION: u32 = 17;
+pub const PHYSICS_VERSION: u32 = 16;

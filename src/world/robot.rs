@@ -50,8 +50,6 @@ pub struct Robot {
     pub(super) carrier: Option<MultibodyJointHandle>,
     /// The hand; `None` if it can't be moved alone.
     pub(super) hand: Option<Hand>,
-    /// Whether a hand that moves alone gives way to contacts.
-    pub(super) yields: bool,
     /// The force of contacts on the hand in the last step, if the engine moves the hand alone. Frame: world.
     pub(super) push_on_hand: Twist,
     /// The equations of its free motion in this control tick, once they are known.
@@ -121,7 +119,6 @@ impl Robot {
             share: Share::Whole,
             carrier: None,
             hand,
-            yields: false,
             push_on_hand: Twist::ZERO,
             equations: None,
         };
@@ -129,7 +126,6 @@ impl Robot {
             motor.target = *position;
             motor.setpoint = *position;
         }
-        robot.yields = robot.must_yield();
         robot.finish_share(engine);
         robot.put_state(engine);
         Ok(robot)

@@ -57,6 +57,8 @@ pub(super) struct Room {
     pub(super) reach: Reach,
     /// Whether something fast can meet something fixed: the engine then sweeps all fast shapes, which takes long.
     pub(super) sweeps: bool,
+    /// Whether links of many pieces in the hand can touch each other.
+    pieces_meet: bool,
     /// Ticks for which the engine still moves the whole robot.
     whole_ticks: u32,
     /// The shortcuts that may be taken.
@@ -114,8 +116,8 @@ impl World {
     pub(super) fn set_substeps(&mut self, reach: Reach) {
         let substeps = match reach {
             Reach::Nothing if self.room.shortcuts.few_substeps => self.substeps.div_ceil(2),
-            // With fewer, a hand that gives way drops its object, and fingers of many pieces that press on each other fly apart.
-            Reach::Hand if self.room.shortcuts.few_substeps && !self.robot.yields => self.substeps.div_ceil(2),
+            // Light fingers whose many pieces press on each other would fly apart.
+            Reach::Hand if self.room.shortcuts.few_substeps && !self.room.pieces_meet => self.substeps.div_ceil(2),
             _ => self.substeps,
         };
         self.engine.integration_parameters.num_solver_iterations = substeps;
@@ -366,6 +368,7 @@ impl World {
     }
 
     fn reach_between_links(&self, room: &mut Room, now: &Moment) -> Reach {
+        room.pieces_meet = false;
         if self.link_pairs.pass {
             return Reach::Nothing;
         }
@@ -389,6 +392,8 @@ impl World {
             }
             let in_hand = self.robot.hand.as_ref().is_some_and(|hand| hand.has(first) && hand.has(second));
             reach = reach.max(if in_hand { Reach::Hand } else { Reach::All });
+            room.pieces_meet |=
+                in_hand && [first, second].iter().any(|link| self.robot.model.links[*link].has_many_pieces());
         }
         reach
     }

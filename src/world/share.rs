@@ -3,8 +3,7 @@
 //! The engine needs a multibody only for links that touch something. Its cost grows with the square of the number of
 //! joints. Links outside of it are kinematic bodies, which the robot's own solution places. A hand alone moves in the
 //! engine on a carrier: a joint with a large inertia, whose velocities lead it along the path of the arm. In each step the
-//! carrier's axes are laid along the motion of the hand, so that three of them are enough. The carrier of a hand that gives way
-//! has the arm's inertia instead, along six axes: see `yielding.rs`.
+//! carrier's axes are laid along the motion of the hand, so that three of them are enough.
 
 use nalgebra::{Isometry3, Matrix3, Rotation3, UnitQuaternion, Vector3};
 use rapier3d::prelude::{
@@ -17,15 +16,12 @@ use crate::description::RobotModel;
 use crate::gripper::Gripper;
 use crate::robot::Robot;
 
-/// Inertia of the carrier of a hand that does not give way: contacts and motors of the fingers change its velocity by less
-/// than a millionth.
+/// Inertia of the carrier of a hand: contacts and motors of the fingers change its velocity by less than a millionth.
 /// Units: kilograms and kg·m².
 const CARRIER_INERTIA: f32 = 1e4;
 
 /// Number of the carrier's coordinates: along two axes and about the first of them.
 const CARRIER_AXES: usize = 3;
-/// The same for a hand that gives way: along and about three axes.
-const YIELDING_AXES: usize = 6;
 
 /// The part of the robot that the engine moves.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -97,7 +93,6 @@ impl Robot {
         if self.share == share {
             return;
         }
-        self.drop_weight(engine);
         (self.share, self.carrier) = (share, None);
         if let Some(body) = self.bodies.get(1) {
             // The link of the hand is a root or follows one, as all others do.
@@ -126,10 +121,7 @@ impl Robot {
     /// Inserts the joints of the engine's share.
     fn insert_share(&mut self, engine: &mut PhysicsWorld) {
         if let (Share::Hand, Some(hand)) = (self.share, &self.hand) {
-            let locked = match self.yields {
-                true => JointAxesMask::empty(),
-                false => JointAxesMask::LIN_Z | JointAxesMask::ANG_Y | JointAxesMask::ANG_Z,
-            };
+            let locked = JointAxesMask::LIN_Z | JointAxesMask::ANG_Y | JointAxesMask::ANG_Z;
             let joint = GenericJoint::new(locked);
             self.carrier = engine.multibody_joints.insert(self.bodies[0], self.bodies[hand.link], joint, true);
         }
@@ -150,9 +142,8 @@ impl Robot {
         // This determines whether the root is fixed, and with it the index of each joint's coordinate.
         multibody.forward_kinematics(&engine.bodies, true);
         if self.share == Share::Hand {
-            let n_axes = if self.yields { YIELDING_AXES } else { CARRIER_AXES };
-            multibody.armature_mut().rows_mut(0, n_axes).fill(CARRIER_INERTIA);
-            multibody.damping_mut().rows_mut(0, n_axes).fill(0.0);
+            multibody.armature_mut().rows_mut(0, CARRIER_AXES).fill(CARRIER_INERTIA);
+            multibody.damping_mut().rows_mut(0, CARRIER_AXES).fill(0.0);
         }
         for motor in self.motors.iter().enumerate().filter(|(idx, _)| self.shares(*idx)).map(|(_, motor)| motor) {
             let Some((multibody, link)) = engine.multibody_joints.get_mut(motor.joint) else { continue };
@@ -209,8 +200,7 @@ impl Robot {
             })
             .collect();
         if let (Share::Hand, Some(hand)) = (self.share, &self.hand) {
-            let at = &poses[hand.link];
-            self.turn_carrier(engine, at, &Isometry3::from_parts(at.translation, UnitQuaternion::identity()));
+            self.turn_carrier(engine, &poses[hand.link], &UnitQuaternion::identity());
         }
         let Some((multibody, _)) = engine.multibody_joints.get_mut(first) else { return };
         let mut ways = vec![0.0_f32; multibody.ndofs()];
@@ -225,22 +215,18 @@ impl Robot {
         self.place_colliders(engine);
     }
 
-    /// Puts the hand at a pose, with the carrier's axes in this frame.
-    pub(super) fn turn_carrier(&self, engine: &mut PhysicsWorld, at: &Isometry3<f64>, frame: &Isometry3<f64>) {
+    /// Puts the hand at a pose, with the carrier's axes in this direction.
+    fn turn_carrier(&self, engine: &mut PhysicsWorld, at: &Isometry3<f64>, axes: &UnitQuaternion<f64>) {
         let Some((multibody, carrier)) = self.carrier.and_then(|joint| engine.multibody_joints.get_mut(joint)) else {
             return;
         };
         let Some(link) = multibody.link_mut(carrier) else { return };
+        let frame = Isometry3::from_parts(at.translation, *axes);
         link.joint.data.set_local_frame1(to_pose(&(self.kinematics.root().inverse() * frame)));
         link.joint.data.set_local_frame2(to_pose(&(at.inverse() * frame)));
-        let (coords, turned) = (link.joint.coords(), link.joint.joint_rot().to_scaled_axis());
+        let coords = link.joint.coords();
         let mut back = vec![0.0_f32; multibody.ndofs()];
-        if self.yields {
-            back[..YIELDING_AXES]
-                .copy_from_slice(&[-coords[0], -coords[1], -coords[2], -turned.x, -turned.y, -turned.z]);
-        } else {
-            back[..CARRIER_AXES].copy_from_slice(&[-coords[0], -coords[1], -coords[3]]);
-        }
+        back[..CARRIER_AXES].copy_from_slice(&[-coords[0], -coords[1], -coords[3]]);
         multibody.apply_displacements(&back);
     }
 
@@ -267,7 +253,7 @@ impl Robot {
         let shift = to.translation.vector - from.translation.vector;
         let turn = (to.rotation * from.rotation.inverse()).scaled_axis();
         let axes = axes_along(&turn, &shift);
-        self.turn_carrier(engine, &from, &Isometry3::from_parts(from.translation, axes));
+        self.turn_carrier(engine, &from, &axes);
         let Some((multibody, _)) = engine.multibody_joints.get_mut(carrier) else { return };
         let (shift, turn) = (axes.inverse() * shift / secs, axes.inverse() * turn / secs);
         for (velocity, of) in multibody.generalized_velocity_mut().iter_mut().zip([shift.x, shift.y, turn.x]) {

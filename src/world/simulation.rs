@@ -260,9 +260,6 @@ impl World {
 
     /// Performs one step of physics; links that the engine does not move follow at the end of the tick.
     fn step_robot(&mut self, reach: Reach, dt: f64, ends_tick: bool) {
-        if reach == Reach::Hand && self.robot.yields {
-            return self.step_yielding_hand(dt, ends_tick);
-        }
         if reach != Reach::All {
             self.robot.move_freely(&self.engine);
         }
@@ -282,7 +279,7 @@ impl World {
         self.robot.push_on_hand = self.push_on_hand();
     }
 
-    pub(super) fn step_engine(&mut self) {
+    fn step_engine(&mut self) {
         let start = self.watch.as_ref().map(|watch| (watch.clock_secs)());
         self.engine.step_with_events(&self.link_pairs, &());
         if let (Some(watch), Some(start)) = (&mut self.watch, start) {
