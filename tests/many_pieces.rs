@@ -4,31 +4,43 @@ use std::path::Path;
 use std::sync::Arc;
 
 use actcheck::actions::perform;
-use actcheck::base::{Files, Source};
-use actcheck::data::{Budget, Choices, Pose, Role, Scene};
-use actcheck::world::{World, build};
+use actcheck::base::{Files, Outcome, Source};
+use actcheck::data::{Budget, Choices, Pose, RobotProfile, Role, Scene};
+use actcheck::world::{Shortcuts, World, build};
 
 use crate::physics::{block, body, call, object, on_table, scene};
+use crate::support::line::{env_of, nominal, outcomes, report};
 
-/// The scene with each finger of the robot cut into five boxes, which have the same surface together.
-fn with_pieces(mut scene: Scene) -> Scene {
-    let mut profile = (*scene.robot.profile).clone();
-    let mut text = profile.urdf.text.to_string();
-    for y in ["0.006", "-0.006"] {
-        let whole = format!(
-            "<collision><origin xyz=\"0 {y} 0.0475\" rpy=\"0 0 0\"/><geometry><box size=\"0.024 0.012 0.095\"/></geometry></collision>"
-        );
+/// A shipped robot's URDF with each finger cut into five boxes, which have the same surface together.
+fn cut(urdf: &str) -> String {
+    let finger = regex::Regex::new(
+        "<collision><origin xyz=\"0 (-?0.006) [0-9.]+\" rpy=\"0 0 0\"/><geometry><box size=\"0.024 0.012 ([0-9.]+)\"/></geometry></collision>",
+    );
+    let finger = finger.expect("a sound pattern");
+    assert_eq!(finger.find_iter(urdf).count(), 2);
+    let text = finger.replace_all(urdf, |found: &regex::Captures| {
+        let length = found[2].parse::<f64>().expect("a number") / 5.0;
         let piece = |idx: u32| {
-            let z = 0.0095 + 0.019 * f64::from(idx);
+            let z = (0.5 + f64::from(idx)) * length;
+            let y = &found[1];
             format!(
-                "<collision><origin xyz=\"0 {y} {z}\"/><geometry><box size=\"0.024 0.012 0.019\"/></geometry></collision>"
+                "<collision><origin xyz=\"0 {y} {z}\"/><geometry><box size=\"0.024 0.012 {length}\"/></geometry></collision>"
             )
         };
-        assert!(text.contains(&whole));
-        text = text.replace(&whole, &(0..5).map(piece).collect::<String>());
-    }
-    profile.urdf = Source::new("pieces.urdf", text);
-    scene.robot.profile = Arc::new(profile);
+        (0..5).map(piece).collect::<String>()
+    });
+    text.into_owned()
+}
+
+/// The robot with another URDF.
+fn changed(profile: &RobotProfile, change: impl Fn(&str) -> String) -> Arc<RobotProfile> {
+    let urdf = Source::new("changed.urdf", change(&profile.urdf.text));
+    Arc::new(RobotProfile { urdf, ..profile.clone() })
+}
+
+/// The scene with the robot's fingers cut.
+fn with_pieces(mut scene: Scene) -> Scene {
+    scene.robot.profile = changed(&scene.robot.profile, cut);
     scene
 }
 
@@ -169,5 +181,84 @@ fn the_root_of_a_fixed_robot_may_touch_things() {
         let [free, .., whole] = world.ticks_by_reach();
         assert!(free > 0 && whole == 0, "{beside_m} m: {:?}", world.ticks_by_reach());
         assert!((world.observe().positions[pan] - command.positions[pan]).abs() < 0.01);
+    }
+}
+
+/// A shipped robot's URDF with a twentieth of the masses of its arm, and a tenth of the efforts of the motors there. The arm goes from
+/// this place in the file to the fingers.
+fn light(urdf: &str, first: &str) -> String {
+    let (arm, end) = (urdf.find(first), urdf.find("<joint name=\"finger_left_joint\""));
+    let (arm, end) = (arm.expect("the arm begins there"), end.expect("the arm ends there"));
+    let attributes = regex::Regex::new("(mass value|ixx|iyy|izz|effort)=\"([^\"]+)\"").expect("a sound pattern");
+    let scaled = attributes.replace_all(&urdf[arm..end], |found: &regex::Captures| {
+        let factor = if &found[1] == "effort" { 0.1 } else { 0.05 };
+        format!("{}=\"{}\"", &found[1], factor * found[2].parse::<f64>().expect("a number"))
+    });
+    format!("{}{scaled}{}", &urdf[..arm], &urdf[end..])
+}
+
+/// The fixed arm beside a table with a thing of 0.8 kg. The arm is so light that it sinks under the thing.
+fn light_arm() -> Scene {
+    let mut scene = arm_on_a_table();
+    let thing = &mut scene.objects[1];
+    thing.mass_kg = 0.8;
+    let [x, y, _] = thing.pose.position;
+    (scene.robot.base, scene.robot.root_height_m) = ([x - 0.55, y, 0.0], 0.0);
+    scene.robot.profile = changed(&scene.robot.profile, |urdf| light(urdf, "<robot"));
+    scene
+}
+
+/// The engine never moves the hand of a light arm alone. The arm gives way as it does with four times as many steps, with fingers of
+/// one piece and of five.
+#[test]
+fn a_light_arm_sinks_under_the_object_in_its_hand() {
+    for fingers in [|scene| scene, with_pieces] {
+        let [exact, usual] = [(Shortcuts::NONE, 960), (Shortcuts::ALL, 240)].map(|(shortcuts, steps_per_second)| {
+            let mut scene = fingers(light_arm());
+            scene.physics.steps_per_second = steps_per_second;
+            let mut world = build(&scene).expect("the scene is right");
+            world.take_shortcuts(shortcuts);
+            assert!(world.settle().settled);
+            let budget = Budget { action_secs: 60.0 };
+            let trace = perform(&[call("Pick")], &mut world, &mut Choices::random(1, 0), &budget);
+            let report = trace.actions[0].report.as_ref().expect("the skill reports");
+            assert!(report.succeeded, "{}", report.message);
+            let mut hold = world.hold();
+            hold.gripper_opening_m = 0.0;
+            (0..120).for_each(|_| world.step(&hold));
+            assert!(!world.moved_hand_alone());
+            let hand = world.snapshot().robot.gripper.position[2];
+            (hand, in_hand(&world).translation.z, world.quality().deepest_penetration_m)
+        });
+        assert!((exact.0 - usual.0).abs() < 1e-3, "the hands are at {} m and {} m", exact.0, usual.0);
+        assert!((exact.1 - usual.1).abs() < 5e-3, "the things are at {} m and {} m in the hand", exact.1, usual.1);
+        assert!(usual.2 < exact.2 + 3e-4, "penetrates by {} m instead of {} m", usual.2, exact.2);
+    }
+}
+
+/// A mobile robot carries an object through the room and sets it down: with fingers of many pieces, with a light arm, and with both.
+#[test]
+fn mobile_robots_place_what_they_hold() {
+    let profile = include_str!("../models/robots/mobile_manipulator.toml");
+    let urdf = include_str!("../models/robots/mobile_manipulator.urdf");
+    let light = |urdf: &str| light(urdf, "<joint name=\"arm_lift_joint\"");
+    let kinds =
+        [("many pieces", cut(urdf)), ("a light arm", light(urdf)), ("many pieces on a light arm", light(&cut(urdf)))];
+    for (kind, urdf) in kinds {
+        let folder = tempfile::tempdir().expect("there is room");
+        let at = folder.path().join("robot.toml");
+        std::fs::write(&at, profile).expect("there is room");
+        std::fs::write(folder.path().join("mobile_manipulator.urdf"), urdf).expect("there is room");
+        let env = env_of(&format!(
+            "tests = [[\"Pick\", \"Place\"]]\ntest_count = 1\nseed = 5\n[objectSurface]\nobject_surfaces = [\"coffee_table\"]\n\
+            [placeSurface]\nplace_object_surfaces = [\"table\"]\n[pickObject]\nmodel_list = [\"can\"]\n\
+            [robot]\nprofile = {at:?}\n"
+        ));
+        let run = nominal(&env, None);
+        for step in [0, 1] {
+            let mut failed = outcomes(&run, step);
+            failed.retain(|_, outcome| *outcome != Outcome::Passed);
+            assert!(failed.is_empty(), "{kind}: {}: {failed:?}", report(&run, step).message);
+        }
     }
 }

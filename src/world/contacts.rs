@@ -42,10 +42,6 @@ impl Touch {
 
 /// Largest force of contacts on a hand that the engine moves alone: a loaded arm gives way. Unit: newtons.
 const MOST_PUSH: f64 = 20.0;
-/// The same without the weight of a held object, for robots of many pieces, whose arms may be light. With 20 N, an SO-101
-/// picked 4 of 15 cans instead of 13. With the whole robot in the engine, a GR1 picks 4 and an SO-100 10 at 240 steps per
-/// second, but 8 and 14 at 960, as with 20 N: the motors of their arms have not converged at 240.
-const MOST_PUSH_OF_PIECES: f64 = 1.0;
 
 impl World {
     /// Returns all contacts above [`CONTACT_FLOOR_NEWTONS`] and the seal of a suction cup, by ordered pair of owners.
@@ -89,11 +85,7 @@ impl World {
 
     /// Returns whether contacts push a hand that moves alone harder than its arm would hold unmoved.
     pub(super) fn is_pushed_hard(&self) -> bool {
-        let push = self.robot.push_on_hand.shift;
-        // Down, it is the weight of a held object.
-        let without_weight = Vector3::new(push.x, push.y, push.z.max(0.0));
-        let has_many_pieces = self.robot.model.has_many_pieces();
-        push.norm() > MOST_PUSH || has_many_pieces && without_weight.norm() > MOST_PUSH_OF_PIECES
+        self.robot.push_on_hand.shift.norm() > MOST_PUSH
     }
 }
 
@@ -148,39 +140,4 @@ fn touches(engine: &PhysicsWorld) -> BTreeMap<(Owner, Owner), Touch> {
     }
     found.retain(|_, touch| touch.normal_n > CONTACT_FLOOR_NEWTONS);
     found
-}
-
-#[cfg(test)]
-mod tests {
-    use crate::gripper::tests::{hand, turning};
-    use crate::inertia::Twist;
-    use crate::robot::tests::alone;
-    use actcheck_base::Source;
-    use nalgebra::{Point3, Vector3};
-
-    /// The arm of such a robot gives way to fingers that push sideways, but carries a held object.
-    #[test]
-    fn a_small_push_on_a_hand_of_many_pieces_moves_its_arm() {
-        let hand = hand(&turning(0.0, 0.6), &turning(-0.6, 0.0), &["left", "right"]);
-        let mut pieces = hand.clone();
-        let piece =
-            "<collision><origin xyz=\"0.06 0.005 0\"/><geometry><box size=\"0.1 0.01 0.03\"/></geometry></collision>";
-        assert!(hand.urdf.text.contains(piece));
-        pieces.urdf = Source::new("pieces.urdf", hand.urdf.text.replace(piece, &piece.repeat(4)));
-        let [mut few, mut many] = [hand, pieces].map(alone);
-        let pushes = [
-            (2.0, 0.0, [false, true]),
-            (0.5, -10.0, [false, false]),
-            (0.0, 2.0, [false, true]),
-            (0.0, -21.0, [true; 2]),
-        ];
-        for (aside_n, up_n, expected) in pushes {
-            let push = Twist::by_force(&Vector3::new(aside_n, 0.0, up_n), &Point3::origin());
-            let found = [&mut few, &mut many].map(|world| {
-                world.robot.push_on_hand = push;
-                world.is_pushed_hard()
-            });
-            assert_eq!(found, expected, "{aside_n} N aside, {up_n} N up");
-        }
-    }
 }

@@ -32,6 +32,13 @@ impl Drive {
     }
 }
 
+/// The state of a joint. Units: metres or radians, and per second.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct State {
+    pub(super) position: f64,
+    pub(super) velocity: f64,
+}
+
 /// The law of a joint's motor in one step.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Law {
@@ -46,6 +53,11 @@ pub(super) struct Law {
 }
 
 impl Law {
+    /// Returns the effort that the law demands in this state, without its bounds.
+    pub(super) fn effort(self, at: State) -> f64 {
+        self.stiffness * (self.target - at.position) + self.damping * (self.velocity - at.velocity)
+    }
+
     /// Returns the motor's drive for a substep of `secs`.
     pub(super) fn drive(self, joint: usize, position: f64, limits: [f64; 2], secs: f64) -> Drive {
         let resistance = secs * self.stiffness + self.damping;

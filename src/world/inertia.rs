@@ -47,8 +47,22 @@ impl Inertias {
     pub(super) fn apparent(&self, joint: usize) -> f64 {
         let mut unit = vec![0.0; self.bias.len()];
         unit[joint] = 1.0;
-        self.factor.get_or_init(|| Factor::new(self.mass.clone(), unit.len())).solve(&mut unit);
+        self.factor().solve(&mut unit);
         1.0 / unit[joint]
+    }
+
+    /// Returns the change of a link's motion by an impulse on it. `joints` are those that move the link.
+    pub(super) fn answer(&self, joints: &[usize], impulse: &Twist) -> Twist {
+        let mut changes = vec![0.0; self.bias.len()];
+        for joint in joints {
+            changes[*joint] = self.effort_of(*joint, impulse);
+        }
+        self.factor().solve(&mut changes);
+        joints.iter().fold(Twist::ZERO, |sum, joint| sum.plus(self.axes[*joint], changes[*joint]))
+    }
+
+    fn factor(&self) -> &Factor {
+        self.factor.get_or_init(|| Factor::new(self.mass.clone(), self.bias.len()))
     }
 }
 

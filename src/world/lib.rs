@@ -15,6 +15,7 @@ mod counterweight;
 mod decompose;
 mod description;
 mod drive;
+mod effective_mass;
 mod engine;
 mod error;
 mod factor;
@@ -95,4 +96,4 @@ pub use views::robot_views;
 
 /// Version of the physics: the same scene and commands give the same bits only with the same version. It rises with each
 /// change of these bits.
-pub const PHYSICS_VERSION: u32 = 16;
+pub const PHYSICS_VERSION: u32 = 17;

@@ -5,7 +5,7 @@ use rapier3d::prelude::{GenericJoint, JointAxis, MultibodyJointHandle, PhysicsWo
 use crate::assemble::WIDEST_RANGE;
 use crate::convert::to_real;
 use crate::description::Joint;
-use crate::drive::Law;
+use crate::drive::{Law, State};
 
 /// The motor of one joint.
 #[derive(Debug, Clone)]
@@ -91,15 +91,36 @@ impl Motor {
     }
 
     /// Gives the engine the law of this step, and the joint's stops if it can reach them.
-    pub(super) fn tell(&self, engine: &mut PhysicsWorld, joint: &Joint, position: f64, largest: f64) {
+    ///
+    /// The engine solves a motor by iteration, as a constraint, or, with `spring_secs` for the length of its substeps, as a
+    /// spring with a damper, together with the masses. Springs are exact, but have no largest effort: motors at theirs stay
+    /// constraints.
+    pub(super) fn tell(
+        &self,
+        engine: &mut PhysicsWorld,
+        joint: &Joint,
+        at: State,
+        largest: f64,
+        spring_secs: Option<f64>,
+    ) {
         let Some((multibody, link)) = engine.multibody_joints.get_mut(self.joint) else { return };
         let Some(link) = multibody.link_mut(link) else { return };
-        let (data, law) = (&mut link.joint.data, &self.law);
-        limit_if_near(data, self.axis, joint, position, largest);
-        let [target, velocity, stiffness, damping] =
-            [law.target, law.velocity, law.stiffness, law.damping].map(to_real);
-        data.set_motor(self.axis, target, velocity, stiffness, damping);
-        data.set_motor_max_force(self.axis, to_real(law.most));
+        let (dof, law, axis) = (link.assembly_id(), &self.law, self.axis as usize);
+        limit_if_near(&mut link.joint.data, self.axis, joint, at.position, largest);
+        let spring_secs = spring_secs.filter(|_| law.stiffness > 0.0 && law.effort(at).abs() < law.most);
+        if let Some(secs) = spring_secs {
+            // The target of a constraint is ahead by the way of a substep, too.
+            let rest = law.target + law.velocity * (law.damping / law.stiffness + secs);
+            link.joint.set_spring(axis, to_real(law.stiffness), to_real(rest));
+            link.joint.data.motor_axes.remove(self.axis.into());
+        } else {
+            let [target, velocity, stiffness, damping] =
+                [law.target, law.velocity, law.stiffness, law.damping].map(to_real);
+            link.joint.set_spring(axis, 0.0, 0.0);
+            link.joint.data.set_motor(self.axis, target, velocity, stiffness, damping);
+            link.joint.data.set_motor_max_force(self.axis, to_real(law.most));
+        }
+        multibody.damping_mut()[dof] = to_real(joint.damping + spring_secs.map_or(0.0, |_| law.damping));
     }
 }
 
@@ -115,6 +136,8 @@ fn limit_if_near(data: &mut GenericJoint, axis: JointAxis, joint: &Joint, positi
 
 #[cfg(test)]
 mod tests {
+    use crate::Shortcuts;
+    use crate::reach::Reach;
     use crate::robot::tests::lonely;
 
     /// A joint without inertia is the fastest: it follows its law at once.
@@ -135,6 +158,36 @@ mod tests {
                 let most = motor.catches_up(lag, tick_secs);
                 assert!(position <= most && most <= lag, "{position} of {most}, {lag} behind");
                 assert!(joint != finger || most < 0.2 * lag, "{most} of {lag}");
+            }
+        }
+    }
+
+    /// With motors as springs, the engine finds the motion of the exact equations, and the robot measures the same efforts.
+    #[test]
+    fn motors_as_springs_move_and_measure_as_the_equations_do() {
+        let [mut springs, mut free] = [lonely(), lonely()];
+        springs.robot.is_springy = true;
+        for world in [&mut springs, &mut free] {
+            world.take_shortcuts(Shortcuts { few_substeps: false, ..Shortcuts::ALL });
+        }
+        let mut command = springs.hold();
+        let (from, arm) = (command.positions.clone(), springs.layout().arm.clone());
+        for tick in 0..150 {
+            // Motors that start at once are at their largest effort, and no springs.
+            let done = f64::from(tick) / 150.0;
+            for (joint, way) in arm.iter().zip([0.2, -0.6, 0.6, 0.4, 0.6]) {
+                command.positions[*joint] = from[*joint] + way * done * done * (3.0 - 2.0 * done);
+            }
+            for (world, reach) in [(&mut springs, Reach::All), (&mut free, Reach::Nothing)] {
+                world.step_with(&command, reach);
+                assert_eq!(world.fault(), None);
+            }
+            let (one, other) = (springs.observe(), free.observe());
+            for (idx, joint) in springs.kinematics().joints().iter().enumerate() {
+                let off = (one.positions[idx] - other.positions[idx]).abs();
+                assert!(off < 3e-4, "{} is {off} off in tick {tick}", joint.name);
+                let off = (one.loads[idx] - other.loads[idx]).abs();
+                assert!(off < 0.05 * joint.effort, "{}: {off} off in tick {tick}", joint.name);
             }
         }
     }

@@ -8,7 +8,7 @@ use rapier3d::prelude::{MultibodyJointHandle, PhysicsWorld, RigidBody, RigidBody
 
 use crate::assemble::{home, insert_joints, insert_links, links_on_floor};
 use crate::description::{Joint, RobotModel};
-use crate::drive::Law;
+use crate::drive::{Law, State};
 use crate::free_motion::Equations;
 use crate::inertia::Twist;
 use crate::layout::Layout;
@@ -50,6 +50,10 @@ pub struct Robot {
     pub(super) carrier: Option<MultibodyJointHandle>,
     /// The hand; `None` if it can't be moved alone.
     pub(super) hand: Option<Hand>,
+    /// Whether its arm is light: the engine then moves a hand that can touch something never without the arm.
+    pub(super) is_light: bool,
+    /// Whether the engine solves its motors, except those of the fingers, as springs.
+    pub(super) is_springy: bool,
     /// The force of contacts on the hand in the last step, if the engine moves the hand alone. Frame: world.
     pub(super) push_on_hand: Twist,
     /// The equations of its free motion in this control tick, once they are known.
@@ -119,9 +123,13 @@ impl Robot {
             share: Share::Whole,
             carrier: None,
             hand,
+            is_light: false,
+            is_springy: false,
             push_on_hand: Twist::ZERO,
             equations: None,
         };
+        robot.is_light = robot.has_light_arm();
+        robot.is_springy = robot.is_light || model.has_many_pieces();
         for (motor, position) in robot.motors.iter_mut().zip(&robot.positions) {
             motor.target = *position;
             motor.setpoint = *position;
@@ -266,8 +274,12 @@ impl Robot {
                 most: motor.max_effort,
             };
         }
-        for (idx, motor) in self.motors.iter().enumerate().filter(|(idx, _)| self.shares(*idx)) {
-            motor.tell(engine, &self.model.joints[idx], self.positions[idx], motor.fastest * dt);
+        let states = self.positions.iter().zip(&self.velocities);
+        let states = states.map(|(position, velocity)| State { position: *position, velocity: *velocity });
+        for (idx, (motor, at)) in self.motors.iter().zip(states).enumerate().filter(|(idx, _)| self.shares(*idx)) {
+            let is_spring = self.is_springy && !self.layout.gripper.contains(idx);
+            let spring_secs = is_spring.then_some(substep_secs);
+            motor.tell(engine, &self.model.joints[idx], at, motor.fastest * dt, spring_secs);
         }
     }
 

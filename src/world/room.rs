@@ -150,7 +150,11 @@ impl World {
         room.sweeps = true;
         let reach = if room.shortcuts == Shortcuts::NONE { Reach::All } else { self.reach(&mut room, poses) };
         self.engine.integration_parameters.max_ccd_substeps = usize::from(room.sweeps || !room.shortcuts.few_sweeps);
-        room.reach = room.shortcuts.limit(reach);
+        room.reach = match room.shortcuts.limit(reach) {
+            // A light arm gives way to its hand's contacts within the step.
+            Reach::Hand if self.robot.is_light => Reach::All,
+            reach => reach,
+        };
         room.ticks[room.reach as usize] += 1;
         self.room = room;
         self.room.reach
