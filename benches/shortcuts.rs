@@ -11,8 +11,8 @@
 //! After the actions, a robot that holds an object keeps still for ten seconds. The slip is the way of the object's
 //! middle in the hand in this time; the tilt, the largest change of its attitude there. Penetration and energy are the
 //! worst of all runs. The last column counts the runs whose actions the robot reports as without shortcuts: as done or as failed.
-//! Try it with robots of others too: arms that are lighter than the shipped ones give way to less. Compare the reports with those at
-//! `steps_per_second = 960` in `[physics]` as well: of a light arm, those without shortcuts at 240 may be the wrong ones.
+//! Try it with robots of others too, and with `steps_per_second = 960` in `[physics]`: that shows whether the reports without shortcuts
+//! are the right ones.
 
 mod support;
 

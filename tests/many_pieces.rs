@@ -252,7 +252,7 @@ fn mobile_robots_place_what_they_hold() {
         let env = env_of(&format!(
             "tests = [[\"Pick\", \"Place\"]]\ntest_count = 1\nseed = 5\n[objectSurface]\nobject_surfaces = [\"coffee_table\"]\n\
             [placeSurface]\nplace_object_surfaces = [\"table\"]\n[pickObject]\nmodel_list = [\"can\"]\n\
-            [robot]\nprofile = {at:?}\n"
+            [physics]\nmass_scale = [1.5, 1.5]\n[robot]\nprofile = {at:?}\n"
         ));
         let run = nominal(&env, None);
         for step in [0, 1] {

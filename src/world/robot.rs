@@ -50,7 +50,7 @@ pub struct Robot {
     pub(super) carrier: Option<MultibodyJointHandle>,
     /// The hand; `None` if it can't be moved alone.
     pub(super) hand: Option<Hand>,
-    /// Whether its arm is light: the engine then moves a hand that can touch something never without the arm.
+    /// Whether its arm is light: the engine then never moves the hand alone.
     pub(super) is_light: bool,
     /// Whether the engine solves its motors, except those of the fingers, as springs.
     pub(super) is_springy: bool,
