@@ -236,9 +236,9 @@ fn a_light_arm_sinks_under_the_object_in_its_hand() {
     }
 }
 
-/// A mobile robot carries an object through the room and sets it down: with fingers of many pieces, with a light arm, and with both.
+/// A mobile robot carries a heavy can through the room and sets it down: with fingers of many pieces, with a light arm, and with both.
 #[test]
-fn mobile_robots_place_what_they_hold() {
+fn mobile_robots_place_a_heavy_can() {
     let profile = include_str!("../models/robots/mobile_manipulator.toml");
     let urdf = include_str!("../models/robots/mobile_manipulator.urdf");
     let light = |urdf: &str| light(urdf, "<joint name=\"arm_lift_joint\"");

@@ -4,7 +4,7 @@
 //! joints. Links outside of it are kinematic bodies, which the robot's own solution places. A hand alone moves in the
 //! engine on a carrier: a joint with a large inertia, whose velocities lead it along the path of the arm. In each step the
 //! carrier's axes are laid along the motion of the hand, so that three of them are enough. The hand of a light arm never moves
-//! alone: such an arm gives way to what the hand holds.
+//! alone: such an arm gives way to a held object.
 
 use nalgebra::{Isometry3, Matrix3, Rotation3, UnitQuaternion, Vector3};
 use rapier3d::prelude::{
