@@ -137,6 +137,13 @@ OTHERS = [
     ("R5 (ARX_Model)", "R5/R5a/urdf/R5a.urdf", [], []),
     ("AI Worker (ai_worker)", "ffw_bg2_rev4_follower/ffw_bg2_follower.urdf", [], []),
     ("Gen3 lite (ros2_kortex)", "kortex_description/robots/gen3_lite.urdf", [], []),
+    ("SO-101 (fiveages-sim's robot_descriptions)", "LeRobot/so_arm_description/urdf/so_arm.urdf", [], []),
+    ("R5 (fiveages-sim's robot_descriptions)", "arx5_description/urdf/arx5_r5.urdf", [], []),
+    ("Galaxea A1 X (fiveages-sim's robot_descriptions)", "galaxea_a1_description/urdf/galaxea_a1_x.urdf", [], []),
+    ("Galaxea A1 Y (fiveages-sim's robot_descriptions)", "galaxea_a1_description/urdf/galaxea_a1_y.urdf", [], []),
+    ("AIRBOT Play (fiveages-sim's robot_descriptions)", "airbot_play_description/urdf/airbot_play.urdf", [], []),
+    ("RM65 (fiveages-sim's robot_descriptions)", "rm65_description/urdf/rm65.urdf", [], []),
+    ("myCobot Pro 600 (mycobot_ros)", "mycobot_pro_600/mycobot_pro_600_gripper.urdf", [], []),
 ]
 
 CUBE = """category = "act:Box"

@@ -2,12 +2,12 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
 use super::between::{Between, CENTRED_AT_M, driven};
 use super::body::chain;
 use super::cup;
-use super::frames::{Pair, Root, likely};
+use super::frames::{LEAST_CHANGE_M, behind, frames};
 use super::hands::groups;
 use super::row::{across, amid, beside};
 use super::stated::{NoHand, Stated};
@@ -15,15 +15,10 @@ use super::weights::{innermost, powered, tips};
 use crate::Gripper;
 use crate::description::{JointKind, RobotModel};
 use crate::gripper::Probe;
-use crate::kinematics::motion;
 use actcheck_data::RobotProfile;
 
 /// Most pairs of fingers that are measured.
 const MOST_PAIRS: usize = 40;
-/// Least change of the gap between two fingers. Unit: metres.
-const LEAST_CHANGE_M: f64 = 0.008;
-/// Weight of a direction from the palm's origin: its frame may be anywhere.
-const FROM_PALM: f64 = 0.9;
 /// Fewest joints that carry a hand of an arm.
 const FEWEST_ARM_JOINTS: usize = 4;
 /// Weight of fingers that point back to the palm: the joints of some fingers are at their tips.
@@ -311,82 +306,6 @@ pub(super) fn leader(model: &RobotModel, joint: usize) -> usize {
     std::iter::successors(Some(joint), next).take(model.joints.len()).last().unwrap_or(joint)
 }
 
-/// Likely grasp frames of a pair, in the palm's frame, with weights: those at which both fingers have surfaces at several
-/// openings. The fingers point away from their joints or, less likely, from the palm's origin.
-fn frames(model: &RobotModel, palm: usize, links: [usize; 2], named: &[usize]) -> Vec<(f64, Isometry3<f64>)> {
-    let ways: &[[bool; 2]] = if named.len() == 1 { &[[true, true]] } else { &[[true, true], [true, false]] };
-    let inner = chain(model, palm);
-    let joints = links.map(|link| chain(model, link).into_iter().find(|joint| !inner.contains(joint)));
-    let origins: Vec<Point3<f64>> =
-        joints.iter().flatten().map(|joint| Point3::from(model.joints[*joint].origin.translation.vector)).collect();
-    let middle = origins.iter().map(|at| at.coords).sum::<Vector3<f64>>() / origins.len().max(1) as f64;
-    let roots = [
-        (1.0, Root { from: Point3::from(middle), sides: joints.map(|joint| joint.is_some()) }),
-        (FROM_PALM, Root { from: Point3::origin(), sides: [true; 2] }),
-    ];
-    let mut found: Vec<(f64, Isometry3<f64>)> = Vec::new();
-    for way in ways {
-        let ends = [posture(model, named, *way, 1.0), posture(model, named, *way, 0.0)];
-        let ends = ends.map(|positions| Pair::new(model, links, &poses(model, &positions), palm));
-        for (weight, frame) in roots.iter().flat_map(|(w, root)| likely(&ends, root).into_iter().map(move |f| (*w, f)))
-        {
-            let is_known = found.iter().any(|(_, known)| {
-                let off = (known.translation.vector - frame.translation.vector).norm();
-                off < 1e-3 && known.rotation.angle_to(&frame.rotation) < 1e-2
-            });
-            if !is_known && closes(model, palm, links, &frame, |share| posture(model, named, *way, share)) {
-                found.push((weight, frame));
-            }
-        }
-    }
-    found
-}
-
-/// Positions at a share of the way between the ends of the named joints; of the second one, in the opposite direction if
-/// the ends differ.
-fn posture(model: &RobotModel, named: &[usize], at_upper: [bool; 2], share: f64) -> Vec<f64> {
-    let mut positions: Vec<f64> = model.joints.iter().map(|joint| 0.0_f64.clamp(joint.lower, joint.upper)).collect();
-    for (joint, rises) in named.iter().zip(at_upper) {
-        let (lower, upper) = (model.joints[*joint].lower.max(-2.0), model.joints[*joint].upper.min(2.0));
-        positions[*joint] = lower + (upper - lower) * if rises { share } else { 1.0 - share };
-    }
-    // Leaders come before their followers, or the chain is longer than one.
-    for _ in 0..2 {
-        for idx in 0..positions.len() {
-            if let Some((leader, factor, offset)) = model.joints[idx].mimic {
-                positions[idx] = factor * positions[leader] + offset;
-            }
-        }
-    }
-    positions
-}
-
-/// Whether the gap between two fingers is measurable at two openings at least, and changes.
-fn closes(
-    model: &RobotModel,
-    palm: usize,
-    links: [usize; 2],
-    frame: &Isometry3<f64>,
-    posture: impl Fn(f64) -> Vec<f64>,
-) -> bool {
-    let [left, right] = links;
-    [[left, right], [right, left]].into_iter().any(|links| {
-        let probe = Probe::new(model, links, (palm, *frame));
-        let gaps = (0..=8).filter_map(|eighth| probe.gap(&posture(f64::from(eighth) / 8.0)));
-        let widths: Vec<f64> = gaps.map(|gap| gap.width_m()).collect();
-        let (least, most) = widths.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), w| (a.min(*w), b.max(*w)));
-        widths.len() >= 2 && most - least > LEAST_CHANGE_M
-    })
-}
-
-fn poses(model: &RobotModel, positions: &[f64]) -> Vec<Isometry3<f64>> {
-    let mut poses = vec![Isometry3::identity()];
-    for (joint, position) in model.joints.iter().zip(positions) {
-        poses.push(poses[joint.parent] * joint.origin * motion(joint, *position));
-    }
-    poses
-}
-
 /// Rates a candidate: how far its fingers open and close, and how far it is from the palm.
 fn rate(
     bare: &RobotProfile,
@@ -417,7 +336,8 @@ fn rate(
         (false, false) => 0.4,
     };
     let reach_m = frame.translation.vector.norm().min(0.3);
-    let points_back = (frame.rotation * Vector3::x()).dot(&frame.translation.vector) < 0.0;
+    let from_palm = frame.translation.vector - behind(model, palm, links).coords;
+    let points_back = (frame.rotation * Vector3::x()).dot(&from_palm) < 0.0;
     let both = both * if points_back { BACKWARDS } else { 1.0 };
     let score = (0.3 + flat) * both * closes_m.min(WIDE_M) * (0.05 + reach_m) / (1.0 + 10.0 * off_m);
     Some(Found { score, named: named.to_vec(), links, frame, widest_m })
@@ -451,9 +371,15 @@ mod tests {
 
     /// The hand that is found on a palm with these fingers.
     fn found(fingers: &[String]) -> RobotProfile {
+        found_on("", fingers)
+    }
+
+    /// The hand that is found on a palm with these shapes and fingers.
+    fn found_on(shapes: &str, fingers: &[String]) -> RobotProfile {
         let path = Path::new("models/robots/fixed_arm.toml");
         let shipped = actcheck_config::robot::read(&Files::Shipped, path).expect("the shipped robot is valid");
-        let text = format!("<robot name=\"hand\"><link name=\"palm\">{INERTIAL}</link>{}</robot>", fingers.concat());
+        let text =
+            format!("<robot name=\"hand\"><link name=\"palm\">{INERTIAL}{shapes}</link>{}</robot>", fingers.concat());
         let profile = RobotProfile {
             urdf: Source::new("hand.urdf", text),
             arm_joints: Vec::new(),
@@ -481,14 +407,17 @@ mod tests {
         assert!((found.max_opening_m - 0.084).abs() < 1e-3, "{}", found.max_opening_m);
     }
 
-    /// The joints of the fingers of a Piper are at their tips.
+    /// The joints of the fingers of a Piper are at their tips; those of an AIRBOT Play, too, with the origin of the palm.
     #[test]
     fn fingers_point_away_from_the_palm_wherever_their_joints_are() {
-        for (joint_m, ahead_m) in [(0.03, 0.06), (0.14, -0.05)] {
-            let found = found(&[
+        let shape =
+            "<collision><origin xyz=\"-0.13 0 0\"/><geometry><box size=\"0.06 0.1 0.06\"/></geometry></collision>";
+        for (shapes, joint_m, ahead_m) in [("", 0.03, 0.06), ("", 0.14, -0.05), (shape, 0.0, -0.05)] {
+            let fingers = [
                 finger("finger_pad_left", [joint_m, 0.006], ahead_m, 1.0),
                 finger("finger_pad_right", [joint_m, -0.006], ahead_m, -1.0),
-            ]);
+            ];
+            let found = found_on(shapes, &fingers);
             let [roll, pitch, yaw] = found.grasp_turned_rad;
             let ahead = UnitQuaternion::from_euler_angles(roll, pitch, yaw) * Vector3::x();
             assert!(ahead.x > 0.99, "{ahead}");

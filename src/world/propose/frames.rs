@@ -2,7 +2,10 @@
 
 use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
 
+use super::body::chain;
 use crate::description::RobotModel;
+use crate::gripper::Probe;
+use crate::kinematics::motion;
 use actcheck_data::{Part, Shape};
 
 /// Distances of the grasp frame from the tips of the fingers. Unit: metres. Skills assume that fingers reach as much
@@ -12,6 +15,12 @@ const DEPTHS_M: [f64; 4] = [0.025, 0.018, 0.012, 0.045];
 const TIP_M: f64 = 0.05;
 /// Axes closer than this to an axis of the palm are taken to be that axis. Unit: cosine (about 10 degrees).
 const ALIGNED_COSINE: f64 = 0.985;
+/// Least change of the gap between two fingers. Unit: metres.
+pub(super) const LEAST_CHANGE_M: f64 = 0.008;
+/// Weight of a direction from the palm's origin: its frame may be anywhere.
+const FROM_PALM: f64 = 0.9;
+/// Weight of a direction from the middle of the palm's shapes.
+const FROM_SHAPES: f64 = 0.8;
 
 /// Returns the corners of a shape, or of the box around it, in its link's frame.
 pub(super) fn corners(part: &Part) -> Vec<Point3<f64>> {
@@ -28,13 +37,13 @@ pub(super) fn corners(part: &Part) -> Vec<Point3<f64>> {
 }
 
 /// The corners of two fingers at one opening, in the palm's frame.
-pub(super) struct Pair {
-    pub(super) left: Vec<Point3<f64>>,
-    pub(super) right: Vec<Point3<f64>>,
+struct Pair {
+    left: Vec<Point3<f64>>,
+    right: Vec<Point3<f64>>,
 }
 
 impl Pair {
-    pub(super) fn new(model: &RobotModel, links: [usize; 2], poses: &[Isometry3<f64>], palm: usize) -> Self {
+    fn new(model: &RobotModel, links: [usize; 2], poses: &[Isometry3<f64>], palm: usize) -> Self {
         let [left, right] = links.map(|link| {
             let from_link = poses[palm].inverse() * poses[link];
             let points = model.links[link].solids.iter().flat_map(corners);
@@ -43,11 +52,12 @@ impl Pair {
         Self { left, right }
     }
 
-    pub(super) fn apart(&self) -> Vector3<f64> {
+    fn apart(&self) -> Vector3<f64> {
         middle(&self.left) - middle(&self.right)
     }
 }
 
+/// Returns the middle of the box around points.
 fn middle(points: &[Point3<f64>]) -> Point3<f64> {
     let (low, high) = points
         .iter()
@@ -57,10 +67,17 @@ fn middle(points: &[Point3<f64>]) -> Point3<f64> {
     Point3::from((low + high) / 2.0)
 }
 
+/// A point behind the fingers, in the palm's frame: the middle of the palm's shapes, or its origin if it has none or is itself a
+/// finger.
+pub(super) fn behind(model: &RobotModel, palm: usize, links: [usize; 2]) -> Point3<f64> {
+    let points: Vec<Point3<f64>> = model.links[palm].solids.iter().flat_map(corners).collect();
+    if points.is_empty() || links.contains(&palm) { Point3::origin() } else { middle(&points) }
+}
+
 /// Where fingers begin, and which of them point away from there.
-pub(super) struct Root {
-    pub(super) from: Point3<f64>,
-    pub(super) sides: [bool; 2],
+struct Root {
+    from: Point3<f64>,
+    sides: [bool; 2],
 }
 
 impl Root {
@@ -76,7 +93,7 @@ impl Root {
 }
 
 /// Returns likely grasp frames in the palm's frame. `ends` are the fingers at both ends of their way.
-pub(super) fn likely(ends: &[Pair; 2], from: &Root) -> Vec<Isometry3<f64>> {
+fn likely(ends: &[Pair; 2], from: &Root) -> Vec<Isometry3<f64>> {
     let mut found = Vec::new();
     let moved = ends[0].apart() - ends[1].apart();
     for across in [moved, ends[0].apart(), ends[1].apart()] {
@@ -129,4 +146,86 @@ fn aligned(direction: Vector3<f64>) -> Vector3<f64> {
         return unit;
     }
     direction
+}
+
+/// Likely grasp frames of a pair, in the palm's frame, with weights: those at which both fingers have surfaces at several
+/// openings. The fingers point away from their joints or, less likely, from the palm's origin or shapes.
+pub(super) fn frames(
+    model: &RobotModel,
+    palm: usize,
+    links: [usize; 2],
+    named: &[usize],
+) -> Vec<(f64, Isometry3<f64>)> {
+    let ways: &[[bool; 2]] = if named.len() == 1 { &[[true, true]] } else { &[[true, true], [true, false]] };
+    let inner = chain(model, palm);
+    let joints = links.map(|link| chain(model, link).into_iter().find(|joint| !inner.contains(joint)));
+    let origins: Vec<Point3<f64>> =
+        joints.iter().flatten().map(|joint| Point3::from(model.joints[*joint].origin.translation.vector)).collect();
+    let middle = origins.iter().map(|at| at.coords).sum::<Vector3<f64>>() / origins.len().max(1) as f64;
+    let roots = [
+        (1.0, Root { from: Point3::from(middle), sides: joints.map(|joint| joint.is_some()) }),
+        (FROM_PALM, Root { from: Point3::origin(), sides: [true; 2] }),
+        (FROM_SHAPES, Root { from: behind(model, palm, links), sides: [true; 2] }),
+    ];
+    let mut found: Vec<(f64, Isometry3<f64>)> = Vec::new();
+    for way in ways {
+        let ends = [posture(model, named, *way, 1.0), posture(model, named, *way, 0.0)];
+        let ends = ends.map(|positions| Pair::new(model, links, &poses(model, &positions), palm));
+        for (weight, frame) in roots.iter().flat_map(|(w, root)| likely(&ends, root).into_iter().map(move |f| (*w, f)))
+        {
+            let is_known = found.iter().any(|(_, known)| {
+                let off = (known.translation.vector - frame.translation.vector).norm();
+                off < 1e-3 && known.rotation.angle_to(&frame.rotation) < 1e-2
+            });
+            if !is_known && closes(model, palm, links, &frame, |share| posture(model, named, *way, share)) {
+                found.push((weight, frame));
+            }
+        }
+    }
+    found
+}
+
+/// Positions at a share of the way between the ends of the named joints; of the second one, in the opposite direction if
+/// the ends differ.
+fn posture(model: &RobotModel, named: &[usize], at_upper: [bool; 2], share: f64) -> Vec<f64> {
+    let mut positions: Vec<f64> = model.joints.iter().map(|joint| 0.0_f64.clamp(joint.lower, joint.upper)).collect();
+    for (joint, rises) in named.iter().zip(at_upper) {
+        let (lower, upper) = (model.joints[*joint].lower.max(-2.0), model.joints[*joint].upper.min(2.0));
+        positions[*joint] = lower + (upper - lower) * if rises { share } else { 1.0 - share };
+    }
+    // Leaders come before their followers, or the chain is longer than one.
+    for _ in 0..2 {
+        for idx in 0..positions.len() {
+            if let Some((leader, factor, offset)) = model.joints[idx].mimic {
+                positions[idx] = factor * positions[leader] + offset;
+            }
+        }
+    }
+    positions
+}
+
+/// Whether the gap between two fingers is measurable at two openings at least, and changes.
+fn closes(
+    model: &RobotModel,
+    palm: usize,
+    links: [usize; 2],
+    frame: &Isometry3<f64>,
+    posture: impl Fn(f64) -> Vec<f64>,
+) -> bool {
+    let [left, right] = links;
+    [[left, right], [right, left]].into_iter().any(|links| {
+        let probe = Probe::new(model, links, (palm, *frame));
+        let gaps = (0..=8).filter_map(|eighth| probe.gap(&posture(f64::from(eighth) / 8.0)));
+        let widths: Vec<f64> = gaps.map(|gap| gap.width_m()).collect();
+        let (least, most) = widths.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), w| (a.min(*w), b.max(*w)));
+        widths.len() >= 2 && most - least > LEAST_CHANGE_M
+    })
+}
+
+fn poses(model: &RobotModel, positions: &[f64]) -> Vec<Isometry3<f64>> {
+    let mut poses = vec![Isometry3::identity()];
+    for (joint, position) in model.joints.iter().zip(positions) {
+        poses.push(poses[joint.parent] * joint.origin * motion(joint, *position));
+    }
+    poses
 }
