@@ -42,7 +42,9 @@ impl Robot {
 #[cfg(test)]
 mod tests {
     use crate::gripper::tests::{hand, turning};
-    use crate::robot::tests::{alone, lonely};
+    use crate::robot::tests::alone;
+    use actcheck_base::Files;
+    use std::path::Path;
 
     /// A hand on a vertical slide yields along the slide alone. Its mass there is that of the links, with the resistance of the motor.
     #[test]
@@ -59,8 +61,12 @@ mod tests {
 
     #[test]
     fn the_shipped_arms_are_not_light() {
-        let world = lonely();
-        let mass_kg = world.robot.least_effective_mass_kg().expect("it has a hand");
-        assert!(mass_kg > super::LIGHT_KG && !world.robot.is_light, "{mass_kg} kg");
+        for name in ["mobile_manipulator", "fixed_arm"] {
+            let path = format!("models/robots/{name}.toml");
+            let profile = actcheck_config::robot::read(&Files::Shipped, Path::new(&path));
+            let world = alone(profile.expect("the shipped robot is valid"));
+            let mass_kg = world.robot.least_effective_mass_kg().expect("it has a hand");
+            assert!(mass_kg > super::LIGHT_KG && !world.robot.is_light, "{name}: {mass_kg} kg");
+        }
     }
 }
