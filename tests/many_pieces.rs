@@ -6,9 +6,10 @@ use std::sync::Arc;
 use actcheck::actions::perform;
 use actcheck::base::{Files, Outcome, Source};
 use actcheck::data::{Budget, Choices, Pose, RobotProfile, Role, Scene};
-use actcheck::world::{Shortcuts, World, build};
+use actcheck::world::{Poison, Shortcuts, World, build};
 
 use crate::physics::{block, body, call, object, on_table, scene};
+use crate::shortcuts::stretched;
 use crate::support::line::{env_of, nominal, outcomes, report};
 
 /// A shipped robot's URDF with each finger cut into five boxes, which have the same surface together.
@@ -96,6 +97,38 @@ fn a_fast_object_does_not_enter_fingers_of_many_pieces_deeper() {
         depth_m
     };
     for height in [0.3, 0.6, 1.0, 2.0] {
+        let [whole, pieces] = [false, true].map(|pieces| falling(pieces, height));
+        assert!(pieces < whole + 5e-4, "from {height} m, it enters by {pieces} m instead of {whole} m");
+    }
+}
+
+/// The engine does not look for contacts of links that can touch nothing. A bar that falls onto a stretched arm enters it no deeper
+/// all the same.
+#[test]
+fn a_falling_object_does_not_enter_an_arm_of_many_pieces_deeper() {
+    let falling = |pieces: bool, height: f64| {
+        let bar = Pose::upright([2.0, 2.0, 0.021], 0.0);
+        let mut scene = scene(vec![object("thing_1", block([0.04, 0.4, 0.04]), Role::Target, bar, 0.5, 0.5)]);
+        scene.robot.base = [0.0, 0.0, 0.0];
+        let mut world = build(&if pieces { with_pieces(scene) } else { scene }).expect("the scene is right");
+        let command = stretched(&world);
+        (0..300).for_each(|_| world.step(&command));
+        assert!(world.moved_freely());
+        let joints = world.kinematics().joints();
+        let wrist = joints.iter().position(|joint| joint.name == "wrist_flex_joint").expect("it has a wrist");
+        let links = world.kinematics().links(&world.observe().positions);
+        let [elbow, wrist] = [joints[wrist].parent, wrist + 1].map(|link| links[link].translation.vector);
+        let above = (elbow + wrist) / 2.0 + nalgebra::Vector3::z() * height;
+        assert!(world.poison("thing_1", Poison::Teleport(above.into())));
+        world.begin_record();
+        (0..90).for_each(|_| world.step(&command));
+        let depth_m = world.quality().deepest_penetration_m;
+        let contacts = world.end_record().contacts;
+        let is_of_arm = |pair: &[String; 2]| pair[0].starts_with("robot/arm_") && pair[1] == "thing_1";
+        assert!(contacts.iter().any(|contact| is_of_arm(&contact.pair)), "{contacts:?}");
+        depth_m
+    };
+    for height in [0.2, 1.0, 2.0] {
         let [whole, pieces] = [false, true].map(|pieces| falling(pieces, height));
         assert!(pieces < whole + 5e-4, "from {height} m, it enters by {pieces} m instead of {whole} m");
     }

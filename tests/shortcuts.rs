@@ -118,7 +118,8 @@ fn block_below() -> Scene {
     scene
 }
 
-fn stretched(world: &World) -> Command {
+/// Stretches its arm.
+pub fn stretched(world: &World) -> Command {
     let mut command = world.hold();
     for (joint, position) in world.layout().arm.iter().zip(LEVEL) {
         command.positions[*joint] = position;

@@ -10,9 +10,11 @@ use rapier3d::prelude::{Collider, RigidBodyHandle};
 
 use crate::World;
 use crate::contacts::Touch;
-use crate::convert::to_vector;
+use crate::convert::{from_pose, from_vector, to_vector};
 use crate::engine::Owner;
 use crate::object::Object;
+use crate::robot_course::ROUNDING_M;
+use crate::self_contact::Turned;
 use actcheck_data::Clearance;
 
 /// Objects farther away than this are not measured. Unit: metres. An arm's reach.
@@ -98,13 +100,38 @@ pub(super) fn gap(a: &Aabb, b: &Aabb) -> f64 {
     f64::from(apart.length())
 }
 
+/// A collider with the box around it.
+pub(super) type Boxed<'a> = (&'a Collider, Aabb);
+
+/// Returns the distance of two colliders with their boxes, or `most` if it is larger. Unit: metres.
+pub(super) fn apart((one, its_box): &Boxed<'_>, (other, other_box): &Boxed<'_>, most: f64) -> f64 {
+    if gap(its_box, other_box) >= most || turned_boxes_apart(one, other) >= most + ROUNDING_M {
+        return most;
+    }
+    let found = distance(one.position(), one.shape(), other.position(), other.shape());
+    found.map_or(0.0, |found| f64::from(found.distance)).min(most)
+}
+
+/// Returns a lower bound of the distance of two colliders, of their boxes in their own frames. Unit: metres.
+fn turned_boxes_apart(one: &Collider, other: &Collider) -> f64 {
+    let pose = from_pose(&one.position().inv_mul(other.position()));
+    let [(middle, half), (other_middle, other_half)] = [one, other].map(|collider| {
+        let bounds = collider.shape().compute_local_aabb();
+        (Point3::from(from_vector(bounds.center())), from_vector(bounds.half_extents()))
+    });
+    let turned = Turned::new(pose.rotation.to_rotation_matrix().into_inner());
+    turned.boxes_apart(pose * other_middle - middle, [&half, &other_half])
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::convert::to_pose;
     use crate::object;
     use crate::robot::tests::lonely;
     use actcheck_data::{Choices, ObjectModel, Part, Pose, Role, SceneObject, Shape};
     use nalgebra::{Isometry3, Vector3};
+    use rapier3d::prelude::{ColliderBuilder, SharedShape};
     use std::sync::Arc;
 
     /// A box of 10 cm, half a metre aside of the origin of its body, as a drawer may be.
@@ -163,6 +190,50 @@ mod tests {
             n_near += usize::from(nearest < RANGE_M);
         }
         assert!(n_near > 10, "{n_near} near");
+    }
+
+    /// All pairs of the shapes of two links, without looking at boxes first.
+    #[test]
+    fn gaps_of_links_are_those_of_all_shapes() {
+        let mut world = lonely();
+        let mut choices = Choices::random(8, 0);
+        let hulls: Vec<_> = (0..3)
+            .map(|_| {
+                let mut number = || crate::convert::to_real(choices.real("at".into(), -0.06, 0.06, 0.0));
+                let corners: Vec<Vector> = (0..20).map(|_| Vector::new(number(), number(), number())).collect();
+                crate::hull::Hull::of(&corners).expect("the corners are not in a plane")
+            })
+            .collect();
+        let links = [4, 6];
+        for (idx, hull) in hulls.iter().cycle().take(12).enumerate() {
+            let mut number = |most: f64| choices.real("at".into(), -most, most, 0.0);
+            let place = Isometry3::new(
+                Vector3::new(number(0.1), number(0.1), number(0.1)),
+                Vector3::new(number(3.0), number(3.0), number(3.0)),
+            );
+            let shape = SharedShape::new(hull.with_memory());
+            let collider = ColliderBuilder::new(shape).position(to_pose(&place));
+            world.engine.insert_collider(collider, Some(world.robot.bodies[links[idx % 2]]));
+        }
+        let (mut n_near, mut n_touching) = (0, 0);
+        for _ in 0..200 {
+            let mut number = |most: f64| choices.real("at".into(), -most, most, 0.0);
+            for idx in 0..world.robot.positions.len() {
+                world.robot.positions[idx] += number(0.3);
+            }
+            world.robot.put_state(&mut world.engine);
+            let [solids, others] = links.map(|link| world.colliders_of(world.robot.bodies[link]).collect::<Vec<_>>());
+            let gaps = solids.iter().flat_map(|one| {
+                others.iter().map(|other| {
+                    let found = distance(one.position(), one.shape(), other.position(), other.shape());
+                    f64::from(found.expect("both are convex").distance)
+                })
+            });
+            let nearest = gaps.fold(0.25, f64::min);
+            assert_eq!(world.gap_of_links(links[0], links[1]).to_bits(), nearest.to_bits());
+            (n_near, n_touching) = (n_near + u32::from(nearest < 0.25), n_touching + u32::from(nearest == 0.0));
+        }
+        assert!(n_near - n_touching > 40, "{n_near} near, of which {n_touching} touch");
     }
 
     #[test]

@@ -8,7 +8,7 @@
 use std::sync::{Arc, Mutex, OnceLock};
 
 use crate::neighbours::Neighbours;
-use parry3d::bounding_volume::{Aabb, BoundingSphere};
+use parry3d::bounding_volume::{Aabb, BoundingSphere, BoundingVolume};
 use parry3d::mass_properties::MassProperties;
 use parry3d::math::{Matrix, Pose, Real, Vector};
 use parry3d::query::{PointProjection, PointQuery, Ray, RayCast, RayIntersection};
@@ -21,6 +21,11 @@ use parry3d::shape::{
 const LANES: usize = 8;
 /// Half of them.
 const HALF: usize = LANES / 2;
+
+/// Margin of the box around a hull that remembers the shapes around it. Unit: metres.
+const ROOMY_M: Real = 1e-3;
+/// Error of a corner's place in 32 bits. Unit: metres.
+const ROUNDING_M: Real = 1e-5;
 
 /// A convex hull. Its clones share the corners.
 pub(crate) struct Hull {
@@ -74,6 +79,26 @@ impl Hull {
     /// Returns the library's hull.
     pub(crate) fn polyhedron(&self) -> &ConvexPolyhedron {
         &self.solid.hull
+    }
+
+    /// Returns a box around it at a pose that is up to a margin too large. It moves with the hull until this has turned too far.
+    fn roomy_bounds(&self, pose: &Pose) -> Aabb {
+        let ball = &self.solid.ball;
+        let middle = pose.transform_point(ball.center);
+        let around = || {
+            let exact = self.solid.bounds_at(pose);
+            Aabb::new(exact.mins - middle, exact.maxs - middle).loosened(ROOMY_M)
+        };
+        // Another thread has it if it is locked.
+        let Ok(mut last) = self.last.try_lock() else { return around().translated(middle) };
+        let is_near = |known: &Pose| {
+            2.0 * (known.rotation.inverse() * pose.rotation).xyz().length() * ball.radius < ROOMY_M - ROUNDING_M
+        };
+        let bounds = match *last {
+            Some((known, bounds)) if is_near(&known) => bounds,
+            _ => last.insert((*pose, around())).1,
+        };
+        bounds.translated(middle)
     }
 
     /// Returns the index of the corner that is farthest along a direction: the first one of equal ones.
@@ -176,6 +201,9 @@ impl Shape for Hull {
     }
 
     fn compute_aabb(&self, pose: &Pose) -> Aabb {
+        if self.neighbours.is_some() {
+            return self.roomy_bounds(pose);
+        }
         // Another thread has it if it is locked.
         let Ok(mut last) = self.last.try_lock() else { return self.solid.bounds_at(pose) };
         match *last {
@@ -267,5 +295,32 @@ mod tests {
             // A few of the last bits of coordinates up to 3.
             assert!((one.mins - other.mins).length() + (one.maxs - other.maxs).length() < 4e-6, "trial {trial}");
         }
+    }
+
+    /// A link that turns slowly: its box is not found anew in each step.
+    #[test]
+    fn the_box_of_a_hull_with_a_memory_is_a_little_too_large() {
+        let mut choices = Choices::random(5, 0);
+        let mut n_kept = 0;
+        for trial in 0..40 {
+            let plain = hull(&mut choices, trial);
+            let known = plain.with_memory();
+            let mut number = |most: f64| crate::convert::to_real(choices.real("at".into(), -most, most, 0.0));
+            let turn = Vector::new(number(1.0), number(1.0), number(1.0));
+            let way = Vector::new(number(1.0), number(1.0), number(1.0));
+            let mut last = None;
+            for step in 0..200_u16 {
+                let share = Real::from(step) / 200.0;
+                let pose = Pose::from_parts(way * share, Rotation::from_scaled_axis(turn * share * 0.05));
+                let (exact, roomy) = (plain.compute_aabb(&pose), known.compute_aabb(&pose));
+                assert!(roomy.contains(&exact), "trial {trial}, step {step}");
+                let most = (exact.mins - roomy.mins).max(roomy.maxs - exact.maxs).max_element();
+                assert!(most < 2.0 * ROOMY_M + 1e-5, "{most} m in trial {trial}, step {step}");
+                let size = roomy.maxs - roomy.mins;
+                n_kept += usize::from(last.is_some_and(|last: Vector| (last - size).length() < 1e-6));
+                last = Some(size);
+            }
+        }
+        assert!(n_kept > 2000, "kept {n_kept} times of 8000");
     }
 }

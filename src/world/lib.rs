@@ -26,6 +26,7 @@ mod fresh;
 mod furniture;
 mod gripper;
 mod hull;
+mod idle_links;
 pub mod ik;
 mod inertia;
 mod kinematics;

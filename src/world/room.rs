@@ -7,12 +7,9 @@
 //! simulation alone.
 
 use nalgebra::{Isometry3, Point3, Vector3};
-use parry3d::bounding_volume::Aabb;
-use parry3d::query::distance;
-use rapier3d::prelude::Collider;
 
 use crate::World;
-use crate::clearance::gap;
+use crate::clearance::{Boxed, apart, gap};
 use crate::convert::{from_pose, from_vector};
 use crate::description::JointKind;
 use crate::kinematics::{GRAVITY, axis_in_world};
@@ -150,7 +147,11 @@ impl World {
         room.sweeps = true;
         let reach = if room.shortcuts == Shortcuts::NONE { Reach::All } else { self.reach(&mut room, poses) };
         self.engine.integration_parameters.max_ccd_substeps = usize::from(room.sweeps || !room.shortcuts.few_sweeps);
-        room.reach = match room.shortcuts.limit(reach) {
+        let reach = room.shortcuts.limit(reach);
+        if reach != Reach::Nothing {
+            self.leave_out_idle(reach);
+        }
+        room.reach = match reach {
             // A light arm gives way to its hand's contacts within the step.
             Reach::Hand if self.robot.is_light => Reach::All,
             reach => reach,
@@ -431,10 +432,15 @@ impl World {
 
     /// Returns the distance of two links, or [`RANGE_M`] if it is larger. Unit: metres.
     pub(super) fn gap_of_links(&self, first: usize, second: usize) -> f64 {
-        let others: Vec<_> = self.boxed(self.robot.bodies[second]).collect();
-        self.boxed(self.robot.bodies[first]).fold(RANGE_M, |nearest, solid| {
-            others.iter().fold(nearest, |nearest, other| nearest.min(apart(&solid, other, nearest)))
-        })
+        let [solids, others] = [first, second].map(|link| self.boxed(self.robot.bodies[link]).collect::<Vec<_>>());
+        let pairs = || solids.iter().flat_map(|solid| others.iter().map(move |other| (solid, other)));
+        // Most others are farther apart than those with the nearest boxes.
+        let boxes_m = |(solid, other): &(&Boxed<'_>, &Boxed<'_>)| gap(&solid.1, &other.1);
+        let begin = pairs().min_by(|one, other| boxes_m(one).total_cmp(&boxes_m(other)));
+        begin
+            .into_iter()
+            .chain(pairs())
+            .fold(RANGE_M, |nearest, (solid, other)| nearest.min(apart(solid, other, nearest)))
     }
 }
 
@@ -451,13 +457,4 @@ fn has_room(
         *known = Some(Measured { gap_m: measure(), pose: *pose });
     }
     known.is_some_and(suffices)
-}
-
-/// Returns the distance of two colliders with their boxes, or `most` if it is larger. Unit: metres.
-fn apart((one, its_box): &(&Collider, Aabb), (other, other_box): &(&Collider, Aabb), most: f64) -> f64 {
-    if gap(its_box, other_box) >= most {
-        return most;
-    }
-    let found = distance(one.position(), one.shape(), other.position(), other.shape());
-    found.map_or(0.0, |found| f64::from(found.distance)).min(most)
 }

@@ -6,6 +6,7 @@ use std::sync::Arc;
 use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
 use parry3d::query::distance;
 use parry3d::query::gjk::{self, CsoPoint, GJKResult, VoronoiSimplex};
+use parry3d::shape::SupportMap;
 use rapier3d::math::{Pose as EnginePose, Vector as EngineVector};
 use rapier3d::prelude::SharedShape;
 
@@ -146,8 +147,14 @@ impl SelfContact {
 
     /// The first two links that collide, or nearly so, at these link poses.
     pub fn touching(&self, poses: &[Isometry3<f64>]) -> Option<(usize, usize)> {
-        let mut pairs = self.pairs.iter().zip(&self.apart);
-        pairs.find(|(pair, apart)| is_closer(&self.links, **pair, poses, apart)).map(|(pair, _)| pair.links)
+        // Most links are far apart.
+        let middles: Vec<Point3<f64>> = self.links.iter().zip(poses).map(|(link, pose)| pose * link.middle).collect();
+        let is_near = |Pair { links: (first, second), clear_m }: &Pair| {
+            let reach = self.links[*first].radius + self.links[*second].radius + clear_m;
+            !is_beyond(middles[*first] - middles[*second], reach)
+        };
+        let mut near = self.pairs.iter().zip(&self.apart).filter(|(pair, _)| is_near(pair));
+        near.find(|(pair, apart)| is_closer(&self.links, **pair, poses, apart)).map(|(pair, _)| pair.links)
     }
 }
 
@@ -211,7 +218,14 @@ fn are_closer(
         // The search also ends with this direction if it does not converge: it counts only if they are apart in it.
         GJKResult::NoIntersection(direction) if is_apart(direction) => false,
         // Nor is it exact in 32 bits.
-        _ => distance_m([a, b], b_in_a, towards_b, clear_m) < clear_m,
+        _ => match separation(b_in_a, [shape_a, shape_b], towards_b, clear_m) {
+            Found::Far(direction) => {
+                last.inspect(|last| last.set(to_vector(&direction)));
+                false
+            }
+            Found::Near(found) => found.distance_m < clear_m,
+            Found::Nothing => true,
+        },
     }
 }
 
@@ -223,12 +237,22 @@ fn distance_m([a, b]: [&Solid; 2], b_in_a: &EnginePose, towards_b: EngineVector,
         // An unsupported pair counts as a collision.
         return found.map_or(0.0, |found| f64::from(found.distance));
     };
-    let start = from_vector(towards_b.try_normalize().unwrap_or(EngineVector::X));
-    match Solids::new(b_in_a, shape_a, shape_b).separation(start, far_m) {
+    match separation(b_in_a, [shape_a, shape_b], towards_b, far_m) {
         Found::Far(_) => far_m,
         Found::Near(found) => found.distance_m.max(0.0),
         Found::Nothing => 0.0,
     }
+}
+
+/// Finds how far apart two shapes are, exactly. Arguments as for [`distance_m`].
+fn separation(
+    b_in_a: &EnginePose,
+    [shape_a, shape_b]: [&dyn SupportMap; 2],
+    towards_b: EngineVector,
+    far_m: f64,
+) -> Found {
+    let start = from_vector(towards_b.try_normalize().unwrap_or(EngineVector::X));
+    Solids::new(b_in_a, shape_a, shape_b).separation(start, far_m)
 }
 
 /// Returns the least of the distances of all pairs of solids by `measure`, or the clearance of the links if all are farther
@@ -299,20 +323,20 @@ fn is_beyond(way: Vector3<f64>, length_m: f64) -> bool {
 }
 
 /// The rotation of one box relative to another.
-struct Turned {
+pub(crate) struct Turned {
     turned: Matrix3<f64>,
     /// Its elements without their signs.
     spread: Matrix3<f64>,
 }
 
 impl Turned {
-    fn new(turned: Matrix3<f64>) -> Self {
+    pub(crate) fn new(turned: Matrix3<f64>) -> Self {
         Self { spread: turned.abs(), turned }
     }
 
     /// Returns a lower bound of the distance of two boxes with these half extents, along the axes of both: the second one
     /// is turned, and its middle is at `way` from that of the first. Unit: metres.
-    fn boxes_apart(&self, way: Vector3<f64>, [first, second]: [&Vector3<f64>; 2]) -> f64 {
+    pub(crate) fn boxes_apart(&self, way: Vector3<f64>, [first, second]: [&Vector3<f64>; 2]) -> f64 {
         let along_first = way.abs() - first - self.spread * second;
         let along_second = self.turned.tr_mul(&way).abs() - second - self.spread.tr_mul(first);
         along_first.max().max(along_second.max())
@@ -414,6 +438,9 @@ mod tests {
         let kinematics = world.kinematics();
         let start = world.observe().positions;
         let itself = SelfContact::new(kinematics, std::slice::from_ref(&start));
+        // Only robots of many solids remember directions.
+        let remember = |pair: &Pair| Directions::new([&itself.links[pair.links.0], &itself.links[pair.links.1]], true);
+        let remembered: Vec<Directions> = itself.pairs.iter().map(remember).collect();
         let (mut close, mut apart) = (0, 0);
         for trial in 0..150 {
             let mut posture = start.clone();
@@ -433,19 +460,19 @@ mod tests {
                 });
                 gaps.fold(f64::INFINITY, f64::min) - pair.clear_m
             };
-            for (pair, directions) in itself.pairs.iter().zip(&itself.apart) {
+            for ((pair, directions), remembered) in itself.pairs.iter().zip(&itself.apart).zip(&remembered) {
                 let spare = least(pair);
                 if spare.abs() > ROUNDING_M {
-                    assert_eq!(
-                        is_closer(&itself.links, *pair, &poses, directions),
-                        spare < 0.0,
-                        "{:?} by {spare}",
-                        pair.links
-                    );
+                    for directions in [directions, remembered] {
+                        let is_closer = is_closer(&itself.links, *pair, &poses, directions);
+                        assert_eq!(is_closer, spare < 0.0, "{:?} by {spare}", pair.links);
+                    }
                     if spare < 0.0 { close += 1 } else { apart += 1 }
                 }
             }
         }
         assert!(close > 100 && apart > 1000, "{close} close, {apart} apart");
+        let is_known = |direction: &Cell<EngineVector>| direction.get() != EngineVector::ZERO;
+        assert!(remembered.iter().flat_map(|directions| &directions.of).any(is_known));
     }
 }
