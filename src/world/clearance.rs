@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use nalgebra::Point3;
 use parry3d::bounding_volume::Aabb;
 use parry3d::query::distance;
-use rapier3d::math::Vector;
+use rapier3d::math::{Real, Vector};
 use rapier3d::prelude::{Collider, RigidBodyHandle};
 
 use crate::World;
@@ -96,8 +96,16 @@ impl World {
 
 /// Returns the distance between two boxes; 0 if they overlap. Unit: metres.
 pub(super) fn gap(a: &Aabb, b: &Aabb) -> f64 {
-    let apart = (a.mins - b.maxs).max(b.mins - a.maxs).max(Vector::ZERO);
-    f64::from(apart.length())
+    f64::from(way_between(a, b).length())
+}
+
+/// Returns the square of the distance between two boxes: faster. Unit: square metres.
+pub(super) fn gap_squared(a: &Aabb, b: &Aabb) -> Real {
+    way_between(a, b).length_squared()
+}
+
+fn way_between(a: &Aabb, b: &Aabb) -> Vector {
+    (a.mins - b.maxs).max(b.mins - a.maxs).max(Vector::ZERO)
 }
 
 /// A collider with the box around it.

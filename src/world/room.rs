@@ -7,9 +7,11 @@
 //! simulation alone.
 
 use nalgebra::{Isometry3, Point3, Vector3};
+use parry3d::bounding_volume::BoundingVolume;
+use parry3d::math::Real;
 
 use crate::World;
-use crate::clearance::{Boxed, apart, gap};
+use crate::clearance::{apart, gap, gap_squared};
 use crate::convert::{from_pose, from_vector};
 use crate::description::JointKind;
 use crate::kinematics::{GRAVITY, axis_in_world};
@@ -27,6 +29,8 @@ const LEFT_M: f64 = 4e-3;
 /// the base of a thumb and the wrist. Unit: metres.
 const LEFT_OF_LINKS_M: f64 = 1e-3;
 const LEAST_LEFT_OF_LINKS_M: f64 = 1e-4;
+/// Factor on a squared distance that is more than its rounding error in 32 bits.
+const ROUNDED_UP: f64 = 1.0 + 1e-5;
 /// Factor on the present and the commanded speeds of joints, because joints overshoot.
 const OVERSHOOT: f64 = 1.25;
 
@@ -433,14 +437,35 @@ impl World {
     /// Returns the distance of two links, or [`RANGE_M`] if it is larger. Unit: metres.
     pub(super) fn gap_of_links(&self, first: usize, second: usize) -> f64 {
         let [solids, others] = [first, second].map(|link| self.boxed(self.robot.bodies[link]).collect::<Vec<_>>());
-        let pairs = || solids.iter().flat_map(|solid| others.iter().map(move |other| (solid, other)));
+        let Some(around) = others.iter().map(|(_, its_box)| *its_box).reduce(|one, other| one.merged(&other)) else {
+            return RANGE_M;
+        };
         // Most others are farther apart than those with the nearest boxes.
-        let boxes_m = |(solid, other): &(&Boxed<'_>, &Boxed<'_>)| gap(&solid.1, &other.1);
-        let begin = pairs().min_by(|one, other| boxes_m(one).total_cmp(&boxes_m(other)));
-        begin
-            .into_iter()
-            .chain(pairs())
-            .fold(RANGE_M, |nearest, (solid, other)| nearest.min(apart(solid, other, nearest)))
+        let (mut least, mut begin) = (Real::INFINITY, None);
+        for solid in &solids {
+            if gap_squared(&solid.1, &around) >= least {
+                continue;
+            }
+            for other in &others {
+                let squared = gap_squared(&solid.1, &other.1);
+                if squared < least {
+                    (least, begin) = (squared, Some((solid, other)));
+                }
+            }
+        }
+        let mut nearest = begin.map_or(RANGE_M, |(solid, other)| apart(solid, other, RANGE_M));
+        let is_far = |squared: Real, nearest: f64| f64::from(squared) > nearest * nearest * ROUNDED_UP;
+        for solid in &solids {
+            if is_far(gap_squared(&solid.1, &around), nearest) {
+                continue;
+            }
+            for other in &others {
+                if !is_far(gap_squared(&solid.1, &other.1), nearest) {
+                    nearest = nearest.min(apart(solid, other, nearest));
+                }
+            }
+        }
+        nearest
     }
 }
 
