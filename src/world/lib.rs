@@ -97,4 +97,4 @@ pub use views::robot_views;
 
 /// Version of the physics: the same scene and commands give the same bits only with the same version. It rises with each
 /// change of these bits.
-pub const PHYSICS_VERSION: u32 = 17;
+pub const PHYSICS_VERSION: u32 = 18;
