@@ -30,7 +30,8 @@ const ROUNDING_M: Real = 1e-5;
 /// A convex hull. Its clones share the corners.
 pub(crate) struct Hull {
     solid: Arc<Solid>,
-    /// The box around it at the pose for which it was last asked. Most hulls are at rest for many steps.
+    /// The box around it at the pose for which it was last calculated. Most hulls are at rest for many steps. With a memory, the
+    /// box is relative to the middle of its bounding ball.
     last: Mutex<Option<(Pose, Aabb)>>,
     /// The shapes around it, if it remembers them.
     pub(crate) neighbours: Option<Neighbours>,
@@ -81,7 +82,8 @@ impl Hull {
         &self.solid.hull
     }
 
-    /// Returns a box around it at a pose that is up to a margin too large. It moves with the hull until this has turned too far.
+    /// Returns a box around it at a pose that is too large by at most twice [`ROOMY_M`]. It moves with the hull until this has turned
+    /// so far that its corners may have left the margin.
     fn roomy_bounds(&self, pose: &Pose) -> Aabb {
         let ball = &self.solid.ball;
         let middle = pose.transform_point(ball.center);
