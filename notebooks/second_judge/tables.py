@@ -21,6 +21,7 @@ class Body:
     fixed: bool
     pose: Pose
     velocity: np.ndarray
+    spin: np.ndarray
     low: np.ndarray
     high: np.ndarray
     size: np.ndarray | None
@@ -72,7 +73,8 @@ class Action:
     """One action of a run with its stored outcomes: pairs of an outcome and a margin, by property.
 
     `path` has the smallest and the largest x and y of the base; `joints` the largest speed of each joint as a share of
-    its limit."""
+    its limit; `extremes` the largest tilt and displacement of each body during the action; `tracks` its positions over
+    time, as rows of time, x, y and z."""
 
     run: Run
     step: int
@@ -88,6 +90,8 @@ class Action:
     plane: Seen | None = None
     objects: list = field(default_factory=list)
     joints: dict = field(default_factory=dict)
+    extremes: dict = field(default_factory=dict)
+    tracks: dict = field(default_factory=dict)
     outcomes: dict = field(default_factory=dict)
 
 
@@ -164,6 +168,7 @@ def read_states(tables):
             fixed=row["fixed"],
             pose=pose(row),
             velocity=numbers(row, "vx_m_s", "vy_m_s", "vz_m_s"),
+            spin=numbers(row, "wx_rad_s", "wy_rad_s", "wz_rad_s"),
             low=numbers(row, "min_x_m", "min_y_m", "min_z_m"),
             high=numbers(row, "max_x_m", "max_y_m", "max_z_m"),
             size=known(row, "size_x_m", "size_y_m", "size_z_m"),
@@ -205,6 +210,10 @@ def add_events(tables, actions):
     for row in tables.rows("percepts"):
         if row["source"] == "reported":
             of(row).objects.append(seen(row, "width_m", "depth_m", "height_m", category=row["category"]))
+    for row in tables.rows("extremes"):
+        of(row).extremes[row["body"]] = row
+    for row in tables.rows("objects"):
+        of(row).tracks.setdefault(row["object"], []).append(numbers(row, "time_s", "x_m", "y_m", "z_m"))
     for row in tables.rows("joint_extremes"):
         of(row).joints[row["joint"]] = row["max_speed_share"]
 
