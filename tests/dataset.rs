@@ -8,7 +8,7 @@ use serde_json::Value;
 use crate::support::{actcheck, copy_made_history, foreign, made_history, root, stderr, stdout};
 
 /// The tables of facts from which outcomes follow.
-const FACTS: [&str; 12] = [
+const FACTS: [&str; 13] = [
     "actions",
     "percepts",
     "planes",
@@ -18,6 +18,7 @@ const FACTS: [&str; 12] = [
     "contacts",
     "self_contacts",
     "extremes",
+    "intervals",
     "joint_extremes",
     "shapes",
     "places",

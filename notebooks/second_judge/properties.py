@@ -346,16 +346,9 @@ def object_on_surface(action):
     gap = abs(body.low[2] - below.high[2])
     speed, spin = (0.0, 0.0) if body.asleep else (np.linalg.norm(body.velocity), np.linalg.norm(body.spin))
     slacks = [0.005 - gap, 0.26 - body.pose.tilt(), 0.01 - speed, 0.2 - spin, -beyond(below, body).max() - 0.02]
-    slacks += [0.02 - late for late in late_speeds(action, body.id)]
+    # Times have another unit than the rest, but only their sign and a narrow miss matter.
+    slacks += [action.duration - end - 0.2 for _, end in action.motions.get(body.id, [])]
     return Verdict("passed" if on_it and min(slacks) >= 0 else "failed", min(slacks) if on_it else None)
-
-
-def late_speeds(action, body):
-    """Mean speeds between the last rows of a body's track that are less than 0.2 s before the last one."""
-    rows = action.tracks.get(body, [])
-    for last, row in zip(rows, rows[1:]):
-        if rows[-1][0] - last[0] < 0.2:
-            yield np.linalg.norm(row[1:] - last[1:]) / (row[0] - last[0])
 
 
 def object_released(action):

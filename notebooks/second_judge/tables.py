@@ -73,8 +73,8 @@ class Action:
     """One action of a run with its stored outcomes: pairs of an outcome and a margin, by property.
 
     `path` has the smallest and the largest x and y of the base; `joints` the largest speed of each joint as a share of
-    its limit; `extremes` the largest tilt and displacement of each body during the action; `tracks` its positions over
-    time, as rows of time, x, y and z."""
+    its limit; `extremes` the largest tilt and displacement of each body during the action; `motions` the times at
+    which it was faster than 2 cm/s."""
 
     run: Run
     step: int
@@ -82,6 +82,7 @@ class Action:
     parameters: dict
     end: str
     reported: bool | None
+    duration: float
     path: np.ndarray | None
     before: State | None = None
     after: State | None = None
@@ -91,7 +92,7 @@ class Action:
     objects: list = field(default_factory=list)
     joints: dict = field(default_factory=dict)
     extremes: dict = field(default_factory=dict)
-    tracks: dict = field(default_factory=dict)
+    motions: dict = field(default_factory=dict)
     outcomes: dict = field(default_factory=dict)
 
 
@@ -111,6 +112,7 @@ def read(folder):
             parameters=json.loads(row["parameters"]),
             end=row["end"],
             reported=row["reported"],
+            duration=row["duration_s"],
             path=None if path is None else path.reshape(2, 2),
             before=states.get((row["run"], row["step"] - 1)),
             after=states.get((row["run"], row["step"])),
@@ -212,8 +214,9 @@ def add_events(tables, actions):
             of(row).objects.append(seen(row, "width_m", "depth_m", "height_m", category=row["category"]))
     for row in tables.rows("extremes"):
         of(row).extremes[row["body"]] = row
-    for row in tables.rows("objects"):
-        of(row).tracks.setdefault(row["object"], []).append(numbers(row, "time_s", "x_m", "y_m", "z_m"))
+    for row in tables.rows("intervals"):
+        if row["kind"] == "motion":
+            of(row).motions.setdefault(row["body"], []).append((row["start_s"], row["end_s"]))
     for row in tables.rows("joint_extremes"):
         of(row).joints[row["joint"]] = row["max_speed_share"]
 

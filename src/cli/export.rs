@@ -60,7 +60,7 @@ pub struct ExportArgs {
     pub sparql: SparqlArgs,
     /// With `--nquads` and `--sparql`: all facts from the traces, not only those in the history. With `--parquet`: also the tables from
     /// which outcomes follow: `actions`, `percepts`, `planes`, `states`, `bodies`, `links`, `contacts`, `self_contacts`,
-    /// `extremes`, `joint_extremes`, `shapes` and `places`
+    /// `extremes`, `intervals`, `joint_extremes`, `shapes` and `places`
     #[arg(long, requires = "with_facts")]
     pub complete: bool,
     /// Write campaigns, runs, scenes and outcomes as RDF, without the facts in named graphs (Turtle)

@@ -188,6 +188,20 @@ pub(super) const EXTREMES: TableSpec = TableSpec {
     ],
 };
 
+/// Holds and motions.
+pub(super) const INTERVALS: TableSpec = TableSpec {
+    file: "intervals.parquet",
+    rows: "one for each hold or motion of an object; none in runs of versions that did not record them",
+    columns: &[
+        RUN,
+        STEP,
+        text("kind", "hold: both fingers touch the object; motion: it is faster than 2 cm/s"),
+        text("body", "id of the object"),
+        number("start_s", "s", "start since the action began"),
+        number("end_s", "s", "end since the action began"),
+    ],
+};
+
 /// Extremes of each joint.
 pub(super) const JOINT_EXTREMES: TableSpec = TableSpec {
     file: "joint_extremes.parquet",

@@ -4,13 +4,13 @@ use std::collections::BTreeMap;
 
 use crate::Hierarchy;
 use crate::dataset::fact_columns::{
-    BODIES, CONTACTS, EXTREMES, JOINT_EXTREMES, LINKS, PLACES, PLANES, SELF_CONTACTS, SHAPES, STATES,
+    BODIES, CONTACTS, EXTREMES, INTERVALS, JOINT_EXTREMES, LINKS, PLACES, PLANES, SELF_CONTACTS, SHAPES, STATES,
 };
 use crate::dataset::sheets::Sheets;
 use crate::dataset::source::look_cells;
 use crate::tables::{Cell, kinds_of};
 use actcheck_data::{
-    ActionEnd, ActionTrace, BodyState, HeldCourse, Part, RobotCourse, RobotState, SceneMap, Shape, Trace,
+    ActionEnd, ActionTrace, BodyState, HeldCourse, IntervalKind, Part, RobotCourse, RobotState, SceneMap, Shape, Trace,
 };
 use actcheck_history::RunDetail;
 
@@ -88,6 +88,15 @@ fn add_events(run: &str, step: usize, action: &ActionTrace, course: Option<&Robo
         let excess = Cell::Number(joint.max_excess.is_finite().then_some(joint.max_excess));
         let numbers = [Cell::number(joint.max_speed_share), Cell::number(joint.overload_secs)];
         sheets.push(&JOINT_EXTREMES, place().into_iter().chain([Cell::text(&joint.name), excess]).chain(numbers));
+    }
+    for interval in course.and_then(|course| course.intervals.as_ref()).into_iter().flatten() {
+        let kind = match interval.kind {
+            IntervalKind::Hold => "hold",
+            IntervalKind::Motion => "motion",
+        };
+        let thing = [Cell::text(kind), Cell::text(&interval.thing)];
+        let times = [interval.start_secs, interval.end_secs].map(Cell::number);
+        sheets.push(&INTERVALS, place().into_iter().chain(thing).chain(times));
     }
     for extremes in &action.extremes {
         let held = course.and_then(|course| course.held.iter().find(|held| held.id == extremes.id));

@@ -6,7 +6,7 @@ use serde_json::{Value, json};
 
 use crate::dataset::columns::{ACTIONS, JOINTS, OBJECTS, PERCEPTS, ROBOT, TableSpec};
 use crate::dataset::fact_columns::{
-    BODIES, CONTACTS, EXTREMES, JOINT_EXTREMES, LINKS, PLACES, PLANES, SELF_CONTACTS, SHAPES, STATES,
+    BODIES, CONTACTS, EXTREMES, INTERVALS, JOINT_EXTREMES, LINKS, PLACES, PLANES, SELF_CONTACTS, SHAPES, STATES,
 };
 use crate::dataset::sheets::Sheets;
 use crate::dataset::{fact_source, source};
@@ -26,6 +26,7 @@ const FACTS: [&TableSpec; 12] = [
     &CONTACTS,
     &SELF_CONTACTS,
     &EXTREMES,
+    &INTERVALS,
     &JOINT_EXTREMES,
     &SHAPES,
     &PLACES,
