@@ -16,7 +16,7 @@ use actcheck_base::Diagnostics;
 use actcheck_history::{History, RunDetail};
 
 /// Tables with the facts from which outcomes follow.
-const FACTS: [&TableSpec; 12] = [
+const FACTS: [&TableSpec; 13] = [
     &ACTIONS,
     &PERCEPTS,
     &PLANES,
