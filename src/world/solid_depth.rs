@@ -7,7 +7,6 @@
 use std::sync::{Arc, OnceLock};
 
 use nalgebra::{Isometry3, Point3, Vector3};
-use parry3d::query::PointQuery as _;
 use rapier3d::math::Pose as EnginePose;
 use rapier3d::prelude::SharedShape;
 
