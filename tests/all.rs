@@ -19,6 +19,7 @@ mod config;
 mod course_faults;
 mod damage;
 mod dataset;
+mod departures;
 mod dependencies;
 mod determinism;
 mod diagnostics;

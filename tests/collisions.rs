@@ -132,6 +132,42 @@ fn the_arm_does_not_pass_through_the_head() {
     };
     assert!(record.contacts.iter().any(|contact| is_of_head(contact) && contact.max_force_n > 50.0));
     assert!(record.robot.self_contacts.iter().all(|contact| contact.max_depth_m < 5e-3), "{:?}", record.robot);
+    // Its depth says nothing, its force does.
+    let pressed = record.robot.self_contacts.iter().find(|contact| contact.pair[1] == "robot/head_tilt_link");
+    let press = pressed.and_then(|contact| contact.press).expect("the force is measured");
+    assert!(press.max_force_n > 50.0 && !press.of_hand, "{press:?}");
+}
+
+/// A hand that closes on nothing: fingers may meet.
+#[test]
+fn fingers_that_meet_press_each_other_as_parts_of_the_hand() {
+    let mut world = before_furniture(400.0, 0.5);
+    world.begin_record();
+    let mut command = world.hold();
+    command.gripper_opening_m = 0.0;
+    (0..180).for_each(|_| world.step(&command));
+    let met = world.end_record().robot.self_contacts;
+    let [fingers] = met.as_slice() else { panic!("{met:?}") };
+    assert_eq!(fingers.pair, ["robot/finger_left_link", "robot/finger_right_link"]);
+    let press = fingers.press.expect("the force is measured");
+    assert!(press.of_hand && press.max_force_n > 1.0 && fingers.max_depth_m < 1e-3, "{fingers:?}");
+}
+
+/// A command without sense stops nothing: it is no reason for a motor to get a limit that is not a number.
+#[test]
+fn commands_that_are_not_numbers_are_ignored() {
+    let mut world = before_furniture(400.0, 0.5);
+    world.begin_record();
+    for value in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+        let mut command = world.hold();
+        command.positions.fill(value);
+        command.gripper_opening_m = value;
+        command.grip_force_n = value;
+        command.efforts = vec![(world.layout().arm[0], value)];
+        (0..20).for_each(|_| world.step(&command));
+        assert_eq!(world.fault(), None, "{value}");
+        assert!(world.observe().positions.iter().all(|position| position.is_finite()), "{value}");
+    }
 }
 
 /// Every recorded effort is within the limit of its joint, and the targets of the fingers are those of the gap.

@@ -107,6 +107,7 @@ fn body(id: &str, category: &str, fixed: bool, middle_m: [f64; 3], size_m: [f64;
         size_m: Some(size_m),
         grasp_distance_m: None,
         part: None,
+        left_world: false,
     }
 }
 

@@ -68,6 +68,7 @@ fn robot() -> Arc<RobotProfile> {
         grip_force_n: 10.0,
         suction: None,
         meshes: BTreeMap::new(),
+        surfaces: BTreeMap::new(),
         digest: String::new(),
     })
 }

@@ -123,17 +123,19 @@ pub(super) const CONTACTS: TableSpec = TableSpec {
     ],
 };
 
-/// Links of the robot that penetrated each other.
+/// Links of the robot that pressed or penetrated each other.
 pub(super) const SELF_CONTACTS: TableSpec = TableSpec {
     file: "self_contacts.parquet",
-    rows: "one for each action and pair of links that penetrated each other",
+    rows: "one for each action and pair of links that pressed or penetrated each other",
     columns: &[
         RUN,
         STEP,
         text("first", "one of the two links: robot/LINK"),
         text("second", "the other one"),
         number("seen_at_s", "s", "first detection since the action began"),
-        number("max_depth_m", "m", "largest penetration depth"),
+        number("max_depth_m", "m", "largest penetration depth where both are solid"),
+        number("max_force_n", "N", "largest normal force; missing in runs of earlier versions"),
+        bool("of_hand", "both belong to the hand, whose fingers may meet; missing in runs of earlier versions"),
     ],
 };
 

@@ -82,7 +82,9 @@ fn add_events(run: &str, step: usize, action: &ActionTrace, course: Option<&Robo
     for contact in course.into_iter().flat_map(|course| &course.self_contacts) {
         let pair = contact.pair.each_ref().map(Cell::text);
         let numbers = [contact.start_secs, contact.max_depth_m].map(Cell::number);
-        sheets.push(&SELF_CONTACTS, place().into_iter().chain(pair).chain(numbers));
+        let force = Cell::Number(contact.press.map(|press| press.max_force_n));
+        let of_hand = Cell::Bool(contact.press.map(|press| press.of_hand));
+        sheets.push(&SELF_CONTACTS, place().into_iter().chain(pair).chain(numbers).chain([force, of_hand]));
     }
     for joint in course.into_iter().flat_map(|course| &course.joints) {
         let excess = Cell::Number(joint.max_excess.is_finite().then_some(joint.max_excess));
