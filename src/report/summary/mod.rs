@@ -29,5 +29,5 @@ pub(crate) use recheck::reason_text;
 pub use recheck::{ChangeReason, RecheckChange, RecheckLine, RecheckSummary};
 pub use remarks::{Oddity, Remark};
 pub use repeated::RepeatedProperty;
-pub use shrunk::{ShrunkChoice, ShrunkSummary};
+pub use shrunk::{PassingValue, ShrunkChoice, ShrunkSummary};
 pub use weighted::{GuidedSearch, WeightedLine};
