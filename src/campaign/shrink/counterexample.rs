@@ -225,11 +225,6 @@ impl Subject<'_> {
         passes.then(|| signature(record).iter().map(|iri| names::local(iri).to_owned()).collect())
     }
 
-    /// Makes one run. Returns `None` unless it completes and fails as required.
-    fn run(&self, choices: Choices) -> Option<RunRecord> {
-        self.complete(choices).filter(|record| self.fails(record))
-    }
-
     /// Keeps the passing values with which a run of these choices passes when it is replayed, at most `most` of them. Returns
     /// also the number of replays.
     fn confirmed(&self, explained: Explained, choices: &[Choice], most: u64) -> (Explained, u64) {

@@ -139,8 +139,9 @@ fn brackets(influences: &[Influence]) -> Vec<Bracket> {
         };
         // Inwards, to a value that is printed as it is.
         let steps = end * STEPS_PER_UNIT;
-        let inwards = if up { steps.floor() } else { steps.ceil() } / STEPS_PER_UNIT;
-        let end = if if up { inwards > value } else { inwards < value } { inwards } else { end };
+        let inwards = if up { libm::floor(steps) } else { libm::ceil(steps) } / STEPS_PER_UNIT;
+        let beyond = if up { inwards > value } else { inwards < value };
+        let end = if beyond { inwards } else { end };
         (end != value).then_some((of, end))
     });
     let bracket = |(of, end): (usize, f64)| {
@@ -155,7 +156,7 @@ impl Bracket {
     fn next(&self) -> f64 {
         let Some(beyond) = self.beyond else { return self.end };
         let middle = (self.fails + beyond) / 2.0;
-        let printed = (middle * STEPS_PER_UNIT).round() / STEPS_PER_UNIT;
+        let printed = libm::round(middle * STEPS_PER_UNIT) / STEPS_PER_UNIT;
         let (low, high) = (self.fails.min(beyond), self.fails.max(beyond));
         if low < printed && printed < high { printed } else { middle }
     }

@@ -16,7 +16,7 @@ mod weighted;
 
 #[cfg(test)]
 pub(crate) use campaign::tests as campaign_samples;
-pub use campaign::{ActionSummary, CampaignSummary, EndedBy, PropertyLine, Proportion, RunSummary};
+pub use campaign::{ActionSummary, CampaignSummary, EndedBy, PropertyLine, Proportion, RateBounds, RunSummary};
 pub use case::CaseSummary;
 pub use compare::{CompareSummary, ComparedSide, SideChange};
 pub(crate) use compare::{compared_name, compared_parts};

@@ -113,7 +113,7 @@ fn choice_table(shrunk: &ShrunkSummary, page: Page) -> String {
 fn number(value: f64) -> String {
     // Adding 0 turns negative zero into zero.
     let text = format!("{:.4}", value + 0.0);
-    if text.parse() != Ok(value + 0.0) {
+    if text.parse::<f64>() != Ok(value + 0.0) {
         return (value + 0.0).to_string();
     }
     let text = text.trim_end_matches('0').trim_end_matches('.');
