@@ -4,7 +4,7 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use actcheck::analysis::{Compared, ComparedRun, Comparison, PairedTable, compare, compared_runs};
+use actcheck::analysis::{Compared, ComparedRun, Comparison, PairedTable, Sampling, compare, compared_runs};
 use actcheck::base::{Outcome, names};
 use actcheck::data::Choices;
 use actcheck::history::{History, OutcomeRow, RunRow, RunStatus, SceneDigest};
@@ -57,7 +57,7 @@ fn alarms(seed: u64, scenes: u64, first: &[f64], second: &[f64]) -> u64 {
             let mut choices = Choices::random(seed, *index);
             let first = flipped(&mut choices, scenes, first);
             let second = flipped(&mut choices, scenes, second);
-            !compare(&first, &second).worse_at(LEVEL).is_empty()
+            !compare(&first, &second, Sampling::Fixed).worse_at(LEVEL).is_empty()
         })
         .count() as u64
 }

@@ -52,6 +52,11 @@ pub struct ExportArgs {
     /// the columns
     #[arg(long, value_name = "DIR")]
     pub dataset: Option<PathBuf>,
+    /// With `--dataset`: also the course of each action at the control rate (60 Hz), from which properties about time can be
+    /// judged: `course_bodies` (poses, velocities, holds), `course_robot` (gripper and base), `course_joints`,
+    /// `course_forces` (between pairs of bodies) and `phases`. It takes about ten times the space
+    #[arg(long, requires = "dataset")]
+    pub course: bool,
     /// Write the whole history as RDF, with facts in their named graphs (N-Quads)
     #[arg(long, value_name = "FILE.nq")]
     pub nquads: Option<PathBuf>,
@@ -133,7 +138,7 @@ fn write_tables(args: &ExportArgs, history: &History) -> Result<(), Diagnostics>
         output::print(&told);
     }
     if let Some(folder) = &args.dataset {
-        print_dataset(&export_dataset(&runs, folder)?);
+        print_dataset(&export_dataset(&runs, folder, args.course)?);
     }
     Ok(())
 }

@@ -14,7 +14,7 @@ use crate::session::{self, Opened, Session};
 use crate::work::{all_cores, quietly};
 use crate::{case, clock, health, output, shrink, stop};
 use actcheck_analysis as analysis;
-use actcheck_analysis::{Interval, Mirror};
+use actcheck_analysis::{Interval, Mirror, Sampling};
 use actcheck_base::{Diagnostic, Diagnostics, Outcome};
 use actcheck_campaign::{
     CampaignOptions, CampaignResult, Ending, Env, ExhaustedBudget, RunContext, StoredRuns, WeightedRate, resume_all,
@@ -99,7 +99,7 @@ pub(super) fn campaign(
     (summary.planned, summary.regressions) = (planned, regressions);
     if finished.is_ok() {
         mirror(&history);
-        summary.failure_modes = failure_modes(&history, id)?;
+        summary.failure_modes = failure_modes(&history, id, summary.sampling())?;
     }
     // If the history failed, only that fault is reported. Failed runs are a biased sample, so their health means little.
     let health =
@@ -277,11 +277,11 @@ fn finish(
     history.finish_campaign(id, &record)
 }
 
-fn failure_modes(history: &History, id: String) -> Result<Vec<analysis::FailureMode>, Diagnostics> {
+fn failure_modes(history: &History, id: String, sampling: Sampling) -> Result<Vec<analysis::FailureMode>, Diagnostics> {
     let filter = RunFilter { campaign: Some(id), ..RunFilter::default() };
     let rows = history.outcomes(&filter)?;
     let runs = history.runs(&filter)?;
-    Ok(analysis::failure_modes(&rows, &scenes(runs)))
+    Ok(analysis::failure_modes(&rows, &scenes(runs), sampling))
 }
 
 /// The scene of each run: its number if scenes are repeated, or the position of the first run with the same trace. Empty if

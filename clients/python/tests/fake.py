@@ -63,7 +63,7 @@ def hello(**changes: Any) -> Message:
         "grip_force_n": 7.0,
         "home": HOME,
         "postures": [LEVEL],
-        "camera": {"link": "head_camera_link", "width": 4, "height": 3, "horizontal_fov_rad": 1.0},
+        "camera": {"link": "head_camera_link", "width": 4, "height": 3, "horizontal_fov_rad": 1.0, "min_range_m": 0.3, "max_range_m": 5.0},
     }
     message = {"type": "hello", "protocol": 1, "actcheck": "0.1.0", "worker": 0, "control_period_s": TICK_S}
     return message | {"privileged": False, "robot": robot, "sensors": []} | changes
@@ -195,7 +195,7 @@ class Simulation:
             self.send(answer | {"binary": announced}, np.arange(15, dtype="<f4"))
         else:
             announced = [{"name": "depth", "dtype": "f32", "shape": [3, 4]}]
-            picture = {"camera_pose": upright, "width": 4, "height": 3, "horizontal_fov_rad": 1.0, "binary": announced}
+            picture = {"camera_pose": upright, "width": 4, "height": 3, "horizontal_fov_rad": 1.0, "focal_px": 3.7, "binary": announced}
             self.send(answer | picture, np.arange(12, dtype="<f4"))
 
     def bye(self) -> None:

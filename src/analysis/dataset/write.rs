@@ -9,7 +9,7 @@ use crate::dataset::fact_columns::{
     BODIES, CONTACTS, EXTREMES, INTERVALS, JOINT_EXTREMES, LINKS, PLACES, PLANES, SELF_CONTACTS, SHAPES, STATES,
 };
 use crate::dataset::sheets::Sheets;
-use crate::dataset::{fact_source, source};
+use crate::dataset::{course, fact_source, source};
 use crate::tables::{new_text, outcomes_schema, pending_parquet, unwritten};
 use crate::{Hierarchy, Mirror, TableFilter};
 use actcheck_base::Diagnostics;
@@ -60,17 +60,20 @@ pub struct DatasetRuns<'a> {
     pub hierarchy: &'a Hierarchy,
 }
 
-/// Writes observations, commands, percepts, ground truth and outcomes of runs into a folder, creating it if needed.
+/// Writes observations, commands, percepts, ground truth and outcomes of runs into a folder, creating it if needed. `with_course`:
+/// also the course of each action at the control rate.
 ///
 /// # Errors
 /// `A001` if it can't be written; errors of reading the history or a trace.
-pub fn export_dataset(runs: &DatasetRuns<'_>, folder: &Path) -> Result<Dataset, Diagnostics> {
-    let tables: Vec<&TableSpec> = FACTS.into_iter().chain(COURSES).collect();
+pub fn export_dataset(runs: &DatasetRuns<'_>, folder: &Path, with_course: bool) -> Result<Dataset, Diagnostics> {
+    let further = course::COURSE.into_iter().filter(|_| with_course);
+    let tables: Vec<&TableSpec> = FACTS.into_iter().chain(COURSES).chain(further).collect();
     export(runs, &tables, folder, |run, sheets| {
         let trace = runs.history.trace(&run.row.run)?;
         source::add(run, &trace, sheets);
         fact_source::add(run, &trace, runs.hierarchy, sheets);
-        Ok(source::add_courses(&run.row.run, &trace, sheets))
+        let any = source::add_courses(&run.row.run, &trace, sheets);
+        Ok((!with_course || course::add(&run.row.run, &trace, sheets)) && any)
     })
 }
 

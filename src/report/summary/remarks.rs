@@ -3,7 +3,6 @@
 use std::collections::BTreeMap;
 
 use crate::CampaignSummary;
-use actcheck_analysis::wilson;
 use actcheck_base::Outcome;
 
 /// Minimum number of judgements for a "never" remark: with 4 of 4, the lower bound of the interval is still near one
@@ -99,7 +98,7 @@ impl CampaignSummary {
         let labels: Vec<&str> = remark.properties.iter().map(|(_, label)| label.as_str()).collect();
         let names = labels.join(", ");
         // Upper bound of the rate of the outcome that never occurred.
-        let most = wilson(0, remark.of).map_or(100.0, |interval| interval.high * 100.0);
+        let most = self.sampling().interval(0, remark.of).map_or(100.0, |interval| interval.high * 100.0);
         let ask = match (&remark.run, labels.first()) {
             (Some(run), Some(label)) => format!("{} why {run} {label} --history {}", self.program, self.history),
             _ => String::new(),

@@ -17,7 +17,7 @@ from types import TracebackType
 
 from actcheck.env import ActionEnv
 from actcheck.faults import Aborted, Closed, Failed
-from actcheck.messages import Report
+from actcheck.messages import Held, Plane, Report, Thing
 from actcheck.robot import Ended, Robot
 from actcheck.session import Session
 from actcheck.skill import Skill, report_of, wanted
@@ -97,12 +97,19 @@ class Connection:
         self._robot = Robot(self.session, call)
         return self._robot
 
-    def end(self, succeeded: bool = True, message: str = "") -> None:
+    def end(
+        self,
+        succeeded: bool = True,
+        message: str = "",
+        perceived: Sequence[Thing] = (),
+        plane: Plane | None = None,
+        held: Held | None = None,
+    ) -> None:
         """Ends the action with its own report."""
         if self._robot is None:
             raise RuntimeError("no action is in progress: call `begin` first")
         self._robot = None
-        self.session.end(Report(succeeded, message))
+        self.session.end(Report(succeeded, message, perceived, plane, held))
 
     def perform(self, function: Skill) -> Report:
         """Performs the next action with a skill. Unlike in a campaign, its exceptions are raised here, with their traceback."""
@@ -119,7 +126,8 @@ class Connection:
             report = Report(False, str(failed))
         finally:
             if self._robot is not None:
-                self.end(report.succeeded, report.message)
+                self._robot = None
+                self.session.end(report)
         return report
 
     def env(self, action: str, ticks: int = 6) -> ActionEnv:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from actcheck.faults import Aborted, Closed
-from actcheck.messages import Report
+from actcheck.messages import Held, Plane, Report, Thing
 from actcheck.pose import Vector
 from actcheck.robot import Robot
 from actcheck.session import Session
@@ -136,12 +136,19 @@ class ActionEnv:
         self._last = self._observe(robot)
         return self._last, float(self._reward(robot)), False, False, {}
 
-    def end(self, succeeded: bool, message: str = "") -> None:
+    def end(
+        self,
+        succeeded: bool,
+        message: str = "",
+        perceived: Sequence[Thing] = (),
+        plane: Plane | None = None,
+        held: Held | None = None,
+    ) -> None:
         """Ends the episode with the action's own report. The report and the rules decide the verdict."""
         if self._robot is None:
             raise RuntimeError(BETWEEN)
         self._robot = None
-        self._session.end(Report(succeeded, message))
+        self._session.end(Report(succeeded, message, perceived, plane, held))
 
     def close(self) -> None:
         """Closes the connection."""

@@ -21,7 +21,7 @@ class Joint:
     """A joint of the robot."""
 
     name: str
-    #: `revolute`, `prismatic` or `continuous`.
+    #: `revolute` or `prismatic`.
     kind: str
     #: `base`, `arm`, `gripper`, `head` or `other`.
     role: str
@@ -41,7 +41,11 @@ class Camera:
     link: str
     width: int
     height: int
+    #: Width of the picture as an angle.
     horizontal_fov_rad: float
+    #: Nearest and farthest distance that it measures. Unit: metres.
+    min_range_m: float
+    max_range_m: float
 
 
 @dataclass(frozen=True)
@@ -74,6 +78,12 @@ class RobotDescription:
     control_period_s: float
     #: Whether messages include ground truth.
     privileged: bool
+    #: Names of the sensors that the program may ask for.
+    sensors: tuple[str, ...] = ()
+    #: Version of actcheck.
+    actcheck: str = ""
+    #: Number of the worker, from 0; behaviour must not depend on it.
+    worker: int = 0
 
     @classmethod
     def from_wire(cls, hello: Message) -> RobotDescription:
@@ -98,6 +108,9 @@ class RobotDescription:
             camera=camera and Camera(**{name: camera[name] for name in Camera.__dataclass_fields__}),
             control_period_s=float(hello["control_period_s"]),
             privileged=bool(hello.get("privileged", False)),
+            sensors=tuple(hello.get("sensors") or ()),
+            actcheck=str(hello.get("actcheck", "")),
+            worker=int(hello.get("worker", 0)),
             **lists,
         )
 
@@ -181,6 +194,44 @@ class Thing:
         return sent if self.category is None else sent | {"category": self.category}
 
 
+@dataclass(frozen=True, eq=False)
+class Plane:
+    """A level surface as perceived."""
+
+    #: Pose of its centre: z is the normal of its upper side, x runs along its first side.
+    pose: Pose
+    #: Lengths of its two sides. Unit: metres.
+    size_m: Vector
+
+    @classmethod
+    def on_top_of(cls, thing: Thing) -> Plane:
+        """The upper side of an upright box."""
+        return cls(thing.pose.moved(z=float(thing.size_m[2])), thing.size_m[:2])
+
+    def to_wire(self) -> Message:
+        """Converts to the plane of an `end` message."""
+        return {"pose": self.pose.to_wire(), "size_m": [float(side) for side in self.size_m]}
+
+
+@dataclass(frozen=True, eq=False)
+class Held:
+    """The object in the hand."""
+
+    #: Pose of its foot when the fingers closed on it.
+    pose: Pose
+    #: Dimensions along the axes of that pose. Unit: metres.
+    size_m: Vector
+
+    @classmethod
+    def of(cls, thing: Thing) -> Held:
+        """An object as it was perceived before the fingers closed on it."""
+        return cls(thing.pose, thing.size_m)
+
+    def to_wire(self) -> Message:
+        """Converts to the held object of an `end` message."""
+        return {"pose": self.pose.to_wire(), "size_m": [float(side) for side in self.size_m]}
+
+
 def things_from_wire(sent: Sequence[Message]) -> tuple[Thing, ...]:
     """Converts all objects of an answer message."""
     return tuple(Thing.from_wire(one) for one in sent)
@@ -195,6 +246,29 @@ class DepthImage:
     #: x looks forward, z is up in the picture. Frame: world, by the robot's belief.
     camera_pose: Pose
     horizontal_fov_rad: float
+    #: Focal length in pixels: the point of column u and row v at depth d is, in the camera's frame,
+    #: (d, d·(width/2 − u − 0.5)/focal_px, d·(height/2 − v − 0.5)/focal_px).
+    focal_px: float
+
+    @property
+    def width(self) -> int:
+        """Number of columns."""
+        return int(self.depth.shape[1])
+
+    @property
+    def height(self) -> int:
+        """Number of rows."""
+        return int(self.depth.shape[0])
+
+    @classmethod
+    def from_wire(cls, sent: Message) -> DepthImage:
+        """Converts an answer message with its array."""
+        return cls(
+            depth=sent["arrays"]["depth"],
+            camera_pose=Pose.from_wire(sent["camera_pose"]),
+            horizontal_fov_rad=float(sent["horizontal_fov_rad"]),
+            focal_px=float(sent["focal_px"]),
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -203,14 +277,22 @@ class Report:
 
     succeeded: bool
     message: str = ""
-    #: The perceived objects, for actions that are judged by them.
+    #: The perceived objects, for actions that are judged by them, and for later actions.
     perceived: Sequence[Thing] = ()
+    #: The perceived surface, likewise.
+    plane: Plane | None = None
+    #: The object in the hand, for later actions. Without it, an object that the fingers feel is assumed to be the `pickObject`.
+    held: Held | None = None
 
     def to_wire(self) -> Message:
         """Converts to an `end` message."""
         sent: Message = {"type": "end", "succeeded": self.succeeded, "message": self.message}
         if self.perceived:
             sent["perceived"] = [thing.to_wire() for thing in self.perceived]
+        if self.plane is not None:
+            sent["plane"] = self.plane.to_wire()
+        if self.held is not None:
+            sent["held"] = self.held.to_wire()
         return sent
 
 
@@ -232,3 +314,5 @@ class Call:
     run: str = ""
     #: Seed of the run, the same for the same campaign seed and run.
     seed: int = 0
+    #: Position of the run in its campaign, for people.
+    index: int = 0

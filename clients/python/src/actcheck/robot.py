@@ -11,7 +11,17 @@ from numpy.typing import NDArray
 
 from actcheck.faults import Failed
 from actcheck.kinematics import Chain, UrdfJoint, on_base, read_urdf, rotation
-from actcheck.messages import Call, DepthImage, Observation, Report, RobotDescription, Thing, things_from_wire
+from actcheck.messages import (
+    Call,
+    DepthImage,
+    Held,
+    Observation,
+    Plane,
+    Report,
+    RobotDescription,
+    Thing,
+    things_from_wire,
+)
 from actcheck.motion import course
 from actcheck.pose import Pose, Vector, wrapped
 from actcheck.session import Session
@@ -100,14 +110,14 @@ class Robot:
         efforts: Mapping[str, float] | None = None,
         base_velocity: Sequence[float] | None = None,
         gripper: float | tuple[float, float] | None = None,
-        head: tuple[float, float] | None = None,
+        head: tuple[float | None, float | None] | None = None,
         ticks: int = 1,
     ) -> Observation:
         """Sends one command and returns the observation after its ticks. Anything not named keeps its previous target.
 
         `positions`, `velocities` and `efforts` by joint; `base_velocity` forwards, to the left (m/s) and turning (rad/s), in
         the base's frame; `gripper` as the gap between the fingers (metres), or as gap and force (newtons); `head` as pan and
-        tilt (radians).
+        tilt (radians), `None` for one that keeps its target.
         """
         message: Message = {"type": "command", "ticks": ticks}
         if positions is not None:
@@ -123,7 +133,9 @@ class Robot:
             opening, force = gripper if isinstance(gripper, tuple) else (gripper, self.description.grip_force_n)
             message["gripper"] = {"opening_m": float(opening), "force_n": float(force)}
         if head is not None:
-            message["head"] = {"pan_rad": float(head[0]), "tilt_rad": float(head[1])}
+            pan, tilt = head
+            turned = {"pan_rad": pan, "tilt_rad": tilt}
+            message["head"] = {name: float(angle) for name, angle in turned.items() if angle is not None}
         return self._command(message)
 
     def wait(self, seconds: float) -> Observation:
@@ -205,8 +217,7 @@ class Robot:
 
     def depth(self) -> DepthImage:
         """A picture of the depth camera."""
-        answer = self._session.ask("depth")
-        return DepthImage(answer["arrays"]["depth"], Pose.from_wire(answer["camera_pose"]), answer["horizontal_fov_rad"])
+        return DepthImage.from_wire(self._session.ask("depth"))
 
     def cloud(self) -> NDArray[np.float32]:
         """The points that the depth camera sees. Shape: points × 3. Frame: world. Unit: metres."""
@@ -226,9 +237,16 @@ class Robot:
 
     # The end.
 
-    def end(self, succeeded: bool, message: str = "", perceived: Sequence[Thing] = ()) -> NoReturn:
+    def end(
+        self,
+        succeeded: bool,
+        message: str = "",
+        perceived: Sequence[Thing] = (),
+        plane: Plane | None = None,
+        held: Held | None = None,
+    ) -> NoReturn:
         """Ends the action with its own report, from any call depth. Returning from the skill does the same."""
-        raise Ended(Report(succeeded, message, perceived))
+        raise Ended(Report(succeeded, message, perceived, plane, held))
 
     def _command(self, message: Message) -> Observation:
         self._observation = self._session.command(message)

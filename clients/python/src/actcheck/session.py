@@ -20,7 +20,7 @@ class Session:
             wire.close()
             raise ProtocolFault(f"actcheck uses protocol version {hello.get('protocol')}, this package version {PROTOCOL}")
         self.description = RobotDescription.from_wire(hello)
-        self._run, self._seed = "", 0
+        self._run, self._seed, self._index = "", 0, 0
         self._aborted: Aborted | None = None
         wire.send({"type": "hello", "protocol": PROTOCOL, "name": name, "actions": actions})
 
@@ -40,6 +40,7 @@ class Session:
                 return None
             if message["type"] == "reset":
                 self._run, self._seed = str(message["run"]), int(message["seed"])
+                self._index = int(message.get("index", 0))
                 self._wire.send({"type": "ready"})
                 continue
             self._aborted = None
@@ -53,6 +54,7 @@ class Session:
                 observation=Observation.from_wire(sent | truth),
                 run=self._run,
                 seed=self._seed,
+                index=self._index,
             )
 
     def command(self, message: Message) -> Observation:
