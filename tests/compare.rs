@@ -136,7 +136,7 @@ fn the_interval_covers_the_true_difference() {
         let mut choices = Choices::random(21, index);
         let first = flipped(&mut choices, 80, &[0.75]);
         let second = flipped(&mut choices, 80, &[0.6]);
-        let difference = compare(&first, &second).lines[0].difference.unwrap();
+        let difference = compare(&first, &second, Sampling::Fixed).lines[0].difference.unwrap();
         covered += u64::from(difference.low <= truth && truth <= difference.high);
     }
     // 95 % of a thousand, less three and a half standard deviations of that.
@@ -321,7 +321,7 @@ fn a_campaign_is_newer_than_its_regressions() {
 #[test]
 fn a_campaign_compared_with_itself_shows_no_difference() {
     let runs = flipped(&mut Choices::random(31, 0), 20, &[0.5, 0.5]);
-    let Comparison { pairs, lines, .. } = compare(&runs, &runs);
+    let Comparison { pairs, lines, .. } = compare(&runs, &runs, Sampling::Fixed);
     assert_eq!((pairs, lines.len(), &lines[0].of), (20, 3, &Compared::WholeRun));
     assert!(lines.iter().all(|line| line.test.two_sided == 1.0 && line.worse.is_empty() && line.better.is_empty()));
 }

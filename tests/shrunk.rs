@@ -206,10 +206,8 @@ fn with_choice(text: &str, name: &str, value: f64) -> Option<String> {
     numbers.get(nth)?.parse::<f64>().ok()?;
     let value = format!("{value:?}");
     numbers[nth] = &value;
-    *line = format!("{key} = [{}]", numbers.join(", "));
-    if numbers.len() == 1 {
-        *line = format!("{key} = {}", numbers[0]);
-    }
+    let joined = numbers.join(", ");
+    *line = if numbers.len() == 1 { format!("{key} = {joined}") } else { format!("{key} = [{joined}]") };
     Some(lines.join("\n"))
 }
 

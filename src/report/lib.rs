@@ -34,8 +34,8 @@ pub use recording::{RecordingFault, Recordings};
 pub use summary::{
     ActionSummary, CampaignSummary, CaseSummary, Causes, ChangeReason, CompareSummary, ComparedSide, EndedBy,
     FindingsSummary, GuidedSearch, HealthSummary, Oddity, OracleSummary, PassingValue, PropertyLine, PropertyReport,
-    Proportion, RecheckChange, RecheckLine, RecheckSummary, Remark, RepeatedProperty, RunSummary, ShrunkChoice,
-    ShrunkSummary, SideChange, WeightedLine,
+    Proportion, RateBounds, RecheckChange, RecheckLine, RecheckSummary, Remark, RepeatedProperty, RunSummary,
+    ShrunkChoice, ShrunkSummary, SideChange, WeightedLine,
 };
 pub use table::{
     Table, TableFormat, TableParts, answer_cells, answer_table, campaign_table, compare_table, findings_table,

@@ -60,7 +60,7 @@ impl<'a> Ends<'a> {
 
     /// The difference of the ends in words.
     fn difference(&self, good: &Runs, bad: &Runs) -> String {
-        let comparison = compare(good, bad);
+        let comparison = compare(good, bad, Sampling::Fixed);
         match self.by {
             By::Outcome => format!(
                 "{} in {}",
