@@ -133,24 +133,23 @@ fn the_arm_does_not_pass_through_the_head() {
     assert!(record.contacts.iter().any(|contact| is_of_head(contact) && contact.max_force_n > 50.0));
     assert!(record.robot.self_contacts.iter().all(|contact| contact.max_depth_m < 5e-3), "{:?}", record.robot);
     // Its depth says nothing, its force does.
-    let pressed = record.robot.self_contacts.iter().find(|contact| contact.pair[1] == "robot/head_tilt_link");
+    let of_head = |pair: &[String; 2]| pair.contains(&"robot/head_tilt_link".to_owned());
+    let pressed = record.robot.self_contacts.iter().find(|contact| of_head(&contact.pair));
     let press = pressed.and_then(|contact| contact.press).expect("the force is measured");
     assert!(press.max_force_n > 50.0 && !press.of_hand, "{press:?}");
 }
 
-/// A hand that closes on nothing: fingers may meet.
+/// A hand that closes on nothing: fingers may meet, and are not inside each other.
 #[test]
-fn fingers_that_meet_press_each_other_as_parts_of_the_hand() {
+fn fingers_that_meet_are_no_collision() {
     let mut world = before_furniture(400.0, 0.5);
     world.begin_record();
     let mut command = world.hold();
     command.gripper_opening_m = 0.0;
     (0..180).for_each(|_| world.step(&command));
+    assert!(world.observe().gripper_opening_m < 1e-3, "the hand is closed");
     let met = world.end_record().robot.self_contacts;
-    let [fingers] = met.as_slice() else { panic!("{met:?}") };
-    assert_eq!(fingers.pair, ["robot/finger_left_link", "robot/finger_right_link"]);
-    let press = fingers.press.expect("the force is measured");
-    assert!(press.of_hand && press.max_force_n > 1.0 && fingers.max_depth_m < 1e-3, "{fingers:?}");
+    assert!(met.iter().all(|pair| pair.press.is_some_and(|press| press.of_hand) && pair.max_depth_m < 1e-3), "{met:?}");
 }
 
 /// A command without sense stops nothing: it is no reason for a motor to get a limit that is not a number.
