@@ -182,16 +182,20 @@ def carried_forces(action, carried, since_start):
 def harm(action, force_limit, meant, placed=(), since_start=True):
     """Used shares of limits, over the whole action and for everything but the things that it is meant to move.
 
-    Things move by 1 cm, are knocked over, are pressed, are dropped; the robot is 5 mm inside itself."""
+    Things move by 1 cm, are knocked over, are pressed, are dropped; the robot presses itself with 5 N or is 5 mm inside
+    itself. A thing that leaves the world has moved by metres."""
     shares = [force / force_limit for thing, force in forces(action) if thing not in meant]
     shares += [force / force_limit for force in carried_forces(action, meant, since_start)]
     for id, body in action.before.bodies.items():
         if body.fixed:
             shares.append(shifted_by(action, id) / 0.01)
         elif id not in meant and not rolls_on(action, id):
-            shares += [left_its_place_by(action, id) / 0.01] + [2.0] * knocked_over(action, id)
+            shares += [left_its_place_by(action, id) / 0.01, 2.0 if knocked_over(action, id) else 0.0]
     shares += [2.0 for id in in_hand(action) if id not in placed and let_go(action, id)]
-    shares += [contact["max_depth_m"] / 0.005 for contact in action.self_contacts]
+    # Fingers of one hand may meet. Runs of earlier versions measured no forces between links.
+    own = [contact for contact in action.self_contacts if not contact["of_hand"]]
+    shares += [contact["max_depth_m"] / 0.005 for contact in own]
+    shares += [(contact["max_force_n"] or 0.0) / 5.0 for contact in own]
     return shares
 
 
