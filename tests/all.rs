@@ -112,6 +112,7 @@ mod temporal;
 mod temporal_programs;
 mod terminal;
 mod terms;
+mod thresholds;
 mod true_claims;
 mod trust;
 mod two_arms;

@@ -8,6 +8,7 @@ mod cup;
 mod cut;
 mod external;
 mod forced;
+mod forced_hand;
 mod foresee;
 mod grasp;
 mod grip;

@@ -15,16 +15,18 @@ const SAMPLES_PER_SEC: f64 = 60.0;
 const ROUNDING: f64 = 1e-6;
 
 /// Quantities of the world vocabulary that are never negative.
-const NEVER_NEGATIVE: [&str; 12] = [
+const NEVER_NEGATIVE: [&str; 14] = [
     "tilt",
     "speed",
     "angularSpeed",
     "acceleration",
+    "acceleration2d",
     "jerk",
     "displacement",
     "pathLength",
     "distance",
     "distance2d",
+    "gap",
     "relativeSpeed",
     "contactForce",
     "time",

@@ -5,6 +5,7 @@
 mod deciding;
 mod evidence;
 mod formula;
+mod gap;
 mod intervals;
 mod margin;
 mod moment;
