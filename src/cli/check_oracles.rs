@@ -73,7 +73,7 @@ pub fn check_oracles(args: &CheckOraclesArgs) -> Result<u8, Diagnostics> {
 
 fn summarise(args: &CheckOraclesArgs, env: &Env, faults: &[Fault], trials: &[Trial]) -> OracleSummary {
     let mut properties: Vec<String> = Vec::new();
-    for action in env.campaign.tests.iter().flatten().filter_map(|name| env.ontology.actions.get(name)) {
+    for action in env.campaign.tests.iter().flatten().filter_map(|step| env.ontology.actions.get(&step.action)) {
         for iri in &action.success_properties {
             if !properties.contains(iri) {
                 properties.push(iri.clone());

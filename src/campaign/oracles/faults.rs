@@ -1,6 +1,7 @@
 //! The table of faults.
 
 use actcheck_actions::{Accident, Defect, Moment, Sabotage};
+use actcheck_config::Step;
 use actcheck_data::RobotProfile;
 
 /// A fault that properties should detect.
@@ -16,9 +17,9 @@ pub struct Fault {
 
 impl Fault {
     /// Whether it can occur when a robot performs a test with these actions.
-    pub fn concerns(&self, test: &[String], robot: &RobotProfile) -> bool {
+    pub fn concerns(&self, test: &[Step], robot: &RobotProfile) -> bool {
         let actions = self.sabotage.actions;
-        let performed = actions.is_empty() || test.iter().any(|name| actions.contains(&name.as_str()));
+        let performed = actions.is_empty() || test.iter().any(|step| actions.contains(&step.action.as_str()));
         performed && self.sabotage.suits(robot)
     }
 }

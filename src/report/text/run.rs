@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
 use crate::text::{Page, fitted, ruled};
-use actcheck_base::names;
+use actcheck_base::{Outcome, names};
 use actcheck_history::{ActionDetail, ObjectDetail, Repetition, RunDetail};
 
 /// Formats a run: its scene, the reports of its actions, and every outcome with margin and witness.
@@ -99,6 +99,7 @@ fn action_text(out: &mut String, action: &ActionDetail, page: Page) {
         None => "reported nothing",
     };
     let message = action.message.as_deref().map_or_else(String::new, |message| format!(": {message}"));
+    let reported = if action.end == Outcome::Inapplicable.word() { "not performed" } else { reported };
     let _ = writeln!(
         out,
         "\n{}. {}: {}, {:.1} s simulated, A = {:.2}, {reported}{message}",
