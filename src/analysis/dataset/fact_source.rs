@@ -10,11 +10,7 @@ use crate::dataset::sheets::Sheets;
 use crate::dataset::source::look_cells;
 use crate::tables::{Cell, kinds_of};
 use actcheck_data::{
-<<<<<<< ours
-    ActionEnd, ActionTrace, BodyState, HeldCourse, IntervalKind, Part, RobotCourse, RobotState, SceneMap, Shape, Trace,
-=======
-    ActionTrace, BodyState, HeldCourse, Part, RobotCourse, RobotState, SceneMap, Shape, Trace,
->>>>>>> theirs
+    ActionTrace, BodyState, HeldCourse, IntervalKind, Part, RobotCourse, RobotState, SceneMap, Shape, Trace,
 };
 use actcheck_history::RunDetail;
 
