@@ -38,7 +38,7 @@ fn matrix_of(env: &Env, faults: &[Fault], trials: &[Trial], is_asked: impl Fn(&s
 /// The properties of all actions of a campaign.
 fn properties(env: &Env) -> Vec<String> {
     let actions = env.campaign.tests.iter().flatten();
-    actions.flat_map(|action| env.ontology.actions[action].success_properties.clone()).collect()
+    actions.flat_map(|action| env.ontology.actions[&action.action].success_properties.clone()).collect()
 }
 
 fn matrix_over(properties: &[String], faults: &[Fault], trials: &[Trial]) -> OracleMatrix {
