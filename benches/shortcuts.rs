@@ -116,9 +116,8 @@ fn simulate(env: &Env, index: u64, shortcuts: Shortcuts, first: bool, found: &mu
         return;
     }
     let steps = env.campaign.tests[number].iter();
-    let calls: Vec<ActionCall> = steps
-        .map(|step| ActionCall { action: step.action.clone(), parameters: scene.designators.clone() })
-        .collect();
+    let calls: Vec<ActionCall> =
+        steps.map(|step| ActionCall { action: step.action.clone(), parameters: scene.designators.clone() }).collect();
     let trace = actions::perform(&calls, &mut built, &mut choices, &env.campaign.budget);
     found.secs += thread_secs() - start;
     if first {

@@ -241,7 +241,9 @@ fn perform(
     disturb(&mut world);
     let calls = calls(test, scene);
     let mut preconditions = Preconditions::new(env, scene);
-    let interference = Interference { gate: Some(&mut preconditions), ..interference };
+    let Interference { cut, saboteur, external, .. } = interference;
+    let external = external.map(|skill| skill as &mut dyn ExternalSkill);
+    let interference = Interference { cut, saboteur, external, gate: Some(&mut preconditions) };
     let trace = actions::perform_with(&calls, &mut world, choices, &env.campaign.budget, interference);
     if preconditions.interrupted {
         return Err(Failure::Interrupted);

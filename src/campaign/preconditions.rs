@@ -34,11 +34,7 @@ impl Gate for Preconditions<'_> {
 }
 
 /// The facts of one state, with the values of designators.
-pub(super) fn facts_of_state(
-    state: &Snapshot,
-    parameters: &BTreeMap<String, Vec<String>>,
-    map: &SceneMap,
-) -> RunFacts {
+pub(super) fn facts_of_state(state: &Snapshot, parameters: &BTreeMap<String, Vec<String>>, map: &SceneMap) -> RunFacts {
     facts::extract(&Trace {
         snapshots: vec![state.clone()],
         // Not performed: it only holds the values of the designators.

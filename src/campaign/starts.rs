@@ -31,7 +31,8 @@ impl Env {
                     return found;
                 }
                 Some(first) => {
-                    let message = format!("{first} in {} of {n_scenes} scenes: such scenes are discarded", overlaps.len());
+                    let message =
+                        format!("{first} in {} of {n_scenes} scenes: such scenes are discarded", overlaps.len());
                     found.push(self.campaign.warning("S025", START, message).help(MOVE_ROBOT));
                 }
                 None => {}

@@ -297,7 +297,8 @@ impl ModelLibrary {
                 1 => format!("there is no location `{}`: the world {} has none", name.value, worlds.remove(0)),
                 _ => format!("there is no location `{}`: the worlds {} have none", name.value, worlds.join(", ")),
             };
-            let help = "name a world that has it, or add `[objectSurface]`: the location is then the place in front of it";
+            let help =
+                "name a world that has it, or add `[objectSurface]`: the location is then the place in front of it";
             table.fault("C021", name.span.clone(), message, help);
             return;
         }

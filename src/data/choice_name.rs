@@ -395,7 +395,19 @@ mod tests {
 
     #[test]
     fn any_other_text_is_a_designator_and_written_alike() {
-        for written in ["objectLocation", "step.0.pickObject", "step.x", "target", "other.01.x", "other.x", "sense.", "sense.x", "robot.z", "", "."] {
+        for written in [
+            "objectLocation",
+            "step.0.pickObject",
+            "step.x",
+            "target",
+            "other.01.x",
+            "other.x",
+            "sense.",
+            "sense.x",
+            "robot.z",
+            "",
+            ".",
+        ] {
             assert_eq!(ChoiceName::from(written), ChoiceName::Designator(written.to_owned()));
             assert_eq!(ChoiceName::from(written).to_string(), written);
         }

@@ -3,8 +3,8 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
-use crate::{placement, step_values};
 use crate::surroundings::Surroundings;
+use crate::{placement, step_values};
 use actcheck_base::{Diagnostics, did_you_mean, names, nearest};
 use actcheck_config as config;
 use actcheck_config::{Campaign, OtherCounts, Step, WorldMap};
