@@ -94,9 +94,10 @@ fn object_row(object: &ObjectDetail) -> Vec<String> {
 
 /// The designators that have other values in an action than in the scene, as ` with pickObject = can_1`.
 fn own_values(action: &ActionDetail, run: &RunDetail) -> String {
-    let own = action.parameters.iter().filter(|(name, values)| {
-        run.designators.get(*name).is_some_and(|of_scene| of_scene != *values)
-    });
+    let own = action
+        .parameters
+        .iter()
+        .filter(|(name, values)| run.designators.get(*name).is_some_and(|of_scene| of_scene != *values));
     let own: Vec<String> = own.map(|(name, values)| format!("{name} = {}", values.join(", "))).collect();
     if own.is_empty() { String::new() } else { format!(" with {}", own.join("; ")) }
 }
