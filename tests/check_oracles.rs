@@ -7,7 +7,7 @@ use actcheck::actions::{Sabotage, Saboteur};
 use actcheck::analysis::{Notice, OracleGap, OracleMatrix, OracleTrial, oracle_matrix};
 use actcheck::campaign::oracles::{FAULTS, Fault, Trial, TrialOptions, try_faults};
 use actcheck::campaign::{Clock, Env, RunContext, RunInput, run_line, run_sabotaged};
-use actcheck::config::Overrides;
+use actcheck::config::{Overrides, Step};
 use actcheck::data::Choices;
 use serde_json::Value;
 
@@ -38,7 +38,7 @@ fn matrix_of(env: &Env, faults: &[Fault], trials: &[Trial], is_asked: impl Fn(&s
 /// The properties of all actions of a campaign.
 fn properties(env: &Env) -> Vec<String> {
     let actions = env.campaign.tests.iter().flatten();
-    actions.flat_map(|action| env.ontology.actions[action].success_properties.clone()).collect()
+    actions.flat_map(|action| env.ontology.actions[&action.action].success_properties.clone()).collect()
 }
 
 fn matrix_over(properties: &[String], faults: &[Fault], trials: &[Trial]) -> OracleMatrix {
@@ -67,7 +67,7 @@ fn sure(folder: &Path) {
 /// The faults that can occur in a pick.
 fn of_pick() -> usize {
     let robot = env(root(), 1).campaign.robot;
-    FAULTS.iter().filter(|fault| fault.concerns(&["Pick".to_owned()], &robot)).count()
+    FAULTS.iter().filter(|fault| fault.concerns(&[Step::plain("Pick")], &robot)).count()
 }
 
 /// In the scenes of the shipped campaign: every fault is noticed, every property notices one, and an idle robot
@@ -121,7 +121,7 @@ fn faults_that_a_robot_can_not_have_are_left_out() {
         let config = root().join(format!("configs/{name}.toml"));
         Env::prepare(&config, &Overrides::default()).unwrap().campaign.robot
     });
-    let pick = ["Pick".to_owned()];
+    let pick = [Step::plain("Pick")];
     let left_out =
         FAULTS.iter().filter(|fault| fault.concerns(&pick, &robots[0]) && !fault.concerns(&pick, &robots[1]));
     assert_eq!(left_out.map(|fault| fault.name).collect::<Vec<_>>(), ["base-pushed", "arm-through-head"]);

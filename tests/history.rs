@@ -91,6 +91,7 @@ fn scene() -> Scene {
         objects: BODIES.iter().enumerate().map(object).collect(),
         robot: RobotStart { profile: robot(), base: [-0.6, 0.0, 0.1], root_height_m: 0.0, knows: Arc::new([]) },
         designators: sample_trace(0).actions[0].parameters.clone(),
+        steps: Vec::new(),
         sensing: Sensing {
             position_noise_m: 0.005,
             height_noise_m: 0.002,

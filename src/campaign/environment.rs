@@ -10,7 +10,7 @@ use crate::solids;
 use actcheck_actions as actions;
 use actcheck_base::{Diagnostic, Diagnostics, Source, program_digest};
 use actcheck_config as config;
-use actcheck_config::{Campaign, Launcher, Overrides};
+use actcheck_config::{Campaign, Launcher, Overrides, Step};
 use actcheck_data::{Choice, ChoiceName, RobotView};
 use actcheck_history::{CampaignRecord, History, SkillRecord};
 use actcheck_ontology as ontology;
@@ -109,15 +109,15 @@ impl Env {
     pub fn index_of(&self, performed: &str, choices: &[Choice]) -> Result<u64, Diagnostics> {
         let left_out = choices.iter().find(|choice| choice.name == ChoiceName::ActionsLeftOut);
         let left_out = left_out.map_or(0.0, |choice| choice.value);
-        let fits = |test: &Vec<String>| {
+        let fits = |test: &Vec<Step>| {
             let done = test.len().checked_sub(left_out as usize);
-            done.is_some_and(|done| test[..done].join(" ") == performed)
+            done.is_some_and(|done| Step::test_name(&test[..done]) == performed)
         };
         match self.campaign.tests.iter().position(fits) {
             Some(test) => Ok(test as u64 * self.runs_of_a_test()),
             None => {
                 let message = format!("the configuration {} has no test `{performed}`", self.campaign.source.name);
-                let tests: Vec<String> = self.campaign.tests.iter().map(|test| test.join(" ")).collect();
+                let tests: Vec<String> = self.campaign.tests.iter().map(|test| Step::test_name(test)).collect();
                 Err(Diagnostic::error("S040", message).help(format!("its tests: {}", tests.join("; "))).into())
             }
         }
@@ -334,7 +334,7 @@ fn programs(campaign: &Campaign) -> Option<Programs> {
     match &campaign.launcher {
         Launcher::Reference => None,
         Launcher::Program(skill) => {
-            let tested = campaign.tests.iter().flatten().cloned().collect();
+            let tested = campaign.tests.iter().flatten().map(|step| step.action.clone()).collect();
             Some(Programs::new(skill.as_ref().clone(), tested))
         }
     }
@@ -347,7 +347,7 @@ fn check_skills(campaign: &Campaign, ontology: &Ontology, faults: &mut Diagnosti
         return;
     }
     for (test, listed) in campaign.tests.iter().enumerate() {
-        for (step, action) in listed.iter().enumerate() {
+        for (step, action) in listed.iter().map(|step| &step.action).enumerate() {
             if let (true, Err(unknown)) = (ontology.actions.contains_key(action), actions::known_skill(action)) {
                 let diagnostic = unknown.diagnostic();
                 let fault = campaign.fault(diagnostic.code, &format!("tests.{test}.{step}"), unknown.to_string());

@@ -9,7 +9,8 @@ use actcheck_ontology::{Action, Ontology};
 use actcheck_rules::{Budget, RuleBook};
 use actcheck_verdict::{Fate, judge};
 
-/// Returns the outcomes of an action's success properties. Rules are evaluated only for completed actions.
+/// Returns the outcomes of an action's success properties. Rules are evaluated only for completed actions, those of
+/// preconditions for the state before the action alone.
 ///
 /// # Errors
 /// [`Failure::Interrupted`] if the budget's `stop` is set during a long evaluation.
@@ -26,11 +27,13 @@ pub(super) fn judge_action(
         ActionEnd::Broken(reason) => Fate::Broken(reason.clone()),
         ActionEnd::Timeout(reason) | ActionEnd::Cut(reason) => Fate::Timeout(reason.clone()),
         ActionEnd::NotReached => Fate::NotReached,
+        ActionEnd::NotPerformed(reason) => Fate::NotPerformed(reason.clone()),
     };
     let findings = match (&fate, facts) {
         (Fate::Completed, Some(facts)) => {
-            let asked: Vec<String> = action.success_properties.iter().chain(&action.preconditions).cloned().collect();
-            uninterrupted(rules.judge(&facts, &asked, budget))?
+            let mut found = uninterrupted(rules.judge(&facts, &action.success_properties, budget))?;
+            found.extend(uninterrupted(rules.held_before(&facts, &action.preconditions, budget))?);
+            found
         }
         _ => BTreeMap::new(),
     };

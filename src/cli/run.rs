@@ -303,7 +303,7 @@ fn scenes(runs: Vec<RunRow>) -> BTreeMap<String, u64> {
 
 fn summarise(env: &Env, campaign: String, runs: Vec<RunSummary>, end: &CampaignResult) -> CampaignSummary {
     let mut properties: Vec<(String, String, Option<String>)> = Vec::new();
-    for action in env.campaign.tests.iter().flatten().filter_map(|name| env.ontology.actions.get(name)) {
+    for action in env.campaign.tests.iter().flatten().filter_map(|step| env.ontology.actions.get(&step.action)) {
         for iri in &action.success_properties {
             if let Some(property) = env.ontology.properties.get(iri)
                 && !properties.iter().any(|(known, ..)| known == iri)

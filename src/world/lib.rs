@@ -42,6 +42,7 @@ mod neighbours;
 mod object;
 mod observe;
 mod odometry;
+mod overlaps;
 mod perturbation;
 mod pieces;
 mod propose;
@@ -85,6 +86,7 @@ pub use layout::{
     Layout, assumed_efforts, assumed_speeds, balanced_joints, check_robot, grip_limit_n, outward_push,
     shapes_between_fingers,
 };
+pub use overlaps::Overlap;
 pub use propose::{Proposal, complete, is_incomplete, propose};
 pub use reach::Shortcuts;
 pub use recorder::{Contact, Course, Record, Tracks};

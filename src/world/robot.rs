@@ -352,6 +352,7 @@ pub(super) mod tests {
             objects: Vec::new(),
             robot: RobotStart { profile, base: [-1.0, 0.3, 0.4], root_height_m: 0.0, knows: Arc::new([]) },
             designators: BTreeMap::new(),
+            steps: Vec::new(),
             sensing: Sensing {
                 position_noise_m: 0.0,
                 height_noise_m: 0.0,

@@ -10,7 +10,7 @@ use crate::dataset::sheets::Sheets;
 use crate::dataset::source::look_cells;
 use crate::tables::{Cell, kinds_of};
 use actcheck_data::{
-    ActionEnd, ActionTrace, BodyState, HeldCourse, IntervalKind, Part, RobotCourse, RobotState, SceneMap, Shape, Trace,
+    ActionTrace, BodyState, HeldCourse, IntervalKind, Part, RobotCourse, RobotState, SceneMap, Shape, Trace,
 };
 use actcheck_history::RunDetail;
 
@@ -34,7 +34,7 @@ pub(super) fn add(run: &RunDetail, trace: &Trace, hierarchy: &Hierarchy, sheets:
         }
     }
     for (step, action) in trace.actions.iter().enumerate() {
-        if action.end != ActionEnd::NotReached {
+        if action.end.was_begun() {
             let began_secs = trace.snapshots.get(step).map_or(0.0, |before| before.time_secs);
             add_events(id, step + 1, action, trace.robot_courses.get(step), sheets);
             add_plane(id, step + 1, action, began_secs, sheets);

@@ -3,6 +3,7 @@
 
 use crate::Env;
 use crate::oracles::retouch::{Retouch, distance};
+use actcheck_config::Step;
 use actcheck_data::Trace;
 
 /// A fault of the course of an action that properties about time should detect.
@@ -113,8 +114,8 @@ pub const COURSE_FAULTS: [CourseFault; 21] = [
 
 impl CourseFault {
     /// Whether it can occur in a test with these actions, and some rule reads courses.
-    pub fn concerns(&self, test: &[String], env: &Env) -> bool {
-        env.rules.reads_course() && test.iter().any(|action| action == self.action)
+    pub fn concerns(&self, test: &[Step], env: &Env) -> bool {
+        env.rules.reads_course() && test.iter().any(|step| step.action == self.action)
     }
 
     /// Puts the fault into the first action of its kind. Returns whether the course has the moment that the fault needs.

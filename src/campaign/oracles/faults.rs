@@ -1,6 +1,7 @@
 //! The table of faults.
 
 use actcheck_actions::{Accident, Defect, Moment, Sabotage};
+use actcheck_config::Step;
 use actcheck_data::RobotProfile;
 
 /// A fault that properties should detect.
@@ -16,12 +17,13 @@ pub struct Fault {
 
 impl Fault {
     /// Whether it can occur when a robot performs a test with these actions.
-    pub fn concerns(&self, test: &[String], robot: &RobotProfile) -> bool {
+    pub fn concerns(&self, test: &[Step], robot: &RobotProfile) -> bool {
         let actions = self.sabotage.actions;
         // A hand that never picked holds nothing.
-        let from = if self.sabotage.needs_load() { test.iter().position(|name| name == PICK[0]) } else { Some(0) };
+        let from =
+            if self.sabotage.needs_load() { test.iter().position(|step| step.action == PICK[0]) } else { Some(0) };
         let possible = from.map_or(&[][..], |from| &test[from..]);
-        let performed = possible.iter().any(|name| actions.is_empty() || actions.contains(&name.as_str()));
+        let performed = possible.iter().any(|step| actions.is_empty() || actions.contains(&step.action.as_str()));
         performed && self.sabotage.suits(robot)
     }
 }
