@@ -34,6 +34,8 @@ pub struct Remark {
 pub enum Oddity {
     /// It passed, but already held before the action.
     HeldBefore,
+    /// It passed, but no left side of its `implies` held.
+    Vacuous,
     /// It was decided often and never passed.
     NeverPassed,
     /// It was decided often and never failed.
@@ -45,6 +47,7 @@ impl Oddity {
     pub fn word(self) -> &'static str {
         match self {
             Self::HeldBefore => "held before",
+            Self::Vacuous => "vacuous",
             Self::NeverPassed => "never passed",
             Self::NeverFailed => "never failed",
         }
@@ -59,6 +62,7 @@ impl CampaignSummary {
             let (counts, decided) = (line.counts, line.counts.decided());
             let odd = [
                 (Oddity::HeldBefore, line.held_before, counts.passed, line.held_before > 0),
+                (Oddity::Vacuous, line.vacuous, counts.passed, line.vacuous > 0),
                 (Oddity::NeverPassed, decided, decided, counts.passed == 0 && decided >= LEAST_FOR_NEVER),
                 (Oddity::NeverFailed, decided, decided, counts.failed == 0 && decided >= LEAST_FOR_NEVER),
             ];
@@ -84,6 +88,7 @@ impl CampaignSummary {
             judgement.property == property
                 && match oddity {
                     Oddity::HeldBefore => judgement.held_before == Some(true),
+                    Oddity::Vacuous => judgement.vacuous == Some(true),
                     Oddity::NeverPassed => judgement.outcome == Outcome::Failed,
                     Oddity::NeverFailed => false,
                 }
@@ -108,6 +113,10 @@ impl CampaignSummary {
             Oddity::HeldBefore => format!(
                 "{names} already held before the action in {count} of {of} passes, which say nothing about the action: \
                  compare `after` with `before` in the rule, or require it to be false beforehand ({ask})"
+            ),
+            Oddity::Vacuous => format!(
+                "{names} passed vacuously in {count} of {of} passes, which say nothing: no left side of an `implies` ever \
+                 held; check whether it can hold, or run scenes in which it does ({ask})"
             ),
             Oddity::NeverPassed => format!(
                 "{names} never passed in {of} judgements (so in at most {most:.0} % of such scenes): \
