@@ -124,6 +124,7 @@ fn judgement(property: &str, outcome: Outcome) -> Judgement {
         witness: format!("{property}: glass_1 \"moved\" 0.4 cm"),
         rule_digest: digest_of(property),
         held_before: (outcome == Outcome::Passed).then_some(property == "CloseObject"),
+        vacuous: (outcome == Outcome::Passed).then_some(property == "MovedObject"),
     }
 }
 

@@ -40,6 +40,7 @@ pub(super) fn judge_action(
     let mut judgements = judge(ontology, action, &findings, &fate, |property| rules.digest(property).to_owned());
     if let Some(facts) = facts {
         note_held_before(rules, &facts, &mut judgements, budget)?;
+        note_vacuous(rules, &facts, &mut judgements, budget)?;
     }
     Ok(judgements)
 }
@@ -72,6 +73,30 @@ fn note_held_before(
         // `held_before` stays unset if the state before the action could not be judged.
         if let Some(Ok(found)) = before.get(&judgement.property) {
             judgement.held_before = Some(found.applicable && found.holds);
+        }
+    }
+    Ok(())
+}
+
+/// Sets `vacuous` on the passed judgements whose property has an `implies`.
+fn note_vacuous(
+    rules: &RuleBook,
+    facts: &ActionFacts<'_>,
+    judgements: &mut [Judgement],
+    budget: &Budget,
+) -> Result<(), Failure> {
+    let asked: Vec<String> = judgements
+        .iter()
+        .filter(|judgement| judgement.outcome == Outcome::Passed && rules.can_pass_vacuously(&judgement.property))
+        .map(|judgement| judgement.property.clone())
+        .collect();
+    if asked.is_empty() {
+        return Ok(());
+    }
+    let found = uninterrupted(rules.without_consequents(facts, &asked, budget))?;
+    for judgement in judgements {
+        if let Some(Ok(found)) = found.get(&judgement.property) {
+            judgement.vacuous = Some(found.applicable && found.holds);
         }
     }
     Ok(())

@@ -164,7 +164,8 @@ pub(super) fn write_assertion(
         .optional("act:margin", judgement.margin.map(Literal::from))
         .text("act:witness", &judgement.witness)
         .text("act:ruleDigest", &judgement.rule_digest)
-        .optional("act:heldBefore", judgement.held_before.map(Literal::from));
+        .optional("act:heldBefore", judgement.held_before.map(Literal::from))
+        .optional("act:vacuous", judgement.vacuous.map(Literal::from));
 }
 
 /// A blank node whose label depends only on the texts.

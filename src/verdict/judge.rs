@@ -45,7 +45,15 @@ pub fn judge(
                 (None, None) => (Outcome::Broken, None, "no rule was evaluated for this property".to_owned()),
             },
         };
-        Judgement { property: iri.clone(), outcome, margin, witness, rule_digest: rule_digest(iri), held_before: None }
+        Judgement {
+            property: iri.clone(),
+            outcome,
+            margin,
+            witness,
+            rule_digest: rule_digest(iri),
+            held_before: None,
+            vacuous: None,
+        }
     };
     action.success_properties.iter().map(decide).collect()
 }

@@ -110,6 +110,9 @@ const COLUMNS: &[Column] = &[
     truth("held_before", "whether the property already held before the action", |p| {
         Cell::Bool(p.judgement.held_before)
     }),
+    truth("vacuous", "whether the property passed without any left side of an `implies` holding", |p| {
+        Cell::Bool(p.judgement.vacuous)
+    }),
     text(
         "designators",
         "designators of the action with their values; objects are given by their models (JSON)",

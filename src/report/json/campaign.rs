@@ -18,7 +18,7 @@ pub fn campaign_json(summary: &CampaignSummary) -> Value {
             json!({
                 "property": line.property, "label": line.label, "unit": unit,
                 "counts": line.counts, "pass_rate": line.rate.as_ref().map(share),
-                "held_before": line.held_before, "bounds": line.bounds.as_ref().map(bounds),
+                "held_before": line.held_before, "vacuous": line.vacuous, "bounds": line.bounds.as_ref().map(bounds),
             })
         })
         .collect();
@@ -86,7 +86,7 @@ fn judgement(judgement: &Judgement) -> Value {
     json!({
         "property": judgement.property, "outcome": judgement.outcome,
         "margin": judgement.margin, "witness": judgement.witness,
-        "held_before": judgement.held_before,
+        "held_before": judgement.held_before, "vacuous": judgement.vacuous,
     })
 }
 

@@ -123,6 +123,8 @@ pub struct PropertyLine {
     pub rate: Option<Proportion>,
     /// Number of passed outcomes whose property already held before the action.
     pub held_before: u64,
+    /// Number of passed outcomes that say nothing because no left side of an `implies` held.
+    pub vacuous: u64,
     /// The rate with lost outcomes counted either way, if there are many. They are broken or timed out, or untested because
     /// the run ended so.
     pub bounds: Option<RateBounds>,
@@ -385,6 +387,7 @@ impl CampaignSummary {
                     exact,
                 ),
                 held_before: own.iter().filter(|judgement| judgement.held_before == Some(true)).count() as u64,
+                vacuous: own.iter().filter(|judgement| judgement.vacuous == Some(true)).count() as u64,
                 bounds: RateBounds::new(counts.passed, counts.decided(), lost, self.sampling()),
             }
         };
@@ -424,6 +427,7 @@ pub(crate) mod tests {
                 witness: "glass_1 moved 0.4 cm, needs more than 2 cm".into(),
                 rule_digest: "d".into(),
                 held_before: None,
+                vacuous: None,
             })
             .collect();
         let score = actcheck_verdict::action_score(outcomes.iter().copied());

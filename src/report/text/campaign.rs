@@ -167,13 +167,12 @@ fn properties_table(summary: &CampaignSummary) -> Table {
 
 fn pass_rate(line: &PropertyLine) -> String {
     let rate = line.rate.as_ref().map_or_else(|| "none decided".to_owned(), Proportion::to_string);
-    match line.bounds {
-        Some(bounds) => {
-            let [low, high] = bounds.ends().map(|end| end * 100.0);
-            format!("{rate}; {low:.0} to {high:.0} % with {} lost", bounds.lost)
-        }
-        None => rate,
-    }
+    let bounds = line.bounds.map_or_else(String::new, |bounds| {
+        let [low, high] = bounds.ends().map(|end| end * 100.0);
+        format!("; {low:.0} to {high:.0} % with {} lost", bounds.lost)
+    });
+    let vacuous = if line.vacuous > 0 { format!("; {} vacuously", line.vacuous) } else { String::new() };
+    rate + &bounds + &vacuous
 }
 
 fn scores(out: &mut String, summary: &CampaignSummary) {

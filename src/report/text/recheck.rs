@@ -20,7 +20,7 @@ pub fn recheck_text(summary: &RecheckSummary, page: Page) -> String {
         table.add_row([
             names::local(iri).to_owned(),
             counted(line.before),
-            counted(line.now),
+            with_vacuous(counted(line.now), line.vacuous),
             line.changed.to_string(),
             line.new.to_string(),
         ]);
@@ -29,6 +29,11 @@ pub fn recheck_text(summary: &RecheckSummary, page: Page) -> String {
     let _ = writeln!(out, "{}\n{}", fitted(table, page, &["new"]), totals(summary, restated));
     changes(&mut out, summary);
     page.set(&out)
+}
+
+/// Adds how many passes say nothing.
+fn with_vacuous(counts: String, vacuous: u64) -> String {
+    if vacuous > 0 { format!("{counts}; {vacuous} vacuously") } else { counts }
 }
 
 fn totals(summary: &RecheckSummary, restated: u64) -> String {

@@ -125,8 +125,9 @@ fn action_text(out: &mut String, action: &ActionDetail, own_values: &str, page: 
         let margin = judgement.margin.map_or_else(String::new, |margin| format!("{margin:+.4}"));
         table.add_row([
             names::local(&judgement.property).to_owned(),
-            match judgement.held_before {
-                Some(true) => format!("{}, held before", judgement.outcome),
+            match (judgement.held_before, judgement.vacuous) {
+                (Some(true), _) => format!("{}, held before", judgement.outcome),
+                (_, Some(true)) => format!("{}, vacuously", judgement.outcome),
                 _ => judgement.outcome.word().to_owned(),
             },
             margin,

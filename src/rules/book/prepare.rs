@@ -27,7 +27,7 @@ use crate::model::universe::Universe;
 #[cfg(feature = "sparql")]
 use crate::sparql::{dataset::Statements, query::Query};
 use crate::syntax::{Syntax, parse};
-use crate::temporal::{IntervalTerms, add_margin, add_moment, define_moment, reads_course};
+use crate::temporal::{IntervalTerms, add_margin, add_moment, define_moment, mark_consequents, reads_course};
 use actcheck_base::{Diagnostic, Diagnostics, Digest, Term, TermId, Terms};
 use actcheck_ontology::{Ontology, Property, RuleLanguage};
 
@@ -182,8 +182,9 @@ impl Preparing {
         let any_reads_course = programs.values().any(program_reads_course);
         let mut properties = self.queries(ontology);
         for (scope, property, syntax) in syntaxes {
-            let program = programs.remove(scope).unwrap_or_default();
+            let mut program = programs.remove(scope).unwrap_or_default();
             let verdict = Verdict::new(&program, &predicates, *scope);
+            let implies = verdict.decisive.as_ref().is_some_and(|decisive| mark_consequents(&mut program, decisive));
             let reads_course = program_reads_course(&program);
             let reads_intervals = program.rules.iter().any(reads_intervals);
             let planned = Box::new(self.plan(program, &predicates, &mut indexes));
@@ -192,6 +193,7 @@ impl Preparing {
                 verdict,
                 reads_course,
                 reads_intervals,
+                implies,
                 scope: *scope,
                 prefixes: syntax.prefixes.clone(),
             };
