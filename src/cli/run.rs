@@ -45,7 +45,7 @@ pub fn run(args: &RunArgs) -> Result<u8, Diagnostics> {
             return Ok(0);
         }
     };
-    output::print_diagnostics(&session.env.campaign.warnings);
+    output::print_diagnostics(&session.env.warnings());
     // From here on, an interrupt must end the campaign properly.
     campaign(args, session, &stop, |bar| {
         shown.get_or_init(|| bar);

@@ -17,6 +17,7 @@ pub fn recheck_json(summary: &RecheckSummary) -> Value {
                 "changed": line.changed,
                 "new": line.new,
                 "restated": line.restated,
+                "held_before": line.held_before,
             })
         })
         .collect();
