@@ -171,8 +171,8 @@ fn no_action(
     let local = names::local(subject);
     let is_class = graph.superclasses.get(subject).is_some_and(|above| above.contains(&names::act("Action")));
     let help = match nearest(local, actions.keys().map(String::as_str)) {
+        _ if is_class => format!("declare an action of this class: `act:MyAction a {}`", names::shorten(subject)),
         Some(found) => format!("did you mean `{found}`?"),
-        None if is_class => format!("declare an action of this class: `act:MyAction a {}`", names::shorten(subject)),
         None => format!("declare it: `{} a act:Action`", names::shorten(subject)),
     };
     let message =
