@@ -30,6 +30,7 @@ mod english;
 mod extra;
 mod facts;
 mod findings;
+mod findings_of_rules;
 mod floors;
 mod foreign_text;
 mod formats;

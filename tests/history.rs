@@ -173,6 +173,7 @@ pub fn sample_campaign(id: &str, minute: u32) -> CampaignRecord {
         config_digest: digest_of("seed = 7\n"),
         config_path: "../pick.toml".to_owned(),
         ontology_digest: digest_of("ontology"),
+        findings: Vec::new(),
         rules: PROPERTIES.iter().map(|p| (names::act(p), format!("../rules/{p}.rls"), digest_of(p))).collect(),
         models: vec![("glass".to_owned(), digest_of("glass"))],
         skill: Some(SkillRecord {

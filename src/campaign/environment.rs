@@ -12,7 +12,7 @@ use actcheck_base::{Diagnostic, Diagnostics, Source, program_digest};
 use actcheck_config as config;
 use actcheck_config::{Campaign, Launcher, Overrides, Step};
 use actcheck_data::{Choice, ChoiceName, RobotView};
-use actcheck_history::{CampaignRecord, History, SkillRecord};
+use actcheck_history::{CampaignRecord, FindingRecord, History, SkillRecord};
 use actcheck_ontology as ontology;
 use actcheck_ontology::Ontology;
 use actcheck_protocol::Programs;
@@ -131,7 +131,8 @@ impl Env {
 
     pub(super) fn of(mut campaign: Campaign, rule_budget: Budget) -> Result<Self, Diagnostics> {
         let (files, path) = &campaign.ontology;
-        let ontology = ontology::load(files, path)?;
+        let mut ontology = ontology::load(files, path)?;
+        forget_requirement(&campaign, &mut ontology);
         let mut faults = Diagnostics::new();
         categorise(&mut campaign, &ontology);
         solids::decompose_meshes(&mut campaign, &mut faults);
@@ -160,12 +161,18 @@ impl Env {
         }
     }
 
-    /// Warnings of the configuration and of the rules, such as rules without effect.
+    /// Warnings of the configuration, of the ontology and of the rules, such as rules without effect.
     pub fn warnings(&self) -> Diagnostics {
         let mut warnings = self.campaign.warnings.clone();
-        warnings.extend(self.rules.warnings().iter().cloned().collect());
-        warnings.extend(self.rules.beyond(self.campaign.budget.action_secs));
+        warnings.extend(self.findings());
         warnings
+    }
+
+    /// The warnings of the ontology and of the rules, which the campaign's record contains.
+    pub fn findings(&self) -> Diagnostics {
+        let mut findings = self.rules.warnings().clone();
+        findings.extend(self.rules.beyond(self.campaign.budget.action_secs));
+        findings
     }
 
     /// The robot in its postures, for a picture. Empty if its model can't be read.
@@ -187,6 +194,8 @@ impl Env {
         let worlds = self.campaign.worlds.values();
         models.extend(worlds.map(|world| (format!("world {}", world.name), world.digest.clone())));
         models.sort();
+        let mut findings: Vec<FindingRecord> = self.findings().iter().map(FindingRecord::of).collect();
+        findings.sort();
         CampaignRecord {
             id,
             name,
@@ -195,6 +204,7 @@ impl Env {
             config_path: path_from(&self.campaign.history, Path::new(&*self.campaign.source.name)),
             ontology_digest: self.ontology.digest.clone(),
             rules,
+            findings,
             models,
             skill: self.skill(),
             seed: self.campaign.seed,
@@ -271,6 +281,17 @@ pub(super) fn recorded_overrides(history: &History, record: &CampaignRecord) -> 
         history: Some(history.dir().to_path_buf()),
         launcher: None,
     }
+}
+
+/// Drops the warning O017 about the rule file that `[scene] require` names.
+fn forget_requirement(campaign: &Campaign, ontology: &mut Ontology) {
+    let file = |source: &Source| std::fs::canonicalize(&*source.name).ok();
+    let Some(required) = campaign.scene_rule.as_ref().and_then(file) else { return };
+    let is_required = |found: &Diagnostic| {
+        found.code == "O017" && found.source.as_ref().and_then(file).is_some_and(|path| path == required)
+    };
+    let warnings = std::mem::take(&mut ontology.warnings);
+    ontology.warnings = warnings.into_iter().filter(|found| !is_required(found)).collect();
 }
 
 /// Sets the category of models that come without one, and of all moving parts, from their name if the ontology has such a

@@ -37,6 +37,7 @@ impl Requirement {
         // The rules may use everything that scene generation sets.
         property.needs = ontology.designators.clone();
         let mut alone = ontology.clone();
+        alone.warnings = Diagnostics::new();
         alone.properties = [(iri.clone(), property)].into();
         alone.vocabulary.terms.extend(scene_facts::vocabulary());
         Ok(Some(Self { rules: RuleBook::prepare_within(&alone, budget)?, iri, path }))

@@ -15,6 +15,7 @@ use actcheck_history::{Judgements, RunFilter, Wish};
 use actcheck_ontology as ontology;
 use actcheck_ontology::{Action, Ontology, Property};
 use actcheck_report::{Proportion, Table};
+use actcheck_rules::RuleBook;
 use actcheck_verdict::Counts;
 
 /// `actcheck rules`
@@ -31,7 +32,11 @@ pub struct RulesArgs {
     pub format: Format,
 }
 
-/// Prints one line for each property of the ontology. Without a history, there are no pass rates.
+/// Prints one line for each property of the ontology, and the warnings about its rules. Without a history, there are no
+/// pass rates.
+///
+/// # Errors
+/// Those of the ontology; and those of the rules, after the table.
 pub fn rules(args: &RulesArgs) -> Result<(), Diagnostics> {
     let (files, path) = ontology_file(args.ontology.as_deref());
     let ontology = ontology::load(&files, &path)?;
@@ -68,6 +73,7 @@ pub fn rules(args: &RulesArgs) -> Result<(), Diagnostics> {
         }
     };
     output::print(&table.render(args.format.into(), output::page()));
+    output::print_diagnostics(RuleBook::prepare(&ontology)?.warnings());
     Ok(())
 }
 

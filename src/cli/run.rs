@@ -38,14 +38,17 @@ pub fn run(args: &RunArgs) -> Result<u8, Diagnostics> {
     let budget = Budget { stop: Arc::clone(&stop), ..Budget::default() };
     let jobs = args.jobs.map_or_else(all_cores, usize::from);
     let session = match session::open(args, &budget, jobs)? {
-        Opened::Case(env) => return case::run(args, *env),
+        Opened::Case(env) => {
+            output::print_diagnostics(&env.findings());
+            return case::run(args, *env);
+        }
         Opened::Campaign(session) => *session,
         Opened::NoneFailed(campaign) => {
             output::print_diagnostics(&none_failed(&campaign).into());
             return Ok(0);
         }
     };
-    output::print_diagnostics(&session.env.campaign.warnings);
+    output::print_diagnostics(&session.env.warnings());
     // From here on, an interrupt must end the campaign properly.
     campaign(args, session, &stop, |bar| {
         shown.get_or_init(|| bar);

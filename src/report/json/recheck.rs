@@ -18,6 +18,7 @@ pub fn recheck_json(summary: &RecheckSummary) -> Value {
                 "new": line.new,
                 "restated": line.restated,
                 "vacuous": line.vacuous,
+                "held_before": line.held_before,
             })
         })
         .collect();

@@ -230,7 +230,7 @@ impl RuleBook {
         self.reads_course
     }
 
-    /// Returns the warnings about the rules.
+    /// Returns the warnings about the rules, after those of their ontology.
     pub fn warnings(&self) -> &Diagnostics {
         &self.warnings
     }

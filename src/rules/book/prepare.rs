@@ -25,7 +25,7 @@ use crate::model::given::Phases;
 use crate::model::program::{Predicates, Program, Rule};
 use crate::model::universe::Universe;
 #[cfg(feature = "sparql")]
-use crate::sparql::{dataset::Statements, query::Query};
+use crate::sparql::{dataset::Statements, query::Query, unchanging::is_unchanging};
 use crate::syntax::{Syntax, parse};
 use crate::temporal::{IntervalTerms, add_margin, add_moment, define_moment, mark_consequents, reads_course};
 use actcheck_base::{Diagnostic, Diagnostics, Digest, Term, TermId, Terms};
@@ -78,6 +78,7 @@ impl Preparing {
     }
 
     pub(crate) fn run(mut self, ontology: &Ontology) -> Result<RuleBook, Diagnostics> {
+        self.diagnostics.extend(ontology.warnings.clone());
         let phases = Phases::intern(&mut self.terms);
         let (libraries, properties) = self.parse(ontology);
         let vocabulary = Some(&ontology.vocabulary).filter(|vocabulary| !vocabulary.terms.is_empty());
@@ -301,6 +302,11 @@ impl Preparing {
         for property in ontology.properties.values().filter(|p| p.rule.language == RuleLanguage::Sparql) {
             match Query::prepare(&property.rule.source, ontology, &self.derived) {
                 Ok(query) => {
+                    if is_unchanging(&property.rule.source.text) {
+                        let (source, start) = (&property.rule.source, query.start(&property.rule.source.text));
+                        let found = unchanging::warning(ontology, property, source, start);
+                        self.diagnostics.extend(found.map(Into::into).unwrap_or_default());
+                    }
                     let rules = JudgeRules::Sparql(Box::new(query));
                     judges.insert(property.iri.clone(), judge(ontology, property, rules));
                 }

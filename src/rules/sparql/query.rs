@@ -78,6 +78,13 @@ impl Query {
         })
     }
 
+    /// The place of the keyword `ASK` or `SELECT` in its text.
+    pub(crate) fn start(&self, text: &str) -> Span {
+        let word = if self.asks { "ask" } else { "select" };
+        let found = scan(text).into_iter().find(|token| token.word.eq_ignore_ascii_case(word));
+        found.map_or(0..0, |token| token.span)
+    }
+
     /// Judges an action: `ASK` passes if it is true, `SELECT` if it has no rows.
     pub(crate) fn judge(
         &self,
