@@ -1,7 +1,7 @@
 //! Findings about rules that say nothing: the same from `check`, `run`, `recheck` and `rules`, and kept with the campaign.
 //!
-//! A case is a file `tests/findings_of_rules/NAME.case`, written as those of [`crate::mistakes`], but its line `$` names only
-//! the configuration; the answers are beside it, in a file of the same name with `.expected` appended. `UPDATE_EXPECT=1`
+//! A case is a file `tests/findings_of_rules/NAME.case`, written as those of [`crate::mistakes`], but its line `$` names the
+//! configuration and its ontology; the answers are beside it, in a file of the same name with `.expected` appended. `UPDATE_EXPECT=1`
 //! writes these files.
 
 use std::collections::BTreeMap;
@@ -41,8 +41,9 @@ fn told(folder: &Path, arguments: &[&str]) -> (Option<i32>, String, String) {
 /// The diagnostics of each command; equal ones are given once.
 fn answers(case: &Path) -> String {
     let folder = project();
-    let config = set_up(&std::fs::read_to_string(case).unwrap(), folder.path()).remove(0);
-    let (code, check, _) = told(folder.path(), &["check", &config]);
+    let inputs = set_up(&std::fs::read_to_string(case).unwrap(), folder.path());
+    let [config, ontology] = inputs.as_slice() else { panic!("{}: {inputs:?}", case.display()) };
+    let (code, check, _) = told(folder.path(), &["check", config]);
     let mut text = format!("== check, exit code {}\n{check}", code.unwrap());
     let mut say = |name: &str, answer: String| {
         text.push_str(&match answer == check {
@@ -51,20 +52,22 @@ fn answers(case: &Path) -> String {
         });
     };
     let history = ["--history", "history"];
-    let run = ["run", &config, "--runs", "1", "--jobs", "1", "--quiet"];
+    let run = ["run", config, "--runs", "1", "--jobs", "1", "--quiet"];
     say("run", told(folder.path(), &[&run[..], &history].concat()).1);
-    if code == Some(0) {
-        say("recheck", told(folder.path(), &[&["recheck", "--jobs", "1"], &history[..]].concat()).1);
+    let rules = ["rules", "--ontology", ontology];
+    if code != Some(0) {
+        say("rules", told(folder.path(), &rules).1);
+        return text;
     }
-    say("rules", told(folder.path(), &[&["rules"], &history[..]].concat()).1);
-    if code == Some(0) {
-        let stored = told(folder.path(), &[&["query", STORED, "--format", "csv"], &history[..]].concat());
-        say("kept with the campaign", stored.1 + &stored.2);
-        let run = first_run(&folder.path().join("history"));
-        let shown = told(folder.path(), &[&["show", &run], &history[..]].concat()).2;
-        let (of_findings, number) = ("finding about the rules", check.matches("\n  help: ").count());
-        assert_eq!(shown.lines().filter(|line| line.starts_with(of_findings)).count(), number, "{shown}");
-    }
+    let recheck = ["recheck", "--jobs", "1", "--ontology", ontology];
+    say("recheck", told(folder.path(), &[&recheck[..], &history].concat()).1);
+    say("rules", told(folder.path(), &[&rules[..], &history].concat()).1);
+    let stored = told(folder.path(), &[&["query", STORED, "--format", "csv"], &history[..]].concat());
+    say("kept with the campaign", stored.1 + &stored.2);
+    let run = first_run(&folder.path().join("history"));
+    let shown = told(folder.path(), &[&["show", &run], &history[..]].concat()).2;
+    let (of_findings, number) = ("finding about the rules", check.matches("\n  help: ").count());
+    assert_eq!(shown.lines().filter(|line| line.starts_with(of_findings)).count(), number, "{shown}");
     text
 }
 
@@ -102,6 +105,6 @@ fn the_shipped_ontologies_have_no_findings() {
 fn a_new_project_has_no_findings() {
     let folder = tempfile::tempdir().unwrap();
     assert_eq!(told(folder.path(), &["new", "campaign", "mine"]).0, Some(0));
-    let (code, warnings, _) = told(folder.path(), &["check", "configs/mine.toml"]);
+    let (code, warnings, _) = told(folder.path(), &["check", "mine.toml"]);
     assert_eq!((code, warnings.as_str()), (Some(0), ""));
 }

@@ -175,8 +175,7 @@ fn no_action(
         Some(found) => format!("did you mean `{found}`?"),
         None => format!("declare it: `{} a act:Action`", names::shorten(subject)),
     };
-    let message =
-        format!("`{local}` is neither an action nor a class that an action has, so that its {kind} are never judged");
+    let message = format!("`{local}` is neither an action nor the class of one, so that its {kind} are never judged");
     Diagnostic::warning("O015", message).at(source, span).help(help)
 }
 

@@ -14,7 +14,7 @@ const ONTOLOGIES: [&str; 5] = ["ttl", "nt", "owl", "rdf", "xml"];
 /// Warnings O017: rule files on disk, in the folders of linked rule files, that nothing links. Subfolders are not searched.
 ///
 /// A file counts as linked also if another ontology beside these, or a configuration in its usual places, mentions it.
-/// Programs with facts of their own (`@import`) are no rules of properties.
+/// Programs with facts of their own (`@import`) are no rules of properties, and copies of shipped files are not the user's.
 pub(super) fn rule_files(graph: &Graph) -> Diagnostics {
     let (mut folders, mut linked) = (BTreeMap::new(), BTreeSet::new());
     for statement in graph.statements() {
@@ -36,17 +36,13 @@ pub(super) fn rule_files(graph: &Graph) -> Diagnostics {
         let others = other_texts(graph);
         unlinked.retain(|path| !others.iter().any(|text| mentions(text, &name_of(path))));
     }
-    unlinked
-        .iter()
-        .filter_map(|path| Files::Disk.read(path).ok())
-        .filter(|file| !is_program(file))
-        .map(warning)
-        .collect()
+    let files = unlinked.iter().filter_map(|path| Files::Disk.read(path).ok());
+    files.filter(|file| !is_program(file) && !is_shipped(file)).map(warning).collect()
 }
 
 fn warning(file: Source) -> Diagnostic {
     let name = name_of(Path::new(&*file.name));
-    Diagnostic::warning("O017", format!("no ontology links the rule file `{}`, so that it has no effect", file.name))
+    Diagnostic::warning("O017", "no ontology links this rule file, so that it has no effect")
         .in_source(&file)
         .help(format!("link it, such as with `act:verifiedBy <…/{name}>`, or remove it"))
 }
@@ -87,6 +83,13 @@ fn mentions(text: &Source, name: &str) -> bool {
 /// Whether a file is a program for `actcheck datalog`, not the rules of a property.
 fn is_program(file: &Source) -> bool {
     file.text.lines().any(|line| ["@import", "@export"].iter().any(|word| line.trim_start().starts_with(word)))
+}
+
+/// Whether a file is a copy of a shipped one, such as the rules of the ontology's closure, which the program itself uses.
+fn is_shipped(file: &Source) -> bool {
+    let name = name_of(Path::new(&*file.name));
+    let mut shipped = Files::all_shipped(Path::new("rules")).into_iter().filter(|path| name_of(path) == name);
+    shipped.any(|path| Files::Shipped.read(&path).is_ok_and(|known| known.text == file.text))
 }
 
 /// Whether a file has the name of rules, and is no hidden file or backup of an editor.
