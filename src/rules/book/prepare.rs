@@ -11,6 +11,7 @@ use crate::book::parts::{extend, gather_state, gathers_state, needed, split_fixe
 use crate::check::checking::{Checking, Role, unique, used_names};
 use crate::check::formulas::{self, Bound};
 use crate::check::ranges::Ranges;
+use crate::check::sides::Sides;
 use crate::check::stratify::stratify;
 use crate::check::termination::warnings;
 use crate::check::unchanging::{self, Reads};
@@ -111,6 +112,7 @@ impl Preparing {
         self.types_and_units(ontology, &library, &programs, &properties, &predicates);
         if split {
             self.unchanging(ontology, &library, &programs, &properties, (&predicates, phases));
+            self.one_sided(&library, &programs, &properties, &predicates);
         }
         if split {
             library.rules.extend(gather_state(&mut predicates));
@@ -275,6 +277,22 @@ impl Preparing {
         }
     }
 
+    /// Warns of properties that tell the two sides of a contact apart.
+    fn one_sided(
+        &mut self,
+        library: &Program,
+        programs: &BTreeMap<usize, Program>,
+        properties: &[(usize, &Property, Syntax)],
+        predicates: &Predicates,
+    ) {
+        let Some(sides) = Sides::new(library, predicates, &self.terms) else { return };
+        for (scope, _, syntax) in properties {
+            if let Some(program) = programs.get(scope).filter(|_| syntax.whole) {
+                self.diagnostics.extend(sides.one_sided(program, *scope).map(Into::into).unwrap_or_default());
+            }
+        }
+    }
+
     /// Returns the ontology's statements with their OWL 2 RL closure.
     fn closed(&mut self, ontology: &Ontology) -> Vec<[TermId; 3]> {
         // Without statements, only the axioms of OWL itself follow.
@@ -301,12 +319,13 @@ impl Preparing {
         let mut judges = BTreeMap::new();
         for property in ontology.properties.values().filter(|p| p.rule.language == RuleLanguage::Sparql) {
             match Query::prepare(&property.rule.source, ontology, &self.derived) {
-                Ok(query) => {
+                Ok(mut query) => {
                     if is_unchanging(&property.rule.source.text) {
                         let (source, start) = (&property.rule.source, query.start(&property.rule.source.text));
                         let found = unchanging::warning(ontology, property, source, start);
                         self.diagnostics.extend(found.map(Into::into).unwrap_or_default());
                     }
+                    self.diagnostics.extend(std::mem::take(&mut query.warnings));
                     let rules = JudgeRules::Sparql(Box::new(query));
                     judges.insert(property.iri.clone(), judge(ontology, property, rules));
                 }
