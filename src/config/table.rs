@@ -242,10 +242,10 @@ impl Table {
             self.fault("C005", span, message, "name the action: `{ action = \"Pick\", pickObject = \"other\" }`");
             return None;
         };
-        let action = self.text_of(key, "a string", action.value)?;
+        let action = self.text_of(key, expected, action.value)?;
         let mut values = BTreeMap::new();
         for (name, entry) in entries {
-            values.insert(name, self.text_of(key, "a string", entry.value)?);
+            values.insert(name, self.text_of(key, expected, entry.value)?);
         }
         Some(WrittenStep { action, values })
     }
