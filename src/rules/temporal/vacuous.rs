@@ -65,9 +65,11 @@ fn mark(formula: &mut Formula, helps: bool, found: &mut bool) {
             parts.iter_mut().for_each(|part| mark(part, helps, found));
         }
         Formula::Consequent { formula, needed } => {
-            *needed = helps;
-            *found |= helps;
-            mark(formula, helps, found);
+            // `a implies (b implies c)` asks for `c` only.
+            let mut inner = false;
+            mark(formula, helps, &mut inner);
+            *needed = helps && !inner;
+            *found |= helps || inner;
         }
     }
 }
