@@ -202,7 +202,7 @@ fn the_drive_notices_an_object_that_is_lost_or_pushes_another() {
         assert!(noticing.clone().any(|property| property.ends_with("#NoDriveCollisions")), "{matrix:#?}");
     }
     // A hand that picked nothing has nothing to lose.
-    let drives = ["MoveTo".to_owned()];
+    let drives = [Step::plain("MoveTo")];
     assert!(faults.iter().all(|fault| !fault.concerns(&drives, &env.campaign.robot)));
 }
 
