@@ -141,7 +141,7 @@ fn the_arm_does_not_pass_through_the_head() {
 
 /// A hand that closes on nothing: fingers may meet, and are not inside each other.
 #[test]
-fn fingers_that_meet_are_no_collision() {
+fn fingers_that_meet_do_not_collide() {
     let mut world = before_furniture(400.0, 0.5);
     world.begin_record();
     let mut command = world.hold();
@@ -152,7 +152,7 @@ fn fingers_that_meet_are_no_collision() {
     assert!(met.iter().all(|pair| pair.press.is_some_and(|press| press.of_hand) && pair.max_depth_m < 1e-3), "{met:?}");
 }
 
-/// A command without sense stops nothing: it is no reason for a motor to get a limit that is not a number.
+/// A command that is not a number is ignored: no motor gets it as a limit.
 #[test]
 fn commands_that_are_not_numbers_are_ignored() {
     let mut world = before_furniture(400.0, 0.5);

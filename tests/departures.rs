@@ -43,7 +43,7 @@ fn state(snapshot: &Snapshot, id: &str) -> BodyState {
     snapshot.bodies.iter().find(|body| body.id == id).expect("it is in the scene").clone()
 }
 
-/// The bottle that an arm swept off a table left the world, and its run was no failure.
+/// The bottle that an arm swept off a table left the world, and its run was broken.
 #[test]
 fn an_object_that_the_robot_flings_away_stays_where_it_left_and_the_run_goes_on() {
     let mut world = sledges();
@@ -67,7 +67,7 @@ fn an_object_that_the_robot_flings_away_stays_where_it_left_and_the_run_goes_on(
     assert_eq!(state(&world.snapshot(), "near_1").pose, left.pose);
 }
 
-/// What a pushed object pushes is the robot's doing too.
+/// Objects that a pushed object pushes are the robot's doing too.
 #[test]
 fn an_object_that_another_one_pushed_is_the_robots_doing() {
     let mut world = sledges();
@@ -106,7 +106,7 @@ fn everything_else_that_leaves_the_world_is_a_fault() {
     }
 }
 
-/// Scenes settle before the robot acts: what leaves then was not pushed.
+/// Scenes settle before the robot acts: an object that leaves then was not pushed.
 #[test]
 fn an_object_that_leaves_before_the_first_action_is_a_fault() {
     let sledge = Pose::upright([0.28, 0.0, 0.0], 0.0);

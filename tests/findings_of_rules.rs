@@ -72,7 +72,7 @@ fn answers(case: &Path) -> String {
 }
 
 #[test]
-fn every_command_tells_the_same_findings() {
+fn every_command_reports_the_same_findings() {
     let folder = root().join("tests/findings_of_rules");
     let mut cases: Vec<PathBuf> = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();
     cases.retain(|path| path.extension().is_some_and(|ending| ending == "case"));

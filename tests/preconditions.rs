@@ -42,7 +42,7 @@ const EMPTY: &str =
     "the precondition `the hand holds the object to place` does not hold: the gripper holds nothing instead of glass_1";
 
 #[test]
-fn a_full_hand_picks_nothing_and_keeps_what_it_holds() {
+fn a_full_hand_picks_nothing_and_keeps_its_object() {
     let run = nominal(&env("[\"PerceivePlane\", \"Pick\", \"Pick\", \"Place\"]"), None);
     all_passed(&run, 0);
     all_passed(&run, 1);

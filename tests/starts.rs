@@ -20,7 +20,7 @@ fn with_home(home: &str) -> tempfile::TempDir {
     project
 }
 
-/// The exit code of a command, and what it prints, in one line.
+/// The exit code of a command, and its output, in one line.
 fn said(folder: &Path, arguments: &[&str]) -> (i32, String) {
     let output = actcheck(folder, arguments);
     let words = (stdout(&output) + &stderr(&output)).replace('│', " ");
@@ -47,7 +47,7 @@ fn a_robot_beside_the_table_overlaps_nothing() {
     assert!(code == 0 && !said.contains("S025"), "{said}");
 }
 
-/// The hand is just above the table, where a can stands in some scenes: these are discarded and counted.
+/// The hand is just above the table, where there is a can in some scenes: these are discarded and counted.
 #[test]
 fn scenes_in_which_the_robot_overlaps_by_chance_are_discarded() {
     let project = with_home("[0.0, 0.5, 0.0, 2.05, 0.0, 0.6, 0.0]");

@@ -83,7 +83,7 @@ pub struct Comparison {
     pub judged_alone: [Vec<Compared>; 2],
     /// Whole runs first, then by action and property.
     pub lines: Vec<ComparedLine>,
-    /// What decided the number of scenes: which tests and intervals are valid.
+    /// How the number of scenes was decided: which tests and intervals are valid.
     pub sampling: Sampling,
 }
 
@@ -198,7 +198,7 @@ fn together(one: Outcome, other: Outcome) -> Outcome {
 /// Compares two campaigns by pairs of runs with the same place and the same scene.
 ///
 /// If scenes are repeated, a scene passes if all its runs pass: runs of one scene are too alike to be counted
-/// separately. Only repetitions that both sides have are compared. `sampling`: what decided the number of scenes.
+/// separately. Only repetitions that both sides have are compared. `sampling`: how the number of scenes was decided.
 pub fn compare(first: &[ComparedRun], second: &[ComparedRun], sampling: Sampling) -> Comparison {
     let by_place = |runs: &'_ [ComparedRun]| runs.iter().enumerate().map(|(at, run)| (run.place, at)).collect();
     let (firsts, seconds): (BTreeMap<_, usize>, BTreeMap<_, usize>) = (by_place(first), by_place(second));
@@ -422,7 +422,7 @@ mod tests {
             let found = compare(&none, &crashing, Sampling::Fixed);
             let worse: Vec<&Compared> = found.worse_at(0.05).into_iter().map(|line| &line.of).collect();
             assert_eq!(worse, [&Compared::Completion], "{found:?}");
-            // Two more such runs may be chance, the same number is no rise, and fewer are better.
+            // Two more such runs may be chance, an equal number does not count, and fewer are better.
             for first in [runs(6, outcome, status), crashing.clone(), runs(20, outcome, status)] {
                 assert!(compare(&first, &crashing, Sampling::Fixed).worse_at(0.05).is_empty());
             }

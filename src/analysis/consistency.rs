@@ -75,7 +75,7 @@ impl Variance {
     }
 }
 
-/// Computes the consistency of a property from its decided runs. `sampling`: what decided the number of runs.
+/// Computes the consistency of a property from its decided runs. `sampling`: how the number of runs was decided.
 pub fn consistency(runs: &[Repeated], sampling: Sampling) -> Consistency {
     let mut scenes: BTreeMap<u64, Vec<&Repeated>> = BTreeMap::new();
     for run in runs {

@@ -20,7 +20,7 @@ pub struct FailureMode {
 /// Returns the failure modes, most frequent first, then sorted by their properties.
 ///
 /// Runs in which no property passed or failed tested nothing and are left out. `scenes` maps the IDs of runs to their
-/// scenes, if scenes are repeated. `sampling`: what decided the number of runs.
+/// scenes, if scenes are repeated. `sampling`: how the number of runs was decided.
 pub fn failure_modes(rows: &[OutcomeRow], scenes: &BTreeMap<String, u64>, sampling: Sampling) -> Vec<FailureMode> {
     let tested = signatures(rows);
     // A run without a known scene counts as a scene of its own.

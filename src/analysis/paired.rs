@@ -82,7 +82,7 @@ impl PairedTable {
         Some(Difference { value, low, high })
     }
 
-    /// As [`PairedTable::difference`], valid for what decided the number of scenes. If outcomes did, the interval is that of
+    /// As [`PairedTable::difference`], valid for the way in which the number of scenes was decided. If outcomes did, the interval is that of
     /// the difference of two shares of scenes, of which each keeps to its own interval with 97.5 % at any time.
     pub fn difference_by(self, sampling: Sampling) -> Option<Difference> {
         if sampling == Sampling::Fixed {
@@ -95,7 +95,7 @@ impl PairedTable {
         Some(Difference { value, low: second.low - first.high, high: second.high - first.low })
     }
 
-    /// As [`PairedTable::test`], valid for what decided the number of scenes.
+    /// As [`PairedTable::test`], valid for the way in which the number of scenes was decided.
     ///
     /// Source: if neither side is better, the likelihood of the directions of the discordant scenes, averaged over a uniform
     /// prior of the probability of one direction, divided by that under ½, is a martingale of mean 1. By Ville's inequality,

@@ -1,4 +1,4 @@
-//! Intervals of rates from campaigns that outcomes have ended: at a number of failures, or when somebody had seen enough.
+//! Intervals of rates from campaigns that outcomes have ended: at a number of failures, or when a user interrupted it.
 //!
 //! Wilson's interval assumes that the number of runs does not depend on outcomes. After `--max-failures 1` its coverage is 80 %
 //! at a rate of 0.8.
@@ -12,7 +12,7 @@ const MISSING: f64 = 0.05;
 /// Both parameters of the prior of the mixture (Jeffreys's): its intervals are narrow also at rates near 0 and 1.
 const PRIOR: f64 = 0.5;
 
-/// What decided how many runs were made.
+/// How the number of runs was decided.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Sampling {
     /// A number that was chosen before, a time, or the width of an interval. (The last two change the coverage of Wilson's
@@ -24,7 +24,7 @@ pub enum Sampling {
 }
 
 impl Sampling {
-    /// What ended a campaign, from its end in the history: a budget, or an interrupt.
+    /// From the end of a campaign in the history: a budget, or an interrupt.
     pub fn of(ended_by: Option<&str>, interrupted: bool) -> Self {
         if interrupted || ended_by == Some("failures") { Self::Stopped } else { Self::Fixed }
     }
@@ -180,7 +180,7 @@ mod tests {
         }
     }
 
-    /// A second property fails in some of the failed runs only, and somebody may stop when the rate looks worst.
+    /// A second property fails in some of the failed runs only, and a user may stop when the rate looks worst.
     #[test]
     fn anytime_intervals_cover_whatever_ends_the_runs() {
         const CAMPAIGNS: usize = 4_000;

@@ -82,7 +82,7 @@ pub struct Judgement {
     #[cfg_attr(feature = "serde", serde(default))]
     pub held_before: Option<bool>,
     /// Whether a passed property would also have passed if the right side of each of its `implies` were false: no left side
-    /// held. If so, it is no evidence about what it asks for.
+    /// held. If so, the pass is no evidence about the right side.
     ///
     /// `None` if the property did not pass or has no such `implies`.
     #[cfg_attr(feature = "serde", serde(default))]

@@ -33,7 +33,7 @@ pub struct ChosenRuns {
     pub history: HistoryArgs,
 }
 
-/// Returns what decided the number of runs of some campaigns: outcomes, if they did so in one of them.
+/// Returns how the number of runs of some campaigns was decided: outcomes, if they did so in one of them.
 pub(super) fn sampling(history: &History, is_meant: impl Fn(&str) -> bool) -> Result<Sampling, Diagnostics> {
     let rows = history.campaigns()?.into_iter().filter(|row| is_meant(&row.id));
     let of = rows.map(|row| Sampling::of(row.ended_by.as_deref(), row.interrupted));

@@ -133,7 +133,7 @@ struct Side {
     runs: Vec<ComparedRun>,
     /// Number of runs, also of those without a known scene.
     count: u64,
-    /// What decided this number.
+    /// How this number was decided.
     sampling: Sampling,
 }
 

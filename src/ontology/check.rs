@@ -159,7 +159,7 @@ pub(super) fn never_judged(graph: &Graph, actions: &BTreeMap<String, Action>, fo
     }
 }
 
-/// Warning: the subject of a success property or precondition is no action (O015).
+/// Warning: the subject of a success property or precondition is not an action (O015).
 fn no_action(
     graph: &Graph,
     actions: &BTreeMap<String, Action>,

@@ -14,7 +14,7 @@ const ONTOLOGIES: [&str; 5] = ["ttl", "nt", "owl", "rdf", "xml"];
 /// Warnings O017: rule files on disk, in the folders of linked rule files, that nothing links. Subfolders are not searched.
 ///
 /// A file counts as linked also if another ontology beside these, or a configuration in its usual places, mentions it.
-/// Programs with facts of their own (`@import`) are no rules of properties, and copies of shipped files are not the user's.
+/// Programs with facts of their own (`@import`) are not rules of properties, and copies of shipped files are not the user's.
 pub(super) fn rule_files(graph: &Graph) -> Diagnostics {
     let (mut folders, mut linked) = (BTreeMap::new(), BTreeSet::new());
     for statement in graph.statements() {
@@ -92,7 +92,7 @@ fn is_shipped(file: &Source) -> bool {
     shipped.any(|path| Files::Shipped.read(&path).is_ok_and(|known| known.text == file.text))
 }
 
-/// Whether a file has the name of rules, and is no hidden file or backup of an editor.
+/// Whether a file has the name of rules, and is not a hidden file or backup of an editor.
 fn is_rule_file(path: &Path) -> bool {
     path.to_str().and_then(language_of).is_some() && !name_of(path).starts_with(['.', '#'])
 }

@@ -16,7 +16,7 @@ const SURFACES: [&str; 2] = ["objectSurface", "placeSurface"];
 const OF_SCENE: [&str; 2] = ["world", OTHERS];
 /// The object to pick of the scene.
 const TARGET: &str = "target";
-/// An object beside the target that no earlier action of the test was told to handle.
+/// An object beside the target that no earlier action of the test handles.
 const OTHER: &str = "other";
 
 /// Checks the values of one action of a test: S011 it can't have such a designator, S012 no scene can have such a value.

@@ -24,7 +24,7 @@ const MOST_DEPTH_M: f64 = 0.02;
 /// Slack of the way in a tick. Unit: metres. Origins of objects that turn are off their centres of mass.
 const SLACK_M: f64 = 0.02;
 
-/// What is known about the motion of an object.
+/// The known motion of an object.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Motions {
     /// Whether the robot pressed it, or something that moved because of the robot.
@@ -38,7 +38,7 @@ pub(super) struct Motions {
 }
 
 impl World {
-    /// Records after a tick what the robot moves, and whether it moves plausibly.
+    /// Records after a tick the objects that the robot moves, and whether they move plausibly.
     pub(super) fn record_motions(&mut self, touches: &BTreeMap<(Owner, Owner), Touch>) {
         let mut motions = std::mem::take(&mut self.motions);
         motions.resize(self.objects.len(), Motions::default());

@@ -109,7 +109,6 @@ fn depth_m(one: &Collider, other: &Collider) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
     use crate::robot::tests::lonely;
 
     #[test]

@@ -73,7 +73,7 @@ pub struct World {
     pub(super) recorder: Recorder,
     pub(super) room: Room,
     pub(super) fault: Option<Fault>,
-    /// What is known about the motion of each object; empty before the first record.
+    /// The known motion of each object; empty before the first record.
     pub(super) motions: Vec<Motions>,
     /// The words of a panic in the engine.
     panicked: Option<String>,

@@ -1,6 +1,6 @@
 //! The depth of two links in each other where both are solid.
 //!
-//! Convex pieces fill the hollows of the meshes that they stand for: a fork that reaches into the mouth of a hand is inside its
+//! Convex pieces fill the hollows of the meshes that they represent: a fork that reaches into the mouth of a hand is inside its
 //! hull, and touches nothing. Boxes, cylinders, spheres and capsules are solid. Where a mesh is involved, the depth is the
 //! diameter of the largest ball that fits into the material of both links, and at most the depth of their pieces.
 

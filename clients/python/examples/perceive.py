@@ -36,7 +36,7 @@ def look(robot: Robot, surface: Thing, others: Sequence[Thing]) -> Report:
 def perceive_plane(robot: Robot, objectSurface: str) -> Report:
     surface, others = robot.look_for(objectSurface)
     if not surface.furniture:
-        raise Failed(f"{objectSurface} is no furniture")
+        raise Failed(f"{objectSurface} is not a piece of furniture")
     return look(robot, surface, others)
 
 

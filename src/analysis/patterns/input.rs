@@ -11,7 +11,7 @@ pub struct PatternInput {
     pub held_out: Vec<bool>,
     /// Parameters that may affect the outcome.
     pub parameters: Vec<Parameter>,
-    /// What decided the number of runs.
+    /// How the number of runs was decided.
     pub sampling: Sampling,
 }
 

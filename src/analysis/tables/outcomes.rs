@@ -67,7 +67,7 @@ pub struct OutcomeTable {
     rows: usize,
     texts: BTreeMap<&'static str, TextColumn>,
     numbers: BTreeMap<&'static str, Vec<f64>>,
-    /// What decided the number of runs: which intervals of rates are valid.
+    /// How the number of runs was decided: which intervals of rates are valid.
     pub sampling: Sampling,
 }
 

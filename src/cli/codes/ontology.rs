@@ -87,7 +87,7 @@ const CODES_O: &[Code] = &[
     ),
     code(
         "O015",
-        "something that is no action has success properties or preconditions",
+        "something other than an action has success properties or preconditions",
         "the name of the action is misspelt, or the action is not declared, so that the properties are never judged",
         "take the suggested name, or declare the action; a class may have properties if an action is of that class",
     ),

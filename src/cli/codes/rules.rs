@@ -248,7 +248,7 @@ const CODES_R: &[Code] = &[
     ),
     code(
         "R056",
-        "a property tells the two sides of a contact apart",
+        "a property depends on the order of a contact's two sides",
         "it reads one of `w:first` and `w:second` (or `w:firstLink` and `w:secondLink`) where the other may be meant: a contact has no order, and its two names are sorted",
         "use `contact(?c, ?a, ?b)` or `self_contact(?c, ?a, ?b)`, in queries `w:between` or `w:betweenLinks`",
     ),

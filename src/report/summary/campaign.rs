@@ -103,7 +103,7 @@ impl Proportion {
         Self::sampled(count, of, Sampling::Fixed)
     }
 
-    /// As [`Proportion::new`], with an interval that is valid for what decided the number of runs.
+    /// As [`Proportion::new`], with an interval that is valid for the way in which the number of runs was decided.
     pub fn sampled(count: u64, of: u64, sampling: Sampling) -> Option<Self> {
         let interval = sampling.interval(count, of)?;
         Some(Self { count, of, rate: (sampling == Sampling::Fixed).then_some(interval.rate), interval })
@@ -257,7 +257,7 @@ impl CampaignSummary {
         mean(self.runs.iter().filter(|run| run.status != RunStatus::Broken).map(|run| run.score))
     }
 
-    /// What decided the number of runs.
+    /// How the number of runs was decided.
     pub fn sampling(&self) -> Sampling {
         Sampling::of(self.ended_by.as_ref().map(|ended| ended.budget), self.interrupted)
     }
@@ -297,7 +297,7 @@ impl CampaignSummary {
         Proportion { count, of, rate: self.estimate([count, of], in_failed), interval: mode.share }
     }
 
-    /// A proportion with an interval that is valid for what ended the campaign. `in_failed`: count and total within failed
+    /// A proportion with an interval that is valid for the way in which the campaign ended. `in_failed`: count and total within failed
     /// runs. `alike`: the interval for scenes that were run several times. `exact`: whether the others of the total are the
     /// failures that may have ended the campaign.
     fn proportion(

@@ -22,7 +22,7 @@ pub struct FindingsSummary {
     pub runs: u64,
     /// Number of runs of the sample in which conditions and collisions were sought; `None` if that was all.
     pub sampled_runs: Option<u64>,
-    /// What decided the number of runs: which intervals are valid, and whether rates are biased.
+    /// How the number of runs was decided: which intervals are valid, and whether rates are biased.
     pub sampling: Sampling,
     /// Number of the runs that don't count because a later run is bit-identical.
     pub twins: u64,

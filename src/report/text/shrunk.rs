@@ -42,7 +42,7 @@ pub fn shrunk_text(shrunk: &ShrunkSummary, page: Page) -> String {
     page.set(&out)
 }
 
-/// Writes what a pass is, and the nearest scene that passes.
+/// Writes the meaning of a pass, and the nearest scene that passes.
 fn passing(out: &mut String, shrunk: &ShrunkSummary) {
     let passes = shrunk.property.as_deref().map_or("everything", names::local);
     let _ = writeln!(out, "passes at: with this value alone changed, the run was repeated and {passes} passed");

@@ -187,7 +187,7 @@ impl RuleBook {
     /// Judges an action as if the right side `b` of every `a implies b` were false. A property that still holds passed
     /// vacuously: no `a` held where it matters, so that no `b` was asked for.
     ///
-    /// Only right sides count that make the property harder to pass. [`RuleBook::can_pass_vacuously`] tells which
+    /// Only right sides count that make the property harder to pass. [`RuleBook::can_pass_vacuously`] names them
     /// properties have one.
     pub fn without_consequents(
         &self,

@@ -277,7 +277,7 @@ impl Preparing {
         }
     }
 
-    /// Warns of properties that tell the two sides of a contact apart.
+    /// Warns of properties that depend on the order of a contact's two sides.
     fn one_sided(
         &mut self,
         library: &Program,

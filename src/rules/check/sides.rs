@@ -1,4 +1,4 @@
-//! Warns of rules that tell the two sides of a contact apart: which side is `w:first` depends only on names.
+//! Warns of rules that depend on the order of a contact's two sides: which side is `w:first` depends only on names.
 //!
 //! A property reads both sides alike if its rules stay the same when `w:first` and `w:second` are exchanged: up to the names
 //! of variables, the order of conditions, and the predicates and arguments that the exchange turns into each other. This is
@@ -14,7 +14,7 @@ use actcheck_base::{Diagnostic, Term, Terms, names};
 /// The properties of contacts of two things, and of two links of the robot.
 pub(crate) const SIDES: [[&str; 2]; 2] = [["first", "second"], ["firstLink", "secondLink"]];
 
-/// Most pairs of conditions that are compared for one property. (10 times what the largest of ours needs.) Beyond, it is
+/// Most pairs of conditions that are compared for one property. Beyond, it is
 /// taken to be in order.
 const STEPS: usize = 200_000;
 
@@ -29,7 +29,7 @@ pub(crate) fn warning(property: &str, help: &str) -> Diagnostic {
     Diagnostic::warning("R056", message).help(help)
 }
 
-/// What the exchange of sides turns a predicate into: another one (or the same), and for each argument its place there.
+/// The image of a predicate under the exchange of sides: another one (or the same), and for each argument its place there.
 type Image = (PredicateId, Vec<usize>);
 
 /// The rules below a property.
@@ -171,7 +171,7 @@ impl<'a> Sides<'a> {
 
 /// Returns a rule without the values that nothing reads. `read`: whether the arguments of its head are read.
 fn plain<'a>(rule: &'a Rule, read: &[bool]) -> Plain<'a> {
-    // What an aggregate is computed from depends on all values.
+    // An aggregate depends on all values.
     let is_read = |at: usize| rule.aggregation.is_some() || read.get(at).copied().unwrap_or(true);
     let head: Vec<Option<Operand>> =
         rule.head.args.iter().enumerate().map(|(at, arg)| is_read(at).then_some(*arg)).collect();
@@ -243,7 +243,7 @@ fn occurrences(head: &[Option<Operand>], body: &[Literal], rule: &Rule) -> Vec<V
     found
 }
 
-/// The search for what the exchange of sides turns each predicate into.
+/// The search for the image of each predicate under the exchange of sides.
 struct Exchange<'p, 'a> {
     sides: &'p Sides<'a>,
     read: &'p BTreeMap<PredicateId, Vec<bool>>,

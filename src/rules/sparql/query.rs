@@ -249,7 +249,7 @@ fn form(text: &str) -> Option<Form> {
     })
 }
 
-/// Returns the warning about a query that tells the two sides of a contact apart: it reads only one of them, or reads each
+/// Returns the warning about a query that depends on the order of a contact's two sides: it reads only one of them, or reads each
 /// once and then one of the two variables more often than the other.
 fn one_sided(source: &Source) -> Option<Diagnostic> {
     let start = first_group(&source.text)?;

@@ -1,4 +1,4 @@
-//! The links of both fingers: what the joints of a gripper move, by the side of the object on which it is.
+//! The links of both fingers: those that the joints of a gripper move, by the side of the object on which it is.
 
 use crate::description::RobotModel;
 use crate::gripper::gap::Probe;
