@@ -18,12 +18,12 @@ use crate::convert::{from_pose, from_vector, to_pose, to_real};
 use crate::engine::Owner;
 use crate::reach::Reach;
 
-/// Mean lever of the friction of a pad about the middle of the area that it touches. By Hertz, a ball of silicone (2 MPa)
-/// with a radius of 4 cm that is pressed with 7 N touches a circle with a radius of 5 mm, and the lever is 3π/16 of that.
-/// Source of the model: R. D. Howe and M. R. Cutkosky, "Practical force-motion models for sliding manipulation", 1996. Unit: metres.
+/// Mean lever of the friction of a pad about the middle of the area that it touches: a choice of this order. By Hertz, a ball of
+/// soft rubber (1.2 MPa, incompressible) with a radius of 4 cm that is pressed with 7 N touches a circle with a radius of
+/// 5.1 mm, and the mean lever under its pressure is 3π/16 of that. It is the same for all forces and shapes here. Unit: metres.
 const PAD_LEVER_M: f64 = 3e-3;
-/// Lever of the force against which a thing rolls. Handbooks give 0.5 mm for iron on iron and up to 1.5 mm for wood on wood.
-/// Unit: metres.
+/// Lever of the force against which a thing rolls, one for all materials. Tables for engineers give 0.5 mm for iron or steel on
+/// the same, 1.2 mm to 1.5 mm for wood and 2 mm for plastic on steel. Unit: metres.
 const ROLLING_LEVER_M: f64 = 5e-4;
 /// A thing that turns faster than this about an axis in the plane of a contact rolls. Unit: rad/s.
 const ROLLS_RAD_S: f64 = 0.1;
@@ -78,7 +78,9 @@ impl Press {
     }
 
     /// Returns the lever of the friction that the points lack for that of a pad, less the share that carries a load: friction
-    /// has one limit for both. Unit: metres.
+    /// has one limit for both, an ellipse of force and torque. Unit: metres.
+    ///
+    /// Source: R. D. Howe and M. R. Cutkosky, "Practical force-motion models for sliding manipulation", 1996.
     fn lacks_m(&self) -> f64 {
         let used = (self.friction.norm() / self.grip).min(1.0);
         (PAD_LEVER_M * (1.0 - used * used).sqrt() - self.spread_m()).max(0.0)
