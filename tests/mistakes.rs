@@ -41,7 +41,7 @@ fn cases() -> Vec<PathBuf> {
 }
 
 /// The id of the first run of a history.
-pub fn first_run(history: &Path) -> String {
+fn first_run(history: &Path) -> String {
     let list = actcheck(history, &["list", "--history", ".", "--format", "csv"]);
     stdout(&list)
         .lines()
@@ -52,7 +52,7 @@ pub fn first_run(history: &Path) -> String {
 }
 
 /// Writes and edits the files of a case. Returns its arguments.
-pub fn set_up(text: &str, folder: &Path) -> Vec<String> {
+fn set_up(text: &str, folder: &Path) -> Vec<String> {
     let mut parts = text.split("\n--- ");
     let head = parts.next().unwrap_or_default();
     for part in parts {

@@ -20,7 +20,6 @@ mod line;
 mod make_run;
 pub mod oracles;
 mod outcome;
-mod preconditions;
 mod recheck;
 mod replay;
 mod requirement;
@@ -35,7 +34,6 @@ mod search_space;
 mod searching;
 pub mod shrink;
 mod solids;
-mod starts;
 mod tally;
 mod workers;
 

@@ -9,7 +9,6 @@ mod intervals;
 mod places;
 mod robot_course;
 mod snapshot;
-mod solids;
 mod writer;
 
 pub use extract::{extract, extract_complete};

@@ -209,7 +209,6 @@ mod tests {
             size_m: None,
             grasp_distance_m: None,
             part: None,
-            left_world: false,
         }
     }
 

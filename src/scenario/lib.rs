@@ -15,7 +15,6 @@ mod overlap;
 mod parameters;
 mod placement;
 mod space;
-mod step_values;
 mod surroundings;
 
 pub use draw::{Discard, draw};

@@ -86,7 +86,6 @@ fn judgement(name: &str, outcome: Outcome) -> Judgement {
         witness: String::new(),
         rule_digest: String::new(),
         held_before: None,
-        vacuous: None,
     }
 }
 

@@ -3,7 +3,6 @@
 //! Never: simulates, renders an image, decides successes (the rules do), or leaves out failed runs.
 
 mod columns;
-mod course;
 mod fact_columns;
 mod fact_source;
 mod sheet;

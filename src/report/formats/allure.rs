@@ -188,7 +188,6 @@ fn report_of(action: &ActionDetail) -> &str {
         ("completed", Some(true)) => "reported success",
         ("completed", Some(false)) => "reported failure",
         ("completed", None) => "reported nothing",
-        ("inapplicable", _) => "not performed",
         (end, _) => end,
     }
 }
@@ -198,7 +197,7 @@ fn end(action: &ActionDetail) -> &'static str {
     match (action.end.as_str(), action.reported) {
         ("completed", Some(false)) => "failed",
         ("completed", _) => "passed",
-        ("untested" | "inapplicable", _) => "skipped",
+        ("untested", _) => "skipped",
         _ => "broken",
     }
 }

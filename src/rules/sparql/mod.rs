@@ -7,4 +7,3 @@ mod ledger;
 pub(crate) mod query;
 mod query_text;
 pub(crate) mod snapshot;
-pub(crate) mod unchanging;
