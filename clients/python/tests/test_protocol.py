@@ -8,16 +8,16 @@ import json
 import unittest
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 
-from actcheck import Call, Held, Plane, Pose, Report, Thing
+from actcheck import Held, Plane, Pose, Report, Thing
 from actcheck.messages import DepthImage, Observation, RobotDescription, things_from_wire
 from actcheck.session import Session
 from actcheck.wire import Message
 
-from .fake import ARM, BASE, Simulation, one_action, robot_of
+from .fake import ARM, Simulation, one_action, robot_of
 
 SCHEMA = json.loads((Path(__file__).parents[2] / "protocol.schema.json").read_text())
 #: Fields that the client needs to read a message, but that say nothing to a skill.
@@ -26,8 +26,11 @@ OF_THE_LINK = {"type", "protocol", "what", "binary", "reason"}
 
 def message_schema(side: str, kind: str, what: str | None = None) -> Any:
     """The schema of a message."""
-    of_kind = [one for one in SCHEMA["$defs"][side]["oneOf"] if one["properties"]["type"]["const"] == kind]
-    return next(one for one in of_kind if what is None or one["properties"]["what"].get("const") == what)
+    for message in SCHEMA["$defs"][side]["oneOf"]:
+        properties = message["properties"]
+        if properties["type"]["const"] == kind and (what is None or properties["what"].get("const") == what):
+            return message
+    raise LookupError(f"the schema has no message {side} {kind} {what}")
 
 
 def resolved(schema: Any) -> Any:
@@ -213,15 +216,6 @@ class ToTheSimulation(unittest.TestCase):
             self.assertEqual(used(sent), names(message_schema("FromProgram", kind)), kind)
         second = [one for one in simulation.received if one["type"] == "command"][1]
         self.assertEqual(second["head"], {"tilt_rad": 0.1})
-        self.assertEqual(len(BASE), 3)
-
-
-class Records(unittest.TestCase):
-    def test_every_field_is_typed_and_has_words(self) -> None:
-        for record in (RobotDescription, Observation, Call, Thing, Plane, Held, Report, DepthImage):
-            self.assertTrue(record.__doc__, record)
-            for field in dataclasses.fields(cast(Any, record)):
-                self.assertTrue(field.type, f"{record.__name__}.{field.name}")
 
 
 if __name__ == "__main__":
