@@ -110,9 +110,9 @@ fn one_run(env: &Env, index: u64, costs: &mut Costs) -> Option<f64> {
     }
     let settled_secs = built.time_secs();
     built.watch(wall_secs);
-    let names = &env.campaign.tests[number];
-    let calls: Vec<ActionCall> =
-        names.iter().map(|name| ActionCall { action: name.clone(), parameters: scene.designators.clone() }).collect();
+    let names: Vec<&String> = env.campaign.tests[number].iter().map(|step| &step.action).collect();
+    let call = |name: &&String| ActionCall { action: (*name).clone(), parameters: scene.designators.clone() };
+    let calls: Vec<ActionCall> = names.iter().map(call).collect();
     let start = wall_secs();
     let trace = actions::perform(&calls, &mut built, &mut choices, &env.campaign.budget);
     let performed = wall_secs() - start;
@@ -123,7 +123,7 @@ fn one_run(env: &Env, index: u64, costs: &mut Costs) -> Option<f64> {
     let run_facts = costs.time("facts", || facts::extract(&trace));
     costs.time("rules", || {
         for (step, name) in names.iter().enumerate() {
-            let properties = &env.ontology.actions[name].success_properties;
+            let properties = &env.ontology.actions[*name].success_properties;
             if let Some(seen) = run_facts.action(step) {
                 env.rules.judge(&seen, properties, &Budget::default());
             }

@@ -115,9 +115,9 @@ fn simulate(env: &Env, index: u64, shortcuts: Shortcuts, first: bool, found: &mu
     if !built.settle().settled {
         return;
     }
-    let names = env.campaign.tests[number].iter();
+    let steps = env.campaign.tests[number].iter();
     let calls: Vec<ActionCall> =
-        names.map(|name| ActionCall { action: name.clone(), parameters: scene.designators.clone() }).collect();
+        steps.map(|step| ActionCall { action: step.action.clone(), parameters: scene.designators.clone() }).collect();
     let trace = actions::perform(&calls, &mut built, &mut choices, &env.campaign.budget);
     found.secs += thread_secs() - start;
     if first {

@@ -30,7 +30,7 @@
 //! | [`actions`] | the robot's actions through commands and observations; the `Trace` | |
 //! | [`protocol`] | actions performed by an external program, in lockstep over a socket | nix |
 //! | [`facts`] | a `Trace` to RDF facts, interned once | |
-//! | [`rules`] | rule text to derived facts; SPARQL properties | datafrog, oxrdf, oxrdfio (imports), oxigraph (evaluator, feature `sparql`) |
+//! | [`rules`] | rule text to derived facts; SPARQL properties | datafrog, oxrdf, oxrdfio (imports), oxigraph (evaluator, feature `sparql`), spargebra (parser) |
 //! | [`verdict`] | findings to outcomes with witness and margin; the scores | |
 //! | [`history`] | the run store: transactions, queries, traces | oxigraph (store), spargebra (parser) |
 //! | [`campaign`] | runs the stages of a campaign; the only crate that calls many stages | rayon |

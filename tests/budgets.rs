@@ -39,6 +39,11 @@ fn failure_and_width_budgets_end_at_the_same_run_with_any_number_of_workers() {
         if name == "failures" {
             assert_eq!(runs.iter().filter(|run| failed(run)).count(), 2);
             assert!(failed(&runs[runs.len() - 1]), "the last run is the second failed run");
+            // The rate is Haldane's: the last failure would bias it.
+            let (passed, of) = (&one.0["runs_passed"]["count"], runs.len() as f64);
+            assert_eq!((passed.as_u64(), &one.0["stopped_by_outcomes"]), (Some(runs.len() as u64 - 2), &true.into()));
+            let rate = one.0["runs_passed"]["rate"].as_f64().unwrap();
+            assert!((rate - (of - 2.0) / (of - 1.0)).abs() < 1e-12, "{:#}", one.0["runs_passed"]);
             assert_eq!(one.0["exit_code"], 1);
         } else {
             for property in one.0["properties"].as_array().unwrap() {

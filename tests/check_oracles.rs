@@ -7,7 +7,7 @@ use actcheck::actions::{Sabotage, Saboteur};
 use actcheck::analysis::{Notice, OracleGap, OracleMatrix, OracleTrial, oracle_matrix};
 use actcheck::campaign::oracles::{FAULTS, Fault, Trial, TrialOptions, try_faults};
 use actcheck::campaign::{Clock, Env, RunContext, RunInput, run_line, run_sabotaged};
-use actcheck::config::Overrides;
+use actcheck::config::{Overrides, Step};
 use actcheck::data::Choices;
 use serde_json::Value;
 
@@ -38,7 +38,7 @@ fn matrix_of(env: &Env, faults: &[Fault], trials: &[Trial], is_asked: impl Fn(&s
 /// The properties of all actions of a campaign.
 fn properties(env: &Env) -> Vec<String> {
     let actions = env.campaign.tests.iter().flatten();
-    actions.flat_map(|action| env.ontology.actions[action].success_properties.clone()).collect()
+    actions.flat_map(|action| env.ontology.actions[&action.action].success_properties.clone()).collect()
 }
 
 fn matrix_over(properties: &[String], faults: &[Fault], trials: &[Trial]) -> OracleMatrix {
@@ -67,7 +67,7 @@ fn sure(folder: &Path) {
 /// The faults that can occur in a pick.
 fn of_pick() -> usize {
     let robot = env(root(), 1).campaign.robot;
-    FAULTS.iter().filter(|fault| fault.concerns(&["Pick".to_owned()], &robot)).count()
+    FAULTS.iter().filter(|fault| fault.concerns(&[Step::plain("Pick")], &robot)).count()
 }
 
 /// In the scenes of the shipped campaign: every fault is noticed, every property notices one, and an idle robot
@@ -106,6 +106,10 @@ fn the_shipped_properties_notice_every_fault() {
     // The robot is back in place when its skill begins, so that only the collision shows.
     assert_eq!(noticing("base-pushed"), ["NoGraspCollisions"]);
     assert_eq!(noticing("arm-through-head"), ["NoGraspCollisions"]);
+    // So does a neighbour that is back in its place.
+    assert_eq!(noticing("neighbour-put-back"), ["NoGraspCollisions"]);
+    // The action reports success, and the object is in the hand, but not off its place.
+    assert!(noticing("drag-and-lift").contains(&"MovedObject"));
     assert!(noticing("percepts-swapped").contains(&"ObjectInGripper"));
     assert!(noticing("runaway-motor").contains(&"CloseObject"));
 }
@@ -117,7 +121,7 @@ fn faults_that_a_robot_can_not_have_are_left_out() {
         let config = root().join(format!("configs/{name}.toml"));
         Env::prepare(&config, &Overrides::default()).unwrap().campaign.robot
     });
-    let pick = ["Pick".to_owned()];
+    let pick = [Step::plain("Pick")];
     let left_out =
         FAULTS.iter().filter(|fault| fault.concerns(&pick, &robots[0]) && !fault.concerns(&pick, &robots[1]));
     assert_eq!(left_out.map(|fault| fault.name).collect::<Vec<_>>(), ["base-pushed", "arm-through-head"]);
@@ -142,7 +146,7 @@ fn every_property_of_the_whole_task_notices_a_fault() {
         .into_iter()
         .filter(|fault| {
             let of_pick = fault.sabotage.actions == ["Pick"] && fault.name != "neighbour-falls";
-            !of_pick && fault.name != "frozen-sensors"
+            !of_pick && fault.name != "frozen-sensors" && !fault.sabotage.needs_load()
         })
         .collect();
     let mut asked = Vec::new();
@@ -176,8 +180,30 @@ fn every_property_of_the_whole_task_notices_a_fault() {
     assert!(noticing("hand-jams").contains(&"ObjectReleased"));
     assert_eq!(noticing("place-neighbour-falls"), ["NoPlaceCollisions"]);
     assert_eq!(noticing("other-kind"), ["ObjectsDetected"]);
+    assert_eq!(noticing("false-height"), ["ObjectsDetected"]);
+    assert!(noticing("sweep").contains(&"ObjectsDetected"));
     let swapped = noticing("percepts-swapped");
     assert!(swapped.contains(&"ObjectsDetected") && swapped.contains(&"ObjectInGripper"), "{swapped:?}");
+}
+
+/// A robot that drives with an object in its hand: it loses it on the way, or pushes another object with it before.
+#[test]
+fn the_drive_notices_an_object_that_is_lost_or_pushes_another() {
+    let folder = tempfile::tempdir().unwrap();
+    let faults = named(&["lost-on-the-way", "held-object-pushes"]);
+    std::fs::write(folder.path().join("task.toml"), format!("tests = [[\"Pick\", \"MoveTo\"]]\n{TASK}{COARSE}"))
+        .unwrap();
+    let env = Env::prepare(&folder.path().join("task.toml"), &Overrides::default()).unwrap();
+    let matrix = matrix_over(&properties(&env), &faults, &trials(&env, &faults, 2));
+    for row in &matrix.rows {
+        let noticing =
+            row.cells.iter().filter(|cell| cell.notice == Notice::Noticed).map(|cell| cell.property.as_str());
+        assert!(row.came_about >= 7, "{matrix:#?}");
+        assert!(noticing.clone().any(|property| property.ends_with("#NoDriveCollisions")), "{matrix:#?}");
+    }
+    // A hand that picked nothing has nothing to lose.
+    let drives = [Step::plain("MoveTo")];
+    assert!(faults.iter().all(|fault| !fault.concerns(&drives, &env.campaign.robot)));
 }
 
 /// Adds a variant of the shipped rule that ignores reported failures, so it notices no false report of one.

@@ -132,6 +132,41 @@ fn the_arm_does_not_pass_through_the_head() {
     };
     assert!(record.contacts.iter().any(|contact| is_of_head(contact) && contact.max_force_n > 50.0));
     assert!(record.robot.self_contacts.iter().all(|contact| contact.max_depth_m < 5e-3), "{:?}", record.robot);
+    // Its depth says nothing, its force does.
+    let of_head = |pair: &[String; 2]| pair.contains(&"robot/head_tilt_link".to_owned());
+    let pressed = record.robot.self_contacts.iter().find(|contact| of_head(&contact.pair));
+    let press = pressed.and_then(|contact| contact.press).expect("the force is measured");
+    assert!(press.max_force_n > 50.0 && !press.of_hand, "{press:?}");
+}
+
+/// A hand that closes on nothing: fingers may meet, and are not inside each other.
+#[test]
+fn fingers_that_meet_do_not_collide() {
+    let mut world = before_furniture(400.0, 0.5);
+    world.begin_record();
+    let mut command = world.hold();
+    command.gripper_opening_m = 0.0;
+    (0..180).for_each(|_| world.step(&command));
+    assert!(world.observe().gripper_opening_m < 1e-3, "the hand is closed");
+    let met = world.end_record().robot.self_contacts;
+    assert!(met.iter().all(|pair| pair.press.is_some_and(|press| press.of_hand) && pair.max_depth_m < 1e-3), "{met:?}");
+}
+
+/// A command that is not a number is ignored: no motor gets it as a limit.
+#[test]
+fn commands_that_are_not_numbers_are_ignored() {
+    let mut world = before_furniture(400.0, 0.5);
+    world.begin_record();
+    for value in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+        let mut command = world.hold();
+        command.positions.fill(value);
+        command.gripper_opening_m = value;
+        command.grip_force_n = value;
+        command.efforts = vec![(world.layout().arm[0], value)];
+        (0..20).for_each(|_| world.step(&command));
+        assert_eq!(world.fault(), None, "{value}");
+        assert!(world.observe().positions.iter().all(|position| position.is_finite()), "{value}");
+    }
 }
 
 /// Every recorded effort is within the limit of its joint, and the targets of the fingers are those of the gap.

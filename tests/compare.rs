@@ -4,7 +4,7 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use actcheck::analysis::{Compared, ComparedRun, Comparison, PairedTable, compare, compared_runs};
+use actcheck::analysis::{Compared, ComparedRun, Comparison, PairedTable, Sampling, compare, compared_runs};
 use actcheck::base::{Outcome, names};
 use actcheck::data::Choices;
 use actcheck::history::{History, OutcomeRow, RunRow, RunStatus, SceneDigest};
@@ -57,7 +57,7 @@ fn alarms(seed: u64, scenes: u64, first: &[f64], second: &[f64]) -> u64 {
             let mut choices = Choices::random(seed, *index);
             let first = flipped(&mut choices, scenes, first);
             let second = flipped(&mut choices, scenes, second);
-            !compare(&first, &second).worse_at(LEVEL).is_empty()
+            !compare(&first, &second, Sampling::Fixed).worse_at(LEVEL).is_empty()
         })
         .count() as u64
 }
@@ -136,7 +136,7 @@ fn the_interval_covers_the_true_difference() {
         let mut choices = Choices::random(21, index);
         let first = flipped(&mut choices, 80, &[0.75]);
         let second = flipped(&mut choices, 80, &[0.6]);
-        let difference = compare(&first, &second).lines[0].difference.unwrap();
+        let difference = compare(&first, &second, Sampling::Fixed).lines[0].difference.unwrap();
         covered += u64::from(difference.low <= truth && truth <= difference.high);
     }
     // 95 % of a thousand, less three and a half standard deviations of that.
@@ -321,7 +321,7 @@ fn a_campaign_is_newer_than_its_regressions() {
 #[test]
 fn a_campaign_compared_with_itself_shows_no_difference() {
     let runs = flipped(&mut Choices::random(31, 0), 20, &[0.5, 0.5]);
-    let Comparison { pairs, lines, .. } = compare(&runs, &runs);
+    let Comparison { pairs, lines, .. } = compare(&runs, &runs, Sampling::Fixed);
     assert_eq!((pairs, lines.len(), &lines[0].of), (20, 3, &Compared::WholeRun));
     assert!(lines.iter().all(|line| line.test.two_sided == 1.0 && line.worse.is_empty() && line.better.is_empty()));
 }

@@ -5,7 +5,7 @@
 use std::path::{Path, PathBuf};
 
 use actcheck::base::Files;
-use actcheck::config::{self, Campaign, Launcher, Overrides};
+use actcheck::config::{self, Campaign, Launcher, Overrides, Step};
 
 fn load(path: &Path) -> Campaign {
     config::load(path, &Overrides::default()).unwrap_or_else(|found| panic!("{found}"))
@@ -55,7 +55,8 @@ fn all_parameters_of_the_paper_are_read() {
         model_list = ["mug", "can"]
         "#,
     );
-    assert_eq!(campaign.tests[1], ["MoveTo", "PerceivePlane", "Pick", "Place"]);
+    let whole = ["MoveTo", "PerceivePlane", "Pick", "Place"].map(Step::plain);
+    assert_eq!(campaign.tests[1], whole);
     assert_eq!(campaign.test_count, 15);
     let Launcher::Program(skill) = &campaign.launcher else { panic!("{:?}", campaign.launcher) };
     assert_eq!((skill.text.as_str(), skill.args.join(" ")), ("python3 my_robot.py", "my_robot.py".to_owned()));

@@ -18,8 +18,8 @@ use crate::support::root;
 /// Samples of each action: six seconds.
 const COUNT: usize = 361;
 const TABLE_TOP_M: f64 = 0.75;
-const REST_M: f64 = 0.8;
-const LIFTED_M: f64 = 1.05;
+const REST_M: f64 = TABLE_TOP_M;
+const LIFTED_M: f64 = 1.0;
 
 /// From 0 to 1 between two times, smoothly.
 fn between(secs: f64, from: f64, to: f64) -> f64 {
@@ -86,14 +86,16 @@ fn samples(act: &Act) -> Samples {
     Samples { period_secs: period, count: COUNT, series }
 }
 
-fn body(id: &str, category: &str, fixed: bool, middle_m: [f64; 3], size_m: [f64; 3]) -> BodyState {
+/// A body without a shape: a box whose origin is at the centre of its base.
+fn body(id: &str, category: &str, fixed: bool, foot_m: [f64; 3], size_m: [f64; 3]) -> BodyState {
+    let middle_m = [foot_m[0], foot_m[1], foot_m[2] + size_m[2] / 2.0];
     let corner = |sign: f64| [0, 1, 2].map(|axis| middle_m[axis] + sign * size_m[axis] / 2.0);
     BodyState {
         id: id.to_owned(),
         model: id.to_owned(),
         category: names::act(category),
         fixed,
-        pose: Pose { position: middle_m, rotation: [0.0, 0.0, 0.0, 1.0] },
+        pose: Pose { position: foot_m, rotation: [0.0, 0.0, 0.0, 1.0] },
         linear_velocity: [0.0; 3],
         angular_velocity: [0.0; 3],
         aabb_min: corner(-1.0),
@@ -107,6 +109,7 @@ fn body(id: &str, category: &str, fixed: bool, middle_m: [f64; 3], size_m: [f64;
         size_m: Some(size_m),
         grasp_distance_m: None,
         part: None,
+        left_world: false,
     }
 }
 
@@ -117,7 +120,7 @@ fn snapshot(act: &Act, secs: f64) -> Snapshot {
     Snapshot {
         time_secs: secs,
         bodies: vec![
-            body("table_1", "Table", true, [0.6, 0.0, TABLE_TOP_M / 2.0], [0.8, 0.8, TABLE_TOP_M]),
+            body("table_1", "Table", true, [0.6, 0.0, 0.0], [0.8, 0.8, TABLE_TOP_M]),
             body("glass_1", "Glass", false, [0.6, 0.0, (act.object_z)(secs)], [0.07, 0.07, 0.1]),
         ],
         robot: RobotState {

@@ -8,7 +8,7 @@ use serde_json::Value;
 use crate::support::{actcheck, copy_made_history, foreign, made_history, root, stderr, stdout};
 
 /// The tables of facts from which outcomes follow.
-const FACTS: [&str; 12] = [
+const FACTS: [&str; 13] = [
     "actions",
     "percepts",
     "planes",
@@ -18,6 +18,7 @@ const FACTS: [&str; 12] = [
     "contacts",
     "self_contacts",
     "extremes",
+    "intervals",
     "joint_extremes",
     "shapes",
     "places",
@@ -60,6 +61,34 @@ fn every_table_is_listed_and_described() {
             assert!(!column["description"].as_str().unwrap().is_empty(), "{column}");
         }
     }
+}
+
+/// The course at the control rate: every sample has a row, with velocities, and every force between two bodies.
+#[test]
+fn the_course_has_every_sample_on_request() {
+    let (folder, printed) = exported(&["--course"]);
+    let tables = schema(folder.path());
+    let described = tables["tables"].as_array().unwrap();
+    let columns = |file: &str| -> Vec<String> {
+        let table = described.iter().find(|table| table["file"] == format!("{file}.parquet")).expect(file);
+        table["columns"].as_array().unwrap().iter().map(|column| column["name"].as_str().unwrap().to_owned()).collect()
+    };
+    for name in ["x_m", "qw", "vx_m_s", "wz_rad_s", "held"] {
+        assert!(columns("course_bodies").iter().any(|column| column == name), "{name}");
+    }
+    assert_eq!(columns("course_forces"), ["run", "step", "time_s", "first", "second", "force_n"]);
+    assert!(columns("phases").ends_with(&["start_s".to_owned()]));
+    // Ten rows a second against sixty.
+    let (coarse, fine) = (rows(&printed, "robot"), rows(&printed, "course_robot"));
+    assert!(coarse > 0 && fine > 5 * coarse && fine < 7 * coarse, "{printed}");
+    assert_eq!(rows(&printed, "course_joints") % fine, 0);
+    assert!(rows(&printed, "course_bodies") > 0 && rows(&printed, "course_forces") > 0, "{printed}");
+    // Without a dataset there is nothing to add it to.
+    assert_eq!(export_of(folder.path(), &["export", "--history", "history", "--course", "--csv", "t"]), Some(2));
+}
+
+fn export_of(folder: &Path, arguments: &[&str]) -> Option<i32> {
+    actcheck(folder, arguments).status.code()
 }
 
 #[test]

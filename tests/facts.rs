@@ -48,6 +48,7 @@ fn body(id: &str, asleep: bool, choices: &mut Choices) -> BodyState {
         size_m: Some(three(choices, 0.05, 0.2)),
         grasp_distance_m: (!fixed).then(|| single(choices, -0.01, 1.0)),
         part: None,
+        left_world: false,
     }
 }
 

@@ -224,6 +224,7 @@ fn report(table: &OutcomeTable, findings: PropertyFindings) -> PropertyReport {
 
 fn summary_of(table: &OutcomeTable, report: PropertyReport) -> FindingsSummary {
     FindingsSummary {
+        sampling: table.sampling,
         history: "h".to_owned(),
         program: "actcheck".to_owned(),
         options: String::new(),

@@ -68,6 +68,7 @@ fn robot() -> Arc<RobotProfile> {
         grip_force_n: 10.0,
         suction: None,
         meshes: BTreeMap::new(),
+        surfaces: BTreeMap::new(),
         digest: String::new(),
     })
 }
@@ -90,6 +91,7 @@ fn scene() -> Scene {
         objects: BODIES.iter().enumerate().map(object).collect(),
         robot: RobotStart { profile: robot(), base: [-0.6, 0.0, 0.1], root_height_m: 0.0, knows: Arc::new([]) },
         designators: sample_trace(0).actions[0].parameters.clone(),
+        steps: Vec::new(),
         sensing: Sensing {
             position_noise_m: 0.005,
             height_noise_m: 0.002,
@@ -122,6 +124,7 @@ fn judgement(property: &str, outcome: Outcome) -> Judgement {
         witness: format!("{property}: glass_1 \"moved\" 0.4 cm"),
         rule_digest: digest_of(property),
         held_before: (outcome == Outcome::Passed).then_some(property == "CloseObject"),
+        vacuous: (outcome == Outcome::Passed).then_some(property == "MovedObject"),
     }
 }
 
@@ -170,6 +173,7 @@ pub fn sample_campaign(id: &str, minute: u32) -> CampaignRecord {
         config_digest: digest_of("seed = 7\n"),
         config_path: "../pick.toml".to_owned(),
         ontology_digest: digest_of("ontology"),
+        findings: Vec::new(),
         rules: PROPERTIES.iter().map(|p| (names::act(p), format!("../rules/{p}.rls"), digest_of(p))).collect(),
         models: vec![("glass".to_owned(), digest_of("glass"))],
         skill: Some(SkillRecord {

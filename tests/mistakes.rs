@@ -41,7 +41,7 @@ fn cases() -> Vec<PathBuf> {
 }
 
 /// The id of the first run of a history.
-fn first_run(history: &Path) -> String {
+pub fn first_run(history: &Path) -> String {
     let list = actcheck(history, &["list", "--history", ".", "--format", "csv"]);
     stdout(&list)
         .lines()
@@ -52,7 +52,7 @@ fn first_run(history: &Path) -> String {
 }
 
 /// Writes and edits the files of a case. Returns its arguments.
-fn set_up(text: &str, folder: &Path) -> Vec<String> {
+pub fn set_up(text: &str, folder: &Path) -> Vec<String> {
     let mut parts = text.split("\n--- ");
     let head = parts.next().unwrap_or_default();
     for part in parts {

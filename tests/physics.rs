@@ -98,6 +98,7 @@ pub(crate) fn scene(objects: Vec<SceneObject>) -> Scene {
         objects,
         robot: RobotStart { profile: robot(), base: [-5.0, 0.0, 0.0], root_height_m: 0.0, knows: Arc::new([]) },
         designators: BTreeMap::new(),
+        steps: Vec::new(),
         sensing: PERFECT,
         physics: Physics {
             mass_scale: (1.0, 1.0),

@@ -99,6 +99,28 @@ fn the_other_examples_perform_their_actions() {
     }
 }
 
+/// Regression: a report could not have a plane, so a Python look at a surface always failed `PlaneFound`.
+#[test]
+fn a_python_look_finds_the_plane() {
+    let folder = project();
+    let launcher = root().join("clients/python/examples/perceive.py");
+    let config = std::fs::read_to_string(root().join("configs/perceive.toml")).unwrap();
+    let named = config.replace("test_launcher = \"reference\"", &format!("test_launcher = {:?}", launcher.display()));
+    assert_ne!(named, config);
+    std::fs::write(folder.path().join("configs/look.toml"), named).unwrap();
+    let output = Command::new(env!("CARGO_BIN_EXE_actcheck"))
+        .args(["run", "configs/look.toml", "--runs", "4", "--history", "h", "--format", "json"])
+        .current_dir(folder.path())
+        .env("PATH", path())
+        .env("PYTHONDONTWRITEBYTECODE", "1")
+        .output()
+        .unwrap();
+    let summary: Value = serde_json::from_slice(&output.stdout).unwrap_or_else(|_| panic!("{}", stderr(&output)));
+    let properties = summary["properties"].as_array().unwrap();
+    let found = properties.iter().find(|line| line["property"].as_str().unwrap().ends_with("#PlaneFound")).unwrap();
+    assert_eq!(found["counts"]["passed"], 4, "{found:#}");
+}
+
 /// A typing error in a skill was a failure of the robot, in every run.
 #[test]
 fn an_exception_in_a_skill_breaks_the_run_and_soon_ends_the_campaign() {

@@ -362,6 +362,45 @@ fn examples() -> Vec<(String, String)> {
 }
 
 /// Every example of `rules/README.md` works on the scene of a successful pick.
+/// Without one of the rules for the other order, a library reads one side.
+#[test]
+fn shipped_rules_read_both_sides_of_contacts_and_a_lost_one_is_noticed() {
+    let load = |name: &str| ontology::load(&Files::Disk, &root().join("../../ontology").join(name)).unwrap();
+    let one_sided = |ontology: &Ontology| {
+        let book = RuleBook::prepare(ontology).unwrap();
+        book.warnings()
+            .iter()
+            .filter(|found| found.code == "R056")
+            .filter_map(|found| found.place())
+            .collect::<Vec<_>>()
+    };
+    for name in ["actions.ttl", "extra.ttl", "time.ttl"] {
+        assert_eq!(one_sided(&load(name)), [""; 0], "{name}");
+    }
+    for lost in [
+        "harm(\"inside\", ?b, ",
+        "robot_link(?link) :- during(_, w:second, ",
+        "    during(?contact, w:second, ?link), during(?contact, w:first, ?thing), ",
+        "contact_interval(?i, ?b, ?a, ",
+    ] {
+        let mut ontology = load("extra.ttl");
+        let mut found = 0;
+        for library in &mut ontology.libraries {
+            let text = &library.source.text;
+            let Some(at) = text.find(lost) else { continue };
+            // From the line that begins a rule to its end.
+            let start = if lost.starts_with(' ') { text[..at - 1].rfind('\n').unwrap() + 1 } else { at };
+            let end = at + text[at..].find(" .\n").unwrap() + 3;
+            let text = format!("{}{}", &text[..start], &text[end..]);
+            *library = RuleFile::new(Source::new(library.source.name.to_string(), text));
+            found += 1;
+        }
+        assert_eq!(found, 1, "{lost}");
+        let places = one_sided(&ontology);
+        assert!(places.iter().any(|place| place.contains(".rls")), "{lost}");
+    }
+}
+
 #[test]
 fn every_example_of_the_readme_runs() {
     let facts = facts_of(&root().join("moved_object_passes"));

@@ -5,7 +5,7 @@ use std::path::Path;
 use actcheck::config::{self, Overrides};
 use actcheck::data::{Choices, ObjectModel, Pose, Role, Scene, SceneObject, Shape};
 use actcheck::ontology;
-use actcheck::scenario::{self, CLEARANCE_M, Solid, Space};
+use actcheck::scenario::{self, CLEARANCE_M, Discard, Solid, Space};
 use parry3d::math::{Pose as ParryPose, Rotation, Vector};
 use parry3d::query;
 use parry3d::shape::{Cuboid, Cylinder, Shape as ParryShape};
@@ -228,10 +228,11 @@ fn a_full_surface_gives_a_discard_that_names_the_unplaced_object() {
     let space = space(r#"["glass"]"#, r#"["plate"]"#, "40", r#"["coffee_table"]"#);
     let mut choices = Choices::random(1, 0);
     let discard = scenario::draw(&space, 0, &mut choices).unwrap_err();
-    assert_eq!((discard.model.as_str(), discard.tries), ("plate", 50));
-    assert_eq!(discard.to_string(), format!("found no free place for `plate` ({}) in 50 tries", discard.name));
+    let Discard::NoPlace { model, name, tries } = &discard else { panic!("{discard}") };
+    assert_eq!((model.as_str(), *tries), ("plate", 50));
+    assert_eq!(discard.to_string(), format!("found no free place for `plate` ({name}) in 50 tries"));
     // Every try is recorded.
-    let tries = choices.made().iter().filter(|choice| choice.name.to_string() == format!("{}.x", discard.name)).count();
+    let tries = choices.made().iter().filter(|choice| choice.name.to_string() == format!("{name}.x")).count();
     assert_eq!(tries, 50);
 }
 

@@ -293,7 +293,7 @@ fn shipped_new_and_exported_configurations_match_the_schema() {
 /// Values at the limits of a key's range, and beyond.
 fn trials(part: &Json) -> Vec<Value> {
     if let Some(forms) = part.get("anyOf").and_then(Json::as_array) {
-        return forms.iter().flat_map(trials).collect();
+        return forms.iter().flat_map(|form| trials(&resolved(form))).collect();
     }
     match part["type"].as_str() {
         Some("integer") => integers(part).into_iter().map(Value::from).collect(),

@@ -92,3 +92,33 @@ fn a_second_judgement_notices_a_wrong_rule() {
     let unexplained = stdout(&output).lines().filter(|line| line.ends_with("(unexplained)")).count();
     assert!(stdout(&output).contains(" MovedObject: stored ") && unexplained == 2, "{}", stdout(&output));
 }
+
+/// Properties about time are judged from the exported course alone, as their labels say.
+#[test]
+fn properties_about_time_can_be_judged_from_the_exported_course() {
+    let Some(python) = foreign::python() else { return };
+    let folder = project();
+    let config = folder.path().join("configs/pick_and_place.toml");
+    edit(&config, "ontology = \"../ontology/actions.ttl\"", "ontology = \"../ontology/time.ttl\"");
+    let ran = actcheck(folder.path(), &["run", "configs/pick_and_place.toml", "--runs", "6", "--history", "h"]);
+    assert!(ran.status.code().is_some_and(|code| code < 2), "{}", stderr(&ran));
+    let exported = actcheck(folder.path(), &["export", "--history", "h", "--dataset", "tables", "--course"]);
+    assert!(exported.status.success(), "{}", stderr(&exported));
+    let judge = || {
+        Command::new(python)
+            .args(["-m", "second_judge.time_properties", "tables"])
+            .current_dir(folder.path())
+            .env("PYTHONPATH", root().join("notebooks"))
+            .env("PYTHONDONTWRITEBYTECODE", "1")
+            .output()
+            .unwrap()
+    };
+    let output = judge();
+    let report = stdout(&output);
+    assert!(output.status.success(), "{report}{}", stderr(&output));
+    let names =
+        ["StillAtTheEnd", "SmoothHand", "SmoothDrive", "ShortPath", "UprightWhenLifted", "HeldWhileLifted", "OneGrasp"];
+    for property in names.into_iter().chain(["SettlesAfterRelease"]) {
+        assert!(agreed(&report, property) >= 4, "{property}: {report}");
+    }
+}

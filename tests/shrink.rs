@@ -2,7 +2,7 @@
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use actcheck::campaign::shrink::{ShrinkPlan, TrialLimits, TrialSearch, Tried, explain, reduce};
+use actcheck::campaign::shrink::{ShrinkPlan, TrialLimits, TrialSearch, Tried, TryResult, explain, reduce};
 use actcheck::data::{Choice, ChoiceGroup, ChoiceKind, ChoiceName, Choices};
 
 /// Objects in the initial list.
@@ -61,11 +61,16 @@ fn failing(fails: Fails) -> Vec<Choice> {
         .unwrap()
 }
 
+/// A try that either fails or passes.
+fn tried(made: Option<Vec<Choice>>) -> Tried {
+    Tried { result: made.map_or_else(|| TryResult::Passes(Vec::new()), TryResult::Fails), simulations: 1 }
+}
+
 fn shrunk(fails: Fails, jobs: usize, simulations: u64) -> (Vec<Choice>, bool, u64) {
     let test = |list: &[Choice]| {
         let mut choices = Choices::recorded(list);
         let (things, noise) = draw(&mut choices);
-        Tried { made: fails(&things, noise).then(|| choices.into_made()), simulations: 1 }
+        tried(fails(&things, noise).then(|| choices.into_made()))
     };
     let never = || false;
     let mut search = TrialSearch::new(&test, TrialLimits { simulations, jobs, stop: &never });
@@ -114,7 +119,7 @@ fn a_limit_ends_shrinking_with_the_best_so_far() {
     }
     let asked = AtomicBool::new(true);
     let stop = || asked.load(Ordering::Relaxed);
-    let test = |list: &[Choice]| Tried { made: Some(list.to_vec()), simulations: 1 };
+    let test = |list: &[Choice]| tried(Some(list.to_vec()));
     let mut search = TrialSearch::new(&test, TrialLimits { simulations: 100, jobs: 1, stop: &stop });
     let start = failing(|_, _| true);
     let plan = ShrinkPlan { removals: (0..THINGS).map(removal).collect(), ends: Vec::new(), group: &group };
@@ -128,7 +133,7 @@ fn the_range_of_a_failure_and_its_nearest_pass_are_found() {
     let (list, ..) = shrunk(fails, 1, 1000);
     let test = |list: &[Choice]| {
         let (things, noise) = draw(&mut Choices::recorded(list));
-        Tried { made: fails(&things, noise).then(|| list.to_vec()), simulations: 1 }
+        tried(fails(&things, noise).then(|| list.to_vec()))
     };
     let never = || false;
     let mut search = TrialSearch::new(&test, TrialLimits { simulations: 100, jobs: 2, stop: &never });
@@ -136,9 +141,37 @@ fn the_range_of_a_failure_and_its_nearest_pass_are_found() {
     let explained = explain(&mut search, &list, &plan);
     let [influence] = explained.influences.as_slice() else { panic!("{explained:?}") };
     assert_eq!((influence.id.name.to_string().as_str(), influence.matters), ("thing.7.x", Some(true)));
-    let (below, above) = (influence.passes.0.unwrap(), influence.passes.1.unwrap());
+    let [below, above] = [&influence.passes.0, &influence.passes.1].map(|at| at.as_ref().unwrap().value);
     assert!(below < 0.2 && 0.2 <= influence.fails.0 && influence.fails.1 < 0.6 && 0.6 <= above, "{influence:?}");
     assert!(influence.fails.0 - below < 0.1 && above - influence.fails.1 < 0.1, "{influence:?}");
     let neighbour = explained.neighbour.unwrap();
-    assert!([below, above].contains(&neighbour.value), "{neighbour:?}");
+    assert!([below, above].contains(&neighbour.passing.value), "{neighbour:?}");
+}
+
+/// Regression: a value with which a run failed in another way, or broke, was said to pass.
+#[test]
+fn only_a_value_that_was_tried_and_passed_passes() {
+    let fails: Fails = |things, _| value(things, 7) > 0.4;
+    let (list, ..) = shrunk(fails, 1, 1000);
+    for (other_from, passes_from) in [(f64::NEG_INFINITY, None), (0.1, Some(0.1)), (0.35, Some(0.35))] {
+        let test = |list: &[Choice]| {
+            let x = value(&draw(&mut Choices::recorded(list)).0, 7);
+            let result = match x {
+                x if x > 0.4 => TryResult::Fails(list.to_vec()),
+                x if x > other_from => TryResult::Otherwise,
+                _ => TryResult::Passes(Vec::new()),
+            };
+            Tried { result, simulations: 1 }
+        };
+        let never = || false;
+        let mut search = TrialSearch::new(&test, TrialLimits { simulations: 100, jobs: 1, stop: &never });
+        let plan = ShrinkPlan { removals: Vec::new(), ends: Vec::new(), group: &group };
+        let explained = explain(&mut search, &list, &plan);
+        let below = explained.influences[0].passes.0.as_ref().map(|at| at.value);
+        assert_eq!(below.is_some(), passes_from.is_some(), "{explained:?}");
+        assert!(below.is_none_or(|below| below <= other_from), "{explained:?}");
+        assert_eq!(explained.neighbour.is_some(), passes_from.is_some(), "{explained:?}");
+        // The printed value is the one that was tried.
+        assert!(below.is_none_or(|below| format!("{below:.4}").parse() == Ok(below)), "{explained:?}");
+    }
 }

@@ -147,6 +147,70 @@ fn a_campaign_that_shrinks_prints_one_document() {
     assert_eq!(output.status.code(), Some(1));
 }
 
+/// Regression: a value with which the run failed in another way was printed as passing. Every printed value is replayed here,
+/// as a user would: the shrunk run as a configuration, with the printed value.
+#[test]
+fn printed_values_that_pass_do_pass() {
+    let project = blurred();
+    let folder = project.path();
+    let output = actcheck(folder, &["run", LOOK, "--runs", "12", "--history", "h", "--format", "json"]);
+    let runs: Value = serde_json::from_str(&stdout(&output)).unwrap();
+    let mut replayed = 0;
+    let failing = runs["runs"].as_array().unwrap().iter().filter(|run| !failed(run).is_empty());
+    for (number, run) in failing.take(6).enumerate() {
+        // Some with one property, some with all.
+        let (id, was) = (run["run"].as_str().unwrap(), failed(run));
+        let property = was[0].rsplit('#').next().unwrap();
+        let one: &[&str] = if number % 2 == 0 { &[] } else { &["--property", property] };
+        let arguments = [&["shrink", id, "--trials", "60", "--jobs", "2"], one].concat();
+        let small = json(folder, &arguments);
+        let case = folder.join("case.toml");
+        let shrunk = small["run"].as_str().unwrap();
+        let exported = actcheck(folder, &["export", shrunk, "-o", "case.toml", "--history", "h"]);
+        assert!(exported.status.success(), "{}", stderr(&exported));
+        let text = std::fs::read_to_string(&case).unwrap();
+        for choice in small["choices"].as_array().unwrap() {
+            for side in ["below", "above"] {
+                let Some(value) = choice[format!("passes_{side}")].as_f64() else { continue };
+                let name = choice["name"].as_str().unwrap();
+                let Some(edited) = with_choice(&text, name, value) else { continue };
+                std::fs::write(&case, edited).unwrap();
+                let again = actcheck(folder, &["run", "case.toml", "--history", "again", "--format", "json"]);
+                let again: Value =
+                    serde_json::from_str(&stdout(&again)).unwrap_or_else(|_| panic!("{}", stderr(&again)));
+                let others =
+                    if one.is_empty() { 0 } else { choice[format!("others_fail_{side}")].as_array().unwrap().len() };
+                let fails = names(&again["failed"]);
+                assert!(again["recurrence"] != "undecided" && !fails.iter().any(|name| name == property), "{again:#}");
+                assert_eq!(fails.len(), others, "{name} = {value} in {shrunk}: {again:#}");
+                replayed += 1;
+            }
+        }
+    }
+    assert!(replayed >= 4, "{replayed} values were replayed");
+}
+
+/// A case's text with another number for a choice, such as `sense.glass_1.y` or `sense.glass_1.y (2)`. Returns `None` for a
+/// choice that the text writes in words.
+fn with_choice(text: &str, name: &str, value: f64) -> Option<String> {
+    let (name, nth) = match name.strip_suffix(')').and_then(|name| name.split_once(" (")) {
+        Some((name, nth)) => (name, nth.parse::<usize>().unwrap() - 1),
+        None => (name, 0),
+    };
+    let mut lines: Vec<String> = text.lines().map(str::to_owned).collect();
+    let key = |line: &str| line.split(" = ").next().unwrap().trim_matches('"') == name;
+    let line = lines.iter_mut().find(|line| line.contains(" = ") && key(line))?;
+    let (key, written) = line.split_once(" = ").unwrap();
+    let written = written.split('#').next().unwrap().trim();
+    let mut numbers: Vec<&str> = written.trim_matches(['[', ']']).split(", ").collect();
+    numbers.get(nth)?.parse::<f64>().ok()?;
+    let value = format!("{value:?}");
+    numbers[nth] = &value;
+    let joined = numbers.join(", ");
+    *line = if numbers.len() == 1 { format!("{key} = {joined}") } else { format!("{key} = [{joined}]") };
+    Some(lines.join("\n"))
+}
+
 fn started(folder: &Path, arguments: &[&str]) -> Child {
     let program = env!("CARGO_BIN_EXE_actcheck");
     let mut command = Command::new(program);

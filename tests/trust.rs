@@ -105,3 +105,53 @@ fn rules_lists_every_property_with_its_rate() {
     let missing = actcheck(project.path(), &["rules", "--ontology", "nowhere.ttl"]);
     assert_eq!(missing.status.code(), Some(2));
 }
+
+#[test]
+fn a_pass_that_no_left_side_tested_is_counted_as_vacuous() {
+    let project = project();
+    let folder = project.path();
+    for (name, left) in [("High", "w:z(?o) > 10"), ("Lifted", "w:rise(?o) > 0.001")] {
+        let text = format!("success(?o) :- parameter(act:pickObject, ?o), always({left} implies w:speed(?o) < 1000) .");
+        std::fs::write(folder.join(format!("rules/{name}.rls")), text).unwrap();
+    }
+    let ontology = folder.join("ontology/actions.ttl");
+    edit(&ontology, "act:CloseObject, act:ObjectGrasped", "act:High, act:Lifted, act:CloseObject, act:ObjectGrasped");
+    let text = std::fs::read_to_string(&ontology).unwrap();
+    let more = "\nact:High a act:Property ; act:verifiedBy <../rules/High.rls> .\n\
+                act:Lifted a act:Property ; act:verifiedBy <../rules/Lifted.rls> .\n";
+    std::fs::write(&ontology, text + more).unwrap();
+
+    let run = ["run", "configs/pick.toml", "--runs", "2", "--history", "h", "--format", "json"];
+    let printed = json(&actcheck(folder, &run));
+    let vacuous = |printed: &Value| -> Vec<(String, Value)> {
+        let properties = printed["properties"].as_array().unwrap();
+        properties.iter().map(|of| (of["property"].as_str().unwrap().to_owned(), of["vacuous"].clone())).collect()
+    };
+    for (property, count) in vacuous(&printed) {
+        assert_eq!(count, if property.ends_with("#High") { 2 } else { 0 }, "{property}");
+    }
+    let remarks = printed["remarks"].as_array().unwrap();
+    let remark = remarks.iter().find(|remark| remark["oddity"] == "vacuous").expect("there is a remark");
+    assert_eq!(remark["properties"], serde_json::json!(["http://actions#High"]));
+    assert_eq!((&remark["count"], &remark["of"], &remark["severity"]), (&2.into(), &2.into(), &"warning".into()));
+    let outcomes = printed["runs"][0]["actions"][0]["outcomes"].as_array().unwrap();
+    let of = |name: &str| outcomes.iter().find(|of| of["property"] == format!("http://actions#{name}")).unwrap();
+    assert_eq!((&of("High")["vacuous"], &of("Lifted")["vacuous"]), (&true.into(), &false.into()));
+    assert!(of("CloseObject")["vacuous"].is_null());
+
+    // The history keeps it.
+    let shown = stdout(&actcheck(folder, &["show", printed["runs"][0]["run"].as_str().unwrap(), "--history", "h"]));
+    assert!(shown.contains("passed, vacuously"), "{shown}");
+    let summary = stdout(&actcheck(folder, &["run", "configs/pick.toml", "--runs", "2", "--history", "h2"]));
+    assert!(summary.contains("2 vacuously"), "{summary}");
+    let query = "SELECT (COUNT(*) AS ?n) WHERE { ?result act:vacuous true }";
+    let kept = stdout(&actcheck(folder, &["query", "--history", "h", "--format", "csv", query]));
+    assert_eq!(kept.lines().nth(1), Some("2"), "{kept}");
+
+    let again = actcheck(folder, &["recheck", "--history", "h", "--format", "json"]);
+    for (property, count) in vacuous(&json(&again)) {
+        assert_eq!(count, if property.ends_with("#High") { 2 } else { 0 }, "{property}");
+    }
+    let again = stdout(&actcheck(folder, &["recheck", "--history", "h"]));
+    assert!(again.contains("2 passed; 2 vacuously"), "{again}");
+}

@@ -74,16 +74,37 @@ def moved_by(action, body):
     return np.linalg.norm(action.after.bodies[body].pose.position - action.before.bodies[body].pose.position)
 
 
+def largest(action, body, extreme):
+    """An extreme of a body during the action: `max_tilt_rad` or `max_displacement_m`; 0 in runs of earlier versions."""
+    return action.extremes.get(body, {}).get(extreme) or 0.0
+
+
+def left_its_place_by(action, body):
+    """Largest distance of a body from its place, during the action or at its end."""
+    return max(moved_by(action, body), largest(action, body, "max_displacement_m"))
+
+
 def knocked_over(action, body):
-    """It tilts by 45 degrees (0.79 rad) more than before."""
-    return action.after.bodies[body].pose.tilt() - action.before.bodies[body].pose.tilt() > 0.79
+    """At some time it tilts by 45 degrees (0.79 rad) more than at the start."""
+    tilt = max(action.after.bodies[body].pose.tilt(), largest(action, body, "max_tilt_rad"))
+    return tilt - action.before.bodies[body].pose.tilt() > 0.79
+
+
+def rolls_on(action, body):
+    """It was faster than 2 cm/s when the action began, and neither the robot nor a movable thing touched it since."""
+    was = action.before.bodies[body]
+    if was.fixed or was.asleep or not np.linalg.norm(was.velocity) > 0.02:
+        return False
+    partners = {contact["first"] for contact in action.contacts if contact["second"] == body}
+    partners |= {contact["second"] for contact in action.contacts if contact["first"] == body}
+    return not any(is_robot(each) or each in action.before.bodies and not action.before.bodies[each].fixed for each in partners)
 
 
 def shifted_by(action, body):
     """How far furniture moved, at its origin or, if it turned, at its ends."""
     before, after = action.before.bodies[body], action.after.bodies[body]
     angle = abs(wrapped(after.pose.yaw() - before.pose.yaw()))
-    return max(moved_by(action, body), (before.high - before.low)[:2].max() * np.sin(angle / 2))
+    return max(left_its_place_by(action, body), (before.high - before.low)[:2].max() * np.sin(angle / 2))
 
 
 def robot_moved(action):
@@ -137,16 +158,45 @@ def forces(action):
     return [(thing, force) for link, thing, force in found if thing != "floor" or link not in standing]
 
 
-def collisions(action, force_limit, expected):
-    """Used shares of limits: pressing unexpected things, shifting furniture by 1 cm, being 5 mm inside itself."""
-    shares = [force / force_limit for thing, force in forces(action) if thing not in expected]
-    shares += [shifted_by(action, id) / 0.01 for id, body in action.before.bodies.items() if body.fixed]
-    shares += [contact["max_depth_m"] / 0.005 for contact in action.self_contacts]
-    return shares
-
-
 def in_hand(action):
     return [id for id in action.before.bodies if action.before.holds(id)]
+
+
+def let_go(action, body):
+    """It was in the hand, and at the end no finger touches it, or something else supports it that did not before."""
+    touching = {*action.after.left_touches, *action.after.right_touches}
+    below = [id for id in action.after.bodies[body].rests_on if not is_robot(id) and id not in action.before.bodies[body].rests_on]
+    return body not in touching or (not action.after.holds(body) and bool(below))
+
+
+def carried_forces(action, carried, since_start):
+    """The largest force of each contact of things that the robot moves with others; also of old contacts if `since_start`."""
+    for contact in action.contacts:
+        pair = [contact["first"], contact["second"]]
+        if since_start or contact["start_s"] > 0.0:
+            for own, other in (pair, pair[::-1]):
+                if own in carried and other not in carried and not is_robot(other):
+                    yield contact["max_force_n"]
+
+
+def harm(action, force_limit, meant, placed=(), since_start=True):
+    """Used shares of limits, over the whole action and for everything but the things that it is meant to move.
+
+    Things move by 1 cm, are knocked over, are pressed, are dropped; the robot presses itself with 5 N or is 5 mm inside
+    itself. A thing that leaves the world has moved by metres."""
+    shares = [force / force_limit for thing, force in forces(action) if thing not in meant]
+    shares += [force / force_limit for force in carried_forces(action, meant, since_start)]
+    for id, body in action.before.bodies.items():
+        if body.fixed:
+            shares.append(shifted_by(action, id) / 0.01)
+        elif id not in meant and not rolls_on(action, id):
+            shares += [left_its_place_by(action, id) / 0.01, 2.0 if knocked_over(action, id) else 0.0]
+    shares += [2.0 for id in in_hand(action) if id not in placed and let_go(action, id)]
+    # Fingers of one hand may meet. Runs of earlier versions measured no forces between links.
+    own = [contact for contact in action.self_contacts if not contact["of_hand"]]
+    shares += [contact["max_depth_m"] / 0.005 for contact in own]
+    shares += [(contact["max_force_n"] or 0.0) / 5.0 for contact in own]
+    return shares
 
 
 def verdict_of_shares(shares, applies):
@@ -156,17 +206,15 @@ def verdict_of_shares(shares, applies):
 
 
 def no_handling_collisions(action):
-    """The robot moved, knocked over and pressed (70 N) nothing but its object, and shifted no furniture."""
-    expected = [*action.parameters["pickObject"], *in_hand(action)]
-    others = [id for id, body in action.before.bodies.items() if not body.fixed and id not in expected]
-    shares = collisions(action, 70.0, expected)
-    shares += [moved_by(action, id) / 0.01 for id in others] + [2.0 for id in others if knocked_over(action, id)]
+    """The robot harmed nothing but its object: 70 N."""
+    target = action.parameters["pickObject"]
+    shares = harm(action, 70.0, [*target, *in_hand(action)], placed=target)
     return verdict_of_shares(shares, robot_moved(action))
 
 
 def no_drive_collisions(action):
-    """The robot pressed (1 N) nothing but the object in its hand, and shifted no furniture."""
-    return verdict_of_shares(collisions(action, 1.0, in_hand(action)), robot_drove(action))
+    """The robot and its held object harmed nothing (1 N), and it still holds that object."""
+    return verdict_of_shares(harm(action, 1.0, in_hand(action), since_start=False), robot_drove(action))
 
 
 # Pick --------------------------------------------------------------------------------------------------------------
@@ -179,8 +227,24 @@ def close_object(action):
 
 
 def moved_object(action):
-    """The object moved by more than 2 cm."""
-    return at_most([-moved_by(action, target(action))], -0.02)
+    """The object moved by more than 2 cm, and is as far above its former support, or all of it is as far beyond the edge."""
+    body = target(action)
+    before, after = action.before.bodies[body], action.after.bodies[body]
+    gaps = [moved_by(action, body)]
+    for below in (id for id in before.rests_on if not is_robot(id)):
+        rise = after.low[2] - before.low[2]
+        gaps.append(rise if below == "floor" else max(rise, *(beyond(action.before.bodies[below], after) - half_width(after))))
+    return at_most([-gap for gap in gaps], -0.02)
+
+
+def half_width(body):
+    return (body.high - body.low)[:2].max() / 2
+
+
+def beyond(support, body):
+    """How far the centre of a body is beyond the edges of another, along its length and its width; negative inside."""
+    middle, heading, size = rectangle(support)
+    return np.abs(turn(-heading) @ (box_centre(body) - middle)) - size / 2
 
 
 def object_in_gripper(action):
@@ -242,9 +306,13 @@ def size_error(seen, body):
 
 
 def objects_detected(action):
-    """Each object on the surface has one percept within 5 cm, of its kind and its size (5 cm), and there are no others.
+    """Each object on the surface has one percept within 5 cm, of its kind, height and size (5 cm), and there are no others.
 
-    A percept without a kind is enough, except of the object to pick."""
+    A percept without a kind is enough, except of the object to pick; `Object` does not count as a kind. An upright object is
+    perceived upright (15 degrees, 0.26 rad). The robot harmed nothing (1 N), and still holds its object."""
+    undisturbed = at_most(harm(action, 1.0, in_hand(action), since_start=False), 1.0, SHARE)
+    if undisturbed.outcome == "failed":
+        return undisturbed
     on_it = [body for body in action.before.bodies.values() if not body.fixed and surface(action) in body.rests_on]
     centres = np.array([box_centre(body) for body in on_it]).reshape(-1, 2)
     places = np.array([from_believed(action, seen)[0] for seen in action.objects]).reshape(-1, 2)
@@ -255,12 +323,17 @@ def objects_detected(action):
     near = gaps.min(axis=1) <= 0.05
     pairs = [(seen, on_it[body]) for seen, body, close in zip(action.objects, nearest, near) if close]
     counts = np.bincount(nearest[near], minlength=len(on_it))
+    target = action.parameters.get("pickObject", [])
     kinds = all(
-        seen.category in body.kinds if seen.category else body.id not in action.parameters.get("pickObject", [])
+        seen.category in body.kinds
+        if seen.category and (seen.category != "Object" or body.id not in target)
+        else body.id not in target
         for seen, body in pairs
     )
-    sizes = [size_error(seen, body) for seen, body in pairs]
-    good = near.all() and (counts == 1).all() and kinds and all(size <= 0.05 for size in sizes)
+    leans = any(seen.pose.tilt() >= 0.26 for seen, body in pairs if body.pose.tilt() < 0.26)
+    sizes = [abs(seen.pose.position[2] - body.low[2]) for seen, body in pairs]
+    sizes += [size_error(seen, body) for seen, body in pairs]
+    good = near.all() and (counts == 1).all() and kinds and not leans and all(size <= 0.05 for size in sizes)
     slack = min([np.abs(gaps.min(axis=1) - 0.05).min(), *(abs(size - 0.05) for size in sizes)])
     return Verdict("passed" if good else "failed", slack)
 
@@ -269,12 +342,16 @@ def objects_detected(action):
 
 
 def object_on_surface(action):
-    """The surface carries the object, which is upright (15 degrees, 0.26 rad) and slower than 1 cm/s."""
+    """The surface carries the object, which is upright (15 degrees, 0.26 rad), 2 cm inside the edges, and at rest.
+
+    At rest: slower than 1 cm/s and 0.2 rad/s, and not faster than 2 cm/s in the last 0.2 s."""
     body, below = action.after.bodies[target(action)], action.after.bodies[surface(action, "placeSurface")]
     on_it = below.id in body.rests_on
     gap = abs(body.low[2] - below.high[2])
-    speed = 0.0 if body.asleep else np.linalg.norm(body.velocity)
-    slacks = [0.005 - gap, 0.26 - body.pose.tilt(), 0.01 - speed]
+    speed, spin = (0.0, 0.0) if body.asleep else (np.linalg.norm(body.velocity), np.linalg.norm(body.spin))
+    slacks = [0.005 - gap, 0.26 - body.pose.tilt(), 0.01 - speed, 0.2 - spin, -beyond(below, body).max() - 0.02]
+    # Times have another unit than the rest, but only their sign and a narrow miss matter.
+    slacks += [action.duration - end - 0.2 for _, end in action.motions.get(body.id, [])]
     return Verdict("passed" if on_it and min(slacks) >= 0 else "failed", min(slacks) if on_it else None)
 
 

@@ -21,6 +21,7 @@ class Body:
     fixed: bool
     pose: Pose
     velocity: np.ndarray
+    spin: np.ndarray
     low: np.ndarray
     high: np.ndarray
     size: np.ndarray | None
@@ -72,7 +73,8 @@ class Action:
     """One action of a run with its stored outcomes: pairs of an outcome and a margin, by property.
 
     `path` has the smallest and the largest x and y of the base; `joints` the largest speed of each joint as a share of
-    its limit."""
+    its limit; `extremes` the largest tilt and displacement of each body during the action; `motions` the times at
+    which it was faster than 2 cm/s."""
 
     run: Run
     step: int
@@ -80,6 +82,7 @@ class Action:
     parameters: dict
     end: str
     reported: bool | None
+    duration: float
     path: np.ndarray | None
     before: State | None = None
     after: State | None = None
@@ -88,6 +91,8 @@ class Action:
     plane: Seen | None = None
     objects: list = field(default_factory=list)
     joints: dict = field(default_factory=dict)
+    extremes: dict = field(default_factory=dict)
+    motions: dict = field(default_factory=dict)
     outcomes: dict = field(default_factory=dict)
 
 
@@ -107,6 +112,7 @@ def read(folder):
             parameters=json.loads(row["parameters"]),
             end=row["end"],
             reported=row["reported"],
+            duration=row["duration_s"],
             path=None if path is None else path.reshape(2, 2),
             before=states.get((row["run"], row["step"] - 1)),
             after=states.get((row["run"], row["step"])),
@@ -164,6 +170,7 @@ def read_states(tables):
             fixed=row["fixed"],
             pose=pose(row),
             velocity=numbers(row, "vx_m_s", "vy_m_s", "vz_m_s"),
+            spin=numbers(row, "wx_rad_s", "wy_rad_s", "wz_rad_s"),
             low=numbers(row, "min_x_m", "min_y_m", "min_z_m"),
             high=numbers(row, "max_x_m", "max_y_m", "max_z_m"),
             size=known(row, "size_x_m", "size_y_m", "size_z_m"),
@@ -205,6 +212,11 @@ def add_events(tables, actions):
     for row in tables.rows("percepts"):
         if row["source"] == "reported":
             of(row).objects.append(seen(row, "width_m", "depth_m", "height_m", category=row["category"]))
+    for row in tables.rows("extremes"):
+        of(row).extremes[row["body"]] = row
+    for row in tables.rows("intervals"):
+        if row["kind"] == "motion":
+            of(row).motions.setdefault(row["body"], []).append((row["start_s"], row["end_s"]))
     for row in tables.rows("joint_extremes"):
         of(row).joints[row["joint"]] = row["max_speed_share"]
 

@@ -8,6 +8,7 @@ mod cup;
 mod cut;
 mod external;
 mod forced;
+mod forced_hand;
 mod foresee;
 mod grasp;
 mod grip;
@@ -42,6 +43,6 @@ pub use foresee::{ForeseenPick, ForeseenView, foresee_pick, foresee_view, needed
 pub use grip::feels_in;
 pub use memory::Held;
 pub use operator::{Interrupt, Operator};
-pub use perform::{Interference, perform, perform_with};
+pub use perform::{Gate, Interference, perform, perform_with};
 pub use sabotage::{Accident, Defect, Moment, Sabotage, Saboteur};
 pub use skills::{UnknownSkill, known_skill};

@@ -4,6 +4,9 @@ use nalgebra::Vector3;
 
 use actcheck_data::{KnownKind, PerceivedThing};
 
+/// How far above its place an object is perceived. Unit: metres. Higher than any of our objects.
+const RAISED_M: f64 = 0.4;
+
 /// Exchanges the poses of two perceived objects: one of the category, if there is one, and the nearest of another
 /// category. Returns whether there are two such objects.
 pub fn swap(things: &mut [PerceivedThing], category: Option<&str>) -> bool {
@@ -28,6 +31,12 @@ pub fn mistake(things: &mut [PerceivedThing], category: Option<&str>, kinds: &[K
     let Some(kind) = others.max_by(|a, b| off(a).total_cmp(&off(b))) else { return false };
     (thing.category, thing.size_m) = (Some(kind.category.clone()), kind.size_m);
     true
+}
+
+/// Moves every perceived object up. Returns whether there is one.
+pub fn raise(things: &mut [PerceivedThing]) -> bool {
+    things.iter_mut().for_each(|thing| thing.pose.position[2] += RAISED_M);
+    !things.is_empty()
 }
 
 /// The index of the first object of the category, or else of the first recognised object.
@@ -57,6 +66,14 @@ mod tests {
         assert_eq!(shown(&things), [(Some("mug"), 0.0), (Some("glass"), 1.2), (Some("can"), 1.0)]);
         assert!(!swap(&mut [thing(Some("mug"), 0.0), thing(Some("mug"), 1.0)], None));
         assert!(!swap(&mut [], Some("glass")));
+    }
+
+    #[test]
+    fn raised_objects_keep_their_places_on_the_map() {
+        let mut things = vec![thing(Some("mug"), 0.5)];
+        assert!(raise(&mut things) && !raise(&mut []));
+        assert!((things[0].pose.position[2] - 1.1).abs() < 1e-9);
+        assert_eq!(shown(&things), [(Some("mug"), 0.5)]);
     }
 
     #[test]

@@ -7,7 +7,7 @@ use crate::skills::skill;
 use crate::{ActionCall, ExternalFault, ExternalSkill, Saboteur};
 use actcheck_data::{
     ActionEnd, ActionReport, ActionTrace, Budget, Choices, ContactEpisode, Extremes, Form, Frames, RobotCourse,
-    SceneMap, Trace,
+    SceneMap, Snapshot, Trace,
 };
 use actcheck_world::World;
 
@@ -28,9 +28,19 @@ pub struct Interference<'a> {
     pub saboteur: Option<&'a mut Saboteur>,
     /// Performs the actions it knows, instead of the reference skills.
     pub external: Option<&'a mut dyn ExternalSkill>,
+    /// Decides before each action whether it may be performed.
+    pub gate: Option<&'a mut dyn Gate>,
+}
+
+/// Decides whether an action may be performed.
+pub trait Gate {
+    /// Returns the reason why an action must not be performed in this state of the world; `None` if it may be.
+    fn reason_not_to_perform(&mut self, call: &ActionCall, state: &Snapshot) -> Option<String>;
 }
 
 /// Performs the actions as [`perform`] does, with interference.
+///
+/// An action that the gate refuses is not performed; the run goes on with the next one.
 ///
 /// The trace records the calls as given, not as sabotaged.
 pub fn perform_with(
@@ -47,14 +57,18 @@ pub fn perform_with(
     let mut robot_courses = Vec::with_capacity(calls.len());
     let mut begun = interference.external.as_deref_mut().map_or(Ok(()), |skill| skill.begin_run(world));
     for call in calls {
-        let stopped = actions.last().is_some_and(|last| last.end != ActionEnd::Completed);
+        let stopped = actions.last().is_some_and(|last| !last.end.lets_run_go_on());
         if stopped {
             actions.push(ActionTrace::not_reached(&call.action, &call.parameters));
             continue;
         }
-        let (action, course) = match std::mem::replace(&mut begun, Ok(())) {
-            Ok(()) => perform_one(call, (world, choices, &mut memory), budget, &mut interference),
-            Err(fault) => (never_begun(call, ended_by(fault)), RobotCourse::default()),
+        let state = snapshots.last();
+        let refused = interference.gate.as_deref_mut().zip(state);
+        let refused = refused.and_then(|(gate, state)| gate.reason_not_to_perform(call, state));
+        let (action, course) = match (std::mem::replace(&mut begun, Ok(())), refused) {
+            (Err(fault), _) => (never_begun(call, ended_by(fault)), RobotCourse::default()),
+            (Ok(()), Some(reason)) => (never_begun(call, ActionEnd::NotPerformed(reason)), RobotCourse::default()),
+            (Ok(()), None) => perform_one(call, (world, choices, &mut memory), budget, &mut interference),
         };
         actions.push(action);
         robot_courses.push(course);

@@ -4,7 +4,7 @@
 //! The skill is unmodified and the recorder sees only physics: neither is informed of the fault.
 
 use crate::whereabouts::{before, body, box_distance, farther, holds, is_above, mistaken, others_by_distance, outside};
-use crate::{ActionCall, forced, misperception};
+use crate::{ActionCall, forced, forced_hand, misperception};
 use actcheck_data::{ActionReport, KnownKind, Perceived, RobotProfile, Snapshot};
 use actcheck_world::{Command, Observation, Perturbation, Sighting, World};
 
@@ -50,6 +50,8 @@ pub enum Defect {
     SwappedPercepts,
     /// The camera perceives an object, the named one if there is one, as an object of another kind.
     MistakenKind,
+    /// The camera perceives every object above its place.
+    FalseHeight,
 }
 
 /// When an accident happens: once per run, at the first control tick at which this holds.
@@ -61,8 +63,12 @@ pub enum Moment {
     Reaching,
     /// Both fingers hold the object in the air, and nothing else touches it.
     Carrying,
+    /// Both fingers hold the object, and it is not lifted yet.
+    Grasping,
     /// The base is half a metre from where the action began.
     Driving,
+    /// The same, and the hand holds an object.
+    DrivingLoaded,
     /// The hand holds the object above the target surface.
     Lowering,
     /// The hand has released the object it held when the action began.
@@ -94,9 +100,22 @@ pub enum Accident {
     ArmThroughHead,
     /// The motor of the arm's last joint runs away with a multiple of its largest effort.
     RunawayMotor,
+    /// The hand drags the object, lifts it by less than a centimetre, and the robot stays so.
+    Drags,
+    /// The object's nearest neighbour is moved aside and back.
+    NeighbourMoved,
+    /// The hand moves through the nearest object and back.
+    Sweeps,
+    /// The robot pushes another object with the one in its hand.
+    PushesWithHeld,
 }
 
 impl Sabotage {
+    /// Whether it needs an object in the hand before the action.
+    pub fn needs_load(&self) -> bool {
+        matches!(self.world, Some((Moment::DrivingLoaded, _) | (_, Accident::PushesWithHeld)))
+    }
+
     /// Whether it can happen to a robot: one without a base can't be pushed against furniture.
     pub fn suits(&self, robot: &RobotProfile) -> bool {
         match self.world {
@@ -124,6 +143,8 @@ pub struct Saboteur {
     opening_m: Option<f64>,
     /// A joint whose motor runs away, and its effort. Unit: newtons or newton metres.
     runaway: Option<(usize, f64)>,
+    /// The command that the robot carries out, whatever its skill commands.
+    stuck: Option<Command>,
     /// The kind of the named object.
     kind: Option<KnownKind>,
     /// The object whose percept is exchanged with that of the named object.
@@ -146,6 +167,7 @@ impl Saboteur {
             first_sights: Vec::new(),
             opening_m: None,
             runaway: None,
+            stuck: None,
             kind: None,
             swapped: None,
             defective: false,
@@ -164,14 +186,14 @@ impl Saboteur {
     /// Begins an action and returns the call as the robot understands it.
     pub(super) fn begin(&mut self, call: &ActionCall, world: &mut World) -> ActionCall {
         self.armed = self.sabotage.actions.is_empty() || self.sabotage.actions.contains(&call.action.as_str());
+        self.object = call.value(OBJECT).map(str::to_owned);
+        self.place = call.value(PLACE).map(str::to_owned);
         if let (Some((Moment::Starting, accident)), true, false) = (self.sabotage.world, self.armed, self.happened) {
             self.happened = self.happen(accident, world);
         }
         let start = world.snapshot();
-        self.object = call.value(OBJECT).map(str::to_owned);
-        self.place = call.value(PLACE).map(str::to_owned);
         self.kind = self.object.as_deref().and_then(|object| world.kind_of(object));
-        (self.frozen, self.swapped, self.runaway) = (None, None, None);
+        (self.frozen, self.swapped, self.runaway, self.stuck) = (None, None, None, None);
         let mut understood = call.clone();
         match self.sabotage.robot.filter(|_| self.armed) {
             Some(Defect::WrongObject) => {
@@ -191,7 +213,7 @@ impl Saboteur {
                 let object = self.object.as_deref().unwrap_or_default();
                 self.swapped = others_by_distance(&start, object).first().map(|other| other.id.clone());
             }
-            Some(Defect::MistakenKind) | None => {}
+            Some(Defect::MistakenKind | Defect::FalseHeight) | None => {}
         }
         self.start = Some(start);
         understood
@@ -209,7 +231,7 @@ impl Saboteur {
         {
             self.happened = self.happen(accident, world);
         }
-        let mut forced = command.clone();
+        let mut forced = self.stuck.as_ref().unwrap_or(command).clone();
         if let Some(opening_m) = self.opening_m {
             forced.gripper_opening_m = opening_m;
         }
@@ -236,6 +258,7 @@ impl Saboteur {
         let changed = match self.sabotage.robot.filter(|_| self.armed) {
             Some(Defect::SwappedPercepts) => misperception::swap(&mut honest.things, category),
             Some(Defect::MistakenKind) => misperception::mistake(&mut honest.things, category, kinds),
+            Some(Defect::FalseHeight) => misperception::raise(&mut honest.things),
             _ => false,
         };
         self.defective |= changed;
@@ -279,22 +302,24 @@ impl Saboteur {
     fn is_time_for(&self, moment: Moment, world: &World) -> bool {
         let Some(start) = &self.start else { return false };
         let now = world.snapshot();
-        if moment == Moment::Driving {
+        if matches!(moment, Moment::Driving | Moment::DrivingLoaded) {
             let ([x0, y0, _], [x, y, _]) = (start.robot.base_true, now.robot.base_true);
-            return libm::hypot(x - x0, y - y0) > DRIVEN_M;
+            let is_loaded = moment == Moment::Driving || forced_hand::in_hand(&now).is_some();
+            return is_loaded && libm::hypot(x - x0, y - y0) > DRIVEN_M;
         }
         let Some(object) = &self.object else { return false };
         let (Some(was), Some(is)) = (body(start, object), body(&now, object)) else { return false };
         let hangs = holds(&now, object) && is.touches.iter().all(|other| other == "robot");
         match moment {
             Moment::Reaching => box_distance(is, now.robot.gripper.position) < REACHING_M,
+            Moment::Grasping => holds(&now, object) && is.pose.position[2] - was.pose.position[2] < CARRIED_M,
             Moment::Carrying => hangs && is.pose.position[2] - was.pose.position[2] > CARRIED_M,
             Moment::Lowering => {
                 let place = self.place.as_deref().and_then(|place| body(&now, place));
                 hangs && place.is_some_and(|place| is_above(is, place))
             }
             Moment::LetGo => holds(start, object) && !is.touches.iter().any(|other| other == "robot"),
-            Moment::Starting | Moment::Driving => false,
+            Moment::Starting | Moment::Driving | Moment::DrivingLoaded => false,
         }
     }
 
@@ -323,6 +348,13 @@ impl Saboteur {
             Accident::CarriedOff => return world.kidnap(outside(world, now.robot.base_true)),
             Accident::PushedIntoFurniture => return forced::push_base(world),
             Accident::ArmThroughHead => return forced::arm_through_head(world),
+            Accident::Drags => {
+                self.stuck = forced_hand::drag(world);
+                return self.stuck.is_some();
+            }
+            Accident::NeighbourMoved => return forced_hand::move_neighbour(world, object),
+            Accident::Sweeps => return forced_hand::sweep(world),
+            Accident::PushesWithHeld => return forced_hand::push_with_held(world),
             Accident::RunawayMotor => {
                 self.runaway = forced::run_away(world);
                 return self.runaway.is_some();

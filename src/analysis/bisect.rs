@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use crate::compare::{Compared, ComparedRun};
-use crate::{Answer, ComparedLine, Comparison, compare};
+use crate::{Answer, ComparedLine, Comparison, Sampling, compare};
 use actcheck_base::Outcome;
 
 /// The end of a bisection that a version is like.
@@ -52,7 +52,7 @@ pub fn outcome_flips(first: &[ComparedRun], second: &[ComparedRun]) -> Vec<Outco
             continue;
         };
         let all: BTreeSet<&Compared> = run.outcomes().keys().chain(other.outcomes().keys()).collect();
-        for of in all.into_iter().filter(|of| **of != Compared::WholeRun) {
+        for of in all.into_iter().filter(|of| matches!(of, Compared::Property { .. })) {
             let outcomes = [run, other].map(|run| run.outcomes().get(of).copied());
             if outcomes[0] != outcomes[1] {
                 let runs = [run.run.clone(), other.run.clone()];
@@ -94,11 +94,11 @@ pub fn like_by_outcomes(flips: &[OutcomeFlip], version: &[ComparedRun]) -> Liken
 /// the margin.
 pub fn like_by_rates(ends: [&[ComparedRun]; 2], version: &[ComparedRun], level: f64, margin: f64) -> Likeness {
     let [first, second] = ends;
-    let wanted: BTreeSet<Compared> = worse_lines(&compare(first, second), level, margin);
+    let wanted: BTreeSet<Compared> = worse_lines(&compare(first, second, Sampling::Fixed), level, margin);
     let answers = |comparison: &Comparison| -> BTreeMap<Compared, Answer> {
         comparison.lines.iter().map(|line| (line.of.clone(), line.answer(level, margin))).collect()
     };
-    let [from_first, from_second] = [first, second].map(|end| answers(&compare(end, version)));
+    let [from_first, from_second] = [first, second].map(|end| answers(&compare(end, version, Sampling::Fixed)));
     if wanted.iter().any(|of| from_first.get(of) == Some(&Answer::Worse)) {
         return Likeness::Second;
     }

@@ -4,7 +4,7 @@
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::sync::Arc;
 
-use crate::{Difference, PairedTable, PairedTest, holm};
+use crate::{Difference, PairedTable, PairedTest, Sampling, holm};
 use actcheck_base::Outcome;
 use actcheck_history::{JudgedOutcome, JudgedRun, OutcomeRow, RunRow, RunStatus, SceneDigest};
 use actcheck_verdict::Counts;
@@ -14,6 +14,8 @@ use actcheck_verdict::Counts;
 pub enum Compared {
     /// Whole runs. A run passes if at least one property passed and none failed.
     WholeRun,
+    /// Whether the run completed: it passes unless it is broken or timed out. Compared only if a run did not.
+    Completion,
     /// A property over all executions of the action in a run.
     Property {
         /// IRI of the action.
@@ -81,6 +83,8 @@ pub struct Comparison {
     pub judged_alone: [Vec<Compared>; 2],
     /// Whole runs first, then by action and property.
     pub lines: Vec<ComparedLine>,
+    /// How the number of scenes was decided: which tests and intervals are valid.
+    pub sampling: Sampling,
 }
 
 /// Returns the runs of a campaign for a comparison, sorted by place. Runs without a known scene are left out.
@@ -179,6 +183,8 @@ fn by_subject(status: RunStatus, outcomes: &[JudgedOutcome]) -> BTreeMap<Compare
         }
     };
     found.insert(Compared::WholeRun, whole);
+    let completed = if status == RunStatus::Completed { Outcome::Passed } else { Outcome::Failed };
+    found.insert(Compared::Completion, completed);
     found
 }
 
@@ -192,8 +198,8 @@ fn together(one: Outcome, other: Outcome) -> Outcome {
 /// Compares two campaigns by pairs of runs with the same place and the same scene.
 ///
 /// If scenes are repeated, a scene passes if all its runs pass: runs of one scene are too alike to be counted
-/// separately. Only repetitions that both sides have are compared.
-pub fn compare(first: &[ComparedRun], second: &[ComparedRun]) -> Comparison {
+/// separately. Only repetitions that both sides have are compared. `sampling`: how the number of scenes was decided.
+pub fn compare(first: &[ComparedRun], second: &[ComparedRun], sampling: Sampling) -> Comparison {
     let by_place = |runs: &'_ [ComparedRun]| runs.iter().enumerate().map(|(at, run)| (run.place, at)).collect();
     let (firsts, seconds): (BTreeMap<_, usize>, BTreeMap<_, usize>) = (by_place(first), by_place(second));
     let alone = |runs: &[ComparedRun], other: &BTreeMap<(u64, u64), usize>| {
@@ -215,7 +221,8 @@ pub fn compare(first: &[ComparedRun], second: &[ComparedRun]) -> Comparison {
             judged_first.difference(&judged_second).cloned().collect(),
             judged_second.difference(&judged_first).cloned().collect(),
         ],
-        lines: lines(&pairs, judged_first.intersection(&judged_second)),
+        lines: lines(&pairs, judged_first.intersection(&judged_second), sampling),
+        sampling,
     }
 }
 
@@ -254,8 +261,14 @@ fn scene_pairs(same: &[[&ComparedRun; 2]]) -> Vec<ScenePair> {
     pairs.into_iter().map(|(_, pair)| pair).collect()
 }
 
-fn lines<'a>(pairs: &[ScenePair], compared: impl Iterator<Item = &'a Compared>) -> Vec<ComparedLine> {
-    let mut lines: Vec<ComparedLine> = compared.map(|of| line(pairs, of)).collect();
+fn lines<'a>(
+    pairs: &[ScenePair],
+    compared: impl Iterator<Item = &'a Compared>,
+    sampling: Sampling,
+) -> Vec<ComparedLine> {
+    let mut lines: Vec<ComparedLine> = compared.map(|of| line(pairs, of, sampling)).collect();
+    // Without discordant scenes its test can never be significant, so it costs the others no correction (Tarone, 1990).
+    lines.retain(|line| line.of != Compared::Completion || line.table.both < line.table.pairs());
     let two_sided = holm(&lines.iter().map(|line| line.test.two_sided).collect::<Vec<f64>>());
     let worse = holm(&lines.iter().map(|line| line.test.second_worse).collect::<Vec<f64>>());
     for ((line, two_sided), worse) in lines.iter_mut().zip(two_sided).zip(worse) {
@@ -264,7 +277,7 @@ fn lines<'a>(pairs: &[ScenePair], compared: impl Iterator<Item = &'a Compared>) 
     lines
 }
 
-fn line(pairs: &[ScenePair], of: &Compared) -> ComparedLine {
+fn line(pairs: &[ScenePair], of: &Compared, sampling: Sampling) -> ComparedLine {
     let mut table = PairedTable::default();
     let (mut worse, mut better, mut left_out) = (Vec::new(), Vec::new(), [Counts::default(); 2]);
     for pair in pairs {
@@ -280,11 +293,11 @@ fn line(pairs: &[ScenePair], of: &Compared) -> ComparedLine {
             _ => {}
         }
     }
-    let test = table.test();
+    let test = table.test_by(sampling);
     ComparedLine {
         of: of.clone(),
         table,
-        difference: table.difference(),
+        difference: table.difference_by(sampling),
         test,
         two_sided_adjusted: test.two_sided,
         second_worse_adjusted: test.second_worse,
@@ -331,7 +344,7 @@ mod tests {
     fn runs_are_paired_by_scene_and_unpaired_ones_are_counted() {
         let a = [run(0, "x", &[("p", Passed)]), run(1, "y", &[("p", Passed)]), run(2, "z", &[("p", Failed)])];
         let b = [run(1, "y", &[("p", Failed)]), run(2, "other", &[("p", Failed)]), run(3, "w", &[("p", Passed)])];
-        let found = compare(&a, &b);
+        let found = compare(&a, &b, Sampling::Fixed);
         assert_eq!(found.pairs, 1);
         assert_eq!(found.alone, [vec!["k-1".to_owned()], vec!["k-4".to_owned()]]);
         assert_eq!(found.other_scene, [("k-3".to_owned(), "k-3".to_owned())]);
@@ -347,7 +360,7 @@ mod tests {
         };
         let a = runs(&[&[Passed, Failed][..], &[Passed; 4]].concat());
         let b = runs(&[&[Passed, Passed][..], &open].concat());
-        let found = compare(&a, &b);
+        let found = compare(&a, &b, Sampling::Fixed);
         for line in &found.lines {
             assert_eq!(line.table, PairedTable { both: 1, only_second: 1, ..PairedTable::default() });
             assert_eq!(line.left_out[0], Counts { passed: 4, ..Counts::default() });
@@ -378,7 +391,7 @@ mod tests {
         };
         let a = runs(&[&[Passed, Passed, Failed], &[Passed, Passed, Passed], &[Passed, Broken, Passed]]);
         let b = runs(&[&[Passed, Passed], &[Passed, Failed], &[Passed, Passed]]);
-        let found = compare(&a, &b);
+        let found = compare(&a, &b, Sampling::Fixed);
         assert_eq!((found.pairs, found.alone[0].len(), found.alone[1].len()), (3, 3, 0));
         for line in &found.lines {
             assert_eq!(line.table, PairedTable { both: 1, only_first: 1, ..PairedTable::default() });
@@ -389,15 +402,43 @@ mod tests {
         }
     }
 
+    /// Regression: a program that crashed or hung whenever it would have failed was not worse than one that failed.
+    #[test]
+    fn a_rise_of_runs_that_do_not_complete_is_worse() {
+        let runs = |lost: u64, outcome: Outcome, status: RunStatus| -> Vec<ComparedRun> {
+            let one = |index: u64| {
+                let mut row = run_row(index);
+                let is_lost = index < lost;
+                row.status = if is_lost { status } else { RunStatus::Completed };
+                let scene = SceneDigest { arrangement: "s".to_owned(), physics: String::new() };
+                let outcomes = [outcome_row(index, "p", if is_lost { outcome } else { Passed })];
+                compared_runs(&[row.clone()], &BTreeMap::from([(row.run, scene)]), &outcomes).remove(0)
+            };
+            (0..30).map(one).collect()
+        };
+        let none = runs(0, Passed, RunStatus::Completed);
+        for (outcome, status) in [(Broken, RunStatus::Broken), (Timeout, RunStatus::Timeout)] {
+            let crashing = runs(8, outcome, status);
+            let found = compare(&none, &crashing, Sampling::Fixed);
+            let worse: Vec<&Compared> = found.worse_at(0.05).into_iter().map(|line| &line.of).collect();
+            assert_eq!(worse, [&Compared::Completion], "{found:?}");
+            // Two more such runs may be chance, an equal number does not count, and fewer are better.
+            for first in [runs(6, outcome, status), crashing.clone(), runs(20, outcome, status)] {
+                assert!(compare(&first, &crashing, Sampling::Fixed).worse_at(0.05).is_empty());
+            }
+        }
+        assert!(compare(&none, &none, Sampling::Fixed).lines.iter().all(|line| line.of != Compared::Completion));
+    }
+
     #[test]
     fn properties_judged_on_one_side_only_are_named() {
         let a = [run(0, "s", &[("old", Passed), ("p", Passed)])];
         let b = [run(0, "s", &[("new", Passed), ("p", Passed)])];
-        let found = compare(&a, &b);
+        let found = compare(&a, &b, Sampling::Fixed);
         let names = |list: &[Compared]| -> Vec<String> {
             list.iter()
                 .map(|of| match of {
-                    Compared::WholeRun => String::new(),
+                    Compared::WholeRun | Compared::Completion => String::new(),
                     Compared::Property { property, .. } => property.clone(),
                 })
                 .collect()

@@ -3,7 +3,7 @@
 
 use std::collections::BTreeMap;
 
-use crate::{Interval, wilson_share};
+use crate::{Interval, Sampling};
 
 /// A decided run of a scene.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -75,8 +75,8 @@ impl Variance {
     }
 }
 
-/// Computes the consistency of a property from its decided runs.
-pub fn consistency(runs: &[Repeated]) -> Consistency {
+/// Computes the consistency of a property from its decided runs. `sampling`: how the number of runs was decided.
+pub fn consistency(runs: &[Repeated], sampling: Sampling) -> Consistency {
     let mut scenes: BTreeMap<u64, Vec<&Repeated>> = BTreeMap::new();
     for run in runs {
         scenes.entry(run.scene).or_default().push(run);
@@ -93,11 +93,11 @@ pub fn consistency(runs: &[Repeated]) -> Consistency {
         always_failed: several().filter(|scene| scene.passed == 0).count() as u64,
         flaky: several().filter(|scene| scene.passed > 0 && scene.passed < scene.of).copied().collect(),
         pass_powers: (1..=counts.iter().map(|scene| scene.of).max().unwrap_or(0))
-            .filter_map(|k| pass_power(&counts, k))
+            .filter_map(|k| pass_power(&counts, k, sampling))
             .collect(),
         outcome: outcome_variance(&shares),
         margin: all_measured.then(|| variance(&numbers(&|run| run.margin.unwrap_or_default()))).flatten(),
-        rate: share_of_scenes(&shares),
+        rate: share_of_scenes(&shares, sampling),
     }
 }
 
@@ -107,7 +107,7 @@ fn count(scene: u64, runs: &[&Repeated]) -> SceneCounts {
 
 /// Returns the mean over scenes of C(passed, k) / C(runs, k), an unbiased estimate for any distribution of the scenes'
 /// probabilities.
-fn pass_power(counts: &[SceneCounts], k: u64) -> Option<PassPower> {
+fn pass_power(counts: &[SceneCounts], k: u64, sampling: Sampling) -> Option<PassPower> {
     let enough: Vec<f64> = counts
         .iter()
         .filter(|scene| scene.of >= k)
@@ -117,7 +117,7 @@ fn pass_power(counts: &[SceneCounts], k: u64) -> Option<PassPower> {
         })
         .collect();
     let scenes = enough.len() as f64;
-    let probability = wilson_share(enough.iter().sum::<f64>() / scenes, scenes)?;
+    let probability = sampling.share(enough.iter().sum::<f64>() / scenes, scenes)?;
     Some(PassPower { k, scenes: enough.len() as u64, probability })
 }
 
@@ -171,18 +171,17 @@ fn components(groups: &[Spread]) -> Option<Variance> {
     Some(Variance { noise, scene: (between / (count - 1.0) - noise) / size })
 }
 
-/// Computes the share of positive runs from the positive runs and all runs of each scene, with Wilson's interval for
-/// the effective sample size, since runs of one scene are correlated. If every scene was run once, this is Wilson's
-/// interval.
+/// Computes the share of positive runs from the positive runs and all runs of each scene, with the interval for the effective
+/// sample size, since runs of one scene are correlated. If every scene was run once, this is the interval of independent runs.
 ///
 /// Source: the design effect of Kish (1965), 1 + (m - 1) ρ, with ρ from the components of the variance.
-fn share_of_scenes(scenes: &[[u64; 2]]) -> Option<Interval> {
+fn share_of_scenes(scenes: &[[u64; 2]], sampling: Sampling) -> Option<Interval> {
     let sum = |number: fn(&[u64; 2]) -> u64| scenes.iter().map(number).sum::<u64>() as f64;
     let (is, runs, squares) = (sum(|[is, _]| *is), sum(|[_, of]| *of), sum(|[_, of]| of * of));
     // If all outcomes are equal, noise and scenes can't be separated: count each scene once.
     let alike = outcome_variance(scenes).and_then(|variance| variance.noise_share()).map_or(1.0, |noise| 1.0 - noise);
     let worth = runs / (1.0 + (squares / runs - 1.0) * alike);
-    wilson_share(is / runs, worth)
+    sampling.share(is / runs, worth)
 }
 
 /// Groups runs by scene.
@@ -213,16 +212,17 @@ impl SceneRuns {
 
     /// Returns the share of some of the runs, given by their indices, with an interval that accounts for runs of the
     /// same scene. Returns `None` if there are no runs.
-    pub fn share(&self, runs: impl IntoIterator<Item = usize>) -> Option<Interval> {
+    pub fn share(&self, runs: impl IntoIterator<Item = usize>, sampling: Sampling) -> Option<Interval> {
         let mut scenes: Vec<[u64; 2]> = self.sizes.iter().map(|size| [0, *size]).collect();
         runs.into_iter().for_each(|run| scenes[self.scene_of[run]][0] += 1);
-        share_of_scenes(&scenes)
+        share_of_scenes(&scenes, sampling)
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::wilson_share;
 
     fn runs(scenes: &[&[u8]]) -> Vec<Repeated> {
         let of = |(scene, runs): (usize, &&[u8])| {
@@ -234,20 +234,20 @@ mod tests {
 
     #[test]
     fn scenes_are_classified_by_the_results_of_their_runs() {
-        let found = consistency(&runs(&[&[1, 1, 1], &[0, 0, 0], &[1, 0, 1], &[1], &[0, 1]]));
+        let found = consistency(&runs(&[&[1, 1, 1], &[0, 0, 0], &[1, 0, 1], &[1], &[0, 1]]), Sampling::Fixed);
         assert_eq!((found.always_passed, found.always_failed), (1, 1));
         assert_eq!(
             found.flaky,
             [SceneCounts { scene: 2, passed: 2, of: 3 }, SceneCounts { scene: 4, passed: 1, of: 2 }],
             "a scene of one run is neither"
         );
-        assert_eq!(consistency(&[]), Consistency::default());
+        assert_eq!(consistency(&[], Sampling::Fixed), Consistency::default());
     }
 
     /// If two of three runs passed, one of the three pairs passed entirely. Computed by hand for all scenes.
     #[test]
     fn pass_powers_are_shares_of_all_subsets_of_runs() {
-        let found = consistency(&runs(&[&[1, 1, 1], &[0, 0, 0], &[1, 0, 1], &[1, 1]]));
+        let found = consistency(&runs(&[&[1, 1, 1], &[0, 0, 0], &[1, 0, 1], &[1, 1]]), Sampling::Fixed);
         let found: Vec<(u64, u64, f64)> =
             found.pass_powers.iter().map(|power| (power.k, power.scenes, power.probability.rate)).collect();
         let expected =
@@ -300,7 +300,7 @@ mod tests {
                     margin: None,
                 }));
             }
-            let found = consistency(&drawn);
+            let found = consistency(&drawn, Sampling::Fixed);
             let outcome = found.outcome.expect("twelve scenes");
             noise += outcome.noise / CAMPAIGNS as f64;
             scene += outcome.scene / CAMPAIGNS as f64;
@@ -317,7 +317,7 @@ mod tests {
 
     #[test]
     fn scenes_whose_runs_all_agree_count_once() {
-        let found = consistency(&runs(&[&[1, 1, 1], &[1, 1, 1]]));
+        let found = consistency(&runs(&[&[1, 1, 1], &[1, 1, 1]]), Sampling::Fixed);
         assert_eq!(found.rate, wilson_share(1.0, 2.0));
         assert_eq!(found.outcome.and_then(|variance| variance.noise_share()), None);
     }
@@ -327,8 +327,8 @@ mod tests {
         let run = |scene, margin| Repeated { scene, passed: true, margin };
         let mut runs = vec![run(0, Some(1.0)), run(0, Some(3.0)), run(1, Some(5.0)), run(1, Some(7.0))];
         // Within: 2 each. Between the means 2 and 6: 2 · (4 + 4) / 1 = 16; minus 2, divided by 2.
-        assert_eq!(consistency(&runs).margin, Some(Variance { noise: 2.0, scene: 7.0 }));
+        assert_eq!(consistency(&runs, Sampling::Fixed).margin, Some(Variance { noise: 2.0, scene: 7.0 }));
         runs.push(run(1, None));
-        assert_eq!(consistency(&runs).margin, None);
+        assert_eq!(consistency(&runs, Sampling::Fixed).margin, None);
     }
 }

@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use crate::{Interval, SceneRuns};
+use crate::{Interval, Sampling, SceneRuns};
 use actcheck_base::Outcome;
 use actcheck_history::OutcomeRow;
 
@@ -20,8 +20,8 @@ pub struct FailureMode {
 /// Returns the failure modes, most frequent first, then sorted by their properties.
 ///
 /// Runs in which no property passed or failed tested nothing and are left out. `scenes` maps the IDs of runs to their
-/// scenes, if scenes are repeated.
-pub fn failure_modes(rows: &[OutcomeRow], scenes: &BTreeMap<String, u64>) -> Vec<FailureMode> {
+/// scenes, if scenes are repeated. `sampling`: how the number of runs was decided.
+pub fn failure_modes(rows: &[OutcomeRow], scenes: &BTreeMap<String, u64>, sampling: Sampling) -> Vec<FailureMode> {
     let tested = signatures(rows);
     // A run without a known scene counts as a scene of its own.
     let of_scenes = SceneRuns::new(tested.iter().map(|(run, _)| scenes.get(*run).ok_or(*run)));
@@ -35,7 +35,7 @@ pub fn failure_modes(rows: &[OutcomeRow], scenes: &BTreeMap<String, u64>) -> Vec
             Some(FailureMode {
                 failed: failed.iter().map(|iri| (*iri).to_owned()).collect(),
                 runs: places.iter().map(|place| tested[*place].0.to_owned()).collect(),
-                share: of_scenes.share(places)?,
+                share: of_scenes.share(places, sampling)?,
             })
         })
         .collect();
@@ -93,7 +93,7 @@ mod tests {
             row("k-4", "b", Broken),
             row("k-5", "a", Failed),
         ];
-        let modes = failure_modes(&rows, &BTreeMap::new());
+        let modes = failure_modes(&rows, &BTreeMap::new(), Sampling::Fixed);
         let plain: Vec<(Vec<&str>, Vec<&str>)> = modes
             .iter()
             .map(|mode| {
@@ -104,10 +104,10 @@ mod tests {
         assert_eq!(modes[0].share, wilson(2, 4).expect("four runs"));
         // Runs of one scene have a smaller effective sample size: the share stays, and its interval is wider.
         let scenes = [("k-1", 1), ("k-3", 1), ("k-2", 2), ("k-5", 2)].map(|(run, scene)| (run.to_owned(), scene));
-        let alike = failure_modes(&rows, &scenes.into());
+        let alike = failure_modes(&rows, &scenes.into(), Sampling::Fixed);
         let (alone, alike) = (modes[0].share, alike[0].share);
         assert!(alike.rate == alone.rate && alike.low < alone.low && alike.high > alone.high, "{alike:?} {alone:?}");
-        assert!(failure_modes(&[], &BTreeMap::new()).is_empty());
-        assert!(failure_modes(&rows[7..9], &BTreeMap::new()).is_empty());
+        assert!(failure_modes(&[], &BTreeMap::new(), Sampling::Fixed).is_empty());
+        assert!(failure_modes(&rows[7..9], &BTreeMap::new(), Sampling::Fixed).is_empty());
     }
 }

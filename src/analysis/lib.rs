@@ -22,6 +22,7 @@ mod runs_needed;
 #[cfg(test)]
 mod sample_rows;
 mod score_interval;
+mod stopped;
 mod tables;
 
 pub use answer::Answer;
@@ -50,6 +51,7 @@ pub use paired::{Difference, PairedTable, PairedTest};
 pub use patterns::{Condition, Parameter, Pattern, PatternInput, PatternOptions, Patterns, Strongest, Values, mine};
 pub use runs_needed::{POWER, TwoRates};
 pub use score_interval::score_interval;
+pub use stopped::{PassesUntilFailures, Sampling, anytime, passes_until_failures};
 pub use tables::{
     Column, ColumnKind, ColumnRole, Hierarchy, Mirror, MirrorChange, OutcomeTable, TableFilter, TextColumn, columns,
     export_csv, export_parquet,

@@ -2,6 +2,10 @@
 
 use serde::Serialize;
 use statrs::distribution::{Binomial, DiscreteCDF};
+use statrs::function::beta::{beta_reg, ln_beta};
+
+use crate::Sampling;
+use crate::stopped::anytime_share;
 
 /// The 97.5 % quantile of the normal distribution, for 95 % intervals.
 const Z: f64 = 1.959_963_984_540_054;
@@ -76,6 +80,35 @@ impl PairedTable {
         let low = if value == -1.0 { -1.0 } else { crossing(-1.0, value, |supposed| self.score(supposed) > Z) };
         let high = if value == 1.0 { 1.0 } else { crossing(value, 1.0, |supposed| self.score(supposed) > -Z) };
         Some(Difference { value, low, high })
+    }
+
+    /// As [`PairedTable::difference`], valid for the way in which the number of scenes was decided. If outcomes did, the interval is that of
+    /// the difference of two shares of scenes, of which each keeps to its own interval with 97.5 % at any time.
+    pub fn difference_by(self, sampling: Sampling) -> Option<Difference> {
+        if sampling == Sampling::Fixed {
+            return self.difference();
+        }
+        let pairs = self.pairs() as f64;
+        let share = |count: u64| anytime_share(count as f64 / pairs, pairs, 0.025);
+        let (first, second) = (share(self.only_first)?, share(self.only_second)?);
+        let value = (self.only_second as f64 - self.only_first as f64) / pairs;
+        Some(Difference { value, low: second.low - first.high, high: second.high - first.low })
+    }
+
+    /// As [`PairedTable::test`], valid for the way in which the number of scenes was decided.
+    ///
+    /// Source: if neither side is better, the likelihood of the directions of the discordant scenes, averaged over a uniform
+    /// prior of the probability of one direction, divided by that under ½, is a martingale of mean 1. By Ville's inequality,
+    /// its inverse is a valid p-value whenever the runs ended (Robbins, 1970). One-sided: the prior is uniform above ½.
+    pub fn test_by(self, sampling: Sampling) -> PairedTest {
+        if sampling == Sampling::Fixed {
+            return self.test();
+        }
+        let (worse, better) = (self.only_first as f64 + 1.0, self.only_second as f64 + 1.0);
+        let ratio = libm::exp(ln_beta(worse, better) + (worse + better - 2.0) * std::f64::consts::LN_2);
+        let above = 2.0 * (1.0 - beta_reg(worse, better, 0.5));
+        let p = |ratio: f64| if ratio > 1.0 { 1.0 / ratio } else { 1.0 };
+        PairedTest { two_sided: p(ratio), mid_p: p(ratio), second_worse: p(ratio * above) }
     }
 
     /// Returns the distance of the observed difference above a hypothetical one in (-1, 1), in standard errors.

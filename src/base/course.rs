@@ -41,6 +41,15 @@ impl Signal {
     }
 }
 
+/// A convex solid of a thing: every point within a distance of the convex hull of some points. Frame: the thing's.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Solid {
+    /// Unit: metres.
+    pub points: Vec<[f64; 3]>,
+    /// The distance. Unit: metres.
+    pub radius: f64,
+}
+
 /// Quantities of one action over time. The first sample is the initial state.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Course {
@@ -51,6 +60,7 @@ pub struct Course {
     /// Names of the action's phases with their start times in order. Unit: seconds.
     pub phases: Vec<(String, f64)>,
     signals: BTreeMap<SignalKey, Signal>,
+    solids: BTreeMap<String, Vec<Solid>>,
 }
 
 impl Course {
@@ -70,6 +80,16 @@ impl Course {
     pub fn get(&self, quantity: &str, first: &str, second: &str) -> Option<&Signal> {
         let (first, second) = if second.is_empty() || first <= second { (first, second) } else { (second, first) };
         self.signals.get(&[quantity, first, second].map(str::to_owned))
+    }
+
+    /// Sets the solids of a thing, for distances between surfaces.
+    pub fn set_solids(&mut self, thing: String, solids: Vec<Solid>) {
+        self.solids.insert(thing, solids);
+    }
+
+    /// Returns the solids of a thing; `None` if they are not known.
+    pub fn solids(&self, thing: &str) -> Option<&[Solid]> {
+        self.solids.get(thing).map(Vec::as_slice)
     }
 
     /// Returns all recorded quantities, sorted.

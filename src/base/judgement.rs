@@ -81,6 +81,12 @@ pub struct Judgement {
     /// which is always the case before an action.
     #[cfg_attr(feature = "serde", serde(default))]
     pub held_before: Option<bool>,
+    /// Whether a passed property would also have passed if the right side of each of its `implies` were false: no left side
+    /// held. If so, the pass is no evidence about the right side.
+    ///
+    /// `None` if the property did not pass or has no such `implies`.
+    #[cfg_attr(feature = "serde", serde(default))]
+    pub vacuous: Option<bool>,
 }
 
 impl Judgement {
@@ -89,7 +95,7 @@ impl Judgement {
         let margin =
             |of: &Self| of.margin.map(|value| if value.is_nan() { f64::NAN.to_bits() } else { value.to_bits() });
         let texts = |of: &Self| [of.property.clone(), of.witness.clone(), of.rule_digest.clone()];
-        (self.outcome, self.held_before) == (other.outcome, other.held_before)
+        (self.outcome, self.held_before, self.vacuous) == (other.outcome, other.held_before, other.vacuous)
             && margin(self) == margin(other)
             && texts(self) == texts(other)
     }

@@ -29,7 +29,7 @@ mod write_atomic;
 mod xml_guard;
 mod xml_limits;
 
-pub use course::{Course, Signal, SignalKey};
+pub use course::{Course, Signal, SignalKey, Solid};
 pub use deciding::DecidingSignal;
 pub use diagnostic::{Diagnostic, Diagnostics, Severity};
 pub use digest::{Digest, digest_of, program_digest, set_program_digest};

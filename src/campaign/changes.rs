@@ -139,6 +139,7 @@ mod tests {
             config_digest: String::new(),
             config_path: String::new(),
             ontology_digest: String::new(),
+            findings: Vec::new(),
             rules: Vec::new(),
             models: Vec::new(),
             skill: None,

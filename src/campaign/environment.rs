@@ -10,9 +10,9 @@ use crate::solids;
 use actcheck_actions as actions;
 use actcheck_base::{Diagnostic, Diagnostics, Source, program_digest};
 use actcheck_config as config;
-use actcheck_config::{Campaign, Launcher, Overrides};
+use actcheck_config::{Campaign, Launcher, Overrides, Step};
 use actcheck_data::{Choice, ChoiceName, RobotView};
-use actcheck_history::{CampaignRecord, History, SkillRecord};
+use actcheck_history::{CampaignRecord, FindingRecord, History, SkillRecord};
 use actcheck_ontology as ontology;
 use actcheck_ontology::Ontology;
 use actcheck_protocol::Programs;
@@ -109,15 +109,15 @@ impl Env {
     pub fn index_of(&self, performed: &str, choices: &[Choice]) -> Result<u64, Diagnostics> {
         let left_out = choices.iter().find(|choice| choice.name == ChoiceName::ActionsLeftOut);
         let left_out = left_out.map_or(0.0, |choice| choice.value);
-        let fits = |test: &Vec<String>| {
+        let fits = |test: &Vec<Step>| {
             let done = test.len().checked_sub(left_out as usize);
-            done.is_some_and(|done| test[..done].join(" ") == performed)
+            done.is_some_and(|done| Step::test_name(&test[..done]) == performed)
         };
         match self.campaign.tests.iter().position(fits) {
             Some(test) => Ok(test as u64 * self.runs_of_a_test()),
             None => {
                 let message = format!("the configuration {} has no test `{performed}`", self.campaign.source.name);
-                let tests: Vec<String> = self.campaign.tests.iter().map(|test| test.join(" ")).collect();
+                let tests: Vec<String> = self.campaign.tests.iter().map(|test| Step::test_name(test)).collect();
                 Err(Diagnostic::error("S040", message).help(format!("its tests: {}", tests.join("; "))).into())
             }
         }
@@ -131,7 +131,8 @@ impl Env {
 
     pub(super) fn of(mut campaign: Campaign, rule_budget: Budget) -> Result<Self, Diagnostics> {
         let (files, path) = &campaign.ontology;
-        let ontology = ontology::load(files, path)?;
+        let mut ontology = ontology::load(files, path)?;
+        forget_requirement(&campaign, &mut ontology);
         let mut faults = Diagnostics::new();
         categorise(&mut campaign, &ontology);
         solids::decompose_meshes(&mut campaign, &mut faults);
@@ -160,12 +161,18 @@ impl Env {
         }
     }
 
-    /// Warnings of the configuration and of the rules, such as rules without effect.
+    /// Warnings of the configuration, of the ontology and of the rules, such as rules without effect.
     pub fn warnings(&self) -> Diagnostics {
         let mut warnings = self.campaign.warnings.clone();
-        warnings.extend(self.rules.warnings().iter().cloned().collect());
-        warnings.extend(self.rules.beyond(self.campaign.budget.action_secs));
+        warnings.extend(self.findings());
         warnings
+    }
+
+    /// The warnings of the ontology and of the rules, which the campaign's record contains.
+    pub fn findings(&self) -> Diagnostics {
+        let mut findings = self.rules.warnings().clone();
+        findings.extend(self.rules.beyond(self.campaign.budget.action_secs));
+        findings
     }
 
     /// The robot in its postures, for a picture. Empty if its model can't be read.
@@ -187,6 +194,8 @@ impl Env {
         let worlds = self.campaign.worlds.values();
         models.extend(worlds.map(|world| (format!("world {}", world.name), world.digest.clone())));
         models.sort();
+        let mut findings: Vec<FindingRecord> = self.findings().iter().map(FindingRecord::of).collect();
+        findings.sort();
         CampaignRecord {
             id,
             name,
@@ -195,6 +204,7 @@ impl Env {
             config_path: path_from(&self.campaign.history, Path::new(&*self.campaign.source.name)),
             ontology_digest: self.ontology.digest.clone(),
             rules,
+            findings,
             models,
             skill: self.skill(),
             seed: self.campaign.seed,
@@ -273,6 +283,17 @@ pub(super) fn recorded_overrides(history: &History, record: &CampaignRecord) -> 
     }
 }
 
+/// Drops the warning O017 about the rule file that `[scene] require` names.
+fn forget_requirement(campaign: &Campaign, ontology: &mut Ontology) {
+    let file = |source: &Source| std::fs::canonicalize(&*source.name).ok();
+    let Some(required) = campaign.scene_rule.as_ref().and_then(file) else { return };
+    let is_required = |found: &Diagnostic| {
+        found.code == "O017" && found.source.as_ref().and_then(file).is_some_and(|path| path == required)
+    };
+    let warnings = std::mem::take(&mut ontology.warnings);
+    ontology.warnings = warnings.into_iter().filter(|found| !is_required(found)).collect();
+}
+
 /// Sets the category of models that come without one, and of all moving parts, from their name if the ontology has such a
 /// class; else they stay `act:Object`.
 fn categorise(campaign: &mut Campaign, ontology: &Ontology) {
@@ -334,7 +355,7 @@ fn programs(campaign: &Campaign) -> Option<Programs> {
     match &campaign.launcher {
         Launcher::Reference => None,
         Launcher::Program(skill) => {
-            let tested = campaign.tests.iter().flatten().cloned().collect();
+            let tested = campaign.tests.iter().flatten().map(|step| step.action.clone()).collect();
             Some(Programs::new(skill.as_ref().clone(), tested))
         }
     }
@@ -347,7 +368,7 @@ fn check_skills(campaign: &Campaign, ontology: &Ontology, faults: &mut Diagnosti
         return;
     }
     for (test, listed) in campaign.tests.iter().enumerate() {
-        for (step, action) in listed.iter().enumerate() {
+        for (step, action) in listed.iter().map(|step| &step.action).enumerate() {
             if let (true, Err(unknown)) = (ontology.actions.contains_key(action), actions::known_skill(action)) {
                 let diagnostic = unknown.diagnostic();
                 let fault = campaign.fault(diagnostic.code, &format!("tests.{test}.{step}"), unknown.to_string());

@@ -6,6 +6,9 @@ pub enum Failure {
     /// The scene could not be generated or did not settle; another one may.
     #[error("{0}")]
     Discard(String),
+    /// The robot overlaps something at the start.
+    #[error("{0}")]
+    Overlap(String),
     /// The run was interrupted while rules were evaluated.
     #[error("interrupted")]
     Interrupted,

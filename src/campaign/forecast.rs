@@ -62,7 +62,7 @@ impl Env {
 
     /// Index of the first test with this action.
     fn test_with(&self, action: &str) -> Option<usize> {
-        self.campaign.tests.iter().position(|test| test.iter().any(|name| name == action))
+        self.campaign.tests.iter().position(|test| test.iter().any(|step| step.action == action))
     }
 
     /// Choices of a scene for each world and each surface in it.
@@ -285,7 +285,7 @@ impl Env {
     ) {
         let names = self.campaign.candidates.get("objectSurface").into_iter().flatten();
         let keys: BTreeMap<&String, usize> = names.enumerate().map(|(idx, name)| (name, idx)).collect();
-        let is_in_front = self.campaign.tests[test].first().is_some_and(|first| first == "PerceivePlane");
+        let is_in_front = self.campaign.tests[test].first().is_some_and(|first| first.action == "PerceivePlane");
         for (surface, values) in scenes {
             let Some(scene) = self.draw(values, test) else { continue };
             let (Some(top_m), Ok(world)) = (top_of(&scene), world::build(&scene)) else { continue };

@@ -20,6 +20,7 @@ mod line;
 mod make_run;
 pub mod oracles;
 mod outcome;
+mod preconditions;
 mod recheck;
 mod replay;
 mod requirement;
@@ -34,6 +35,7 @@ mod search_space;
 mod searching;
 pub mod shrink;
 mod solids;
+mod starts;
 mod tally;
 mod workers;
 

@@ -4,10 +4,12 @@ use std::sync::Arc;
 
 use crate::finished_run::{FinishedRun, RunPlace};
 use crate::judging::judge_action;
+use crate::preconditions::Preconditions;
 use crate::{Env, Failure};
 use actcheck_actions as actions;
 use actcheck_actions::{ActionCall, ExternalSkill, Interference, Saboteur};
 use actcheck_base::{Judgement, RunFacts};
+use actcheck_config::Step;
 use actcheck_data::{ActionEnd, ChoiceName, Choices, Quality, Scene, Trace};
 use actcheck_facts as facts;
 use actcheck_history::{RunRecord, RunStatus};
@@ -70,7 +72,8 @@ pub struct RunInput<'a> {
 /// The same `choices` give the same record, except for its times. `campaign` is the campaign's id.
 ///
 /// # Errors
-/// [`Failure::Discard`] if the scene could not be generated or did not settle, [`Failure::Interrupted`] if
+/// [`Failure::Discard`] if the scene could not be generated or did not settle, [`Failure::Overlap`] if the robot overlaps
+/// something in it, [`Failure::Interrupted`] if
 /// [`Env::rule_budget`] was stopped during a long rule or an action of an external program. Simulation faults are not
 /// errors: the record is `broken`.
 pub fn run_line(
@@ -129,20 +132,20 @@ pub(super) fn simulate(
         Performance::new(programs, run, context.clock.secs, Arc::clone(&env.rule_budget.stop))
     });
     let external = program.as_mut().map(|program| program as &mut dyn ExternalSkill);
-    let interference = Interference { cut: interference.cut, saboteur: interference.saboteur, external };
+    let interference = Interference { cut: interference.cut, saboteur: interference.saboteur, external, gate: None };
     let (trace, quality) = perform(env, test, &scene, &mut choices, disturb, interference)?;
     if program.as_ref().is_some_and(Performance::was_stopped) {
         return Err(Failure::Interrupted);
     }
     let program_output = program.as_ref().and_then(Performance::output).map(|lines| lines.join("\n"));
-    finish(env, Simulated { index, scene, trace, quality, choices, program_output }, context, start)
+    finish(env, Simulated { index, test, scene, trace, quality, choices, program_output }, context, start)
 }
 
 /// Number of seeds of a program: every language can represent them.
 const SEEDS: usize = 1 << 32;
 
 /// The actions of a run. Only shrunk runs leave the last ones out.
-fn test_to_perform<'a>(env: &'a Env, index: u64, choices: &mut Choices) -> &'a [String] {
+fn test_to_perform<'a>(env: &'a Env, index: u64, choices: &mut Choices) -> &'a [Step] {
     let test = &env.campaign.tests[env.test_of(index)];
     let left_out = choices.exception(ChoiceName::ActionsLeftOut, test.len());
     &test[..test.len() - left_out]
@@ -160,14 +163,16 @@ pub(super) fn crashed(
 ) -> Option<FinishedRun> {
     let RunInput { index, mut choices, .. } = input;
     let scene = scenario::draw(&env.space, env.test_of(index), &mut choices).ok()?;
-    let trace = never_performed(test_to_perform(env, index, &mut choices), &scene, reason);
-    let simulated = Simulated { index, scene, trace, quality: None, choices, program_output: None };
+    let test = test_to_perform(env, index, &mut choices);
+    let trace = never_performed(test, &scene, reason);
+    let simulated = Simulated { index, test, scene, trace, quality: None, choices, program_output: None };
     finish(env, simulated, context, start).ok()
 }
 
 /// A simulated run that is not judged yet.
-struct Simulated {
+struct Simulated<'a> {
     index: u64,
+    test: &'a [Step],
     scene: Scene,
     trace: Trace,
     quality: Option<Quality>,
@@ -176,15 +181,15 @@ struct Simulated {
 }
 
 /// Computes facts, findings, verdicts and scores of a simulated run.
-fn finish(env: &Env, simulated: Simulated, context: &RunContext, start: Start) -> Result<FinishedRun, Failure> {
-    let Simulated { index, scene, trace, quality, choices, program_output } = simulated;
+fn finish(env: &Env, simulated: Simulated<'_>, context: &RunContext, start: Start) -> Result<FinishedRun, Failure> {
+    let Simulated { index, test, scene, trace, quality, choices, program_output } = simulated;
     let facts = facts::extract(&trace);
     let judgements = judge_all(env, &trace, &facts)?;
     let action_scores: Vec<f64> = judgements.iter().map(|list| action_score(list.iter().map(|j| j.outcome))).collect();
     let (status, reason) = status_of(&trace);
     Ok(FinishedRun {
         index,
-        test: trace.actions.iter().map(|action| action.action.as_str()).collect::<Vec<_>>().join(" "),
+        test: Step::test_name(test),
         seed: env.campaign.seed,
         status,
         reason,
@@ -207,7 +212,7 @@ fn finish(env: &Env, simulated: Simulated, context: &RunContext, start: Start) -
 /// figures if a world could be built.
 fn perform(
     env: &Env,
-    test: &[String],
+    test: &[Step],
     scene: &Scene,
     choices: &mut Choices,
     disturb: impl FnOnce(&mut World),
@@ -217,6 +222,9 @@ fn perform(
         Ok(world) => world,
         Err(error) => return Ok((never_performed(test, scene, &error.to_string()), None)),
     };
+    if let Some(deepest) = world.overlaps().first() {
+        return Err(Failure::Overlap(deepest.to_string()));
+    }
     let settling = world.settle();
     if !settling.left.is_empty() {
         return Err(Failure::Discard(format!("fell from its initial position: {}", settling.left.join(", "))));
@@ -232,16 +240,27 @@ fn perform(
     }
     disturb(&mut world);
     let calls = calls(test, scene);
+    let mut preconditions = Preconditions::new(env, scene);
+    let Interference { cut, saboteur, external, .. } = interference;
+    let external = external.map(|skill| skill as &mut dyn ExternalSkill);
+    let interference = Interference { cut, saboteur, external, gate: Some(&mut preconditions) };
     let trace = actions::perform_with(&calls, &mut world, choices, &env.campaign.budget, interference);
+    if preconditions.interrupted {
+        return Err(Failure::Interrupted);
+    }
     Ok((Trace { map: scene.map.clone(), ..trace }, Some(world.quality())))
 }
 
-fn calls(test: &[String], scene: &Scene) -> Vec<ActionCall> {
-    test.iter().map(|action| ActionCall { action: action.clone(), parameters: scene.designators.clone() }).collect()
+/// The calls of a test's actions, each with the values that are in force for it.
+fn calls(test: &[Step], scene: &Scene) -> Vec<ActionCall> {
+    let parameters = |number: usize| scene.steps.get(number).unwrap_or(&scene.designators).clone();
+    let call =
+        |(number, step): (usize, &Step)| ActionCall { action: step.action.clone(), parameters: parameters(number) };
+    test.iter().enumerate().map(call).collect()
 }
 
 /// The trace of a run that ended with a fault before its first action.
-fn never_performed(test: &[String], scene: &Scene, reason: &str) -> Trace {
+fn never_performed(test: &[Step], scene: &Scene, reason: &str) -> Trace {
     let actions = calls(test, scene)
         .into_iter()
         .map(|call| actcheck_data::ActionTrace {
@@ -274,7 +293,7 @@ fn status_of(trace: &Trace) -> (RunStatus, Option<String>) {
             ActionEnd::Timeout(reason) | ActionEnd::Cut(reason) => {
                 return (RunStatus::Timeout, Some(reason.clone()));
             }
-            ActionEnd::Completed | ActionEnd::NotReached => {}
+            ActionEnd::Completed | ActionEnd::NotReached | ActionEnd::NotPerformed(_) => {}
         }
     }
     (RunStatus::Completed, None)

@@ -33,7 +33,7 @@ pub(super) enum Making {
 /// Makes a planned run of a campaign that began at a time of the context's clock (unit: seconds). Draws scenes until one
 /// can be built.
 pub(super) fn make_run(env: &Env, campaign: &str, began_secs: f64, planned: Planned, context: &RunContext) -> Making {
-    let mut discards = Vec::new();
+    let (mut discards, mut n_overlaps) = (Vec::new(), 0);
     for number in 0..SCENES_PER_RUN {
         let choices = || planned.choices(env.campaign.seed, number);
         let cut = time_limit(env, context);
@@ -48,12 +48,20 @@ pub(super) fn make_run(env: &Env, campaign: &str, began_secs: f64, planned: Plan
             }
             Err(AttemptFault::Failure(Failure::Interrupted)) => return Making::Interrupted,
             Err(AttemptFault::Failure(Failure::Discard(reason))) => discards.push(reason),
+            Err(AttemptFault::Failure(Failure::Overlap(reason))) => {
+                discards.push(reason);
+                n_overlaps += 1;
+            }
             Err(AttemptFault::Crash(reason)) => {
                 return Making::Impossible(Diagnostic::error("S031", reason).into());
             }
         }
     }
-    Making::Impossible(no_scene(env, &planned, discards.last()).into())
+    let last = discards.last().map_or("", String::as_str);
+    Making::Impossible(match n_overlaps {
+        SCENES_PER_RUN => env.overlaps_at_start(last, SCENES_PER_RUN).into(),
+        _ => no_scene(env, &planned, last).into(),
+    })
 }
 
 /// The record of a run, with repetition and weight from its plan. Only the first run of a scene has the discards.
@@ -80,7 +88,7 @@ fn entry(env: &Env, record: &RunRecord) -> Result<Entry, Diagnostics> {
     }
 }
 
-fn no_scene(env: &Env, planned: &Planned, last: Option<&String>) -> Diagnostic {
+fn no_scene(env: &Env, planned: &Planned, last: &str) -> Diagnostic {
     let room = "put fewer objects on the surface (`[surfaceObjects] count`), smaller ones, or a larger surface";
     let help = match env.campaign.robot.reach_m {
         Some([nearest, farthest]) => format!(
@@ -93,7 +101,7 @@ fn no_scene(env: &Env, planned: &Planned, last: Option<&String>) -> Diagnostic {
         format!(
             "no scene could be built for run {} in {SCENES_PER_RUN} draws; the last failure: {}",
             planned.index + 1,
-            last.map_or("", String::as_str)
+            last
         ),
     )
     .at(&env.campaign.source, 0..0)

@@ -52,7 +52,7 @@ type Judged = Vec<Result<Vec<Recheck>, Diagnostics>>;
 /// `on_batch` is called once a batch is in the history, with all judgements (unchanged ones too) in the order of the
 /// runs. When `stop` is set, it ends after the runs in flight; their judgements are stored. A run that can't be judged
 /// (its trace is corrupt, or the rules' ontology lacks its action) is left unchanged and does not stop the others.
-/// Actions that did not complete keep their outcomes.
+/// Actions that did not complete, or were not performed, keep their outcomes.
 pub fn recheck<'a>(
     history: &History,
     runs: &[RunRow],

@@ -200,7 +200,9 @@ fn refused(detail: &RunDetail, why: &str) -> Diagnostic {
 pub(super) fn rerun(env: &Env, attempt: &Attempt<'_>, context: &RunContext) -> Result<FinishedRun, String> {
     attempt.make(env, context).map_err(|fault| match fault {
         AttemptFault::Failure(Failure::Interrupted) => Failure::Interrupted.to_string(),
-        AttemptFault::Failure(Failure::Discard(reason)) => format!("its scene can no longer be built: {reason}"),
+        AttemptFault::Failure(Failure::Discard(reason) | Failure::Overlap(reason)) => {
+            format!("its scene can no longer be built: {reason}")
+        }
         AttemptFault::Crash(reason) => reason,
     })
 }

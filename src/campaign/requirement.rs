@@ -1,10 +1,10 @@
 //! A rule file of the configuration that scenes must satisfy before a run begins.
 
+use crate::preconditions::{facts_before, facts_of_state};
 use crate::{Failure, scene_facts};
-use actcheck_base::{ActionFacts, Diagnostics, RuleFault, names};
+use actcheck_base::{Diagnostics, RuleFault, names};
 use actcheck_config::Campaign;
-use actcheck_data::{ActionTrace, Scene, Trace};
-use actcheck_facts as facts;
+use actcheck_data::Scene;
 use actcheck_ontology::{Ontology, Property, RuleFile};
 use actcheck_rules::{Budget, RuleBook};
 use actcheck_world::World;
@@ -37,6 +37,7 @@ impl Requirement {
         // The rules may use everything that scene generation sets.
         property.needs = ontology.designators.clone();
         let mut alone = ontology.clone();
+        alone.warnings = Diagnostics::new();
         alone.properties = [(iri.clone(), property)].into();
         alone.vocabulary.terms.extend(scene_facts::vocabulary());
         Ok(Some(Self { rules: RuleBook::prepare_within(&alone, budget)?, iri, path }))
@@ -48,25 +49,9 @@ impl Requirement {
     /// [`Failure::Discard`] if it does not, or if the rules can't be evaluated; [`Failure::Interrupted`] if the
     /// evaluation was interrupted.
     pub(super) fn check(&self, scene: &Scene, world: &World, budget: &Budget) -> Result<(), Failure> {
-        let trace = Trace {
-            snapshots: vec![world.snapshot()],
-            // Not performed: it only holds the values of the designators.
-            actions: vec![ActionTrace::not_reached("", &scene.designators)],
-            map: scene.map.clone(),
-            ..Trace::default()
-        };
-        let mut facts = facts::extract(&trace);
+        let mut facts = facts_of_state(&world.snapshot(), &scene.designators, &scene.map);
         scene_facts::add(scene, &mut facts);
-        let state = &facts.snapshots[0];
-        let asked = ActionFacts {
-            terms: &facts.terms,
-            before: state,
-            after: state,
-            during: &[],
-            parameters: &facts.parameters[0],
-            course: None,
-        };
-        match self.rules.judge(&asked, std::slice::from_ref(&self.iri), budget).remove(&self.iri) {
+        match self.rules.judge(&facts_before(&facts), std::slice::from_ref(&self.iri), budget).remove(&self.iri) {
             Some(Ok(found)) if found.holds => Ok(()),
             Some(Err(RuleFault::Interrupted)) => Err(Failure::Interrupted),
             Some(Err(fault)) => Err(Failure::Discard(format!("{} can't be evaluated: {fault}", self.path))),

@@ -28,6 +28,11 @@ impl RuleSet {
         Ok(Self { ontology, rules, actions })
     }
 
+    /// Warnings of the ontology and of the rules, such as rules without effect.
+    pub fn warnings(&self) -> &Diagnostics {
+        self.rules.warnings()
+    }
+
     /// Whether a rule reads quantities over time.
     pub fn reads_course(&self) -> bool {
         self.rules.reads_course()

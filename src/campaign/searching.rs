@@ -5,6 +5,7 @@ use std::sync::Arc;
 use crate::search_space::SearchSpace;
 use crate::{Env, Planned, RunResult, Schedule, Steering, WeightedRate};
 use actcheck_base::Outcome;
+use actcheck_config::Step;
 use actcheck_search::{Ask, PropertyResult, Search};
 
 /// Asks the searches of the tests in turn for a generation of scenes, and returns the results to them.
@@ -43,12 +44,12 @@ impl Searching {
             Search::new(space.cube(), campaign.search, seed)
         };
         let tests = campaign.tests.iter().enumerate().map(|(number, test)| {
-            let actions = test.iter().filter_map(|name| env.ontology.actions.get(name));
+            let actions = test.iter().filter_map(|step| env.ontology.actions.get(&step.action));
             let mut properties: Vec<String> =
                 actions.flat_map(|action| action.success_properties.iter().cloned()).collect();
             properties.sort();
             properties.dedup();
-            SearchedTest { name: test.join(" "), search: search(number), properties, made: 0 }
+            SearchedTest { name: Step::test_name(test), search: search(number), properties, made: 0 }
         });
         let (scenes, repeat) = (u64::from(campaign.test_count), u64::from(campaign.repeat));
         Self { tests: tests.collect(), space, scenes, repeat, turn: 0, asked: false }

@@ -97,6 +97,14 @@ pub(super) fn complete_robot(campaign: &mut Campaign) -> Result<(), world::World
 fn decompose_with(cache: &mut HullCache, robot: &mut RobotProfile, faults: &mut Diagnostics) {
     for (file, shapes) in &mut robot.meshes {
         let apart: Result<Vec<Vec<Shape>>, String> = shapes.iter().map(|shape| cache.solids_or_sheet(shape)).collect();
+        let meshes = shapes.iter().filter_map(|shape| match shape {
+            Shape::Mesh { mesh } => Some(Arc::new(mesh.clone())),
+            _ => None,
+        });
+        let meshes: Vec<Arc<Mesh>> = meshes.collect();
+        if !meshes.is_empty() {
+            robot.surfaces.insert(file.clone(), meshes);
+        }
         match apart {
             Ok(apart) => *shapes = apart.concat().iter().map(world::simplified).collect(),
             Err(reason) => faults.push(unusable(&format!("the robot's mesh {file}"), &reason)),

@@ -21,7 +21,7 @@ pub(super) struct Tally {
 impl Tally {
     /// Creates an empty tally for all success properties of the campaign's actions.
     pub(super) fn new(env: &Env) -> Self {
-        let actions = env.campaign.tests.iter().flatten().filter_map(|name| env.ontology.actions.get(name));
+        let actions = env.campaign.tests.iter().flatten().filter_map(|step| env.ontology.actions.get(&step.action));
         let properties = actions.flat_map(|action| &action.success_properties);
         Self {
             limits: env.campaign.limits,

@@ -156,7 +156,10 @@ pub(super) fn analysed(
     let ontology = asked.chosen.ontology()?;
     let hierarchy = chosen::hierarchy(&ontology);
     let (mirror, _) = Mirror::update(history)?;
-    let (table, sample) = read(&mirror, &filter, further)?;
+    let (mut table, mut sample) = read(&mirror, &filter, further)?;
+    let sampling = chosen::sampling(history, |id| table.text("campaign").texts.iter().any(|known| known == id))?;
+    table.sampling = sampling;
+    sample.iter_mut().for_each(|sample| sample.sampling = sampling);
     if table.is_empty() {
         return Err(chosen::none_of(history).into());
     }
@@ -180,6 +183,7 @@ pub(super) fn analysed(
         options: asked.typed(),
         campaigns: table.text("campaign").texts.clone(),
         runs: table.text("run").texts.len() as u64,
+        sampling,
         twins: table.counted_runs().iter().filter(|counts| !**counts).count() as u64,
         sampled_runs: sample.as_ref().map(|sample| sample.text("run").texts.len() as u64),
         counts,

@@ -49,7 +49,12 @@ pub fn check(args: &CheckArgs, stop: &Arc<AtomicBool>) -> Result<(), Diagnostics
     let budget = Budget { stop: Arc::clone(stop), ..Budget::default() };
     let env = Env::prepare_within(config, &Overrides::default(), budget.clone())?;
     let cases = if env.campaign.case.is_some() { Vec::new() } else { regressions::prepare(&env, &budget)? };
+    let starts = env.starts();
+    if starts.has_errors() {
+        return Err(starts);
+    }
     output::print_diagnostics(&env.warnings());
+    output::print_diagnostics(&starts);
     output::print_diagnostics(&env.forecast());
     output::print_prose(&format!(
         "{}: {}, {}, {}; {} and {} in {}; {}; robot {}\n",

@@ -45,6 +45,7 @@ pub fn check_oracles(args: &CheckOraclesArgs) -> Result<u8, Diagnostics> {
     let stop = stop::on_interrupt(|| {});
     let budget = Budget { stop: Arc::clone(&stop), ..Budget::default() };
     let env = Env::prepare_within(&args.config, &overrides, budget)?;
+    env.check_starts()?;
     let concerns = |fault: &Fault| env.campaign.tests.iter().any(|test| fault.concerns(test, &env.campaign.robot));
     let faults: Vec<Fault> = FAULTS.into_iter().filter(concerns).collect();
     let steps = env.planned_runs() * (faults.len() as u64 + 1);
@@ -73,7 +74,7 @@ pub fn check_oracles(args: &CheckOraclesArgs) -> Result<u8, Diagnostics> {
 
 fn summarise(args: &CheckOraclesArgs, env: &Env, faults: &[Fault], trials: &[Trial]) -> OracleSummary {
     let mut properties: Vec<String> = Vec::new();
-    for action in env.campaign.tests.iter().flatten().filter_map(|name| env.ontology.actions.get(name)) {
+    for action in env.campaign.tests.iter().flatten().filter_map(|step| env.ontology.actions.get(&step.action)) {
         for iri in &action.success_properties {
             if !properties.contains(iri) {
                 properties.push(iri.clone());

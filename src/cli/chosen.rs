@@ -8,7 +8,7 @@ use clap::Args;
 
 use crate::options::HistoryArgs;
 use crate::{history_dir, when, why};
-use actcheck_analysis::{Hierarchy, TableFilter};
+use actcheck_analysis::{Hierarchy, Sampling, TableFilter};
 use actcheck_base::{Diagnostic, Diagnostics, did_you_mean, names};
 use actcheck_history::History;
 use actcheck_ontology as ontology;
@@ -31,6 +31,13 @@ pub struct ChosenRuns {
     /// The folder of the history.
     #[command(flatten)]
     pub history: HistoryArgs,
+}
+
+/// Returns how the number of runs of some campaigns was decided: outcomes, if they did so in one of them.
+pub(super) fn sampling(history: &History, is_meant: impl Fn(&str) -> bool) -> Result<Sampling, Diagnostics> {
+    let rows = history.campaigns()?.into_iter().filter(|row| is_meant(&row.id));
+    let of = rows.map(|row| Sampling::of(row.ended_by.as_deref(), row.interrupted));
+    Ok(of.fold(Sampling::Fixed, Sampling::and))
 }
 
 impl ChosenRuns {

@@ -5,9 +5,10 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 
+use crate::chosen::sampling;
 use crate::options::{Format, HistoryArgs, level};
 use crate::{history_dir, output};
-use actcheck_analysis::{ComparedRun, ComparedRuns, Comparison, compare as compare_runs};
+use actcheck_analysis::{ComparedRun, ComparedRuns, Comparison, Sampling, compare as compare_runs};
 use actcheck_base::{Diagnostic, Diagnostics};
 use actcheck_campaign::changes;
 use actcheck_history::{CampaignRecord, History, Judgements, RunFilter, Wish};
@@ -27,8 +28,8 @@ pub struct CompareArgs {
     #[arg(value_name = "B")]
     pub second: String,
     /// Exit with 1 if B is worse than A: if, in any line, so many scenes that only A passes would occur with at most
-    /// this probability if B were not worse. The probability of a false alarm is at most LEVEL (usually 0.05), over all
-    /// lines together
+    /// this probability if B were not worse. Broken runs and timeouts are a line, too. The probability of a false alarm is at
+    /// most LEVEL (usually 0.05), over all lines together
     #[arg(long, value_name = "LEVEL", value_parser = level)]
     pub fail_if_worse: Option<f64>,
     /// Rates that differ by less count as equal, as a share
@@ -51,7 +52,7 @@ pub fn compare(args: &CompareArgs) -> Result<u8, Diagnostics> {
     let mut histories = Histories::default();
     let first = Side::read(&args.first, &args.history, &mut histories)?;
     let second = Side::read(&args.second, &args.history, &mut histories)?;
-    let comparison = compare_runs(&first.runs, &second.runs);
+    let comparison = compare_runs(&first.runs, &second.runs, first.sampling.and(second.sampling));
     if comparison.pairs == 0 {
         return Err(nothing_shared(&first, &second, &comparison).into());
     }
@@ -132,6 +133,8 @@ struct Side {
     runs: Vec<ComparedRun>,
     /// Number of runs, also of those without a known scene.
     count: u64,
+    /// How this number was decided.
+    sampling: Sampling,
 }
 
 impl Side {
@@ -143,6 +146,7 @@ impl Side {
             None => newest(history)?,
         };
         let mut record = history.campaign(&id)?;
+        let sampling = sampling(history, |campaign| campaign == id)?;
         let filter = RunFilter { campaign: Some(id), ..RunFilter::default() };
         let judgements = if name.rechecked { Judgements::Newest } else { Judgements::Campaign };
         let mut collected = ComparedRuns::default();
@@ -151,7 +155,7 @@ impl Side {
             judged_by(&mut record, &later);
         }
         let count = collected.len() as u64;
-        Ok(Self { name: text.to_owned(), record, runs: collected.sorted(), count })
+        Ok(Self { name: text.to_owned(), record, runs: collected.sorted(), count, sampling })
     }
 
     fn summary(&self) -> ComparedSide {

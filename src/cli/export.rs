@@ -52,6 +52,11 @@ pub struct ExportArgs {
     /// the columns
     #[arg(long, value_name = "DIR")]
     pub dataset: Option<PathBuf>,
+    /// With `--dataset`: also the course of each action at the control rate (60 Hz), from which properties about time can be
+    /// judged: `course_bodies` (poses, velocities, holds), `course_robot` (gripper and base), `course_joints`,
+    /// `course_forces` (between pairs of bodies) and `phases`. It takes about ten times the space
+    #[arg(long, requires = "dataset")]
+    pub course: bool,
     /// Write the whole history as RDF, with facts in their named graphs (N-Quads)
     #[arg(long, value_name = "FILE.nq")]
     pub nquads: Option<PathBuf>,
@@ -60,7 +65,7 @@ pub struct ExportArgs {
     pub sparql: SparqlArgs,
     /// With `--nquads` and `--sparql`: all facts from the traces, not only those in the history. With `--parquet`: also the tables from
     /// which outcomes follow: `actions`, `percepts`, `planes`, `states`, `bodies`, `links`, `contacts`, `self_contacts`,
-    /// `extremes`, `joint_extremes`, `shapes` and `places`
+    /// `extremes`, `intervals`, `joint_extremes`, `shapes` and `places`
     #[arg(long, requires = "with_facts")]
     pub complete: bool,
     /// Write campaigns, runs, scenes and outcomes as RDF, without the facts in named graphs (Turtle)
@@ -133,7 +138,7 @@ fn write_tables(args: &ExportArgs, history: &History) -> Result<(), Diagnostics>
         output::print(&told);
     }
     if let Some(folder) = &args.dataset {
-        print_dataset(&export_dataset(&runs, folder)?);
+        print_dataset(&export_dataset(&runs, folder, args.course)?);
     }
     Ok(())
 }

@@ -58,6 +58,7 @@ pub fn recheck(args: &RecheckArgs) -> Result<u8, Diagnostics> {
         },
     )?;
     let (rules, (history, runs)) = both(rules, listed)?;
+    output::print_diagnostics(rules.warnings());
     let progress = Progress::new(runs.len() as u64, None);
     let bar = progress.bar();
     let stop = stop::on_interrupt(move || bar.println("stopping after the runs in flight; judgements so far are kept"));

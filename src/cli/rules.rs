@@ -8,12 +8,14 @@ use serde_json::Value;
 
 use crate::options::{Format, HistoryArgs};
 use crate::why::ontology_file;
-use crate::{history_dir, output};
+use crate::{chosen, history_dir, output};
+use actcheck_analysis::Sampling;
 use actcheck_base::{Diagnostics, Outcome};
 use actcheck_history::{Judgements, RunFilter, Wish};
 use actcheck_ontology as ontology;
 use actcheck_ontology::{Action, Ontology, Property};
 use actcheck_report::{Proportion, Table};
+use actcheck_rules::RuleBook;
 use actcheck_verdict::Counts;
 
 /// `actcheck rules`
@@ -30,13 +32,19 @@ pub struct RulesArgs {
     pub format: Format,
 }
 
-/// Prints one line for each property of the ontology. Without a history, there are no pass rates.
+/// Prints one line for each property of the ontology, and the warnings about its rules. Without a history, there are no
+/// pass rates.
+///
+/// # Errors
+/// Those of the ontology; and those of the rules, after the table.
 pub fn rules(args: &RulesArgs) -> Result<(), Diagnostics> {
     let (files, path) = ontology_file(args.ontology.as_deref());
     let ontology = ontology::load(&files, &path)?;
     let mut judged: BTreeMap<String, Counts> = BTreeMap::new();
+    let mut sampling = Sampling::Fixed;
     if let Some(history) = history_dir::open_if_any(&args.history)? {
         let counted = history.counted_runs()?;
+        sampling = chosen::sampling(&history, |_| true)?;
         let wish = Wish { judgements: Judgements::Newest, ..Wish::default() };
         history.each_judged(&RunFilter::default(), wish, &mut |run| {
             for own in run.outcomes.iter().filter(|_| counted.contains(&run.row.run)) {
@@ -57,35 +65,38 @@ pub fn rules(args: &RulesArgs) -> Result<(), Diagnostics> {
         ),
     };
     table.rows = match args.format {
-        Format::Text => properties.map(|property| for_people(property, &ontology, counts(property))).collect(),
+        Format::Text => {
+            properties.map(|property| for_people(property, &ontology, counts(property), sampling)).collect()
+        }
         Format::Csv | Format::Json => {
-            properties.map(|property| for_programs(property, &ontology, counts(property))).collect()
+            properties.map(|property| for_programs(property, &ontology, counts(property), sampling)).collect()
         }
     };
     output::print(&table.render(args.format.into(), output::page()));
+    output::print_diagnostics(RuleBook::prepare(&ontology)?.warnings());
     Ok(())
 }
 
-fn for_people(property: &Property, ontology: &Ontology, counts: Counts) -> Vec<Value> {
+fn for_people(property: &Property, ontology: &Ontology, counts: Counts, sampling: Sampling) -> Vec<Value> {
     let preconditions = named(ontology, |action| action.preconditions.contains(&property.iri));
     let mut actions = named(ontology, |action| action.success_properties.contains(&property.iri));
     actions.extend(preconditions.into_iter().map(|name| format!("{name} (before it)")));
-    let rate =
-        Proportion::new(counts.passed, counts.decided()).map_or_else(|| "–".to_owned(), |share| share.to_string());
+    let rate = Proportion::sampled(counts.passed, counts.decided(), sampling);
+    let rate = rate.map_or_else(|| "–".to_owned(), |share| share.to_string());
     let unit = property.unit.clone().unwrap_or_default();
     let [name, label, language, file] = described(property);
     vec![name, label, language, file, actions.join(", ").into(), unit.into(), rate.into()]
 }
 
-fn for_programs(property: &Property, ontology: &Ontology, counts: Counts) -> Vec<Value> {
+fn for_programs(property: &Property, ontology: &Ontology, counts: Counts, sampling: Sampling) -> Vec<Value> {
     let actions = named(ontology, |action| action.success_properties.contains(&property.iri));
     let preconditions = named(ontology, |action| action.preconditions.contains(&property.iri));
-    let share = Proportion::new(counts.passed, counts.decided());
-    let part = |part: fn(&Proportion) -> f64| Value::from(share.as_ref().map(part));
+    let share = Proportion::sampled(counts.passed, counts.decided(), sampling);
+    let part = |part: fn(&Proportion) -> Option<f64>| Value::from(share.as_ref().and_then(part));
     let mut row: Vec<Value> = described(property).into();
     row.extend([actions.join(" ").into(), preconditions.join(" ").into(), property.unit.clone().into()]);
     row.extend(Outcome::ALL.map(|outcome| counts.get(outcome).into()));
-    row.extend([part(|it| it.interval.rate), part(|it| it.interval.low), part(|it| it.interval.high)]);
+    row.extend([part(|it| it.rate), part(|it| Some(it.interval.low)), part(|it| Some(it.interval.high))]);
     row
 }
 

@@ -14,7 +14,7 @@ use crate::session::{self, Opened, Session};
 use crate::work::{all_cores, quietly};
 use crate::{case, clock, health, output, shrink, stop};
 use actcheck_analysis as analysis;
-use actcheck_analysis::{Interval, Mirror};
+use actcheck_analysis::{Interval, Mirror, Sampling};
 use actcheck_base::{Diagnostic, Diagnostics, Outcome};
 use actcheck_campaign::{
     CampaignOptions, CampaignResult, Ending, Env, ExhaustedBudget, RunContext, StoredRuns, WeightedRate, resume_all,
@@ -38,14 +38,17 @@ pub fn run(args: &RunArgs) -> Result<u8, Diagnostics> {
     let budget = Budget { stop: Arc::clone(&stop), ..Budget::default() };
     let jobs = args.jobs.map_or_else(all_cores, usize::from);
     let session = match session::open(args, &budget, jobs)? {
-        Opened::Case(env) => return case::run(args, *env),
+        Opened::Case(env) => {
+            output::print_diagnostics(&env.findings());
+            return case::run(args, *env);
+        }
         Opened::Campaign(session) => *session,
         Opened::NoneFailed(campaign) => {
             output::print_diagnostics(&none_failed(&campaign).into());
             return Ok(0);
         }
     };
-    output::print_diagnostics(&session.env.campaign.warnings);
+    output::print_diagnostics(&session.env.warnings());
     // From here on, an interrupt must end the campaign properly.
     campaign(args, session, &stop, |bar| {
         shown.get_or_init(|| bar);
@@ -99,7 +102,7 @@ pub(super) fn campaign(
     (summary.planned, summary.regressions) = (planned, regressions);
     if finished.is_ok() {
         mirror(&history);
-        summary.failure_modes = failure_modes(&history, id)?;
+        summary.failure_modes = failure_modes(&history, id, summary.sampling())?;
     }
     // If the history failed, only that fault is reported. Failed runs are a biased sample, so their health means little.
     let health =
@@ -277,11 +280,11 @@ fn finish(
     history.finish_campaign(id, &record)
 }
 
-fn failure_modes(history: &History, id: String) -> Result<Vec<analysis::FailureMode>, Diagnostics> {
+fn failure_modes(history: &History, id: String, sampling: Sampling) -> Result<Vec<analysis::FailureMode>, Diagnostics> {
     let filter = RunFilter { campaign: Some(id), ..RunFilter::default() };
     let rows = history.outcomes(&filter)?;
     let runs = history.runs(&filter)?;
-    Ok(analysis::failure_modes(&rows, &scenes(runs)))
+    Ok(analysis::failure_modes(&rows, &scenes(runs), sampling))
 }
 
 /// The scene of each run: its number if scenes are repeated, or the position of the first run with the same trace. Empty if
@@ -303,7 +306,7 @@ fn scenes(runs: Vec<RunRow>) -> BTreeMap<String, u64> {
 
 fn summarise(env: &Env, campaign: String, runs: Vec<RunSummary>, end: &CampaignResult) -> CampaignSummary {
     let mut properties: Vec<(String, String, Option<String>)> = Vec::new();
-    for action in env.campaign.tests.iter().flatten().filter_map(|name| env.ontology.actions.get(name)) {
+    for action in env.campaign.tests.iter().flatten().filter_map(|step| env.ontology.actions.get(&step.action)) {
         for iri in &action.success_properties {
             if let Some(property) = env.ontology.properties.get(iri)
                 && !properties.iter().any(|(known, ..)| known == iri)

@@ -61,6 +61,9 @@ pub fn open(args: &RunArgs, budget: &Budget, jobs: usize) -> Result<Opened, Diag
         }
         return Ok(Opened::Case(Box::new(env)));
     }
+    if going_on.is_none() {
+        env.check_starts()?;
+    }
     let cases = regressions::prepare(&env, budget)?;
     let (history, resumed) = match going_on {
         Some((history, record)) => (history, Some(record)),

@@ -11,7 +11,7 @@ use crate::{history_dir, output};
 use actcheck_analysis::perceived_sentences;
 use actcheck_base::{Diagnostics, names};
 use actcheck_campaign::made_by_other_physics;
-use actcheck_history::{History, RunDetail};
+use actcheck_history::{CampaignRecord, FindingRecord, History, RunDetail};
 use actcheck_report::{Table, run_json, run_text};
 
 /// `actcheck show`
@@ -42,7 +42,9 @@ pub fn show(args: &ShowArgs) -> Result<(), Diagnostics> {
         Format::Text => {
             let page = output::page();
             let again = judged_again(&history.run(&run.row.run)?, &run);
-            run_text(&run, &perceived(&history, &run), page) + &page.set(&again) + &page.set(&made_by(&history, &run)?)
+            let campaign = history.campaign(&run.row.campaign)?;
+            let notes = again + &made_by(&campaign) + &findings(&campaign);
+            run_text(&run, &perceived(&history, &run), page) + &page.set(&notes)
         }
         Format::Json => format!("{:#}\n", run_json(&run, &perceived(&history, &run))),
         Format::Csv => outcomes(&run).render(Format::Csv.into(), output::page()),
@@ -54,9 +56,17 @@ pub fn show(args: &ShowArgs) -> Result<(), Diagnostics> {
 }
 
 /// Says that the run was made by other physics than this program's. Empty if it was not.
-fn made_by(history: &History, run: &RunDetail) -> Result<String, Diagnostics> {
-    let told = made_by_other_physics(&history.campaign(&run.row.campaign)?);
-    Ok(told.map(|made| format!("{made}: a replay has other states\n")).unwrap_or_default())
+fn made_by(campaign: &CampaignRecord) -> String {
+    made_by_other_physics(campaign).map(|made| format!("{made}: a replay has other states\n")).unwrap_or_default()
+}
+
+/// Names the warnings about the rules that its campaign keeps.
+fn findings(campaign: &CampaignRecord) -> String {
+    let line = |found: &FindingRecord| {
+        let place = found.place.as_ref().map(|place| format!(" {place}")).unwrap_or_default();
+        format!("finding about the rules of its campaign: {}{place}: {}\n", found.code, found.message)
+    };
+    campaign.findings.iter().map(line).collect()
 }
 
 /// Sentences about the perceived targets of a run's actions that failed, by their positions. Empty if its trace can't be

@@ -14,8 +14,9 @@ use actcheck_campaign::shrink::{self, Id, Repeat, ShrinkOptions, Shrunk};
 use actcheck_campaign::{Env, RunContext};
 use actcheck_data::Choice;
 use actcheck_history::{History, RunRecord};
-use actcheck_report::{ShrunkChoice, ShrunkSummary, Table, shrunk_json, shrunk_text};
+use actcheck_report::{PassingValue, ShrunkChoice, ShrunkSummary, Table, shrunk_json, shrunk_text};
 use actcheck_rules::Budget;
+use serde_json::Value;
 
 /// `actcheck shrink`
 #[derive(Debug, Args)]
@@ -132,13 +133,13 @@ fn shrink_one(
     let recorded = history.choices(run)?;
     let shrunk = quietly(|| shrink::shrink(env, index, &recorded, options, &mut |_| {}))?;
     let record = shrink::store(env, history, run, index, &shrunk, &options.context)?;
-    summary(env, history, run, shrunk, &record)
+    summary(env, history, (run, options.property), shrunk, &record)
 }
 
 fn summary(
     env: &Env,
     history: &History,
-    original: &str,
+    (original, property): (&str, Option<&str>),
     shrunk: Shrunk,
     record: &RunRecord,
 ) -> Result<ShrunkSummary, Diagnostics> {
@@ -152,7 +153,8 @@ fn summary(
         original: original.to_owned(),
         run: history.run(&record.id)?,
         choices: choices.collect(),
-        neighbour: shrunk.explained.neighbour.as_ref().map(|near| (shown(&near.id), near.value)),
+        property: property.map(str::to_owned),
+        neighbour: shrunk.explained.neighbour.as_ref().map(|near| (shown(&near.id), passing_value(&near.passing))),
         why: why(env, record, &shrunk)?,
         failed: shrunk.failed.into_iter().collect(),
         others_before: shrunk.others_before,
@@ -170,7 +172,8 @@ fn choices_table(shrunk: &ShrunkSummary) -> Table {
     let columns = ["run", "name", "value", "nominal", "unit", "needed", "fails_from", "fails_to", "passes_below"];
     let mut table = Table::new(columns.into_iter().chain(["passes_above"]));
     let row = |choice: &ShrunkChoice| {
-        let (fails, passes) = (choice.fails, choice.passes);
+        let fails = choice.fails;
+        let passes = |side: &Option<PassingValue>| Value::from(side.as_ref().map(|at| at.value));
         vec![
             shrunk.run.row.run.clone().into(),
             choice.name.clone().into(),
@@ -180,8 +183,8 @@ fn choices_table(shrunk: &ShrunkSummary) -> Table {
             choice.matters.into(),
             fails.0.into(),
             fails.1.into(),
-            passes.0.into(),
-            passes.1.into(),
+            passes(&choice.passes.0),
+            passes(&choice.passes.1),
         ]
     };
     table.rows = shrunk.choices.iter().map(row).collect();
@@ -197,8 +200,12 @@ fn shrunk_choice(name: String, influence: &shrink::Influence) -> ShrunkChoice {
         unit: full.unit(),
         matters: influence.matters,
         fails: influence.fails,
-        passes: influence.passes,
+        passes: (influence.passes.0.as_ref().map(passing_value), influence.passes.1.as_ref().map(passing_value)),
     }
+}
+
+fn passing_value(passing: &shrink::Passing) -> PassingValue {
+    PassingValue { value: passing.value, others: passing.others.clone() }
 }
 
 /// The explanation of each property that fails.

@@ -7,15 +7,15 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use crate::{Case, Launcher, OtherCounts, WorldMap, designators};
+use crate::{Case, Launcher, OtherCounts, Step, WorldMap, designators};
 
 /// One campaign: runs every test in `test_count` scenes, `repeat` times in each.
 #[derive(Debug, Clone)]
 pub struct Campaign {
     /// The configuration's text.
     pub source: Source,
-    /// Lists of action names, performed in order (`tests`).
-    pub tests: Vec<Vec<String>>,
+    /// Lists of actions, performed in order (`tests`).
+    pub tests: Vec<Vec<Step>>,
     /// Scenes of each test (`test_count`).
     pub test_count: u32,
     /// Runs of each scene, each with different noise (`repeat`; default 1).
@@ -74,7 +74,7 @@ pub struct Campaign {
     /// Which runs the history keeps whole (`[history] keep` and `keep_whole`; by default all).
     pub keeping: Keeping,
     /// Spans of keys and values, for faults that only a later stage can find: `tests.0.1` is the second action of
-    /// the first test, `pickObject` the table's header, `pickObject.2` its third candidate.
+    /// the first test, `tests.0.1.pickObject` the value that it gives to this designator, `pickObject` the table's header, `pickObject.2` its third candidate.
     pub places: BTreeMap<String, Span>,
     /// Warnings about ignored parts of used models, and about unused models with errors.
     pub warnings: Diagnostics,

@@ -36,6 +36,8 @@ enum Form<'a> {
     Count(u32),
     /// As `true` for 1 and `false` for 0.
     YesNo,
+    /// As the id of an object of the scene, or another name that only the scene knows.
+    OfScene,
     /// As a number.
     Number,
 }
@@ -48,6 +50,7 @@ impl<'a> Form<'a> {
                 designators.candidates.get(name).map_or(Self::Number, |names| Self::Candidate(names))
             }
             ChoiceName::Object(_, ObjectAxis::LeftOut) => Self::YesNo,
+            ChoiceName::Step { .. } => Self::OfScene,
             _ => match (choice.candidates(), designators.other_counts.of_choice(choice)) {
                 (Some(OBSTACLE_LIST), _) => Self::Candidate(&designators.nav_obstacles),
                 (Some(table), _) => Self::Candidate(designators.candidates.get(table).map_or(&[], Vec::as_slice)),
@@ -114,6 +117,10 @@ fn read_choices(
 fn read_values(table: &mut Table, key: &str, form: Form<'_>) -> Vec<ChoiceValue> {
     let numbers = match form {
         Form::Candidate(_) if table.is_number(key) => table.number(key, ..).into_iter().collect(),
+        Form::OfScene => {
+            let written = table.string(key).into_iter();
+            return written.map(|text| ChoiceValue::Candidate(text.value)).collect();
+        }
         Form::Candidate(names) => return read_candidates(table, key, names),
         Form::Count(least) => table
             .integer(key, 0..=i64::from(u32::MAX))

@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 
 use toml::Value;
 
-use crate::{Campaign, OtherCounts};
+use crate::{Campaign, OtherCounts, Step};
 use actcheck_base::{Diagnostic, Diagnostics, Source};
 use actcheck_data::{Choice, ChoiceKind, ChoiceName, ObjectAxis};
 
@@ -20,8 +20,8 @@ const BUDGETS_OF_CAMPAIGNS: [&str; 3] = ["max_failures", "time", "until_width"];
 pub struct CaseText<'a> {
     /// The run that the case is exported from.
     pub run: &'a str,
-    /// Names of its actions.
-    pub test: &'a [String],
+    /// Its actions.
+    pub test: &'a [Step],
     /// Names of the properties that failed.
     pub failed: &'a [String],
     /// Digest over all states of the run.
@@ -94,7 +94,7 @@ pub fn case_text(campaign: &Campaign, case: &CaseText<'_>) -> Result<String, Dia
     if let Some(Value::Table(budget)) = table.get_mut("budget") {
         BUDGETS_OF_CAMPAIGNS.iter().for_each(|key| drop(budget.remove(*key)));
     }
-    table.insert("tests".to_owned(), Value::Array(vec![names(case.test)]));
+    table.insert("tests".to_owned(), Value::Array(vec![Value::Array(case.test.iter().map(step).collect())]));
     table.insert("test_count".to_owned(), Value::Integer(1));
     let WrittenPaths { ontology, models, profile } = case.paths.clone();
     let mut models: Vec<Value> = models.into_iter().map(Value::String).collect();
@@ -160,6 +160,15 @@ pub fn with_skills(
     let keys = ["test_launcher", "skill"].map(str::to_owned);
     table.extend(keys.into_iter().zip(is).filter_map(|(key, value)| Some((key, value?))));
     Ok(table.to_string())
+}
+
+/// An action of a test as configurations write it.
+fn step(step: &Step) -> Value {
+    if step.values.is_empty() {
+        return Value::String(step.action.clone());
+    }
+    let values = step.values.iter().map(|(name, value)| (name.clone(), Value::String(value.clone())));
+    Value::Table([("action".to_owned(), Value::String(step.action.clone()))].into_iter().chain(values).collect())
 }
 
 fn names(names: &[String]) -> Value {

@@ -53,6 +53,7 @@ pub(crate) fn read(
     let mut lying = (0.0, 0.0);
     let nav_may_block = read_nav(root, found);
     let has_others = root.key_span("surfaceObjects").is_some();
+    let has_surface = root.key_span("objectSurface").is_some();
     for (name, key, kind) in PAPER_TABLES {
         let Some(mut table) = root.table(name) else { continue };
         table.require(&[key]);
@@ -60,7 +61,7 @@ pub(crate) fn read(
         for value in &values {
             match kind {
                 Kind::World => library.read_world(&mut table, value, found),
-                Kind::Location => library.check_location(&mut table, value),
+                Kind::Location => library.check_location(&mut table, value, has_surface),
                 Kind::Surface => library.check_surface(&mut table, value),
                 Kind::Model => library.check_name(&mut table, value),
             }

@@ -7,7 +7,8 @@ use crate::Launcher;
 use crate::designators::{self, Designators};
 use crate::paths::resolve_path;
 use crate::robot::{MendedUrdf, mended};
-use crate::{Campaign, Overrides, Table, case, model_library, ranges, skill};
+use crate::table::WrittenStep;
+use crate::{Campaign, Overrides, Step, Table, case, model_library, ranges, skill};
 use actcheck_base::{Diagnostic, Diagnostics, Files, Keep, Keeping, Severity, Source, Span, did_you_mean};
 use actcheck_search::Strategy;
 
@@ -154,14 +155,19 @@ pub fn in_order_of_place(found: Diagnostics) -> Diagnostics {
     sorted
 }
 
-fn read_tests(table: &mut Table) -> (Vec<Vec<String>>, BTreeMap<String, Span>) {
+fn read_tests(table: &mut Table) -> (Vec<Vec<Step>>, BTreeMap<String, Span>) {
     let mut places = BTreeMap::new();
     let mut tests = Vec::new();
-    for (idx, list) in table.non_empty_lists_of_strings("tests").unwrap_or_default().into_iter().enumerate() {
-        for (step, action) in list.value.iter().enumerate() {
-            places.insert(format!("tests.{idx}.{step}"), action.span.clone());
+    for (idx, list) in table.lists_of_steps("tests").unwrap_or_default().into_iter().enumerate() {
+        let mut test = Vec::new();
+        for (number, WrittenStep { action, values }) in list.into_iter().enumerate() {
+            let place = format!("tests.{idx}.{number}");
+            places.extend(values.iter().map(|(name, value)| (format!("{place}.{name}"), value.span.clone())));
+            places.insert(place, action.span);
+            let values = values.into_iter().map(|(name, value)| (name, value.value)).collect();
+            test.push(Step { action: action.value, values });
         }
-        tests.push(list.value.into_iter().map(|action| action.value).collect());
+        tests.push(test);
     }
     (tests, places)
 }

@@ -285,10 +285,23 @@ impl ModelLibrary {
         }
     }
 
-    /// Reports a location that no named world has (C021). If no world has locations, any name is accepted.
-    pub(crate) fn check_location(&self, table: &mut Table, name: &Located<String>) {
+    /// Reports a location that no named world has (C021). If no world has locations, any name is accepted for the place in
+    /// front of the surface that holds the objects, if there is one.
+    pub(crate) fn check_location(&self, table: &mut Table, name: &Located<String>, has_surface: bool) {
         let known: Vec<String> =
             self.worlds.values().flat_map(|world| &world.locations).map(|location| location.name.clone()).collect();
+        if known.is_empty() && !has_surface {
+            let mut worlds: Vec<String> = self.worlds.keys().map(|world| format!("`{world}`")).collect();
+            let message = match worlds.len() {
+                0 => format!("there is no location `{}`: the configuration names no world", name.value),
+                1 => format!("there is no location `{}`: the world {} has none", name.value, worlds.remove(0)),
+                _ => format!("there is no location `{}`: the worlds {} have none", name.value, worlds.join(", ")),
+            };
+            let help =
+                "name a world that has it, or add `[objectSurface]`: the location is then the place in front of it";
+            table.fault("C021", name.span.clone(), message, help);
+            return;
+        }
         let is_named = known.is_empty() || known.contains(&name.value);
         if !is_named {
             let message = format!("no world of the configuration has a location `{}`", name.value);

@@ -235,6 +235,7 @@ pub fn bare(
         grip_force_n: GRIP_FORCE_N,
         suction: None,
         meshes: BTreeMap::new(),
+        surfaces: BTreeMap::new(),
     };
     Ok(with_meshes(profile, read))
 }
@@ -376,6 +377,7 @@ fn read_table(
         grip_force_n,
         suction: None,
         meshes: BTreeMap::new(),
+        surfaces: BTreeMap::new(),
         digest: digest.finish(),
     };
     Some(match suction {

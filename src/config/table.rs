@@ -29,6 +29,16 @@ pub struct Table {
     found: Diagnostics,
 }
 
+/// Key of the action's name in a table that is an action of a test.
+const ACTION: &str = "action";
+
+/// An action of a test as written, with the values of designators.
+#[derive(Debug)]
+pub(crate) struct WrittenStep {
+    pub(crate) action: Located<String>,
+    pub(crate) values: BTreeMap<String, Located<String>>,
+}
+
 impl Table {
     /// Parses the root table of a text.
     ///
@@ -198,8 +208,8 @@ impl Table {
         (!list.is_empty()).then_some(list)
     }
 
-    /// Takes a list of at least one list of at least one string; each inner list has its span.
-    pub fn non_empty_lists_of_strings(&mut self, key: &str) -> Option<Vec<Located<Vec<Located<String>>>>> {
+    /// Takes a list of at least one test: a list of at least one action.
+    pub(crate) fn lists_of_steps(&mut self, key: &str) -> Option<Vec<Vec<WrittenStep>>> {
         let expected = "a list of lists of strings";
         let place = self.entries.get(key).map(|entry| entry.value.span.clone());
         let outer = self.list(key, expected)?;
@@ -213,13 +223,31 @@ impl Table {
                     self.fault("C007", span, format!("an empty list in {}", self.name(key)), "name at least one");
                 }
                 Value::Array(inner) => {
-                    let value = inner.into_iter().filter_map(|value| self.text_of(key, expected, value)).collect();
-                    lists.push(Located { value, span });
+                    lists.push(inner.into_iter().filter_map(|value| self.step_of(key, expected, value)).collect());
                 }
                 other => self.wrong(key, expected, &Located { value: other, span }),
             }
         }
         Some(lists)
+    }
+
+    /// Returns an action of a test: its name, or a table with its name as `action` and with values of designators.
+    fn step_of(&mut self, key: &str, expected: &str, Located { value, span }: Located<Value>) -> Option<WrittenStep> {
+        let Value::Table(mut entries) = value else {
+            let action = self.text_of(key, expected, Located { value, span })?;
+            return Some(WrittenStep { action, values: BTreeMap::new() });
+        };
+        let Some(action) = entries.remove(ACTION) else {
+            let message = format!("`{ACTION}` is missing in a table of {}", self.name(key));
+            self.fault("C005", span, message, "name the action: `{ action = \"Pick\", pickObject = \"other\" }`");
+            return None;
+        };
+        let action = self.text_of(key, expected, action.value)?;
+        let mut values = BTreeMap::new();
+        for (name, entry) in entries {
+            values.insert(name, self.text_of(key, expected, entry.value)?);
+        }
+        Some(WrittenStep { action, values })
     }
 
     /// Takes an integer within bounds.

@@ -48,6 +48,13 @@ pub enum ChoiceName {
     Robot(StartAxis),
     /// Number of the test's last actions that a shrunk run leaves out.
     ActionsLeftOut,
+    /// The value of a designator in one action of the test, a candidate: the id of an object of the scene.
+    Step {
+        /// Position of the action in the test, from 1.
+        number: u32,
+        /// The designator.
+        designator: String,
+    },
     /// Seed of all randomness of a program that performs actions.
     SkillSeed,
     /// Seed of a motion planner's samples.
@@ -95,6 +102,8 @@ pub const OBSTACLE_LIST: &str = "nav_obstacle_list";
 
 /// Prefix of sensor noise.
 const SENSE: &str = "sense.";
+/// Prefix of the values of one action.
+const STEP: &str = "step.";
 const LOCALISATION: &str = "localisation";
 const LANDMARK: &str = "odometry.landmark";
 const ODOMETRY: &str = "odometry";
@@ -255,12 +264,23 @@ impl ChoiceName {
         }
     }
 
+    /// Reads the part of the name of an action's value after the prefix.
+    fn read_step(rest: &str) -> Option<Self> {
+        let (written, designator) = rest.split_once('.')?;
+        let number: u32 = written.parse().ok()?;
+        let is_canonical = number > 0 && number.to_string() == written && !designator.is_empty();
+        is_canonical.then(|| Self::Step { number, designator: designator.to_owned() })
+    }
+
     fn read(text: &str) -> Option<Self> {
         if let Some((name, _)) = FIXED.into_iter().find(|(_, written)| *written == text) {
             return Some(name);
         }
         if let Some(rest) = text.strip_prefix(SENSE) {
             return Self::read_noise(rest);
+        }
+        if let Some(rest) = text.strip_prefix(STEP) {
+            return Self::read_step(rest);
         }
         let (of, axis) = text.rsplit_once('.')?;
         match of {
@@ -275,6 +295,7 @@ impl fmt::Display for ChoiceName {
         match self {
             Self::Object(object, axis) => write!(f, "{object}.{}", axis.word()),
             Self::Robot(axis) => write!(f, "robot.{}", axis.word()),
+            Self::Step { number, designator } => write!(f, "{STEP}{number}.{designator}"),
             Self::Localisation(axis) => write!(f, "{SENSE}{LOCALISATION}.{}", axis.word()),
             Self::Odometry(axis) => write!(f, "{SENSE}{ODOMETRY}.{}", axis.word()),
             Self::Landmark(axis) => write!(f, "{SENSE}{LANDMARK}.{}", axis.word()),
@@ -319,7 +340,7 @@ mod tests {
     use super::*;
 
     /// Names as histories and case files have them, in any version of the program.
-    const WRITTEN: [&str; 40] = [
+    const WRITTEN: [&str; 41] = [
         "world",
         "surface.name",
         "surface.model",
@@ -346,6 +367,7 @@ mod tests {
         "robot.x",
         "robot.y",
         "test.left_out",
+        "step.3.pickObject",
         "skill.seed",
         "motion.samples",
         "sense.localisation.x",
@@ -373,7 +395,19 @@ mod tests {
 
     #[test]
     fn any_other_text_is_a_designator_and_written_alike() {
-        for written in ["objectLocation", "target", "other.01.x", "other.x", "sense.", "sense.x", "robot.z", "", "."] {
+        for written in [
+            "objectLocation",
+            "step.0.pickObject",
+            "step.x",
+            "target",
+            "other.01.x",
+            "other.x",
+            "sense.",
+            "sense.x",
+            "robot.z",
+            "",
+            ".",
+        ] {
             assert_eq!(ChoiceName::from(written), ChoiceName::Designator(written.to_owned()));
             assert_eq!(ChoiceName::from(written).to_string(), written);
         }

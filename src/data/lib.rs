@@ -40,7 +40,7 @@ pub use places::{FLOOR_M, Location, OVERHEAD_M, Room};
 pub use pose::Pose;
 pub use quality::Quality;
 pub use robot::{LEAST_LINK_KG, RobotProfile, RobotView, Suction};
-pub use robot_course::{Clearance, HeldCourse, JointCourse, RobotCourse, SelfCollision};
+pub use robot_course::{Clearance, HeldCourse, JointCourse, RobotCourse, SelfCollision, SelfPress};
 pub use samples::{Samples, Series};
 pub use scene::{Attached, KnownKind, RobotStart, Role, Scene, SceneObject};
 pub use scene_map::{NamedSurface, SceneMap};

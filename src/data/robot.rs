@@ -1,8 +1,9 @@
 //! Robots: the URDF and the roles of its joints and links.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
-use crate::{Part, Pose, Shape};
+use crate::{Mesh, Part, Pose, Shape};
 use actcheck_base::Source;
 
 /// Mass of links without a mass in the URDF, such as the stages of a base, and of lighter ones. Unit: kilograms. Small
@@ -78,6 +79,8 @@ pub struct RobotProfile {
     pub suction: Option<Suction>,
     /// Collision meshes by the file name in the URDF, in the file's own scale.
     pub meshes: BTreeMap<String, Vec<Shape>>,
+    /// The same meshes before they were divided into convex pieces, which fill hollows; empty if they were not divided.
+    pub surfaces: BTreeMap<String, Vec<Arc<Mesh>>>,
     /// Digest of profile, URDF and meshes.
     pub digest: String,
 }

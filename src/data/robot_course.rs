@@ -9,7 +9,7 @@ use crate::{Interval, Motion, Samples};
 pub struct RobotCourse {
     /// One for each joint, in the robot's order.
     pub joints: Vec<JointCourse>,
-    /// Pairs of links that penetrated each other, sorted.
+    /// Pairs of links that pressed or penetrated each other, sorted.
     pub self_contacts: Vec<SelfCollision>,
     /// Objects that both fingers touched at the same time, in scene order.
     pub held: Vec<HeldCourse>,
@@ -41,15 +41,28 @@ pub struct JointCourse {
     pub overload_secs: f64,
 }
 
-/// Two links of the robot that penetrated each other, and did not when the run began.
+/// Two links of the robot that pressed or penetrated each other, and did neither when the run began.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SelfCollision {
     /// `robot/LINK`, sorted.
     pub pair: [String; 2],
     /// Time of its first detection since the action began. Unit: seconds.
     pub start_secs: f64,
-    /// Largest penetration depth. Unit: metres.
+    /// Largest penetration depth, of solid material only: hulls that fill the hollows of a mesh do not count. In traces of
+    /// earlier versions, they do. Unit: metres.
     pub max_depth_m: f64,
+    /// How hard they pressed each other. `None` in traces of earlier versions.
+    #[serde(skip)]
+    pub press: Option<SelfPress>,
+}
+
+/// The force between two links.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct SelfPress {
+    /// Largest normal force; 0 if they pass through each other. Unit: newtons.
+    pub max_force_n: f64,
+    /// Whether both belong to the hand, whose fingers may meet.
+    pub of_hand: bool,
 }
 
 /// The smallest distance of the robot to an object.

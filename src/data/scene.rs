@@ -18,6 +18,8 @@ pub struct Scene {
     pub robot: RobotStart,
     /// Values of the designators: ids of objects, or names of locations.
     pub designators: BTreeMap<String, Vec<String>>,
+    /// The same for each action of the test, with the values that the test gives. Actions beyond have those of the scene.
+    pub steps: Vec<BTreeMap<String, Vec<String>>>,
     /// Sensor noise of the run.
     pub sensing: Sensing,
     /// Parameters of the physics engine.

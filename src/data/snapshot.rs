@@ -59,6 +59,9 @@ pub struct BodyState {
     /// traces read from a history.
     #[serde(skip)]
     pub part: Option<(String, f64)>,
+    /// Whether the robot flung, pushed or dropped it out of the world, where it stays. False in traces of earlier versions.
+    #[serde(skip)]
+    pub left_world: bool,
 }
 
 /// The robot.

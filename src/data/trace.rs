@@ -8,13 +8,13 @@ use crate::{Part, Pose, RobotCourse, SceneMap, Snapshot};
 
 /// A whole run as recorded by the simulation.
 ///
-/// `snapshots` has one more element than there are performed actions: the state after one action is the state before
-/// the next and is stored once.
+/// `snapshots` has one more element than there are reached actions: the state after one action is the state before
+/// the next and is stored once. An action that was not performed has the same state before and after it.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Trace {
     /// States before, between and after the actions.
     pub snapshots: Vec<Snapshot>,
-    /// The actions in order, including those that were never reached.
+    /// The actions in order, including those that were not performed or never reached.
     pub actions: Vec<ActionTrace>,
     /// The motion of all bodies, for replay and pictures.
     pub frames: Frames,
@@ -96,6 +96,20 @@ pub enum ActionEnd {
     NotReached,
     /// The run exceeded its wall-clock limit: a timeout that says nothing about the robot.
     Cut(String),
+    /// A precondition of the action did not hold, as the text says: the action was not performed, and the run went on.
+    NotPerformed(String),
+}
+
+impl ActionEnd {
+    /// Whether the action began: neither a precondition nor an earlier action kept it from that.
+    pub fn was_begun(&self) -> bool {
+        !matches!(self, Self::NotReached | Self::NotPerformed(_))
+    }
+
+    /// Whether later actions of the test follow.
+    pub fn lets_run_go_on(&self) -> bool {
+        matches!(self, Self::Completed | Self::NotPerformed(_))
+    }
 }
 
 /// The action's own report. It can be wrong.

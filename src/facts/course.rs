@@ -1,6 +1,7 @@
 //! The course of an action, from its recorded samples.
 
 use crate::snapshot::{POSITION, ROTATION};
+use crate::solids::{boxed, solid_of};
 use crate::thing_iri;
 use actcheck_base::{Course, Signal, names};
 use actcheck_data::Trace;
@@ -22,6 +23,15 @@ pub(super) fn of_action(trace: &Trace, step: usize) -> Option<Course> {
         POSITION.into_iter().zip(body.pose.position).for_each(|(quantity, value)| set(quantity, value));
         ROTATION.into_iter().zip(body.pose.rotation).for_each(|(quantity, value)| set(quantity, value));
         AT_REST.into_iter().for_each(|quantity| set(quantity, 0.0));
+    }
+    for body in &trace.snapshots.get(step)?.bodies {
+        let form = trace.forms.iter().find(|form| form.name == body.id);
+        // Without its shape, as in traces of earlier versions, a body is a box.
+        let solids = match form {
+            Some(form) => form.parts.iter().map(solid_of).collect(),
+            None => body.size_m.map(boxed).into_iter().collect(),
+        };
+        course.set_solids(thing_iri(&body.id), solids);
     }
     // Furniture that can slide has samples, too: they replace its constants.
     for series in &samples.series {

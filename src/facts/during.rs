@@ -132,7 +132,7 @@ fn write_perceived(perceived: &Perceived, began_secs: f64, writer: &mut Writer) 
         let subject = writer.named("perceivedObject", &(idx + 1).to_string());
         writer.world_class(subject, "PerceivedObject");
         writer.numbers(subject, ["x", "y", "z"], thing.pose.position);
-        writer.number(subject, "yaw", thing.pose.yaw());
+        writer.numbers(subject, ["yaw", "tilt"], [thing.pose.yaw(), thing.pose.tilt()]);
         writer.numbers(subject, ["sizeX", "sizeY", "sizeZ"], thing.size_m);
         write_look(subject, perceived.look.as_ref(), began_secs, writer);
         if let Some(category) = &thing.category {

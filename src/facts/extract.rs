@@ -5,13 +5,13 @@ use std::collections::{BTreeMap, BTreeSet};
 use crate::writer::Writer;
 use crate::{course, during, intervals, places, robot_course, snapshot};
 use actcheck_base::{RunFacts, Term, TermId, names};
-use actcheck_data::{ActionEnd, SceneMap, Trace};
+use actcheck_data::{SceneMap, Trace};
 
 /// Extracts the facts of a run: one list for each snapshot, and for each action one list of events and one of
 /// designators.
 ///
-/// The same trace gives the same facts with the same term IDs. An action that was never reached has designators but no
-/// events. Every number is the shortest decimal of its f32.
+/// The same trace gives the same facts with the same term IDs. An action that was never reached or not performed has
+/// designators but no events. Every number is the shortest decimal of its f32.
 pub fn extract(trace: &Trace) -> RunFacts {
     extract_to(trace, Extent::Rules)
 }
@@ -44,7 +44,7 @@ fn extract_to(trace: &Trace, extent: Extent) -> RunFacts {
     }
     let bodies: BTreeSet<&str> = trace.snapshots.iter().flat_map(|s| s.bodies.iter().map(|b| b.id.as_str())).collect();
     for (idx, action) in trace.actions.iter().enumerate() {
-        if action.end != ActionEnd::NotReached {
+        if action.end.was_begun() {
             let began_secs = trace.snapshots.get(idx).map_or(0.0, |before| before.time_secs);
             during::write(action, began_secs, extent, &mut writer);
             if extent == Extent::Complete {

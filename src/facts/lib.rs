@@ -9,6 +9,7 @@ mod intervals;
 mod places;
 mod robot_course;
 mod snapshot;
+mod solids;
 mod writer;
 
 pub use extract::{extract, extract_complete};

@@ -32,6 +32,10 @@ pub(super) fn write(course: &RobotCourse, writer: &mut Writer) {
             writer.state(subject, property, link);
         }
         writer.numbers(subject, ["seenAt", "maxDepth"], [contact.start_secs, contact.max_depth_m]);
+        if let Some(press) = contact.press {
+            writer.number(subject, "maxForce", press.max_force_n);
+            writer.boolean(subject, "fingersMeet", press.of_hand);
+        }
     }
     for near in &course.clearances {
         let subject = writer.thing(&near.id);

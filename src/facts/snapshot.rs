@@ -43,6 +43,9 @@ fn write_body(body: &BodyState, writer: &mut Writer) {
     writer.things(subject, "restsOn", &body.rests_on);
     writer.boolean(subject, "asleep", body.asleep);
     writer.boolean(subject, "fixed", body.fixed);
+    if body.left_world {
+        writer.boolean(subject, "leftWorld", true);
+    }
 }
 
 fn write_robot(robot: &RobotState, writer: &mut Writer) {

@@ -202,5 +202,6 @@ pub(super) fn judgement(
         witness: result.text("act:witness").unwrap_or_default(),
         rule_digest: result.text("act:ruleDigest").unwrap_or_default(),
         held_before: result.boolean("act:heldBefore"),
+        vacuous: result.boolean("act:vacuous"),
     })
 }

@@ -94,6 +94,7 @@ impl History {
         // The fault of the copy of a run's outcomes in its trace file. (Files of earlier versions have none.)
         let fault_of_copy = |id: &str, bytes: &[u8]| match trace_file::after_trace(bytes) {
             Ok([]) => None,
+            Ok(after) if trace_parts::is_older(after) => None,
             Ok(after) => match (trace_parts::of_bytes(after), detail::parts(&*store, &run_node(id))) {
                 (Ok((_, copied)), Ok(stored)) if copied != stored => {
                     Some("its copy of the outcomes differs from the store".to_owned())

@@ -70,7 +70,7 @@ pub use outlines::Restore;
 pub use parts::HistoryPart;
 pub use rdf_text::{RdfSyntax, rdf_text};
 pub use recheck::{NewestJudgements, Recheck, StoredJudgement};
-pub use record::{CampaignEnd, CampaignRecord, Repetition, RunRecord, RunStatus, SkillRecord};
+pub use record::{CampaignEnd, CampaignRecord, FindingRecord, Repetition, RunRecord, RunStatus, SkillRecord};
 pub use rows::{ActionDetail, CampaignRow, ObjectDetail, OutcomeRow, RunDetail, RunFilter, RunRow};
 pub use scene_digest::SceneDigest;
 pub use store::History;

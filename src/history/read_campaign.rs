@@ -6,7 +6,7 @@ use oxigraph::store::{StorageError, Store};
 use crate::detail::version;
 use crate::read::{Node, text_of};
 use crate::write_campaign::campaign_node;
-use crate::{CampaignRecord, SkillRecord};
+use crate::{CampaignRecord, FindingRecord, SkillRecord};
 use actcheck_base::Shard;
 
 /// Reads the record of a campaign. Returns `None` if the history has no such campaign.
@@ -21,6 +21,13 @@ pub(super) fn beginning(store: &Store, id: &str) -> Result<Option<CampaignRecord
         rules.push((text(&rule, "act:verifies"), text(&rule, "act:rulePath"), text(&rule, "act:ruleDigest")));
     }
     rules.sort();
+    let mut findings = Vec::new();
+    for found in parts(store, &node, "act:ruleFinding")? {
+        let place = found.text("act:findingPlace");
+        let (code, message) = (text(&found, "act:findingCode"), text(&found, "act:findingText"));
+        findings.push(FindingRecord { code, message, place });
+    }
+    findings.sort();
     let mut models = Vec::new();
     for model in parts(store, &node, "act:usedModel")? {
         models.push((text(&model, "act:model"), text(&model, "act:digest")));
@@ -34,6 +41,7 @@ pub(super) fn beginning(store: &Store, id: &str) -> Result<Option<CampaignRecord
         config_path: text(&node, "act:configPath"),
         ontology_digest: text(&node, "act:ontologyDigest"),
         rules,
+        findings,
         models,
         skill: skill(&node),
         seed: node.count("act:seed").unwrap_or_default(),

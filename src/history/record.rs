@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use actcheck_base::{Judgement, Outcome, RunFacts, Shard};
+use actcheck_base::{Diagnostic, Judgement, Outcome, RunFacts, Shard};
 use actcheck_data::{Choice, Quality, Scene, Trace};
 
 /// A campaign, written before its first run.
@@ -22,6 +22,8 @@ pub struct CampaignRecord {
     pub ontology_digest: String,
     /// Property IRI, rule path and digest of the rule file (with its libraries), sorted.
     pub rules: Vec<(String, String, String)>,
+    /// Warnings about the ontology and the rules, sorted; empty if an earlier version wrote the campaign.
+    pub findings: Vec<FindingRecord>,
     /// Digests of robot and models by name, sorted.
     pub models: Vec<(String, String)>,
     /// The program that performed actions; `None` if the reference skills performed all.
@@ -50,6 +52,24 @@ pub struct CampaignRecord {
     pub program_digest: String,
     /// Version of the program's physics; `None` if an earlier version wrote the campaign.
     pub physics: Option<u32>,
+}
+
+/// A warning about the ontology or the rules of a campaign.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
+pub struct FindingRecord {
+    /// Its code, such as `R046`.
+    pub code: String,
+    /// The problem.
+    pub message: String,
+    /// File, line and column, as far as they are known.
+    pub place: Option<String>,
+}
+
+impl FindingRecord {
+    /// The record of a diagnostic.
+    pub fn of(found: &Diagnostic) -> Self {
+        Self { code: found.code.to_owned(), message: found.message.clone(), place: found.place() }
+    }
 }
 
 /// A program that performs actions, as recorded with a campaign.

@@ -3,7 +3,9 @@
 
 use serde::{Deserialize, Serialize};
 
-use actcheck_data::{ActionTrace, Clearance, CupState, Interval, LinkState, Look, RobotCourse, Snapshot, Trace};
+use actcheck_data::{
+    ActionTrace, Clearance, CupState, Interval, LinkState, Look, RobotCourse, SelfPress, Snapshot, Trace,
+};
 
 /// The later fields of a whole trace, in the order of its parts.
 #[derive(Default, Serialize, Deserialize)]
@@ -45,6 +47,45 @@ impl Cups {
     pub(super) fn fill(self, trace: &mut Trace) {
         for (snapshot, cup) in trace.snapshots.iter_mut().zip(self.0) {
             snapshot.robot.cup = cup;
+        }
+    }
+}
+
+/// How hard links pressed each other in each action, and the bodies that had left the world in each snapshot, which follow
+/// [`Cups`] in the file if there are any.
+#[derive(Default, Serialize, Deserialize)]
+pub(super) struct Marks {
+    presses: Vec<Vec<Option<SelfPress>>>,
+    left: Vec<Vec<String>>,
+}
+
+impl Marks {
+    /// Returns `None` if no links met and nothing left the world.
+    pub(super) fn of(trace: &Trace) -> Option<Self> {
+        let presses = |course: &RobotCourse| course.self_contacts.iter().map(|contact| contact.press).collect();
+        let left = |snapshot: &Snapshot| {
+            let left = snapshot.bodies.iter().filter(|body| body.left_world);
+            left.map(|body| body.id.clone()).collect()
+        };
+        let marks = Self {
+            presses: trace.robot_courses.iter().map(presses).collect(),
+            left: trace.snapshots.iter().map(left).collect(),
+        };
+        let is_empty = marks.presses.iter().flatten().all(Option::is_none) && marks.left.iter().all(Vec::is_empty);
+        (!is_empty).then_some(marks)
+    }
+
+    /// Sets these fields of a trace.
+    pub(super) fn fill(self, trace: &mut Trace) {
+        for (course, presses) in trace.robot_courses.iter_mut().zip(self.presses) {
+            for (contact, press) in course.self_contacts.iter_mut().zip(presses) {
+                contact.press = press;
+            }
+        }
+        for (snapshot, left) in trace.snapshots.iter_mut().zip(self.left) {
+            for body in &mut snapshot.bodies {
+                body.left_world = left.contains(&body.id);
+            }
         }
     }
 }

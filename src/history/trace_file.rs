@@ -11,7 +11,7 @@ use flate2::write::GzEncoder;
 
 use crate::frames;
 use crate::inflate::expanded;
-use crate::trace_details::{Cups, Details, Intervals};
+use crate::trace_details::{Cups, Details, Intervals, Marks};
 use actcheck_base::Steps;
 use actcheck_data::{ActionTrace, Choice, Form, Frames, RobotCourse, Samples, SceneMap, Series, Snapshot, Trace};
 
@@ -22,8 +22,8 @@ const MAGIC: &[u8; 8] = b"actrace4";
 const WITHOUT_CANDIDATES: &[u8; 8] = b"actrace3";
 
 /// First part: choices, states, actions, time between frames, names of tracks, hash. The map, the forms of bodies, the
-/// courses of the robot, [`Details`], [`Intervals`] and, of a robot with a suction cup, [`Cups`] follow it. (Traces of
-/// earlier versions end before any of these.)
+/// courses of the robot, [`Details`] and [`Intervals`] follow it, then, of a robot with a suction cup, [`Cups`], and
+/// [`Marks`] if there are any. (Traces of earlier versions end before any of these.)
 type Head = (Vec<Choice>, Vec<Snapshot>, Vec<ActionTrace>, f64, Vec<String>, String);
 
 /// Encodes a run's file.
@@ -47,8 +47,12 @@ pub(super) fn encode_head(choices: &[Choice], trace: &Trace) -> Result<Vec<u8>, 
     let mut head = postcard::to_stdvec(&head).map_err(|error| error.to_string())?;
     let later = (&trace.map, &trace.forms, &trace.robot_courses, Details::of(trace), Intervals::of(trace));
     head.extend(postcard::to_stdvec(&later).map_err(|error| error.to_string())?);
-    if let Some(cups) = Cups::of(trace) {
-        head.extend(postcard::to_stdvec(&cups).map_err(|error| error.to_string())?);
+    let (cups, marks) = (Cups::of(trace), Marks::of(trace));
+    if cups.is_some() || marks.is_some() {
+        head.extend(postcard::to_stdvec(&cups.unwrap_or_default()).map_err(|error| error.to_string())?);
+    }
+    if let Some(marks) = marks {
+        head.extend(postcard::to_stdvec(&marks).map_err(|error| error.to_string())?);
     }
     Ok(head)
 }
@@ -203,13 +207,15 @@ pub(super) fn decode_head(head: &[u8]) -> Result<(Vec<Choice>, Trace), String> {
     let (robot_courses, rest): (Vec<RobotCourse>, &[u8]) = part_of(rest).map_err(read)?;
     let (details, rest): (Details, &[u8]) = part_of(rest).map_err(read)?;
     let (intervals, rest): (Intervals, &[u8]) = part_of(rest).map_err(read)?;
-    let (cups, _): (Cups, &[u8]) = part_of(rest).map_err(read)?;
+    let (cups, rest): (Cups, &[u8]) = part_of(rest).map_err(read)?;
+    let (marks, _): (Marks, &[u8]) = part_of(rest).map_err(read)?;
     let (choices, snapshots, actions, period_secs, names, hash) = head;
     let frames = Frames { period_secs, names, rows: Vec::new() };
     let mut trace = Trace { snapshots, actions, frames, hash, map, forms, robot_courses };
     details.fill(&mut trace);
     intervals.fill(&mut trace);
     cups.fill(&mut trace);
+    marks.fill(&mut trace);
     Ok((choices, trace))
 }
 

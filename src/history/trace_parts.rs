@@ -12,7 +12,9 @@ use crate::inflate::expanded;
 use crate::trace_file::compressed;
 
 /// Last bytes of a file that has a copy. The last one is its version; it increases whenever a type of [`Parts`] changes.
-const MAGIC: &[u8; 8] = b"actpart1";
+const MAGIC: &[u8; 8] = b"actpart2";
+/// Those of earlier versions, whose copies are not read.
+const OLDER: [&[u8; 8]; 1] = [b"actpart1"];
 /// Size of the length and the magic bytes after the copy. Unit: bytes.
 const TRAILER: u64 = 12;
 
@@ -39,6 +41,11 @@ pub(super) fn read(file: &Path) -> Option<(String, Parts)> {
     let mut after = Vec::new();
     file.read_to_end(&mut after).ok()?;
     of_bytes(&after).ok()
+}
+
+/// Returns whether the bytes after a trace are the copy of an earlier version, which is not read.
+pub(super) fn is_older(after: &[u8]) -> bool {
+    OLDER.iter().any(|magic| after.ends_with(*magic))
 }
 
 /// Reads the copy in the bytes after a trace, and the hash of its trace.
@@ -88,6 +95,7 @@ mod tests {
             witness: "no success was derived".to_owned(),
             rule_digest: "ab".to_owned(),
             held_before: Some(false),
+            vacuous: Some(true),
         };
         let action = ActionDetail {
             step: 1,

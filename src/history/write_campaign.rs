@@ -55,6 +55,16 @@ pub(super) fn beginning(record: &CampaignRecord) -> Vec<Quad> {
             .text("act:rulePath", path)
             .text("act:ruleDigest", digest);
     }
+    for (number, found) in record.findings.iter().enumerate() {
+        let finding = NamedNode::new_unchecked(format!("{}/finding/{}", campaign.as_str(), number + 1));
+        statements.about(campaign.clone()).has("act:ruleFinding", finding.clone());
+        statements
+            .about(finding)
+            .is_a("act:RuleFinding")
+            .text("act:findingCode", &found.code)
+            .text("act:findingText", &found.message)
+            .optional("act:findingPlace", found.place.as_deref().map(Literal::new_simple_literal));
+    }
     for (number, (name, digest)) in record.models.iter().enumerate() {
         let model = NamedNode::new_unchecked(format!("{}/model/{}", campaign.as_str(), number + 1));
         statements.about(campaign.clone()).has("act:usedModel", model.clone());

@@ -128,13 +128,17 @@ fn end_word(end: &ActionEnd) -> &'static str {
         ActionEnd::Broken(_) => "broken",
         ActionEnd::Timeout(_) | ActionEnd::Cut(_) => "timeout",
         ActionEnd::NotReached => "untested",
+        ActionEnd::NotPerformed(_) => "inapplicable",
     }
 }
 
 /// The message of an action: why it did not complete, or the message of its report.
 fn message(action: &ActionTrace) -> Option<&str> {
     match &action.end {
-        ActionEnd::Broken(reason) | ActionEnd::Timeout(reason) | ActionEnd::Cut(reason) => Some(reason),
+        ActionEnd::Broken(reason)
+        | ActionEnd::Timeout(reason)
+        | ActionEnd::Cut(reason)
+        | ActionEnd::NotPerformed(reason) => Some(reason),
         ActionEnd::Completed | ActionEnd::NotReached => action.report.as_ref().map(|report| report.message.as_str()),
     }
 }
@@ -160,7 +164,8 @@ pub(super) fn write_assertion(
         .optional("act:margin", judgement.margin.map(Literal::from))
         .text("act:witness", &judgement.witness)
         .text("act:ruleDigest", &judgement.rule_digest)
-        .optional("act:heldBefore", judgement.held_before.map(Literal::from));
+        .optional("act:heldBefore", judgement.held_before.map(Literal::from))
+        .optional("act:vacuous", judgement.vacuous.map(Literal::from));
 }
 
 /// A blank node whose label depends only on the texts.

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use crate::graph::{Graph, rdfs};
 use crate::read::Statement;
 use crate::{Action, Ontology, Property, RuleFile, RuleLanguage, Vocabulary, VocabularyTerm};
-use crate::{check, read, rule_files};
+use crate::{check, read, rule_files, unlinked};
 use actcheck_base::{Diagnostic, Diagnostics, Digest, Files, Source, Term, names};
 
 /// Loads an ontology with its imports and linked rule files.
@@ -40,9 +40,16 @@ pub fn load(files: &Files, path: &Path) -> Result<Ontology, Diagnostics> {
         .collect();
     check::actions(&graph, &actions, &mut found);
     check::misspelt_predicates(&graph, &mut found);
-    let found = in_order_of_place(found, graph.sources());
+    if !found.has_errors() {
+        check::never_judged(&graph, &actions, &mut found);
+    }
+    let mut found = in_order_of_place(found, graph.sources());
+    if !found.has_errors() {
+        found.extend(unlinked::rule_files(&graph));
+    }
     let mut digest = Digest::new();
     graph.sources().iter().for_each(|source| digest.update(source.text.as_bytes()));
+    let warnings = found.clone();
     found.or(Ontology {
         sources: graph.sources().to_vec(),
         actions,
@@ -53,6 +60,7 @@ pub fn load(files: &Files, path: &Path) -> Result<Ontology, Diagnostics> {
         superclasses: graph.superclasses.clone(),
         vocabulary: vocabulary(&graph),
         digest: digest.finish(),
+        warnings,
     })
 }
 

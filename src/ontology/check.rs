@@ -23,6 +23,15 @@ pub(super) fn action_iris(graph: &Graph) -> BTreeSet<String> {
 
 /// Statements about an individual and about all its classes, in reading order.
 pub(super) fn inherited<'a>(graph: &'a Graph, iri: &str, predicate: &str) -> Vec<&'a Statement> {
+    let owners = owners(graph, iri);
+    let mut statements: Vec<&Statement> = owners.iter().flat_map(|owner| graph.stated(owner, predicate)).collect();
+    // All statements are in one slice in reading order, so their addresses give that order.
+    statements.sort_by_key(|statement| std::ptr::from_ref::<Statement>(statement));
+    statements
+}
+
+/// An individual, its classes, and the classes of these.
+fn owners(graph: &Graph, iri: &str) -> BTreeSet<String> {
     let mut owners: BTreeSet<String> = BTreeSet::from([iri.to_owned()]);
     let mut waiting = vec![iri.to_owned()];
     while let Some(next) = waiting.pop() {
@@ -30,10 +39,7 @@ pub(super) fn inherited<'a>(graph: &'a Graph, iri: &str, predicate: &str) -> Vec
         waiting.extend(above.iter().filter(|class| !owners.contains(*class)).cloned());
         owners.extend(above);
     }
-    let mut statements: Vec<&Statement> = owners.iter().flat_map(|owner| graph.stated(owner, predicate)).collect();
-    // All statements are in one slice in reading order, so their addresses give that order.
-    statements.sort_by_key(|statement| std::ptr::from_ref::<Statement>(statement));
-    statements
+    owners
 }
 
 /// Local names of the predicates in the paper's namespace that have a meaning here.
@@ -124,6 +130,66 @@ pub(super) fn actions(graph: &Graph, actions: &BTreeMap<String, Action>, found: 
             }
         }
     }
+}
+
+/// Warnings: properties of something that is neither an action nor a class of one (O015), and properties that no action
+/// has (O016). Neither is ever judged.
+pub(super) fn never_judged(graph: &Graph, actions: &BTreeMap<String, Action>, found: &mut Diagnostics) {
+    let owners: BTreeSet<String> = actions.values().flat_map(|action| owners(graph, &action.iri)).collect();
+    let (mut reported, mut explained) = (BTreeSet::new(), BTreeSet::new());
+    for statement in graph.statements() {
+        let states = |predicate: &str| graph.means(&statement.predicate, &names::act(predicate));
+        let kind = match (states("successProperty"), states("precondition")) {
+            (true, _) => "success properties",
+            (false, true) => "preconditions",
+            (false, false) => continue,
+        };
+        let Some(subject) = statement.subject.as_iri().filter(|subject| !owners.contains(*subject)) else { continue };
+        explained.extend(statement.object.as_iri());
+        if reported.insert((subject, kind)) {
+            found.push(no_action(graph, actions, statement, subject, kind));
+        }
+    }
+    let has =
+        |action: &Action, iri: &String| action.success_properties.contains(iri) || action.preconditions.contains(iri);
+    for iri in graph.individuals(&names::act("Property")) {
+        if !explained.contains(iri.as_str()) && !actions.values().any(|action| has(action, &iri)) {
+            found.push(of_no_action(graph, actions, &iri));
+        }
+    }
+}
+
+/// Warning: the subject of a success property or precondition is not an action (O015).
+fn no_action(
+    graph: &Graph,
+    actions: &BTreeMap<String, Action>,
+    statement: &Statement,
+    subject: &str,
+    kind: &str,
+) -> Diagnostic {
+    let (source, span) = graph.place(statement, subject);
+    let local = names::local(subject);
+    let is_class = graph.superclasses.get(subject).is_some_and(|above| above.contains(&names::act("Action")));
+    let help = match nearest(local, actions.keys().map(String::as_str)) {
+        _ if is_class => format!("declare an action of this class: `act:MyAction a {}`", names::shorten(subject)),
+        Some(found) => format!("did you mean `{found}`?"),
+        None => format!("declare it: `{} a act:Action`", names::shorten(subject)),
+    };
+    let message = format!("`{local}` is neither an action nor the class of one, so that its {kind} are never judged");
+    Diagnostic::warning("O015", message).at(source, span).help(help)
+}
+
+/// Warning: no action has a property (O016).
+fn of_no_action(graph: &Graph, actions: &BTreeMap<String, Action>, iri: &str) -> Diagnostic {
+    let needs: BTreeSet<&str> = graph
+        .stated(iri, &names::act("needsParameter"))
+        .filter_map(|statement| statement.object.as_iri().map(names::local))
+        .collect();
+    let fits = |action: &&Action| needs.iter().all(|name| action.parameters.contains(*name));
+    let action = actions.values().find(fits).map_or("act:Pick".to_owned(), |action| names::shorten(&action.iri));
+    let message = format!("no action has the property `{}`, so that it is never judged", names::local(iri));
+    at_first(graph, iri, Diagnostic::warning("O016", message))
+        .help(format!("state it of an action, such as `{action} act:successProperty {}`", names::shorten(iri)))
 }
 
 /// Declared properties and parameters, to check references against.

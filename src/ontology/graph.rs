@@ -84,12 +84,18 @@ impl Graph {
         (&self.reading.sources[statement.text], self.reading.place(statement, iri))
     }
 
+    /// Bases of the relative paths in all sources, in the order of the sources.
+    pub(super) fn homes(&self) -> &[Home] {
+        &self.reading.homes
+    }
+
     /// Base of the relative paths in a statement's source.
     pub(super) fn home(&self, statement: &Statement) -> &Home {
         &self.reading.homes[statement.text]
     }
 
-    fn means(&self, predicate: &str, wanted: &str) -> bool {
+    /// Whether a predicate is the wanted one or one of its sub-properties.
+    pub(super) fn means(&self, predicate: &str, wanted: &str) -> bool {
         predicate == wanted || self.superproperties.get(predicate).is_some_and(|above| above.contains(wanted))
     }
 }

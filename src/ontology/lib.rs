@@ -12,6 +12,7 @@ mod model;
 mod read;
 mod rule_files;
 mod template;
+mod unlinked;
 
 pub use assemble::{load, load_vocabulary};
 pub use model::{Action, Ontology, Property, RuleFile, RuleLanguage, Vocabulary, VocabularyTerm};

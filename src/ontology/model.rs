@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use actcheck_base::{Source, Span, Term, digest_of, names};
+use actcheck_base::{Diagnostics, Source, Span, Term, digest_of, names};
 
 /// A checked ontology, including its imports.
 ///
@@ -28,6 +28,8 @@ pub struct Ontology {
     pub vocabulary: Vocabulary,
     /// Digest of all sources, excluding the rule files.
     pub digest: String,
+    /// Warnings about statements and rule files without effect (O015 to O017).
+    pub warnings: Diagnostics,
 }
 
 /// One action.

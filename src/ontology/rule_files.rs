@@ -46,7 +46,7 @@ pub(super) fn read(graph: &Graph, statement: &Statement, found: &mut Diagnostics
     }
 }
 
-fn relative_path(object: &Term) -> Option<String> {
+pub(super) fn relative_path(object: &Term) -> Option<String> {
     match object {
         Term::Iri(iri) => path_of_plain(iri),
         Term::String(path) if !path.contains("://") && !Path::new(path.as_ref()).is_absolute() => {
@@ -56,7 +56,7 @@ fn relative_path(object: &Term) -> Option<String> {
     }
 }
 
-fn language_of(path: &str) -> Option<RuleLanguage> {
+pub(super) fn language_of(path: &str) -> Option<RuleLanguage> {
     match Path::new(path).extension()?.to_str()? {
         "rls" => Some(RuleLanguage::Datalog),
         "rq" => Some(RuleLanguage::Sparql),

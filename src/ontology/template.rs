@@ -22,7 +22,7 @@ pub fn property_template(name: &str, action: &str, designator: &str, rules_folde
          %\n\
          % The example below requires that the object did not tilt by more than 0.5 rad (29 degrees) during the action. Change it.\n\
          % Available predicates: before(s, p, o), after(s, p, o), during(s, p, o), parameter(designator, value), ontology(s, p, o),\n\
-         % and those derived by the libraries in rules/lib. ontology/world.ttl describes the terms of w:.\n\n\
+         % and those derived by the libraries in rules/lib, such as contact(c, a, b), with both sides of each contact first once. ontology/world.ttl describes the terms of w:.\n\n\
          @prefix act: <http://actions#> .\n\
          @prefix w: <https://w3id.org/actcheck/world#> .\n\n\
          % The property passes if a success(…) fact is derived. For a \"for all\" condition, write violation(…) instead: it passes if none is derived.\n\

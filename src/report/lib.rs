@@ -33,9 +33,9 @@ pub use picture::{Caption, Chart, Drawing, collisions_picture, patterns_picture,
 pub use recording::{RecordingFault, Recordings};
 pub use summary::{
     ActionSummary, CampaignSummary, CaseSummary, Causes, ChangeReason, CompareSummary, ComparedSide, EndedBy,
-    FindingsSummary, GuidedSearch, HealthSummary, Oddity, OracleSummary, PropertyLine, PropertyReport, Proportion,
-    RecheckChange, RecheckLine, RecheckSummary, Remark, RepeatedProperty, RunSummary, ShrunkChoice, ShrunkSummary,
-    SideChange, WeightedLine,
+    FindingsSummary, GuidedSearch, HealthSummary, Oddity, OracleSummary, PassingValue, PropertyLine, PropertyReport,
+    Proportion, RateBounds, RecheckChange, RecheckLine, RecheckSummary, Remark, RepeatedProperty, RunSummary,
+    ShrunkChoice, ShrunkSummary, SideChange, WeightedLine,
 };
 pub use table::{
     Table, TableFormat, TableParts, answer_cells, answer_table, campaign_table, compare_table, findings_table,

@@ -209,6 +209,7 @@ mod tests {
             size_m: None,
             grasp_distance_m: None,
             part: None,
+            left_world: false,
         }
     }
 

@@ -81,7 +81,7 @@ fn of_action(trace: &Trace, idx: usize) -> impl Iterator<Item = Pressed> {
             touches.into_iter().all(|touched| touched.iter().any(|other| other == thing))
         });
         let rolls = thing == "floor" && contact.start_secs <= 0.0;
-        (!held && !rolls && !is_target(action, thing)).then(|| Pressed {
+        (!held && !rolls && !is_target(action, thing) && !fingers_meet(trace, idx, contact)).then(|| Pressed {
             link: link.to_owned(),
             thing: thing.to_owned(),
             force_n: contact.max_force_n,
@@ -89,6 +89,12 @@ fn of_action(trace: &Trace, idx: usize) -> impl Iterator<Item = Pressed> {
             point_m: contact.point_m,
         })
     })
+}
+
+/// Whether a contact is one of two links of the hand, whose fingers may meet.
+fn fingers_meet(trace: &Trace, idx: usize, contact: &ContactEpisode) -> bool {
+    let own = trace.robot_courses.get(idx).map(|course| course.self_contacts.as_slice()).unwrap_or_default();
+    own.iter().any(|own| own.pair == contact.pair && own.press.is_some_and(|press| press.of_hand))
 }
 
 fn is_target(action: &ActionTrace, thing: &str) -> bool {
@@ -111,6 +117,7 @@ mod tests {
     use std::collections::BTreeMap;
 
     use super::*;
+    use actcheck_data::{RobotCourse, SelfCollision, SelfPress};
 
     fn contact(pair: [&str; 2], start_secs: f64, max_force_n: f64) -> ContactEpisode {
         let point_m = Some([1.0, 0.25, 0.5]);
@@ -155,6 +162,19 @@ mod tests {
         let named = [(0, "the robot's hand pressed bowl_1 with 6 N")];
         assert_eq!(label(&trace, &named).as_deref(), Some("hand presses bowl_1: 6.0 N"));
         assert_eq!(label(&trace, &[(0, "glass_1 did not move")]), None);
+    }
+
+    /// A hand that closed on nothing with 80 N got a red star.
+    #[test]
+    fn fingers_that_meet_are_not_shown() {
+        let pair = ["robot/left", "robot/right"];
+        let mut trace = trace(vec![contact(pair, 1.0, 80.0)]);
+        for (of_hand, expected) in [(true, None), (false, Some("left presses right: 80 N"))] {
+            let press = Some(SelfPress { max_force_n: 80.0, of_hand });
+            let met = SelfCollision { pair: pair.map(str::to_owned), start_secs: 1.0, max_depth_m: 0.0, press };
+            trace.robot_courses = vec![RobotCourse { self_contacts: vec![met], ..RobotCourse::default() }];
+            assert_eq!(label(&trace, &[]).as_deref(), expected);
+        }
     }
 
     #[test]

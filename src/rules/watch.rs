@@ -82,6 +82,8 @@ pub(crate) struct Watch {
     work: Cell<usize>,
     stop: Cell<Option<Stop>>,
     unrecorded: OnceCell<String>,
+    /// Whether the right sides of `implies` that a property needs count as false.
+    fails_consequents: bool,
 }
 
 impl Watch {
@@ -95,7 +97,18 @@ impl Watch {
             work: Cell::new(0),
             stop: Cell::new(None),
             unrecorded: OnceCell::new(),
+            fails_consequents: false,
         }
+    }
+
+    /// Lets the right sides of `implies` that a property needs count as false.
+    pub(crate) fn fail_consequents(&mut self) {
+        self.fails_consequents = true;
+    }
+
+    /// Returns whether the right sides of `implies` that a property needs count as false.
+    pub(crate) fn fails_consequents(&self) -> bool {
+        self.fails_consequents
     }
 
     /// Returns a watch with the same deadline and the memory that is left. Its limits don't stop the evaluation.
@@ -108,6 +121,7 @@ impl Watch {
             work: Cell::new(0),
             stop: Cell::new(None),
             unrecorded: OnceCell::new(),
+            fails_consequents: self.fails_consequents,
         }
     }
 

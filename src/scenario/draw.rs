@@ -23,14 +23,27 @@ const DEFAULT_WORLD: &str = "empty";
 
 /// A scene that could not be generated. The campaign counts discards.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("found no free place for `{model}` ({name}) in {tries} tries")]
-pub struct Discard {
-    /// Name of the model.
-    pub model: String,
-    /// Prefix of its choices, such as `other.3`.
-    pub name: String,
-    /// Number of tries.
-    pub tries: u32,
+pub enum Discard {
+    /// An object or the robot has no free place.
+    #[error("found no free place for `{model}` ({name}) in {tries} tries")]
+    NoPlace {
+        /// Name of the model.
+        model: String,
+        /// Prefix of its choices, such as `other.3`.
+        name: String,
+        /// Number of tries.
+        tries: u32,
+    },
+    /// The scene has nothing that an action of the test is to have as the value of a designator.
+    #[error("the scene has nothing for `{designator} = \"{value}\"` of action {number}")]
+    NoValue {
+        /// Position of the action in the test, from 1.
+        number: usize,
+        /// The designator.
+        designator: String,
+        /// The value that the test gives to it.
+        value: String,
+    },
 }
 
 /// Draws one scene. It depends only on the choices.
@@ -40,7 +53,7 @@ pub struct Discard {
 /// configuration draw from the same space.
 ///
 /// # Errors
-/// No free place was found for an object or the robot.
+/// No free place was found for an object or the robot, or the scene has nothing for a value of an action.
 pub fn draw(space: &Space, test: usize, choices: &mut Choices) -> Result<Scene, Discard> {
     let mut builder = SceneBuilder {
         space,
@@ -87,6 +100,7 @@ pub fn draw(space: &Space, test: usize, choices: &mut Choices) -> Result<Scene, 
     builder.set_obstacles(base, world, drives, &map)?;
     let parts: Vec<SceneObject> = builder.objects.iter().flat_map(SceneObject::moving_parts).collect();
     builder.objects.extend(parts);
+    let steps = builder.set_steps(test)?;
     let root_height_m = builder.ground_m + space.robot.mount_height_m;
     let name = builder.designators.get("world").and_then(|names| names.first()).cloned();
     Ok(Scene {
@@ -95,6 +109,7 @@ pub fn draw(space: &Space, test: usize, choices: &mut Choices) -> Result<Scene, 
         objects: builder.objects,
         robot: RobotStart { profile: Arc::clone(&space.robot), base, root_height_m, knows: Arc::clone(&space.knows) },
         designators: builder.designators,
+        steps,
         sensing: space.sensing.clone(),
         physics: space.physics.clone(),
     })
@@ -356,7 +371,7 @@ impl<'a> SceneBuilder<'a> {
             });
             return Ok(id);
         }
-        Err(Discard { model: model.name.clone(), name: object.to_string(), tries: TRIES })
+        Err(Discard::NoPlace { model: model.name.clone(), name: object.to_string(), tries: TRIES })
     }
 
     /// Draws a pose on the surface. Returns `None` if the object would overhang the edge at the drawn yaw.

@@ -155,7 +155,7 @@ impl SceneBuilder<'_> {
             }
             self.choices.forget_after(n_made);
         }
-        Err(Discard { model: "robot".to_owned(), name: "robot".to_owned(), tries: TRIES })
+        Err(Discard::NoPlace { model: "robot".to_owned(), name: "robot".to_owned(), tries: TRIES })
     }
 
     /// Draws the start of a base that has to drive first: in the ranges of the configuration if it has any, else
@@ -299,7 +299,7 @@ impl SceneBuilder<'_> {
             });
             return Ok(());
         }
-        Err(Discard { model: model.name.clone(), name: object.to_string(), tries: TRIES })
+        Err(Discard::NoPlace { model: model.name.clone(), name: object.to_string(), tries: TRIES })
     }
 
     /// Draws the pose of an obstacle within a rectangle of the floor.

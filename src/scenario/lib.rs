@@ -15,6 +15,7 @@ mod overlap;
 mod parameters;
 mod placement;
 mod space;
+mod step_values;
 mod surroundings;
 
 pub use draw::{Discard, draw};

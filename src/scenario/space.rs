@@ -3,11 +3,11 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
-use crate::placement;
 use crate::surroundings::Surroundings;
+use crate::{placement, step_values};
 use actcheck_base::{Diagnostics, did_you_mean, names, nearest};
 use actcheck_config as config;
-use actcheck_config::{Campaign, OtherCounts, WorldMap};
+use actcheck_config::{Campaign, OtherCounts, Step, WorldMap};
 use actcheck_data::{KnownKind, Location, ObjectModel, Physics, RobotProfile, Sensing, Surface};
 use actcheck_ontology::Ontology;
 
@@ -21,6 +21,8 @@ const DRIVING: &str = "MoveTo";
 #[derive(Debug, Clone)]
 pub struct Space {
     pub(super) tests: usize,
+    /// For each test and each of its actions, the values that it gives to designators.
+    pub(super) steps: Vec<Vec<BTreeMap<String, String>>>,
     /// For each test, the position of its first driving action, from 0; `None` if it has none.
     pub(super) drives: Vec<Option<usize>>,
     pub(super) surfaces: Vec<Arc<ObjectModel>>,
@@ -59,7 +61,7 @@ impl Space {
     /// (S001) or that has no success properties (S002), a required designator has no candidates (S003), a table has no
     /// designator of its name (S004), a model's category is not a class of the ontology (S005), a model has no surface
     /// (S006), an object does not fit on a surface (S007), objects have no surface (S008), or a world lacks all named
-    /// surfaces or locations (S009).
+    /// surfaces or locations (S009), or an action of a test can't have a designator (S011) or its value (S012).
     pub fn new(campaign: &Campaign, ontology: &Ontology) -> Result<Self, Diagnostics> {
         let mut found = Diagnostics::new();
         check_tests(campaign, ontology, &mut found);
@@ -90,6 +92,7 @@ impl Space {
         let names = campaign.candidates.iter().filter(|(name, _)| !is_of_objects(name));
         config::in_order_of_place(found).or(Self {
             tests: campaign.tests.len(),
+            steps: campaign.tests.iter().map(|test| test.iter().map(|step| step.values.clone()).collect()).collect(),
             drives: drives(campaign),
             surfaces,
             targets,
@@ -121,7 +124,7 @@ impl Space {
 /// Position of the first driving action of each test, if the robot can drive.
 fn drives(campaign: &Campaign) -> Vec<Option<usize>> {
     let mobile = campaign.robot.base_joints.is_some();
-    let first = |test: &Vec<String>| test.iter().position(|action| mobile && action == DRIVING);
+    let first = |test: &Vec<Step>| test.iter().position(|step| mobile && step.action == DRIVING);
     campaign.tests.iter().map(first).collect()
 }
 
@@ -196,13 +199,14 @@ fn placed_models<'a>(
 fn check_tests(campaign: &Campaign, ontology: &Ontology, found: &mut Diagnostics) {
     let mut reported: BTreeSet<String> = BTreeSet::new();
     for (idx, test) in campaign.tests.iter().enumerate() {
-        for (step, name) in test.iter().enumerate() {
-            let key = format!("tests.{idx}.{step}");
+        for (number, step) in test.iter().enumerate() {
+            let (name, key) = (&step.action, format!("tests.{idx}.{number}"));
             let Some(action) = ontology.actions.get(name) else {
                 let help = did_you_mean(name, ontology.actions.keys().map(String::as_str));
                 found.push(campaign.fault("S001", &key, format!("the ontology has no action `{name}`")).help(help));
                 continue;
             };
+            step_values::check(campaign, ontology, (action, step), &key, found);
             if !reported.insert(name.clone()) {
                 continue;
             }

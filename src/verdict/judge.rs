@@ -16,6 +16,8 @@ pub enum Fate {
     Timeout(String),
     /// The action was never reached.
     NotReached,
+    /// A precondition did not hold, with the reason: the action was not performed.
+    NotPerformed(String),
 }
 
 /// Returns the outcomes of an action's success properties, in the action's order.
@@ -36,15 +38,38 @@ pub fn judge(
             Fate::Broken(reason) => (Outcome::Broken, None, reason.clone()),
             Fate::Timeout(reason) => (Outcome::Timeout, None, reason.clone()),
             Fate::NotReached => (Outcome::Untested, None, "the action was never reached".to_owned()),
+            Fate::NotPerformed(reason) => (Outcome::Inapplicable, None, reason.clone()),
             Fate::Completed => match (&unmet, findings.get(iri)) {
                 (Some(unmet), _) => unmet.clone(),
                 (None, Some(result)) => outcome_of(result, property),
                 (None, None) => (Outcome::Broken, None, "no rule was evaluated for this property".to_owned()),
             },
         };
-        Judgement { property: iri.clone(), outcome, margin, witness, rule_digest: rule_digest(iri), held_before: None }
+        Judgement {
+            property: iri.clone(),
+            outcome,
+            margin,
+            witness,
+            rule_digest: rule_digest(iri),
+            held_before: None,
+            vacuous: None,
+        }
     };
     action.success_properties.iter().map(decide).collect()
+}
+
+/// Returns the reason why an action must not be performed: the first of its preconditions that does not hold, and its
+/// witness. `findings` holds the rules' findings for its preconditions.
+///
+/// Returns `None` if all hold or are inapplicable, and if one can't be decided: the action is then performed, and its
+/// properties get the outcome of that precondition.
+pub fn reason_not_to_perform(
+    ontology: &Ontology,
+    action: &Action,
+    findings: &BTreeMap<String, Result<Findings, RuleFault>>,
+) -> Option<String> {
+    let (outcome, _, reason) = unmet_precondition(ontology, action, findings)?;
+    (outcome == Outcome::Inapplicable).then_some(reason)
 }
 
 /// Returns the outcome that all success properties share if a precondition does not hold, or `None` if all
@@ -60,10 +85,10 @@ fn unmet_precondition(
         match findings.get(iri).map(|result| outcome_of(result, property)) {
             Some((Outcome::Passed | Outcome::Inapplicable, ..)) => None,
             Some((Outcome::Failed, _, words)) => {
-                Some((Outcome::Inapplicable, None, format!("precondition `{label}` does not hold: {words}")))
+                Some((Outcome::Inapplicable, None, format!("the precondition `{label}` does not hold: {words}")))
             }
-            Some((outcome, _, words)) => Some((outcome, None, format!("precondition `{label}`: {words}"))),
-            None => Some((Outcome::Broken, None, format!("precondition `{label}` was not evaluated"))),
+            Some((outcome, _, words)) => Some((outcome, None, format!("the precondition `{label}`: {words}"))),
+            None => Some((Outcome::Broken, None, format!("the precondition `{label}` was not evaluated"))),
         }
     })
 }

@@ -7,7 +7,7 @@ mod recurrence;
 mod score;
 mod wilson;
 
-pub use judge::{Fate, judge};
+pub use judge::{Fate, judge, reason_not_to_perform};
 pub use recurrence::Recurrence;
 pub use score::{Counts, action_score, mean, run_score};
 pub use wilson::{Interval, trials_for_width, wilson, wilson_share};

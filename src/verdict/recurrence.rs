@@ -70,6 +70,7 @@ mod tests {
                 witness: String::new(),
                 rule_digest: String::new(),
                 held_before: None,
+                vacuous: None,
             })
             .collect();
         Recurrence::of(&set(expected), judgements.iter())

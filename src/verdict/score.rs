@@ -74,7 +74,8 @@ impl Counts {
 /// Computes A: the share of an action's properties that passed, in [0, 1].
 ///
 /// Inapplicable properties are not counted in the denominator. An action without applicable properties scores 0, like
-/// an action whose properties were all broken, timed out or untested. Source: the paper, equation 1.
+/// an action whose properties were all broken, timed out or untested: one that was not performed never raises the score of a
+/// run. Source: the paper, equation 1.
 pub fn action_score(outcomes: impl IntoIterator<Item = Outcome>) -> f64 {
     let counts = Counts::of(outcomes);
     let applicable = counts.total() - counts.inapplicable;

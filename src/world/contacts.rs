@@ -48,6 +48,9 @@ impl World {
     pub(super) fn touches(&self) -> BTreeMap<(Owner, Owner), Touch> {
         let mut found = touches(&self.engine);
         found.extend(self.seal_touch());
+        // The engine keeps the last contacts of bodies that it no longer moves.
+        let has_left = |owner: &Owner| matches!(owner, Owner::Object(idx) if self.has_left(*idx));
+        found.retain(|(first, second), _| !has_left(first) && !has_left(second));
         found
     }
 

@@ -15,9 +15,10 @@ use crate::kinematics::motion;
 use crate::mechanism::lead_with_carriers;
 use crate::needed::Needed;
 use crate::self_contact::Form;
+use crate::solid_depth::Material;
 use crate::surface::spread;
 use actcheck_base::did_you_mean;
-use actcheck_data::{LEAST_LINK_KG, Part, Pose, RobotProfile, Shape, bounds};
+use actcheck_data::{LEAST_LINK_KG, Mesh, Part, Pose, RobotProfile, Shape, bounds};
 
 /// The type of a joint.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -68,6 +69,8 @@ pub struct Link {
     pub inertia: Matrix3<f64>,
     /// Collision shapes in the link's frame.
     pub solids: Vec<Part>,
+    /// The meshes that some of the shapes are pieces of, with the indices of these.
+    pub(crate) materials: Vec<(Range<usize>, Arc<Material>)>,
     /// The same shapes for measurements, built when they are first needed.
     surface: OnceLock<Arc<Surface>>,
     /// The same shapes for collisions with other links.
@@ -146,7 +149,7 @@ impl RobotModel {
         if robot.links.is_empty() {
             return Err(WorldError::Urdf { name, reason: "it has no links".to_owned() });
         }
-        Folding::new(&robot, name, &profile.meshes)?.fold(profile)
+        Folding::new(&robot, name, profile)?.fold(profile)
     }
 
     /// Returns the index of a joint by its name.
@@ -196,15 +199,13 @@ struct Folding<'a> {
     children: BTreeMap<&'a str, Vec<&'a urdf_rs::Joint>>,
     /// Solids by mesh file.
     meshes: &'a BTreeMap<String, Vec<Shape>>,
+    /// The meshes that they are pieces of.
+    surfaces: &'a BTreeMap<String, Vec<Arc<Mesh>>>,
     out: RobotModel,
 }
 
 impl<'a> Folding<'a> {
-    fn new(
-        robot: &'a urdf_rs::Robot,
-        name: String,
-        meshes: &'a BTreeMap<String, Vec<Shape>>,
-    ) -> Result<Self, WorldError> {
+    fn new(robot: &'a urdf_rs::Robot, name: String, profile: &'a RobotProfile) -> Result<Self, WorldError> {
         let links = robot.links.iter().map(|link| (link.name.as_str(), link)).collect();
         let mut children: BTreeMap<&str, Vec<&urdf_rs::Joint>> = BTreeMap::new();
         let mut parents: BTreeMap<&str, &str> = BTreeMap::new();
@@ -229,7 +230,7 @@ impl<'a> Folding<'a> {
             assumed_speeds: Vec::new(),
             name,
         };
-        Ok(Self { robot, links, children, meshes, out })
+        Ok(Self { robot, links, children, meshes: &profile.meshes, surfaces: &profile.surfaces, out })
     }
 
     fn fold(mut self, profile: &RobotProfile) -> Result<RobotModel, WorldError> {
@@ -324,12 +325,19 @@ impl<'a> Folding<'a> {
             },
         };
         let mut solids: Vec<Part> = Vec::new();
+        let mut materials = Vec::new();
+        let before = self.out.links[into].solids.len();
         for collision in source.collision.iter().filter(|_| has_shapes) {
-            let pose = Pose::from_isometry(&(at * isometry(&collision.origin)));
+            let origin = at * isometry(&collision.origin);
+            let pose = Pose::from_isometry(&origin);
             let shapes = self.shapes(&collision.geometry, name)?;
+            let first = before + solids.len();
             solids.extend(shapes.into_iter().map(|shape| Part { pose, shape }));
+            let pieces = first..before + solids.len();
+            materials.extend(self.material(&collision.geometry, origin).map(|of| (pieces, Arc::new(of))));
         }
         let link = &mut self.out.links[into];
+        link.materials.extend(materials);
         let sum = Mass { mass: link.mass, com: link.com, inertia: link.inertia }.plus(&added);
         (link.mass, link.com, link.inertia) = (sum.mass, sum.com, sum.inertia);
         let first = link.solids.len();
@@ -358,6 +366,22 @@ impl<'a> Folding<'a> {
                 solids.iter().map(|solid| solid.scaled(scale)).collect()
             }
         })
+    }
+
+    /// Returns the mesh of a collision geometry, as its file has it; `None` for a primitive.
+    fn material(&self, geometry: &urdf_rs::Geometry, origin: Isometry3<f64>) -> Option<Material> {
+        let urdf_rs::Geometry::Mesh { filename, scale } = geometry else { return None };
+        let scale = scale.map_or([1.0; 3], |scale| scale.0);
+        let mesh = match self.surfaces.get(filename).map(Vec::as_slice) {
+            Some([only]) => Arc::clone(only),
+            Some(several) => Arc::new(joined(several)),
+            // Not yet divided.
+            None => match self.meshes.get(filename)?.first()? {
+                Shape::Mesh { mesh } => Arc::new(mesh.clone()),
+                _ => return None,
+            },
+        };
+        Some(Material::new(mesh, scale, origin))
     }
 
     fn movable(&self, joint: &urdf_rs::Joint, parent: usize, origin: Isometry3<f64>) -> Result<Joint, WorldError> {
@@ -406,6 +430,17 @@ impl<'a> Folding<'a> {
         widen_followers(&mut self.out.joints);
         Ok(())
     }
+}
+
+/// Several meshes as one.
+fn joined(meshes: &[Arc<Mesh>]) -> Mesh {
+    let mut all = Mesh::default();
+    for mesh in meshes {
+        let before = u32::try_from(all.vertices.len()).unwrap_or(u32::MAX);
+        all.vertices.extend(&mesh.vertices);
+        all.triangles.extend(mesh.triangles.iter().map(|corners| corners.map(|idx| idx.saturating_add(before))));
+    }
+    all
 }
 
 /// The pairs of links in the `<disable_collisions>` of a text: an element of SRDF, which the URDF of a converted robot has.
@@ -470,6 +505,7 @@ fn empty_link(name: &str) -> Link {
         com: Vector3::zeros(),
         inertia: Matrix3::zeros(),
         solids: Vec::new(),
+        materials: Vec::new(),
         surface: OnceLock::new(),
         form: OnceLock::new(),
         points: Arc::default(),

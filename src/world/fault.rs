@@ -23,6 +23,10 @@ pub enum Fault {
         /// Its position. Unit: metres.
         position: [f64; 3],
     },
+    /// The state, the target or a limit of this joint is not a number, or its limits contradict each other.
+    Joint(String),
+    /// The physics engine panicked, with these words.
+    Engine(String),
 }
 
 impl fmt::Display for Fault {
@@ -32,6 +36,8 @@ impl fmt::Display for Fault {
             Self::LeftWorld { id, position: [x, y, z] } => {
                 write!(f, "{id} left the world at ({x:.2}, {y:.2}, {z:.2})")
             }
+            Self::Joint(name) => write!(f, "the state or a limit of the joint {name} is not a valid number"),
+            Self::Engine(words) => write!(f, "a fault in the physics engine: {words}"),
         }
     }
 }

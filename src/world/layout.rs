@@ -6,6 +6,7 @@ use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
 use crate::assumed::{UNKNOWN_EFFORT, UNKNOWN_SPEEDS};
 use crate::description::RobotModel;
+use crate::gripper::{Probe, links_of_fingers};
 use crate::kinematics::Mount;
 use crate::wrist;
 use crate::{BalancedJoint, Gripper, WorldError};
@@ -30,7 +31,10 @@ const OPENING_SLACK_M: f64 = 2e-3;
 /// The profile's joints and links, resolved in the URDF.
 pub(super) struct Named {
     pub(super) layout: Layout,
+    /// The fingertips, left and right.
     pub(super) finger_links: [usize; 2],
+    /// All links of each finger, left and right, with the fingertips.
+    pub(super) fingers: [Vec<usize>; 2],
     pub(super) grasp: (usize, Isometry3<f64>),
     pub(super) camera: Mount,
 }
@@ -52,7 +56,9 @@ impl Named {
             head: joints(&profile.head_joints)?,
             gripper: Gripper::find(profile, model, finger_links, grasp)?,
         };
-        Ok(Self { layout, finger_links, grasp, camera })
+        let probe = Probe::new(model, finger_links, grasp);
+        let fingers = links_of_fingers(model, &layout.gripper, &probe);
+        Ok(Self { layout, finger_links, fingers, grasp, camera })
     }
 
     /// Returns the pairs of links that pass through each other, with the smaller index first: those of the hand, but not

@@ -13,6 +13,7 @@ mod contacts;
 mod convert;
 mod counterweight;
 mod decompose;
+mod departure;
 mod description;
 mod drive;
 mod effective_mass;
@@ -41,6 +42,7 @@ mod neighbours;
 mod object;
 mod observe;
 mod odometry;
+mod overlaps;
 mod perturbation;
 mod pieces;
 mod propose;
@@ -61,6 +63,7 @@ mod share;
 mod shell;
 mod silhouette;
 mod simulation;
+mod solid_depth;
 mod spans;
 mod sphere_tree;
 mod suction;
@@ -83,6 +86,7 @@ pub use layout::{
     Layout, assumed_efforts, assumed_speeds, balanced_joints, check_robot, grip_limit_n, outward_push,
     shapes_between_fingers,
 };
+pub use overlaps::Overlap;
 pub use propose::{Proposal, complete, is_incomplete, propose};
 pub use reach::Shortcuts;
 pub use recorder::{Contact, Course, Record, Tracks};

@@ -44,6 +44,15 @@ const SLACK: f64 = 0.02;
 const STOP_RANGE: f64 = 0.02;
 
 impl Motor {
+    /// Returns whether its targets are numbers, and its limits are not below 0.
+    pub(super) fn is_valid(&self) -> bool {
+        let targets = [self.target, self.setpoint, self.setpoint_velocity, self.push.unwrap_or(0.0)];
+        let limits = [self.max_effort, self.stiffness, self.damping, self.fastest];
+        targets.iter().all(|target| target.is_finite())
+            && limits.iter().all(|limit| *limit >= 0.0)
+            && self.stiffness.is_finite()
+    }
+
     /// Returns its mean effort in a step that ended at this position, without gravity compensation (`held`).
     ///
     /// The engine applies the control law in each of `n_substeps`, with the target position ahead by the way of one

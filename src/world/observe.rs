@@ -50,7 +50,7 @@ impl World {
             }
             touching.insert(name);
         }
-        if let Some(attached) = &object.attached {
+        if let Some(attached) = object.attached.as_ref().filter(|_| !self.has_left(idx)) {
             carriers.insert(self.objects[attached.to].id.clone());
         }
         let (aabb_min, aabb_max) = self.aabb(object);
@@ -75,13 +75,14 @@ impl World {
             restitution: object.restitution,
             touches: touching.into_iter().collect(),
             rests_on: carriers.into_iter().collect(),
-            asleep: body.is_some_and(rapier3d::prelude::RigidBody::is_sleeping),
+            asleep: body.is_some_and(rapier3d::prelude::RigidBody::is_sleeping) || self.has_left(idx),
             size_m: Some(object.model.size_m),
             grasp_distance_m: None,
             part: object
                 .attached
                 .as_ref()
                 .and_then(|attached| Some((self.objects[attached.whole].id.clone(), self.part_position(object)?))),
+            left_world: self.has_left(idx),
         }
     }
 
@@ -105,16 +106,16 @@ impl World {
     fn robot_state(&self, pairs: &[Pair]) -> RobotState {
         let joints = self.robot.joint_states();
         let positions: Vec<f64> = joints.iter().map(|joint| joint.position).collect();
-        let touched_by = |link: usize| -> Vec<String> {
+        let touched_by = |finger: &[usize]| -> Vec<String> {
             let objects = pairs.iter().filter_map(|pair| match (pair.first, pair.second) {
-                (Owner::Object(idx), Owner::Link(own)) if own == link => Some(self.thing(Owner::Object(idx))),
+                (Owner::Object(idx), Owner::Link(own)) if finger.contains(&own) => Some(self.thing(Owner::Object(idx))),
                 _ => None,
             });
             let sorted: BTreeSet<String> = objects.collect();
             sorted.into_iter().collect()
         };
         let base_true = self.base_true();
-        let [left, right] = self.robot.finger_links;
+        let [left, right] = &self.robot.fingers;
         RobotState {
             base_true,
             base_believed: self.believed(base_true),

@@ -260,6 +260,7 @@ impl World {
             self.record_robot(&touches);
             self.record_samples(&touches);
             self.record_touched(&touches);
+            self.record_motions(&touches);
             self.move_furniture(&touches);
             if (self.recorder.n_ticks - self.recorder.began).is_multiple_of(self.recorder.ticks_per_frame) {
                 self.frame();

@@ -31,8 +31,10 @@ pub struct Robot {
     pub bodies: Vec<RigidBodyHandle>,
     /// Its joints by role.
     pub layout: Layout,
-    /// Links of the fingers, left and right.
+    /// Links of the fingertips, left and right.
     pub finger_links: [usize; 2],
+    /// All links of the fingers, left and right: see [`Named::fingers`](crate::layout::Named).
+    pub fingers: [Vec<usize>; 2],
     pub(super) motors: Vec<Motor>,
     /// Links that do not collide with the floor.
     pub(super) off_floor: Vec<bool>,
@@ -114,6 +116,7 @@ impl Robot {
             kinematics,
             bodies,
             finger_links: named.finger_links,
+            fingers: named.fingers.clone(),
             motors,
             off_floor,
             balls,
@@ -245,8 +248,22 @@ impl Robot {
     /// Limits the force of both fingers. Unit: newtons.
     pub fn limit_grip(&mut self, force: f64) {
         for (idx, effort_per_n) in self.layout.gripper.motors() {
-            self.motors[idx].max_effort = (force * effort_per_n).clamp(0.0, self.model.joints[idx].effort);
+            if force.is_finite() {
+                self.motors[idx].max_effort = (force * effort_per_n).clamp(0.0, self.model.joints[idx].effort);
+            }
         }
+    }
+
+    /// Returns the name of a joint whose state, target or limits are not finite or contradict each other. `None` if there is none.
+    pub fn invalid_joint(&self) -> Option<&str> {
+        let states = self.positions.iter().zip(&self.velocities);
+        let mut joints = self.motors.iter().zip(&self.model.joints).zip(states);
+        let is_valid = |motor: &Motor, joint: &Joint, position: f64, velocity: f64| {
+            position.is_finite() && velocity.is_finite() && motor.is_valid() && joint.lower <= joint.upper
+        };
+        let found =
+            joints.find(|((motor, joint), (position, velocity))| !is_valid(motor, joint, **position, **velocity));
+        found.map(|((_, joint), _)| joint.name.as_str())
     }
 
     /// Steps the joint controllers: setpoints approach the targets evenly over the `steps_left` of the tick, within the
@@ -335,6 +352,7 @@ pub(super) mod tests {
             objects: Vec::new(),
             robot: RobotStart { profile, base: [-1.0, 0.3, 0.4], root_height_m: 0.0, knows: Arc::new([]) },
             designators: BTreeMap::new(),
+            steps: Vec::new(),
             sensing: Sensing {
                 position_noise_m: 0.0,
                 height_noise_m: 0.0,
@@ -463,6 +481,30 @@ pub(super) mod tests {
             }
             let lag = (world.observe().positions[joint] - command.positions[joint]).abs();
             assert!(lag < 0.05, "{lag} rad behind with {damping} N·m·s");
+        }
+    }
+
+    /// A panic about `min > max` ended the run of a robot whose state was not a number.
+    #[test]
+    fn a_joint_whose_state_or_limits_are_not_numbers_is_a_fault() {
+        type Spoil = fn(&mut Robot, usize);
+        let spoils: [Spoil; 5] = [
+            |robot, joint| robot.velocities[joint] = f64::NAN,
+            |robot, joint| robot.positions[joint] = f64::INFINITY,
+            |robot, joint| robot.motors[joint].target = f64::NAN,
+            |robot, joint| robot.motors[joint].max_effort = f64::NAN,
+            |robot, joint| std::mem::swap(&mut Arc::make_mut(&mut robot.model).joints[joint].lower, &mut 9.0),
+        ];
+        for (idx, spoil) in spoils.into_iter().enumerate() {
+            let mut world = lonely();
+            let joint = world.layout().arm[1];
+            let command = world.hold();
+            world.step(&command);
+            spoil(&mut world.robot, joint);
+            world.tick();
+            let name = world.kinematics().joints()[joint].name.clone();
+            assert_eq!(world.fault(), Some(&crate::Fault::Joint(name)), "{idx}");
+            world.step(&command);
         }
     }
 

@@ -1,9 +1,9 @@
 //! Measures the robot's course: joints at their limits, self-collisions, held objects.
 //!
-//! Self-collisions are measured from the links' shapes and poses: contact forces don't show how deep a motor presses
-//! one link into another.
+//! Self-collisions are measured by the forces between links, and from their shapes and poses: links that pass through each
+//! other because of an injected fault have no forces.
 
-use actcheck_data::{HeldCourse, JointCourse, Pose, RobotCourse, SelfCollision};
+use actcheck_data::{HeldCourse, JointCourse, Pose, RobotCourse, SelfCollision, SelfPress};
 use std::collections::BTreeMap;
 
 use nalgebra::{Isometry3, Point3};
@@ -24,6 +24,9 @@ const TICKS_PER_LOOK: u64 = 3;
 const OVERLOAD_SHARE: f64 = 0.99;
 /// Links that penetrate each other by no more than this only touch. Unit: metres.
 pub(super) const TOUCH_M: f64 = 1e-4;
+/// The depth of links is measured again once they have moved against each other by this much. Units: metres, radians.
+const SAME_M: f64 = 5e-4;
+const SAME_RAD: f64 = 2e-3;
 /// Error of positions in 32 bits. Unit: metres.
 pub(super) const ROUNDING_M: f64 = 1e-4;
 
@@ -31,10 +34,35 @@ pub(super) const ROUNDING_M: f64 = 1e-4;
 #[derive(Default)]
 pub(super) struct RobotMeter {
     joints: Vec<JointMeter>,
-    /// Tick of the first detection, and largest depth.
-    self_contacts: BTreeMap<(usize, usize), (u64, f64)>,
+    /// Pairs of links that pressed or penetrated each other.
+    self_contacts: BTreeMap<(usize, usize), LinksMet>,
     /// Number of ticks, and largest tilt.
     held: BTreeMap<usize, (u64, f64)>,
+}
+
+/// Two links that pressed or penetrated each other.
+#[derive(Debug, Clone, Copy)]
+struct LinksMet {
+    /// Tick of the first detection.
+    tick: u64,
+    max_depth_m: f64,
+    max_force_n: f64,
+    /// The pose of the second in the frame of the first when their depth was last measured.
+    measured: Option<Isometry3<f64>>,
+}
+
+impl LinksMet {
+    fn at(tick: u64) -> Self {
+        Self { tick, max_depth_m: 0.0, max_force_n: 0.0, measured: None }
+    }
+
+    /// Whether the depth at a pose is about that at the last one.
+    fn is_known(&self, between: &Isometry3<f64>) -> bool {
+        self.measured.is_some_and(|last| {
+            let shift = (last.translation.vector - between.translation.vector).norm();
+            shift < SAME_M && last.rotation.angle_to(&between.rotation) < SAME_RAD
+        })
+    }
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -65,6 +93,7 @@ impl World {
     pub(super) fn record_robot(&mut self, touches: &BTreeMap<(Owner, Owner), Touch>) {
         self.record_joints();
         self.record_held(touches);
+        self.record_pressed_links(touches);
         if self.recorder.n_ticks().is_multiple_of(TICKS_PER_LOOK) {
             self.record_self_contacts();
         }
@@ -79,10 +108,16 @@ impl World {
             max_speed_share: course.max_speed_share,
             overload_secs: course.longest_overload as f64 * tick_secs,
         });
-        let contacts = meter.self_contacts.iter().map(|((first, second), (tick, depth))| {
+        let contacts = meter.self_contacts.iter().map(|((first, second), met)| {
             let mut pair = [*first, *second].map(|link| self.name_of(Owner::Link(link)));
             pair.sort();
-            SelfCollision { pair, start_secs: self.recorder.secs_since_begin(*tick), max_depth_m: *depth }
+            let of_hand = self.robot.kinematics.are_of_hand(*first, *second);
+            SelfCollision {
+                pair,
+                start_secs: self.recorder.secs_since_begin(met.tick),
+                max_depth_m: met.max_depth_m,
+                press: Some(SelfPress { max_force_n: met.max_force_n, of_hand }),
+            }
         });
         let mut self_contacts: Vec<SelfCollision> = contacts.collect();
         self_contacts.sort_by(|a, b| a.pair.cmp(&b.pair));
@@ -112,10 +147,8 @@ impl World {
     }
 
     fn record_held(&mut self, touches: &BTreeMap<(Owner, Owner), Touch>) {
-        let [left, right] = self.robot.finger_links;
         for (idx, object) in self.objects.iter().enumerate() {
-            let by = |link| touches.contains_key(&(Owner::Object(idx), Owner::Link(link)));
-            if object.fixed || !(by(left) && by(right)) {
+            if object.fixed || !self.is_held(idx, touches) {
                 continue;
             }
             let Some(body) = self.engine.bodies.get(object.body) else { continue };
@@ -125,17 +158,46 @@ impl World {
         }
     }
 
+    /// Returns whether both fingers touch an object, each with any of its links.
+    pub(super) fn is_held(&self, object: usize, touches: &BTreeMap<(Owner, Owner), Touch>) -> bool {
+        let touches = |link: &usize| touches.contains_key(&(Owner::Object(object), Owner::Link(*link)));
+        self.robot.fingers.iter().all(|finger| finger.iter().any(touches))
+    }
+
     fn record_self_contacts(&mut self) {
         if self.room.reach <= Reach::Apart && !self.link_pairs.pass {
             // They are known to be apart.
             return;
         }
         let now = self.recorder.n_ticks();
+        let mut met = std::mem::take(&mut self.recorder.robot.self_contacts);
         for (first, second) in self.link_pairs.iter() {
-            let depth = self.depth_of(first, second);
-            if depth > TOUCH_M {
-                let (_, most) = self.recorder.robot.self_contacts.entry((first, second)).or_insert((now, 0.0));
-                *most = most.max(depth);
+            let pair = (first, second);
+            // The library's depth is fast, and wrong for hulls that only touch.
+            if self.depth_of(first, second) <= TOUCH_M {
+                continue;
+            }
+            let Some(between) = self.pose_between(first, second) else { continue };
+            if met.get(&pair).is_some_and(|known| known.is_known(&between)) {
+                continue;
+            }
+            let depth = self.solid_depth_of(first, second, &between);
+            if depth > TOUCH_M || met.contains_key(&pair) {
+                let known = met.entry(pair).or_insert(LinksMet::at(now));
+                known.max_depth_m = known.max_depth_m.max(depth);
+                known.measured = Some(between);
+            }
+        }
+        self.recorder.robot.self_contacts = met;
+    }
+
+    /// Records the forces between links.
+    fn record_pressed_links(&mut self, touches: &BTreeMap<(Owner, Owner), Touch>) {
+        let now = self.recorder.n_ticks();
+        for (pair, touch) in touches {
+            if let (Owner::Link(first), Owner::Link(second)) = pair {
+                let known = self.recorder.robot.self_contacts.entry((*first, *second)).or_insert(LinksMet::at(now));
+                known.max_force_n = known.max_force_n.max(touch.normal_n);
             }
         }
     }

@@ -59,15 +59,13 @@ impl World {
                 series.steps.push(Series::steps_of(value, series.steps_per_unit));
             }
         };
-        let [left, right] = self.robot.finger_links;
         for (idx, object) in self.objects.iter().enumerate().filter(|(_, object)| can_move(object)) {
             let Some(body) = self.engine.bodies.get(object.body) else { continue };
             let pose = Pose::from_isometry(&from_pose(body.position()));
             pose.position.into_iter().chain(pose.rotation).for_each(&mut put);
             from_vector(body.velocity_at_point(body.translation())).iter().copied().for_each(&mut put);
             from_vector(body.angvel()).iter().copied().for_each(&mut put);
-            let by = |link| touches.contains_key(&(Owner::Object(idx), Owner::Link(link)));
-            put(f64::from(u8::from(by(left) && by(right))));
+            put(f64::from(u8::from(self.is_held(idx, touches))));
         }
         let (positions, velocities) = self.robot.state();
         let hand = Pose::from_isometry(&self.robot.kinematics.grasp(&positions));

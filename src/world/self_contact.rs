@@ -73,6 +73,8 @@ struct Pair {
 /// A convex solid with the ball and the box around it, in its link's frame.
 #[derive(Debug)]
 struct Solid {
+    /// Its index among the shapes of the link.
+    part: usize,
     pose: EnginePose,
     shape: SharedShape,
     ball: Ball,
@@ -367,14 +369,19 @@ impl Form {
         self.solids.iter().map(|solid| (&solid.shape, &solid.pose))
     }
 
+    /// Returns the shapes as [`Form::shapes`], each with its index among the shapes of the link.
+    pub(crate) fn parts(&self) -> impl Iterator<Item = (usize, &SharedShape, &EnginePose)> {
+        self.solids.iter().map(|solid| (solid.part, &solid.shape, &solid.pose))
+    }
+
     pub(crate) fn new(solids: &[actcheck_data::Part]) -> Self {
         let around = Ball::around(solids).unwrap_or(Ball { middle: Point3::origin(), radius: 0.0 });
-        let forms = solids.iter().filter_map(|solid| {
+        let forms = solids.iter().enumerate().filter_map(|(part, solid)| {
             let form = collider(solid, Owner::Floor, 0.0, 0.0)?;
             let (low, high) = solid.bounds();
             let half = (Vector3::from(high) - Vector3::from(low)) / 2.0;
             let ball = Ball::around(std::slice::from_ref(solid))?;
-            Some(Solid { pose: form.position, shape: form.shape, ball, half })
+            Some(Solid { part, pose: form.position, shape: form.shape, ball, half })
         });
         let ends = solids.iter().map(actcheck_data::Part::bounds).reduce(|(low, high), (lower, upper)| {
             let pick =

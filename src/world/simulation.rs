@@ -2,6 +2,7 @@
 
 use std::cell::Cell;
 use std::collections::BTreeMap;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 
 use nalgebra::{Isometry3, Vector3};
@@ -9,6 +10,7 @@ use rapier3d::prelude::{PhysicsWorld, RigidBodyHandle};
 
 use crate::attach::attach;
 use crate::convert::{from_pose, from_vector, to_vector};
+use crate::departure::Motions;
 use crate::engine::{add_floor, engine};
 use crate::furniture::Sliding;
 use crate::link_pairs::LinkPairs;
@@ -71,6 +73,10 @@ pub struct World {
     pub(super) recorder: Recorder,
     pub(super) room: Room,
     pub(super) fault: Option<Fault>,
+    /// The known motion of each object; empty before the first record.
+    pub(super) motions: Vec<Motions>,
+    /// The words of a panic in the engine.
+    panicked: Option<String>,
     /// The furniture that slides at the moment, by its index.
     pub(super) sliding: BTreeMap<usize, Sliding>,
     /// The links of the robot that collide with each other.
@@ -123,6 +129,8 @@ pub fn build(scene: &Scene) -> Result<World, WorldError> {
         tracker: Tracker::default(),
         room: Room::default(),
         fault: None,
+        motions: Vec::new(),
+        panicked: None,
         sliding: BTreeMap::new(),
         link_pairs: LinkPairs::default(),
         decoys: BTreeMap::new(),
@@ -229,6 +237,11 @@ impl World {
                 self.need_whole();
                 reach = Reach::All;
             }
+            // The engine and the equations of free motion fail on numbers that are not finite.
+            if let Some(joint) = self.robot.invalid_joint() {
+                self.fault = Some(Fault::Joint(joint.to_owned()));
+                return;
+            }
             self.set_substeps(reach);
             self.robot.hand_over(&mut self.engine, reach.share());
             self.robot.control(&mut self.engine, holding, dt, self.steps_per_tick - step);
@@ -240,7 +253,7 @@ impl World {
             self.n_steps += 1;
             // Without the engine, no body moves before the end of the tick.
             if ends_tick || reach != Reach::Nothing {
-                self.fault = self.find_fault();
+                self.check_faults();
             }
             if self.fault.is_some() {
                 return;
@@ -281,7 +294,12 @@ impl World {
 
     fn step_engine(&mut self) {
         let start = self.watch.as_ref().map(|watch| (watch.clock_secs)());
-        self.engine.step_with_events(&self.link_pairs, &());
+        let (engine, link_pairs) = (&mut self.engine, &self.link_pairs);
+        // After a panic, the world has a fault and takes no further step.
+        let step = catch_unwind(AssertUnwindSafe(|| engine.step_with_events(link_pairs, &())));
+        if let Err(panic) = step {
+            self.panicked = Some(words_of(panic.as_ref()));
+        }
         if let (Some(watch), Some(start)) = (&mut self.watch, start) {
             watch.spent_secs += (watch.clock_secs)() - start;
         }
@@ -423,9 +441,14 @@ impl World {
         }
     }
 
-    fn find_fault(&self) -> Option<Fault> {
+    pub(super) fn find_fault(&self) -> Option<Fault> {
+        if let Some(words) = &self.panicked {
+            return Some(Fault::Engine(words.clone()));
+        }
         // Static bodies may reach far below the floor, as foundations do.
-        let objects = self.objects.iter().map(|object| (object.id.as_str(), object.body, !object.fixed));
+        let objects = self.objects.iter().enumerate();
+        let objects =
+            objects.map(|(idx, object)| (object.id.as_str(), object.body, !object.fixed && !self.has_left(idx)));
         let links = self.robot.model.links.iter().zip(&self.robot.bodies);
         let links = links.map(|(link, body)| (link.name.as_str(), *body, true));
         let quarantined = self.engine.quarantine().bodies();
@@ -441,7 +464,7 @@ impl World {
                 return Some(Fault::LeftWorld { id: id.to_owned(), position: position.into() });
             }
         }
-        None
+        self.robot.invalid_joint().map(|joint| Fault::Joint(joint.to_owned()))
     }
 
     /// Returns the pose at which sensors see an object: the true one, unless it has a decoy.
@@ -453,6 +476,12 @@ impl World {
     pub(super) fn pose_of(&self, object: &Object) -> Isometry3<f64> {
         self.engine.bodies.get(object.body).map_or(object.placed, |body| from_pose(body.position()))
     }
+}
+
+/// The words of a panic.
+fn words_of(panic: &(dyn std::any::Any + Send)) -> String {
+    let words = panic.downcast_ref::<String>().map(String::as_str);
+    words.or_else(|| panic.downcast_ref::<&str>().copied()).unwrap_or("no reason was given").to_owned()
 }
 
 fn moved(by: &Isometry3<f64>, [x, y, heading]: [f64; 3]) -> [f64; 3] {

@@ -86,6 +86,7 @@ fn judgement(name: &str, outcome: Outcome) -> Judgement {
         witness: String::new(),
         rule_digest: String::new(),
         held_before: None,
+        vacuous: None,
     }
 }
 

@@ -34,6 +34,7 @@ pub fn findings(table: &OutcomeTable, history: &str) -> FindingsSummary {
         }
     };
     FindingsSummary {
+        sampling: table.sampling,
         history: history.to_owned(),
         program: "actcheck".to_owned(),
         options: String::new(),

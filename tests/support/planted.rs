@@ -93,7 +93,7 @@ pub fn input(runs: usize, seed: u64, planted: &[Vec<Condition>]) -> PatternInput
             .for_each(|(distance, _)| *distance = f64::NAN);
     }
     let held_out = (0..runs).map(|_| dice.below(3) == 0).collect();
-    let mut input = PatternInput { failed: vec![false; runs], held_out, parameters };
+    let mut input = PatternInput { failed: vec![false; runs], held_out, parameters, ..PatternInput::default() };
     let mut within = vec![false; runs];
     for conditions in planted {
         let mut all = vec![true; runs];

@@ -123,17 +123,19 @@ pub(super) const CONTACTS: TableSpec = TableSpec {
     ],
 };
 
-/// Links of the robot that penetrated each other.
+/// Links of the robot that pressed or penetrated each other.
 pub(super) const SELF_CONTACTS: TableSpec = TableSpec {
     file: "self_contacts.parquet",
-    rows: "one for each action and pair of links that penetrated each other",
+    rows: "one for each action and pair of links that pressed or penetrated each other",
     columns: &[
         RUN,
         STEP,
         text("first", "one of the two links: robot/LINK"),
         text("second", "the other one"),
         number("seen_at_s", "s", "first detection since the action began"),
-        number("max_depth_m", "m", "largest penetration depth"),
+        number("max_depth_m", "m", "largest penetration depth where both are solid"),
+        number("max_force_n", "N", "largest normal force; missing in runs of earlier versions"),
+        bool("of_hand", "both belong to the hand, whose fingers may meet; missing in runs of earlier versions"),
     ],
 };
 
@@ -185,6 +187,20 @@ pub(super) const EXTREMES: TableSpec = TableSpec {
         number("held_s", "s", "total time that both fingers touched it; missing if they never did"),
         number("held_tilt_rad", "rad", "largest angle from the vertical while held"),
         number("clearance_m", "m", "smallest distance of any link to it; 0 if they touched, missing beyond 0.5 m"),
+    ],
+};
+
+/// Holds and motions.
+pub(super) const INTERVALS: TableSpec = TableSpec {
+    file: "intervals.parquet",
+    rows: "one for each hold or motion of an object; none in runs of versions that did not record them",
+    columns: &[
+        RUN,
+        STEP,
+        text("kind", "hold: both fingers touch the object; motion: it is faster than 2 cm/s"),
+        text("body", "id of the object"),
+        number("start_s", "s", "start since the action began"),
+        number("end_s", "s", "end since the action began"),
     ],
 };
 

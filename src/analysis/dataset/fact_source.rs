@@ -4,13 +4,13 @@ use std::collections::BTreeMap;
 
 use crate::Hierarchy;
 use crate::dataset::fact_columns::{
-    BODIES, CONTACTS, EXTREMES, JOINT_EXTREMES, LINKS, PLACES, PLANES, SELF_CONTACTS, SHAPES, STATES,
+    BODIES, CONTACTS, EXTREMES, INTERVALS, JOINT_EXTREMES, LINKS, PLACES, PLANES, SELF_CONTACTS, SHAPES, STATES,
 };
 use crate::dataset::sheets::Sheets;
 use crate::dataset::source::look_cells;
 use crate::tables::{Cell, kinds_of};
 use actcheck_data::{
-    ActionEnd, ActionTrace, BodyState, HeldCourse, Part, RobotCourse, RobotState, SceneMap, Shape, Trace,
+    ActionTrace, BodyState, HeldCourse, IntervalKind, Part, RobotCourse, RobotState, SceneMap, Shape, Trace,
 };
 use actcheck_history::RunDetail;
 
@@ -34,7 +34,7 @@ pub(super) fn add(run: &RunDetail, trace: &Trace, hierarchy: &Hierarchy, sheets:
         }
     }
     for (step, action) in trace.actions.iter().enumerate() {
-        if action.end != ActionEnd::NotReached {
+        if action.end.was_begun() {
             let began_secs = trace.snapshots.get(step).map_or(0.0, |before| before.time_secs);
             add_events(id, step + 1, action, trace.robot_courses.get(step), sheets);
             add_plane(id, step + 1, action, began_secs, sheets);
@@ -82,12 +82,23 @@ fn add_events(run: &str, step: usize, action: &ActionTrace, course: Option<&Robo
     for contact in course.into_iter().flat_map(|course| &course.self_contacts) {
         let pair = contact.pair.each_ref().map(Cell::text);
         let numbers = [contact.start_secs, contact.max_depth_m].map(Cell::number);
-        sheets.push(&SELF_CONTACTS, place().into_iter().chain(pair).chain(numbers));
+        let force = Cell::Number(contact.press.map(|press| press.max_force_n));
+        let of_hand = Cell::Bool(contact.press.map(|press| press.of_hand));
+        sheets.push(&SELF_CONTACTS, place().into_iter().chain(pair).chain(numbers).chain([force, of_hand]));
     }
     for joint in course.into_iter().flat_map(|course| &course.joints) {
         let excess = Cell::Number(joint.max_excess.is_finite().then_some(joint.max_excess));
         let numbers = [Cell::number(joint.max_speed_share), Cell::number(joint.overload_secs)];
         sheets.push(&JOINT_EXTREMES, place().into_iter().chain([Cell::text(&joint.name), excess]).chain(numbers));
+    }
+    for interval in course.and_then(|course| course.intervals.as_ref()).into_iter().flatten() {
+        let kind = match interval.kind {
+            IntervalKind::Hold => "hold",
+            IntervalKind::Motion => "motion",
+        };
+        let thing = [Cell::text(kind), Cell::text(&interval.thing)];
+        let times = [interval.start_secs, interval.end_secs].map(Cell::number);
+        sheets.push(&INTERVALS, place().into_iter().chain(thing).chain(times));
     }
     for extremes in &action.extremes {
         let held = course.and_then(|course| course.held.iter().find(|held| held.id == extremes.id));

@@ -3,6 +3,7 @@
 //! Never: simulates, renders an image, decides successes (the rules do), or leaves out failed runs.
 
 mod columns;
+mod course;
 mod fact_columns;
 mod fact_source;
 mod sheet;

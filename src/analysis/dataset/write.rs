@@ -6,17 +6,17 @@ use serde_json::{Value, json};
 
 use crate::dataset::columns::{ACTIONS, JOINTS, OBJECTS, PERCEPTS, ROBOT, TableSpec};
 use crate::dataset::fact_columns::{
-    BODIES, CONTACTS, EXTREMES, JOINT_EXTREMES, LINKS, PLACES, PLANES, SELF_CONTACTS, SHAPES, STATES,
+    BODIES, CONTACTS, EXTREMES, INTERVALS, JOINT_EXTREMES, LINKS, PLACES, PLANES, SELF_CONTACTS, SHAPES, STATES,
 };
 use crate::dataset::sheets::Sheets;
-use crate::dataset::{fact_source, source};
+use crate::dataset::{course, fact_source, source};
 use crate::tables::{new_text, outcomes_schema, pending_parquet, unwritten};
 use crate::{Hierarchy, Mirror, TableFilter};
 use actcheck_base::Diagnostics;
 use actcheck_history::{History, RunDetail};
 
 /// Tables with the facts from which outcomes follow.
-const FACTS: [&TableSpec; 12] = [
+const FACTS: [&TableSpec; 13] = [
     &ACTIONS,
     &PERCEPTS,
     &PLANES,
@@ -26,6 +26,7 @@ const FACTS: [&TableSpec; 12] = [
     &CONTACTS,
     &SELF_CONTACTS,
     &EXTREMES,
+    &INTERVALS,
     &JOINT_EXTREMES,
     &SHAPES,
     &PLACES,
@@ -59,17 +60,20 @@ pub struct DatasetRuns<'a> {
     pub hierarchy: &'a Hierarchy,
 }
 
-/// Writes observations, commands, percepts, ground truth and outcomes of runs into a folder, creating it if needed.
+/// Writes observations, commands, percepts, ground truth and outcomes of runs into a folder, creating it if needed. `with_course`:
+/// also the course of each action at the control rate.
 ///
 /// # Errors
 /// `A001` if it can't be written; errors of reading the history or a trace.
-pub fn export_dataset(runs: &DatasetRuns<'_>, folder: &Path) -> Result<Dataset, Diagnostics> {
-    let tables: Vec<&TableSpec> = FACTS.into_iter().chain(COURSES).collect();
+pub fn export_dataset(runs: &DatasetRuns<'_>, folder: &Path, with_course: bool) -> Result<Dataset, Diagnostics> {
+    let further = course::COURSE.into_iter().filter(|_| with_course);
+    let tables: Vec<&TableSpec> = FACTS.into_iter().chain(COURSES).chain(further).collect();
     export(runs, &tables, folder, |run, sheets| {
         let trace = runs.history.trace(&run.row.run)?;
         source::add(run, &trace, sheets);
         fact_source::add(run, &trace, runs.hierarchy, sheets);
-        Ok(source::add_courses(&run.row.run, &trace, sheets))
+        let any = source::add_courses(&run.row.run, &trace, sheets);
+        Ok((!with_course || course::add(&run.row.run, &trace, sheets)) && any)
     })
 }
 

@@ -5,11 +5,12 @@ use crate::effects::contacts::{self, FirstContact, LargestForce};
 use crate::effects::surroundings;
 use crate::effects::{PerceptionError, Surrounding};
 use actcheck_base::names;
-use actcheck_data::{ActionEnd, ActionTrace, BodyState, Role, Snapshot, Trace};
+use actcheck_data::{ActionTrace, BodyState, Role, Snapshot, Trace};
 use actcheck_history::{ActionDetail, ObjectDetail, RunDetail};
 
 /// Designator of the location that a robot is sent to.
 const LOCATION: &str = "objectLocation";
+const OBJECT: &str = "pickObject";
 /// The action that goes to this location.
 const MOVE: &str = "MoveTo";
 /// Actions that handle no object, although the run's designators name a target. Any other action may touch its target.
@@ -87,11 +88,13 @@ pub(super) struct ActionView<'a> {
 impl<'a> ActionView<'a> {
     fn of(run: &'a RunDetail, trace: &'a Trace, step: usize) -> Option<Self> {
         let (detail, action) = (run.actions.get(step)?, trace.actions.get(step)?);
-        let before = trace.snapshots.get(step).filter(|_| action.end != ActionEnd::NotReached)?;
+        let before = trace.snapshots.get(step).filter(|_| action.end.was_begun())?;
         let kind = names::local(&detail.action);
         let handles = !WITHOUT_OBJECT.contains(&kind);
         let named = |object: &&ObjectDetail| {
-            object.role == Role::Target && detail.parameters.values().flatten().any(|value| *value == object.id)
+            let is_named = |values: &Vec<String>| values.contains(&object.id);
+            let is_target = object.role == Role::Target && detail.parameters.values().any(is_named);
+            is_target || detail.parameters.get(OBJECT).is_some_and(is_named)
         };
         let held = before.robot.left_touches.iter().filter(|id| before.robot.right_touches.contains(id));
         let held: Vec<&str> = held.map(String::as_str).collect();

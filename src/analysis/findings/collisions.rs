@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use crate::findings::judged::newest_of_alike;
 use crate::findings::margins::{Quantiles, quantiles};
 use crate::findings::scenes::Scenes;
-use crate::{Interval, OutcomeTable, Surrounding, wilson};
+use crate::{Interval, OutcomeTable, Sampling, Surrounding};
 use actcheck_data::Role;
 
 /// Directions from the goal, by quarter turns to the left: the first is along the approach.
@@ -112,12 +112,12 @@ pub fn collisions(table: &OutcomeTable) -> Vec<Collisions> {
                 let things: Vec<Surrounding> = serde_json::from_str(around.get(*row as usize)?).ok()?;
                 Some((runs.get(*row as usize)?, things))
             };
-            of_action(action, &rows.iter().filter_map(read).collect::<Vec<_>>())
+            of_action(action, table.sampling, &rows.iter().filter_map(read).collect::<Vec<_>>())
         })
         .collect()
 }
 
-fn of_action(action: &str, executions: &[(&str, Vec<Surrounding>)]) -> Option<Collisions> {
+fn of_action(action: &str, sampling: Sampling, executions: &[(&str, Vec<Surrounding>)]) -> Option<Collisions> {
     let hit = executions.iter().filter(|(_, things)| things.iter().any(|thing| thing.force_n.is_some())).count() as u64;
     let mut categories: Vec<&str> = executions
         .iter()
@@ -127,7 +127,8 @@ fn of_action(action: &str, executions: &[(&str, Vec<Surrounding>)]) -> Option<Co
         .collect();
     categories.sort_unstable();
     categories.dedup();
-    let mut kinds: Vec<HitKind> = categories.into_iter().filter_map(|category| kind(category, executions)).collect();
+    let mut kinds: Vec<HitKind> =
+        categories.into_iter().filter_map(|category| kind(category, sampling, executions)).collect();
     kinds.sort_by(|a, b| b.hit.cmp(&a.hit).then_with(|| a.category.cmp(&b.category)));
     let placed = |(run, things): &(&str, Vec<Surrounding>)| -> Vec<PlacedThing> {
         let place = |thing: &Surrounding| {
@@ -146,9 +147,9 @@ fn of_action(action: &str, executions: &[(&str, Vec<Surrounding>)]) -> Option<Co
         action: action.to_owned(),
         executions: executions.len() as u64,
         hit,
-        rate: wilson(hit, executions.len() as u64)?,
+        rate: sampling.interval(hit, executions.len() as u64)?,
         kinds,
-        sectors: sectors(executions.iter().flat_map(|(_, things)| things)),
+        sectors: sectors(sampling, executions.iter().flat_map(|(_, things)| things)),
         things: executions.iter().flat_map(placed).collect(),
     })
 }
@@ -157,7 +158,7 @@ fn is_furniture(thing: &Surrounding) -> bool {
     thing.role == Role::Platform.word()
 }
 
-fn kind(category: &str, executions: &[(&str, Vec<Surrounding>)]) -> Option<HitKind> {
+fn kind(category: &str, sampling: Sampling, executions: &[(&str, Vec<Surrounding>)]) -> Option<HitKind> {
     let of_kind = |things: &'_ [Surrounding]| -> Vec<Surrounding> {
         things.iter().filter(|thing| thing.category == category).cloned().collect()
     };
@@ -184,7 +185,7 @@ fn kind(category: &str, executions: &[(&str, Vec<Surrounding>)]) -> Option<HitKi
         furniture,
         present,
         hit,
-        rate: wilson(hit, present)?,
+        rate: sampling.interval(hit, present)?,
         force_n: quantiles(hits.iter().filter_map(|(_, thing)| thing.force_n))?,
         by: tally(hits.iter().filter_map(|(_, thing)| by(thing))),
         phases: tally(hits.iter().filter_map(|(_, thing)| thing.phase.clone())),
@@ -211,7 +212,7 @@ fn direction(thing: &Surrounding) -> Option<usize> {
     Some(quarter.min(DIRECTIONS.len() - 1))
 }
 
-fn sectors<'a>(things: impl Iterator<Item = &'a Surrounding>) -> Vec<Vec<Sector>> {
+fn sectors<'a>(sampling: Sampling, things: impl Iterator<Item = &'a Surrounding>) -> Vec<Vec<Sector>> {
     let lower = |band: usize| band.checked_sub(1).map_or(0.0, |below| DISTANCES_M[below]);
     let sector = |direction: &'static str, band: usize| Sector {
         direction,
@@ -231,6 +232,6 @@ fn sectors<'a>(things: impl Iterator<Item = &'a Surrounding>) -> Vec<Vec<Sector>
         let cell = &mut found[direction][band];
         (cell.present, cell.hit) = (cell.present + 1, cell.hit + u64::from(thing.force_n.is_some()));
     }
-    found.iter_mut().flatten().for_each(|cell| cell.rate = wilson(cell.hit, cell.present));
+    found.iter_mut().flatten().for_each(|cell| cell.rate = sampling.interval(cell.hit, cell.present));
     found
 }

@@ -38,7 +38,7 @@ pub fn flaky_scenes(table: &OutcomeTable, of: &JudgedProperty) -> (Vec<FlakyScen
         });
         runs.push(Repeated { scene, passed: !failed, margin: None });
     }
-    let found = consistency(&runs);
+    let found = consistency(&runs, table.sampling);
     let repeated = found.always_passed + found.always_failed + found.flaky.len() as u64;
     let named = |flaky: &crate::SceneCounts| {
         let (of, scene) = keys[flaky.scene as usize];

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 use crate::findings::judged::{failed, outcomes};
 use crate::findings::scenes::Scenes;
-use crate::{FailureMode, OutcomeTable, wilson};
+use crate::{FailureMode, OutcomeTable};
 
 /// Returns the failure modes of the runs of a table, most frequent first, then sorted by their properties.
 ///
@@ -39,8 +39,8 @@ pub fn table_failure_modes(table: &OutcomeTable) -> Vec<FailureMode> {
             let mut failed: Vec<String> = signature.iter().map(|of| properties.texts[*of as usize].clone()).collect();
             failed.sort();
             let share = match &scenes {
-                Some(scenes) => scenes.share(of_them.iter().map(|(place, _)| *place))?,
-                None => wilson(of_them.len() as u64, total)?,
+                Some(scenes) => scenes.share(of_them.iter().map(|(place, _)| *place), table.sampling)?,
+                None => table.sampling.interval(of_them.len() as u64, total)?,
             };
             let runs = of_them.into_iter().map(|(_, run)| runs.texts[run as usize].clone()).collect();
             Some(FailureMode { failed, runs, share })

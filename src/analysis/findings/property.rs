@@ -4,7 +4,7 @@ use crate::findings::judged::{JudgedProperty, failed, outcomes};
 use crate::findings::margins::{Quantiles, quantiles};
 use crate::findings::parameters::{conditions, effects};
 use crate::findings::scenes::Scenes;
-use crate::{Hierarchy, Interval, OutcomeTable, PatternInput, PatternOptions, Patterns, mine, wilson};
+use crate::{Hierarchy, Interval, OutcomeTable, PatternInput, PatternOptions, Patterns, mine};
 use actcheck_base::{Outcome, digest_of};
 use actcheck_verdict::Counts;
 
@@ -87,6 +87,7 @@ pub fn property_findings(
         failed: rows.iter().map(|row| failed(outcomes[*row as usize]) == Some(true)).collect(),
         held_out: rows.iter().map(|row| is_held_out(table, *row as usize)).collect(),
         parameters: conditions(table, rows, hierarchy),
+        sampling: table.sampling,
     };
     let happened = PatternInput { parameters: effects(table, rows, hierarchy), ..input.clone() };
     let simple = PatternOptions { most_conditions: options.most_conditions.min(MOST_EFFECTS), ..*options };
@@ -142,9 +143,10 @@ impl Rates {
         Self {
             failing: match scenes.runs(decided.iter().map(|row| *row as usize)) {
                 Some(runs) => {
-                    runs.share((0..decided.len()).filter(|at| outcomes[decided[*at] as usize] == Outcome::Failed))
+                    let failed = |at: &usize| outcomes[decided[*at] as usize] == Outcome::Failed;
+                    runs.share((0..decided.len()).filter(failed), table.sampling)
                 }
-                None => wilson(of.counts.failed, of.counts.decided()),
+                None => table.sampling.interval(of.counts.failed, of.counts.decided()),
             },
             margins: quantiles(decided.iter().filter_map(|row| margin.get(*row as usize).copied())),
             twins: (of.every_row.iter().filter(|row| is_decided(row)).count() - decided.len()) as u64,

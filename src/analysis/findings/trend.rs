@@ -2,7 +2,7 @@
 
 use crate::findings::judged::{JudgedProperty, failed, outcomes};
 use crate::findings::scenes::Scenes;
-use crate::{Interval, OutcomeTable, TwoByTwo, wilson};
+use crate::{Interval, OutcomeTable, TwoByTwo};
 
 /// A campaign.
 #[derive(Debug, Clone, PartialEq)]
@@ -88,7 +88,7 @@ pub fn trend(table: &OutcomeTable, of: &JudgedProperty, level: f64) -> Trend {
     for (point, runs) in points.iter_mut().zip(&runs) {
         let (failed, passed) = distinct([runs], Order::OldestFirst).last().copied().unwrap_or_default();
         (point.runs, point.failed) = (failed + passed, failed);
-        point.failing = wilson(point.failed, point.runs);
+        point.failing = table.sampling.interval(point.failed, point.runs);
     }
     let mut places = Vec::new();
     part(&runs, 0, level, &mut places);
@@ -96,7 +96,7 @@ pub fn trend(table: &OutcomeTable, of: &JudgedProperty, level: f64) -> Trend {
     let bounds: Vec<usize> = std::iter::once(0).chain(places.iter().map(|(at, _)| *at)).chain([points.len()]).collect();
     let share = |from: usize, to: usize| {
         let (failed, passed) = distinct(&runs[from..to], Order::OldestFirst).last().copied().unwrap_or_default();
-        wilson(failed, failed + passed)
+        table.sampling.interval(failed, failed + passed)
     };
     let changes = places
         .iter()

@@ -1,7 +1,7 @@
 //! Failure rates by one or two parameters, for heat maps.
 
 use crate::patterns::simplest_between;
-use crate::{Interval, Parameter, PatternInput, Values, wilson};
+use crate::{Interval, Parameter, PatternInput, Values};
 
 /// Maximum number of cells along a numeric axis.
 const MOST_CELLS: usize = 8;
@@ -48,7 +48,7 @@ pub fn two_way(input: &PatternInput, by: &[&str]) -> Option<TwoWay> {
             cell.failed += u64::from(input.failed[run]);
         }
     }
-    cells.iter_mut().flatten().for_each(|cell| cell.failing = wilson(cell.failed, cell.runs));
+    cells.iter_mut().flatten().for_each(|cell| cell.failing = input.sampling.interval(cell.failed, cell.runs));
     let by = by.iter().take(2).map(|name| (*name).to_owned()).collect();
     Some(TwoWay { by, down: down.0, across: across.0, cells })
 }

@@ -1,5 +1,7 @@
 //! The input of pattern mining: decided runs, and the parameters of their scenes.
 
+use crate::Sampling;
+
 /// Decided runs with their parameters. Every list has one entry for each run.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct PatternInput {
@@ -9,6 +11,8 @@ pub struct PatternInput {
     pub held_out: Vec<bool>,
     /// Parameters that may affect the outcome.
     pub parameters: Vec<Parameter>,
+    /// How the number of runs was decided.
+    pub sampling: Sampling,
 }
 
 /// One parameter of the scenes.

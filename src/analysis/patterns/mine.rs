@@ -14,7 +14,7 @@ use crate::patterns::refine::{OpenRuns, refine};
 use crate::patterns::simplify::simplify;
 use crate::patterns::strongest::{Strongest, strongest};
 use crate::patterns::{Condition, PatternInput};
-use crate::{Interval, TwoByTwo, benjamini_hochberg, wilson};
+use crate::{Interval, TwoByTwo, benjamini_hochberg};
 
 /// Minimum number of failures and of passes. With fewer, no pattern can be significant.
 const LEAST_OF_EACH: u64 = 4;
@@ -135,7 +135,7 @@ pub fn mine(input: &PatternInput, options: &PatternOptions) -> Patterns {
         let within = all_hold(&conditions, input);
         let all = count(input, &within, |_| true);
         let (inside, outside) = (all.failed_in + all.passed_in, all.failed_out + all.passed_out);
-        let Some(rate) = wilson(all.failed_in, inside) else { continue };
+        let Some(rate) = input.sampling.interval(all.failed_in, inside) else { continue };
         let overall = found.failed as f64 / found.runs as f64;
         found.patterns.push(Pattern {
             conditions,
@@ -144,7 +144,7 @@ pub fn mine(input: &PatternInput, options: &PatternOptions) -> Patterns {
             searched,
             held_out,
             rate,
-            elsewhere: wilson(all.failed_out, outside),
+            elsewhere: input.sampling.interval(all.failed_out, outside),
             lift: rate.rate / overall,
             wracc: inside as f64 / found.runs as f64 * (rate.rate - overall),
             p,

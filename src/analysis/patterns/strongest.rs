@@ -7,7 +7,7 @@ use crate::patterns::likelihood::{Likelihood, one};
 use crate::patterns::mine::cells;
 use crate::patterns::{Condition, PatternInput, PatternOptions};
 use crate::runs_needed::{POWER, TwoRates};
-use crate::{Interval, TwoByTwo, wilson};
+use crate::{Interval, Sampling, TwoByTwo};
 
 /// Maximum number of conditions.
 const MOST: usize = 3;
@@ -57,7 +57,7 @@ pub(super) fn strongest(input: &PatternInput, options: &PatternOptions, families
         }
         let table = count(input, &holds, |_| true);
         if table.failed_in >= LEAST_FAILED {
-            found.extend(assessed(condition, table, tests, options.level));
+            found.extend(assessed(condition, table, input.sampling, (tests, options.level)));
             known.push(holds);
         }
         if found.len() == MOST {
@@ -77,9 +77,9 @@ fn best_of(axis: &Axis, input: &PatternInput, likelihood: &Likelihood) -> Option
     (score > 0.0).then(|| (score, axis.condition(place)))
 }
 
-fn assessed(condition: Condition, all: TwoByTwo, tests: f64, level: f64) -> Option<Strongest> {
+fn assessed(condition: Condition, all: TwoByTwo, sampling: Sampling, (tests, level): (f64, f64)) -> Option<Strongest> {
     let (inside, outside) = (all.failed_in + all.passed_in, all.failed_out + all.passed_out);
-    let (rate, elsewhere) = (wilson(all.failed_in, inside)?, wilson(all.failed_out, outside)?);
+    let (rate, elsewhere) = (sampling.interval(all.failed_in, inside)?, sampling.interval(all.failed_out, outside)?);
     let p = all.fisher().greater;
     let rates =
         TwoRates { within: rate.rate, outside: elsewhere.rate, share: inside as f64 / (inside + outside) as f64 };

@@ -91,7 +91,9 @@ const COLUMNS: &[Column] = &[
     text("program_version", "version of actcheck that performed the run", |p| Cell::text(&p.run.program_version)),
     count("step", "position of the action in the test, from 1", |p| Cell::count(p.action.step)),
     text("action", "the action (IRI)", |p| Cell::text(&p.action.action)),
-    text("action_end", "how the action ended: completed, broken, timeout or untested", |p| Cell::text(&p.action.end)),
+    text("action_end", "how the action ended: completed, broken, timeout, untested or inapplicable", |p| {
+        Cell::text(&p.action.end)
+    }),
     truth("reported", "whether the action reported success", |p| Cell::Bool(p.action.reported)),
     text("message", "the action's message, or the reason why it did not complete", |p| {
         Cell::Text(p.action.message.clone())
@@ -107,6 +109,9 @@ const COLUMNS: &[Column] = &[
     text("witness", "explanation of the outcome", |p| Cell::text(&p.judgement.witness)),
     truth("held_before", "whether the property already held before the action", |p| {
         Cell::Bool(p.judgement.held_before)
+    }),
+    truth("vacuous", "whether the property passed without any left side of an `implies` holding", |p| {
+        Cell::Bool(p.judgement.vacuous)
     }),
     text(
         "designators",

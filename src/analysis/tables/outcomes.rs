@@ -7,6 +7,7 @@ use std::thread::available_parallelism;
 use polars::prelude::{BooleanChunked, DataFrame, DataType, NewChunkedArray as _, PolarsError};
 use rustc_hash::FxHashMap;
 
+use crate::Sampling;
 use crate::tables::columns::{ColumnKind, columns};
 use crate::tables::mirror::{Mirror, TableFile, read, unread};
 use actcheck_base::Diagnostics;
@@ -66,6 +67,8 @@ pub struct OutcomeTable {
     rows: usize,
     texts: BTreeMap<&'static str, TextColumn>,
     numbers: BTreeMap<&'static str, Vec<f64>>,
+    /// How the number of runs was decided: which intervals of rates are valid.
+    pub sampling: Sampling,
 }
 
 impl OutcomeTable {

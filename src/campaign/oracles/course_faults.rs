@@ -3,6 +3,7 @@
 
 use crate::Env;
 use crate::oracles::retouch::{Retouch, distance};
+use actcheck_config::Step;
 use actcheck_data::Trace;
 
 /// A fault of the course of an action that properties about time should detect.
@@ -47,7 +48,7 @@ pub enum CourseChange {
     HandDetour,
     /// The hand shakes at 15 Hz, by 5 mm.
     Shaking,
-    /// A person of 1.75 m is 20 cm from the carried object.
+    /// A person of 1.75 m is at most 20 cm from the carried object.
     PersonNear,
     /// The base believes for a third of the time that it is 30 cm beside its place.
     BeliefJumps,
@@ -113,8 +114,8 @@ pub const COURSE_FAULTS: [CourseFault; 21] = [
 
 impl CourseFault {
     /// Whether it can occur in a test with these actions, and some rule reads courses.
-    pub fn concerns(&self, test: &[String], env: &Env) -> bool {
-        env.rules.reads_course() && test.iter().any(|action| action == self.action)
+    pub fn concerns(&self, test: &[Step], env: &Env) -> bool {
+        env.rules.reads_course() && test.iter().any(|step| step.action == self.action)
     }
 
     /// Puts the fault into the first action of its kind. Returns whether the course has the moment that the fault needs.
@@ -274,11 +275,12 @@ fn stand_near(course: &mut Retouch<'_>) -> Option<()> {
         (person.id, person.model) = ("person_1".to_owned(), "person".to_owned());
         person.category = "https://w3id.org/actcheck/world#Person".to_owned();
         person.fixed = true;
-        person.pose.position = [x + BESIDE_M, y, SIZE_M[2] / 2.0];
+        person.pose.position = [x + BESIDE_M + SIZE_M[0] / 2.0, y, 0.0];
         person.pose.rotation = [0.0, 0.0, 0.0, 1.0];
         (person.linear_velocity, person.angular_velocity) = ([0.0; 3], [0.0; 3]);
-        person.aabb_min = [0, 1, 2].map(|axis| person.pose.position[axis] - SIZE_M[axis] / 2.0);
-        person.aabb_max = [0, 1, 2].map(|axis| person.pose.position[axis] + SIZE_M[axis] / 2.0);
+        let middle = [person.pose.position[0], person.pose.position[1], SIZE_M[2] / 2.0];
+        person.aabb_min = [0, 1, 2].map(|axis| middle[axis] - SIZE_M[axis] / 2.0);
+        person.aabb_max = [0, 1, 2].map(|axis| middle[axis] + SIZE_M[axis] / 2.0);
         person.size_m = Some(SIZE_M);
         (person.touches, person.rests_on) = (Vec::new(), vec!["floor".to_owned()]);
         person.grasp_distance_m = None;

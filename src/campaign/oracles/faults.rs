@@ -1,6 +1,7 @@
 //! The table of faults.
 
 use actcheck_actions::{Accident, Defect, Moment, Sabotage};
+use actcheck_config::Step;
 use actcheck_data::RobotProfile;
 
 /// A fault that properties should detect.
@@ -16,9 +17,13 @@ pub struct Fault {
 
 impl Fault {
     /// Whether it can occur when a robot performs a test with these actions.
-    pub fn concerns(&self, test: &[String], robot: &RobotProfile) -> bool {
+    pub fn concerns(&self, test: &[Step], robot: &RobotProfile) -> bool {
         let actions = self.sabotage.actions;
-        let performed = actions.is_empty() || test.iter().any(|name| actions.contains(&name.as_str()));
+        // A hand that never picked holds nothing.
+        let from =
+            if self.sabotage.needs_load() { test.iter().position(|step| step.action == PICK[0]) } else { Some(0) };
+        let possible = from.map_or(&[][..], |from| &test[from..]);
+        let performed = possible.iter().any(|step| actions.is_empty() || actions.contains(&step.action.as_str()));
         performed && self.sabotage.suits(robot)
     }
 }
@@ -34,7 +39,7 @@ const PICK: &[&str] = &["Pick"];
 const PLACE: &[&str] = &["Place"];
 
 /// All faults, in the order of the table of results. To add one, add a row.
-pub const FAULTS: [Fault; 21] = [
+pub const FAULTS: [Fault; 27] = [
     Fault {
         name: "no-op",
         description: "the robot does nothing and reports success",
@@ -149,6 +154,41 @@ pub const FAULTS: [Fault; 21] = [
         name: "runaway-motor",
         description: "the motor of the hand's joint runs away with three times its largest effort while the hand reaches",
         sabotage: Sabotage { actions: PICK, world: Some((Moment::Reaching, Accident::RunawayMotor)), ..NONE },
+    },
+    Fault {
+        name: "drag-and-lift",
+        description: "the hand drags the object and lifts it by less than a centimetre, and the action reports success",
+        sabotage: Sabotage {
+            actions: PICK,
+            world: Some((Moment::Grasping, Accident::Drags)),
+            report: Some(true),
+            ..NONE
+        },
+    },
+    Fault {
+        name: "neighbour-put-back",
+        description: "the object's nearest neighbour is moved aside and put back before the robot picks",
+        sabotage: Sabotage { actions: PICK, world: Some((Moment::Starting, Accident::NeighbourMoved)), ..NONE },
+    },
+    Fault {
+        name: "sweep",
+        description: "the hand sweeps through the nearest object before the robot perceives the surface",
+        sabotage: Sabotage { actions: PERCEIVE, world: Some((Moment::Starting, Accident::Sweeps)), ..NONE },
+    },
+    Fault {
+        name: "false-height",
+        description: "the camera perceives every object 40 cm above its place",
+        sabotage: Sabotage { actions: PERCEIVE, robot: Some(Defect::FalseHeight), ..NONE },
+    },
+    Fault {
+        name: "lost-on-the-way",
+        description: "the hand opens while the robot drives with an object to its goal",
+        sabotage: Sabotage { actions: MOVE_TO, world: Some((Moment::DrivingLoaded, Accident::HandOpens)), ..NONE },
+    },
+    Fault {
+        name: "held-object-pushes",
+        description: "the object in the hand pushes another one before the robot drives",
+        sabotage: Sabotage { actions: MOVE_TO, world: Some((Moment::Starting, Accident::PushesWithHeld)), ..NONE },
     },
 ];
 

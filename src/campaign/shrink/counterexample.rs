@@ -6,14 +6,15 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use crate::finished_run::RunPlace;
 use crate::line::simulate;
 use crate::run_cases::end_of;
-use crate::shrink::list::{drop_rejected_tries, has};
-use crate::shrink::{Explained, ShrinkPlan, TrialLimits, TrialSearch, Tried, explain, reduce};
+use crate::shrink::list::{drop_rejected_tries, has, with_value};
+use crate::shrink::{Explained, Id, Passing, ShrinkPlan, TrialLimits, TrialSearch, Tried, TryResult, explain, reduce};
 use crate::{Env, RunContext, RunInput, run_line};
 use actcheck_actions::Interference;
-use actcheck_base::{Diagnostic, Diagnostics, Outcome, did_you_mean, names};
+use actcheck_base::{Diagnostic, Diagnostics, Judgement, Outcome, did_you_mean, names};
 use actcheck_data::{Choice, ChoiceGroup, ChoiceKind, ChoiceName, Choices, ObjectAxis, PlacedObject, Role};
 use actcheck_history::{History, RunRecord, RunStatus};
 use actcheck_scenario as scenario;
+use actcheck_verdict::Counts;
 
 /// Repetitions of the shrunk scene with fresh noise, to estimate how often it fails.
 const FRESH: u32 = 5;
@@ -100,7 +101,7 @@ pub fn shrink(
     let fresh_noise = |list: &[Choice]| subject.with_fresh_noise(list);
     let as_recorded = |list: &[Choice]| subject.as_recorded(list);
     let noisy = start.iter().any(|choice| choice.name.is_noise() && choice.value != 0.0);
-    let repeated = options.repeat.is_some() && noisy && fresh_noise(&start).made.is_some();
+    let repeated = options.repeat.is_some() && noisy && matches!(fresh_noise(&start).result, TryResult::Fails(_));
     let test: &(dyn Fn(&[Choice]) -> Tried + Sync) = if repeated { &fresh_noise } else { &as_recorded };
     let limits = TrialLimits { simulations: options.trials, jobs: options.jobs, stop: options.stop };
     let mut search = TrialSearch::new(test, limits);
@@ -108,11 +109,19 @@ pub fn shrink(
     let start = if repeated { start.into_iter().filter(|choice| !choice.name.is_noise()).collect() } else { start };
     let (choices, minimal) = reduce(&mut search, start, &plan, on_better);
     let simulations = search.simulations();
-    let explained = explain(&mut search, &choices, &plan);
-    let explaining = search.simulations() - simulations;
+    let mut explained = explain(&mut search, &choices, &plan);
+    let mut explaining = search.simulations() - simulations;
+    let fresh = (noisy && !(options.stop)()).then(|| subject.fresh_failures(&choices));
+    let choices = if repeated { subject.with_failing_noise(&choices) } else { choices };
+    if repeated {
+        // Tried with fresh noise, but replayed with that of the stored run.
+        let left = options.trials.saturating_sub(simulations + explaining);
+        let (confirmed, replays) = subject.confirmed(explained, &choices, left);
+        (explained, explaining) = (confirmed, explaining + replays);
+    }
     Ok(Shrunk {
-        fresh: (noisy && !(options.stop)()).then(|| subject.fresh_failures(&choices)),
-        choices: if repeated { subject.with_failing_noise(&choices) } else { choices },
+        fresh,
+        choices,
         failed: subject.failed,
         others_before,
         special_before,
@@ -186,19 +195,52 @@ impl Subject<'_> {
         }
     }
 
-    /// Makes one run. Returns `None` unless it completes and fails as required.
-    fn run(&self, choices: Choices) -> Option<RunRecord> {
+    /// Makes one run. Returns `None` if its scene can't be built, or if it does not complete.
+    fn complete(&self, choices: Choices) -> Option<RunRecord> {
         if !self.may_block && self.is_blocked(choices.clone()) {
             return None;
         }
         let run = || run_line(self.env, "shrink", self.index, choices, &self.options.context).ok();
         let record = catch_unwind(AssertUnwindSafe(run)).ok().flatten()?;
-        let failed = signature(&record);
-        let same = match self.options.property {
+        (record.status == RunStatus::Completed).then_some(record)
+    }
+
+    /// Whether a run fails as required.
+    fn fails(&self, record: &RunRecord) -> bool {
+        let failed = signature(record);
+        match self.options.property {
             Some(property) => failed.iter().any(|iri| is_named(iri, property)),
             None => failed == self.failed,
+        }
+    }
+
+    /// Returns the names of the properties that failed in a run that passes: none, unless a single property was asked for
+    /// and passes. Returns `None` if the run does not pass.
+    fn passes(&self, record: &RunRecord) -> Option<Vec<String>> {
+        let asked =
+            |judgement: &&Judgement| self.options.property.is_none_or(|name| is_named(&judgement.property, name));
+        let judgements = record.judgements.iter().flatten().filter(asked);
+        let counts = Counts::of(judgements.map(|judgement| judgement.outcome));
+        let passes = counts.passed > 0 && counts.passed + counts.inapplicable == counts.total();
+        passes.then(|| signature(record).iter().map(|iri| names::local(iri).to_owned()).collect())
+    }
+
+    /// Keeps the passing values with which a run of these choices passes when it is replayed, at most `most` of them. Returns
+    /// also the number of replays.
+    fn confirmed(&self, explained: Explained, choices: &[Choice], most: u64) -> (Explained, u64) {
+        let mut replays = 0;
+        let mut confirm = |id: &Id, passing: Option<Passing>| {
+            let passing = passing.filter(|_| replays < most)?;
+            replays += 1;
+            let record = self.complete(Choices::recorded(&with_value(choices.to_vec(), id, passing.value)))?;
+            self.passes(&record).map(|others| Passing { others, ..passing })
         };
-        (record.status == RunStatus::Completed && same).then_some(record)
+        let mut influences = explained.influences;
+        for influence in &mut influences {
+            let (below, above) = (influence.passes.0.take(), influence.passes.1.take());
+            influence.passes = (confirm(&influence.id, below), confirm(&influence.id, above));
+        }
+        (Explained::of(influences), replays)
     }
 
     /// Whether an obstacle of the scene is in the way of the robot. Such a scene would fail for another reason.
@@ -208,36 +250,57 @@ impl Subject<'_> {
     }
 
     fn as_recorded(&self, list: &[Choice]) -> Tried {
-        let made = self.run(Choices::recorded(list)).map(|record| drop_rejected_tries(&record.choices));
-        Tried { made, simulations: 1 }
+        let result = match self.complete(Choices::recorded(list)) {
+            Some(record) if self.fails(&record) => TryResult::Fails(drop_rejected_tries(&record.choices)),
+            Some(record) => self.passes(&record).map_or(TryResult::Otherwise, TryResult::Passes),
+            None => TryResult::Otherwise,
+        };
+        Tried { result, simulations: 1 }
     }
 
     /// Runs the scene of a list with the noise of a repetition. The noise does not depend on the scene.
     fn repetition(&self, list: &[Choice], number: u32) -> Option<RunRecord> {
+        self.repeated(list, number).filter(|record| self.fails(record))
+    }
+
+    /// As [`Self::repetition`], whether the run fails or not.
+    fn repeated(&self, list: &[Choice], number: u32) -> Option<RunRecord> {
         let scene: Vec<Choice> = list.iter().filter(|choice| !choice.name.is_noise()).cloned().collect();
         // The campaign uses the streams from 0 up; these count down from the maximum.
-        self.run(Choices::partly_recorded(&scene, self.env.campaign.seed, u64::MAX - u64::from(number)))
+        self.complete(Choices::partly_recorded(&scene, self.env.campaign.seed, u64::MAX - u64::from(number)))
     }
 
     fn with_fresh_noise(&self, list: &[Choice]) -> Tried {
         let Some(Repeat { least, of }) = self.options.repeat else { return self.as_recorded(list) };
         let mut made = None;
         let (mut failures, mut simulations) = (0, 0);
+        let mut others: Option<BTreeSet<String>> = Some(BTreeSet::new());
         for number in 0..of {
             simulations += 1;
-            if let Some(record) = self.repetition(list, number) {
+            let record = self.repeated(list, number);
+            // It passes if all of its repetitions do.
+            others = others.and_then(|mut others| {
+                others.extend(self.passes(record.as_ref()?)?);
+                Some(others)
+            });
+            if let Some(record) = record.filter(|record| self.fails(record)) {
                 failures += 1;
                 made.get_or_insert(record.choices);
             }
             let left = of - number - 1;
-            if failures >= least || failures + left < least {
+            if failures >= least || (failures + left < least && others.is_none()) {
                 break;
             }
         }
         let scene = |made: Vec<Choice>| {
             drop_rejected_tries(&made).into_iter().filter(|choice| !choice.name.is_noise()).collect::<Vec<_>>()
         };
-        Tried { made: made.filter(|_| failures >= least).map(scene), simulations }
+        let result = match (made.filter(|_| failures >= least), others) {
+            (Some(made), _) => TryResult::Fails(scene(made)),
+            (None, Some(others)) => TryResult::Passes(others.into_iter().collect()),
+            (None, None) => TryResult::Otherwise,
+        };
+        Tried { result, simulations }
     }
 
     fn fresh_failures(&self, list: &[Choice]) -> (u32, u32) {

@@ -1,13 +1,15 @@
 //! Explains a failing list: the choices that matter, the failing range of each, and the nearest passing list.
 
 use crate::shrink::list::{ids, is_nominal, spread, with_value};
-use crate::shrink::{Id, ShrinkPlan, TrialSearch};
+use crate::shrink::{Id, ShrinkPlan, TrialSearch, TryResult};
 use actcheck_data::{Choice, ChoiceKind};
 
 /// Bisections between a failing and a passing value: the gap shrinks to an eighth.
 const HALVINGS: usize = 3;
 /// Noise is drawn within this many standard deviations of 0.
 const FARTHEST_SIGMAS: f64 = 4.0;
+/// Tried values have four decimals, as they are printed, wherever these are fine enough.
+const STEPS_PER_UNIT: f64 = 1e4;
 
 /// The influence of one choice with all others fixed.
 #[derive(Debug, Clone, PartialEq)]
@@ -16,12 +18,21 @@ pub struct Influence {
     pub id: Id,
     /// Its kind and its value in the failing list.
     pub choice: Choice,
-    /// Whether the list passes with the nominal value; `None` if limits ended the search first.
+    /// Whether the list no longer fails as required with the nominal value; `None` if limits ended the search first.
     pub matters: Option<bool>,
     /// The list fails at both of these values and at every tried value in between. In the unit of the choice.
     pub fails: (f64, f64),
-    /// The nearest passing values below and above; `None` if none was found.
-    pub passes: (Option<f64>, Option<f64>),
+    /// The nearest values below and above with which the list was tried and passed; `None` if none was found.
+    pub passes: (Option<Passing>, Option<Passing>),
+}
+
+/// A value with which a list was tried and passed.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Passing {
+    /// The value, exactly as it was tried.
+    pub value: f64,
+    /// Names of other properties that fail there, if only one property was asked for.
+    pub others: Vec<String>,
 }
 
 /// The nearest passing list, which differs in one choice.
@@ -30,7 +41,7 @@ pub struct Neighbour {
     /// The choice.
     pub id: Id,
     /// Its passing value.
-    pub value: f64,
+    pub passing: Passing,
     /// Distance from the failing value, as a share of the choice's spread.
     pub distance: f64,
 }
@@ -44,13 +55,15 @@ pub struct Explained {
     pub neighbour: Option<Neighbour>,
 }
 
-/// An interval between a failing value and a passing one, or the end of the choice's range.
+/// An interval between a value that fails as required and one that does not, or the end of the choice's range.
 struct Bracket {
     /// Position of the influence.
     of: usize,
     fails: f64,
-    /// `None` until the end was tried.
-    passes: Option<f64>,
+    /// The nearest value that does not fail as required; `None` until the end was tried.
+    beyond: Option<f64>,
+    /// The nearest value that passes. It may be farther than `beyond`, where the list fails in another way.
+    passes: Option<Passing>,
     end: f64,
     /// Whether the choice has values in between.
     continuous: bool,
@@ -79,18 +92,25 @@ pub fn explain(search: &mut TrialSearch<'_>, list: &[Choice], plan: &ShrinkPlan<
             .zip(&points)
             .map(|(at, point)| with_value(list.to_vec(), &influences[brackets[*at].of].id, *point))
             .collect();
-        for ((at, point), fails) in open.into_iter().zip(points).zip(search.each(&lists)) {
+        for ((at, point), result) in open.into_iter().zip(points).zip(search.each(&lists)) {
             let bracket = &mut brackets[at];
             let influence = &mut influences[bracket.of];
             if round == 0 && point == influence.choice.kind.nominal() {
-                influence.matters = fails.map(|fails| !fails);
+                influence.matters = result.as_ref().map(|result| !matches!(result, TryResult::Fails(_)));
             }
-            bracket.learn(point, fails);
+            bracket.learn(point, result);
         }
     }
     brackets.iter().for_each(|bracket| bracket.apply_to(&mut influences[bracket.of]));
-    let neighbour = neighbour(&influences);
-    Explained { influences, neighbour }
+    Explained::of(influences)
+}
+
+impl Explained {
+    /// Finds the nearest passing list among the influences.
+    pub(super) fn of(influences: Vec<Influence>) -> Self {
+        let neighbour = neighbour(&influences);
+        Self { influences, neighbour }
+    }
 }
 
 /// Brackets towards nominal come first, so that the influences are known before limits end the search; then those away
@@ -117,30 +137,43 @@ fn brackets(influences: &[Influence]) -> Vec<Bracket> {
             }
             ChoiceKind::Index { .. } | ChoiceKind::Candidate { .. } => return None,
         };
+        // Inwards, to a value that is printed as it is.
+        let steps = end * STEPS_PER_UNIT;
+        let inwards = if up { libm::floor(steps) } else { libm::ceil(steps) } / STEPS_PER_UNIT;
+        let beyond = if up { inwards > value } else { inwards < value };
+        let end = if beyond { inwards } else { end };
         (end != value).then_some((of, end))
     });
     let bracket = |(of, end): (usize, f64)| {
         let choice = &influences[of].choice;
         let continuous = !matches!(choice.kind, ChoiceKind::Index { .. } | ChoiceKind::Candidate { .. });
-        Bracket { of, fails: choice.value, passes: None, end, continuous, open: true }
+        Bracket { of, fails: choice.value, beyond: None, passes: None, end, continuous, open: true }
     };
     towards.chain(away).map(bracket).collect()
 }
 
 impl Bracket {
     fn next(&self) -> f64 {
-        self.passes.map_or(self.end, |passes| (self.fails + passes) / 2.0)
+        let Some(beyond) = self.beyond else { return self.end };
+        let middle = (self.fails + beyond) / 2.0;
+        let printed = libm::round(middle * STEPS_PER_UNIT) / STEPS_PER_UNIT;
+        let (low, high) = (self.fails.min(beyond), self.fails.max(beyond));
+        if low < printed && printed < high { printed } else { middle }
     }
 
-    fn learn(&mut self, point: f64, fails: Option<bool>) {
-        match fails {
-            Some(true) => {
+    fn learn(&mut self, point: f64, result: Option<TryResult>) {
+        match result {
+            Some(TryResult::Fails(_)) => {
                 self.fails = point;
                 // If the list fails at the end, there is no boundary to bisect.
-                self.open = self.continuous && self.passes.is_some();
+                self.open = self.continuous && self.beyond.is_some();
             }
-            Some(false) => {
-                self.passes = Some(point);
+            Some(TryResult::Passes(others)) => {
+                (self.beyond, self.passes) = (Some(point), Some(Passing { value: point, others }));
+                self.open = self.continuous;
+            }
+            Some(TryResult::Otherwise) => {
+                self.beyond = Some(point);
                 self.open = self.continuous;
             }
             None => self.open = false,
@@ -150,12 +183,10 @@ impl Bracket {
     fn apply_to(&self, influence: &mut Influence) {
         let (low, high) = influence.fails;
         influence.fails = (low.min(self.fails), high.max(self.fails));
-        if let Some(passes) = self.passes {
-            if passes < influence.choice.value {
-                influence.passes.0 = Some(passes)
-            } else {
-                influence.passes.1 = Some(passes)
-            }
+        if let Some(passing) = &self.passes {
+            let below = passing.value < influence.choice.value;
+            let side = if below { &mut influence.passes.0 } else { &mut influence.passes.1 };
+            *side = Some(passing.clone());
         }
     }
 }
@@ -163,10 +194,10 @@ impl Bracket {
 fn neighbour(influences: &[Influence]) -> Option<Neighbour> {
     let passing = influences.iter().flat_map(|influence| {
         let spread = spread(&influence.choice.kind);
-        [influence.passes.0, influence.passes.1].into_iter().flatten().map(move |value| Neighbour {
+        [&influence.passes.0, &influence.passes.1].into_iter().flatten().map(move |passing| Neighbour {
             id: influence.id.clone(),
-            value,
-            distance: (value - influence.choice.value).abs() / spread,
+            passing: passing.clone(),
+            distance: (passing.value - influence.choice.value).abs() / spread,
         })
     });
     passing.min_by(|a, b| a.distance.total_cmp(&b.distance))

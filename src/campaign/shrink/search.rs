@@ -11,10 +11,32 @@ use actcheck_data::{Choice, ChoiceName};
 /// The result of a try.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Tried {
-    /// The choices that the run made, without unused ones; `None` if it did not fail as required.
-    pub made: Option<Vec<Choice>>,
+    /// The result.
+    pub result: TryResult,
     /// Number of simulations.
     pub simulations: u64,
+}
+
+/// How a tried list ended. A list that does not fail as required does not pass for that reason alone: it may fail in
+/// another way, or not be a run at all.
+#[derive(Debug, Clone, PartialEq)]
+pub enum TryResult {
+    /// It failed as required; the choices that the run made, without unused ones.
+    Fails(Vec<Choice>),
+    /// It passed. The names of properties that failed although they are not asked for.
+    Passes(Vec<String>),
+    /// It failed in another way, broke, timed out, tested nothing, or its scene can't be built.
+    Otherwise,
+}
+
+impl TryResult {
+    /// Returns the choices of a run that failed as required.
+    pub fn made(self) -> Option<Vec<Choice>> {
+        match self {
+            Self::Fails(made) => Some(made),
+            Self::Passes(_) | Self::Otherwise => None,
+        }
+    }
 }
 
 /// Limits of a search.
@@ -68,7 +90,7 @@ impl<'a> TrialSearch<'a> {
                 return None;
             }
             for (at, list) in batch.iter().enumerate() {
-                if let Some(made) = self.count(list)? {
+                if let Some(made) = self.count(list)?.made() {
                     return Some((number * self.limits.jobs.max(1) + at, made));
                 }
             }
@@ -76,13 +98,13 @@ impl<'a> TrialSearch<'a> {
         None
     }
 
-    /// Returns for each list whether it fails; `None` for lists beyond the limits.
-    pub fn each(&mut self, lists: &[Vec<Choice>]) -> Vec<Option<bool>> {
+    /// Returns the result of each list; `None` for lists beyond the limits.
+    pub fn each(&mut self, lists: &[Vec<Choice>]) -> Vec<Option<TryResult>> {
         let mut answers = Vec::with_capacity(lists.len());
         for batch in lists.chunks(self.limits.jobs.max(1)) {
             let learned = self.learn(batch);
             for list in batch {
-                answers.push(if learned { self.count(list).map(|made| made.is_some()) } else { None });
+                answers.push(if learned { self.count(list) } else { None });
             }
         }
         answers
@@ -109,7 +131,7 @@ impl<'a> TrialSearch<'a> {
     }
 
     /// Returns the result of a known list and counts it. Returns `None` if the limit was reached before.
-    fn count(&mut self, list: &[Choice]) -> Option<Option<Vec<Choice>>> {
+    fn count(&mut self, list: &[Choice]) -> Option<TryResult> {
         let key = key(list);
         let tried = self.known.get(&key)?;
         if !self.counted.contains(&key) {
@@ -119,7 +141,7 @@ impl<'a> TrialSearch<'a> {
             self.simulations += tried.simulations;
             self.counted.insert(key);
         }
-        Some(tried.made.clone())
+        Some(tried.result.clone())
     }
 }
 

@@ -8,7 +8,8 @@ use super::versions::{Version, Versions};
 use super::{BisectArgs, By, LEVEL, text};
 use crate::output;
 use actcheck_analysis::{
-    Answer, Compared, ComparedRun, Likeness, OutcomeFlip, compare, like_by_outcomes, like_by_rates, outcome_flips,
+    Answer, Compared, ComparedRun, Likeness, OutcomeFlip, Sampling, compare, like_by_outcomes, like_by_rates,
+    outcome_flips,
 };
 use actcheck_base::{Diagnostic, Diagnostics, names};
 
@@ -40,7 +41,7 @@ impl<'a> Ends<'a> {
             let flips = if versions.finds_fix { outcome_flips(&bad, &good) } else { outcome_flips(&good, &bad) };
             let answer = match by {
                 By::Outcome => answer_of(&flips, versions.finds_fix),
-                By::Rate => compare(&good, &bad).answer(LEVEL, args.margin),
+                By::Rate => compare(&good, &bad, Sampling::Fixed).answer(LEVEL, args.margin),
             };
             let more = (scenes * 2).min(args.most_scenes);
             match answer {
@@ -59,7 +60,7 @@ impl<'a> Ends<'a> {
 
     /// The difference of the ends in words.
     fn difference(&self, good: &Runs, bad: &Runs) -> String {
-        let comparison = compare(good, bad);
+        let comparison = compare(good, bad, Sampling::Fixed);
         match self.by {
             By::Outcome => format!(
                 "{} in {}",
@@ -111,11 +112,11 @@ impl<'a> Ends<'a> {
                 let reason = if likeness == Likeness::Undecided {
                     format!("{} are too few to decide; see --most-scenes", text::count(runs.len(), "scene", "scenes"))
                 } else {
-                    let ends = compare(&good, &bad);
+                    let ends = compare(&good, &bad, Sampling::Fixed);
                     let worse = |of: &Compared| {
                         ends.lines.iter().any(|line| line.of == *of && line.answer(LEVEL, args.margin) == Answer::Worse)
                     };
-                    text::rates(&compare(&good, runs), |line| worse(&line.of))
+                    text::rates(&compare(&good, runs, Sampling::Fixed), |line| worse(&line.of))
                 };
                 Ok((likeness, reason))
             }
@@ -167,7 +168,7 @@ fn check_names(named: &[String], good: &Runs, bad: &Runs) -> Result<(), Diagnost
 /// The IRIs of judged properties.
 fn judged(runs: &Runs) -> impl Iterator<Item = &str> {
     runs.iter().flat_map(|run| run.outcomes().keys()).filter_map(|of| match of {
-        Compared::WholeRun => None,
+        Compared::WholeRun | Compared::Completion => None,
         Compared::Property { property, .. } => Some(property.as_str()),
     })
 }

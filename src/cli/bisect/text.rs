@@ -74,6 +74,7 @@ pub fn rates(comparison: &Comparison, is_shown: impl Fn(&ComparedLine) -> bool) 
 fn subject(of: &Compared) -> String {
     match of {
         Compared::WholeRun => "whole runs".to_owned(),
+        Compared::Completion => "completion".to_owned(),
         Compared::Property { action, property } => format!("{} {}", names::local(action), names::local(property)),
     }
 }

@@ -85,4 +85,22 @@ const CODES_O: &[Code] = &[
         "its name is misspelt, so that the statement has no effect: a property that is never judged, for example",
         "take the suggested name",
     ),
+    code(
+        "O015",
+        "something other than an action has success properties or preconditions",
+        "the name of the action is misspelt, or the action is not declared, so that the properties are never judged",
+        "take the suggested name, or declare the action; a class may have properties if an action is of that class",
+    ),
+    code(
+        "O016",
+        "no action has a property",
+        "the property is declared and has a rule, but no `act:successProperty` or `act:precondition` names it, so that it is never judged",
+        "state it of an action, such as `act:Pick act:successProperty act:MyProperty`, or remove it",
+    ),
+    code(
+        "O017",
+        "no ontology links a rule file",
+        "the file lies beside linked rule files, but neither `act:verifiedBy` nor `act:ruleLibrary` names it, so that it has no effect",
+        "link it with `act:verifiedBy` or `act:ruleLibrary`, or remove it",
+    ),
 ];

@@ -247,6 +247,12 @@ const CODES_R: &[Code] = &[
         "correct the interval, or leave it out: without one, an operator reaches to the end",
     ),
     code(
+        "R056",
+        "a property depends on the order of a contact's two sides",
+        "it reads one of `w:first` and `w:second` (or `w:firstLink` and `w:secondLink`) where the other may be meant: a contact has no order, and its two names are sorted",
+        "use `contact(?c, ?a, ?b)` or `self_contact(?c, ?a, ?b)`, in queries `w:between` or `w:betweenLinks`",
+    ),
+    code(
         "R060",
         "a SPARQL query has an error",
         "a syntax error, a designator outside the first group, or too much nesting",

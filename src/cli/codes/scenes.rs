@@ -57,10 +57,34 @@ const CODES_S: &[Code] = &[
         "name a program that performs it in `test_launcher`, or take the suggested name",
     ),
     code(
+        "S011",
+        "an action of a test has no such designator",
+        "the designator is misspelt, or it is the same for all actions of a scene",
+        "take the suggested name, or set candidates in the designator's table",
+    ),
+    code(
+        "S012",
+        "an action of a test can't have such a value",
+        "the object or place is misspelt, or no scene has it",
+        "take a value from the help",
+    ),
+    code(
         "S024",
         "the search strategy contradicts another option",
         "guided searches are biased towards failures, so a width or a part can't be requested",
         "remove the option, or use `strategy = \"random\"`",
+    ),
+    code(
+        "S025",
+        "the robot starts inside furniture, an object or the floor",
+        "its start, its home posture or its height does not fit the furniture",
+        "move the robot, change its `home` or `mount_height_m`, or choose other furniture",
+    ),
+    code(
+        "S026",
+        "the first action of a test is never performed",
+        "one of its preconditions does not hold at the start",
+        "let another action come first that makes it hold",
     ),
     code(
         "S030",

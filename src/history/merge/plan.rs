@@ -349,7 +349,8 @@ fn end_of_parts(group: &[&Found], best: &BTreeMap<u64, Copy<'_>>, missing: &[u64
         score_without_broken: mean(runs().filter(|run| run.row.status != RunStatus::Broken).map(|run| run.row.score)),
         outcomes: Outcome::ALL.into_iter().map(|outcome| (outcome, counts.get(outcome))).collect(),
         discards: runs().map(|run| run.discards).sum(),
-        ended_by: None,
+        // A part that failures ended makes the number of all runs depend on outcomes.
+        ended_by: group.iter().filter_map(|found| found.row.ended_by.clone()).find(|budget| budget == "failures"),
         interrupted: !missing.is_empty(),
     }))
 }

@@ -16,7 +16,7 @@ use actcheck_base::names;
 /// Properties whose values are nodes of the same run.
 const WITHIN_RUN: [&str; 3] = ["act:ofRun", "earl:subject", "earl:result"];
 /// Classes of nodes that are never in outlines.
-const OF_CAMPAIGNS: [&str; 2] = ["act:Campaign", "act:UsedRule"];
+const OF_CAMPAIGNS: [&str; 3] = ["act:Campaign", "act:UsedRule", "act:RuleFinding"];
 
 /// Whether the values of a property are nodes of the same run.
 pub(super) fn is_within_run(property: &str) -> bool {

@@ -188,6 +188,7 @@ fn report_of(action: &ActionDetail) -> &str {
         ("completed", Some(true)) => "reported success",
         ("completed", Some(false)) => "reported failure",
         ("completed", None) => "reported nothing",
+        ("inapplicable", _) => "not performed",
         (end, _) => end,
     }
 }
@@ -197,7 +198,7 @@ fn end(action: &ActionDetail) -> &'static str {
     match (action.end.as_str(), action.reported) {
         ("completed", Some(false)) => "failed",
         ("completed", _) => "passed",
-        ("untested", _) => "skipped",
+        ("untested" | "inapplicable", _) => "skipped",
         _ => "broken",
     }
 }

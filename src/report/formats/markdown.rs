@@ -5,9 +5,11 @@ use std::fmt::Write as _;
 
 use quick_xml::escape::partial_escape;
 
+use crate::{Proportion, RateBounds};
+use actcheck_analysis::Sampling;
 use actcheck_base::{Judgement, Outcome, names};
 use actcheck_history::{CampaignRow, RunDetail, RunStatus, SkillRecord};
-use actcheck_verdict::{Counts, wilson};
+use actcheck_verdict::Counts;
 
 /// Maximum number of failed runs that are listed; the rest are counted.
 const MOST_FAILURES: usize = 10;
@@ -26,6 +28,7 @@ pub struct MarkdownReport {
     failed_runs: u64,
     twins: u64,
     privileged: Vec<String>,
+    sampling: Sampling,
 }
 
 impl MarkdownReport {
@@ -34,10 +37,12 @@ impl MarkdownReport {
         Self::default()
     }
 
-    /// Records which campaigns had a skill program that received ground truth.
+    /// Records which campaigns had a skill program that received ground truth, and whether outcomes ended one.
     pub fn know(&mut self, campaigns: &[CampaignRow]) {
         let privileged = campaigns.iter().filter(|row| row.skill.as_ref().is_some_and(|skill| skill.privileged));
         self.privileged = privileged.map(|row| row.id.clone()).collect();
+        let of = campaigns.iter().map(|row| Sampling::of(row.ended_by.as_deref(), row.interrupted));
+        self.sampling = of.fold(Sampling::Fixed, Sampling::and);
     }
 
     /// Counts a run that a later run repeats bit for bit: it does not count otherwise.
@@ -107,7 +112,26 @@ pub fn markdown(report: &MarkdownReport) -> String {
     }
     if runs > 0 {
         let mean = report.scores.iter().sum::<f64>() / runs as f64;
-        let _ = writeln!(out, "\nT = {mean:.4}; runs in which everything passed: {}.", rate(report.passed_runs, runs));
+        let _ = writeln!(
+            out,
+            "\nT = {mean:.4}; runs in which everything passed: {}.",
+            rate(report.passed_runs, runs, report.sampling)
+        );
+        let lost: u64 =
+            report.statuses.iter().filter(|(status, _)| **status != RunStatus::Completed).map(|(_, n)| *n).sum();
+        let lost = lost.min(runs.saturating_sub(report.passed_runs + report.failed_runs));
+        if let Some(bounds) = RateBounds::new(report.passed_runs, runs - lost, lost, report.sampling) {
+            let _ = writeln!(
+                out,
+                "\n{lost} of {runs} runs were lost (broken or timed out): counted as failures, the rate is {}; counted as passes, {}.",
+                bounds.as_failures, bounds.as_passes
+            );
+        }
+    }
+    if report.sampling == Sampling::Stopped {
+        out.push_str(
+            "\nOutcomes ended a campaign: its shares are biased and left out; intervals are valid for that.\n",
+        );
     }
     for campaign in &report.privileged {
         let _ = writeln!(out, "\nIn {}, {}.", code(campaign), SkillRecord::PRIVILEGED);
@@ -121,7 +145,13 @@ pub fn markdown(report: &MarkdownReport) -> String {
     }
     for ((action, property), counts) in &report.properties {
         let decided = counts.decided();
-        let _ = write!(out, "| {} | {} | {} |", plain(action), plain(property), rate(counts.passed, decided));
+        let _ = write!(
+            out,
+            "| {} | {} | {} |",
+            plain(action),
+            plain(property),
+            rate(counts.passed, decided, report.sampling)
+        );
         Outcome::ALL.iter().for_each(|outcome| out.push_str(&format!(" {} |", counts.get(*outcome))));
         out.push('\n');
     }
@@ -168,11 +198,9 @@ fn failure(run: &RunDetail) -> String {
     out
 }
 
-fn rate(passed: u64, of: u64) -> String {
-    let Some(interval) = wilson(passed, of) else { return "nothing was decided".to_owned() };
-    let percent = |share: f64| format!("{:.0}", 100.0 * share);
-    let (rate, low, high) = (percent(interval.rate), percent(interval.low), percent(interval.high));
-    format!("{rate} % [{low}–{high}] ({passed} of {of})")
+fn rate(passed: u64, of: u64, sampling: Sampling) -> String {
+    Proportion::sampled(passed, of, sampling)
+        .map_or_else(|| "nothing was decided".to_owned(), |share| share.to_string())
 }
 
 fn listed<'a>(counts: impl IntoIterator<Item = (&'a str, u64)>) -> String {

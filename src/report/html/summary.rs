@@ -9,11 +9,11 @@ use crate::html::HtmlReport;
 use crate::html::columns::{Slot, Slots};
 use crate::html::pack::Pack;
 use crate::json::findings_with;
-use crate::scene_rule;
-use actcheck_analysis::{FailureMode, score_interval};
+use crate::{RateBounds, scene_rule};
+use actcheck_analysis::{FailureMode, Sampling, score_interval};
 use actcheck_base::{Outcome, names};
 use actcheck_history::{CampaignRow, SkillRecord};
-use actcheck_verdict::{mean, wilson};
+use actcheck_verdict::mean;
 
 /// Packs findings, campaigns and properties. Runs are referred to by index.
 pub(super) fn summary(report: &HtmlReport<'_>, slots: &Slots) -> String {
@@ -112,12 +112,20 @@ fn scores(report: &HtmlReport<'_>) -> Value {
     let modes = &report.findings.modes;
     let passed: u64 = modes.iter().filter(|mode| mode.failed.is_empty()).map(|mode| mode.runs.len() as u64).sum();
     let tested: u64 = modes.iter().map(|mode| mode.runs.len() as u64).sum();
+    let sampling = report.findings.sampling;
+    // Without the runs that failed before they were lost.
+    let lost = first.iter().filter(|row| status.get(**row) != Some("completed")).count() as u64;
+    let lost = lost.min((first.len() as u64).saturating_sub(tested));
+    let bounds = RateBounds::new(passed, first.len() as u64 - lost, lost, sampling);
     let mut statuses: BTreeMap<&str, u64> = BTreeMap::new();
     first.iter().filter_map(|row| status.get(*row)).for_each(|word| *statuses.entry(word).or_default() += 1);
     json!({
         "T": mean(first.iter().filter_map(of)), "T_interval": score_interval(first.iter().filter_map(of)),
         "without_broken": mean(whole.clone().filter_map(of)), "without_broken_interval": score_interval(whole.filter_map(of)),
-        "runs": first.len(), "all_passed": wilson(passed, tested), "passed": passed, "tested": tested,
+        "runs": first.len(), "all_passed": sampling.interval(passed, tested), "stopped": sampling == Sampling::Stopped,
+        "bounds": bounds.map(|bounds| json!({
+            "lost": bounds.lost, "as_failures": bounds.as_failures.interval, "as_passes": bounds.as_passes.interval,
+        })), "passed": passed, "tested": tested,
         "statuses": statuses, "twins": report.findings.twins,
     })
 }

@@ -4,7 +4,7 @@ use serde_json::{Value, json};
 
 use crate::CompareSummary;
 use crate::summary::compared_parts;
-use actcheck_analysis::{Answer, Compared, ComparedLine};
+use actcheck_analysis::{Answer, Compared, ComparedLine, Sampling};
 
 /// Returns the whole comparison as JSON.
 pub fn compare_json(summary: &CompareSummary) -> Value {
@@ -26,6 +26,7 @@ pub fn compare_json(summary: &CompareSummary) -> Value {
         "a": first,
         "b": second,
         "pairs": found.pairs,
+        "stopped_by_outcomes": found.sampling == Sampling::Stopped,
         "other_physics": found.other_physics,
         "only_in_a": found.alone[0],
         "only_in_b": found.alone[1],

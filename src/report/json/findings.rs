@@ -4,8 +4,8 @@ use serde_json::{Value, json};
 
 use crate::{Causes, FindingsSummary, PropertyReport};
 use actcheck_analysis::{
-    Cascade, Collisions, Condition, FailureMode, HitKind, Judged, Parameter, Pattern, PropertyFindings, Sector,
-    Strongest, TwoByTwo, TwoWay,
+    Cascade, Collisions, Condition, FailureMode, HitKind, Judged, Parameter, Pattern, PropertyFindings, Sampling,
+    Sector, Strongest, TwoByTwo, TwoWay,
 };
 
 /// Returns all findings as JSON.
@@ -18,7 +18,8 @@ pub fn findings_json(summary: &FindingsSummary) -> Value {
 pub(crate) fn findings_with(summary: &FindingsSummary, modes: Vec<Value>) -> Value {
     json!({
         "campaigns": summary.campaigns,
-        "runs": summary.runs, "twins": summary.twins, "sampled_runs": summary.sampled_runs,
+        "runs": summary.runs, "twins": summary.twins,
+        "stopped_by_outcomes": summary.sampling == Sampling::Stopped, "sampled_runs": summary.sampled_runs,
         "outcomes": summary.counts,
         "level": summary.level,
         "failure_modes": modes,

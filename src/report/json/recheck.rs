@@ -17,6 +17,8 @@ pub fn recheck_json(summary: &RecheckSummary) -> Value {
                 "changed": line.changed,
                 "new": line.new,
                 "restated": line.restated,
+                "vacuous": line.vacuous,
+                "held_before": line.held_before,
             })
         })
         .collect();

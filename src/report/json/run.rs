@@ -33,7 +33,7 @@ pub fn run_json(run: &RunDetail, perceived: &BTreeMap<u32, String>) -> Value {
                 "message": a.message, "perceived": perceived.get(&a.step), "duration_secs": a.duration_secs, "parameters": a.parameters,
                 "outcomes": a.judgements.iter().map(|j| json!({
                     "property": j.property, "outcome": j.outcome, "margin": j.margin, "witness": j.witness,
-                    "rule_digest": j.rule_digest, "held_before": j.held_before,
+                    "rule_digest": j.rule_digest, "held_before": j.held_before, "vacuous": j.vacuous,
                 })).collect::<Vec<_>>(),
             })
         })

@@ -2,7 +2,7 @@
 
 use serde_json::{Value, json};
 
-use crate::ShrunkSummary;
+use crate::{PassingValue, ShrunkSummary};
 
 /// Returns the shrunk run as JSON.
 pub fn shrunk_json(shrunk: &ShrunkSummary) -> Value {
@@ -12,7 +12,11 @@ pub fn shrunk_json(shrunk: &ShrunkSummary) -> Value {
         .map(|c| {
             json!({
                 "name": c.name, "value": c.value, "nominal": c.nominal, "unit": c.unit, "needed": c.matters,
-                "fails_from": c.fails.0, "fails_to": c.fails.1, "passes_below": c.passes.0, "passes_above": c.passes.1,
+                "fails_from": c.fails.0, "fails_to": c.fails.1,
+                "passes_below": c.passes.0.as_ref().map(|at| at.value),
+                "passes_above": c.passes.1.as_ref().map(|at| at.value),
+                "others_fail_below": c.passes.0.as_ref().map(|at| &at.others),
+                "others_fail_above": c.passes.1.as_ref().map(|at| &at.others),
             })
         })
         .collect();
@@ -28,7 +32,10 @@ pub fn shrunk_json(shrunk: &ShrunkSummary) -> Value {
         "minimal": shrunk.minimal, "simulations": shrunk.simulations, "explaining_simulations": shrunk.explaining,
         "fresh_noise": shrunk.fresh.map(|(failures, of)| json!({"failed": failures, "of": of})),
         "noise_kept": shrunk.noise_kept, "objects": objects, "choices": choices,
-        "nearest_passing": shrunk.neighbour.as_ref().map(|(name, value)| json!({"choice": name, "value": value})),
+        "passes_means": shrunk.property.as_deref().unwrap_or("everything"),
+        "nearest_passing": shrunk.neighbour.as_ref().map(|(name, PassingValue { value, others })| {
+            json!({"choice": name, "value": value, "others_fail": others})
+        }),
         "why": shrunk.why,
     })
 }

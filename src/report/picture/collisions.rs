@@ -4,7 +4,7 @@
 use crate::picture::drawing::{Drawing, Line, Paint, Rect, Style, Words};
 use crate::picture::{font, paint};
 use crate::{FindingsSummary, Proportion};
-use actcheck_analysis::{Collisions, PlacedThing};
+use actcheck_analysis::{Collisions, PlacedThing, Sampling};
 use actcheck_base::names;
 
 /// Width of a picture. Unit: pixels.
@@ -38,14 +38,15 @@ pub fn collisions_picture(findings: &FindingsSummary) -> Option<Drawing> {
     let mut top = GAP_PX;
     let with_places = findings.collisions.iter().filter(|of| of.things.iter().any(|thing| thing.force_n.is_some()));
     for of in with_places {
-        top = panel(&mut drawing, of, top) + GAP_PX;
+        top = panel(&mut drawing, of, findings.sampling, top) + GAP_PX;
     }
     drawing.height = top;
     (top > GAP_PX).then_some(drawing)
 }
 
-fn panel(drawing: &mut Drawing, of: &Collisions, top: f64) -> f64 {
-    let share = Proportion::new(of.hit, of.executions).map_or_else(String::new, |share| share.to_string());
+fn panel(drawing: &mut Drawing, of: &Collisions, sampling: Sampling, top: f64) -> f64 {
+    let share =
+        Proportion::sampled(of.hit, of.executions, sampling).map_or_else(String::new, |share| share.to_string());
     let title = format!("{}: collisions in {share}", names::local(&of.action));
     write(drawing, &title, [GAP_PX, top + TITLE_PX], TITLE_PX, true, paint::INK);
     let view = View::of(&of.things, Rect { left: GAP_PX, top: top + 26.0, width: PANEL_PX, height: PANEL_PX });

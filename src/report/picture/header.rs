@@ -70,6 +70,7 @@ fn what_was_done(action: &ActionDetail) -> String {
         (Some(true), _) => "reported success".to_owned(),
         (Some(false), Some(message)) => format!("reported failure: {message}"),
         (Some(false), None) => "reported failure".to_owned(),
+        (None, Some(reason)) if action.end == Outcome::Inapplicable.word() => format!("not performed: {reason}"),
         (None, _) => action.end.clone(),
     };
     let name = names::local(&action.action);

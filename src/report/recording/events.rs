@@ -58,6 +58,11 @@ fn actions(run: &RunDetail, trace: Option<&Trace>) -> Vec<Line> {
             lines.push(line(start, "WARN", "was not reached"));
             continue;
         }
+        if action.end == Outcome::Inapplicable.word() {
+            let reason = action.message.as_deref().unwrap_or_default();
+            lines.push(line(start, "WARN", &format!("was not performed: {reason}")));
+            continue;
+        }
         lines.push(line(start, "INFO", "begins"));
         let phases = trace.and_then(|trace| trace.actions.get(idx)).into_iter().flat_map(|action| &action.phases);
         lines.extend(phases.map(|phase| line(start + phase.start_secs, "DEBUG", &format!("· {}", phase.name))));

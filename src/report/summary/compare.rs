@@ -91,14 +91,16 @@ impl CompareSummary {
 pub(crate) fn compared_name(of: &Compared) -> String {
     match of {
         Compared::WholeRun => "whole run".to_owned(),
+        Compared::Completion => "run completes".to_owned(),
         Compared::Property { action, property } => format!("{} {}", names::local(action), names::local(property)),
     }
 }
 
-/// Action and property; `(None, None)` for whole runs.
+/// Action and property; `(None, None)` for whole runs, and no action for their completion.
 pub(crate) fn compared_parts(of: &Compared) -> (Option<String>, Option<String>) {
     match of {
         Compared::WholeRun => (None, None),
+        Compared::Completion => (None, Some("run completes".to_owned())),
         Compared::Property { action, property } => (Some(action.clone()), Some(property.clone())),
     }
 }

@@ -2,7 +2,7 @@
 
 use actcheck_analysis::{
     Cascade, Collisions, Condition, FailureMode, FlakyScene, Interval, Parameter, Pattern, PatternInput, Patterns,
-    PropertyFindings, Strongest, Trend, TwoWay,
+    PropertyFindings, Sampling, Strongest, Trend, TwoWay,
 };
 use actcheck_base::names;
 use actcheck_verdict::Counts;
@@ -22,6 +22,8 @@ pub struct FindingsSummary {
     pub runs: u64,
     /// Number of runs of the sample in which conditions and collisions were sought; `None` if that was all.
     pub sampled_runs: Option<u64>,
+    /// How the number of runs was decided: which intervals are valid, and whether rates are biased.
+    pub sampling: Sampling,
     /// Number of the runs that don't count because a later run is bit-identical.
     pub twins: u64,
     /// Outcome counts of the runs that count.

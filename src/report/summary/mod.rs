@@ -16,7 +16,7 @@ mod weighted;
 
 #[cfg(test)]
 pub(crate) use campaign::tests as campaign_samples;
-pub use campaign::{ActionSummary, CampaignSummary, EndedBy, PropertyLine, Proportion, RunSummary};
+pub use campaign::{ActionSummary, CampaignSummary, EndedBy, PropertyLine, Proportion, RateBounds, RunSummary};
 pub use case::CaseSummary;
 pub use compare::{CompareSummary, ComparedSide, SideChange};
 pub(crate) use compare::{compared_name, compared_parts};
@@ -29,5 +29,5 @@ pub(crate) use recheck::reason_text;
 pub use recheck::{ChangeReason, RecheckChange, RecheckLine, RecheckSummary};
 pub use remarks::{Oddity, Remark};
 pub use repeated::RepeatedProperty;
-pub use shrunk::{ShrunkChoice, ShrunkSummary};
+pub use shrunk::{PassingValue, ShrunkChoice, ShrunkSummary};
 pub use weighted::{GuidedSearch, WeightedLine};

@@ -47,6 +47,10 @@ pub struct RecheckLine {
     pub changed: u64,
     /// Unchanged outcomes with a different margin, witness or rule.
     pub restated: u64,
+    /// Outcomes that pass now because no left side of an `implies` held.
+    pub vacuous: u64,
+    /// Passed outcomes now whose property already held before the action.
+    pub held_before: u64,
 }
 
 /// The result of a recheck.
@@ -65,6 +69,8 @@ impl RecheckSummary {
     pub fn add(&mut self, recheck: &Recheck) {
         let line = self.properties.entry(recheck.now.property.clone()).or_default();
         line.now.add(recheck.now.outcome);
+        line.vacuous += u64::from(recheck.now.vacuous == Some(true));
+        line.held_before += u64::from(recheck.now.held_before == Some(true));
         let before = recheck.before.as_ref().map(|before| &before.judgement);
         if let Some(before) = before {
             line.before.add(before.outcome);

@@ -3,7 +3,6 @@
 use std::collections::BTreeMap;
 
 use crate::CampaignSummary;
-use actcheck_analysis::wilson;
 use actcheck_base::Outcome;
 
 /// Minimum number of judgements for a "never" remark: with 4 of 4, the lower bound of the interval is still near one
@@ -35,8 +34,12 @@ pub struct Remark {
 pub enum Oddity {
     /// It passed, but already held before the action.
     HeldBefore,
+    /// It passed, but no left side of its `implies` held.
+    Vacuous,
     /// It was decided often and never passed.
     NeverPassed,
+    /// It never applied.
+    NeverApplied,
     /// It was decided often and never failed.
     NeverFailed,
 }
@@ -46,7 +49,9 @@ impl Oddity {
     pub fn word(self) -> &'static str {
         match self {
             Self::HeldBefore => "held before",
+            Self::Vacuous => "vacuous",
             Self::NeverPassed => "never passed",
+            Self::NeverApplied => "never applied",
             Self::NeverFailed => "never failed",
         }
     }
@@ -57,10 +62,12 @@ impl CampaignSummary {
     pub fn remarks(&self) -> Vec<Remark> {
         let mut alike: BTreeMap<(Oddity, u64, u64), Vec<(String, String)>> = BTreeMap::new();
         for line in self.property_lines() {
-            let (counts, decided) = (line.counts, line.counts.decided());
+            let (counts, decided, all) = (line.counts, line.counts.decided(), line.counts.total());
             let odd = [
                 (Oddity::HeldBefore, line.held_before, counts.passed, line.held_before > 0),
+                (Oddity::Vacuous, line.vacuous, counts.passed, line.vacuous > 0),
                 (Oddity::NeverPassed, decided, decided, counts.passed == 0 && decided >= LEAST_FOR_NEVER),
+                (Oddity::NeverApplied, all, all, counts.inapplicable == all && all >= LEAST_FOR_NEVER),
                 (Oddity::NeverFailed, decided, decided, counts.failed == 0 && decided >= LEAST_FOR_NEVER),
             ];
             for (oddity, count, of, _) in odd.into_iter().filter(|(.., is)| *is) {
@@ -85,7 +92,9 @@ impl CampaignSummary {
             judgement.property == property
                 && match oddity {
                     Oddity::HeldBefore => judgement.held_before == Some(true),
+                    Oddity::Vacuous => judgement.vacuous == Some(true),
                     Oddity::NeverPassed => judgement.outcome == Outcome::Failed,
+                    Oddity::NeverApplied => judgement.outcome == Outcome::Inapplicable,
                     Oddity::NeverFailed => false,
                 }
         };
@@ -99,7 +108,7 @@ impl CampaignSummary {
         let labels: Vec<&str> = remark.properties.iter().map(|(_, label)| label.as_str()).collect();
         let names = labels.join(", ");
         // Upper bound of the rate of the outcome that never occurred.
-        let most = wilson(0, remark.of).map_or(100.0, |interval| interval.high * 100.0);
+        let most = self.sampling().interval(0, remark.of).map_or(100.0, |interval| interval.high * 100.0);
         let ask = match (&remark.run, labels.first()) {
             (Some(run), Some(label)) => format!("{} why {run} {label} --history {}", self.program, self.history),
             _ => String::new(),
@@ -110,9 +119,17 @@ impl CampaignSummary {
                 "{names} already held before the action in {count} of {of} passes, which say nothing about the action: \
                  compare `after` with `before` in the rule, or require it to be false beforehand ({ask})"
             ),
+            Oddity::Vacuous => format!(
+                "{names} passed vacuously in {count} of {of} passes: no left side of an `implies` held, so that no right side \
+                 was asked for; check whether it can hold, or run scenes in which it does ({ask})"
+            ),
             Oddity::NeverPassed => format!(
                 "{names} never passed in {of} judgements (so in at most {most:.0} % of such scenes): \
                  check its rule ({ask})"
+            ),
+            Oddity::NeverApplied => format!(
+                "{names} applied in none of {of} judgements: check `applicable` in its rule and the preconditions of its \
+                 action ({ask})"
             ),
             Oddity::NeverFailed if remark.warning => format!(
                 "{names} never failed in {of} judgements (so in at most {most:.0} % of such scenes): \
@@ -142,6 +159,14 @@ mod tests {
         });
         let summary = campaign(runs.collect());
         summary.remarks().iter().map(|r| (r.oddity, r.count, r.of, r.warning)).collect()
+    }
+
+    #[test]
+    fn a_property_that_never_applied_is_reported() {
+        use Outcome::{Inapplicable, Passed};
+        let never = |of| (Oddity::NeverApplied, of, of, true);
+        assert_eq!(kinds(6, [Inapplicable, Passed], None), [never(6), (Oddity::NeverFailed, 6, 6, false)]);
+        assert_eq!(kinds(4, [Inapplicable, Passed], None), []);
     }
 
     #[test]

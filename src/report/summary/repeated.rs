@@ -30,7 +30,7 @@ impl CampaignSummary {
             .map(|(iri, label)| RepeatedProperty {
                 property: iri.cloned(),
                 label: label.to_owned(),
-                found: consistency(&self.decided(iri.map(String::as_str))),
+                found: consistency(&self.decided(iri.map(String::as_str)), self.sampling()),
             })
             .collect()
     }
@@ -44,7 +44,7 @@ impl CampaignSummary {
     /// run once.
     pub(super) fn interval_of_alike(&self, property: Option<&str>) -> Option<Interval> {
         let is_alike = self.is_repeated() || self.scenes().iter().zip(0..).any(|(scene, place)| *scene != place);
-        if is_alike { consistency(&self.decided(property)).rate } else { None }
+        if is_alike { consistency(&self.decided(property), self.sampling()).rate } else { None }
     }
 
     /// The scene of each run: its number if scenes are repeated, else the position of the first run with the same trace.
@@ -61,7 +61,7 @@ impl CampaignSummary {
         scenes
     }
 
-    fn is_repeated(&self) -> bool {
+    pub(super) fn is_repeated(&self) -> bool {
         self.runs.iter().any(|run| run.repetition.is_some())
     }
 

@@ -23,8 +23,10 @@ pub struct ShrunkSummary {
     pub simulations: u64,
     /// Number of simulations for the explanation.
     pub explaining: u64,
+    /// The property that was shrunk for; `None` for all that failed. A value passes if it passes, or if everything does.
+    pub property: Option<String>,
     /// The nearest scene that passes: name and value of the choice that differs.
-    pub neighbour: Option<(String, f64)>,
+    pub neighbour: Option<(String, PassingValue)>,
     /// Number of failures with fresh noise, and number of repetitions.
     pub fresh: Option<(u32, u32)>,
     /// Whether the recorded noise had to be kept.
@@ -44,12 +46,22 @@ pub struct ShrunkChoice {
     pub nominal: f64,
     /// Unit of the values; empty for factors and for list indices.
     pub unit: &'static str,
-    /// Whether the run passes if only this choice is set to its nominal value. `None` if that was not tried.
+    /// Whether the run no longer fails in this way if only this choice is set to its nominal value. `None` if that was not
+    /// tried.
     pub matters: Option<bool>,
     /// Range of values with which the run fails.
     pub fails: (f64, f64),
-    /// Nearest values with which the run passes, below and above that range.
-    pub passes: (Option<f64>, Option<f64>),
+    /// Nearest values below and above that range with which the run was replayed and passes.
+    pub passes: (Option<PassingValue>, Option<PassingValue>),
+}
+
+/// A value with which a run was replayed and passes.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PassingValue {
+    /// The value.
+    pub value: f64,
+    /// Names of other properties that fail there; none unless a single property was shrunk for.
+    pub others: Vec<String>,
 }
 
 impl ShrunkSummary {

@@ -7,7 +7,8 @@ use comfy_table::{Attribute, Cell, Color, Table};
 use crate::text::repeated::repeated_text;
 use crate::text::weighted::weighted_text;
 use crate::text::{Page, by_action, command, fit, fitted, regressions_text, ruled};
-use crate::{CampaignSummary, PropertyLine, Proportion, RunSummary};
+use crate::{CampaignSummary, PropertyLine, Proportion, RateBounds, RunSummary};
+use actcheck_analysis::Sampling;
 use actcheck_base::{Outcome, names};
 use actcheck_history::SkillRecord;
 
@@ -165,7 +166,13 @@ fn properties_table(summary: &CampaignSummary) -> Table {
 }
 
 fn pass_rate(line: &PropertyLine) -> String {
-    line.rate.as_ref().map_or_else(|| "none decided".to_owned(), Proportion::to_string)
+    let rate = line.rate.as_ref().map_or_else(|| "none decided".to_owned(), Proportion::to_string);
+    let bounds = line.bounds.map_or_else(String::new, |bounds| {
+        let [low, high] = bounds.ends().map(|end| end * 100.0);
+        format!("; {low:.0} to {high:.0} % with {} lost", bounds.lost)
+    });
+    let vacuous = if line.vacuous > 0 { format!("; {} vacuously", line.vacuous) } else { String::new() };
+    rate + &bounds + &vacuous
 }
 
 fn scores(out: &mut String, summary: &CampaignSummary) {
@@ -186,6 +193,15 @@ fn scores(out: &mut String, summary: &CampaignSummary) {
     if let Some(rate) = summary.pass_rate() {
         let _ = writeln!(out, "runs in which everything passed: {}", rate);
     }
+    if let Some(RateBounds { lost, as_failures, as_passes }) = summary.pass_rate_bounds() {
+        let _ = writeln!(
+            out,
+            "warning: {lost} of {} runs were lost (broken or timed out), perhaps because they would have failed: counted as \
+             failures, the rate is {as_failures}; counted as passes, {as_passes}",
+            summary.runs.len()
+        );
+    }
+    out.push_str(sampling_note(summary));
     if let Some(ended) = &summary.ended_by {
         let _ = writeln!(
             out,
@@ -206,19 +222,36 @@ fn scores(out: &mut String, summary: &CampaignSummary) {
     let _ = writeln!(out, "campaign {} in {}", summary.campaign, summary.history);
 }
 
+/// Says which rates and intervals are printed if outcomes ended the campaign.
+fn sampling_note(summary: &CampaignSummary) -> &'static str {
+    match (summary.sampling(), summary.ended_at_failures()) {
+        (Sampling::Fixed, _) => "",
+        (Sampling::Stopped, Some(1)) => {
+            "note: the first failure ended the campaign, so no rate can be estimated; the intervals are valid for that\n"
+        }
+        (Sampling::Stopped, Some(_)) => {
+            "note: failures ended the campaign: rates leave out the last one, which would bias them, and intervals are valid \
+             for that\n"
+        }
+        (Sampling::Stopped, None) => {
+            "note: the campaign was stopped: intervals are wider, so that they are valid whenever one stops\n"
+        }
+    }
+}
+
 /// Writes which properties fail together, and how often.
 fn failure_modes(out: &mut String, summary: &CampaignSummary) {
     let modes = summary.failure_modes.iter().filter(|mode| !mode.failed.is_empty());
     for mode in modes {
         let failed: Vec<&str> = mode.failed.iter().map(|iri| names::local(iri)).collect();
         let example = mode.runs.first().map_or("", String::as_str);
-        let (rate, low, high) = (mode.share.rate * 100.0, mode.share.low * 100.0, mode.share.high * 100.0);
-        let _ = writeln!(
-            out,
-            "  {rate:.0} % [{low:.0}–{high:.0}] of the runs ({}, such as {example}) fail {}",
-            mode.runs.len(),
-            failed.join(" + ")
-        );
+        let (low, high) = (mode.share.low * 100.0, mode.share.high * 100.0);
+        let share = match summary.mode_share(mode).rate {
+            Some(rate) => format!("{:.0} % [{low:.0}–{high:.0}]", rate * 100.0),
+            None => format!("[{low:.0}–{high:.0} %]"),
+        };
+        let _ =
+            writeln!(out, "  {share} of the runs ({}, such as {example}) fail {}", mode.runs.len(), failed.join(" + "));
     }
 }
 

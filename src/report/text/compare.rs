@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use crate::summary::compared_name;
 use crate::text::{Page, fitted, ruled};
 use crate::{CompareSummary, ComparedSide};
-use actcheck_analysis::{Answer, ComparedLine, PairedTable};
+use actcheck_analysis::{Answer, Compared, ComparedLine, PairedTable, Sampling};
 use actcheck_base::Outcome;
 use actcheck_verdict::Counts;
 
@@ -106,12 +106,17 @@ fn lines(out: &mut String, summary: &CompareSummary, page: Page) {
             probability(line.two_sided_adjusted),
         ]);
     }
-    let _ = writeln!(
-        out,
-        "{}\np: McNemar's exact test, two-sided; corrected: for {} lines, by Holm. [95 %]: Tango's score interval",
-        fitted(table, page, &["p", "only A", "only B", "p corrected"]),
-        summary.comparison.lines.len()
-    );
+    let lines = summary.comparison.lines.len();
+    let table = fitted(table, page, &["p", "only A", "only B", "p corrected"]);
+    let how = match summary.comparison.sampling {
+        Sampling::Fixed => format!(
+            "p: McNemar's exact test, two-sided; corrected: for {lines} lines, by Holm. [95 %]: Tango's score interval"
+        ),
+        Sampling::Stopped => format!(
+            "outcomes ended one of the campaigns, so p and [95 %] are valid whenever runs end; corrected: for {lines} lines, by Holm"
+        ),
+    };
+    let _ = writeln!(out, "{table}\n{how}");
 }
 
 fn difference(line: &ComparedLine) -> String {
@@ -195,7 +200,13 @@ fn verdict(out: &mut String, summary: &CompareSummary) {
     }
     let _ = writeln!(out, "\nB is worse {how}:");
     for line in worse {
-        let _ = writeln!(out, "  {}: p = {}", compared_name(&line.of), probability(line.second_worse_adjusted));
+        let lost = |passed: u64| line.table.pairs() - passed;
+        let why = match (&line.of, line.table.passed().map(lost)) {
+            (Compared::Completion, [a, b]) => format!(": {b} runs are broken or timed out, {a} in A"),
+            _ => String::new(),
+        };
+        let p = probability(line.second_worse_adjusted);
+        let _ = writeln!(out, "  {}: p = {p}{why}", compared_name(&line.of));
     }
 }
 

@@ -6,7 +6,7 @@ use crate::summary::percent;
 use crate::text::collisions::{collisions, shade};
 use crate::text::{Page, command, fitted, ruled, scene_rule};
 use crate::{Causes, FindingsSummary, PropertyReport, Proportion};
-use actcheck_analysis::{Judged, Pattern, TwoWay, TwoWayCell};
+use actcheck_analysis::{Judged, Pattern, Sampling, TwoWay, TwoWayCell};
 use actcheck_base::{Outcome, names};
 use actcheck_verdict::Counts;
 
@@ -23,6 +23,12 @@ pub fn findings_text(summary: &FindingsSummary, page: Page) -> String {
     let _ = writeln!(out, "{} runs of {} campaign{plural} ({campaigns})", summary.runs, summary.campaigns.len());
     if summary.twins > 0 {
         let _ = writeln!(out, "{}", twins_line(summary.twins));
+    }
+    if summary.sampling == Sampling::Stopped {
+        let _ = writeln!(
+            out,
+            "outcomes ended a campaign (--max-failures, or an interrupt): shares are biased, and intervals are valid for that"
+        );
     }
     let _ = writeln!(out, "{} outcomes: {}", summary.counts.total(), counts(summary.counts));
     if let Some(sampled) = summary.sampled_runs {
@@ -109,7 +115,7 @@ fn cascades(out: &mut String, summary: &FindingsSummary) {
 fn property(out: &mut String, report: &PropertyReport, summary: &FindingsSummary, page: Page) {
     let found = &report.findings;
     let _ = write!(out, "\n{} ({}): ", report.name(), names::local(&found.action));
-    match Proportion::new(found.counts.failed, found.counts.decided()) {
+    match Proportion::sampled(found.counts.failed, found.counts.decided(), summary.sampling) {
         Some(share) => {
             let _ = writeln!(out, "fails in {share}");
         }

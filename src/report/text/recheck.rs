@@ -20,15 +20,21 @@ pub fn recheck_text(summary: &RecheckSummary, page: Page) -> String {
         table.add_row([
             names::local(iri).to_owned(),
             counted(line.before),
-            counted(line.now),
+            with_vacuous(counted(line.now), line.vacuous),
             line.changed.to_string(),
             line.new.to_string(),
         ]);
     }
     let restated: u64 = summary.properties.values().map(|line| line.restated).sum();
     let _ = writeln!(out, "{}\n{}", fitted(table, page, &["new"]), totals(summary, restated));
+    held_before(&mut out, summary);
     changes(&mut out, summary);
     page.set(&out)
+}
+
+/// Adds how many passes say nothing.
+fn with_vacuous(counts: String, vacuous: u64) -> String {
+    if vacuous > 0 { format!("{counts}; {vacuous} vacuously") } else { counts }
 }
 
 fn totals(summary: &RecheckSummary, restated: u64) -> String {
@@ -39,6 +45,19 @@ fn totals(summary: &RecheckSummary, restated: u64) -> String {
         let _ = write!(text, ", {restated} unchanged with a different rule, margin or witness");
     }
     text
+}
+
+/// Names the properties that already held before actions that passed them: such passes say nothing about the action.
+fn held_before(out: &mut String, summary: &RecheckSummary) {
+    for (iri, line) in summary.properties.iter().filter(|(_, line)| line.held_before > 0) {
+        let _ = writeln!(
+            out,
+            "{} already held before the action in {} of {} passes, which say nothing about the action",
+            names::local(iri),
+            line.held_before,
+            line.now.passed
+        );
+    }
 }
 
 fn runs(count: u64) -> String {

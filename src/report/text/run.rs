@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
 use crate::text::{Page, fitted, ruled};
-use actcheck_base::names;
+use actcheck_base::{Outcome, names};
 use actcheck_history::{ActionDetail, ObjectDetail, Repetition, RunDetail};
 
 /// Formats a run: its scene, the reports of its actions, and every outcome with margin and witness.
@@ -44,7 +44,7 @@ pub fn run_text(run: &RunDetail, perceived: &BTreeMap<u32, String>, page: Page) 
     out.push('\n');
     scene(&mut out, run, page);
     for action in &run.actions {
-        action_text(&mut out, action, page);
+        action_text(&mut out, action, &own_values(action, run), page);
         if let Some(sentence) = perceived.get(&action.step) {
             let _ = writeln!(out, "{sentence}");
         }
@@ -92,16 +92,27 @@ fn object_row(object: &ObjectDetail) -> Vec<String> {
     ]
 }
 
-fn action_text(out: &mut String, action: &ActionDetail, page: Page) {
+/// The designators that have other values in an action than in the scene, as ` with pickObject = can_1`.
+fn own_values(action: &ActionDetail, run: &RunDetail) -> String {
+    let own = action
+        .parameters
+        .iter()
+        .filter(|(name, values)| run.designators.get(*name).is_some_and(|of_scene| of_scene != *values));
+    let own: Vec<String> = own.map(|(name, values)| format!("{name} = {}", values.join(", "))).collect();
+    if own.is_empty() { String::new() } else { format!(" with {}", own.join("; ")) }
+}
+
+fn action_text(out: &mut String, action: &ActionDetail, own_values: &str, page: Page) {
     let reported = match action.reported {
         Some(true) => "reported success",
         Some(false) => "reported failure",
         None => "reported nothing",
     };
     let message = action.message.as_deref().map_or_else(String::new, |message| format!(": {message}"));
+    let reported = if action.end == Outcome::Inapplicable.word() { "not performed" } else { reported };
     let _ = writeln!(
         out,
-        "\n{}. {}: {}, {:.1} s simulated, A = {:.2}, {reported}{message}",
+        "\n{}. {}{own_values}: {}, {:.1} s simulated, A = {:.2}, {reported}{message}",
         action.step,
         names::local(&action.action),
         action.end,
@@ -114,8 +125,9 @@ fn action_text(out: &mut String, action: &ActionDetail, page: Page) {
         let margin = judgement.margin.map_or_else(String::new, |margin| format!("{margin:+.4}"));
         table.add_row([
             names::local(&judgement.property).to_owned(),
-            match judgement.held_before {
-                Some(true) => format!("{}, held before", judgement.outcome),
+            match (judgement.held_before, judgement.vacuous) {
+                (Some(true), _) => format!("{}, held before", judgement.outcome),
+                (_, Some(true)) => format!("{}, vacuously", judgement.outcome),
                 _ => judgement.outcome.word().to_owned(),
             },
             margin,

@@ -2,8 +2,8 @@
 
 use std::fmt::Write as _;
 
-use crate::ShrunkSummary;
 use crate::text::{Page, fitted, ruled};
+use crate::{PassingValue, ShrunkChoice, ShrunkSummary};
 use actcheck_base::names;
 
 /// Formats the shrunk scene, the choices that matter, and why it fails.
@@ -34,21 +34,44 @@ pub fn shrunk_text(shrunk: &ShrunkSummary, page: Page) -> String {
         let _ = writeln!(out, "it fails with every choice at its nominal value");
     } else {
         let _ = write!(out, "\n{}", choice_table(shrunk, page));
-    }
-    if let Some((name, value)) = &shrunk.neighbour
-        && let Some(choice) = shrunk.choices.iter().find(|choice| choice.name == *name)
-    {
-        let _ = writeln!(
-            out,
-            "nearest scene that passes: {name} = {} instead of {}",
-            with_unit(*value, choice.unit),
-            with_unit(choice.value, choice.unit)
-        );
+        passing(&mut out, shrunk);
     }
     for why in &shrunk.why {
         let _ = write!(out, "\n{why}");
     }
     page.set(&out)
+}
+
+/// Writes the meaning of a pass, and the nearest scene that passes.
+fn passing(out: &mut String, shrunk: &ShrunkSummary) {
+    let passes = shrunk.property.as_deref().map_or("everything", names::local);
+    let _ = writeln!(out, "passes at: with this value alone changed, the run was repeated and {passes} passed");
+    for choice in &shrunk.choices {
+        for PassingValue { value, others } in passes_of(choice).filter(|at| !at.others.is_empty()) {
+            let value = with_unit(*value, choice.unit);
+            let _ = writeln!(out, "at {} = {value}, {} fails there", choice.name, others.join(" + "));
+        }
+    }
+    match &shrunk.neighbour {
+        Some((name, at)) => {
+            let choice = shrunk.choices.iter().find(|choice| choice.name == *name);
+            let unit = choice.map_or("", |choice| choice.unit);
+            let instead = choice.map_or_else(String::new, |choice| with_unit(choice.value, unit));
+            let value = with_unit(at.value, unit);
+            let _ = writeln!(out, "nearest scene that passes: {name} = {value} instead of {instead}");
+        }
+        None => {
+            let _ = writeln!(
+                out,
+                "no scene that passes was found by changing one of these within the trials: where the run no longer \
+                 fails like this, it fails in another way or does not complete"
+            );
+        }
+    }
+}
+
+fn passes_of(choice: &ShrunkChoice) -> impl Iterator<Item = &PassingValue> {
+    [&choice.passes.0, &choice.passes.1].into_iter().flatten()
 }
 
 fn scene_table(shrunk: &ShrunkSummary, page: Page) -> String {
@@ -72,22 +95,27 @@ fn choice_table(shrunk: &ShrunkSummary, page: Page) -> String {
     table.set_header(["choice", "value", "nominal", "needed", "fails from … to", "passes at"]);
     for choice in &shrunk.choices {
         let (low, high) = choice.fails;
-        let passes: Vec<String> = [choice.passes.0, choice.passes.1].into_iter().flatten().map(number).collect();
+        let passes: Vec<String> = passes_of(choice).map(|at| number(at.value)).collect();
         table.add_row([
             choice.name.clone(),
             with_unit(choice.value, choice.unit),
             number(choice.nominal),
             choice.matters.map_or("not tried", |matters| if matters { "yes" } else { "no" }).to_owned(),
             format!("{} … {}", number(low), number(high)),
-            passes.join(", "),
+            if passes.is_empty() { "none found".to_owned() } else { passes.join(", ") },
         ]);
     }
     fitted(table, page, &["passes at", "nominal", "needed"])
 }
 
+/// Writes a number with up to four decimals, or with all of them if it is not exactly such a number: the value that is
+/// printed is the one that was tried.
 fn number(value: f64) -> String {
     // Adding 0 turns negative zero into zero.
     let text = format!("{:.4}", value + 0.0);
+    if text.parse::<f64>() != Ok(value + 0.0) {
+        return (value + 0.0).to_string();
+    }
     let text = text.trim_end_matches('0').trim_end_matches('.');
     if text == "-0" { "0".to_owned() } else { text.to_owned() }
 }

@@ -95,6 +95,8 @@ pub(crate) enum JudgeRules {
         reads_course: bool,
         /// Whether its rules read holds or motions.
         reads_intervals: bool,
+        /// Whether its pass may depend on the right side of an `implies`.
+        implies: bool,
         /// Scope of the file's predicates.
         scope: Scope,
         /// Prefixes that the file declares.
@@ -126,6 +128,16 @@ impl RuleBook {
         properties: &[String],
         budget: &Budget,
     ) -> BTreeMap<String, Result<Findings, RuleFault>> {
+        self.judge_as(facts, properties, budget, false)
+    }
+
+    fn judge_as(
+        &self,
+        facts: &ActionFacts<'_>,
+        properties: &[String],
+        budget: &Budget,
+        fails_consequents: bool,
+    ) -> BTreeMap<String, Result<Findings, RuleFault>> {
         let mut universe = Universe::of_action(&self.terms, facts);
         let derived = match self.enriched(facts, &mut universe, budget) {
             Ok(derived) => derived,
@@ -146,7 +158,7 @@ impl RuleBook {
                 }
                 None => Err(RuleFault::Value(format!("unknown property {iri}"))),
                 Some(Judge { rules: JudgeRules::Datalog { planned, verdict, reads_course, .. }, .. }) => {
-                    self.datalog((planned, verdict, *reads_course), &derived, &mut universe, budget)
+                    self.datalog((planned, verdict, *reads_course), &derived, &mut universe, budget, fails_consequents)
                 }
                 #[cfg(feature = "sparql")]
                 Some(Judge { rules: JudgeRules::Sparql(query), .. }) => {
@@ -170,6 +182,26 @@ impl RuleBook {
     ) -> BTreeMap<String, Result<Findings, RuleFault>> {
         let unchanged = ActionFacts { after: facts.before, during: &[], course: None, ..*facts };
         self.judge(&unchanged, properties, budget)
+    }
+
+    /// Judges an action as if the right side `b` of every `a implies b` were false. A property that still holds passed
+    /// vacuously: no `a` held where it matters, so that no `b` was asked for.
+    ///
+    /// Only right sides count that make the property harder to pass. [`RuleBook::can_pass_vacuously`] names them
+    /// properties have one.
+    pub fn without_consequents(
+        &self,
+        facts: &ActionFacts<'_>,
+        properties: &[String],
+        budget: &Budget,
+    ) -> BTreeMap<String, Result<Findings, RuleFault>> {
+        self.judge_as(facts, properties, budget, true)
+    }
+
+    /// Returns whether a property has an `implies` whose left side may never hold while the property passes.
+    pub fn can_pass_vacuously(&self, property: &str) -> bool {
+        let rules = self.properties.get(property).map(|judge| &judge.rules);
+        matches!(rules, Some(JudgeRules::Datalog { implies: true, .. }))
     }
 
     /// Returns whether a property requires a result (`success`, `ASK`); otherwise it forbids an event (`violation`,
@@ -198,7 +230,7 @@ impl RuleBook {
         self.reads_course
     }
 
-    /// Returns the warnings about the rules.
+    /// Returns the warnings about the rules, after those of their ontology.
     pub fn warnings(&self) -> &Diagnostics {
         &self.warnings
     }
@@ -229,12 +261,16 @@ impl RuleBook {
         derived: &Tables,
         universe: &mut Universe<'_>,
         budget: &Budget,
+        fails_consequents: bool,
     ) -> Result<Findings, RuleFault> {
         if reads_course && universe.course().is_none() {
             return Err(RuleFault::Value(UNRECORDED.to_owned()));
         }
         let mut layers = Layers { own: Tables::default(), below: vec![derived, &self.fixed] };
         let mut meter = Meter::new(budget);
+        if fails_consequents {
+            meter.watch.fail_consequents();
+        }
         evaluate(planned, &self.predicates, &self.indexes, &mut layers, universe, &mut meter)
             .map_err(|stopped| fault(&meter, stopped, planned))?;
         findings(verdict, &layers, universe)

@@ -11,6 +11,7 @@ use crate::book::parts::{extend, gather_state, gathers_state, needed, split_fixe
 use crate::check::checking::{Checking, Role, unique, used_names};
 use crate::check::formulas::{self, Bound};
 use crate::check::ranges::Ranges;
+use crate::check::sides::Sides;
 use crate::check::stratify::stratify;
 use crate::check::termination::warnings;
 use crate::check::unchanging::{self, Reads};
@@ -25,9 +26,9 @@ use crate::model::given::Phases;
 use crate::model::program::{Predicates, Program, Rule};
 use crate::model::universe::Universe;
 #[cfg(feature = "sparql")]
-use crate::sparql::{dataset::Statements, query::Query};
+use crate::sparql::{dataset::Statements, query::Query, unchanging::is_unchanging};
 use crate::syntax::{Syntax, parse};
-use crate::temporal::{IntervalTerms, add_margin, add_moment, define_moment, reads_course};
+use crate::temporal::{IntervalTerms, add_margin, add_moment, define_moment, mark_consequents, reads_course};
 use actcheck_base::{Diagnostic, Diagnostics, Digest, Term, TermId, Terms};
 use actcheck_ontology::{Ontology, Property, RuleLanguage};
 
@@ -78,6 +79,7 @@ impl Preparing {
     }
 
     pub(crate) fn run(mut self, ontology: &Ontology) -> Result<RuleBook, Diagnostics> {
+        self.diagnostics.extend(ontology.warnings.clone());
         let phases = Phases::intern(&mut self.terms);
         let (libraries, properties) = self.parse(ontology);
         let vocabulary = Some(&ontology.vocabulary).filter(|vocabulary| !vocabulary.terms.is_empty());
@@ -110,6 +112,7 @@ impl Preparing {
         self.types_and_units(ontology, &library, &programs, &properties, &predicates);
         if split {
             self.unchanging(ontology, &library, &programs, &properties, (&predicates, phases));
+            self.one_sided(&library, &programs, &properties, &predicates);
         }
         if split {
             library.rules.extend(gather_state(&mut predicates));
@@ -182,8 +185,9 @@ impl Preparing {
         let any_reads_course = programs.values().any(program_reads_course);
         let mut properties = self.queries(ontology);
         for (scope, property, syntax) in syntaxes {
-            let program = programs.remove(scope).unwrap_or_default();
+            let mut program = programs.remove(scope).unwrap_or_default();
             let verdict = Verdict::new(&program, &predicates, *scope);
+            let implies = verdict.decisive.as_ref().is_some_and(|decisive| mark_consequents(&mut program, decisive));
             let reads_course = program_reads_course(&program);
             let reads_intervals = program.rules.iter().any(reads_intervals);
             let planned = Box::new(self.plan(program, &predicates, &mut indexes));
@@ -192,6 +196,7 @@ impl Preparing {
                 verdict,
                 reads_course,
                 reads_intervals,
+                implies,
                 scope: *scope,
                 prefixes: syntax.prefixes.clone(),
             };
@@ -272,6 +277,22 @@ impl Preparing {
         }
     }
 
+    /// Warns of properties that depend on the order of a contact's two sides.
+    fn one_sided(
+        &mut self,
+        library: &Program,
+        programs: &BTreeMap<usize, Program>,
+        properties: &[(usize, &Property, Syntax)],
+        predicates: &Predicates,
+    ) {
+        let Some(sides) = Sides::new(library, predicates, &self.terms) else { return };
+        for (scope, _, syntax) in properties {
+            if let Some(program) = programs.get(scope).filter(|_| syntax.whole) {
+                self.diagnostics.extend(sides.one_sided(program, *scope).map(Into::into).unwrap_or_default());
+            }
+        }
+    }
+
     /// Returns the ontology's statements with their OWL 2 RL closure.
     fn closed(&mut self, ontology: &Ontology) -> Vec<[TermId; 3]> {
         // Without statements, only the axioms of OWL itself follow.
@@ -298,7 +319,13 @@ impl Preparing {
         let mut judges = BTreeMap::new();
         for property in ontology.properties.values().filter(|p| p.rule.language == RuleLanguage::Sparql) {
             match Query::prepare(&property.rule.source, ontology, &self.derived) {
-                Ok(query) => {
+                Ok(mut query) => {
+                    if is_unchanging(&property.rule.source.text) {
+                        let (source, start) = (&property.rule.source, query.start(&property.rule.source.text));
+                        let found = unchanging::warning(ontology, property, source, start);
+                        self.diagnostics.extend(found.map(Into::into).unwrap_or_default());
+                    }
+                    self.diagnostics.extend(std::mem::take(&mut query.warnings));
                     let rules = JudgeRules::Sparql(Box::new(query));
                     judges.insert(property.iri.clone(), judge(ontology, property, rules));
                 }

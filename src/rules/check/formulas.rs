@@ -15,16 +15,18 @@ const SAMPLES_PER_SEC: f64 = 60.0;
 const ROUNDING: f64 = 1e-6;
 
 /// Quantities of the world vocabulary that are never negative.
-const NEVER_NEGATIVE: [&str; 12] = [
+const NEVER_NEGATIVE: [&str; 14] = [
     "tilt",
     "speed",
     "angularSpeed",
     "acceleration",
+    "acceleration2d",
     "jerk",
     "displacement",
     "pathLength",
     "distance",
     "distance2d",
+    "gap",
     "relativeSpeed",
     "contactForce",
     "time",
@@ -97,6 +99,14 @@ pub(crate) fn formulas(rule: &Rule) -> impl Iterator<Item = &Formula> {
     })
 }
 
+/// Returns the formulas of a rule's conditions, to be changed.
+pub(crate) fn formulas_mut(rule: &mut Rule) -> impl Iterator<Item = &mut Formula> {
+    rule.body.iter_mut().flat_map(|literal| match literal {
+        Literal::Test { value: Expr::Timed(timed), .. } => timed.formulas_mut(),
+        _ => &mut [],
+    })
+}
+
 /// Returns the fault of a formula itself, without those of its parts.
 fn fault_of(formula: &Formula) -> Option<(Diagnostic, Span)> {
     match formula {
@@ -124,7 +134,7 @@ fn fault_of(formula: &Formula) -> Option<(Diagnostic, Span)> {
             let message = "the interval contains no sample";
             (last < first).then(|| (Diagnostic::warning("R055", message).help(help), span.clone()))
         }
-        Formula::Truth { .. } | Formula::Not(_) => None,
+        Formula::Truth { .. } | Formula::Not(_) | Formula::Consequent { .. } => None,
     }
 }
 
@@ -189,6 +199,7 @@ fn exclusive(parts: &[Formula]) -> Option<Span> {
 fn conjuncts<'f>(formula: &'f Formula, negated: bool, found: &mut Vec<(&'f Formula, bool)>) {
     match formula {
         Formula::Not(inner) => conjuncts(inner, !negated, found),
+        Formula::Consequent { formula, .. } => conjuncts(formula, negated, found),
         Formula::And(parts) if !negated => parts.iter().for_each(|part| conjuncts(part, negated, found)),
         Formula::Or(parts) if negated => parts.iter().for_each(|part| conjuncts(part, negated, found)),
         Formula::Compare { .. } if compared(formula).is_none() => {}

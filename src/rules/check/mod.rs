@@ -11,6 +11,7 @@ pub(crate) mod options;
 mod predicates;
 pub(crate) mod ranges;
 mod safety;
+pub(crate) mod sides;
 pub(crate) mod stratify;
 mod temporal;
 pub(crate) mod termination;

@@ -40,7 +40,8 @@ impl Translation<'_, '_> {
             FormulaKind::Or(parts) => Formula::Or(self.all_checked(parts)?),
             FormulaKind::Implies(left, right) => {
                 let (left, right) = (self.checked(left), self.checked(right));
-                Formula::Or(vec![Formula::Not(Box::new(left?)), right?])
+                let consequent = Formula::Consequent { formula: Box::new(right?), needed: false };
+                Formula::Or(vec![Formula::Not(Box::new(left?)), consequent])
             }
             FormulaKind::Temporal { operator, bound, parts } => {
                 let interval = self.interval(bound.as_ref(), operator.name());

@@ -308,7 +308,7 @@ impl Seen<'_> {
                 }
             }
             Formula::Truth { .. } => {}
-            Formula::Not(inner) => self.formula(inner, found),
+            Formula::Not(inner) | Formula::Consequent { formula: inner, .. } => self.formula(inner, found),
             Formula::And(parts) | Formula::Or(parts) | Formula::Temporal { parts, .. } => {
                 parts.iter().for_each(|part| self.formula(part, found));
             }

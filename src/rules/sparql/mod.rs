@@ -7,3 +7,4 @@ mod ledger;
 pub(crate) mod query;
 mod query_text;
 pub(crate) mod snapshot;
+pub(crate) mod unchanging;

@@ -6,6 +6,7 @@ use oxigraph::sparql::{PreparedSparqlQuery, QueryEvaluationError, QueryResults, 
 use oxrdf::{NamedNode, Term as RdfTerm};
 
 use crate::builtins;
+use crate::check::sides::{self, SIDES};
 use crate::engine::budget::Budget;
 use crate::engine::meter::{Stop, mebibytes};
 use crate::engine::reading::smaller_margin;
@@ -30,6 +31,8 @@ pub(crate) struct Query {
     pub(crate) asks: bool,
     /// Whether it reads holds or motions.
     pub(crate) reads_intervals: bool,
+    /// Warnings about it.
+    pub(crate) warnings: Diagnostics,
     /// Name of its file.
     file: String,
 }
@@ -70,12 +73,21 @@ impl Query {
             diagnostics
                 .push(Diagnostic::error("R061", "the query is neither ASK nor SELECT").in_source(source).help(help));
         }
+        let warnings = one_sided(source).into_iter().collect();
         diagnostics.or(Self {
             prepared,
+            warnings,
             asks: form == Some(Form::Ask),
             reads_intervals: named_in(&source.text),
             file: source.name.to_string(),
         })
+    }
+
+    /// The place of the keyword `ASK` or `SELECT` in its text.
+    pub(crate) fn start(&self, text: &str) -> Span {
+        let word = if self.asks { "ask" } else { "select" };
+        let found = scan(text).into_iter().find(|token| token.word.eq_ignore_ascii_case(word));
+        found.map_or(0..0, |token| token.span)
     }
 
     /// Judges an action: `ASK` passes if it is true, `SELECT` if it has no rows.
@@ -234,6 +246,39 @@ fn form(text: &str) -> Option<Form> {
             "select" => Some(Form::Select),
             _ => None,
         }
+    })
+}
+
+/// Returns the warning about a query that depends on the order of a contact's two sides: it reads only one of them, or reads each
+/// once and then one of the two variables more often than the other.
+fn one_sided(source: &Source) -> Option<Diagnostic> {
+    let start = first_group(&source.text)?;
+    let words: Vec<_> = scan(&source.text).into_iter().filter(|word| word.span.start >= start).collect();
+    let uses = |variable: &str| words.iter().filter(|word| word.word.get(1..) == variable.get(1..)).count();
+    SIDES.iter().find_map(|names| {
+        let [first, second] = names.map(|local| {
+            let iri = names::w(local);
+            (0..words.len()).filter(|at| words[*at].iri.as_ref() == Some(&iri)).collect::<Vec<usize>>()
+        });
+        // The variable after each; none if a constant or another property follows, as in `w:first|w:second`.
+        let variable =
+            |at: usize| words.get(at + 1).map(|next| next.word.as_str()).filter(|word| word.starts_with(['?', '$']));
+        let at = match (first.as_slice(), second.as_slice()) {
+            // That a contact has a side says nothing about which.
+            (one @ [at, ..], []) | ([], one @ [at, ..]) => {
+                let matters = one.iter().any(|at| variable(*at).is_none_or(|variable| uses(variable) > 1));
+                matters.then_some(*at)
+            }
+            ([one], [two]) => {
+                let (a, b) = (variable(*one)?, variable(*two)?);
+                (uses(a) != uses(b)).then_some(*one.min(two))
+            }
+            _ => None,
+        }?;
+        let property = if first.contains(&at) { names[0] } else { names[1] };
+        let derived = if names == &SIDES[0] { "w:between" } else { "w:betweenLinks" };
+        let help = format!("use `{derived}`, which leads to both sides");
+        Some(sides::warning(property, &help).at(source, words[at].span.clone()))
     })
 }
 

@@ -131,9 +131,9 @@ fn unit_of(quantity: &Quantity) -> &'static str {
         Quantity::Number(_) | Quantity::Variable(_) => "",
         Quantity::Recorded { iri, .. } => match iri.strip_prefix(names::W).unwrap_or_default() {
             "x" | "y" | "z" | "opening" | "baseX" | "baseY" | "believedX" | "believedY" | "rise" | "displacement"
-            | "pathLength" | "distance" | "distance2d" => "m",
+            | "pathLength" | "distance" | "distance2d" | "gap" => "m",
             "vx" | "vy" | "vz" | "speed" | "relativeSpeed" => "m/s",
-            "acceleration" => "m/s²",
+            "acceleration" | "acceleration2d" | "accelerationZ" => "m/s²",
             "jerk" => "m/s³",
             "tilt" | "yaw" | "baseYaw" | "believedYaw" => "rad",
             "wx" | "wy" | "wz" | "angularSpeed" => "rad/s",

@@ -67,7 +67,7 @@ impl Search<'_> {
                 found.push(Decisive::Atom { at, formula });
                 Some(())
             }
-            Formula::Not(inner) => self.decides(inner, at, found),
+            Formula::Not(inner) | Formula::Consequent { formula: inner, .. } => self.decides(inner, at, found),
             Formula::And(parts) => self.decides(self.extreme(parts, at, f64::lt)?, at, found),
             Formula::Or(parts) => {
                 let best = self.extreme(parts, at, f64::gt)?;

@@ -26,6 +26,12 @@ pub(crate) enum Formula {
     Not(Box<Formula>),
     And(Vec<Formula>),
     Or(Vec<Formula>),
+    /// The right side of `a implies b`, which is the formula `~a or b`.
+    Consequent {
+        formula: Box<Formula>,
+        /// Whether the property can only become harder to pass if this is false.
+        needed: bool,
+    },
     /// An operator over times between `from` and `to` after the present, or before it. Unit: seconds.
     Temporal {
         operator: TemporalOperator,
@@ -63,7 +69,7 @@ impl Formula {
         see(self);
         match self {
             Self::Compare { .. } | Self::Truth { .. } => {}
-            Self::Not(inner) => inner.visit(see),
+            Self::Not(inner) | Self::Consequent { formula: inner, .. } => inner.visit(see),
             Self::And(parts) | Self::Or(parts) | Self::Temporal { parts, .. } => {
                 parts.iter().for_each(|part| part.visit(see));
             }
@@ -74,7 +80,7 @@ impl Formula {
         match self {
             Self::Compare { left, right, .. } => [left, right].into_iter().for_each(|side| side.variables(found)),
             Self::Truth { quantity, .. } => quantity.variables(found),
-            Self::Not(inner) => inner.variables(found),
+            Self::Not(inner) | Self::Consequent { formula: inner, .. } => inner.variables(found),
             Self::And(parts) | Self::Or(parts) | Self::Temporal { parts, .. } => {
                 parts.iter().for_each(|part| part.variables(found));
             }
@@ -158,6 +164,11 @@ impl Timed {
     /// Returns its formulas.
     pub(crate) fn formulas(&self) -> &[Formula] {
         &self.formulas
+    }
+
+    /// Returns its formulas, to be changed.
+    pub(crate) fn formulas_mut(&mut self) -> &mut [Formula] {
+        &mut self.formulas
     }
 
     /// Returns the truth, the robustness if it is finite, or the moment. Returns `None` if a quantity was not recorded; then the

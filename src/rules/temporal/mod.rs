@@ -5,11 +5,13 @@
 mod deciding;
 mod evidence;
 mod formula;
+mod gap;
 mod intervals;
 mod margin;
 mod moment;
 mod quantities;
 mod semantics;
+mod vacuous;
 mod windows;
 
 pub(crate) use evidence::Evidence;
@@ -21,3 +23,4 @@ pub(crate) use margin::{add_margin, reads_course};
 pub(crate) use moment::{add_moment, define_moment};
 pub(crate) use quantities::{known_quantity, quantity_names, things_of, values_of};
 pub(crate) use semantics::UNRECORDED;
+pub(crate) use vacuous::mark_consequents;

@@ -2,10 +2,11 @@
 
 use std::collections::BTreeSet;
 
+use crate::temporal::gap::gaps;
 use actcheck_base::{Course, Signal, names, tilt_of, yaw_of};
 
 /// Name of a quantity in the world vocabulary, and the number of things it is of.
-const QUANTITIES: [(&str, usize); 40] = [
+const QUANTITIES: [(&str, usize); 43] = [
     ("x", 1),
     ("y", 1),
     ("z", 1),
@@ -35,12 +36,15 @@ const QUANTITIES: [(&str, usize); 40] = [
     ("speed", 1),
     ("angularSpeed", 1),
     ("acceleration", 1),
+    ("acceleration2d", 1),
+    ("accelerationZ", 1),
     ("jerk", 1),
     ("rise", 1),
     ("displacement", 1),
     ("pathLength", 1),
     ("distance", 2),
     ("distance2d", 2),
+    ("gap", 2),
     ("relativeSpeed", 2),
     ("contactForce", 2),
     ("touches", 2),
@@ -73,6 +77,7 @@ pub(crate) fn values_of(course: &Course, iri: &str, things: &[String]) -> Option
         }
         ("distance", [a, b]) => Some(distances(&place(course, a)?, &place(course, b)?)),
         ("distance2d", [a, b]) => Some(distances(&flat(place(course, a)?), &flat(place(course, b)?))),
+        ("gap", [a, b]) => gaps(course, a, b),
         ("relativeSpeed", [a, b]) => Some(norms(&rates(&seen_from(course, a, b)?, course.period_secs))),
         ("contactForce", [a, b]) => force(course, a, b),
         ("touches", [a, b]) => {
@@ -110,6 +115,11 @@ fn of_one(course: &Course, local: &str, thing: &str) -> Option<Vec<f64>> {
             norms(&[x?, y?, z?])
         }
         "acceleration" => norms(&rates(&velocity(course, thing)?, course.period_secs)),
+        "acceleration2d" => norms(&flat(rates(&velocity(course, thing)?, course.period_secs))),
+        "accelerationZ" => {
+            let [_, _, z] = rates(&velocity(course, thing)?, course.period_secs);
+            z
+        }
         "jerk" => norms(&rates(&rates(&velocity(course, thing)?, course.period_secs), course.period_secs)),
         "rise" => {
             let place = place(course, thing)?;
@@ -136,12 +146,12 @@ fn of_one(course: &Course, local: &str, thing: &str) -> Option<Vec<f64>> {
     })
 }
 
-fn recorded(course: &Course, local: &str, thing: &str) -> Option<Vec<f64>> {
+pub(super) fn recorded(course: &Course, local: &str, thing: &str) -> Option<Vec<f64>> {
     Some(course.get(&names::w(local), thing, "")?.values(course.count))
 }
 
 /// Returns the position of a thing. The robot is where its base is, on the floor.
-fn place(course: &Course, thing: &str) -> Option<[Vec<f64>; 3]> {
+pub(super) fn place(course: &Course, thing: &str) -> Option<[Vec<f64>; 3]> {
     if thing == names::w("robot") {
         let [x, y] = ["baseX", "baseY"].map(|part| recorded(course, part, thing));
         return Some([x?, y?, vec![0.0; course.count]]);
@@ -178,7 +188,7 @@ fn seen_from(course: &Course, thing: &str, from: &str) -> Option<[Vec<f64>; 3]> 
 }
 
 /// Rotates a vector by the inverse of a unit quaternion.
-fn turned_back([x, y, z, w]: [f64; 4], v: [f64; 3]) -> [f64; 3] {
+pub(super) fn turned_back([x, y, z, w]: [f64; 4], v: [f64; 3]) -> [f64; 3] {
     let cross =
         |a: [f64; 3], b: [f64; 3]| [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
     let axis = [-x, -y, -z];

@@ -110,6 +110,10 @@ impl<'a> Reader<'a> {
                 Some(self.quantity(quantity)?.iter().map(|value| factor * sign(*value != 0.0)).collect())
             }
             Formula::Not(inner) => self.samples(inner, scale).map(negated),
+            Formula::Consequent { needed: true, .. } if self.watch.fails_consequents() => {
+                Some(vec![if scale == Scale::Truth { -1.0 } else { f64::NEG_INFINITY }; self.course.count])
+            }
+            Formula::Consequent { formula, .. } => self.samples(formula, scale),
             Formula::And(parts) => self.joined(parts, scale, f64::min),
             Formula::Or(parts) => self.joined(parts, scale, f64::max),
             Formula::Temporal { operator, from, to, parts, .. } => {

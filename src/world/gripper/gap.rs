@@ -140,6 +140,11 @@ impl<'a> Probe<'a> {
         Self { model, links, grasp, surfaces: links.map(|link| model.links[link].surface()) }
     }
 
+    /// The links of the fingertips, left and right.
+    pub(crate) fn links(&self) -> [usize; 2] {
+        self.links
+    }
+
     /// Returns the parts that these joints move.
     pub(crate) fn moving(&self, joints: &[usize]) -> Moving {
         let above = |link: usize| -> Vec<usize> {

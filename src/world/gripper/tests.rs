@@ -360,3 +360,152 @@ fn coupled_joints_share_the_inertia_of_the_rotors() {
     assert_eq!(shares.len(), 2);
     assert!((shares[0] - shares[1]).abs() < 1e-15, "{shares:?}");
 }
+
+/// The names of the links of both fingers, sorted.
+fn links_of_fingers(profile: &RobotProfile) -> [Vec<String>; 2] {
+    let model = RobotModel::read(profile).expect("it is valid");
+    let fingers = Named::find(profile, &model).expect("it has a gripper").fingers;
+    fingers.map(|finger| {
+        let mut names: Vec<String> = finger.into_iter().map(|link| model.links[link].name.clone()).collect();
+        names.sort();
+        names
+    })
+}
+
+/// A link with a shape in front of its joint, as many as there are; `joint` is the rest of the joint.
+fn link(name: &str, shape: &str, joint: &str) -> String {
+    format!(
+        "<link name=\"{name}\"><inertial><mass value=\"0.1\"/><inertia ixx=\"1e-4\" ixy=\"0\" ixz=\"0\" iyy=\"1e-4\" iyz=\"0\" \
+         izz=\"1e-4\"/></inertial><collision>{shape}</collision></link><joint name=\"{name}_joint\" {joint}\
+         <child link=\"{name}\"/></joint>"
+    )
+}
+
+/// The hand with these links in addition.
+fn with_links(profile: &RobotProfile, links: &[String]) -> RobotProfile {
+    let text = profile.urdf.text.replace("</robot>", &format!("{}</robot>", links.concat()));
+    RobotProfile { urdf: Source::new("hand.urdf", text), ..profile.clone() }
+}
+
+/// A can that was held between the lower links of both fingers was not held, because only the tips counted.
+#[test]
+fn all_links_that_a_finger_joint_moves_belong_to_the_finger_on_their_side() {
+    let (left, right) = (turning(0.0, 0.6), turning(-0.6, 0.0));
+    let plain = hand(&left, &format!("{right}{MIMIC}"), &["left"]);
+    let mimic = |parent: &str, y: f64, factor: f64| {
+        format!(
+            "type=\"revolute\"><parent link=\"{parent}\"/><origin xyz=\"0.1 {y} 0\"/><axis xyz=\"0 0 1\"/><limit lower=\"-0.6\" \
+             upper=\"0.6\" effort=\"9\" velocity=\"2\"/><mimic joint=\"left\" multiplier=\"{factor}\"/>"
+        )
+    };
+    let cube = "<geometry><box size=\"0.02 0.01 0.02\"/></geometry>";
+    let owned =
+        |names: [&[&str]; 2]| names.map(|names| names.iter().map(|name| (*name).to_owned()).collect::<Vec<_>>());
+    assert_eq!(links_of_fingers(&plain), owned([&["left_finger"], &["right_finger"]]));
+
+    // Tips on joints that mimic, with a pad that is fixed to one of them and a claw that a program moves.
+    let mut phalanges = with_links(
+        &plain,
+        &[
+            link("left_tip", cube, &mimic("left_finger", 0.005, -1.0)),
+            link("right_tip", cube, &mimic("right_finger", -0.005, 1.0)),
+            link("pad", cube, "type=\"fixed\"><parent link=\"left_tip\"/>"),
+            link("claw", cube, &mimic("right_tip", 0.0, 1.0).replace("<mimic joint=\"left\" multiplier=\"1\"/>", "")),
+        ],
+    );
+    phalanges.other_joints = vec!["claw_joint".to_owned()];
+    assert_eq!(
+        links_of_fingers(&phalanges),
+        owned([&["left_finger", "left_tip"], &["claw", "right_finger", "right_tip"]])
+    );
+
+    // Knuckles beside the fingers, which carry nothing, and a plate between them; the fingers are named in the other order.
+    let mut linkage = with_links(
+        &plain,
+        &[
+            link("left_knuckle", cube, &mimic("palm", 0.05, 1.0).replace("0.1 ", "0.02 ")),
+            link("right_knuckle", cube, &mimic("palm", -0.05, -1.0).replace("0.1 ", "0.02 ")),
+            link("plate", cube, &mimic("palm", 0.0, 0.1).replace("0.1 ", "-0.05 ")),
+        ],
+    );
+    assert_eq!(
+        links_of_fingers(&linkage),
+        owned([&["left_finger", "left_knuckle"], &["right_finger", "right_knuckle"]])
+    );
+    linkage.finger_links.reverse();
+    assert_eq!(
+        links_of_fingers(&linkage),
+        owned([&["right_finger", "right_knuckle"], &["left_finger", "left_knuckle"]])
+    );
+
+    // A further finger is on the side from which it presses.
+    let further = three_fingers(&["left", "right", "third"]);
+    assert_eq!(links_of_fingers(&further), owned([&["left_finger"], &["right_finger", "third_finger"]]));
+
+    // A fixed jaw is part of the palm.
+    assert_eq!(links_of_fingers(&hand(&left, FIXED, &["left"])), owned([&["left_finger"], &["palm"]]));
+
+    // A carriage that moves with both fingers.
+    let carried = plain.urdf.text.replace(
+        "<parent link=\"palm\"/><child link=\"left_finger\"/>",
+        "<parent link=\"carriage\"/><child link=\"left_finger\"/>",
+    );
+    let carried = carried.replace(
+        "<parent link=\"palm\"/><child link=\"right_finger\"/>",
+        "<parent link=\"carriage\"/><child link=\"right_finger\"/>",
+    );
+    let slides = "type=\"prismatic\"><parent link=\"palm\"/><axis xyz=\"1 0 0\"/><limit lower=\"-0.1\" upper=\"0.1\" effort=\"9\" \
+                  velocity=\"1\"/><mimic joint=\"left\" multiplier=\"0.001\"/>";
+    let base = RobotProfile { urdf: Source::new("hand.urdf", carried), ..plain };
+    let carriage = with_links(
+        &base,
+        &[link(
+            "carriage",
+            "<origin xyz=\"-0.05 0.03 0\"/><geometry><box size=\"0.01 0.01 0.01\"/></geometry>",
+            slides,
+        )],
+    );
+    assert_eq!(links_of_fingers(&carriage), owned([&["left_finger"], &["right_finger"]]));
+}
+
+/// The same for a hand in MuJoCo's format, whose joints are coupled by equalities.
+#[test]
+fn coupled_links_of_a_mujoco_hand_belong_to_its_fingers() {
+    let folder = actcheck_base::ScratchFolder::create().expect("it can be created");
+    let finger = |side: &str, y: f64| {
+        let sign = y.signum();
+        format!(
+            "<body name=\"{side}_lower\" pos=\"0 {y} 0\"><joint name=\"{side}\" type=\"hinge\" axis=\"0 0 {sign}\" range=\"0 0.6\"/>\
+             <geom type=\"box\" pos=\"0.03 {} 0\" size=\"0.025 0.005 0.015\"/>\
+             <body name=\"{side}_upper\" pos=\"0.06 0 0\"><joint name=\"{side}_upper\" type=\"hinge\" axis=\"0 0 {sign}\" range=\"-0.6 0.6\"/>\
+             <geom type=\"box\" pos=\"0.03 {} 0\" size=\"0.03 0.005 0.015\"/></body></body>",
+            0.005 * sign,
+            0.005 * sign
+        )
+    };
+    let couple =
+        |joint: &str, factor: f64| format!("<joint joint1=\"{joint}\" joint2=\"left\" polycoef=\"0 {factor} 0 0 0\"/>");
+    let text = format!(
+        "<mujoco><compiler angle=\"radian\"/><worldbody><body name=\"base\"><geom type=\"box\" size=\"0.05 0.05 0.05\"/>\
+         <body name=\"palm\" pos=\"0 0 0.2\"><joint name=\"lift\" type=\"slide\" axis=\"0 0 1\" range=\"0.3 1\"/>\
+         <geom type=\"box\" pos=\"-0.03 0 0\" size=\"0.01 0.04 0.01\"/>{}{}\
+         <site name=\"grasp\" pos=\"0.1 0 0\"/></body></body></worldbody>\
+         <equality>{}{}{}</equality>\
+         <actuator><position joint=\"lift\" kp=\"100\" forcerange=\"-300 300\"/><position joint=\"left\" kp=\"100\" forcerange=\"-20 20\"/></actuator>\
+         </mujoco>",
+        finger("left", 0.02),
+        finger("right", -0.02),
+        couple("right", 1.0),
+        couple("left_upper", -1.0),
+        couple("right_upper", -1.0),
+    );
+    let profile = "urdf = \"hand.xml\"\narm_joints = [\"lift\"]\nfinger_joints = [\"left\"]\nfinger_links = [\"left_upper\", \"right_upper\"]\n\
+                   grasp_link = \"grasp\"\ncamera_link = \"base\"\nmax_opening_m = 0.05\nhome = [0.6]\n";
+    std::fs::write(folder.path().join("hand.xml"), text).expect("it can be written");
+    std::fs::write(folder.path().join("hand.toml"), profile).expect("it can be written");
+    let read = actcheck_config::robot::read(&Files::Disk, &folder.path().join("hand.toml")).expect("it is valid");
+    assert_eq!(
+        links_of_fingers(&read),
+        [["left_lower", "left_upper"], ["right_lower", "right_upper"]].map(|names| names.map(str::to_owned).to_vec())
+    );
+}
