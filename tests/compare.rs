@@ -7,7 +7,7 @@ use std::path::Path;
 use actcheck::analysis::{Compared, ComparedRun, Comparison, PairedTable, Sampling, compare, compared_runs};
 use actcheck::base::{Outcome, names};
 use actcheck::data::Choices;
-use actcheck::history::{History, OutcomeRow, RunRow, RunStatus, SceneDigest};
+use actcheck::history::{CampaignEnd, History, OutcomeRow, RunRow, RunStatus, SceneDigest};
 use serde_json::Value;
 
 use crate::history::{sample_campaign, sample_run};
@@ -209,6 +209,9 @@ fn samples(folder: &Path, name: &str, campaign: &str, runs: u64, failing: &[u64]
         }
         history.commit(&record).unwrap();
     }
+    history
+        .finish_campaign(campaign, &CampaignEnd { ended: "2026-08-01T13:00:00Z".to_owned(), ..CampaignEnd::default() })
+        .unwrap();
     history
 }
 

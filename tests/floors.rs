@@ -55,7 +55,7 @@ const FENCES: [(&str, &[&str]); 31] = [
     ("hyper", &["serve"]),
     ("hyper-util", &["serve"]),
     ("tokio", &["serve"]),
-    ("spargebra", &["history"]),
+    ("spargebra", &["history", "rules"]),
     ("ureq", &["remote"]),
     ("rustls", &["remote"]),
     ("rusty-s3", &["remote"]),

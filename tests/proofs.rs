@@ -13,6 +13,8 @@ use actcheck::rules::{Budget, RuleBook, owl_closure};
 
 use crate::rules::{TESTED, cases, facts_of, ontology_of};
 
+/// Number of matches of an aggregate that a proof shows.
+const MATCHES_SHOWN: usize = 3;
 /// Numbers in statements are rounded to six digits.
 const ROUNDED: f64 = 2e-5;
 
@@ -206,6 +208,9 @@ fn call(name: &str, args: &[Value]) -> Value {
         "MIN" => Value::Number(numbers.iter().copied().fold(f64::INFINITY, f64::min)),
         "MAX" => Value::Number(numbers.iter().copied().fold(f64::NEG_INFINITY, f64::max)),
         "geo3d:distance2d" => Value::Number((numbers[2] - numbers[0]).hypot(numbers[3] - numbers[1])),
+        "geo3d:distance" => {
+            Value::Number((numbers[3] - numbers[0]).hypot(numbers[4] - numbers[1]).hypot(numbers[5] - numbers[2]))
+        }
         "geo3d:angleDifference" => {
             let turn = (numbers[1] - numbers[0]).rem_euclid(std::f64::consts::TAU);
             Value::Number(if turn > std::f64::consts::PI { turn - std::f64::consts::TAU } else { turn })
@@ -249,6 +254,38 @@ fn condition(text: &str, binding: &Binding) -> Option<Option<Binding>> {
     Some(holds.then(|| binding.clone()))
 }
 
+/// The largest or smallest number that an aggregate such as `#max(?d)` takes over the bindings of its group.
+fn aggregated(text: &str, bindings: &[&Binding]) -> Value {
+    let (name, of) = text.trim_end_matches(')').split_once('(').expect("an aggregate");
+    let numbers = bindings.iter().map(|binding| match evaluate(of, binding) {
+        Some(Value::Number(number)) => number,
+        other => panic!("{text} of {other:?}"),
+    });
+    Value::Number(match name {
+        "#max" => numbers.fold(f64::NEG_INFINITY, f64::max),
+        "#min" => numbers.fold(f64::INFINITY, f64::min),
+        other => panic!("{other} is not supported by the checker"),
+    })
+}
+
+/// The tuples that a head concludes from the solutions of its body: one per solution, or one per group of an aggregate.
+fn concluded(head: &Atom, solutions: &[Binding]) -> Vec<Vec<Value>> {
+    let mut groups: Vec<(Vec<Option<Value>>, Vec<&Binding>)> = Vec::new();
+    let aggregates = head.args.iter().any(|arg| arg.starts_with('#'));
+    for binding in solutions {
+        let key = head.args.iter().filter(|arg| !arg.starts_with('#')).map(|arg| evaluate(arg, binding)).collect();
+        match groups.iter_mut().find(|(known, _)| aggregates && *known == key) {
+            Some((_, members)) => members.push(binding),
+            None => groups.push((key, vec![binding])),
+        }
+    }
+    let value = |arg: &String, members: &[&Binding]| match arg.starts_with('#') {
+        true => Some(aggregated(arg, members)),
+        false => evaluate(arg, members[0]),
+    };
+    groups.iter().map(|(_, members)| head.args.iter().filter_map(|arg| value(arg, members)).collect()).collect()
+}
+
 fn is_atom(text: &str) -> bool {
     text.starts_with(|c: char| c.is_ascii_lowercase()) && text.contains('(')
 }
@@ -275,7 +312,7 @@ impl Case {
         for rule in &self.rules {
             for head in rule.heads.iter().filter(|head| head.name == name && head.args.len() == pattern.len()) {
                 let possible = head.args.iter().zip(pattern).all(|(arg, asked)| {
-                    arg.starts_with(['?', '_']) || asked.as_ref().is_none_or(|asked| same(&constant(arg), asked))
+                    arg.starts_with(['?', '_', '#']) || asked.as_ref().is_none_or(|asked| same(&constant(arg), asked))
                 });
                 // An open property matches only given facts: no shipped rule needs more.
                 if !possible || (name == "state" && pattern[2].is_none()) {
@@ -287,12 +324,7 @@ impl Case {
                         start.insert(arg.clone(), asked.clone());
                     }
                 }
-                for binding in self.solve(&rule.body, &start) {
-                    let tuple: Vec<Value> = head.args.iter().filter_map(|arg| evaluate(arg, &binding)).collect();
-                    if fits(&tuple) {
-                        found.push(tuple);
-                    }
-                }
+                found.extend(concluded(head, &self.solve(&rule.body, &start)).into_iter().filter(|tuple| fits(tuple)));
             }
         }
         found
@@ -364,30 +396,35 @@ impl Case {
             Support::Rule { rule: cited, premises } => {
                 1 + self.check_step(&statement, &values, &cited.text, premises, proved)?
             }
+            Support::Aggregate { rule: cited, matches, premises } => {
+                let conditions = rule(&cited.text).body.len() * MATCHES_SHOWN.min(*matches);
+                if premises.len() != conditions {
+                    return Err(format!("{} conditions, not {conditions}: `{}`", premises.len(), cited.text));
+                }
+                1 + self.check_group(&statement, &values, &cited.text, premises, proved)?
+            }
             other => return Err(format!("no shipped property has the support {other:?}")),
         };
         proved.push(proof.statement.clone());
         Ok(steps)
     }
 
-    fn check_step(
-        &self,
-        statement: &Atom,
-        values: &[Value],
-        text: &str,
-        premises: &[Premise],
-        proved: &mut Vec<String>,
-    ) -> Result<usize, String> {
+    /// The rule with a text, which must be in a rule file.
+    fn cited(&self, text: &str) -> Result<Rule, String> {
         let cited = rule(text);
         let known = |known: &Rule| known.body == cited.body && known.heads.len() == cited.heads.len();
-        if !self.rules.iter().any(known) {
-            return Err(format!("`{text}` is in no rule file"));
-        }
-        if premises.len() != cited.body.len() {
-            return Err(format!("{} conditions for {} of `{text}`", premises.len(), cited.body.len()));
-        }
+        if self.rules.iter().any(known) { Ok(cited) } else { Err(format!("`{text}` is in no rule file")) }
+    }
+
+    /// Checks that a rule's conditions, with proofs as premises, hold. Returns their binding, and the number of steps.
+    fn check_body(
+        &self,
+        body: &[String],
+        premises: &[Premise],
+        proved: &mut Vec<String>,
+    ) -> Result<(Binding, usize), String> {
         let (mut binding, mut steps) = (Binding::new(), 0);
-        for (literal, premise) in cited.body.iter().zip(premises) {
+        for (literal, premise) in body.iter().zip(premises) {
             match premise {
                 Premise::Proof(inner) if is_atom(literal) => {
                     steps += self.check(inner, proved)?;
@@ -401,14 +438,58 @@ impl Case {
                 other => return Err(format!("{other:?} can't support {literal}")),
             }
         }
-        let binding =
-            self.settle(&cited.body, binding).ok_or_else(|| format!("a condition of `{text}` does not hold"))?;
+        let binding = self.settle(body, binding).ok_or_else(|| format!("a condition of {body:?} does not hold"))?;
+        Ok((binding, steps))
+    }
+
+    fn check_step(
+        &self,
+        statement: &Atom,
+        values: &[Value],
+        text: &str,
+        premises: &[Premise],
+        proved: &mut Vec<String>,
+    ) -> Result<usize, String> {
+        let cited = self.cited(text)?;
+        if premises.len() != cited.body.len() {
+            return Err(format!("{} conditions for {} of `{text}`", premises.len(), cited.body.len()));
+        }
+        let (binding, steps) = self.check_body(&cited.body, premises, proved)?;
         let concludes = |head: &Atom| head.name == statement.name && unify(&head.args, values, &binding).is_some();
         if cited.heads.iter().any(concludes) {
             Ok(steps)
         } else {
             Err(format!("`{text}` does not conclude {statement:?}"))
         }
+    }
+
+    /// An aggregate is computed again from all matches; the premises show the first few of them.
+    fn check_group(
+        &self,
+        statement: &Atom,
+        values: &[Value],
+        text: &str,
+        premises: &[Premise],
+        proved: &mut Vec<String>,
+    ) -> Result<usize, String> {
+        let cited = self.cited(text)?;
+        let mut steps = 0;
+        for of_match in premises.chunks(cited.body.len()) {
+            let (binding, within) = self.check_body(&cited.body, of_match, proved)?;
+            let in_group = |(arg, value): (&String, &Value)| {
+                arg.starts_with('#') || evaluate(arg, &binding).is_some_and(|own| same(&own, value))
+            };
+            let of_group = |head: &&Atom| head.name == statement.name && head.args.iter().zip(values).all(in_group);
+            if cited.heads.iter().find(of_group).is_none() {
+                return Err(format!("a match of `{text}` is of another group than {statement:?}"));
+            }
+            steps += within;
+        }
+        let pattern: Vec<Option<Value>> = values.iter().cloned().map(Some).collect();
+        if self.tuples(&statement.name, &pattern).is_empty() {
+            return Err(format!("`{text}` does not conclude {statement:?}"));
+        }
+        Ok(steps)
     }
 }
 
@@ -422,9 +503,9 @@ fn shipped() -> Vec<(String, Case, actcheck::rules::explain::Explanation)> {
             continue;
         }
         let ontology = ontology_of(&folder);
-        // The checker's own rules have no aggregates. Their conclusions are compared with the naive evaluator's.
+        // The checker has no sums and counts. Their conclusions are compared with the naive evaluator's.
         let text = &ontology.properties[TESTED].rule.source.text;
-        if ["#min(", "#max(", "#sum(", "#count("].iter().any(|aggregate| text.contains(aggregate)) {
+        if ["#sum(", "#count("].iter().any(|aggregate| text.contains(aggregate)) {
             continue;
         }
         let facts = facts_of(&folder);
@@ -463,6 +544,12 @@ fn every_shipped_proof_consists_of_rule_instances_and_facts() {
     assert!(proofs >= 4 && steps >= 30, "{proofs} proofs of {steps} steps");
 }
 
+fn with_support(proof: &Proof, support: Support) -> Proof {
+    let mut copy = proof.clone();
+    copy.support = support;
+    copy
+}
+
 /// Every variant of a proof with one statement slightly changed.
 fn spoiled(proof: &Proof) -> Vec<Proof> {
     let mut all = Vec::new();
@@ -475,23 +562,24 @@ fn spoiled(proof: &Proof) -> Vec<Proof> {
     let mut copy = proof.clone();
     copy.statement = wrong;
     all.push(copy);
-    if let Support::Rule { rule, premises } = &proof.support {
-        for (idx, premise) in premises.iter().enumerate() {
-            let Premise::Proof(inner) = premise else { continue };
-            for inner in spoiled(inner) {
-                let mut premises = premises.clone();
-                premises[idx] = Premise::Proof(inner);
-                let mut copy = proof.clone();
-                copy.support = Support::Rule { rule: rule.clone(), premises };
-                all.push(copy);
-            }
+    let (premises, rebuilt): (_, Box<dyn Fn(Vec<Premise>) -> Support>) = match &proof.support {
+        Support::Rule { rule, premises } => {
+            (premises, Box::new(|premises| Support::Rule { rule: rule.clone(), premises }))
         }
-        for idx in 0..premises.len() {
+        Support::Aggregate { rule, matches, premises } => {
+            (premises, Box::new(|premises| Support::Aggregate { rule: rule.clone(), matches: *matches, premises }))
+        }
+        _ => return all,
+    };
+    for (idx, premise) in premises.iter().enumerate() {
+        let mut fewer = premises.clone();
+        fewer.remove(idx);
+        all.push(with_support(proof, rebuilt(fewer)));
+        let Premise::Proof(inner) = premise else { continue };
+        for inner in spoiled(inner) {
             let mut premises = premises.clone();
-            premises.remove(idx);
-            let mut copy = proof.clone();
-            copy.support = Support::Rule { rule: rule.clone(), premises };
-            all.push(copy);
+            premises[idx] = Premise::Proof(inner);
+            all.push(with_support(proof, rebuilt(premises)));
         }
     }
     all

@@ -230,7 +230,7 @@ fn meshes_with_an_absolute_path_are_found_beside_the_model() {
     std::fs::create_dir(&meshes).unwrap();
     std::fs::copy(root().join("tests/models/gazebo/cafe_table/meshes/top.stl"), meshes.join("top.stl")).unwrap();
     let (solid, mesh) =
-        ("<box size=\"0.12 0.48 0.02\"/>", "<mesh filename=\"/meshes/top.stl\" scale=\"0.1 0.1 0.1\"/>");
+        ("<box size=\"0.12 0.48 0.02\"/>", "<mesh filename=\"/meshes/top.stl\" scale=\"1e-4 1e-4 1e-4\"/>");
     std::fs::write(folder.path().join("robot.urdf"), fixed_arm().replace(solid, mesh)).unwrap();
     std::fs::write(folder.path().join("robot.toml"), "urdf = \"robot.urdf\"\n").unwrap();
     std::fs::write(folder.path().join("c.toml"), format!("{PICKS}[\"can\"]\n")).unwrap();
@@ -250,7 +250,7 @@ fn meshes_with_paths_of_another_machine_are_found_in_their_package() {
     std::fs::copy(root().join("tests/models/gazebo/cafe_table/meshes/top.stl"), meshes.join("top.stl")).unwrap();
     let solid = "<box size=\"0.12 0.48 0.02\"/>";
     for path in ["file:///else/where/share/table_top/meshes/top.stl", "/else/where/share/table_top/meshes/top.stl"] {
-        let mesh = format!("<mesh filename=\"{path}\" scale=\"0.1 0.1 0.1\"/>");
+        let mesh = format!("<mesh filename=\"{path}\" scale=\"1e-4 1e-4 1e-4\"/>");
         std::fs::write(folder.path().join("robot.urdf"), fixed_arm().replace(solid, &mesh)).unwrap();
         std::fs::write(folder.path().join("c.toml"), format!("{PICKS}[\"can\"]\n")).unwrap();
         std::fs::write(folder.path().join("robot.toml"), "urdf = \"robot.urdf\"\npackage_dirs = [\"robots\"]\n")

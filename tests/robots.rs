@@ -148,7 +148,8 @@ fn check_xacro(path: &Path, body: &str) -> (Option<i32>, String) {
     copy(&root().join("tests/models/crane"), folder.path());
     std::fs::write(folder.path().join("robot.urdf.xacro"), body).unwrap();
     let profile = std::fs::read_to_string(folder.path().join("robot.toml")).unwrap();
-    std::fs::write(folder.path().join("x.toml"), profile.replace("robot.urdf", "robot.urdf.xacro")).unwrap();
+    let profile = profile.replace("robot.urdf", "robot.urdf.xacro").replace("home =", "mount_height_m = 0.4\nhome =");
+    std::fs::write(folder.path().join("x.toml"), profile).unwrap();
     let text = "tests = [[\"Pick\"]]\ntest_count = 1\n[robot]\nprofile = \"x.toml\"\n\
         [pickObject]\nmodel_list = [\"glass\"]\n[objectSurface]\nobject_surfaces = [\"coffee_table\"]\n";
     std::fs::write(folder.path().join("c.toml"), text).unwrap();

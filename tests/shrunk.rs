@@ -180,6 +180,7 @@ fn printed_values_that_pass_do_pass() {
                     serde_json::from_str(&stdout(&again)).unwrap_or_else(|_| panic!("{}", stderr(&again)));
                 let others =
                     if one.is_empty() { 0 } else { choice[format!("others_fail_{side}")].as_array().unwrap().len() };
+                let again = &again["case"];
                 let fails = names(&again["failed"]);
                 assert!(again["recurrence"] != "undecided" && !fails.iter().any(|name| name == property), "{again:#}");
                 assert_eq!(fails.len(), others, "{name} = {value} in {shrunk}: {again:#}");

@@ -62,7 +62,7 @@ fn tables_agree_with_the_history(here: &Path) {
     let shown = json(here, &["show", &rows[0]["run"], "--format", "json"]);
     let target = shown["objects"].as_array().unwrap().iter().find(|object| object["role"] == "target").unwrap();
     let number = |name: &str| rows[0][name].parse::<f64>().unwrap();
-    assert_eq!(rows[0]["target_kinds"], "Glass Cup Container Graspable Object");
+    assert_eq!(rows[0]["target_kinds"], "Glass Cup OpenContainer Container Graspable Object");
     assert_eq!(number("target_friction"), target["friction"].as_f64().unwrap());
     let (ahead, left) = (number("target_ahead_m"), number("target_left_m"));
     assert!((ahead.hypot(left) - number("robot_distance_m")).abs() < 1e-9);

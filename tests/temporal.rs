@@ -39,7 +39,8 @@ fn numbers(value: &toml::Value) -> Vec<f64> {
 fn course_of(case: &toml::Value) -> Option<Course> {
     let signals = case.get("signals")?.as_table().expect("signals are a table");
     let count = signals.values().map(|values| numbers(values).len()).max().unwrap_or(0);
-    let mut course = Course::new(0.1, count);
+    let period = case.get("period").and_then(toml::Value::as_float).unwrap_or(0.1);
+    let mut course = Course::new(period, count);
     for (key, values) in signals {
         let mut parts = key.split(' ').map(iri);
         let mut next = || parts.next().unwrap_or_default();

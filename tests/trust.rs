@@ -87,7 +87,7 @@ fn rules_lists_every_property_with_its_rate() {
     actcheck(project.path(), &["run", "configs/pick.toml", "--runs", "4", "--history", "h"]);
     let rows: Value = serde_json::from_str(&list(&["--history", "h", "--format", "json"])).unwrap();
     let rows = rows.as_array().unwrap();
-    assert_eq!(rows.len(), 19);
+    assert_eq!(rows.len(), 21);
     // This campaign had only picks.
     let is_of_pick = |row: &&Value| row["actions"].as_str().is_some_and(|actions| actions.starts_with("Pick"));
     for row in rows.iter().filter(is_of_pick) {

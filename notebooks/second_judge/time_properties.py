@@ -98,7 +98,7 @@ def below(values, limit):
 
 def later(flags, period, seconds):
     """Number of samples in a duration."""
-    return int(round(seconds / period))
+    return int(seconds / period + 0.1)
 
 
 def still_at_the_end(course):
@@ -137,15 +137,15 @@ def upright_when_lifted(course):
 
 
 def held_while_lifted(course):
-    """While the object is 3 cm above its initial height, both fingers touch it, or touch it again within 0.1 s."""
+    """While the object is 3 cm above its initial height, both fingers touch it, or touch it again within 0.04 s."""
     thing = course.target()
     if thing is None:
         return None, None
     height, held = thing["position"][:, 2], thing["held"]
-    lost = later(held, course.period, 0.1)
+    lost = later(held, course.period, 0.04)
     for at in np.flatnonzero(height - height[0] > 0.03):
         window = held[at : at + lost + 1]
-        # At the end of the action, the 0.1 s are not over.
+        # At the end of the action, the 0.04 s are not over.
         if len(window) == lost + 1 and not window.any():
             return False, None
     return True, None
@@ -204,7 +204,8 @@ def main():
     for course in read(sys.argv[1]):
         for name, judge in TIME_PROPERTIES.items():
             stored = course.outcomes.get(name)
-            if stored is None or course.end != "completed":
+            # A single sample: a precondition did not hold, so that the action was not performed.
+            if stored is None or course.end != "completed" or len(course.times) < 2:
                 continue
             holds, slack = judge(course)
             if agrees(stored, holds, slack):

@@ -493,7 +493,7 @@ pub(super) mod tests {
             |robot, joint| robot.positions[joint] = f64::INFINITY,
             |robot, joint| robot.motors[joint].target = f64::NAN,
             |robot, joint| robot.motors[joint].max_effort = f64::NAN,
-            |robot, joint| std::mem::swap(&mut Arc::make_mut(&mut robot.model).joints[joint].lower, &mut 9.0),
+            |robot, joint| Arc::make_mut(&mut robot.model).joints[joint].lower = 9.0,
         ];
         for (idx, spoil) in spoils.into_iter().enumerate() {
             let mut world = lonely();
