@@ -205,7 +205,7 @@ impl Robot {
     /// Sets a joint's target position, clamped to its limits.
     pub fn aim(&mut self, joint: usize, target: f64) {
         let Joint { lower, upper, .. } = self.model.joints[joint];
-        if target.is_finite() {
+        if target.is_finite() && lower <= upper {
             self.motors[joint].target = target.clamp(lower, upper);
         }
     }

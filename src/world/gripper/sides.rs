@@ -6,8 +6,9 @@ use crate::gripper::opening::Gripper;
 
 /// Openings at which the place of a link beside the grasp frame is measured, as shares of the widest.
 const SHARES: [f64; 3] = [0.0, 0.5, 1.0];
-/// A link that is nearer to the middle between the fingers than this is on neither side. Unit: metres.
-const BESIDE_M: f64 = 2e-3;
+/// A link that is nearer to the middle between the fingers than this is on neither side: the nearest point of a plate of 1 cm in the
+/// middle jumps from edge to edge as the plate turns a little. Unit: metres.
+const BESIDE_M: f64 = 5e-3;
 
 /// Returns the links of the left and of the right finger: the named fingertips, and all links that a joint of the gripper moves
 /// without the other fingertip. Links of couplings and of further fingers are on the side of the grasp frame on which they are
