@@ -173,7 +173,8 @@ fn printed_values_that_pass_do_pass() {
             for side in ["below", "above"] {
                 let Some(value) = choice[format!("passes_{side}")].as_f64() else { continue };
                 let name = choice["name"].as_str().unwrap();
-                let Some(edited) = with_choice(&text, name, value) else { continue };
+                let was = choice["value"].as_f64().unwrap();
+                let Some(edited) = with_choice(&text, name, was, value) else { continue };
                 std::fs::write(&case, edited).unwrap();
                 let again = actcheck(folder, &["run", "case.toml", "--history", "again", "--format", "json"]);
                 let again: Value =
@@ -191,20 +192,17 @@ fn printed_values_that_pass_do_pass() {
     assert!(replayed >= 4, "{replayed} values were replayed");
 }
 
-/// A case's text with another number for a choice, such as `sense.glass_1.y` or `sense.glass_1.y (2)`. Returns `None` for a
-/// choice that the text writes in words.
-fn with_choice(text: &str, name: &str, value: f64) -> Option<String> {
-    let (name, nth) = match name.strip_suffix(')').and_then(|name| name.split_once(" (")) {
-        Some((name, nth)) => (name, nth.parse::<usize>().unwrap() - 1),
-        None => (name, 0),
-    };
+/// A case's text with another number for a choice, such as `sense.glass_1.y` or `sense.glass_1.y (2)`, which the text writes as a
+/// list. Returns `None` for a choice that the text writes in words.
+fn with_choice(text: &str, name: &str, was: f64, value: f64) -> Option<String> {
+    let name = name.split(" (").next().unwrap();
     let mut lines: Vec<String> = text.lines().map(str::to_owned).collect();
     let key = |line: &str| line.split(" = ").next().unwrap().trim_matches('"') == name;
     let line = lines.iter_mut().find(|line| line.contains(" = ") && key(line))?;
     let (key, written) = line.split_once(" = ").unwrap();
     let written = written.split('#').next().unwrap().trim();
     let mut numbers: Vec<&str> = written.trim_matches(['[', ']']).split(", ").collect();
-    numbers.get(nth)?.parse::<f64>().ok()?;
+    let nth = numbers.iter().position(|number| number.parse() == Ok(was))?;
     let value = format!("{value:?}");
     numbers[nth] = &value;
     let joined = numbers.join(", ");

@@ -192,6 +192,9 @@ def agrees(stored, holds, slack):
     """Whether a stored outcome is that of the second judgement, up to the rounding of samples."""
     if holds is None:
         return stored in ("inapplicable", "passed")
+    # Whether a property applies is not judged again; it never excuses one that does not hold.
+    if stored == "inapplicable":
+        return holds
     if stored not in ("passed", "failed"):
         return False
     return stored == ("passed" if holds else "failed") or (slack is not None and abs(slack) <= SHARE)
