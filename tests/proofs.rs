@@ -394,14 +394,17 @@ impl Case {
             Support::Cut if proved.contains(&proof.statement) => 1,
             Support::Cut => return Err(format!("{} has no proof in the tree", proof.statement)),
             Support::Rule { rule: cited, premises } => {
-                1 + self.check_step(&statement, &values, &cited.text, premises, proved)?
+                1 + self.check_step((&statement, &values), &cited.text, (1, premises), proved)?
             }
             Support::Aggregate { rule: cited, matches, premises } => {
-                let conditions = rule(&cited.text).body.len() * MATCHES_SHOWN.min(*matches);
-                if premises.len() != conditions {
-                    return Err(format!("{} conditions, not {conditions}: `{}`", premises.len(), cited.text));
+                let shown = MATCHES_SHOWN.min(*matches);
+                let steps = self.check_step((&statement, &values), &cited.text, (shown, premises), proved)?;
+                // It is computed again from all matches; the premises show the first few of them.
+                let pattern: Vec<Option<Value>> = values.iter().cloned().map(Some).collect();
+                if shown == 0 || self.tuples(&statement.name, &pattern).is_empty() {
+                    return Err(format!("`{}` does not conclude {statement:?}", cited.text));
                 }
-                1 + self.check_group(&statement, &values, &cited.text, premises, proved)?
+                1 + steps
             }
             other => return Err(format!("no shipped property has the support {other:?}")),
         };
@@ -442,52 +445,33 @@ impl Case {
         Ok((binding, steps))
     }
 
+    /// Checks that each match of a rule concludes the statement, or belongs to its group if the rule aggregates.
     fn check_step(
         &self,
-        statement: &Atom,
-        values: &[Value],
+        (statement, values): (&Atom, &[Value]),
         text: &str,
-        premises: &[Premise],
+        (matches, premises): (usize, &[Premise]),
         proved: &mut Vec<String>,
     ) -> Result<usize, String> {
         let cited = self.cited(text)?;
-        if premises.len() != cited.body.len() {
-            return Err(format!("{} conditions for {} of `{text}`", premises.len(), cited.body.len()));
+        let conditions = cited.body.len();
+        if premises.len() != matches * conditions {
+            return Err(format!("{} conditions for {matches} times {conditions} of `{text}`", premises.len()));
         }
-        let (binding, steps) = self.check_body(&cited.body, premises, proved)?;
-        let concludes = |head: &Atom| head.name == statement.name && unify(&head.args, values, &binding).is_some();
-        if cited.heads.iter().any(concludes) {
-            Ok(steps)
-        } else {
-            Err(format!("`{text}` does not conclude {statement:?}"))
-        }
-    }
-
-    /// An aggregate is computed again from all matches; the premises show the first few of them.
-    fn check_group(
-        &self,
-        statement: &Atom,
-        values: &[Value],
-        text: &str,
-        premises: &[Premise],
-        proved: &mut Vec<String>,
-    ) -> Result<usize, String> {
-        let cited = self.cited(text)?;
         let mut steps = 0;
-        for of_match in premises.chunks(cited.body.len()) {
+        for number in 0..matches {
+            let of_match = &premises[number * conditions..][..conditions];
             let (binding, within) = self.check_body(&cited.body, of_match, proved)?;
-            let in_group = |(arg, value): (&String, &Value)| {
-                arg.starts_with('#') || evaluate(arg, &binding).is_some_and(|own| same(&own, value))
+            let concludes = |head: &Atom| {
+                let plain = head.args.iter().zip(values).filter(|(arg, _)| !arg.starts_with('#'));
+                let (args, own): (Vec<String>, Vec<Value>) = plain.map(|(arg, own)| (arg.clone(), own.clone())).unzip();
+                let fits = head.name == statement.name && head.args.len() == values.len();
+                fits && unify(&args, &own, &binding).is_some()
             };
-            let of_group = |head: &&Atom| head.name == statement.name && head.args.iter().zip(values).all(in_group);
-            if cited.heads.iter().find(of_group).is_none() {
-                return Err(format!("a match of `{text}` is of another group than {statement:?}"));
+            if !cited.heads.iter().any(concludes) {
+                return Err(format!("`{text}` does not conclude {statement:?}"));
             }
             steps += within;
-        }
-        let pattern: Vec<Option<Value>> = values.iter().cloned().map(Some).collect();
-        if self.tuples(&statement.name, &pattern).is_empty() {
-            return Err(format!("`{text}` does not conclude {statement:?}"));
         }
         Ok(steps)
     }

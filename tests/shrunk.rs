@@ -151,18 +151,26 @@ fn a_campaign_that_shrinks_prints_one_document() {
 /// as a user would: the shrunk run as a configuration, with the printed value.
 #[test]
 fn printed_values_that_pass_do_pass() {
-    let project = blurred();
-    let folder = project.path();
-    let output = actcheck(folder, &["run", LOOK, "--runs", "12", "--history", "h", "--format", "json"]);
+    let looks = blurred();
+    let picks = project();
+    edit(&picks.path().join("configs/pick.toml"), "position_noise_m = 0.025", "position_noise_m = 0.08");
+    let replayed = replayed_values(looks.path(), LOOK, ["12", "60"], 6)
+        + replayed_values(picks.path(), "configs/pick.toml", ["4", "40"], 2);
+    assert!(replayed >= 4, "{replayed} values were replayed");
+}
+
+/// Shrinks some failing runs of a campaign, replays every value that is printed as passing, and returns their number.
+fn replayed_values(folder: &Path, config: &str, [runs, trials]: [&str; 2], take: usize) -> usize {
+    let output = actcheck(folder, &["run", config, "--runs", runs, "--history", "h", "--format", "json"]);
     let runs: Value = serde_json::from_str(&stdout(&output)).unwrap();
     let mut replayed = 0;
     let failing = runs["runs"].as_array().unwrap().iter().filter(|run| !failed(run).is_empty());
-    for (number, run) in failing.take(6).enumerate() {
+    for (number, run) in failing.take(take).enumerate() {
         // Some with one property, some with all.
         let (id, was) = (run["run"].as_str().unwrap(), failed(run));
         let property = was[0].rsplit('#').next().unwrap();
         let one: &[&str] = if number % 2 == 0 { &[] } else { &["--property", property] };
-        let arguments = [&["shrink", id, "--trials", "60", "--jobs", "2"], one].concat();
+        let arguments = [&["shrink", id, "--trials", trials, "--jobs", "2"], one].concat();
         let small = json(folder, &arguments);
         let case = folder.join("case.toml");
         let shrunk = small["run"].as_str().unwrap();
@@ -173,15 +181,11 @@ fn printed_values_that_pass_do_pass() {
             for side in ["below", "above"] {
                 let Some(value) = choice[format!("passes_{side}")].as_f64() else { continue };
                 let name = choice["name"].as_str().unwrap();
-                let was = choice["value"].as_f64().unwrap();
-                let Some(edited) = with_choice(&text, name, was, value) else { continue };
+                let Some(edited) = with_choice(&text, name, choice["value"].as_f64().unwrap(), value) else { continue };
                 std::fs::write(&case, edited).unwrap();
-                let again = actcheck(folder, &["run", "case.toml", "--history", "again", "--format", "json"]);
-                let again: Value =
-                    serde_json::from_str(&stdout(&again)).unwrap_or_else(|_| panic!("{}", stderr(&again)));
+                let again = json_of_case(folder);
                 let others =
                     if one.is_empty() { 0 } else { choice[format!("others_fail_{side}")].as_array().unwrap().len() };
-                let again = &again["case"];
                 let fails = names(&again["failed"]);
                 assert!(again["recurrence"] != "undecided" && !fails.iter().any(|name| name == property), "{again:#}");
                 assert_eq!(fails.len(), others, "{name} = {value} in {shrunk}: {again:#}");
@@ -189,11 +193,18 @@ fn printed_values_that_pass_do_pass() {
             }
         }
     }
-    assert!(replayed >= 2, "{replayed} values were replayed");
+    replayed
 }
 
-/// A case's text with another number for a choice, such as `sense.glass_1.y` or `sense.glass_1.y (2)`, which the text writes as a
-/// list. Returns `None` for a choice that the text writes in words.
+/// Runs `case.toml` again.
+fn json_of_case(folder: &Path) -> Value {
+    let again = actcheck(folder, &["run", "case.toml", "--history", "again", "--format", "json"]);
+    let mut again: Value = serde_json::from_str(&stdout(&again)).unwrap_or_else(|_| panic!("{}", stderr(&again)));
+    again["case"].take()
+}
+
+/// A case's text with another number for a choice. Repeated choices, such as `sense.glass_1.y (2)`, are a list in the text; the
+/// present number finds its place there. Returns `None` for a choice that the text writes in words.
 fn with_choice(text: &str, name: &str, was: f64, value: f64) -> Option<String> {
     let name = name.split(" (").next().unwrap();
     let mut lines: Vec<String> = text.lines().map(str::to_owned).collect();

@@ -54,7 +54,7 @@ pub struct ExportArgs {
     pub dataset: Option<PathBuf>,
     /// With `--dataset`: also the course of each action at the control rate (60 Hz), from which properties about time can be
     /// judged: `course_bodies` (poses, velocities, holds), `course_robot` (gripper and base), `course_joints`,
-    /// `course_forces` (between pairs of bodies) and `phases`. It takes about ten times the space
+    /// `course_forces` (between pairs of bodies) and `phases`. The folder is then five to six times as large
     #[arg(long, requires = "dataset")]
     pub course: bool,
     /// Write the whole history as RDF, with facts in their named graphs (N-Quads)

@@ -202,7 +202,7 @@ impl Robot {
         }
     }
 
-    /// Sets a joint's target position, clamped to its limits.
+    /// Sets a joint's target position, clamped to its limits. Limits that are not in order, which are a fault, leave it.
     pub fn aim(&mut self, joint: usize, target: f64) {
         let Joint { lower, upper, .. } = self.model.joints[joint];
         if target.is_finite() && lower <= upper {

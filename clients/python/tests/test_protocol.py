@@ -24,13 +24,15 @@ SCHEMA = json.loads((Path(__file__).parents[2] / "protocol.schema.json").read_te
 OF_THE_LINK = {"type", "protocol", "what", "binary", "reason"}
 
 
-def message_schema(side: str, kind: str, what: str | None = None) -> Any:
-    """The schema of a message."""
+def message_schema(side: str, kind: str, question: str | None = None) -> Any:
+    """The schema of a message. `question` is the subject of an answer."""
     for message in SCHEMA["$defs"][side]["oneOf"]:
         properties = message["properties"]
-        if properties["type"]["const"] == kind and (what is None or properties["what"].get("const") == what):
+        if properties["type"]["const"] != kind:
+            continue
+        if question is None or properties["what"].get("const") == question:
             return message
-    raise LookupError(f"the schema has no message {side} {kind} {what}")
+    raise LookupError(f"the schema has no message {side} {kind} {question}")
 
 
 def resolved(schema: Any) -> Any:
