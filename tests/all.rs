@@ -67,6 +67,7 @@ mod oracle;
 mod other_stores;
 mod outlined_queries;
 mod outlines;
+mod pads;
 mod patterns;
 mod perceive;
 mod physics;

@@ -93,19 +93,19 @@ impl World {
 }
 
 /// Returns whether the engine solved any point of a pair of colliders in the last step: it keeps many pairs that are near.
-fn has_solved(pair: &ContactPair) -> bool {
+pub(super) fn has_solved(pair: &ContactPair) -> bool {
     pair.solver_manifolds().iter().any(|manifold| !manifold.data.solver_contacts.is_empty())
 }
 
 /// Returns the points of a contact that the engine solved in the last step. It leaves out some of those that it found: they
 /// keep the impulse of an earlier step.
-fn solved(manifold: &ContactManifold) -> impl Iterator<Item = &TrackedContact<ContactData>> {
+pub(super) fn solved(manifold: &ContactManifold) -> impl Iterator<Item = &TrackedContact<ContactData>> {
     let indices = manifold.data.solver_contacts.iter().flat_map(SolverContact::contact_indices);
     indices.filter_map(|index| manifold.points.get(usize::try_from(index).ok()?))
 }
 
 /// Returns the impulse of normal force and friction on the second of a pair in the last step. Unit: N·s.
-fn impulse_of(point: &TrackedContact<ContactData>, normal: &Vector3<f64>) -> Vector3<f64> {
+pub(super) fn impulse_of(point: &TrackedContact<ContactData>, normal: &Vector3<f64>) -> Vector3<f64> {
     let impulse = f64::from(point.data.impulse);
     // The engine keeps friction only for the last substep, and as it acts on the first of the pair.
     let last = f64::from(point.data.warmstart_impulse);

@@ -9,19 +9,18 @@ use crate::robot::Robot;
 const PUSH_SECS: f64 = 1.0 / 960.0;
 /// An arm is light if a push meets less than this in some direction. Held objects have masses of this order, and the hand then moves
 /// within a step as they push it. The lightest shipped arm has 1.1 kg. Unit: kilograms.
-const LIGHT_KG: f64 = 0.8;
+pub(super) const LIGHT_KG: f64 = 0.8;
+/// The engine moves the hand alone only while it touches less than this share of the least mass that a push meets: the arm answers
+/// a push one step later, and swings with an object of nearly its own mass, which then slips. With the shipped arm, that begins at
+/// 0.7 kg.
+pub(super) const CARRIED_SHARE: f64 = 0.5;
 
 impl Robot {
-    /// Returns whether its arm is light in its present posture. A robot whose hand can't move alone has none.
-    pub(super) fn has_light_arm(&self) -> bool {
-        self.least_effective_mass_kg().is_some_and(|mass_kg| mass_kg < LIGHT_KG)
-    }
-
     /// Returns the least mass that a push at the grasp frame meets in any direction: the robot's effective mass there, with the
     /// resistance of its motors during the push. Returns `None` if the hand can't move alone.
     ///
     /// Source: O. Khatib, "Inertial properties in robotic manipulation: an object-level framework", 1995.
-    fn least_effective_mass_kg(&self) -> Option<f64> {
+    pub(super) fn least_effective_mass_kg(&self) -> Option<f64> {
         let joints: Vec<usize> = self.joints_to(self.hand.as_ref()?.link).collect();
         let poses = self.kinematics.links(&self.positions);
         let at_rest = vec![0.0; self.motors.len()];

@@ -4,7 +4,7 @@ use nalgebra::Vector3;
 use rapier3d::math::Pose;
 use rapier3d::prelude::{
     CoefficientCombineRule, ColliderBuilder, Group, IntegrationParameters, InteractionGroups, InteractionTestMode,
-    PhysicsWorld, SharedShape, SpringCoefficients,
+    PhysicsWorld, RigidBodyBuilder, RigidBodyHandle, SharedShape, SpringCoefficients,
 };
 
 use crate::convert::{to_pose, to_real, to_vector};
@@ -106,8 +106,8 @@ pub fn off_floor() -> InteractionGroups {
     InteractionGroups::new(Group::ALL, Group::ALL.difference(FLOOR_GROUP), InteractionTestMode::And)
 }
 
-/// Adds the floor: a slab with its top at z = 0.
-pub fn add_floor(engine: &mut PhysicsWorld) {
+/// Adds the floor: a slab with its top at z = 0. Returns a fixed body at the origin, without a shape, for joints to the floor.
+pub fn add_floor(engine: &mut PhysicsWorld) -> RigidBodyHandle {
     let half = to_real(fault::WORLD_RADIUS_M + 1.0);
     let floor = ColliderBuilder::cuboid(half, half, 0.5)
         .position(to_pose(&nalgebra::Isometry3::translation(0.0, 0.0, -0.5)))
@@ -116,6 +116,7 @@ pub fn add_floor(engine: &mut PhysicsWorld) {
         .collision_groups(InteractionGroups::new(FLOOR_GROUP, Group::ALL, InteractionTestMode::And))
         .user_data(Owner::Floor.to_tag());
     engine.insert_collider(floor, None);
+    engine.insert_body(RigidBodyBuilder::fixed())
 }
 
 /// Returns a collider for a convex solid in its body's frame. Returns `None` for tubes, which the caller must decompose

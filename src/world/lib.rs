@@ -43,6 +43,7 @@ mod object;
 mod observe;
 mod odometry;
 mod overlaps;
+mod patches;
 mod perturbation;
 mod pieces;
 mod propose;
@@ -101,4 +102,4 @@ pub use views::robot_views;
 
 /// Version of the physics: the same scene and commands give the same bits only with the same version. It rises with each
 /// change of these bits.
-pub const PHYSICS_VERSION: u32 = 18;
+pub const PHYSICS_VERSION: u32 = 19;

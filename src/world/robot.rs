@@ -9,6 +9,7 @@ use rapier3d::prelude::{MultibodyJointHandle, PhysicsWorld, RigidBody, RigidBody
 use crate::assemble::{home, insert_joints, insert_links, links_on_floor};
 use crate::description::{Joint, RobotModel};
 use crate::drive::{Law, State};
+use crate::effective_mass::{CARRIED_SHARE, LIGHT_KG};
 use crate::free_motion::Equations;
 use crate::inertia::Twist;
 use crate::layout::Layout;
@@ -54,6 +55,11 @@ pub struct Robot {
     pub(super) hand: Option<Hand>,
     /// Whether its arm is light: the engine then never moves the hand alone.
     pub(super) is_light: bool,
+    /// Largest mass of the objects at the hand with which the engine moves it alone. Unit: kilograms.
+    pub(super) most_carried_kg: f64,
+    /// Whether the objects at its hand have more than this mass. The engine then solves its motors as those of a light arm: as
+    /// constraints, they let held objects creep.
+    pub(super) is_loaded: bool,
     /// Whether the engine solves its motors, except those of the fingers, as springs.
     pub(super) is_springy: bool,
     /// The force of contacts on the hand in the last step, if the engine moves the hand alone. Frame: world.
@@ -127,11 +133,15 @@ impl Robot {
             carrier: None,
             hand,
             is_light: false,
+            most_carried_kg: 0.0,
+            is_loaded: false,
             is_springy: false,
             push_on_hand: Twist::ZERO,
             equations: None,
         };
-        robot.is_light = robot.has_light_arm();
+        let effective_kg = robot.least_effective_mass_kg();
+        robot.is_light = effective_kg.is_some_and(|mass_kg| mass_kg < LIGHT_KG);
+        robot.most_carried_kg = CARRIED_SHARE * effective_kg.unwrap_or(0.0);
         robot.is_springy = robot.is_light || model.has_many_pieces();
         for (motor, position) in robot.motors.iter_mut().zip(&robot.positions) {
             motor.target = *position;
@@ -294,10 +304,16 @@ impl Robot {
         let states = self.positions.iter().zip(&self.velocities);
         let states = states.map(|(position, velocity)| State { position: *position, velocity: *velocity });
         for (idx, (motor, at)) in self.motors.iter().zip(states).enumerate().filter(|(idx, _)| self.shares(*idx)) {
-            let is_spring = self.is_springy && !self.layout.gripper.contains(idx);
+            let is_spring = (self.is_springy || self.is_loaded) && !self.layout.gripper.contains(idx);
             let spring_secs = is_spring.then_some(substep_secs);
             motor.tell(engine, &self.model.joints[idx], at, motor.fastest * dt, spring_secs);
         }
+    }
+
+    /// Returns whether a link is a finger, whose surface is a pad.
+    pub(super) fn is_pad(&self, link: usize) -> bool {
+        let moves_further = |joint: usize| self.layout.gripper.moves_further_finger(joint);
+        self.finger_links.contains(&link) || link.checked_sub(1).is_some_and(moves_further)
     }
 
     /// Returns the joints between the root and a link.

@@ -157,7 +157,7 @@ impl World {
         }
         room.reach = match reach {
             // A light arm gives way to its hand's contacts within the step.
-            Reach::Hand if self.robot.is_light => Reach::All,
+            Reach::Hand if self.robot.is_light || self.robot.is_loaded => Reach::All,
             reach => reach,
         };
         room.ticks[room.reach as usize] += 1;

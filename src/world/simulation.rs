@@ -11,11 +11,12 @@ use rapier3d::prelude::{PhysicsWorld, RigidBodyHandle};
 use crate::attach::attach;
 use crate::convert::{from_pose, from_vector, to_vector};
 use crate::departure::Motions;
-use crate::engine::{add_floor, engine};
+use crate::engine::{Owner, add_floor, engine};
 use crate::furniture::Sliding;
 use crate::link_pairs::LinkPairs;
 use crate::object::{self, Object};
 use crate::odometry::Tracker;
+use crate::patches::Patch;
 use crate::reach::Reach;
 use crate::recorder::Recorder;
 use crate::robot::Robot;
@@ -92,6 +93,10 @@ pub struct World {
     steps_per_second: u32,
     /// The engine's substeps in each step of the whole robot.
     pub(super) substeps: usize,
+    /// The friction of areas in contact.
+    pub(super) patches: BTreeMap<(Owner, Owner), Patch>,
+    /// A fixed body for what joins objects to the floor.
+    pub(super) floor: RigidBodyHandle,
     watch: Option<Watch>,
 }
 
@@ -109,7 +114,7 @@ struct Watch {
 /// [`WorldError`] if the robot's files or the physics settings are unusable.
 pub fn build(scene: &Scene) -> Result<World, WorldError> {
     let mut engine = engine(&scene.physics)?;
-    add_floor(&mut engine);
+    let floor = add_floor(&mut engine);
     let robot = Robot::insert(&mut engine, &scene.robot)?;
     let mut objects: Vec<Object> =
         scene.objects.iter().enumerate().map(|(idx, object)| object::insert(&mut engine, idx, object)).collect();
@@ -141,6 +146,8 @@ pub fn build(scene: &Scene) -> Result<World, WorldError> {
         steps_per_tick,
         steps_per_second,
         substeps: scene.physics.iterations as usize,
+        patches: BTreeMap::new(),
+        floor,
         watch: None,
     };
     world.link_pairs = world.find_link_pairs();
@@ -232,6 +239,7 @@ impl World {
         let dt = 1.0 / f64::from(self.steps_per_second);
         self.robot.begin_tick();
         self.prepare_contacts();
+        self.rub(reach);
         for step in 0..self.steps_per_tick {
             if reach == Reach::Hand && self.is_pushed_hard() {
                 self.need_whole();
