@@ -96,9 +96,14 @@ fn a_fast_object_does_not_enter_fingers_of_many_pieces_deeper() {
         assert!(contacts.iter().any(|contact| is_of_robot(&contact.pair)), "{contacts:?}");
         depth_m
     };
-    for height in [0.3, 0.6, 1.0, 2.0] {
-        let [whole, pieces] = [false, true].map(|pieces| falling(pieces, height));
-        assert!(pieces < whole + 5e-4, "from {height} m, it enters by {pieces} m instead of {whole} m");
+    // How deep a single fall ends depends on the last bit, because the bar tumbles: the median of several counts.
+    for heights in [0.3, 0.8, 1.3, 1.8].map(|lowest| [0.0, 0.1, 0.2, 0.3, 0.4].map(|more| lowest + more)) {
+        let [whole, pieces] = [false, true].map(|pieces| {
+            let mut depths = heights.map(|height| falling(pieces, height));
+            depths.sort_by(f64::total_cmp);
+            depths[2]
+        });
+        assert!(pieces < whole + 5e-4, "from {heights:?} m, it enters by {pieces} m instead of {whole} m");
     }
 }
 

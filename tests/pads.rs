@@ -55,7 +55,7 @@ fn in_hand(world: &World) -> Isometry3<f64> {
 /// Two pads that press with N each hold up to 2·µ·N: below 85 % of it nothing slips, above 110 % everything does. The arm gives
 /// way to objects of more than 1.2 kg, which are heavier than its effective mass, so that these may slip by some millimetres.
 #[test]
-fn two_pads_hold_what_weighs_less_than_twice_their_friction() {
+fn two_pads_hold_objects_that_weigh_less_than_twice_their_friction() {
     let model = block([0.06, 0.06, 0.15]);
     for force_n in [4.0, 7.0, 10.0] {
         let limit_kg = 2.0 * FRICTION * force_n / GRAVITY;
@@ -68,7 +68,7 @@ fn two_pads_hold_what_weighs_less_than_twice_their_friction() {
             (0..60).for_each(|_| world.step(&command));
             assert_eq!(world.fault(), None);
             let slipped = (in_hand(&world).translation.vector - before.translation.vector).norm();
-            // What exceeds the limit accelerates it.
+            // The excess over the limit accelerates it.
             let expected = GRAVITY * (share - 1.0).max(0.0) / 2.0;
             let case = format!("{share} of {limit_kg:.3} kg at {force_n} N");
             if share < 1.0 {
@@ -80,8 +80,7 @@ fn two_pads_hold_what_weighs_less_than_twice_their_friction() {
     }
 }
 
-/// A ball between the pads, which touch it at one point each, with its centre of mass beside the line between them. It stands on
-/// a narrow foot until it is gripped.
+/// A ball on a flat foot. The pads touch the ball at one point each, and its centre of mass is beside the line between them.
 fn unbalanced(lever_m: f64) -> Arc<ObjectModel> {
     let radius = 0.03;
     let about = 4e-4;
@@ -99,8 +98,8 @@ fn unbalanced(lever_m: f64) -> Arc<ObjectModel> {
     })
 }
 
-/// The largest torque of two pads on an object of this mass: what its weight leaves of the friction, times the lever of the
-/// friction about the middle of a pad.
+/// The largest torque of two pads on an object of this mass: the friction that its weight leaves, times the lever of the friction
+/// about the middle of a pad.
 fn largest_torque(mass_kg: f64, force_n: f64) -> f64 {
     let most = 2.0 * FRICTION * force_n;
     (most.powi(2) - (mass_kg * GRAVITY).powi(2)).sqrt() * PAD_LEVER_M

@@ -1,4 +1,4 @@
-//! The friction of areas in contact: what the contact points of the engine lack.
+//! The friction of areas in contact, which the contact points of the engine lack.
 //!
 //! A pad is soft, and touches an area, not a point: it resists an object that turns about the line between two fingers.
 //! Things that roll lose energy where they press each other. Both are torques with a limit: joints without a locked axis,
@@ -176,7 +176,7 @@ impl World {
         Some(Patch { joint: self.engine.impulse_joints.insert(bodies[0], bodies[1], data, false) })
     }
 
-    /// Returns what presses the moving objects, by pairs with such an object at the second place.
+    /// Returns the things that press the moving objects, by pairs with such an object at the second place.
     fn presses(&self) -> BTreeMap<(Owner, Owner), Press> {
         let mut found: BTreeMap<(Owner, Owner), Press> = BTreeMap::new();
         for pair in self.engine.narrow_phase.contact_pairs().filter(|pair| has_solved(pair)) {
@@ -200,7 +200,7 @@ impl World {
         found
     }
 
-    /// Returns whether two bodies need a look at their contact: the links of the robot, and what may roll.
+    /// Returns whether two bodies need a look at their contact: links of the robot, and things that may roll.
     fn may_rub(&self, owners: (Owner, Owner), bodies: [RigidBodyHandle; 2]) -> bool {
         let [one, other] = bodies.map(|handle| self.engine.bodies.get(handle).map(|body| from_vector(body.angvel())));
         matches!(owners.0, Owner::Link(_))

@@ -95,7 +95,7 @@ pub struct World {
     pub(super) substeps: usize,
     /// The friction of areas in contact.
     pub(super) patches: BTreeMap<(Owner, Owner), Patch>,
-    /// A fixed body for what joins objects to the floor.
+    /// A fixed body for the joints of objects to the floor.
     pub(super) floor: RigidBodyHandle,
     watch: Option<Watch>,
 }
