@@ -253,6 +253,12 @@ const CODES_R: &[Code] = &[
         "use `contact(?c, ?a, ?b)` or `self_contact(?c, ?a, ?b)`, in queries `w:between` or `w:betweenLinks`",
     ),
     code(
+        "R057",
+        "the margin of a property leaves out a formula",
+        "the formula is in the rule of a helper predicate, not of `success` or `violation`",
+        "write the formula in the rule that decides, or derive `margin`",
+    ),
+    code(
         "R060",
         "a SPARQL query has an error",
         "a syntax error, a designator outside the first group, or too much nesting",
@@ -275,6 +281,12 @@ const CODES_R: &[Code] = &[
         "a rule may make new things without end",
         "its new things satisfy its own conditions, directly or by way of other rules",
         "add a condition that new things don't satisfy; an evaluation ends with an error after a number of them, which `actcheck datalog --max-new` sets",
+    ),
+    code(
+        "R064",
+        "a property is no function of the facts",
+        "its query uses `RAND`, `NOW`, `UUID`, `STRUUID` or `BNODE`, which have another value each time",
+        "compare facts of the run instead; `actcheck query` may use these functions",
     ),
     code(
         "R070",
@@ -330,5 +342,11 @@ const CODES_R: &[Code] = &[
         "a constant of a fact to explain is unknown",
         "a misspelt name, or a value of another type: `1`, `1.0` and `\"1\"` differ",
         "compare it with the facts of the program",
+    ),
+    code(
+        "R094",
+        "a sum does not fit",
+        "the integers of a `#sum` add up to more than 64 bits, or its doubles to more than the largest double",
+        "sum doubles, as in `?x = DOUBLE(?n)`, or fewer values in each group",
     ),
 ];

@@ -174,7 +174,7 @@ impl Program {
         let mut checking = Checking::new(&mut terms, None);
         checking.define(&syntax, Role::Standalone);
         define_declared(&mut checking, &syntax);
-        let imports = define_imports(&mut checking, &syntax, folder);
+        let imports = define_imports(&mut checking, &syntax, folder, &limits);
         let mut program = checking.rules(&syntax, Role::Standalone);
         let (predicates, found) = (checking.predicates, checking.diagnostics);
         diagnostics.extend(found);

@@ -23,7 +23,7 @@ pub struct Summary {
 /// Runs a program: reads its imports (relative to its folder), evaluates it, and writes its exports below `out_dir`.
 ///
 /// # Errors
-/// All errors of the program and its files; the budget was exceeded (`R090`); an export can't be written (`R073`); the
+/// All errors of the program and its files; the budget was exceeded (`R090`); a sum does not fit (`R094`); an export can't be written (`R073`); the
 /// budget's `stop` was set (`R091`).
 pub fn run(path: &Path, out_dir: &Path, budget: &Budget) -> Result<Summary, Diagnostics> {
     run_as(path, out_dir, &Loading { budget: budget.clone(), lenient: false })
@@ -62,6 +62,10 @@ pub fn run_as(path: &Path, out_dir: &Path, loading: &Loading) -> Result<Summary,
 fn stopped(fault: &RuleFault, warnings: &Diagnostics, source: &Source) -> Diagnostics {
     if *fault == RuleFault::Interrupted {
         return Diagnostic::error("R091", fault.to_string()).in_source(source).into();
+    }
+    if let RuleFault::Value(reason) = fault {
+        let help = "sum doubles, as in `#sum(?x)` with `?x = DOUBLE(?n)`, or fewer values in each group";
+        return Diagnostic::error("R094", reason).in_source(source).help(help).into();
     }
     let mut found = Diagnostics::new();
     let help = if fault.reason().contains(NEW_THINGS) {
