@@ -284,9 +284,15 @@ const CODES_R: &[Code] = &[
     ),
     code(
         "R064",
-        "a property is no function of the facts",
+        "a property is not a function of the facts",
         "its query uses `RAND`, `NOW`, `UUID`, `STRUUID` or `BNODE`, which have another value each time",
         "compare facts of the run instead; `actcheck query` may use these functions",
+    ),
+    code(
+        "R065",
+        "a sum does not fit",
+        "the integers of a `#sum` add up to more than 64 bits, or its doubles to more than the largest double",
+        "sum doubles, as in `?x = DOUBLE(?n)`, or fewer values in each group",
     ),
     code(
         "R070",
@@ -303,7 +309,7 @@ const CODES_R: &[Code] = &[
     code(
         "R072",
         "an import can't be read",
-        "the file does not exist, is not local, is not UTF-8, is a cut `.gz`, or has another number of columns",
+        "the file does not exist, is not local, is not UTF-8, is a cut `.gz`, is nested too deeply, or has another number of columns",
         "correct the path or the columns; convert UTF-16 to UTF-8; imports read local files only",
     ),
     code(
@@ -317,6 +323,12 @@ const CODES_R: &[Code] = &[
         "rows or statements of an import can't be read",
         "rows lack fields, fields don't fit the column's format, a quote has no end, statements have wrong syntax, a JSON document is not valid, or an XML document is cut or demands too much",
         "correct the file at the places of the message; `--lenient` leaves out the rest",
+    ),
+    code(
+        "R075",
+        "rows of an export are not RDF statements",
+        "a subject is neither an IRI nor a blank node, or a predicate is not an IRI",
+        "export other columns, or derive IRIs with `IRI(…)`",
     ),
     code(
         "R080",
@@ -342,11 +354,5 @@ const CODES_R: &[Code] = &[
         "a constant of a fact to explain is unknown",
         "a misspelt name, or a value of another type: `1`, `1.0` and `\"1\"` differ",
         "compare it with the facts of the program",
-    ),
-    code(
-        "R094",
-        "a sum does not fit",
-        "the integers of a `#sum` add up to more than 64 bits, or its doubles to more than the largest double",
-        "sum doubles, as in `?x = DOUBLE(?n)`, or fewer values in each group",
     ),
 ];

@@ -133,7 +133,7 @@ fn known_format(checking: &mut Checking<'_>, source: &Source, transfer: &Transfe
 }
 
 /// Returns the stated compression, or that of the file's name.
-fn compression(settings: &mut Settings<'_>, path: &Path) -> Compression {
+pub(super) fn compression(settings: &mut Settings<'_>, path: &Path) -> Compression {
     let usual = match path.extension().is_some_and(|extension| extension == "gz") {
         true => Compression::Gzip,
         false => Compression::None,
@@ -240,7 +240,7 @@ fn columns_of_file(
     (found.ok()? == Found::Row).then_some(records.len())
 }
 
-fn rdf_format(format: &str, path: &Path) -> Option<RdfFormat> {
+pub(super) fn rdf_format(format: &str, path: &Path) -> Option<RdfFormat> {
     match format {
         "ntriples" => Some(RdfFormat::NTriples),
         "nquads" => Some(RdfFormat::NQuads),

@@ -12,7 +12,7 @@ use crate::standalone::sink::Sink;
 use actcheck_base::{Term, TermId, Terms, TurtleGuard, XmlGuard, XmlProgress};
 
 /// Nemo's name for the default graph.
-const DEFAULT_GRAPH: &str = "tag:nemo:defaultgraph";
+pub(super) const DEFAULT_GRAPH: &str = "tag:nemo:defaultgraph";
 
 /// Minimum length of the labels that the parser draws: 128 bits in hexadecimal digits, without zeros at the beginning.
 const RANDOM_LABEL: usize = 24;

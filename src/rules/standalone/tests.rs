@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use crate::Budget;
-use crate::standalone::{Engine, Program};
+use crate::standalone::{Engine, Loading, Program, run};
 use actcheck_base::Source;
 
 fn load(text: &str) -> Program {
@@ -121,5 +121,153 @@ fn programs_of_current_nemo_are_understood() {
     ] {
         let text = format!("@prefix xsd: <http://www.w3.org/2001/XMLSchema#> . {text}");
         assert_eq!(derived(&text, "q").replace(", ", " "), expected, "{text}");
+    }
+}
+
+/// Runs a program in a folder of its own. Returns its files with their texts.
+fn exported(text: &str) -> Vec<(String, String)> {
+    let folder = tempfile::tempdir().expect("there is a folder for temporary files");
+    let program = folder.path().join("p.rls");
+    std::fs::write(&program, text).expect("the folder is writable");
+    let out = folder.path().join("out");
+    let summary = run(&program, &out, &Budget::default()).unwrap_or_else(|faults| panic!("{faults}\n{text}"));
+    let read = |path: &std::path::PathBuf| {
+        let bytes = std::fs::read(path).expect("it was written");
+        let mut text = String::new();
+        if path.extension().is_some_and(|extension| extension == "gz") {
+            #[cfg(feature = "gzip")]
+            std::io::Read::read_to_string(&mut flate2::read::GzDecoder::new(bytes.as_slice()), &mut text)
+                .expect("it is compressed");
+        } else {
+            text = String::from_utf8(bytes).expect("it is text");
+        }
+        let name = path.strip_prefix(&out).expect("exports are below the folder").display().to_string();
+        let warnings: String = summary.warnings.iter().map(|warning| format!("{} ", warning.code)).collect();
+        (name, format!("{warnings}{text}"))
+    };
+    summary.written.iter().map(|(path, _)| read(path)).collect()
+}
+
+#[test]
+fn exports_are_tables_or_rdf() {
+    let facts = "@prefix e: <http://e/> . t(e:a, e:p, \"x\") . t(e:a, e:p, 2) . t(_:b, e:p, e:a) .
+        m(1, \"a,b\", 2.5) . m(2, b, 1.5) . m(\"3\", \"c\", 1.5) .";
+    for (export, name, text) in [
+        (
+            "@export t :- ntriples{} .",
+            "t.nt",
+            "<http://e/a> <http://e/p> \"x\" .\n\
+             <http://e/a> <http://e/p> \"2\"^^<http://www.w3.org/2001/XMLSchema#integer> .\n\
+             _:b <http://e/p> <http://e/a> .\n",
+        ),
+        ("@export t :- rdf{resource = \"o.nt\", limit = 1} .", "o.nt", "<http://e/a> <http://e/p> \"x\" .\n"),
+        (
+            "@export g :- nquads{} . g(e:g, ?s, ?p, ?o) :- t(?s, ?p, ?o), isString(?o) .",
+            "g.nq",
+            "<http://e/a> <http://e/p> \"x\" <http://e/g> .\n",
+        ),
+        (
+            "@export w :- ntriples{} . w(?s, ?p, ?o) :- t(?o, ?p, ?s), isIri(?p) .",
+            "w.nt",
+            "R075 <http://e/a> <http://e/p> _:b .\n",
+        ),
+        ("@export m :- csv{format = (int, string, skip)} .", "m.csv", "1,\"a,b\"\n"),
+        ("@export m :- tsv{format = (skip, skip, double), limit = 2} .", "m.tsv", "2.5\n1.5\n"),
+        #[cfg(feature = "gzip")]
+        (
+            "@export m :- csv{compression = \"gzip\", format = (int, any, any), limit = 1} .",
+            "m.csv.gz",
+            "1,\"\"\"a,b\"\"\",\"\"\"2.5\"\"^^<http://www.w3.org/2001/XMLSchema#double>\"\n",
+        ),
+        #[cfg(feature = "gzip")]
+        ("@export n :- csv{resource = \"x/n.csv.gz\"} . n(?x) :- m(?x, _, _), isInteger(?x) .", "x/n.csv.gz", "1\n2\n"),
+    ] {
+        let found = exported(&format!("{facts} {export}"));
+        assert_eq!(found, [(name.to_owned(), text.to_owned())], "{export}");
+    }
+    for export in ["turtle{}", "trig{}", "rdfxml{}"] {
+        let facts = facts.replace("_:b", "e:b");
+        let quads = if export == "trig{}" { "g(e:g, ?s, ?p, ?o) :- t(?s, ?p, ?o) . @export g" } else { "@export t" };
+        let (name, text) = exported(&format!("{facts} {quads} :- {export} .")).remove(0);
+        let folder = tempfile::tempdir().expect("there is a folder for temporary files");
+        std::fs::write(folder.path().join(&name), text).expect("the folder is writable");
+        let back = format!("@import t :- rdf{{resource = \"{name}\"}} .");
+        let program = Program::load(&Source::new("back.rls", back), folder.path()).expect("the export is valid");
+        let closure = program.close(Engine::Fast, &Budget::default()).expect("it is small");
+        assert_eq!(closure.count("t"), 3, "{name}");
+    }
+}
+
+#[test]
+fn wrong_exports_are_reported() {
+    for (export, code) in [
+        ("@export m :- turtle{} . m(1, 2) .", "R071"),
+        ("@export m :- rdf{resource = \"m.txt\"} . m(1, 2, 3) .", "R070"),
+        ("@export m :- csv{format = (int)} . m(1, 2) .", "R071"),
+        ("@export m :- csv{compression = \"zip\"} . m(1, 2) .", "R071"),
+        ("@export m :- ntriples{delimiter = \";\"} . m(1, 2, 3) .", "R071"),
+    ] {
+        let folder = tempfile::tempdir().expect("there is a folder for temporary files");
+        let program = folder.path().join("p.rls");
+        std::fs::write(&program, export).expect("the folder is writable");
+        let found = run(&program, folder.path(), &Budget::default()).expect_err(export);
+        assert!(found.iter().any(|fault| fault.code == code), "{export}: {found}");
+    }
+}
+
+#[test]
+fn parameters_have_the_values_that_the_caller_gives() {
+    let load = |text: &str, values: &[(&str, &str)]| {
+        let parameters = values.iter().map(|(name, value)| ((*name).to_owned(), (*value).to_owned())).collect();
+        let loading = Loading { parameters, ..Loading::default() };
+        Program::load_as(&Source::new("edge.rls", text), Path::new(""), &loading)
+    };
+    let text = "@parameter $limit . @parameter $twice = $limit * 2 . q($limit, $twice) .";
+    let closure = load(text, &[("limit", "-3")]).expect("it is set").close(Engine::Fast, &Budget::default());
+    assert_eq!(
+        closure.expect("it is small").tuples("q"),
+        [[actcheck_base::Term::Integer(-3), actcheck_base::Term::Integer(-6)]]
+    );
+    let text = "@parameter $name = \"a\" . q($name) .";
+    let closure = load(text, &[("name", "\"b\"")]).expect("it is set").close(Engine::Fast, &Budget::default());
+    assert_eq!(closure.expect("it is small").tuples("q"), [[actcheck_base::Term::string("b")]]);
+    for values in
+        [&[("names", "1")][..], &[("name", "")], &[("name", "?x")], &[("name", "1) . p(2")], &[("name", "1, 2")]]
+    {
+        let found = load(text, values).expect_err("it is wrong");
+        assert!(found.iter().all(|fault| ["R036", "R020"].contains(&fault.code)), "{found}");
+    }
+    assert!(load("@parameter $limit . q($limit) .", &[]).is_err());
+}
+
+#[test]
+#[cfg(feature = "gzip")]
+fn imports_end_at_the_budget_also_for_texts_without_facts() {
+    use std::io::Write as _;
+    let folder = tempfile::tempdir().expect("there is a folder for temporary files");
+    let pack = |name: &str, parts: &mut dyn Iterator<Item = String>| {
+        let file = std::fs::File::create(folder.path().join(name)).expect("the folder is writable");
+        let mut packed = flate2::write::GzEncoder::new(file, flate2::Compression::fast());
+        parts.for_each(|part| packed.write_all(part.as_bytes()).expect("there is room"));
+        packed.finish().expect("there is room");
+    };
+    let many = |text: &str| std::iter::repeat_n(text.repeat(10_000), 300);
+    pack("brackets.ttl.gz", &mut std::iter::once("<a:a> <a:b> ".to_owned()).chain(many("(")));
+    pack("lists.ttl.gz", &mut std::iter::once("<a:a> <a:b> ".to_owned()).chain(many("(1 ")));
+    pack("prefixes.ttl.gz", &mut (0..2_000_000).map(|n| format!("@prefix p{n}: <a:{n}> .\n")));
+    pack("row.csv.gz", &mut many(",,,,,,,,,,"));
+    pack("list.ttl.gz", &mut std::iter::once("<a:a> <a:b> (".to_owned()).chain(many("1 2 3 ")));
+    for (format, name, code) in [
+        ("turtle", "brackets.ttl.gz", "R072"),
+        ("turtle", "lists.ttl.gz", "R072"),
+        ("turtle", "prefixes.ttl.gz", "R090"),
+        ("csv", "row.csv.gz", "R090"),
+        ("turtle", "list.ttl.gz", "R090"),
+    ] {
+        let columns = if format == "csv" { ", format = (any, any)" } else { "" };
+        let text = format!("@import t :- {format}{{resource = \"{name}\"{columns}}} .");
+        let loading = Loading::within(&Budget { bytes: 64 << 20, secs: 60.0, ..Budget::default() });
+        let found = Program::load_as(&Source::new("p.rls", text), folder.path(), &loading).expect_err(name);
+        assert!(found.iter().all(|fault| fault.code == code), "{name}: {found}");
     }
 }

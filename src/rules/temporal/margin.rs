@@ -51,7 +51,7 @@ pub(crate) fn add_margin(checking: &mut Checking<'_>, program: &mut Program, syn
     program.rules.extend(largest);
 }
 
-/// Warns (R057) of formulas in the rules of helper predicates: their robustness is no part of the margin.
+/// Warns (R057) of formulas in the rules of helper predicates: their robustness is not part of the margin.
 fn warn_of_helpers(checking: &mut Checking<'_>, program: &Program, decisive: PredicateId) {
     let (mut reached, mut waiting) = (BTreeSet::new(), vec![decisive]);
     while let Some(predicate) = waiting.pop() {
