@@ -215,7 +215,7 @@ fn pipes_without_a_writer_and_endless_devices_stay_within_the_budget() {
     let folder = folder(&[]);
     let made = std::process::Command::new("mkfifo").arg(folder.path().join("pipe.csv")).status().unwrap();
     assert!(made.success());
-    let limited = |bytes, secs| Loading { budget: Budget { bytes, secs, ..Budget::default() }, lenient: false };
+    let limited = |bytes, secs| Loading::within(&Budget { bytes, secs, ..Budget::default() });
     let text = "@import p :- csv{resource = \"pipe.csv\", format = (int)} .";
     let found = shown(&load(text, folder.path(), &limited(usize::MAX, 0.05)).unwrap_err());
     assert!(found.contains("R090") && found.contains("exceeded the limit of time"), "{found}");
@@ -236,7 +236,7 @@ fn pipes_without_a_writer_and_endless_devices_stay_within_the_budget() {
 fn facts_of_imports_stay_within_the_memory() {
     let rows: String = (0..20_000).map(|n| format!("{n}\n")).collect();
     let folder = folder(&[("t.csv", rows.as_bytes()), ("one.csv", b"1\n")]);
-    let limited = |bytes| Loading { budget: Budget { bytes, ..Budget::default() }, lenient: true };
+    let limited = |bytes| Loading { lenient: true, ..Loading::within(&Budget { bytes, ..Budget::default() }) };
     let import = |file| format!("@import p :- csv{{resource = \"{file}\", format = (int)}} .\n");
     let found = shown(&load(&import("t.csv"), folder.path(), &limited(200_000)).unwrap_err());
     assert!(found.contains("R090") && found.contains("exceeded the limit of memory"), "{found}");

@@ -4,7 +4,8 @@
     python3 benches/engines/compare.py [--actcheck PROGRAM] [--rounds N] [--only TASK] [--by-hand]
 
 The programs are closure (alone, and with a condition that changes nothing), same generation, Andersen's points-to
-analysis, triangles of a graph with hubs, and a points-to analysis like Souffle's example hmmer; see programs.py. Runs
+analysis, triangles of a graph with hubs, a points-to analysis like Souffle's example hmmer, and joins by equal and by
+computed values; see programs.py. Runs
 each engine in a process of its own, checks that all count the same tuples of `p`, and prints seconds and ratios. Seconds
 are processor time of the whole process, including parsing: the least of the rounds, in which the engines alternate.
 
@@ -54,7 +55,7 @@ def swi(folder, task):
     tables = "".join(f":- table {name}/{size}.\n" for name, size in derived.items())
     tables += "".join(f":- dynamic {name}/{size}.\n" for name, size in given.items())
     (folder / "program.pl").write_text(
-        ":- style_check(-discontiguous).\n" + tables + programs.write_rules(rules, "tnot ", ".") + programs.write_facts(facts, ".")
+        ":- style_check(-discontiguous).\n" + tables + programs.write_rules(rules, "tnot ", ".", equals="is") + programs.write_facts(facts, ".")
     )
     goal = f"aggregate_all(count, p({', '.join('_' * derived['p'])}), N), format('p ~w~n', [N]), halt"
     # The default of 1 GB is too small for tables of this size.
@@ -82,7 +83,8 @@ def duckdb(folder, task, python):
     loads = ""
     for table, rows in facts.items():
         (folder / f"{table}.csv").write_text("".join(",".join(map(str, row)) + "\n" for row in rows))
-        loads += f"base.execute(\"create table {table} as select * from read_csv('{table}.csv', names=['a', 'b'])\")\n"
+        names = ["a", "b"][: len(rows[0])]
+        loads += f"base.execute(\"create table {table} as select * from read_csv('{table}.csv', names={names})\")\n"
     (folder / "query.py").write_text(
         f"import duckdb\nbase = duckdb.connect()\nbase.execute('set threads = 1')\n{loads}"
         f"print('p', base.execute({programs.SQL[name]!r}).fetchone()[0])\n"

@@ -1,10 +1,11 @@
 """The programs that compare.py runs, their facts, and how each engine writes them.
 
-A rule is a head and a body of atoms, each a tuple of the predicate and its arguments: variables begin with a capital
-letter, and a predicate that begins with `!` is negated.
+A rule is a head and a body of atoms and conditions: variables begin with a capital letter, a predicate that begins with
+`!` is negated, and a condition such as `J = I + 1` has no parentheses.
 """
 
 import random
+import re
 
 
 def rules(text):
@@ -12,7 +13,8 @@ def rules(text):
     found = []
     for line in text.strip().splitlines():
         head, _, body = line.strip().rstrip(".").partition(":-")
-        atoms = [atom.strip() for atom in body.replace("),", ")\n").splitlines()]
+        # Commas outside of parentheses.
+        atoms = [atom.strip() for atom in re.split(r",(?![^(]*\))", body)]
         found.append((head.strip(), [atom for atom in atoms if atom]))
     return found
 
@@ -133,6 +135,17 @@ open(O) :- q(U, V), isptr(V, O).
 open(O) :- load(V, A), isptr(A, O), !lptr(V).
 open(O) :- store(V, A), isptr(A, O), !lptr(V)."""
 
+# Joins by equal and by computed values.
+EQUAL = "p(A, B) :- r(A), s(B), A = B."
+NEXT = "p(I, J) :- r(I), J = I + 1, s(J)."
+BEFORE = "p(I, J) :- r(I), s(J), I = J - 1."
+CHAIN = """
+p(I) :- first(I).
+p(J) :- p(I), J = I + 1, s(J)."""
+CHAIN_BEFORE = """
+p(I) :- first(I).
+p(J) :- p(I), s(J), I = J - 1."""
+
 # DuckDB can't express programs in which several predicates depend on each other.
 SQL = {
     "closure": "with recursive p(x, y) as (select * from e union select p.x, e.b from p join e on p.y = e.a) select count(*) from p",
@@ -140,6 +153,9 @@ SQL = {
     "select p.x, e.b from p, reached, e where p.y = e.a and e.b = reached.b) select count(*) from p",
     "same generation": "with recursive p(x, y) as (select l.a, r.a from up l join up r on l.b = r.b union "
     "select l.a, r.a from p join up l on p.x = l.b join up r on p.y = r.b) select count(*) from p",
+    "join by =": "select count(*) from r, s where r.a = s.a",
+    "join by the next number": "select count(*) from r, s where s.a = r.a + 1",
+    "join by the number before": "select count(*) from r, s where r.a = s.a - 1",
     "triangles": "select count(*) from (select distinct x.a, y.a, y.b from e x, e y, e z where x.b = y.a and z.a = x.a and z.b = y.b)",
 }
 
@@ -147,6 +163,7 @@ SQL = {
 def tasks():
     """Name, rules and facts by predicate of each program."""
     edges = sorted(set(graph()))
+    numbers = [(number,) for number in range(8_000)]
     return [
         ("closure", rules(CLOSURE), {"e": edges}),
         ("closure with a harmless condition", rules(HARMLESS), {"e": edges}),
@@ -154,10 +171,22 @@ def tasks():
         ("Andersen's points-to", rules(ANDERSEN), pointers()),
         ("triangles", rules(TRIANGLES), {"e": hubs()}),
         ("hmmer-like points-to", rules(MEMORY), memory()),
+        ("join by =", rules(EQUAL), {"r": numbers, "s": numbers}),
+        ("join by the next number", rules(NEXT), {"r": numbers, "s": numbers}),
+        ("join by the number before", rules(BEFORE), {"r": numbers, "s": numbers}),
+        ("chain of next numbers", rules(CHAIN), {"first": [(0,)], "s": numbers}),
+        ("chain of numbers before", rules(CHAIN_BEFORE), {"first": [(0,)], "s": numbers}),
     ]
 
 
+def is_condition(atom):
+    return "(" not in atom
+
+
 def arguments(atom):
+    """The arguments of an atom, or the variables of a condition."""
+    if is_condition(atom):
+        return re.findall(r"\b[A-Z]\w*", atom)
     return [part.strip() for part in atom[atom.index("(") + 1 : -1].split(",")]
 
 
@@ -168,17 +197,19 @@ def arity(atom):
 def predicates(program):
     """The arities of the predicates of heads, and of those in bodies only."""
     derived = {head.split("(")[0]: arity(head) for head, _ in program}
-    given = {a.lstrip("!").split("(")[0]: arity(a) for _, body in program for a in body}
+    given = {a.lstrip("!").split("(")[0]: arity(a) for _, body in program for a in body if not is_condition(a)}
     return derived, {name: size for name, size in given.items() if name not in derived}
 
 
-def write_rules(program, negation, end, variable=lambda v: v, constant=lambda c: c):
+def write_rules(program, negation, end, variable=lambda v: v, constant=lambda c: c, equals="="):
     """Writes rules; a variable that occurs once becomes `_`."""
     lines = []
     for head, body in program:
         used = [v for atom in [head, *body] for v in arguments(atom)]
 
         def shown(atom):
+            if is_condition(atom):
+                return re.sub(r"\b[A-Z]\w*", lambda found: variable(found[0]), atom).replace("=", equals)
             name, negated = atom.lstrip("!").split("(")[0], atom.startswith("!")
             args = [
                 (variable(v) if used.count(v) > 1 else "_") if v[0].isupper() else constant(v) for v in arguments(atom)

@@ -44,6 +44,15 @@ pub struct DatalogArgs {
     /// Leave out rows and statements of imported files that can't be read, with a warning
     #[arg(long)]
     pub lenient: bool,
+    /// Value of a parameter instead of that in the program, such as limit=1 or 'name="cup"'; may be repeated
+    #[arg(long = "param", value_name = "NAME=VALUE", value_parser = parameter)]
+    pub parameters: Vec<(String, String)>,
+}
+
+/// Parses the name and value of a parameter.
+fn parameter(text: &str) -> Result<(String, String), String> {
+    let (name, value) = text.split_once('=').ok_or("write the name, `=` and the value, such as `limit=1`")?;
+    Ok((name.trim().trim_start_matches('$').to_owned(), value.trim().to_owned()))
 }
 
 /// Runs a standalone program, or explains why one of its facts holds or does not. Returns the exit code: 1 if the fact
@@ -51,7 +60,8 @@ pub struct DatalogArgs {
 pub fn datalog(args: &DatalogArgs, stop: &Arc<AtomicBool>) -> Result<u8, Diagnostics> {
     let (tuples, bytes, secs) = (args.max_tuples, args.max_memory, args.max_time);
     let budget = Budget { tuples, bytes, secs, new_things: args.max_new, stop: Arc::clone(stop) };
-    let loading = Loading { budget: budget.clone(), lenient: args.lenient };
+    let parameters = args.parameters.iter().cloned().collect();
+    let loading = Loading { budget: budget.clone(), lenient: args.lenient, parameters };
     if let Some(statement) = &args.trace {
         let source = Files::Disk.read_program(&args.file).map_err(|why| {
             Diagnostic::error("X005", format!("{}: {why}", args.file.display())).help("name a file with rules (.rls)")

@@ -10,7 +10,7 @@ use std::sync::Arc;
 use oxrdfio::{RdfFormat, RdfParseError, RdfParser};
 
 use crate::{file_iri, literal};
-use actcheck_base::{Diagnostic, Diagnostics, Files, Source, Span, Term, check_xml, names};
+use actcheck_base::{Diagnostic, Diagnostics, Files, Source, Span, Term, check_turtle, check_xml, names};
 
 /// Importing this IRI adds the ontology embedded in the program, independent of the importing file's location.
 const SHIPPED: &str = "https://w3id.org/actcheck/ontology";
@@ -18,6 +18,8 @@ const SHIPPED_FOLDER: &str = "ontology";
 const SHIPPED_ROOT: &str = "actions.ttl";
 /// Maximum number of syntax errors reported per file; more are usually consequences of the first ones.
 const MOST_SYNTAX_ERRORS: usize = 5;
+/// Maximum number of statements of all files; each takes about 200 bytes.
+const MOST_STATEMENTS: usize = 2_000_000;
 /// Maximum number of imported files; more indicate a mistake.
 const MOST_FILES: usize = 200;
 
@@ -98,7 +100,7 @@ pub(super) fn read(files: &Files, root: &Path, found: &mut Diagnostics) -> Readi
 /// `document` distinguishes the blank nodes of several sources.
 ///
 /// # Errors
-/// `O002` for each syntax error, at most five; `O013` if parsing XML could exhaust time or memory.
+/// `O002` for each syntax error, at most five; `O013` if parsing could exhaust time or memory.
 pub fn triples_of(source: &Source, document: usize) -> Result<Vec<[Term; 3]>, Diagnostics> {
     let (mut statements, mut found) = (Vec::new(), Diagnostics::new());
     parse(source, document, "", &mut statements, &mut found);
@@ -144,6 +146,12 @@ fn parse(source: &Source, text: usize, base: &str, statements: &mut Vec<Statemen
         found.extend(faults);
         return;
     }
+    if format == RdfFormat::Turtle
+        && let Err(faults) = check_turtle(source, "O013")
+    {
+        found.extend(faults);
+        return;
+    }
     let position = Rc::new(Cell::new(mark_length(source)));
     let lines = Lines { text: source.text.as_bytes(), position: Rc::clone(&position) };
     let parser = RdfParser::from_format(format).with_base_iri(base).unwrap_or_else(|_| RdfParser::from_format(format));
@@ -151,6 +159,12 @@ fn parse(source: &Source, text: usize, base: &str, statements: &mut Vec<Statemen
     let mut errors = 0;
     for quad in parser.for_reader(lines) {
         let end = position.get();
+        if statements.len() == MOST_STATEMENTS {
+            let message = format!("the ontology has more than {MOST_STATEMENTS} statements");
+            let help = "an ontology describes kinds of things; keep data in files that `actcheck datalog` imports";
+            found.push(Diagnostic::error("O013", message).at(source, line_before(&source.text, end)).help(help));
+            return;
+        }
         match quad {
             Ok(quad) => {
                 let subject = literal::subject(&quad.subject, |id| blank(&mut blanks, text, id));

@@ -278,6 +278,29 @@ mod tests {
     }
 
     #[test]
+    fn a_formula_in_a_helper_predicate_is_noted() {
+        let warned = |text: &str| {
+            let prefixes = "@prefix w: <https://w3id.org/actcheck/world#> .";
+            let rules = Rules::parse(&format!("{prefixes} {text}")).expect("the rules are valid");
+            rules.warnings().iter().any(|warning| warning.code == "R057" && warning.place().is_some())
+        };
+        let kept = "kept(?o) :- after(?o, w:z, _), always(w:tilt(?o) < 0.5) .";
+        assert!(warned(&format!("{kept} success(?o) :- kept(?o) .")));
+        assert!(warned(&format!("{kept} held(?o) :- kept(?o) . violation(?o) :- after(?o, w:z, _), ~held(?o) .")));
+        assert!(!warned(&format!("{kept} success(?o) :- kept(?o) . margin(0.1) :- kept(_) .")));
+        assert!(!warned("success(?o) :- after(?o, w:z, _), always(w:tilt(?o) < 0.5) ."));
+    }
+
+    #[test]
+    #[cfg(feature = "sparql")]
+    fn a_property_is_a_function_of_the_facts() {
+        for query in ["ASK { FILTER(RAND() < 0.5) }", "SELECT (NOW() AS ?because) { ?s ?p ?o }"] {
+            let found = Rules::builder().build("rules.rq", query).expect_err("it varies");
+            assert!(found.iter().any(|fault| fault.code == "R064" && fault.place().is_some()), "{found}");
+        }
+    }
+
+    #[test]
     fn an_exceeded_budget_is_a_timeout() {
         let rules = Rules::builder()
             .budget(Budget { tuples: 1, ..Budget::default() })

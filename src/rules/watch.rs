@@ -20,8 +20,9 @@ pub(crate) enum Stop {
     Time,
     /// The caller requested a stop.
     Requested,
-    /// A quantity over time that a rule reads was not recorded; the watch has the text.
-    Unrecorded,
+    /// A value that a rule reads does not exist: a quantity over time was not recorded, or a sum is too large. The watch
+    /// has the text.
+    Value,
 }
 
 /// Minimum running time before a requested stop takes effect. The properties of a pick take about a millisecond, so
@@ -81,7 +82,7 @@ pub(crate) struct Watch {
     /// Text processed since the last check of the clock. Unit: bytes.
     work: Cell<usize>,
     stop: Cell<Option<Stop>>,
-    unrecorded: OnceCell<String>,
+    missing: OnceCell<String>,
     /// Whether the right sides of `implies` that a property needs count as false.
     fails_consequents: bool,
 }
@@ -96,7 +97,7 @@ impl Watch {
             made: Cell::new(0),
             work: Cell::new(0),
             stop: Cell::new(None),
-            unrecorded: OnceCell::new(),
+            missing: OnceCell::new(),
             fails_consequents: false,
         }
     }
@@ -120,7 +121,7 @@ impl Watch {
             made: Cell::new(0),
             work: Cell::new(0),
             stop: Cell::new(None),
-            unrecorded: OnceCell::new(),
+            missing: OnceCell::new(),
             fails_consequents: self.fails_consequents,
         }
     }
@@ -135,15 +136,15 @@ impl Watch {
         self.stop.get().map_or(Ok(()), Err)
     }
 
-    /// Stops the evaluation because a quantity was not recorded.
-    pub(crate) fn unrecorded(&self, text: String) {
-        self.unrecorded.get_or_init(|| text);
-        self.stop.set(Some(Stop::Unrecorded));
+    /// Stops the evaluation because a value does not exist, such as a quantity that was not recorded.
+    pub(crate) fn no_value(&self, text: String) {
+        self.missing.get_or_init(|| text);
+        self.stop.set(Some(Stop::Value));
     }
 
-    /// Returns which quantity was not recorded.
-    pub(crate) fn unrecorded_text(&self) -> &str {
-        self.unrecorded.get().map_or("a quantity over time was not recorded", String::as_str)
+    /// Returns which value does not exist.
+    pub(crate) fn value_text(&self) -> &str {
+        self.missing.get().map_or("a value does not exist", String::as_str)
     }
 
     /// Accounts for memory until it is released.

@@ -75,9 +75,9 @@ const CODES_O: &[Code] = &[
     ),
     code(
         "O013",
-        "an ontology in RDF/XML exceeds a limit of its structure",
-        "a damaged or malicious file: entities that grow, hundreds of attributes or namespaces, thousands of levels",
-        "don't use the file, or convert it to Turtle",
+        "an ontology exceeds a limit of its structure",
+        "a damaged or malicious file: entities that grow, hundreds of attributes or namespaces, thousands of levels, millions of statements",
+        "don't use the file; keep data in files that `actcheck datalog` imports",
     ),
     code(
         "O014",

@@ -253,6 +253,12 @@ const CODES_R: &[Code] = &[
         "use `contact(?c, ?a, ?b)` or `self_contact(?c, ?a, ?b)`, in queries `w:between` or `w:betweenLinks`",
     ),
     code(
+        "R057",
+        "the margin of a property leaves out a formula",
+        "the formula is in the rule of a helper predicate, not of `success` or `violation`",
+        "write the formula in the rule that decides, or derive `margin`",
+    ),
+    code(
         "R060",
         "a SPARQL query has an error",
         "a syntax error, a designator outside the first group, or too much nesting",
@@ -277,6 +283,18 @@ const CODES_R: &[Code] = &[
         "add a condition that new things don't satisfy; an evaluation ends with an error after a number of them, which `actcheck datalog --max-new` sets",
     ),
     code(
+        "R064",
+        "a property is not a function of the facts",
+        "its query uses `RAND`, `NOW`, `UUID`, `STRUUID` or `BNODE`, which have another value each time",
+        "compare facts of the run instead; `actcheck query` may use these functions",
+    ),
+    code(
+        "R065",
+        "a sum does not fit",
+        "the integers of a `#sum` add up to more than 64 bits, or its doubles to more than the largest double",
+        "sum doubles, as in `?x = DOUBLE(?n)`, or fewer values in each group",
+    ),
+    code(
         "R070",
         "an unknown format of an import or export",
         "the format is misspelt or not supported",
@@ -291,7 +309,7 @@ const CODES_R: &[Code] = &[
     code(
         "R072",
         "an import can't be read",
-        "the file does not exist, is not local, is not UTF-8, is a cut `.gz`, or has another number of columns",
+        "the file does not exist, is not local, is not UTF-8, is a cut `.gz`, is nested too deeply, or has another number of columns",
         "correct the path or the columns; convert UTF-16 to UTF-8; imports read local files only",
     ),
     code(
@@ -305,6 +323,12 @@ const CODES_R: &[Code] = &[
         "rows or statements of an import can't be read",
         "rows lack fields, fields don't fit the column's format, a quote has no end, statements have wrong syntax, a JSON document is not valid, or an XML document is cut or demands too much",
         "correct the file at the places of the message; `--lenient` leaves out the rest",
+    ),
+    code(
+        "R075",
+        "rows of an export are not RDF statements",
+        "a subject is neither an IRI nor a blank node, or a predicate is not an IRI",
+        "export other columns, or derive IRIs with `IRI(…)`",
     ),
     code(
         "R080",

@@ -6,7 +6,9 @@
 //! Never: depends on a predicate, a rule or a fact; a function depends only on its arguments, and stops at the budget.
 
 mod bits;
+mod dates;
 mod geometry;
+mod hashes;
 mod numeric;
 mod table;
 mod text;
@@ -17,6 +19,6 @@ pub(crate) use geometry::GEO3D;
 pub(crate) use numeric::{compare, equal};
 #[cfg(feature = "sparql")]
 pub(crate) use table::builtin_by_exact_name;
-pub(crate) use table::{Builtin, builtin, builtin_names};
-pub(crate) use text::{compile_pattern, matches};
+pub(crate) use table::{Builtin, builtin, builtin_names, is_equality, is_reserved};
+pub(crate) use text::{compile_pattern, compile_pattern_as, matches};
 pub(crate) use value::Value;

@@ -1,6 +1,6 @@
 //! Table of the built-ins: name, number of arguments, function.
 
-use crate::builtins::{Value, bits, geometry, numeric, text, types};
+use crate::builtins::{Value, bits, dates, geometry, hashes, numeric, text, types};
 use crate::model::values::text_len;
 use crate::watch::Watch;
 use actcheck_base::Term;
@@ -62,12 +62,17 @@ const fn entry(
     Builtin { name, min_args, max_args, apply: Apply::Plain(apply) }
 }
 
-const fn watched(name: &'static str, apply: fn(&[Value<'_>], &Watch) -> Option<Term>) -> Builtin {
-    Builtin { name, min_args: 2, max_args: 2, apply: Apply::Watched(apply) }
+const fn watched(
+    name: &'static str,
+    min_args: usize,
+    max_args: usize,
+    apply: fn(&[Value<'_>], &Watch) -> Option<Term>,
+) -> Builtin {
+    Builtin { name, min_args, max_args, apply: Apply::Watched(apply) }
 }
 
 /// Every built-in. The first six are also written as operators.
-static BUILTINS: [Builtin; 89] = [
+static BUILTINS: [Builtin; 109] = [
     entry("SUM", 1, MANY, numeric::sum),
     entry("MINUS", 2, 2, numeric::minus),
     entry("PRODUCT", 1, MANY, numeric::product),
@@ -118,8 +123,8 @@ static BUILTINS: [Builtin; 89] = [
     entry("STRENDS", 2, 2, text::ends),
     entry("STRBEFORE", 2, 2, text::before),
     entry("STRAFTER", 2, 2, text::after),
-    watched("REGEX", text::regex),
-    watched("LEVENSHTEIN", text::levenshtein),
+    watched("REGEX", 2, 3, text::regex),
+    watched("LEVENSHTEIN", 2, 2, text::levenshtein),
     entry("UCASE", 1, 1, text::ucase),
     entry("LCASE", 1, 1, text::lcase),
     entry("URIENCODE", 1, 1, text::uri_encode),
@@ -157,14 +162,52 @@ static BUILTINS: [Builtin; 89] = [
     entry("geo3d:boxesOverlap", 12, 12, geometry::boxes_overlap),
     entry("geo3d:overlapArea", 8, 8, geometry::overlap_area),
     entry("geo3d:degrees", 1, 1, geometry::degrees),
+    watched("REPLACE", 3, 4, text::replace),
+    entry("TRIM", 1, 1, text::trim),
+    entry("LTRIM", 1, 1, text::ltrim),
+    entry("RTRIM", 1, 1, text::rtrim),
+    entry("STRDT", 2, 2, types::str_dt),
+    entry("LANGMATCHES", 2, 2, types::lang_matches),
+    entry("YEAR", 1, 1, dates::year),
+    entry("MONTH", 1, 1, dates::month),
+    entry("DAY", 1, 1, dates::day),
+    entry("HOURS", 1, 1, dates::hours),
+    entry("MINUTES", 1, 1, dates::minutes),
+    entry("SECONDS", 1, 1, dates::seconds),
+    entry("TIMEZONE", 1, 1, dates::timezone),
+    entry("TZ", 1, 1, dates::tz),
+    entry("MD5", 1, 1, hashes::md5),
+    entry("SHA1", 1, 1, hashes::sha1),
+    entry("SHA256", 1, 1, hashes::sha256),
+    entry("SHA384", 1, 1, hashes::sha384),
+    entry("SHA512", 1, 1, hashes::sha512),
+    entry("SAMETERM", 2, 2, |a| Some(Term::Boolean(numeric::equal(&a[0], &a[1])))),
 ];
+
+/// Other names of built-ins, which Nemo uses.
+const ALIASES: [(&str, &str); 2] = [("INVERTSIGN", "INVERSE"), ("SUBTRACTION", "MINUS")];
+
+/// The names of these functions are common words, so that predicates may have them in another case.
+const COMMON: [&str; 9] = ["REPLACE", "TRIM", "YEAR", "MONTH", "DAY", "HOURS", "MINUTES", "SECONDS", "TIMEZONE"];
 
 /// Finds a built-in by name, ignoring case; geometry functions by their full IRI. Returns `None` if it is unknown.
 pub(crate) fn builtin(name: &str) -> Option<&'static Builtin> {
     if let Some(local) = name.strip_prefix(geometry::GEO3D) {
         return BUILTINS.iter().find(|b| b.name.strip_prefix("geo3d:") == Some(local));
     }
+    let alias = ALIASES.iter().find(|(alias, _)| alias.eq_ignore_ascii_case(name));
+    let name = alias.map_or(name, |(_, name)| name);
     BUILTINS.iter().find(|b| b.name.eq_ignore_ascii_case(name) && !b.name.contains(':'))
+}
+
+/// Returns whether no predicate of a property may have a name, because a built-in has it.
+pub(crate) fn is_reserved(name: &str) -> bool {
+    builtin(name).is_some_and(|builtin| builtin.name == name || !COMMON.contains(&builtin.name))
+}
+
+/// Returns whether a built-in compares two values as `=` does.
+pub(crate) fn is_equality(builtin: &Builtin) -> bool {
+    matches!(builtin.name, "EQUALITY" | "SAMETERM")
 }
 
 /// Returns all names, for "did you mean".

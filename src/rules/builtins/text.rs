@@ -117,28 +117,114 @@ pub(super) fn lcase(args: &[Value<'_>]) -> Option<Term> {
     map(args, str::to_lowercase)
 }
 
-pub(super) fn regex(args: &[Value<'_>], watch: &Watch) -> Option<Term> {
+pub(super) fn trim(args: &[Value<'_>]) -> Option<Term> {
+    map(args, |text| text.trim().to_owned())
+}
+
+pub(super) fn ltrim(args: &[Value<'_>]) -> Option<Term> {
+    map(args, |text| text.trim_start().to_owned())
+}
+
+pub(super) fn rtrim(args: &[Value<'_>]) -> Option<Term> {
+    map(args, |text| text.trim_end().to_owned())
+}
+
+/// Compiles the pattern and the optional flags that begin at an argument.
+fn pattern_of(args: &[Value<'_>], flags: usize, watch: &Watch) -> Option<regex::Regex> {
     pair(args)?;
-    let (Term::String(text) | Term::LangString(text, _)) = args[0].as_ref() else { return None };
+    let flags = match args.get(flags) {
+        Some(flags) => parts(flags)?.0,
+        None => "",
+    };
     watch.work(COMPILING)?;
-    let pattern = compile_pattern(parts(&args[1])?.0).ok()?;
+    compile_pattern_as(parts(&args[1])?.0, flags).ok()
+}
+
+pub(super) fn regex(args: &[Value<'_>], watch: &Watch) -> Option<Term> {
+    let pattern = pattern_of(args, 2, watch)?;
+    let (Term::String(text) | Term::LangString(text, _)) = args[0].as_ref() else { return None };
     matches(&pattern, text, watch).map(Term::Boolean)
 }
 
+/// Replaces all matches of a pattern: `$1` is the text of the first group. A pattern that matches the empty text has no
+/// result, as in SPARQL.
+pub(super) fn replace(args: &[Value<'_>], watch: &Watch) -> Option<Term> {
+    let pattern = pattern_of(args, 3, watch)?;
+    let (Term::String(text) | Term::LangString(text, _)) = args[0].as_ref() else { return None };
+    let by = replacement(parts(&args[2])?.0)?;
+    if pattern.is_match("") {
+        return None;
+    }
+    let most = watch.left();
+    let found = bounded(text, watch, move |text| {
+        let (mut out, mut last) = (String::new(), 0);
+        for found in pattern.captures_iter(text) {
+            let whole = found.get_match();
+            out.push_str(&text[last..whole.start()]);
+            found.expand(&by, &mut out);
+            last = whole.end();
+            if out.len() > most {
+                return out;
+            }
+        }
+        out.push_str(&text[last..]);
+        out
+    })?;
+    watch.make(found.len())?;
+    Some(tagged(found, parts(&args[0])?.1))
+}
+
+/// Converts a replacement of SPARQL, with `$1`, `\\$` and `\\\\`, to one of the library. Returns `None` if it is invalid.
+fn replacement(text: &str) -> Option<String> {
+    let mut out = String::new();
+    let mut chars = text.chars().peekable();
+    while let Some(c) = chars.next() {
+        match c {
+            '\\' => match chars.next()? {
+                '$' => out.push_str("$$"),
+                '\\' => out.push('\\'),
+                _ => return None,
+            },
+            '$' => {
+                let mut number = String::new();
+                while let Some(digit) = chars.next_if(char::is_ascii_digit) {
+                    number.push(digit);
+                }
+                if number.is_empty() {
+                    return None;
+                }
+                out.push_str(&format!("${{{number}}}"));
+            }
+            c => out.push(c),
+        }
+    }
+    Some(out)
+}
+
 /// Returns whether a text contains a match. Returns `None` if the time is over.
+pub(crate) fn matches(pattern: &regex::Regex, text: &Arc<str>, watch: &Watch) -> Option<bool> {
+    let pattern = pattern.clone();
+    bounded(text, watch, move |text| pattern.is_match(text))
+}
+
+/// Applies a pattern to a text. Returns `None` if the time is over.
 ///
 /// Matching takes time linear in the text, but the factor may be the size of the pattern, and it can't be interrupted.
 /// A long text is therefore matched in a thread, which is left to itself if the time is over.
-pub(crate) fn matches(pattern: &regex::Regex, text: &Arc<str>, watch: &Watch) -> Option<bool> {
+fn bounded<T: Send + 'static>(
+    text: &Arc<str>,
+    watch: &Watch,
+    apply: impl FnOnce(&str) -> T + Send + 'static,
+) -> Option<T> {
     if text.len() <= LONG_TEXT {
         watch.work(text.len())?;
-        return Some(pattern.is_match(text));
+        return Some(apply(text));
     }
     let (sender, receiver) = sync_channel(1);
-    let (pattern, text) = (pattern.clone(), Arc::clone(text));
+    let text = Arc::clone(text);
     // If no thread can be created, the sender is dropped and the receiver reports it.
     let _ = std::thread::Builder::new().spawn(move || {
-        let _ = sender.send(pattern.is_match(&text));
+        let _ = sender.send(apply(&text));
     });
     loop {
         match receiver.recv_timeout(LOOK_EVERY) {
@@ -149,12 +235,28 @@ pub(crate) fn matches(pattern: &regex::Regex, text: &Arc<str>, watch: &Watch) ->
     }
 }
 
-/// Compiles a pattern. Matching takes time linear in the text.
+/// Compiles a pattern without flags.
 ///
 /// # Errors
 /// The reason why the pattern is invalid.
 pub(crate) fn compile_pattern(pattern: &str) -> Result<regex::Regex, String> {
-    regex::RegexBuilder::new(pattern).size_limit(PATTERN_LIMIT).build().map_err(|error| {
+    compile_pattern_as(pattern, "")
+}
+
+/// Compiles a pattern with the flags of SPARQL: `i`, `m`, `s`, `x` and `q`. Matching takes time linear in the text.
+///
+/// # Errors
+/// The reason why the pattern or a flag is invalid.
+pub(crate) fn compile_pattern_as(pattern: &str, flags: &str) -> Result<regex::Regex, String> {
+    if let Some(flag) = flags.chars().find(|flag| !"imsxq".contains(*flag)) {
+        return Err(format!("unknown flag `{flag}`; the flags are i, m, s, x and q"));
+    }
+    let has = |flag| flags.contains(flag);
+    let escaped = if has('q') { regex::escape(pattern) } else { pattern.to_owned() };
+    let mut builder = regex::RegexBuilder::new(&escaped);
+    builder.size_limit(PATTERN_LIMIT).case_insensitive(has('i')).multi_line(has('m'));
+    builder.dot_matches_new_line(has('s')).ignore_whitespace(has('x') && !has('q'));
+    builder.build().map_err(|error| {
         error.to_string().lines().last().unwrap_or("syntax error").trim_start_matches("error: ").to_owned()
     })
 }

@@ -114,6 +114,21 @@ pub(super) fn str_lang(args: &[Value<'_>]) -> Option<Term> {
     }
 }
 
+pub(super) fn str_dt(args: &[Value<'_>]) -> Option<Term> {
+    match (args[0].as_ref(), args[1].as_ref()) {
+        (Term::String(text), Term::Iri(datatype)) => Some(values::literal(text, datatype)),
+        _ => None,
+    }
+}
+
+/// Returns whether a language tag is in a range: `en-GB` is in `en`, and every tag is in `*`.
+pub(super) fn lang_matches(args: &[Value<'_>]) -> Option<Term> {
+    let (Term::String(tag), Term::String(range)) = (args[0].as_ref(), args[1].as_ref()) else { return None };
+    let (tag, range) = (tag.to_ascii_lowercase(), range.to_ascii_lowercase());
+    let begins = tag.strip_prefix(&range).is_some_and(|rest| rest.is_empty() || rest.starts_with('-'));
+    Some(Term::Boolean(if range == "*" { !tag.is_empty() } else { begins }))
+}
+
 fn is(args: &[Value<'_>], kind: fn(&Term) -> bool) -> Option<Term> {
     Some(Term::Boolean(kind(&args[0])))
 }

@@ -152,7 +152,7 @@ impl<'a> Checking<'a> {
             let help = "define it in the file of one property, which `act:verifiedBy` links";
             return self.error("R034", source, &head.name_span, format!("a library can't define `{name}`"), help);
         }
-        if role != Role::Standalone && builtins::builtin(name).is_some() {
+        if role != Role::Standalone && builtins::is_reserved(name) {
             let help = "choose another name";
             return self.error("R038", source, &head.name_span, format!("`{name}` is a built-in function"), help);
         }

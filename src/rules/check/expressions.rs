@@ -197,8 +197,15 @@ impl Translation<'_, '_> {
 
     pub(crate) fn call(&mut self, name: &str, args: Vec<Expr>, span: &Span) -> Option<Expr> {
         let builtin = self.builtin(name, args.len(), span)?;
-        if let ("REGEX", [_, Expr::Constant(Term::String(pattern))]) = (builtin.name, args.as_slice()) {
-            return match builtins::compile_pattern(pattern) {
+        let pattern = match (builtin.name, args.as_slice()) {
+            ("REGEX", [_, Expr::Constant(Term::String(pattern))]) => Some(builtins::compile_pattern(pattern)),
+            ("REGEX", [_, Expr::Constant(Term::String(pattern)), Expr::Constant(Term::String(flags))]) => {
+                Some(builtins::compile_pattern_as(pattern, flags))
+            }
+            _ => None,
+        };
+        if let Some(pattern) = pattern {
+            return match pattern {
                 Ok(pattern) => args.into_iter().next().map(|text| Expr::Matches(Box::new(text), Box::new(pattern))),
                 Err(reason) => {
                     self.error("R033", span, format!("invalid pattern: {reason}"), "see https://docs.rs/regex/#syntax");

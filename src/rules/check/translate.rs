@@ -42,7 +42,7 @@ pub(crate) fn translate(checking: &mut Checking<'_>, syntax: &Syntax, role: Role
                 program.rules.extend(Translation::new(checking, &syntax.source, role, &globals).making(rule));
             }
             Statement::Rule(rule) => {
-                for head in &rule.heads {
+                for head in 0..rule.heads.len() {
                     let rules = Translation::new(checking, &syntax.source, role, &globals).rule(rule, head);
                     program.rules.extend(rules);
                 }
@@ -100,11 +100,15 @@ impl<'c, 'a> Translation<'c, 'a> {
         self.checking.error(code, self.source, span, message, help);
     }
 
-    /// Returns the helper rules followed by the checked rule; empty if an error was reported.
-    fn rule(mut self, rule: &RuleSyntax, head: &AtomSyntax) -> Vec<Rule> {
+    /// Returns the helper rules followed by the checked rule of one head; empty if an error was reported.
+    fn rule(mut self, rule: &RuleSyntax, head: usize) -> Vec<Rule> {
         for literal in &rule.body {
             self.literal(literal);
         }
+        for (_, other) in rule.heads.iter().enumerate().filter(|(idx, _)| *idx != head) {
+            self.values(other);
+        }
+        let head = &rule.heads[head];
         let (predicate, args) = match self.predicate(head, true) {
             Some(found) => found,
             None => return Vec::new(),
@@ -133,6 +137,22 @@ impl<'c, 'a> Translation<'c, 'a> {
         let mut rules = self.extra;
         rules.push(Rule { head, body: self.body, aggregation, variables, head_names, origin, making: None });
         rules
+    }
+
+    /// Adds the computed values of another head as conditions: a rule applies to a match as a whole or not at all.
+    fn values(&mut self, head: &AtomSyntax) {
+        // Its own translation reports wrong predicates. The faults here are those of the other head, not of this one.
+        let faulty = self.faulty;
+        let args = self.predicate(head, true).map_or(Vec::new(), |(_, args)| args);
+        let mut unused = Aggregation { group: Vec::new(), aggregates: Vec::new(), after: Vec::new() };
+        for arg in args.iter().filter(|arg| !matches!(arg.kind, ExpressionKind::Variable(_))) {
+            let before = self.body.len();
+            self.head_argument(arg, Some(&mut unused));
+            if matches!(self.body.last(), Some(Literal::Assign { value, .. }) if value.is_total()) {
+                self.body.truncate(before);
+            }
+        }
+        self.faulty = faulty;
     }
 
     fn fact(mut self, head: &AtomSyntax) -> Option<(PredicateId, Vec<TermId>)> {

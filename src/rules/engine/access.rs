@@ -5,11 +5,14 @@ use std::collections::HashMap;
 use std::sync::Arc;
 
 use crate::check::stratify::Stratum;
+use crate::engine::equal::{Keyed, KeyedRows};
 use crate::engine::evaluate::{Grown, Layers};
+use crate::engine::meter::{Meter, Stop};
 use crate::engine::plan::{Indexes, Part};
 use crate::engine::relation::{Batch, permuted_rows};
 use crate::engine::variant::UNQUESTIONED;
 use crate::model::program::{PredicateId, Predicates};
+use crate::model::universe::Universe;
 use actcheck_base::TermId;
 
 /// The tuples of a recursive stratum while they grow.
@@ -32,6 +35,8 @@ pub(crate) struct Access<'a> {
     planned: &'a Indexes,
     pub(crate) indexes: Cow<'a, Indexes>,
     added: HashMap<(PredicateId, usize), Arc<[TermId]>>,
+    /// Rows sorted by computed values.
+    keyed: HashMap<PredicateId, HashMap<String, KeyedRows>>,
     /// Number of distinct values of each column, with the number of rows when they were counted.
     distinct: HashMap<PredicateId, (usize, Vec<f64>)>,
     /// Memory of the added indexes that the budget doesn't know yet. Unit: bytes.
@@ -49,6 +54,7 @@ impl<'a> Access<'a> {
             planned,
             indexes: Cow::Borrowed(planned),
             added: HashMap::new(),
+            keyed: HashMap::new(),
             distinct: HashMap::new(),
             unaccounted: 0,
             rows_read: 0,
@@ -84,6 +90,54 @@ impl<'a> Access<'a> {
         });
         found.push(Batch::Shared(Arc::clone(rows)));
         found
+    }
+
+    /// Returns the rows of a part of a predicate that are sorted by a computed value.
+    pub(crate) fn keyed<'b>(
+        &mut self,
+        keyed: &Arc<Keyed>,
+        part: Part,
+        layers: &'b Layers<'_>,
+        own: Option<Own<'b>>,
+        universe: &mut Universe<'_>,
+        meter: &mut Meter,
+    ) -> Result<Vec<Batch<'b>>, Stop> {
+        let (predicate, name) = keyed.id();
+        if !self.keyed.get(&predicate).is_some_and(|known| known.contains_key(name)) {
+            let [old, recent] = [Part::Old, Part::Recent].map(|part| self.batches(predicate, part, 0, layers, own));
+            // The parts of finished tuples are equal.
+            let is_own = own.is_some_and(|own| own.place(predicate).is_some());
+            let recent = if is_own { recent } else { Vec::new() };
+            let width = self.predicates.get(predicate).width;
+            let rows = KeyedRows::new(keyed, (&old, &recent), width, universe, meter)?;
+            self.keyed.entry(predicate).or_default().insert(name.to_owned(), rows);
+        }
+        let mut found = Vec::new();
+        if let Some(rows) = self.keyed.get(&predicate).and_then(|known| known.get(name)) {
+            rows.batches(part, &mut found);
+        }
+        Ok(found)
+    }
+
+    /// Begins a round of a recursive stratum for the rows that are sorted by computed values. `places`: the predicates of
+    /// the stratum that may have changed.
+    pub(crate) fn advance(
+        &mut self,
+        places: &[usize],
+        own: Own<'_>,
+        universe: &mut Universe<'_>,
+        meter: &mut Meter,
+    ) -> Result<(), Stop> {
+        for place in places {
+            let predicate = own.stratum.predicates[*place];
+            let Some(known) = self.keyed.get_mut(&predicate) else { continue };
+            let mut recent = Vec::new();
+            own.grown[*place].batches(Part::Recent, 0, &mut recent);
+            for rows in known.values_mut() {
+                rows.advance(&recent, self.predicates.get(predicate).width, universe, meter)?;
+            }
+        }
+        Ok(())
     }
 
     /// Returns an index that begins with some columns (in any order) and is there already, or quickly made.

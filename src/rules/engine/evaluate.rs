@@ -143,7 +143,8 @@ pub(crate) fn evaluate_recording_rounds(
     rounds: Option<&mut Rounds>,
 ) -> Result<(), Stopped> {
     let access = Access::new(predicates, indexes);
-    Run { planned, predicates, access, adapted: Adapted::new(), universe, meter, rounds }.all(layers)
+    Run { planned, predicates, access, adapted: Adapted::new(), spent: HashMap::new(), universe, meter, rounds }
+        .all(layers)
 }
 
 /// Memory of a recorded round without the row. Unit: bytes.
@@ -155,6 +156,8 @@ pub(crate) struct Run<'a, 'u, 't> {
     pub(crate) predicates: &'a Predicates,
     pub(crate) access: Access<'a>,
     pub(crate) adapted: Adapted,
+    /// Number of rows that each variant of a rule has read.
+    pub(crate) spent: HashMap<(usize, usize), u64>,
     pub(crate) universe: &'u mut Universe<'t>,
     pub(crate) meter: &'u mut Meter,
     pub(crate) rounds: Option<&'u mut Rounds>,
@@ -245,7 +248,11 @@ impl Run<'_, '_, '_> {
             }
         }
         loop {
+            let places: Vec<usize> = active.iter().copied().collect();
             active.retain(|place| grown[*place].changed());
+            self.access
+                .advance(&places, Own { stratum, grown: &grown }, self.universe, self.meter)
+                .map_err(|stop| Stopped { stop, rule: stratum.rules.first().copied() })?;
             if active.is_empty() {
                 active.extend(self.turn(&mut makers, stratum, layers, &grown, &mut new)?);
                 if active.is_empty() {
@@ -396,11 +403,19 @@ impl Run<'_, '_, '_> {
         let adapted = self.adapted.get(&(rule_idx, position));
         let (variant, allowed) =
             adapted.map_or((planned, allowance(planned, rule, &self.access)), |(variant, allowed)| (variant, *allowed));
+        // A few rows in each of many rounds are many, too.
+        let spent = self.spent.entry((rule_idx, position)).or_default();
+        let is_doubtful = adapted.is_none() && planned.may_meet;
+        let allowed = if is_doubtful { allowed.saturating_sub(*spent) } else { allowed };
+        let before = self.access.rows_read;
         let mut context = Context { access: &mut self.access, universe: self.universe, meter: self.meter };
         let own = stratum.recursive.then_some(Own { stratum, grown });
         let mut flush = |sink: &mut Sink, meter: &Meter| empty(grown, sink, meter);
         match attempt(&mut context, rule, variant, layers, own, allowed, sink, &mut flush) {
-            Ok(()) => return Ok(()),
+            Ok(()) => {
+                *spent += context.access.rows_read - before;
+                return Ok(());
+            }
             Err(Halt::Stop(stop)) => return Err(stop),
             Err(Halt::Replan) => {}
         }

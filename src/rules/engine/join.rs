@@ -73,6 +73,22 @@ impl Join<'_, '_, '_> {
                 self.binding[*variable] = self.universe.create(term, watch)?;
                 self.run(at + 1)
             }
+            Some(Op::Equate { variable, value }) => {
+                let watch = &self.meter.watch;
+                watch.begin();
+                let Some(term) = value.value(&self.binding, self.universe, watch) else {
+                    watch.stopped()?;
+                    return Ok(false);
+                };
+                match self.universe.id(&term) {
+                    Some(id) => {
+                        self.binding[*variable] = id;
+                        self.run(at + 1)
+                    }
+                    // No tuple has it.
+                    None => Ok(false),
+                }
+            }
             Some(Op::Compare { op, left, right }) => {
                 let watch = &self.meter.watch;
                 watch.begin();

@@ -1,8 +1,13 @@
 //! Turns an order of a rule's atoms into steps.
 
+use std::collections::BTreeSet;
+use std::sync::Arc;
+
+use crate::engine::equal::{Keyed, given, is_assigned, meeting};
 use crate::engine::plan::{Column, Indexes, Op, Part, Parts, Rival, Scan};
-use crate::model::expression::Variable;
-use crate::model::program::{Atom, Literal, Operand, Rule};
+use crate::model::expression::{Expr, Variable};
+use crate::model::program::{Atom, Literal, Operand, PredicateId, Rule};
+use crate::syntax::Comparison;
 
 /// Returns which variables the head or its aggregates read.
 pub(crate) fn outputs(rule: &Rule) -> Vec<bool> {
@@ -52,21 +57,78 @@ pub(crate) fn groups(rule: &Rule) -> Vec<Vec<usize>> {
     groups
 }
 
-/// Turns an order of atoms into steps, with each test as early as possible.
-pub(crate) fn lower(rule: &Rule, group: &[usize], atoms: &[usize], parts: &Parts, indexes: &mut Indexes) -> Vec<Op> {
+/// Turns an order of atoms into steps, with each test as early as possible. `measured`: see
+/// [`plan_variant`](crate::engine::plan::plan_variant). `may_meet` is set if atoms could be looked up by a computed value
+/// as well.
+pub(crate) fn lower(
+    rule: &Rule,
+    group: &[usize],
+    atoms: &[usize],
+    parts: &Parts,
+    indexes: &mut Indexes,
+    measured: Option<&BTreeSet<usize>>,
+    may_meet: &mut bool,
+) -> Vec<Op> {
     let mut bound = vec![false; rule.variables.len()];
     let mut tests: Vec<usize> =
         group.iter().copied().filter(|idx| !matches!(rule.body[*idx], Literal::Positive(_))).collect();
+    // Variables with a value that no atom has confirmed yet.
+    let mut expected: Vec<Variable> = Vec::new();
     let mut ops = Vec::new();
     let mut atoms = atoms.iter().copied();
     // With a delta, its rows come before tests without variables.
     let mut next = parts.delta.filter(|delta| group.contains(delta)).and_then(|_| atoms.next());
     loop {
-        let ready = |idx: &usize| rule.body[*idx].needs().iter().all(|v| bound[*v]);
-        let chosen = next.take().or_else(|| tests.iter().copied().find(ready)).or_else(|| atoms.next());
-        let Some(chosen) = chosen.or_else(|| tests.first().copied()) else { return ops };
+        let ready = |idx: &usize| {
+            let needs = rule.body[*idx].needs();
+            // A formula over time may lack values for things that no tuple names.
+            needs.iter().all(|v| bound[*v] && !(expected.contains(v) && is_timed(&rule.body[*idx])))
+        };
+        let chosen = next.take().or_else(|| tests.iter().copied().find(ready));
+        if chosen.is_none()
+            && let Some((idx, (variable, value))) =
+                tests.iter().find_map(|idx| Some((*idx, given(&rule.body[*idx], &bound)?)))
+        {
+            tests.retain(|test| *test != idx);
+            bound[variable] = true;
+            expected.push(variable);
+            // No tuple has an assigned value.
+            let is_assigned = is_assigned(rule, variable);
+            ops.push(if is_assigned { Op::Assign { variable, value } } else { Op::Equate { variable, value } });
+            continue;
+        }
+        let Some(chosen) = chosen.or_else(|| atoms.next()).or_else(|| tests.first().copied()) else { return ops };
         tests.retain(|idx| *idx != chosen);
+        if let Literal::Positive(atom) = &rule.body[chosen] {
+            expected.retain(|variable| !atom.args.contains(&Operand::Variable(*variable)));
+        }
+        if let Literal::Positive(atom) = &rule.body[chosen]
+            && bound.contains(&true)
+            && let Some(meeting) = meeting(rule, tests.iter().copied(), atom, &bound)
+        {
+            let is_free = operand_variables(&atom.args).iter().all(|variable| !bound[*variable]);
+            if is_free || measured.is_some_and(|many| many.contains(&chosen)) {
+                tests.retain(|idx| *idx != meeting.idx);
+                let slot = rule.variables.len() + meeting.idx;
+                let (keyed, key, columns) = Keyed::new(atom, &meeting, slot, &mut bound);
+                ops.push(Op::Equate { variable: slot, value: meeting.known });
+                let part = parts.of(chosen);
+                let scan = Scan { keyed: Some(Arc::new(keyed)), ..Scan::new(atom.predicate, part, 0, key, columns) };
+                ops.push(Op::Scan(scan));
+                continue;
+            }
+            *may_meet |= measured.is_none();
+        }
         ops.push(step(&rule.body[chosen], parts.of(chosen), &mut bound, indexes));
+    }
+}
+
+/// Returns whether a formula over time is part of a condition.
+fn is_timed(literal: &Literal) -> bool {
+    match literal {
+        Literal::Positive(_) | Literal::Negative(_) => false,
+        Literal::Assign { value, .. } | Literal::Test { value, .. } => value.is_timed(),
+        Literal::Compare { left, right, .. } => left.is_timed() || right.is_timed(),
     }
 }
 
@@ -76,6 +138,10 @@ fn step(literal: &Literal, part: Part, bound: &mut [bool], indexes: &mut Indexes
         Literal::Negative(atom) => {
             let (index, key) = lookup(atom, bound, indexes);
             Op::Absent { predicate: atom.predicate, index, key }
+        }
+        // An equality may have given the variable its value.
+        Literal::Assign { variable, value, .. } if bound[*variable] => {
+            Op::Compare { op: Comparison::Equal, left: Expr::Variable(*variable), right: value.clone() }
         }
         Literal::Assign { variable, value, .. } => {
             bound[*variable] = true;
@@ -115,17 +181,14 @@ pub(crate) fn scan(atom: &Atom, part: Part, bound: &mut [bool], indexes: &mut In
             }
         }
     }
-    Op::Scan(Scan {
-        predicate: atom.predicate,
-        part,
-        index,
-        key,
-        columns,
-        once: false,
-        exists: false,
-        settled: 0,
-        rivals: Vec::new(),
-    })
+    Op::Scan(Scan::new(atom.predicate, part, index, key, columns))
+}
+
+impl Scan {
+    fn new(predicate: PredicateId, part: Part, index: usize, key: Vec<Operand>, columns: Vec<(usize, Column)>) -> Self {
+        let rivals = Vec::new();
+        Self { predicate, part, index, key, columns, once: false, exists: false, settled: 0, rivals, keyed: None }
+    }
 }
 
 /// Marks the scans that need only one match.
@@ -145,12 +208,13 @@ pub(crate) fn mark(rule: &Rule, outputs: &[bool], ops: &mut [Op]) {
                 scan.settled = columns.and_then(|columns| columns.into_iter().max()).unwrap_or(0);
                 unbound.retain(|v| binds(v).is_none());
             }
-            Op::Assign { variable, .. } => unbound.retain(|v| v != variable),
+            Op::Assign { variable, .. } | Op::Equate { variable, .. } => unbound.retain(|v| v != variable),
             _ => {}
         }
     }
     let mut read = outputs.to_vec();
-    read.resize(rule.variables.len(), false);
+    // With a slot for the known value of each equality.
+    read.resize(rule.variables.len() + rule.body.len(), false);
     for op in ops.iter_mut().rev() {
         let mut used = Vec::new();
         match op {
@@ -166,7 +230,7 @@ pub(crate) fn mark(rule: &Rule, outputs: &[bool], ops: &mut [Op]) {
                 }));
             }
             Op::Absent { key, .. } => used.extend(operand_variables(key)),
-            Op::Assign { value, .. } | Op::Test { value } => value.variables(&mut used),
+            Op::Assign { value, .. } | Op::Equate { value, .. } | Op::Test { value } => value.variables(&mut used),
             Op::Compare { left, right, .. } => {
                 left.variables(&mut used);
                 right.variables(&mut used);
@@ -182,11 +246,23 @@ pub(crate) fn add_rivals(ops: &mut [Op], indexes: &mut Indexes, add: bool) {
         let (before, after) = ops.split_at_mut(at + 1);
         let Op::Scan(scan) = &mut before[at] else { continue };
         let [(offset, Column::Bind(value))] = scan.columns.as_slice() else { continue };
-        if *offset != scan.key.len() {
+        if *offset != scan.key.len() || scan.keyed.is_some() {
             continue;
         }
+        let mut later = Vec::new();
         for (place, op) in after.iter_mut().enumerate() {
-            let Op::Scan(check) = op else { continue };
+            let check = match op {
+                Op::Scan(check) if check.keyed.is_none() => check,
+                Op::Scan(_) => break,
+                Op::Equate { variable, .. } => {
+                    later.push(Operand::Variable(*variable));
+                    continue;
+                }
+                _ => continue,
+            };
+            if check.key.iter().any(|operand| later.contains(operand)) {
+                break;
+            }
             if !check.columns.is_empty() || !check.key.contains(&Operand::Variable(*value)) {
                 break;
             }

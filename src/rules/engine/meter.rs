@@ -80,7 +80,7 @@ impl Meter {
             }
             Stop::Time => RuleFault::BudgetSpent(format!("more than {} s{place}", self.budget.secs)),
             Stop::Requested => RuleFault::Interrupted,
-            Stop::Unrecorded => RuleFault::Value(format!("{}{place}", self.watch.unrecorded_text())),
+            Stop::Value => RuleFault::Value(format!("{}{place}", self.watch.value_text())),
         }
     }
 }

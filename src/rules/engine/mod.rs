@@ -6,6 +6,7 @@ pub(crate) mod access;
 pub(crate) mod aggregate;
 pub(crate) mod budget;
 pub(crate) mod collect;
+pub(crate) mod equal;
 pub(crate) mod evaluate;
 pub(crate) mod join;
 pub(crate) mod load;

@@ -1,6 +1,6 @@
 //! Orders of atoms: the rows that they read, and that they derive the same.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeSet, HashMap};
 use std::fmt::Write as _;
 use std::path::Path;
 
@@ -54,6 +54,7 @@ fn evaluated(program: &Program, unquestioned: u64, predicate: &str) -> (u64, Vec
         predicates: &program.predicates,
         access,
         adapted: Adapted::new(),
+        spent: HashMap::new(),
         universe: &mut universe,
         meter: &mut meter,
         rounds: None,
@@ -82,7 +83,7 @@ fn best_order(program: &Program, limit: u64, expected: &[TermId]) -> u64 {
         let orders = Orders::new(rule, &parts, &mut |group, _| {
             order.iter().copied().filter(|idx| group.contains(idx)).collect()
         });
-        let variant = plan_variant(rule, &parts, &orders, access.indexes.to_mut(), true);
+        let variant = plan_variant(rule, &parts, &orders, access.indexes.to_mut(), Some(&BTreeSet::new()));
         let before = access.rows_read;
         let mut context = Context { access: &mut access, universe: &mut universe, meter: &mut meter };
         let mut sink = Sink::new(Vec::new());

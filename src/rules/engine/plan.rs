@@ -1,8 +1,10 @@
 //! Plans the evaluation of each rule: the order of its conditions and the indexes it needs.
 
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use crate::check::stratify::Stratum;
+use crate::engine::equal::{Keyed, meeting, settle};
 use crate::engine::lower::{add_rivals, groups, literal_variables, lower, mark, operand_variables, outputs};
 use crate::model::expression::{Expr, Variable};
 use crate::model::program::{Atom, Literal, Operand, PredicateId, Predicates, Rule};
@@ -121,6 +123,8 @@ pub(crate) struct Scan {
     /// column is left, or some variable is bound later.
     pub(crate) settled: usize,
     pub(crate) rivals: Vec<Rival>,
+    /// The rows are sorted by a computed value, and `index` is not used.
+    pub(crate) keyed: Option<Arc<Keyed>>,
 }
 
 /// One step of a rule's evaluation.
@@ -135,6 +139,11 @@ pub(crate) enum Op {
         key: Vec<Operand>,
     },
     Assign {
+        variable: Variable,
+        value: Expr,
+    },
+    /// Like an assignment, but continues only if some tuple may have the value.
+    Equate {
         variable: Variable,
         value: Expr,
     },
@@ -159,6 +168,8 @@ pub(crate) struct Variant {
     pub(crate) delta: Option<usize>,
     /// Whether the conditions can be evaluated in more than one order.
     pub(crate) has_choice: bool,
+    /// Whether rows that are looked up by some columns could be looked up by a computed value too, if they are many.
+    pub(crate) may_meet: bool,
 }
 
 /// A rule's variants.
@@ -244,27 +255,31 @@ pub(crate) fn plan_rule(rule: &Rule, stratum: &Stratum, indexes: &mut Indexes, s
         .map(|delta| {
             let parts = Parts::new(rule, stratum, delta);
             let orders = Orders::new(rule, &parts, &mut |group, first| by_connection(rule, group, first, sizes));
-            plan_variant(rule, &parts, &orders, indexes, false)
+            plan_variant(rule, &parts, &orders, indexes, None)
         })
         .collect();
     RulePlan { variants }
 }
 
-/// Plans one variant with given orders of atoms. `add`: whether an index may be added only to read the smaller of two
-/// sets of rows that must share a value.
-pub(crate) fn plan_variant(rule: &Rule, parts: &Parts, orders: &Orders, indexes: &mut Indexes, add: bool) -> Variant {
+/// Plans one variant with given orders of atoms. `measured`: the atoms that have many rows for each key, if they were
+/// counted. Then an index may be added only to read the smaller of two sets of rows that must share a value.
+pub(crate) fn plan_variant(
+    rule: &Rule,
+    parts: &Parts,
+    orders: &Orders,
+    indexes: &mut Indexes,
+    measured: Option<&BTreeSet<usize>>,
+) -> Variant {
+    let mut may_meet = false;
     let mut lowered = |(group, atoms): &(Vec<usize>, Vec<usize>), outputs: &[bool]| {
-        let mut ops = lower(rule, group, atoms, parts, indexes);
+        let mut ops = lower(rule, group, atoms, parts, indexes, measured, &mut may_meet);
         mark(rule, outputs, &mut ops);
-        add_rivals(&mut ops, indexes, add);
+        add_rivals(&mut ops, indexes, measured.is_some());
         ops
     };
-    Variant {
-        guards: orders.guards.iter().map(|guard| lowered(guard, &[])).collect(),
-        ops: lowered(&orders.main, &outputs(rule)),
-        delta: parts.delta,
-        has_choice: orders.has_choice,
-    }
+    let guards = orders.guards.iter().map(|guard| lowered(guard, &[])).collect();
+    let ops = lowered(&orders.main, &outputs(rule));
+    Variant { guards, ops, delta: parts.delta, has_choice: orders.has_choice || may_meet, may_meet }
 }
 
 /// Orders the atoms of a group before their tuples are known: those that share variables with earlier ones first, then
@@ -281,10 +296,11 @@ pub(crate) fn by_connection(rule: &Rule, group: &[usize], first: Option<usize>, 
     let mut sorted = Vec::new();
     let mut next = first;
     while !left.is_empty() {
+        settle(rule, group, &mut bound);
         let place = next
             .take()
             .and_then(|first| left.iter().position(|(idx, _)| *idx == first))
-            .unwrap_or_else(|| best_atom(&left, &bound, sizes));
+            .unwrap_or_else(|| best_atom(rule, group, &left, &bound, sizes));
         let (idx, atom) = left.remove(place);
         operand_variables(&atom.args).into_iter().for_each(|v| bound[v] = true);
         sorted.push(idx);
@@ -293,15 +309,18 @@ pub(crate) fn by_connection(rule: &Rule, group: &[usize], first: Option<usize>, 
 }
 
 /// Returns the place of the atom to read next, the first one of equals.
-fn best_atom(left: &[(usize, &Atom)], bound: &[bool], sizes: Sizes<'_>) -> usize {
+fn best_atom(rule: &Rule, group: &[usize], left: &[(usize, &Atom)], bound: &[bool], sizes: Sizes<'_>) -> usize {
     let rank = |atom: &Atom| {
         // Unknown sizes count as 1000 tuples. A constant or bound variable is assumed to keep one tuple of ten.
         let size = sizes(atom.predicate).unwrap_or(1000) as f64;
         let constants = atom.args.iter().filter(|arg| matches!(arg, Operand::Constant(_))).count();
         let shared = operand_variables(&atom.args).into_iter().filter(|v| bound[*v]).count();
+        // A computed value that must be equal counts as a variable.
+        let meets = bound.contains(&true) && meeting(rule, group.iter().copied(), atom, bound).is_some();
+        let shared = shared + usize::from(meets);
         let fixed = constants + shared;
         let expected =
-            if fixed == atom.args.len() { 0.0 } else { size / 10f64.powi(i32::try_from(fixed).unwrap_or(9)) };
+            if fixed >= atom.args.len() { 0.0 } else { size / 10f64.powi(i32::try_from(fixed).unwrap_or(9)) };
         // The first atom, and one whose columns are all fixed, need no shared variable.
         (bound.contains(&true) && shared == 0 && expected > 0.0, expected)
     };

@@ -6,6 +6,7 @@
 use std::collections::BTreeSet;
 
 use crate::engine::access::{Access, Own};
+use crate::engine::equal::{given, is_assigned, meeting};
 use crate::engine::evaluate::Layers;
 use crate::engine::join::equal_range;
 use crate::engine::lower::literal_variables;
@@ -24,6 +25,8 @@ const SAMPLE: usize = 256;
 const ORIGINS: usize = 32;
 /// Number of partial orders of equal length that are extended.
 const BREADTH: usize = 24;
+/// Number of rows for one key above which they are also looked up by a computed value.
+const MANY_ROWS: f64 = 16.0;
 /// Cost of looking up a key. Unit: rows read.
 const LOOKUP: f64 = 0.25;
 
@@ -85,6 +88,8 @@ struct Partial {
     /// The conditions that are neither atoms nor still to be checked.
     tested: BTreeSet<usize>,
     sample: Vec<Drawn>,
+    /// The atoms that are looked up by a computed value.
+    keyed: BTreeSet<usize>,
     /// The search for one match, if it has begun.
     search: Option<Search>,
     /// Estimated number of bindings.
@@ -94,26 +99,30 @@ struct Partial {
 }
 
 impl Sampler<'_, '_, '_> {
-    /// Returns the order of a group's atoms that reads the fewest rows, and the estimated number of these rows.
-    pub(crate) fn order(&mut self, group: &[usize], first: Option<usize>) -> (Vec<usize>, f64) {
+    /// Returns the order of a group's atoms that reads the fewest rows, the estimated number of these rows, and the atoms
+    /// that have many rows for each key, so that a computed value should be part of it.
+    pub(crate) fn order(&mut self, group: &[usize], first: Option<usize>) -> (Vec<usize>, f64, BTreeSet<usize>) {
         let atoms: Vec<usize> =
             group.iter().copied().filter(|idx| matches!(self.rule.body[*idx], Literal::Positive(_))).collect();
         let nothing = vec![0; self.rule.variables.len()];
-        let mut open = vec![Partial {
+        let mut start = Partial {
             atoms: Vec::new(),
             bound: vec![false; self.rule.variables.len()],
             tested: BTreeSet::new(),
             sample: vec![Drawn { binding: nothing, weight: 1.0, origin: 0 }],
+            keyed: BTreeSet::new(),
             search: None,
             count: 1.0,
             cost: 0.0,
-        }];
+        };
+        self.settle(&mut start, group);
+        let mut open = vec![start];
         let mut closed: BTreeSet<Vec<usize>> = BTreeSet::new();
         let mut extended = vec![0; atoms.len() + 1];
         while let Some(place) = cheapest(&open) {
             let partial = open.swap_remove(place);
             if partial.atoms.len() == atoms.len() {
-                return (partial.atoms, partial.cost);
+                return (partial.atoms, partial.cost, partial.keyed);
             }
             let mut set = partial.atoms.clone();
             set.sort_unstable();
@@ -129,7 +138,7 @@ impl Sampler<'_, '_, '_> {
                 }
             }
         }
-        (atoms, f64::INFINITY)
+        (atoms, f64::INFINITY, BTreeSet::new())
     }
 
     fn extended(&mut self, partial: &Partial, idx: usize, group: &[usize]) -> Partial {
@@ -143,6 +152,8 @@ impl Sampler<'_, '_, '_> {
                 next.bound[*variable] = true;
             }
         }
+        let open = group.iter().copied().filter(|idx| !partial.tested.contains(idx));
+        let meets = !partial.atoms.is_empty() && meeting(self.rule, open, atom, &partial.bound).is_some();
         let one_match = !self.reads_new(partial, &next, group);
         if next.search.is_none() && !partial.sample.is_empty() && self.outputs_are_bound(partial, group) {
             next.search = Some(Search::begin(&mut next));
@@ -150,10 +161,11 @@ impl Sampler<'_, '_, '_> {
         let mut search = next.search.take();
         let mut count = |drawn: &Drawn, rows_read: f64| {
             if let Some(search) = &mut search {
+                let rows_read = if meets { rows_read.min(1.0) } else { rows_read };
                 search.origins[drawn.origin].1 += drawn.weight * (rows_read + LOOKUP);
             }
         };
-        let rows_read = match self.matches(&next, &partial.bound, idx, atom, &fixed, one_match, &mut count) {
+        let mut rows_read = match self.matches(&next, &partial.bound, idx, atom, &fixed, one_match, &mut count) {
             Some((rows_read, sample)) => {
                 next.count = sample.iter().map(|drawn| drawn.weight).sum();
                 next.sample = thinned(sample, SAMPLE);
@@ -168,6 +180,12 @@ impl Sampler<'_, '_, '_> {
         };
         if !next.sample.is_empty() {
             self.test(&mut next, group);
+        }
+        self.settle(&mut next, group);
+        let is_free = fixed.iter().all(|column| matches!(atom.args[*column], Operand::Constant(_)));
+        if meets && (is_free || rows_read > partial.count * MANY_ROWS) {
+            next.keyed.insert(idx);
+            rows_read = rows_read.min(next.count);
         }
         next.cost = match &search {
             Some(search) if !partial.sample.is_empty() => search.cost(&next.sample).max(partial.cost),
@@ -254,6 +272,31 @@ impl Sampler<'_, '_, '_> {
             each /= self.access.distinct(atom.predicate, *column, self.layers, self.own);
         }
         partial.count * each
+    }
+
+    /// Binds the variables to which equalities give values.
+    fn settle(&self, partial: &mut Partial, group: &[usize]) {
+        let found = |partial: &Partial| {
+            let open = group.iter().copied().filter(|idx| !partial.tested.contains(idx));
+            // Assigned variables occur in no atom.
+            let given = |idx: usize| given(&self.rule.body[idx], &partial.bound).map(|found| (idx, found));
+            open.filter_map(given).find(|(_, (variable, _))| !is_assigned(self.rule, *variable))
+        };
+        let is_sampled = !partial.sample.is_empty();
+        while let Some((idx, (variable, value))) = found(partial) {
+            partial.sample.retain_mut(|Drawn { binding, .. }| {
+                self.watch.begin();
+                let value = value.value(binding, self.universe, self.watch);
+                let id = value.and_then(|value| self.universe.id(&value));
+                binding[variable] = id.unwrap_or_default();
+                id.is_some()
+            });
+            partial.bound[variable] = true;
+            partial.tested.insert(idx);
+        }
+        if is_sampled {
+            partial.count = partial.sample.iter().map(|drawn| drawn.weight).sum();
+        }
     }
 
     /// Checks the comparisons whose variables are bound by now.

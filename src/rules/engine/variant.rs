@@ -1,6 +1,6 @@
 //! Evaluates one variant of a rule, and plans it anew if it reads more rows than expected.
 
-use std::collections::HashMap;
+use std::collections::{BTreeSet, HashMap};
 
 use crate::engine::access::{Access, Own};
 use crate::engine::aggregate::{aggregate, projection};
@@ -45,7 +45,7 @@ pub(crate) fn replanned(
     own: Option<Own<'_>>,
 ) -> (Variant, u64) {
     let outputs = outputs(rule);
-    let mut rows_read = 0.0;
+    let (mut rows_read, mut many) = (0.0, BTreeSet::new());
     let trial = context.meter.watch.trial();
     let orders = Orders::new(rule, parts, &mut |group, first| {
         let mut sampler = Sampler {
@@ -58,11 +58,12 @@ pub(crate) fn replanned(
             watch: &trial,
             outputs: &outputs,
         };
-        let (atoms, rows) = sampler.order(group, first);
+        let (atoms, rows, keyed) = sampler.order(group, first);
         rows_read += rows;
+        many.extend(keyed);
         atoms
     });
-    let variant = plan_variant(rule, parts, &orders, context.access.indexes.to_mut(), true);
+    let variant = plan_variant(rule, parts, &orders, context.access.indexes.to_mut(), Some(&many));
     (variant, ((rows_read * TOLERANCE) as u64).max(context.access.unquestioned))
 }
 
@@ -132,6 +133,15 @@ impl<'b> Sources<'b> {
         let mut sources = Self { batches: Vec::with_capacity(ops.len()), widths: Vec::with_capacity(ops.len()) };
         for op in ops {
             let (predicate, part, index) = match op {
+                Op::Scan(Scan { keyed: Some(keyed), part, .. }) => {
+                    let found = access.keyed(keyed, *part, layers, own, context.universe, context.meter)?;
+                    if found.iter().all(|batch| batch.is_empty()) {
+                        return Ok(None);
+                    }
+                    sources.batches.push(found);
+                    sources.widths.push(keyed.width());
+                    continue;
+                }
                 Op::Scan(Scan { predicate, part, index, .. }) => (*predicate, *part, *index),
                 Op::Absent { predicate, index, .. } => (*predicate, Part::All, *index),
                 _ => {
@@ -166,7 +176,8 @@ impl<'b> Sources<'b> {
             ops,
             batches: &self.batches,
             widths: &self.widths,
-            binding: vec![0; rule.variables.len()],
+            // With a slot for the known value of each equality.
+            binding: vec![0; rule.variables.len() + rule.body.len()],
             universe: &mut *context.universe,
             meter: &mut *context.meter,
             sink,

@@ -43,6 +43,27 @@ impl Expr {
         }
     }
 
+    /// Returns the expression with other variables. Formulas over time are not renamed.
+    pub(crate) fn renamed(&self, new: &dyn Fn(Variable) -> Variable) -> Self {
+        let all = |args: &[Self]| args.iter().map(|arg| arg.renamed(new)).collect();
+        match self {
+            Self::Variable(variable) => Self::Variable(new(*variable)),
+            Self::Call(builtin, args) => Self::Call(builtin, all(args)),
+            Self::Matches(arg, pattern) => Self::Matches(Box::new(arg.renamed(new)), pattern.clone()),
+            Self::Format(parts) => Self::Format(all(parts)),
+            Self::Constant(_) | Self::Timed(_) => self.clone(),
+        }
+    }
+
+    /// Whether the expression has a value for any binding.
+    pub(crate) fn is_total(&self) -> bool {
+        match self {
+            Self::Constant(_) | Self::Variable(_) => true,
+            Self::Format(parts) => parts.iter().all(Self::is_total),
+            Self::Call(..) | Self::Matches(..) | Self::Timed(_) => false,
+        }
+    }
+
     /// Whether a formula over the course of the action is part of the expression.
     pub(crate) fn is_timed(&self) -> bool {
         match self {

@@ -3,7 +3,7 @@
 //! Never: reports a diagnostic, or derives a tuple.
 
 pub(crate) mod datatypes;
-mod datetime;
+pub(crate) mod datetime;
 pub(crate) mod expression;
 pub(crate) mod given;
 pub(crate) mod program;

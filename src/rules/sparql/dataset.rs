@@ -4,10 +4,10 @@ use std::convert::Infallible;
 use std::hash::{Hash, Hasher};
 use std::rc::Rc;
 
-use oxrdf::{BlankNode, Literal, NamedNode, Term as RdfTerm};
+use oxrdf::Term as RdfTerm;
 use spareval::{InternalQuad, QueryableDataset};
 
-use crate::model::rdf::from_rdf;
+use crate::model::rdf::{from_rdf, to_rdf};
 use crate::model::universe::Universe;
 use crate::sparql::ledger::{Entry, Ledger, Weight};
 use actcheck_base::{Term, TermId, Terms, names};
@@ -228,23 +228,5 @@ pub(crate) fn length_of(term: &RdfTerm) -> usize {
         RdfTerm::NamedNode(node) => node.as_str().len(),
         RdfTerm::BlankNode(node) => node.as_str().len(),
         RdfTerm::Literal(literal) => literal.value().len(),
-    }
-}
-
-/// Converts a term to oxigraph's type.
-pub(crate) fn to_rdf(term: &Term) -> RdfTerm {
-    let iri = |iri: &str| NamedNode::new_unchecked(iri);
-    match term {
-        Term::Iri(text) => iri(text).into(),
-        Term::Blank(label) => BlankNode::new_unchecked(label.as_ref()).into(),
-        Term::String(text) => Literal::new_simple_literal(text.as_ref()).into(),
-        Term::LangString(text, tag) => {
-            Literal::new_language_tagged_literal_unchecked(text.as_ref(), tag.as_ref()).into()
-        }
-        Term::Integer(value) => Literal::from(*value).into(),
-        Term::Double(value) => Literal::from(*value).into(),
-        Term::Boolean(value) => Literal::from(*value).into(),
-        Term::Decimal(text) => Literal::new_typed_literal(text.as_ref(), iri(&format!("{}decimal", names::XSD))).into(),
-        Term::Literal(text, datatype) => Literal::new_typed_literal(text.as_ref(), iri(datatype)).into(),
     }
 }

@@ -8,3 +8,4 @@ pub(crate) mod query;
 mod query_text;
 pub(crate) mod snapshot;
 pub(crate) mod unchanging;
+mod varying;

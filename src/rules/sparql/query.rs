@@ -10,12 +10,13 @@ use crate::check::sides::{self, SIDES};
 use crate::engine::budget::Budget;
 use crate::engine::meter::{Stop, mebibytes};
 use crate::engine::reading::smaller_margin;
-use crate::model::rdf::from_rdf;
+use crate::model::rdf::{from_rdf, to_rdf};
 use crate::model::universe::Universe;
 use crate::model::values::lexical;
-use crate::sparql::dataset::{Snapshot, Statements, View, length_of, to_rdf};
+use crate::sparql::dataset::{Snapshot, Statements, View, length_of};
 use crate::sparql::ledger::Ledger;
 use crate::sparql::query_text::{first_group, groups, scan, variables};
+use crate::sparql::varying::varying;
 use crate::temporal::named_in;
 use crate::watch::Watch;
 use actcheck_base::{
@@ -61,6 +62,9 @@ impl Query {
         if let Err(error) = evaluator().parse_query(source.text.as_ref()) {
             diagnostics.push(syntax_fault(source, &error.to_string()));
             return Err(diagnostics);
+        }
+        if let Some(fault) = varying(source) {
+            diagnostics.push(fault);
         }
         let text = bounded_texts(&bind_designators(&source.text, &ontology.designators));
         let prepared = evaluator().parse_query(&text).map_err(|error| {
@@ -158,7 +162,7 @@ impl Query {
                 RuleFault::BudgetSpent(format!("the query in {} {how}; {advice}", self.file))
             }
             // Queries read no quantities over time.
-            Stop::Requested | Stop::Unrecorded | Stop::NewThings => RuleFault::Interrupted,
+            Stop::Requested | Stop::Value | Stop::NewThings => RuleFault::Interrupted,
         }
     }
 

@@ -1,9 +1,10 @@
 //! Which queries read only facts that no action can change.
 
+use spargebra::Query;
 use spargebra::algebra::{AggregateExpression, Expression, GraphPattern, OrderExpression, PropertyPathExpression};
 use spargebra::term::{NamedNodePattern, TriplePattern};
-use spargebra::{Query, SparqlParser};
 
+use crate::sparql::varying::parsed;
 use actcheck_base::{CONSTANT_PROPERTIES, names};
 
 /// Graphs with facts that are the same whatever the robot does, by their local names.
@@ -11,11 +12,8 @@ const UNCHANGING: [&str; 3] = ["before", "parameters", "ontology"];
 
 /// Whether a valid query reads only the state before the action, constant properties, designators and the ontology.
 pub(crate) fn is_unchanging(text: &str) -> bool {
-    let parser = names::PREFIXES.iter().fold(SparqlParser::new(), |parser, (prefix, namespace)| {
-        parser.clone().with_prefix(*prefix, *namespace).unwrap_or(parser)
-    });
-    match parser.parse_query(text) {
-        Ok(Query::Ask { pattern, dataset: None, .. } | Query::Select { pattern, dataset: None, .. }) => {
+    match parsed(text) {
+        Some(Query::Ask { pattern, dataset: None, .. } | Query::Select { pattern, dataset: None, .. }) => {
             !changes(&pattern, Graph::All)
         }
         _ => false,

@@ -5,7 +5,6 @@ use std::path::{Path, PathBuf};
 use oxrdfio::{RdfFormat, RdfParser};
 
 use crate::check::checking::{Checking, Role, counted};
-use crate::engine::budget::Budget;
 use crate::model::program::{Predicates, Program};
 use crate::standalone::faults::Faults;
 use crate::standalone::input::{Compression, Ended, Limits, open};
@@ -46,12 +45,17 @@ enum Content {
 }
 
 /// First pass: collects the imports. The number of columns comes from an option, a rule, or the file itself.
-pub(super) fn define_imports(checking: &mut Checking<'_>, syntax: &Syntax, folder: &Path) -> Vec<Import> {
+pub(super) fn define_imports(
+    checking: &mut Checking<'_>,
+    syntax: &Syntax,
+    folder: &Path,
+    limits: &Limits<'_>,
+) -> Vec<Import> {
     let mut imports = Vec::new();
     for statement in &syntax.statements {
         if let Statement::Transfer(transfer) = statement
             && transfer.import
-            && let Some(import) = define_import(checking, syntax, transfer, folder)
+            && let Some(import) = define_import(checking, syntax, transfer, (folder, limits))
         {
             let Import { predicate, arity, .. } = &import;
             checking.define_predicate(&syntax.source, predicate, *arity, &transfer.span, Role::Standalone);
@@ -62,7 +66,12 @@ pub(super) fn define_imports(checking: &mut Checking<'_>, syntax: &Syntax, folde
 }
 
 /// Returns `None` if an error was reported.
-fn define_import(checking: &mut Checking<'_>, syntax: &Syntax, transfer: &Transfer, folder: &Path) -> Option<Import> {
+fn define_import(
+    checking: &mut Checking<'_>,
+    syntax: &Syntax,
+    transfer: &Transfer,
+    place: (&Path, &Limits<'_>),
+) -> Option<Import> {
     let source = &syntax.source;
     known_format(checking, source, transfer)?;
     let options: &[&str] = match transfer.format.as_str() {
@@ -71,7 +80,7 @@ fn define_import(checking: &mut Checking<'_>, syntax: &Syntax, transfer: &Transf
         _ => &RDF_OPTIONS,
     };
     let mut settings = Settings::new(syntax, transfer, options);
-    let import = import_of(checking, syntax, transfer, folder, &mut settings);
+    let import = import_of(checking, syntax, transfer, place, &mut settings);
     let failed = settings.diagnostics.has_errors();
     checking.diagnostics.extend(settings.diagnostics);
     import.filter(|_| !failed)
@@ -82,7 +91,7 @@ fn import_of(
     checking: &mut Checking<'_>,
     syntax: &Syntax,
     transfer: &Transfer,
-    folder: &Path,
+    (folder, limits): (&Path, &Limits<'_>),
     settings: &mut Settings<'_>,
 ) -> Option<Import> {
     let source = &syntax.source;
@@ -100,7 +109,7 @@ fn import_of(
     let path = folder.join(&resource);
     let compression = compression(settings, &path);
     let (content, arity) = match transfer.format.as_str() {
-        "csv" | "dsv" | "tsv" => table(checking, syntax, transfer, settings, &path, compression)?,
+        "csv" | "dsv" | "tsv" => table(checking, syntax, transfer, settings, (&path, compression, limits))?,
         "json" => (Content::Json, 3),
         _ => rdf(checking, source, transfer, settings, &path)?,
     };
@@ -124,7 +133,7 @@ fn known_format(checking: &mut Checking<'_>, source: &Source, transfer: &Transfe
 }
 
 /// Returns the stated compression, or that of the file's name.
-fn compression(settings: &mut Settings<'_>, path: &Path) -> Compression {
+pub(super) fn compression(settings: &mut Settings<'_>, path: &Path) -> Compression {
     let usual = match path.extension().is_some_and(|extension| extension == "gz") {
         true => Compression::Gzip,
         false => Compression::None,
@@ -147,8 +156,7 @@ fn table(
     syntax: &Syntax,
     transfer: &Transfer,
     settings: &mut Settings<'_>,
-    path: &Path,
-    compression: Compression,
+    (path, compression, limits): (&Path, Compression, &Limits<'_>),
 ) -> Option<(Content, usize)> {
     let delimiter = settings.delimiter();
     let (quoting, headers) = (settings.flag("quoting").unwrap_or(true), settings.flag("ignore_headers") == Some(true));
@@ -156,7 +164,7 @@ fn table(
         true => settings.columns()?,
         false => {
             let used = arity_in_rules(checking, syntax, &transfer.predicate);
-            let count = used.or_else(|| columns_of_file(path, compression, delimiter, quoting));
+            let count = used.or_else(|| columns_of_file(path, compression, delimiter, quoting, limits));
             vec![ColumnKind::Any; count.unwrap_or(0)]
         }
     };
@@ -215,18 +223,24 @@ fn arity_in_rules(checking: &Checking<'_>, syntax: &Syntax, predicate: &str) -> 
 }
 
 /// Returns the number of columns in the first row, or `None` if the file is empty, unreadable or a pipe.
-fn columns_of_file(path: &Path, compression: Compression, delimiter: u8, quoting: bool) -> Option<usize> {
+fn columns_of_file(
+    path: &Path,
+    compression: Compression,
+    delimiter: u8,
+    quoting: bool,
+    limits: &Limits<'_>,
+) -> Option<usize> {
     // A pipe can be read only once.
     if !std::fs::metadata(path).ok()?.is_file() {
         return None;
     }
-    let budget = Budget::default();
-    let limits = Limits::new(&budget);
-    let mut records = Records::new(open(path, compression, &limits).ok()?, delimiter, quoting);
-    (records.next().ok()? == Found::Row).then_some(records.len())
+    let mut records = Records::new(limits.counted(open(path, compression, limits).ok()?), delimiter, quoting);
+    let found = records.next();
+    limits.settle();
+    (found.ok()? == Found::Row).then_some(records.len())
 }
 
-fn rdf_format(format: &str, path: &Path) -> Option<RdfFormat> {
+pub(super) fn rdf_format(format: &str, path: &Path) -> Option<RdfFormat> {
     match format {
         "ntriples" => Some(RdfFormat::NTriples),
         "nquads" => Some(RdfFormat::NQuads),
@@ -302,9 +316,11 @@ pub(super) fn import(
 fn read(import: &Import, sink: &mut Sink<'_>, faults: &mut Faults) -> Result<(), String> {
     let reader = open(&import.path, import.compression, sink.limits)?;
     match &import.content {
-        Content::Table(layout) => read_table(reader, layout, import.limit, sink, faults),
+        Content::Table(layout) => read_table(sink.limits.counted(reader), layout, import.limit, sink, faults),
         Content::Json => read_json(reader, import.limit, sink, faults),
-        Content::Rdf { format, base } => read_rdf(reader, *format, base.as_deref(), import.limit, sink, faults),
+        Content::Rdf { format, base } => {
+            read_rdf(sink.limits.counted(reader), *format, base.as_deref(), import.limit, sink, faults)
+        }
     }
     .and_then(|()| sink.check())
     .map_err(|error| error.to_string())

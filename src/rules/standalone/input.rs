@@ -16,7 +16,18 @@ pub(super) struct Limits<'a> {
     /// `None` if the time limit is beyond the range of the clock.
     end: Option<Instant>,
     ended: Cell<Option<Ended>>,
+    /// Memory of the facts when it was last computed. Unit: bytes.
+    facts: Cell<usize>,
+    /// Text read since the last row. Unit: bytes.
+    unsettled: Cell<usize>,
 }
+
+/// A parser takes at most about this memory for each byte of a text from which it makes no rows, such as brackets and
+/// prefixes.
+const PARSER_BYTES: usize = 48;
+
+/// Text that is read before its rows are counted.
+const READ_AHEAD: usize = 1 << 20;
 
 /// The limit that ended an import.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -30,7 +41,8 @@ impl<'a> Limits<'a> {
     /// Starts the clock.
     pub(super) fn new(budget: &'a Budget) -> Self {
         let time = Duration::try_from_secs_f64(budget.secs.max(0.0)).ok();
-        Self { budget, end: time.and_then(|time| Instant::now().checked_add(time)), ended: Cell::new(None) }
+        let end = time.and_then(|time| Instant::now().checked_add(time));
+        Self { budget, end, ended: Cell::new(None), facts: Cell::new(0), unsettled: Cell::new(0) }
     }
 
     /// Returns the limit that ended an import, if one did.
@@ -53,10 +65,22 @@ impl<'a> Limits<'a> {
     ///
     /// `bytes`: the memory of the facts.
     pub(super) fn check_with(&self, bytes: usize) -> std::io::Result<()> {
+        self.facts.set(bytes);
         if bytes > self.budget.bytes {
             return Err(self.end(Ended::Memory));
         }
         self.check()
+    }
+
+    /// Notes that a row was made of the text read so far.
+    pub(super) fn settle(&self) {
+        self.unsettled.set(0);
+    }
+
+    /// Returns a reader for a parser that makes rows while it reads. Reads fail if the parser may need more than the
+    /// permitted memory for a text from which it makes none.
+    pub(super) fn counted<R: Read>(&'a self, inner: R) -> Counted<'a, R> {
+        Counted { inner, limits: self }
     }
 
     fn end(&self, ended: Ended) -> Error {
@@ -119,6 +143,25 @@ fn unpacked<'a>(file: impl std::io::BufRead + 'a) -> Result<Box<dyn Read + 'a>, 
 #[cfg(not(feature = "gzip"))]
 fn unpacked<'a>(_file: impl Read) -> Result<Box<dyn Read + 'a>, String> {
     Err("this build can't decompress it; unpack it, or build `actcheck-rules` with the feature `gzip`".to_owned())
+}
+
+/// A reader that counts the text from which no rows were made.
+pub(super) struct Counted<'a, R> {
+    inner: R,
+    limits: &'a Limits<'a>,
+}
+
+impl<R: Read> Read for Counted<'_, R> {
+    fn read(&mut self, buffer: &mut [u8]) -> std::io::Result<usize> {
+        let count = self.inner.read(buffer)?;
+        let Limits { unsettled, facts, budget, .. } = self.limits;
+        unsettled.set(unsettled.get() + count);
+        let parser = unsettled.get().saturating_sub(READ_AHEAD).saturating_mul(PARSER_BYTES);
+        if facts.get().saturating_add(parser) > budget.bytes {
+            return Err(self.limits.end(Ended::Memory));
+        }
+        Ok(count)
+    }
 }
 
 /// A reader whose reads fail once a limit is reached.

@@ -16,5 +16,8 @@ mod statements;
 mod table;
 mod unfinished;
 
+#[cfg(test)]
+mod tests;
+
 pub use program::{Closure, Engine, Loading, Program};
 pub use run::{Summary, run, run_as};

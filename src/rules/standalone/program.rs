@@ -16,8 +16,8 @@ use crate::model::program::{PredicateId, Predicates};
 use crate::model::universe::Universe;
 use crate::standalone::import::{define_imports, import};
 use crate::standalone::input::Limits;
-use crate::syntax::{Statement, Syntax, parse};
-use actcheck_base::{Diagnostics, RuleFault, Source, Term, TermId, Terms};
+use crate::syntax::{Expression, Statement, Syntax, parse};
+use actcheck_base::{Diagnostic, Diagnostics, RuleFault, Source, Term, TermId, Terms, did_you_mean};
 
 /// The evaluator of a program.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -42,12 +42,24 @@ pub struct Loading {
     pub budget: Budget,
     /// Whether rows and statements that can't be read are left out with a warning.
     pub lenient: bool,
+    /// Values of parameters by name, as written in rules; they replace those of `@parameter`.
+    pub parameters: BTreeMap<String, String>,
+}
+
+impl Loading {
+    /// Strict, with these limits and without values of parameters.
+    pub fn within(budget: &Budget) -> Self {
+        Self { budget: budget.clone(), lenient: false, parameters: BTreeMap::new() }
+    }
 }
 
 impl Default for Loading {
     /// Strict, with at most 4 GiB of facts and without a time limit.
     fn default() -> Self {
-        Self { budget: Budget { bytes: 4 << 30, secs: f64::INFINITY, ..Budget::default() }, lenient: false }
+        Self {
+            budget: Budget { bytes: 4 << 30, secs: f64::INFINITY, ..Budget::default() },
+            ..Self::within(&Budget::default())
+        }
     }
 }
 
@@ -169,12 +181,13 @@ impl Program {
     /// All errors with their places; a limit was reached (`R090`), or the budget's `stop` was set (`R091`).
     pub fn load_as(source: &Source, folder: &Path, loading: &Loading) -> Result<Self, Diagnostics> {
         let limits = Limits::new(&loading.budget);
-        let (syntax, mut diagnostics) = parse(source);
+        let (mut syntax, mut diagnostics) = parse(source);
+        diagnostics.extend(set_parameters(&mut syntax, &loading.parameters));
         let mut terms = Terms::new();
         let mut checking = Checking::new(&mut terms, None);
         checking.define(&syntax, Role::Standalone);
         define_declared(&mut checking, &syntax);
-        let imports = define_imports(&mut checking, &syntax, folder);
+        let imports = define_imports(&mut checking, &syntax, folder, &limits);
         let mut program = checking.rules(&syntax, Role::Standalone);
         let (predicates, found) = (checking.predicates, checking.diagnostics);
         diagnostics.extend(found);
@@ -266,6 +279,42 @@ impl Program {
         let rows = |id| sets.get(&id).map_or(Vec::new(), |set| set.iter().flatten().copied().collect());
         Ok((0..self.predicates.len()).map(|id| (id, rows(id))).collect())
     }
+}
+
+/// Gives parameters other values. Reports those that the program does not have, and values that are not constants.
+fn set_parameters(syntax: &mut Syntax, values: &BTreeMap<String, String>) -> Diagnostics {
+    let mut found = Diagnostics::new();
+    for (name, text) in values {
+        let source = Source::new("parameter", format!("value({text}) ."));
+        let (parsed, faults) = parse(&source);
+        let value = match parsed.statements.as_slice() {
+            [Statement::Rule(rule)] if rule.body.is_empty() && !faults.has_errors() => {
+                rule.heads.first().and_then(|head| Some((head.args.first()?.clone(), head.args.len() == 1)))
+            }
+            _ => None,
+        };
+        let Some((value, true)) = value else {
+            let help = "write a constant as in rules, such as `limit=1` or `name=\"text\"`";
+            found.push(Diagnostic::error("R036", format!("`{text}` is not a value for `${name}`")).help(help));
+            continue;
+        };
+        let mut known = Vec::new();
+        let mut is_set = false;
+        for statement in &mut syntax.statements {
+            let Statement::Parameter { name: own, value: old, span } = statement else { continue };
+            known.push(own.clone());
+            if own == name {
+                // Faults of the value are shown at the parameter.
+                *old = Some(Expression { kind: value.kind.clone(), span: span.clone() });
+                is_set = true;
+            }
+        }
+        if !is_set {
+            let help = did_you_mean(name, known.iter().map(String::as_str));
+            found.push(Diagnostic::error("R036", format!("the program has no parameter `${name}`")).help(help));
+        }
+    }
+    found
 }
 
 fn define_declared(checking: &mut Checking<'_>, syntax: &Syntax) {

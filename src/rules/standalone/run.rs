@@ -23,10 +23,10 @@ pub struct Summary {
 /// Runs a program: reads its imports (relative to its folder), evaluates it, and writes its exports below `out_dir`.
 ///
 /// # Errors
-/// All errors of the program and its files; the budget was exceeded (`R090`); an export can't be written (`R073`); the
+/// All errors of the program and its files; the budget was exceeded (`R090`); a sum does not fit (`R065`); an export can't be written (`R073`); the
 /// budget's `stop` was set (`R091`).
 pub fn run(path: &Path, out_dir: &Path, budget: &Budget) -> Result<Summary, Diagnostics> {
-    run_as(path, out_dir, &Loading { budget: budget.clone(), lenient: false })
+    run_as(path, out_dir, &Loading::within(budget))
 }
 
 /// Like [`run`], on request without the rows of imports that can't be read. The imports may take the
@@ -49,11 +49,17 @@ pub fn run_as(path: &Path, out_dir: &Path, loading: &Loading) -> Result<Summary,
     let mut summary = Summary { warnings: program.warnings, ..Summary::default() };
     summary.tuples = closure.predicates().map(|name| (name.to_owned(), closure.count(name))).collect();
     for export in exports {
-        let count = write(&export, out_dir, &closure, &loading.budget.stop).map_err(|reason| {
+        let written = write(&export, out_dir, &closure, &loading.budget.stop).map_err(|reason| {
             let message = format!("`{}` can't be written: {reason}", out_dir.join(&export.path).display());
             Diagnostic::error("R073", message).in_source(&source)
         })?;
-        summary.written.push((out_dir.join(&export.path), count));
+        if written.left_out > 0 {
+            let message =
+                format!("{} rows of `{}` are not RDF statements, and were left out", written.left_out, export.predicate);
+            let help = "a subject is an IRI or a blank node, and a predicate an IRI";
+            summary.warnings.push(Diagnostic::warning("R075", message).in_source(&source).help(help));
+        }
+        summary.written.push((out_dir.join(&export.path), written.rows));
     }
     Ok(summary)
 }
@@ -62,6 +68,10 @@ pub fn run_as(path: &Path, out_dir: &Path, loading: &Loading) -> Result<Summary,
 fn stopped(fault: &RuleFault, warnings: &Diagnostics, source: &Source) -> Diagnostics {
     if *fault == RuleFault::Interrupted {
         return Diagnostic::error("R091", fault.to_string()).in_source(source).into();
+    }
+    if let RuleFault::Value(reason) = fault {
+        let help = "sum doubles, as in `#sum(?x)` with `?x = DOUBLE(?n)`, or fewer values in each group";
+        return Diagnostic::error("R065", reason).in_source(source).help(help).into();
     }
     let mut found = Diagnostics::new();
     let help = if fault.reason().contains(NEW_THINGS) {

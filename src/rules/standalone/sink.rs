@@ -27,6 +27,7 @@ impl Sink<'_> {
         if !intern(self.terms, self.rows) {
             self.rows.truncate(before);
         }
+        self.limits.settle();
         self.unchecked += 1;
         if self.unchecked < ROWS_PER_CHECK { Ok(()) } else { self.check() }
     }
@@ -37,6 +38,7 @@ impl Sink<'_> {
     /// A limit was reached.
     pub(super) fn check(&mut self) -> std::io::Result<()> {
         self.unchecked = 0;
+        self.limits.settle();
         self.limits.check_with(self.other_bytes + self.terms.bytes() + self.rows.len() * size_of::<TermId>())
     }
 }

@@ -9,10 +9,10 @@ use oxrdfio::{RdfFormat, RdfParseError, RdfParser};
 use crate::model::rdf::from_rdf;
 use crate::standalone::faults::{Faults, Place};
 use crate::standalone::sink::Sink;
-use actcheck_base::{Term, TermId, Terms, XmlGuard, XmlProgress};
+use actcheck_base::{Term, TermId, Terms, TurtleGuard, XmlGuard, XmlProgress};
 
 /// Nemo's name for the default graph.
-const DEFAULT_GRAPH: &str = "tag:nemo:defaultgraph";
+pub(super) const DEFAULT_GRAPH: &str = "tag:nemo:defaultgraph";
 
 /// Minimum length of the labels that the parser draws: 128 bits in hexadecimal digits, without zeros at the beginning.
 const RANDOM_LABEL: usize = 24;
@@ -40,12 +40,14 @@ pub(super) fn read_rdf(
             let (guard, progress) = XmlGuard::new(reader);
             (Box::new(guard), Some(progress))
         }
+        RdfFormat::Turtle | RdfFormat::TriG => (Box::new(TurtleGuard::new(reader)), None),
         _ => (Box::new(reader), None),
     };
     for (count, quad) in parser.for_reader(reader).enumerate() {
         if count >= limit {
             break;
         }
+        sink.other_bytes += std::mem::take(&mut blanks.bytes);
         let quad = match quad {
             Ok(quad) => quad,
             Err(error) => {
@@ -131,6 +133,8 @@ struct Blanks {
     known: HashMap<BlankNode, TermId>,
     /// Number of nodes without a label.
     unnamed: usize,
+    /// Memory of the nodes that are not accounted for. Unit: bytes.
+    bytes: usize,
 }
 
 impl Blanks {
@@ -154,6 +158,7 @@ impl Blanks {
             candidate = Term::Blank(format!("{label}_{number}").into());
         }
         let id = terms.intern(candidate);
+        self.bytes += size_of::<(BlankNode, TermId)>() * 2 + node.as_str().len();
         self.known.insert(node.clone(), id);
         id
     }

@@ -185,6 +185,7 @@ impl Lexer<'_> {
                 Some(Token::Anonymous)
             }
             c if c.is_ascii_digit() => Some(self.number()),
+            '.' if self.peek_second().is_some_and(|c| c.is_ascii_digit()) => Some(self.number()),
             c if starts_name(c) => Some(self.name()),
             ':' if self.peek_second().is_some_and(starts_name) => {
                 self.at += 1;

@@ -94,7 +94,6 @@ impl Parser<'_> {
             Token::Global(name) => ExpressionKind::Global(name),
             Token::Anonymous => ExpressionKind::Anonymous,
             Token::Blank(label) => ExpressionKind::Constant(Term::Blank(label.into())),
-            Token::Iri(iri) => ExpressionKind::Constant(Term::iri(self.resolve(&iri))),
             Token::Number(text) => {
                 self.advance();
                 return Ok(self.number(&text, false, span));
@@ -114,7 +113,7 @@ impl Parser<'_> {
                 let span = span.start..self.end();
                 return Ok(Expression { kind: ExpressionKind::Aggregate(name, args), span });
             }
-            Token::Name(_) | Token::Prefixed(..) => return self.name_or_call(),
+            Token::Name(_) | Token::Prefixed(..) | Token::Iri(_) => return self.name_or_call(),
             Token::Symbol("{") => {
                 let help = "write one fact for each entry; JSON files are imported as facts with three arguments";
                 return Err(self.fault("R012", span, "maps are not supported", help));
@@ -132,6 +131,7 @@ impl Parser<'_> {
         let name = match &token {
             Token::Name(name) => name.clone(),
             Token::Prefixed(prefix, local) => self.expand(prefix, local, span.clone()),
+            Token::Iri(iri) => self.resolve(iri),
             _ => return Err(self.unexpected("a name")),
         };
         self.advance();

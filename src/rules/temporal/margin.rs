@@ -1,5 +1,7 @@
 //! The margin of a property whose `success` or `violation` reads formulas: their robustness.
 
+use std::collections::BTreeSet;
+
 use crate::builtins;
 use crate::check::checking::{Checking, Role};
 use crate::model::expression::Expr;
@@ -33,6 +35,7 @@ pub(crate) fn add_margin(checking: &mut Checking<'_>, program: &mut Program, syn
         .find_map(|(name, positive)| Some((find(checking, name)?, positive)));
     let Some((decisive, positive)) = decisive else { return };
     let deciding: Vec<Rule> = program.rules.iter().filter(|rule| rule.head.predicate == decisive).cloned().collect();
+    warn_of_helpers(checking, program, decisive);
     if deciding.is_empty() || deciding.iter().any(|rule| rule.aggregation.is_some() || formulas_of(rule).is_none()) {
         return;
     }
@@ -46,6 +49,35 @@ pub(crate) fn add_margin(checking: &mut Checking<'_>, program: &mut Program, syn
     let largest = rules.first().filter(|_| positive).map(|rule| largest(rule, each, margin));
     program.rules.extend(rules);
     program.rules.extend(largest);
+}
+
+/// Warns (R057) of formulas in the rules of helper predicates: their robustness is not part of the margin.
+fn warn_of_helpers(checking: &mut Checking<'_>, program: &Program, decisive: PredicateId) {
+    let (mut reached, mut waiting) = (BTreeSet::new(), vec![decisive]);
+    while let Some(predicate) = waiting.pop() {
+        if predicate != decisive && !reached.insert(predicate) {
+            continue;
+        }
+        let rules = program.rules.iter().filter(|rule| rule.head.predicate == predicate);
+        waiting.extend(rules.flat_map(Rule::reads).filter(|read| *read != decisive && !reached.contains(read)));
+    }
+    let name = checking.predicates.get(decisive).name.clone();
+    for rule in program.rules.iter().filter(|rule| reached.contains(&rule.head.predicate)) {
+        for literal in &rule.body {
+            let Literal::Test { value: Expr::Timed(timed), span } = literal else { continue };
+            let mut compares = false;
+            for formula in timed.formulas() {
+                formula.visit(&mut |part| compares |= matches!(part, crate::temporal::Formula::Compare { .. }));
+            }
+            if compares {
+                let helper = &checking.predicates.get(rule.head.predicate).name;
+                let message =
+                    format!("the margin of the property leaves out this formula, which is in a rule of `{helper}`");
+                let help = format!("write the formula in the rule of `{name}`, or derive `margin(?m)` of your own");
+                checking.warning("R057", &rule.origin.source, span, message, help);
+            }
+        }
+    }
 }
 
 /// Returns the conditions of a rule that read formulas; `None` if there are none.

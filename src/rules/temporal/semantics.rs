@@ -45,7 +45,7 @@ impl<'a> Reader<'a> {
     /// Returns `None`, and stops the evaluation, if the course of the action was not recorded.
     pub(super) fn new(binding: &'a [TermId], terms: &'a Universe<'a>, watch: &'a Watch) -> Option<Self> {
         let Some(course) = terms.course().filter(|course| course.count > 0) else {
-            watch.unrecorded(UNRECORDED.to_owned());
+            watch.no_value(UNRECORDED.to_owned());
             return None;
         };
         Some(Self { course, binding, terms, watch })
@@ -146,7 +146,7 @@ impl<'a> Reader<'a> {
         let term = self.terms.term(self.binding[variable]);
         let value = term.number();
         if value.is_none() {
-            self.watch.unrecorded(format!("{term} is not a number"));
+            self.watch.no_value(format!("{term} is not a number"));
         }
         value
     }
@@ -163,7 +163,7 @@ impl<'a> Reader<'a> {
                 if values.is_none() {
                     let things = things.iter().map(|thing| names::shorten(&self.thing(thing)));
                     let of = things.collect::<Vec<_>>().join(" and ");
-                    self.watch.unrecorded(format!("`{}` of {of} was not recorded", names::shorten(iri)));
+                    self.watch.no_value(format!("`{}` of {of} was not recorded", names::shorten(iri)));
                 }
                 values
             }
