@@ -6,9 +6,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use crate::model::values;
 use crate::standalone::program::{Closure, Program};
 use crate::standalone::settings::Settings;
-use crate::standalone::unfinished::Unfinished;
 use crate::syntax::{Statement, Syntax, Transfer};
-use actcheck_base::{Diagnostic, Diagnostics, RuleFault, Span, TermId, did_you_mean};
+use actcheck_base::{Below, Diagnostic, Diagnostics, RuleFault, Span, TermId, did_you_mean};
 
 const FORMATS: [&str; 3] = ["csv", "dsv", "tsv"];
 const OPTIONS: [&str; 2] = ["resource", "delimiter"];
@@ -100,14 +99,13 @@ fn file_name(syntax: &Syntax, predicate: &str) -> String {
 /// # Errors
 /// The reason why the file can't be written, or `stop` was set.
 pub(super) fn write(export: &Export, folder: &Path, closure: &Closure, stop: &AtomicBool) -> Result<usize, String> {
-    let path = folder.join(&export.path);
+    let (path, below) = (folder.join(&export.path), Below::new(folder));
     let lower = |error: &dyn std::fmt::Display| error.to_string().to_lowercase();
-    if let Some(parent) = path.parent() {
-        std::fs::create_dir_all(parent).map_err(|error| lower(&error))?;
-    }
+    below.create_folder(path.parent().unwrap_or(folder)).map_err(|error| lower(&error))?;
     let mut rows: Vec<&[TermId]> = closure.rows_unsorted(&export.predicate).collect();
     rows.sort_unstable_by(|a, b| a.iter().map(|id| closure.term(*id)).cmp(b.iter().map(|id| closure.term(*id))));
-    let (unfinished, file) = Unfinished::begin(path).map_err(|error| lower(&error))?;
+    let new = below.new_file(&path).map_err(|error| lower(&error))?;
+    let file = new.writer().map_err(|error| lower(&error))?;
     let mut writer = csv::WriterBuilder::new().delimiter(export.delimiter).from_writer(file);
     let mut count = 0;
     for row in rows {
@@ -120,6 +118,6 @@ pub(super) fn write(export: &Export, folder: &Path, closure: &Closure, stop: &At
         count += 1;
     }
     writer.flush().map_err(|error| lower(&error))?;
-    unfinished.keep().map_err(|error| lower(&error))?;
+    new.finish().map_err(|error| lower(&error))?;
     Ok(count)
 }

@@ -14,7 +14,6 @@ mod settings;
 mod sink;
 mod statements;
 mod table;
-mod unfinished;
 
 pub use program::{Closure, Engine, Loading, Program};
 pub use run::{Summary, run, run_as};
