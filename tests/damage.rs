@@ -1,6 +1,7 @@
 //! Damage to any file of a history is found or harmless, and readable data is saved.
 //!
-//! `ACTCHECK_FLIPS` sets the number of flipped bits.
+//! `ACTCHECK_FLIPS` sets the number of flipped bits; `ACTCHECK_DAMAGED` the number of flips and of truncations of each kind of file, of
+//! which `ACTCHECK_KIND` chooses one, such as `traces/trace`, and `ACTCHECK_SEED` the places.
 
 use std::collections::BTreeMap;
 use std::io::Read as _;
@@ -8,10 +9,11 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
-use actcheck::history::{History, RunFilter};
+use actcheck::history::{CampaignEnd, History, RunFilter};
 
+use crate::history::{sample_campaign, sample_run};
 use crate::support::planted::Dice;
-use crate::support::{actcheck, copy_made_history, stderr, stdout};
+use crate::support::{actcheck, copy, copy_made_history, copy_open, stderr, stdout};
 
 /// Time limit of one command: it takes about a second, or is in an endless loop. Unit: seconds.
 const MOST_SECS: u64 = 60;
@@ -116,6 +118,127 @@ fn an_intact_history_passes_its_examination() {
     assert_eq!(stdout(&output), "h: store, 4 traces and mirror are intact\n");
 }
 
+/// A history with every kind of file: runs that are kept whole, outlines, tables, and the journal of a killed process.
+fn every_kind(folder: &Path) {
+    let (live, left) = (folder.join("live"), folder.join("h"));
+    copy_made_history(&live);
+    let history = History::open(&live).unwrap();
+    history.begin_campaign(&sample_campaign("o", 1)).unwrap();
+    (0..3).for_each(|index| history.commit_outline(&sample_run("o", index)).unwrap());
+    let end = CampaignEnd { ended: "2026-08-01T13:00:00Z".to_owned(), ..CampaignEnd::default() };
+    history.finish_campaign("o", &end).unwrap();
+    drop(history);
+    let history = History::open(&live).unwrap();
+    history.begin_campaign(&sample_campaign("k", 2)).unwrap();
+    (0..3).for_each(|index| history.commit(&sample_run("k", index)).unwrap());
+    copy_open(&live, &left);
+    drop(history);
+    std::fs::remove_dir_all(&live).unwrap();
+    let made = asked(folder, &["analyse", "--history", "h"]).unwrap();
+    assert_eq!(made.0, Some(0), "{}", made.2);
+}
+
+/// Questions that are asked after the damage, with the tables made anew from it.
+const ASKED: [&[&str]; 7] = [
+    &["list", "--format", "csv", "--history", "h"],
+    &["analyse", "--format", "json", "--history", "h"],
+    &["export", "--rebuild-mirror", "--history", "h"],
+    &["analyse", "--format", "json", "--history", "h"],
+    &["export", "--csv", "out", "--history", "h"],
+    &["show", "k-2", "--format", "json", "--history", "h"],
+    &["show", "o-2", "--format", "json", "--history", "h"],
+];
+
+/// The answers; that of an export is its table. `show` is also asked for a run with a trace of a simulation.
+fn asked_anew(folder: &Path, first: &str) -> Vec<(Option<i32>, String, String)> {
+    let _ = std::fs::remove_dir_all(folder.join("out"));
+    let show = ["show", first, "--format", "json", "--history", "h"];
+    let all = ASKED.into_iter().chain([&show[..]]);
+    all.map(|question| {
+        let mut answer = asked(folder, question).unwrap_or_else(|| panic!("{question:?} does not end"));
+        if question.contains(&"--csv") {
+            let table = std::fs::read_to_string(folder.join("out/outcomes.csv")).unwrap_or_default();
+            let mut lines: Vec<&str> = table.lines().collect();
+            lines.sort_unstable();
+            answer.1 = lines.join("\n");
+        }
+        answer
+    })
+    .collect()
+}
+
+/// The kind of a file of a history: its folder, and its ending or the first word of its name.
+fn kind_of(file: &Path) -> String {
+    let name = file.file_name().unwrap().to_string_lossy().into_owned();
+    let kind = file.extension().map_or_else(|| name.clone(), |ending| ending.to_string_lossy().into_owned());
+    let place = file.parent().unwrap().file_name().unwrap().to_string_lossy().into_owned();
+    format!("{place}/{}", kind.split('-').next().unwrap())
+}
+
+/// One flipped bit in a trace, and tables made anew from it, gave other numbers with exit code 0.
+#[test]
+fn numbers_made_anew_from_damaged_files_are_the_same_or_refused() {
+    let number = |name: &str, default| std::env::var(name).ok().and_then(|n| n.parse().ok()).unwrap_or(default);
+    let (of_kind, only) = (number("ACTCHECK_DAMAGED", 0usize), std::env::var("ACTCHECK_KIND").ok());
+    let whole = tempfile::tempdir().unwrap();
+    every_kind(whole.path());
+    let runs = files(&whole.path().join("h/traces")).into_iter();
+    let mut runs = runs.map(|file| file.file_stem().unwrap().to_string_lossy().into_owned());
+    let first = runs.find(|run| !run.starts_with("k-")).unwrap();
+    let keep = tempfile::tempdir().unwrap();
+    copy(&whole.path().join("h"), &keep.path().join("h"));
+    let right = asked_anew(whole.path(), &first);
+    assert!(right.iter().all(|(code, ..)| *code == Some(0)), "{right:?}");
+    let relative = |file: PathBuf| file.strip_prefix(keep.path()).unwrap().to_path_buf();
+    let all: Vec<PathBuf> = files(&keep.path().join("h"))
+        .into_iter()
+        .filter(|file| file.metadata().unwrap().len() > 0 && file.file_name().unwrap() != "LOG")
+        .map(relative)
+        .collect();
+    let mut kinds: Vec<String> = all.iter().map(|file| kind_of(file)).collect();
+    kinds.sort();
+    kinds.dedup();
+    kinds.retain(|kind| only.as_ref().is_none_or(|only| only == kind));
+    let mut dice = Dice::new(number("ACTCHECK_SEED", 63) as u64);
+    // By default, some kinds are damaged in one way and some in the other.
+    let cases: Vec<(usize, bool)> = match of_kind {
+        0 => (0..kinds.len()).map(|place| (place, place % 2 == 0)).collect(),
+        many => (0..kinds.len()).flat_map(|place| (0..2 * many).map(move |n| (place, n % 2 == 0))).collect(),
+    };
+    let mut table: BTreeMap<(String, &str, &str), usize> = BTreeMap::new();
+    for (place, is_flip) in cases {
+        let kind = &kinds[place];
+        let folder = tempfile::tempdir().unwrap();
+        copy(&keep.path().join("h"), &folder.path().join("h"));
+        let of_kind: Vec<&PathBuf> = all.iter().filter(|file| kind_of(file) == *kind).collect();
+        let file = folder.path().join(of_kind[dice.below(of_kind.len() as u64) as usize]);
+        let damage = if is_flip {
+            let (at, bit) = flip(&file, &mut dice);
+            format!("bit {bit} of byte {at} of {}", file.display())
+        } else {
+            let length = dice.below(file.metadata().unwrap().len());
+            std::fs::File::options().write(true).open(&file).unwrap().set_len(length).unwrap();
+            format!("{} cut to {length} bytes", file.display())
+        };
+        let mut is_noticed = false;
+        for (idx, (answer, right)) in asked_anew(folder.path(), &first).into_iter().zip(&right).enumerate() {
+            let place = format!("{damage}: {:?}", ASKED.get(idx));
+            let (code, output, errors) = answer;
+            let code = code.unwrap_or_else(|| panic!("{place}: crashed: {errors}"));
+            assert!(code <= 2 && !errors.contains("panicked"), "{place}: {errors}");
+            let same = code == 0 && output == right.1;
+            let said = code > 0 || errors.contains("H029");
+            assert!(same || said, "{place}: another answer with exit code 0 and no warning\n{output}\n{}", right.1);
+            is_noticed |= said;
+        }
+        let result = if is_noticed { "found" } else { "harmless" };
+        *table.entry((kind.clone(), if is_flip { "flip" } else { "cut" }, result)).or_default() += 1;
+    }
+    for ((kind, way, result), times) in table {
+        println!("{kind:24} {way:5} {times:4} {result}");
+    }
+}
+
 /// No answer after a flipped bit may differ from the right one without an error, take for ever, or come from a crash.
 #[test]
 fn a_flipped_bit_in_any_file_is_found_or_harmless() {
@@ -132,17 +255,11 @@ fn a_flipped_bit_in_any_file_is_found_or_harmless() {
             .filter(|file| file.metadata().unwrap().len() > 0 && file.file_name().unwrap() != "LOG")
             .collect();
         // Each kind of file comes up as often as the others.
-        let kind = |file: &Path| {
-            let name = file.file_name().unwrap().to_string_lossy().into_owned();
-            let kind = file.extension().map_or_else(|| name.clone(), |ending| ending.to_string_lossy().into_owned());
-            let place = file.parent().unwrap().file_name().unwrap().to_string_lossy().into_owned();
-            format!("{place}/{}", kind.split('-').next().unwrap())
-        };
-        let mut kinds: Vec<String> = all.iter().map(|file| kind(file)).collect();
+        let mut kinds: Vec<String> = all.iter().map(|file| kind_of(file)).collect();
         kinds.sort();
         kinds.dedup();
         let chosen = &kinds[number % kinds.len()];
-        let of_kind: Vec<&PathBuf> = all.iter().filter(|file| kind(file) == *chosen).collect();
+        let of_kind: Vec<&PathBuf> = all.iter().filter(|file| kind_of(file) == *chosen).collect();
         let file = of_kind[dice.below(of_kind.len() as u64) as usize];
         let (at, bit) = flip(file, &mut dice);
         let place = format!("bit {bit} of byte {at} of {}", file.display());

@@ -7,19 +7,21 @@
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
+use actcheck::analysis::Mirror;
 use actcheck::base::{Diagnostics, Files, Source};
 use actcheck::campaign::Env;
 use actcheck::config::{self, Overrides};
 use actcheck::history::merge::{MergeOptions, carry_out, plan};
-use actcheck::history::{History, RunFilter};
+use actcheck::history::{CampaignEnd, History, RunFilter};
 use actcheck::ontology;
 use actcheck::world;
 use oxigraph::model::{Literal, NamedNode, Quad, Term};
 use oxigraph::store::Store;
 
+use crate::fuzz_corpus::entrances::histories;
 use crate::history::{sample_campaign, sample_run};
-use crate::support::copy;
 use crate::support::mutations::{Mutations, cases};
+use crate::support::{actcheck, copy, stderr};
 
 /// Renders diagnostics as the program prints them: the first 200.
 fn show(found: &Diagnostics) {
@@ -435,5 +437,83 @@ fn merged_histories() {
         let around = [&outer, &outer.join("b")].map(|folder| std::fs::read_dir(folder).unwrap().count());
         assert_eq!(around, [1, 1], "a file was written outside of the history");
         assert_eq!(std::fs::read_dir(&inner).unwrap().count(), if inner.join("ours").exists() { 2 } else { 1 });
+    });
+}
+
+/// The bytes of files of each kind, after the byte that chooses their place.
+fn seeds(folder: &Path) -> Vec<Vec<u8>> {
+    let live = folder.join("live");
+    let history = History::open(&live).unwrap();
+    history.begin_campaign(&sample_campaign("k", 1)).unwrap();
+    (0..3).for_each(|index| history.commit(&sample_run("k", index)).unwrap());
+    (3..6).for_each(|index| history.commit_outline(&sample_run("k", index)).unwrap());
+    let journal = std::fs::read(live.join("journal")).unwrap();
+    history
+        .finish_campaign("k", &CampaignEnd { ended: "2026-08-01T13:00:00Z".to_owned(), ..CampaignEnd::default() })
+        .unwrap();
+    drop(history);
+    let (mirror, _) = Mirror::update(&History::open_to_read(&live).unwrap()).unwrap();
+    let table = mirror.paths().next().unwrap().1.to_path_buf();
+    let outlines = Files::Disk.list(&live.join("outlines"));
+    let traces = Files::Disk.list(&live.join("traces"));
+    let files = [live.join("seal/SUMS"), outlines[0].clone(), traces[0].clone(), live.join("tables/FILES"), table];
+    let mut contents: Vec<Vec<u8>> = files.iter().map(|file| std::fs::read(file).unwrap()).collect();
+    contents.insert(1, journal);
+    let places = [0, 1, 2, 4, 5, 7];
+    places.into_iter().zip(contents).map(|(place, bytes)| [vec![place], bytes].concat()).collect()
+}
+
+#[test]
+fn history_files() {
+    let folder = tempfile::tempdir().unwrap();
+    let seeds = seeds(folder.path());
+    let made = folder.path().join("made");
+    histories::made(&made);
+    let others: Vec<&[u8]> = seeds.iter().map(Vec::as_slice).collect();
+    cases("files of histories", 18, |mut random| {
+        let seed = random.below(seeds.len());
+        let seed = &seeds[seed];
+        let mut bytes = random.text(&seed[1..], &["\u{0}", "\u{7f}", "PAR1"], &others);
+        // With wrong or with correct checksums.
+        let places = histories::PLACES.len() as u8;
+        bytes.insert(0, seed[0] + if random.below(3) == 0 { places } else { 0 });
+        if let Err(found) = histories::history(&made, &bytes) {
+            show(&found);
+        }
+    });
+}
+
+/// Folders of launches, and caches, in a project.
+#[test]
+fn launches_and_caches() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    let config = "tests = [[\"Pick\"]]\ntest_count = 4\n[pickObject]\nmodel_list = [\"glass\"]\n";
+    std::fs::write(here.join("c.toml"), config).unwrap();
+    let launch = here.join(".actcheck.launch");
+    let plan = "{\"id\": \"ab\", \"program\": \"x\", \"config\": \"c.toml\", \"config_digest\": \"x\", \"runs\": null, \
+                \"seed\": 7, \"shards\": 2, \"jobs\": 1, \"planned\": 4}";
+    cases("launches", 6, |mut random| {
+        let _ = std::fs::remove_dir_all(&launch);
+        for name in ["done", "faults", "locks", "logs", "shards/1/hulls", "shards/1/traces"] {
+            std::fs::create_dir_all(launch.join(name)).unwrap();
+        }
+        for name in
+            ["plan.json", "job.json", "done/1", "faults/1", "logs/1.log", "shards/1/VERSION", "shards/1/hulls/x.hulls"]
+        {
+            if random.below(2) == 0 {
+                let text = random.text(plan.as_bytes(), &["18446744073709551615", "null", "{", "}"], &[]);
+                std::fs::write(launch.join(name), text).unwrap();
+            }
+        }
+        for arguments in [
+            &["launch", "c.toml", "--shards", "2", "--dry-run"][..],
+            &["launch", "c.toml", "--shards", "2", "-q"],
+            &["launch-task", ".actcheck.launch", "1"],
+        ] {
+            let output = actcheck(here, arguments);
+            let said = stderr(&output);
+            assert!(output.status.code().is_some_and(|code| code <= 2) && !said.contains("panicked"), "{said}");
+        }
     });
 }

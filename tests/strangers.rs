@@ -216,7 +216,7 @@ fn devices_and_pipes_are_not_read() {
     let history = folder.path().join("h");
     std::fs::create_dir(&history).unwrap();
     std::os::unix::fs::symlink("/dev/zero", history.join("VERSION")).unwrap();
-    assert!(refused(folder.path(), &["list", "--history", "h"]).contains("H003"));
+    assert!(refused(folder.path(), &["list", "--history", "h"]).contains("H027"));
     let found = ontology::load(&Files::Disk, Path::new("/dev/zero")).map(drop).unwrap_err();
     assert!(found.to_string().contains("O001") && found.to_string().contains("it is a device or a pipe"), "{found}");
 }

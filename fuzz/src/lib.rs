@@ -3,6 +3,7 @@
 //! The targets below `fuzz_targets/` give libFuzzer's inputs to these functions; `tests/fuzz_corpus.rs` of the program
 //! includes this file and gives them the corpus as a regression test.
 
+pub mod histories;
 pub mod imports;
 
 use std::path::Path;

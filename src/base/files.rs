@@ -1,11 +1,9 @@
 //! Files of a project: on disk, or embedded in the binary.
 
-use std::fs::File;
-use std::io::Read as _;
 use std::path::{Component, Path, PathBuf};
 
-use crate::Source;
 use crate::shipped;
+use crate::{FileKind, NotPlain, Source, read_regular};
 
 /// Longest file that is read as a whole. Unit: bytes.
 const LONGEST: u64 = 1 << 30;
@@ -35,7 +33,7 @@ impl Files {
             Self::Shipped => {
                 shipped::read(&slashed(&normalised(path))).ok_or_else(|| "no built-in file has this path".to_owned())
             }
-            Self::Disk => read_regular(path, longest),
+            Self::Disk => read_disk(path, longest),
         }
     }
 
@@ -118,22 +116,12 @@ impl Files {
 }
 
 /// Reads a regular file: opening a pipe may wait for ever, and a device may have no end.
-fn read_regular(path: &Path, longest: u64) -> Result<Vec<u8>, String> {
-    let data = std::fs::metadata(path).map_err(|error| describe(&error))?;
-    if data.is_dir() {
-        return Err("it is a folder".to_owned());
-    }
-    if !data.is_file() {
-        return Err("it is a device or a pipe, not a file".to_owned());
-    }
-    let file = File::open(path).map_err(|error| describe(&error))?;
-    let mut bytes = Vec::with_capacity(usize::try_from(data.len().min(longest)).unwrap_or_default());
-    // Some files are longer than their metadata says.
-    file.take(longest + 1).read_to_end(&mut bytes).map_err(|error| describe(&error))?;
-    if bytes.len() as u64 > longest {
-        return Err(format!("it is longer than {} MiB", longest >> 20));
-    }
-    Ok(bytes)
+fn read_disk(path: &Path, longest: u64) -> Result<Vec<u8>, String> {
+    read_regular(path, longest).map_err(|error| match NotPlain::of(&error) {
+        Some(NotPlain { kind, .. }) if *kind == FileKind::Folder => "it is a folder".to_owned(),
+        Some(NotPlain { kind, .. }) => format!("it is {kind}, not a file"),
+        None => describe(&error),
+    })
 }
 
 /// Removes `.` and `..` from a path as far as possible without reading the disk.

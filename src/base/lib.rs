@@ -2,6 +2,7 @@
 //!
 //! Never: reads a configuration, depends on actions, rules or robots, or prints.
 
+mod below;
 mod course;
 mod deciding;
 mod diagnostic;
@@ -12,6 +13,7 @@ mod judgement;
 mod keep;
 mod meaning;
 pub mod names;
+mod panic_guard;
 mod printable;
 mod query_texts;
 mod rotation;
@@ -30,6 +32,7 @@ mod write_atomic;
 mod xml_guard;
 mod xml_limits;
 
+pub use below::{Below, FileKind, NotPlain, open_regular, read_regular};
 pub use course::{Course, Signal, SignalKey, Solid};
 pub use deciding::DecidingSignal;
 pub use diagnostic::{Diagnostic, Diagnostics, Severity};
@@ -38,6 +41,7 @@ pub use files::Files;
 pub use findings::{Findings, RuleFault, WitnessRow};
 pub use judgement::{Judgement, Outcome};
 pub use keep::{Keep, Keeping};
+pub use panic_guard::guarded;
 pub use printable::{printable, printable_in_colour};
 pub use query_texts::{
     COUNTED_TEXT, MOST_NESTED_CALLS, TEXT_FUNCTIONS, TextFunction, TextTooLong, bounded_texts, check_calls,
@@ -54,6 +58,6 @@ pub use suggest::{did_you_mean, misspelt, nearest};
 pub use term::{Term, TermId, Terms};
 pub use turtle_guard::{TurtleGuard, check_turtle};
 pub use varint::{ByteReader, put_varint, unzigzag, zigzag};
-pub use write_atomic::{NewFile, write_atomic, write_quickly};
+pub use write_atomic::NewFile;
 pub use xml_guard::{XmlGuard, XmlProgress};
 pub use xml_limits::check_xml;

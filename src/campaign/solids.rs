@@ -1,25 +1,26 @@
 //! Decomposes the meshes of models and robot into convex hulls before the first run, with a cache beside the history.
 
 use std::collections::BTreeMap;
-use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use rayon::prelude::*;
 
-use actcheck_base::{Diagnostic, Diagnostics, Digest, Files};
+use actcheck_base::{Below, Diagnostic, Diagnostics, Digest};
 use actcheck_config::Campaign;
 use actcheck_data::{Mesh, ObjectModel, Part, RobotProfile, Shape};
 use actcheck_world as world;
 
 /// Cache folder in the history's folder.
 const FOLDER: &str = "hulls";
+/// Longest file: the solids of a mesh have some kilobytes. Unit: bytes.
+const LONGEST: u64 = 64 << 20;
 /// The start of each file, with the format version.
-const TITLE: &str = "actcheck hulls 1";
+const TITLE: &str = "actcheck hulls 2";
 
 /// Convex decompositions by the key of their mesh, cached in memory and on disk.
 struct HullCache {
-    folder: PathBuf,
+    history: PathBuf,
     known: BTreeMap<String, Result<Vec<Shape>, String>>,
 }
 
@@ -27,7 +28,7 @@ struct HullCache {
 ///
 /// Adds a fault (W037) for each mesh without a convex decomposition.
 pub(super) fn decompose_meshes(campaign: &mut Campaign, faults: &mut Diagnostics) {
-    let mut cache = HullCache { folder: campaign.history.join(FOLDER), known: BTreeMap::new() };
+    let mut cache = HullCache { history: campaign.history.clone(), known: BTreeMap::new() };
     let used = campaign.used_models();
     let models = campaign.models.iter().filter(|(name, _)| used.contains(*name)).map(|(_, model)| model.as_ref());
     cache.fill(models.flat_map(shapes_of).chain(campaign.robot.meshes.values().flatten()));
@@ -71,7 +72,7 @@ pub fn proposed_robot(
     history: &Path,
     hand: Option<&str>,
 ) -> Result<world::Proposal, Diagnostics> {
-    let mut cache = HullCache { folder: history.join(FOLDER), known: BTreeMap::new() };
+    let mut cache = HullCache { history: history.to_path_buf(), known: BTreeMap::new() };
     let mut faults = Diagnostics::new();
     cache.fill(robot.meshes.values().flatten());
     decompose_with(&mut cache, &mut robot, &mut faults);
@@ -158,41 +159,52 @@ impl HullCache {
     }
 
     fn cached_or_new(&self, key: &str, mesh: &Mesh) -> Result<Vec<Shape>, String> {
-        let path = self.folder.join(format!("{key}.hulls"));
-        if let Some(solids) = read(&path) {
+        if let Some(solids) = read(&self.history, key) {
             return Ok(solids);
         }
         let solids = world::decompose(mesh)?;
         // If the cache can't be written, the mesh is decomposed again next time.
-        let _ = write(&path, &solids);
+        let _ = write(&self.history, key, &solids);
         Ok(solids)
     }
 }
 
-/// Reads a cache file. Returns `None` if it is missing, corrupt or in another format.
-fn read(path: &Path) -> Option<Vec<Shape>> {
-    let bytes = Files::Disk.read_bytes(path).ok()?;
+/// The file of a mesh.
+fn file_of(history: &Path, key: &str) -> PathBuf {
+    history.join(FOLDER).join(format!("{key}.hulls"))
+}
+
+/// Reads the cache file of a mesh. Returns `None` if it is missing, corrupt, of another mesh, or in another format.
+fn read(history: &Path, key: &str) -> Option<Vec<Shape>> {
+    let bytes = Below::new(history).read(&file_of(history, key), LONGEST).ok()?;
     let (head, body) = bytes.split_at_checked(bytes.iter().position(|byte| *byte == b'\n')? + 1)?;
     let solids: Vec<Shape> =
-        if head == head_of(body).as_bytes() { postcard::from_bytes(body).ok()? } else { return None };
+        if head == head_of(key, body).as_bytes() { postcard::from_bytes(body).ok()? } else { return None };
     let is_solid = |shape: &Shape| matches!(shape, Shape::Hull { points, .. } if points.len() >= 4);
     (!solids.is_empty() && solids.iter().all(is_solid)).then_some(solids)
 }
 
 /// Writes a file atomically: a reader finds all of it or none.
-fn write(path: &Path, solids: &[Shape]) -> Result<(), String> {
+fn write(history: &Path, key: &str, solids: &[Shape]) -> Result<(), String> {
     let body = postcard::to_stdvec(solids).map_err(|error| error.to_string())?;
-    let unfinished = path.with_extension(format!("{}.tmp", std::process::id()));
-    let folder = path.parent().unwrap_or(Path::new(""));
-    let written = fs::create_dir_all(folder)
-        .and_then(|()| fs::write(&unfinished, [head_of(&body).as_bytes(), &body].concat()))
-        .and_then(|()| fs::rename(&unfinished, path));
+    let below = Below::new(history);
+    let entries = below.entries(history).map_err(|error| error.to_string())?;
+    let has = |names: &[&str]| entries.iter().any(|(name, _)| name.to_str().is_some_and(|name| names.contains(&name)));
+    let is_ours = has(&["VERSION"]) || entries.iter().all(|(name, _)| name == FOLDER || name == "lock");
+    if !is_ours {
+        return Err("the folder is not that of a history".to_owned());
+    }
+    let written = below.create_folder(&history.join(FOLDER)).and_then(|()| {
+        let bytes = [head_of(key, &body).as_bytes(), &body].concat();
+        below.write_quickly(&file_of(history, key), &bytes)
+    });
     written.map_err(|error| error.to_string())
 }
 
-/// The first line: the format and a digest of the rest.
-fn head_of(body: &[u8]) -> String {
+/// The first line: the format, and a digest of the mesh's key and the rest.
+fn head_of(key: &str, body: &[u8]) -> String {
     let mut digest = Digest::new();
+    digest.update(key.as_bytes());
     digest.update(body);
     format!("{TITLE} {}\n", digest.finish())
 }
@@ -200,19 +212,22 @@ fn head_of(body: &[u8]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::fs;
 
     /// Values are read back bit by bit, and a modified file is rejected.
     #[test]
     fn cached_solids_are_read_back_exactly_or_rejected() {
         let folder = tempfile::tempdir().expect("a temporary folder");
-        let path = folder.path().join("deep/key.hulls");
+        let history = folder.path().join("deep");
+        let path = file_of(&history, "key");
         let third = 1.0 / 3.0;
         let solids = vec![Shape::Hull {
             points: vec![[third, -0.0, 1e-300], [1.0, 0.1, 0.2], [f64::MAX, 0.3, 5e-324], [0.7, third / 7.0, 9.9]],
             volume: third,
         }];
-        write(&path, &solids).expect("the cache can be written");
-        let Some([Shape::Hull { points, volume }]) = read(&path).as_deref().map(|list| [list[0].clone()]) else {
+        write(&history, "key", &solids).expect("the cache can be written");
+        let Some([Shape::Hull { points, volume }]) = read(&history, "key").as_deref().map(|list| [list[0].clone()])
+        else {
             panic!("one hull is read");
         };
         let Shape::Hull { points: expected, .. } = &solids[0] else { unreachable!() };
@@ -223,9 +238,11 @@ mod tests {
             let mut other = bytes.clone();
             other[at] ^= 1;
             fs::write(&path, other).expect("the cache can be written");
-            assert!(read(&path).is_none(), "byte {at}");
+            assert!(read(&history, "key").is_none(), "byte {at}");
         }
         fs::write(&path, &bytes[..bytes.len() / 2]).expect("the cache can be written");
-        assert!(read(&path).is_none());
+        assert!(read(&history, "key").is_none());
+        fs::write(file_of(&history, "other"), &bytes).expect("the cache can be written");
+        assert!(read(&history, "other").is_none(), "the file of another mesh");
     }
 }

@@ -31,7 +31,7 @@ pub fn run(args: &RunArgs, env: Env) -> Result<u8, Diagnostics> {
     })?;
     let Some(summary) = summary else { return Ok(2) };
     let run = history.run(&summary.run)?;
-    let perceived = show::perceived(&history, &run);
+    let perceived = show::perceived(&history, &run)?;
     match args.format {
         Format::Text => {
             output::print(&run_text(&run, &perceived, output::page()));

@@ -180,7 +180,7 @@ fn export_run(args: &ExportArgs, history: &History, run: &str) -> Result<(), Dia
         output::print(&text);
         return Ok(());
     }
-    output_file::write(&file, text)?;
+    if args.output.is_some() { output_file::write(&file, text) } else { output_file::write_in_project(&file, text) }?;
     let shown = file.display();
     output::print_prose(&format!("{shown} holds run {}: actcheck run {shown}\n", run.row.run));
     Ok(())
@@ -189,7 +189,8 @@ fn export_run(args: &ExportArgs, history: &History, run: &str) -> Result<(), Dia
 /// Returns the path of a new file in the folder of regressions, which is created if missing.
 fn new_regression(env: &Env, run: &str) -> Result<PathBuf, Diagnostics> {
     let folder = campaign::regressions_folder(&env.campaign.source)?;
-    std::fs::create_dir_all(&folder).map_err(|error| output_file::cannot_write(&folder, error))?;
+    let created = output_file::project(&folder).create_folder(&folder);
+    created.map_err(|error| output_file::cannot_write(&folder, error))?;
     let file = folder.join(format!("{run}.toml"));
     if file.exists() {
         let fault = Diagnostic::error("X042", format!("{} already exists", file.display()));

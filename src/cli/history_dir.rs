@@ -3,9 +3,10 @@
 use std::path::{Path, PathBuf};
 
 use crate::options::HistoryArgs;
-use crate::restore;
 use crate::work::all_cores;
-use actcheck_base::{Diagnostic, Diagnostics};
+use crate::{output, restore};
+use actcheck_base::{Below, Diagnostic, Diagnostics};
+use actcheck_config as config;
 use actcheck_history::History;
 
 /// Code of the fault for a missing history.
@@ -25,8 +26,7 @@ pub fn open(args: &HistoryArgs) -> Result<History, Diagnostics> {
 /// As [`open`].
 pub fn open_with(args: &HistoryArgs, threads: usize) -> Result<History, Diagnostics> {
     let history = History::open_existing_with(&folder(args)?, threads)?;
-    restore::allow(&history);
-    Ok(history)
+    allowed(history)
 }
 
 /// Like [`open`], but the state of this moment for reading: other processes may read and write the history.
@@ -35,6 +35,14 @@ pub fn open_with(args: &HistoryArgs, threads: usize) -> Result<History, Diagnost
 /// As [`open`].
 pub fn open_to_read(args: &HistoryArgs) -> Result<History, Diagnostics> {
     let history = History::open_to_read(&folder(args)?)?;
+    allowed(history)
+}
+
+/// An open history, after warnings about its journal.
+fn allowed(history: History) -> Result<History, Diagnostics> {
+    if let Some(warning) = history.journal_warning()? {
+        output::print_diagnostics(&warning.into());
+    }
     restore::allow(&history);
     Ok(history)
 }
@@ -46,7 +54,22 @@ pub fn open_to_read(args: &HistoryArgs) -> Result<History, Diagnostics> {
 pub fn folder(args: &HistoryArgs) -> Result<PathBuf, Diagnostics> {
     match &args.history {
         Some(folder) => Ok(folder.clone()),
-        None => find(Path::new(".")),
+        None => {
+            let found = find(Path::new("."))?;
+            config::check_unnamed(Path::new(""), &found)?;
+            Ok(found)
+        }
+    }
+}
+
+/// A trace, or a part of one, if it can be read. `None` if it is missing, or can't be simulated again.
+///
+/// # Errors
+/// `H007` it is damaged: an answer without it would be another than before.
+pub fn unless_damaged<T>(read: Result<T, Diagnostics>) -> Result<Option<T>, Diagnostics> {
+    match read {
+        Err(faults) if faults.iter().any(|fault| fault.code == "H007") => Err(faults),
+        read => Ok(read.ok()),
     }
 }
 
@@ -66,11 +89,11 @@ fn find(here: &Path) -> Result<PathBuf, Diagnostics> {
     if here.join(NAME).is_dir() {
         return Ok(PathBuf::from(NAME));
     }
-    let mut found: Vec<PathBuf> = std::fs::read_dir(here)
+    let mut found: Vec<PathBuf> = Below::new(here)
+        .entries(here)
+        .unwrap_or_default()
         .into_iter()
-        .flatten()
-        .filter_map(Result::ok)
-        .map(|entry| PathBuf::from(entry.file_name()).join(NAME))
+        .map(|(name, _)| PathBuf::from(name).join(NAME))
         .filter(|path| here.join(path).is_dir())
         .collect();
     found.sort();

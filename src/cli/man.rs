@@ -66,13 +66,15 @@ fn with_examples(page: &[u8]) -> String {
 }
 
 fn write_pages(root: &Command, folder: &Path) -> Result<(), Diagnostics> {
-    std::fs::create_dir_all(folder).map_err(|error| output_file::cannot_write(folder, error))?;
+    let pages = output_file::folder(folder)?;
     let commands: Vec<&Command> = std::iter::once(root).chain(below(root)).collect();
     for command in &commands {
         let man = manual(command);
         let mut page = Vec::new();
         man.render(&mut page).map_err(unrendered)?;
-        output_file::write(&folder.join(man.get_filename()), with_examples(&page))?;
+        let file = folder.join(man.get_filename());
+        let written = pages.write_quickly(&file, with_examples(&page).as_bytes());
+        written.map_err(|error| output_file::cannot_write(&file, error))?;
     }
     let first = folder.join("actcheck.1");
     output::print_prose(&format!("wrote {} pages: man -l {}\n", commands.len(), first.display()));

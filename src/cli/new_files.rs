@@ -45,7 +45,8 @@ impl NewFiles {
         }
         let mut made = Vec::new();
         for (file, bytes) in &self.files {
-            if let Err(faults) = make_folders(file, &mut made).and_then(|()| output_file::write(file, bytes)) {
+            if let Err(faults) = make_folders(file, &mut made).and_then(|()| output_file::write_in_project(file, bytes))
+            {
                 take_back(&made);
                 return Err(faults);
             }
@@ -75,7 +76,8 @@ fn make_folders(file: &Path, made: &mut Vec<PathBuf>) -> Result<(), Diagnostics>
         file.ancestors().skip(1).take_while(|folder| !folder.as_os_str().is_empty() && !folder.exists()).collect();
     missing.reverse();
     for folder in missing {
-        fs::create_dir(folder).map_err(|error| output_file::cannot_write(folder, error))?;
+        let created = output_file::project(folder).create_folder(folder);
+        created.map_err(|error| output_file::cannot_write(folder, error))?;
         made.push(folder.to_owned());
     }
     Ok(())
@@ -84,7 +86,8 @@ fn make_folders(file: &Path, made: &mut Vec<PathBuf>) -> Result<(), Diagnostics>
 /// Removes files and folders, the last one first. Ignores errors: the caller reports the fault that came before.
 fn take_back(made: &[PathBuf]) {
     for path in made.iter().rev() {
-        let _ = if path.is_dir() { fs::remove_dir(path) } else { fs::remove_file(path) };
+        let below = output_file::project(path);
+        let _ = if path.is_dir() { below.remove_folder(path) } else { below.remove(path) };
     }
 }
 

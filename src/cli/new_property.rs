@@ -34,7 +34,7 @@ pub fn property(args: &NewPropertyArgs) -> Result<(), Diagnostics> {
     let rule = folder.join("rules").join(&template.rule_file);
     match files {
         Files::Shipped => write_project(&path, &rule, &template)?,
-        Files::Disk => write_property(&path, &rule, &template)?,
+        Files::Disk => write_property(&path, &rule, &template, args.ontology.is_some())?,
     }
     if args.ontology.is_none() {
         link_configurations(&path)?;
@@ -84,16 +84,17 @@ fn is_there(rule: &Path) -> Diagnostics {
         .into()
 }
 
-/// Adds a property to an ontology on disk.
-fn write_property(path: &Path, rule: &Path, template: &Template) -> Result<(), Diagnostics> {
+/// Adds a property to an ontology on disk. `is_named`: by the user.
+fn write_property(path: &Path, rule: &Path, template: &Template, is_named: bool) -> Result<(), Diagnostics> {
     if rule.exists() {
         return Err(is_there(rule));
     }
     let text = Files::Disk.read(path).map_err(|why| {
         output_file::cannot_write(path, why).help("name an ontology in a writable folder with `--ontology FILE`")
     })?;
-    output_file::write(rule, &template.rule_text)?;
-    output_file::write(path, with_entry(&text.text, template))?;
+    output_file::write_in_project(rule, &template.rule_text)?;
+    let text = with_entry(&text.text, template);
+    if is_named { output_file::write(path, text) } else { output_file::write_in_project(path, text) }?;
     output::print_prose(&format!("wrote {} and an entry in {}\n", rule.display(), path.display()));
     Ok(())
 }
@@ -131,7 +132,7 @@ fn link_configurations(ontology: &Path) -> Result<(), Diagnostics> {
         match (link_ontology(&source.text), folder) {
             (LinksOntology::Already, _) => {}
             (LinksOntology::Now(text), None) => {
-                output_file::write(&file, text)?;
+                output_file::write_in_project(&file, text)?;
                 output::print_prose(&format!("{} uses {} from now on\n", file.display(), ontology.display()));
             }
             (_, folder) => {

@@ -1,9 +1,9 @@
 //! Writes results into files, completely or not at all.
 
 use std::io::Write as _;
-use std::path::Path;
+use std::path::{Component, Path};
 
-use actcheck_base::{Diagnostic, Diagnostics, NewFile};
+use actcheck_base::{Below, Diagnostic, Diagnostics, FileKind, NewFile};
 
 /// Writes a file. If that fails, for instance on a full disk, the previous content is kept.
 ///
@@ -17,12 +17,33 @@ pub(super) fn write(file: &Path, bytes: impl AsRef<[u8]>) -> Result<(), Diagnost
     written.map_err(|error| cannot_write(file, &error).into())
 }
 
-/// Writes one of many files that can be made again, without waiting for the disk.
+/// Writes a file of the project whose path the user did not name. Neither it nor a folder on the way may be a link.
 ///
 /// # Errors
 /// X007: it can't be written.
-pub(super) fn write_quickly(file: &Path, bytes: &[u8]) -> Result<(), Diagnostics> {
-    actcheck_base::write_quickly(file, bytes).map_err(|error| cannot_write(file, &error).into())
+pub(super) fn write_in_project(file: &Path, bytes: impl AsRef<[u8]>) -> Result<(), Diagnostics> {
+    let below = project(file);
+    let written = match below.kind(file) {
+        Some(FileKind::File) | None => below.write_atomic(file, bytes.as_ref()),
+        Some(kind) => Err(std::io::Error::other(format!("it is {kind}"))),
+    };
+    written.map_err(|error| cannot_write(file, &error).into())
+}
+
+/// The folder below which a path has no links: the present one, or that of a file elsewhere.
+pub(super) fn project(file: &Path) -> Below {
+    let is_inside = file.components().all(|part| matches!(part, Component::Normal(_) | Component::CurDir));
+    Below::new(if is_inside { Path::new("") } else { file.parent().unwrap_or(Path::new("")) })
+}
+
+/// Creates a folder that the user named, for files that are then written below it.
+///
+/// # Errors
+/// X007: it can't be created.
+pub(super) fn folder(folder: &Path) -> Result<Below, Diagnostics> {
+    let below = Below::new(folder);
+    below.create_folder(folder).map_err(|error| cannot_write(folder, error))?;
+    Ok(below)
 }
 
 /// X007: a file or folder that can't be written.

@@ -9,7 +9,7 @@ use std::time::Duration;
 use clap::Args;
 
 use crate::options::duration;
-use actcheck_base::{Diagnostic, Diagnostics};
+use actcheck_base::{Diagnostic, Diagnostics, read_regular};
 use actcheck_remote::{Address, Client, Credentials};
 
 /// Environment variables with credentials.
@@ -44,6 +44,9 @@ impl RemoteArgs {
     }
 }
 
+/// Longest netrc file. Unit: bytes.
+const LONGEST_NETRC: u64 = 1 << 20;
+
 fn from_netrc(address: &Address, variable: &dyn Fn(&str) -> Option<OsString>) -> Result<Credentials, Diagnostics> {
     let home = || variable("HOME").map(|home| PathBuf::from(home).join(".netrc"));
     let Some(file) = variable("NETRC").map(PathBuf::from).or_else(home) else {
@@ -51,7 +54,9 @@ fn from_netrc(address: &Address, variable: &dyn Fn(&str) -> Option<OsString>) ->
             .help("set NETRC to the file's path")
             .into());
     };
-    let text = std::fs::read_to_string(&file).map_err(|error| {
+    let text =
+        read_regular(&file, LONGEST_NETRC).and_then(|text| String::from_utf8(text).map_err(std::io::Error::other));
+    let text = text.map_err(|error| {
         Diagnostic::error("X096", format!("{} can't be read: {error}", file.display()))
             .help("write `machine SERVER login NAME password PASSWORD` into it, or set NETRC to another file")
     })?;

@@ -3,6 +3,7 @@
 
 use std::ops::ControlFlow;
 
+use crate::history_dir::unless_damaged;
 use crate::work::all_cores;
 use actcheck_base::{Diagnostics, Outcome};
 use actcheck_data::Trace;
@@ -33,7 +34,7 @@ pub(super) fn for_each_batch(
     let read = |id: &String| -> Result<ReplayedRun, Diagnostics> {
         let run = history.newest_run(id)?;
         // A run that broke before its first state has no trace; everything else about it is reported.
-        let trace = history.trace(id).ok();
+        let trace = unless_damaged(history.trace(id))?;
         let explained = rules.as_ref().zip(trace.as_ref()).map(|(rules, trace)| explained(trace, rules, &run, &budget));
         Ok((run, trace, explained.unwrap_or_default()))
     };

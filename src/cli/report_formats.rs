@@ -6,10 +6,11 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 
+use crate::history_dir::unless_damaged;
 use crate::replayed_runs::MOST_RESTORED;
 use crate::report::ReportArgs;
 use crate::{chosen, output, output_file, replayed_runs, show};
-use actcheck_base::{Diagnostics, Outcome};
+use actcheck_base::{Below, Diagnostics, Outcome};
 use actcheck_history::{CampaignRow, History, RunDetail, RunFilter, RunRow, newest_of_alike};
 use actcheck_report::{
     Attachment, Caption, Chart, EarlReport, JunitReport, MarkdownReport, Repetitions, allure_common, allure_results,
@@ -188,7 +189,7 @@ impl<'a> AllureFolder<'a> {
         let budget = Budget::default();
         // If the current rules can't be read, there are no explanations; the outcomes come from the history.
         let rules = RuleBook::prepare_within(&args.chosen.ontology()?, &budget).ok();
-        std::fs::create_dir_all(folder).map_err(|error| output_file::cannot_write(folder, error))?;
+        output_file::folder(folder)?;
         let ids: Vec<String> = campaigns.iter().map(|row| row.id.clone()).collect();
         let made = Self {
             folder,
@@ -207,24 +208,24 @@ impl<'a> AllureFolder<'a> {
     fn take(&mut self, run: &RunDetail) -> Result<(), Diagnostics> {
         let number = self.repetitions.number(run);
         self.results += run.actions.iter().map(|action| action.judgements.len()).sum::<usize>();
-        let attachments = self.attachments(run);
-        self.write(&allure_results(run, number, &attachments, &show::perceived(self.history, run)))
+        let attachments = self.attachments(run)?;
+        self.write(&allure_results(run, number, &attachments, &show::perceived(self.history, run)?))
     }
 
     /// Explanations of failures, and a picture unless everything passed.
-    fn attachments(&mut self, run: &RunDetail) -> Vec<Attachment> {
+    fn attachments(&mut self, run: &RunDetail) -> Result<Vec<Attachment>, Diagnostics> {
         let mut judgements = run.actions.iter().flat_map(|action| &action.judgements);
         if judgements.all(|judgement| judgement.outcome == Outcome::Passed) {
-            return Vec::new();
+            return Ok(Vec::new());
         }
         let is_outline = self.history.is_outline(&run.row.run).unwrap_or(false);
         self.restored += usize::from(is_outline);
         if is_outline && self.restored > MOST_RESTORED {
-            return Vec::new();
+            return Ok(Vec::new());
         }
-        let Ok(trace) = self.history.trace(&run.row.run) else {
+        let Some(trace) = unless_damaged(self.history.trace(&run.row.run))? else {
             self.untraced += 1;
-            return Vec::new();
+            return Ok(Vec::new());
         };
         let rules = self.rules.as_ref();
         let explained = rules.map(|rules| replayed_runs::explained(&trace, rules, run, &self.budget));
@@ -249,12 +250,14 @@ impl<'a> AllureFolder<'a> {
             ending: "svg",
             bytes: drawing.to_svg().into_bytes(),
         }));
-        attachments
+        Ok(attachments)
     }
 
     fn write(&self, files: &[(String, Vec<u8>)]) -> Result<(), Diagnostics> {
         for (name, bytes) in files {
-            output_file::write_quickly(&self.folder.join(name), bytes)?;
+            let file = self.folder.join(name);
+            let written = Below::new(self.folder).write_quickly(&file, bytes);
+            written.map_err(|error| output_file::cannot_write(&file, error))?;
         }
         Ok(())
     }

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use crate::options::HistoryArgs;
 use crate::run_args::RunArgs;
-use crate::{configurations, history_dir, regressions, trust};
+use crate::{clock, configurations, history_dir, output, regressions, trust};
 use actcheck_base::{Diagnostics, digest_of};
 use actcheck_campaign::{Env, LastFailed, unfinished};
 use actcheck_config as config;
@@ -41,6 +41,17 @@ pub struct Session {
     pub regressions: Vec<CaseSummary>,
 }
 
+/// Prints the warnings about a history that a campaign is added to.
+fn notices(history: &History) -> Result<(), Diagnostics> {
+    let mut warnings = Diagnostics::new();
+    history.journal_warning()?.into_iter().for_each(|warning| warnings.push(warning));
+    history.clock_warning(&(clock::system().now)())?.into_iter().for_each(|warning| warnings.push(warning));
+    if !warnings.is_empty() {
+        output::print_diagnostics(&warnings);
+    }
+    Ok(())
+}
+
 /// Prepares the campaign or case of the arguments, and runs the project's cases. The results of a resumed campaign include
 /// those of the cases that ran before it.
 pub fn open(args: &RunArgs, budget: &Budget, jobs: usize) -> Result<Opened, Diagnostics> {
@@ -69,6 +80,7 @@ pub fn open(args: &RunArgs, budget: &Budget, jobs: usize) -> Result<Opened, Diag
         Some((history, record)) => (history, Some(record)),
         None => (History::open(&env.campaign.history)?, None),
     };
+    notices(&history)?;
     if env.campaign.sync_each_run {
         history.sync_each_run();
     }

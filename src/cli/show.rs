@@ -38,17 +38,25 @@ pub fn show(args: &ShowArgs) -> Result<(), Diagnostics> {
     let picture = args.picture.as_deref().map(Picture::new).transpose()?;
     let history = history_dir::open_to_read(&args.history)?;
     let run = history.newest_run(&args.run)?;
+    // The store has the outcomes, also those of a run whose trace is damaged.
+    let (perceived, damage) = match perceived(&history, &run) {
+        Ok(perceived) => (perceived, None),
+        Err(faults) => (BTreeMap::new(), Some(faults)),
+    };
     output::print(&match args.format {
         Format::Text => {
             let page = output::page();
             let again = judged_again(&history.run(&run.row.run)?, &run);
             let campaign = history.campaign(&run.row.campaign)?;
             let notes = again + &made_by(&campaign) + &findings(&campaign);
-            run_text(&run, &perceived(&history, &run), page) + &page.set(&notes)
+            run_text(&run, &perceived, page) + &page.set(&notes)
         }
-        Format::Json => format!("{:#}\n", run_json(&run, &perceived(&history, &run))),
+        Format::Json => format!("{:#}\n", run_json(&run, &perceived)),
         Format::Csv => outcomes(&run).render(Format::Csv.into(), output::page()),
     });
+    if let Some(faults) = damage {
+        return Err(faults);
+    }
     match picture {
         Some(picture) => picture.draw(&history, &run, args.ontology.as_deref()),
         None => Ok(()),
@@ -69,10 +77,13 @@ fn findings(campaign: &CampaignRecord) -> String {
     campaign.findings.iter().map(line).collect()
 }
 
-/// Sentences about the perceived targets of a run's actions that failed, by their positions. Empty if its trace can't be
-/// read.
-pub(super) fn perceived(history: &History, run: &RunDetail) -> BTreeMap<u32, String> {
-    history.states(&run.row.run).map(|trace| perceived_sentences(run, &trace)).unwrap_or_default()
+/// Sentences about the perceived targets of a run's actions that failed, by their positions. Empty if its trace is missing.
+///
+/// # Errors
+/// `H007` its trace is damaged.
+pub(super) fn perceived(history: &History, run: &RunDetail) -> Result<BTreeMap<u32, String>, Diagnostics> {
+    let trace = history_dir::unless_damaged(history.states(&run.row.run))?;
+    Ok(trace.map(|trace| perceived_sentences(run, &trace)).unwrap_or_default())
 }
 
 /// Names the outcomes that differ from those of the campaign. Empty if all are the same.

@@ -40,7 +40,7 @@ pub fn why(args: &WhyArgs, stop: &Arc<AtomicBool>) -> Result<(), Diagnostics> {
     let (files, path) = ontology_file(args.ontology.as_deref());
     let rules = RuleBook::prepare_within(&ontology::load(&files, &path)?, &budget)?;
     let facts = history.facts(&run.row.run, rules.reads_course())?;
-    let perceived = show::perceived(&history, &run);
+    let perceived = show::perceived(&history, &run)?;
     let mut told = 0;
     let mut table = Table::new(["run", "step", "action", "property", "holds", "margin", "explanation"]);
     for (step, action) in run.actions.iter().enumerate() {

@@ -37,7 +37,7 @@ pub use case_text::{CaseText, WrittenPaths, case_text, with_skills, written_path
 pub use duration::duration_secs;
 pub use load::{in_order_of_place, load, load_text, mended_robot};
 pub use other_counts::OtherCounts;
-pub use paths::resolve_path;
+pub use paths::{check_unnamed, resolve_path};
 pub use schema::SCHEMA;
 pub use skill::{Launcher, Skill};
 pub use step::Step;

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use crate::Launcher;
 use crate::designators::{self, Designators};
-use crate::paths::resolve_path;
+use crate::paths::{check_unnamed, resolve_path};
 use crate::robot::{MendedUrdf, mended};
 use crate::table::WrittenStep;
 use crate::{Campaign, Overrides, Step, Table, case, model_library, ranges, skill};
@@ -64,6 +64,11 @@ pub fn load_text(source: Source, folder: &Path, overrides: &Overrides) -> Result
     let (budget, limits) = ranges::read_budget(&mut table, &mut found);
     let search = read_search(&mut table, &mut found);
     let (history, sync_each_run, keeping) = read_history(&mut table, folder, &mut found);
+    if overrides.history.is_none()
+        && let Err(faults) = check_unnamed(folder, &history)
+    {
+        found.extend(faults);
+    }
     if keeping.keep != Keep::All && launcher != Launcher::Reference {
         let span = places.get("test_launcher").cloned().unwrap_or(0..0);
         let message =

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 
 use crate::paths::resolve_path;
 use crate::{Located, Table};
-use actcheck_base::{Diagnostic, Diagnostics, Digest, Span};
+use actcheck_base::{Diagnostic, Diagnostics, Digest, Files, Span};
 
 /// The skills that perform the actions.
 #[derive(Debug, Clone, PartialEq)]
@@ -325,6 +325,5 @@ fn last(path: &Path) -> std::borrow::Cow<'_, str> {
 
 /// Returns the contents of a file, or nothing if it can't be read.
 fn bytes(path: &Path) -> Vec<u8> {
-    let file = path.is_file().then(|| std::fs::read(path).ok());
-    file.flatten().unwrap_or_default()
+    Files::Disk.read_bytes(path).unwrap_or_default()
 }

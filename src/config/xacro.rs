@@ -7,12 +7,11 @@ use std::io::Read;
 use std::os::unix::process::CommandExt as _;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, ExitStatus, Stdio};
-use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
 use std::time::Duration;
 
 use crate::skill::on_path;
-use actcheck_base::Source;
+use actcheck_base::{Below, ScratchFolder, Source};
 
 /// The program, as installed by ROS or by `pip install xacro`.
 const PROGRAM: &str = "xacro";
@@ -125,7 +124,7 @@ fn run(program: &PathBuf, path: &Path, inputs: Inputs<'_>, limit: Duration) -> s
     let mut command = Command::new("/bin/sh");
     command.args(["-c", GUARDED, "sh"]).arg(program).arg(path).args(inputs.arguments);
     let others = std::env::var_os("PYTHONPATH").filter(|paths| !paths.is_empty());
-    let mut paths = finder.0.as_os_str().to_owned();
+    let mut paths = finder.0.path().as_os_str().to_owned();
     if let Some(others) = others {
         paths.push(":");
         paths.push(others);
@@ -152,28 +151,18 @@ fn run(program: &PathBuf, path: &Path, inputs: Inputs<'_>, limit: Duration) -> s
     Ok(Some(Output { status, text, error }))
 }
 
-/// A temporary folder with the module [`FINDER`], removed when dropped.
-struct Finder(PathBuf);
+/// A temporary folder with the module [`FINDER`].
+struct Finder(ScratchFolder);
 
 impl Finder {
     fn new() -> std::io::Result<Self> {
-        static NUMBER: AtomicU32 = AtomicU32::new(0);
-        let name = format!("actcheck-xacro-{}-{}", std::process::id(), NUMBER.fetch_add(1, Ordering::Relaxed));
-        let finder = Self(std::env::temp_dir().join(name));
-        let module = finder.0.join("ament_index_python");
-        // Fails if the folder exists, so that no other user's module is run.
-        std::fs::create_dir(&finder.0)?;
-        std::fs::create_dir(&module)?;
-        std::fs::write(module.join("__init__.py"), "")?;
-        std::fs::write(module.join("packages.py"), FINDER)?;
-        Ok(finder)
-    }
-}
-
-impl Drop for Finder {
-    fn drop(&mut self) {
-        // A folder that can't be removed does no harm.
-        let _ = std::fs::remove_dir_all(&self.0);
+        // No other user can write into it, so that no other user's module is run.
+        let folder = ScratchFolder::create()?;
+        let (below, module) = (Below::new(folder.path()), folder.path().join("ament_index_python"));
+        below.create_folder(&module)?;
+        below.write_quickly(&module.join("__init__.py"), b"")?;
+        below.write_quickly(&module.join("packages.py"), FINDER.as_bytes())?;
+        Ok(Self(folder))
     }
 }
 

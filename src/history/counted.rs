@@ -59,11 +59,11 @@ fn is_variable(text: &str) -> bool {
 
 /// The definition of [`History::counted_runs`] as an expression.
 fn counts(run: &str) -> String {
-    let campaigns_after = "?ac_t2 > ?ac_t1 || (?ac_t2 = ?ac_t1 && STR(?ac_c2) > STR(?ac_c1))";
+    let campaigns_after = "?ac_n2 > ?ac_n1";
     let runs_after = format!("?ac_i2 > ?ac_i1 || (?ac_i2 = ?ac_i1 && STR(?ac_other) > STR({run}))");
     let newer = format!(
-        "{run} act:traceHash ?ac_hash ; act:index ?ac_i1 ; act:campaign ?ac_c1 . ?ac_c1 prov:startedAtTime ?ac_t1 . \
-         ?ac_other act:traceHash ?ac_hash ; act:index ?ac_i2 ; act:campaign ?ac_c2 . ?ac_c2 prov:startedAtTime ?ac_t2 . \
+        "{run} act:traceHash ?ac_hash ; act:index ?ac_i1 ; act:campaign ?ac_c1 . ?ac_c1 act:number ?ac_n1 . \
+         ?ac_other act:traceHash ?ac_hash ; act:index ?ac_i2 ; act:campaign ?ac_c2 . ?ac_c2 act:number ?ac_n2 . \
          FILTER(?ac_hash != '' && ({campaigns_after} || (?ac_c2 = ?ac_c1 && ({runs_after})))) \
          FILTER NOT EXISTS {{ {} }}",
         lists::is_selected("?ac_c2")

@@ -5,7 +5,7 @@ use crate::outlines::Outline;
 use crate::quad_source::RunQuads;
 use crate::write_run::{self, run_node};
 use crate::{History, RunRecord, detail, fault, graphs, trace_file, trace_parts};
-use actcheck_base::{Diagnostic, Diagnostics, write_atomic};
+use actcheck_base::{Diagnostic, Diagnostics};
 
 /// A run that is ready to be stored by [`History::write`].
 #[derive(Debug)]
@@ -79,10 +79,10 @@ impl History {
         };
         let doing = format!("writing run {}", entry.run);
         let file = self.folder.trace(&entry.run);
-        write_atomic(&file, trace).map_err(|error| fault::io(self.dir(), &doing, &error))?;
+        self.folder.below().write_atomic(&file, trace).map_err(|error| fault::io(self.dir(), &doing, &error))?;
         self.enter(statements, &doing).inspect_err(|_| {
             // A trace without a run is harmless; if it can't be removed now, the next campaign removes it.
-            let _ = std::fs::remove_file(&file);
+            let _ = self.folder.below().remove(&file);
         })?;
         self.load_long_journal()
     }

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use oxigraph::store::StorageError;
 
-use actcheck_base::{Diagnostic, Diagnostics};
+use actcheck_base::{Diagnostic, Diagnostics, FileKind, NotPlain};
 
 /// H001: a folder can't be used as a history, or can't be accessed.
 pub(super) fn unusable(dir: &Path, why: &str) -> Diagnostics {
@@ -32,6 +32,17 @@ pub(super) fn being_created(dir: &Path) -> Diagnostics {
 pub(super) fn not_created(dir: &Path) -> Diagnostics {
     Diagnostic::error("H003", format!("the history `{}` has no runs: its creation was interrupted", dir.display()))
         .help("`actcheck run CONFIG` completes it, and adds runs; or name another folder with `--history DIR`")
+        .into()
+}
+
+/// H027: a file of the history is a link or a special file.
+pub(super) fn not_plain(dir: &Path, path: &Path, kind: FileKind) -> Diagnostics {
+    let message = format!("the history `{}` can't be used: `{}` is {kind}", dir.display(), path.display());
+    Diagnostic::error("H027", message)
+        .help(
+            "actcheck writes only plain files there, and follows no link: remove it if you do not know its origin; a history \
+             elsewhere is named with `--history DIR`",
+        )
         .into()
 }
 
@@ -62,6 +73,9 @@ pub(super) fn newer(dir: &Path, theirs: u64, ours: u64) -> Diagnostics {
 
 /// Reading or writing a file failed.
 pub(super) fn io(dir: &Path, doing: &str, error: &std::io::Error) -> Diagnostics {
+    if let Some(NotPlain { path, kind, .. }) = NotPlain::of(error) {
+        return not_plain(dir, path, *kind);
+    }
     failed(dir, doing, error.kind(), &error.to_string())
 }
 

@@ -5,14 +5,14 @@
 //! run that is kept whole, `outlines/` the others; `hulls/` caches the convex solids of meshes, which can be recomputed at
 //! any time.
 
-use std::fs::{self, File, OpenOptions, TryLockError};
-use std::io::ErrorKind;
+use std::fs::{File, TryLockError};
+use std::io::{self, ErrorKind};
 use std::path::{Path, PathBuf};
 use std::thread::sleep;
 use std::time::Duration;
 
-use crate::fault;
-use actcheck_base::{Diagnostics, write_atomic};
+use crate::{fault, journal};
+use actcheck_base::{Below, Diagnostics, FileKind};
 
 /// Format of a folder without a journal.
 const FORMAT: u64 = 1;
@@ -23,6 +23,21 @@ const FORMAT_WITH_OUTLINES: u64 = 3;
 const TITLE: &str = "actcheck history";
 /// Longest version file. Unit: bytes.
 const LONGEST_VERSION: u64 = 1_000;
+/// Longest file of a history that is read as a whole: those of this program have some megabytes. Unit: bytes.
+pub(super) const LONGEST: u64 = 256 << 20;
+/// The names in the folder of a history that this program opens, with their kinds. Others are left alone.
+const LAYOUT: [(&str, FileKind); 10] = [
+    ("VERSION", FileKind::File),
+    ("lock", FileKind::File),
+    (journal::NAME, FileKind::File),
+    ("store", FileKind::Folder),
+    ("seal", FileKind::Folder),
+    ("traces", FileKind::Folder),
+    ("outlines", FileKind::Folder),
+    ("tables", FileKind::Folder),
+    ("hulls", FileKind::Folder),
+    ("sent", FileKind::Folder),
+];
 /// Number of tries to lock a folder: a reader holds the lock for a moment if it finds the store incomplete.
 const TRIES: usize = 10;
 /// Time between two tries.
@@ -33,7 +48,7 @@ const PAUSE: Duration = Duration::from_millis(10);
 pub(super) struct Folder {
     dir: PathBuf,
     /// Holds the lock of an owner. The operating system releases it when the process ends, even after a crash.
-    _lock: Option<File>,
+    lock: Option<File>,
 }
 
 impl Folder {
@@ -42,6 +57,7 @@ impl Folder {
         if dir.is_file() {
             return Err(fault::unusable(dir, "a file exists at its path"));
         }
+        check_layout(dir)?;
         let known = has_version(dir)?;
         if !known && !create {
             return Err(if holds_other_things(dir) { fault::foreign(dir) } else { fault::none_there(dir) });
@@ -50,29 +66,31 @@ impl Folder {
             if holds_other_things(dir) {
                 return Err(fault::foreign(dir));
             }
-            fs::create_dir_all(dir).map_err(|error| fault::io(dir, "creating the folder", &error))?;
+            Below::new(dir).create_folder(dir).map_err(|error| fault::io(dir, "creating the folder", &error))?;
         }
-        let folder = Self { dir: dir.to_path_buf(), _lock: Some(lock(dir)?) };
+        let folder = Self { dir: dir.to_path_buf(), lock: Some(lock(dir)?) };
         if !known {
             folder.write_version(FORMAT)?;
         }
-        fs::create_dir_all(folder.traces()).map_err(|error| fault::io(dir, "creating the folder of traces", &error))?;
+        let traces = folder.below().create_folder(&folder.traces());
+        traces.map_err(|error| fault::io(dir, "creating the folder of traces", &error))?;
         Ok(folder)
     }
 
     /// An existing folder, to read it while other processes may read or write it.
     pub(super) fn to_read(dir: &Path) -> Result<Self, Diagnostics> {
+        check_layout(dir)?;
         if !has_version(dir)? {
             // A process may have created the history meanwhile.
             let is_foreign = holds_other_things(dir) && !has_version(dir)?;
             return Err(if is_foreign { fault::foreign(dir) } else { fault::none_there(dir) });
         }
-        Ok(Self { dir: dir.to_path_buf(), _lock: None })
+        Ok(Self { dir: dir.to_path_buf(), lock: None })
     }
 
     /// Whether another process owns the folder.
     pub(super) fn is_locked(&self) -> bool {
-        let lock = File::open(self.dir.join("lock"));
+        let lock = self.below().open(&self.dir.join("lock"));
         lock.is_ok_and(|lock| matches!(lock.try_lock_shared(), Err(TryLockError::WouldBlock)))
     }
 
@@ -87,18 +105,34 @@ impl Folder {
         if version(&self.dir)? == Some(format) { Ok(()) } else { self.write_version(format) }
     }
 
+    /// Whether there is a journal that no other process writes, and whether the version says that there is one.
+    pub(super) fn has_journal(&self) -> (bool, bool) {
+        if self.lock.is_none() && self.is_locked() {
+            return (false, false);
+        }
+        let exists = self.below().kind(&self.dir.join(journal::NAME)).is_some();
+        (exists, version(&self.dir).is_ok_and(|version| version == Some(FORMAT_WITH_JOURNAL)))
+    }
+
     /// Creates the folder of outlines, and marks the history before.
     pub(super) fn begin_outlines(&self) -> Result<(), Diagnostics> {
         if self.outlines().exists() {
             return Ok(());
         }
         self.write_version(FORMAT_WITH_OUTLINES)?;
-        fs::create_dir_all(self.outlines()).map_err(|error| fault::io(&self.dir, "creating its outlines", &error))
+        let created = self.below().create_folder(&self.outlines());
+        created.map_err(|error| fault::io(&self.dir, "creating its outlines", &error))
     }
 
     fn write_version(&self, format: u64) -> Result<(), Diagnostics> {
-        write_atomic(&self.dir.join("VERSION"), format!("{TITLE} {format}\n").as_bytes())
+        self.below()
+            .write_atomic(&self.dir.join("VERSION"), format!("{TITLE} {format}\n").as_bytes())
             .map_err(|error| fault::io(&self.dir, "writing its version", &error))
+    }
+
+    /// Its files, of which none is a link.
+    pub(super) fn below(&self) -> Below {
+        Below::new(&self.dir)
     }
 
     /// The folder as the user gave it.
@@ -133,17 +167,69 @@ impl Folder {
 
     /// The ids of the runs that have a trace, sorted.
     pub(super) fn traced(&self) -> Vec<String> {
-        let entries = fs::read_dir(self.traces()).into_iter().flatten().filter_map(Result::ok);
-        let names = entries.filter_map(|entry| entry.file_name().into_string().ok());
-        let mut ids: Vec<String> = names.filter_map(|name| Some(name.strip_suffix(".trace")?.to_owned())).collect();
-        ids.sort();
-        ids
+        let files = self.below().files(&self.traces()).into_iter();
+        files.filter_map(|file| Some(file.file_name()?.to_str()?.strip_suffix(".trace")?.to_owned())).collect()
+    }
+
+    /// Whether a history has a file of this path in its folder.
+    pub(super) fn writes(path: &Path) -> bool {
+        let mut names = path.iter().map(|name| name.to_str().unwrap_or_default());
+        let (first, second) = (names.next().unwrap_or_default(), names.next().unwrap_or_default());
+        let ends = |endings: &[&str]| endings.iter().any(|ending| second.ends_with(ending));
+        let is_ours = match first {
+            "store" => {
+                let begins = ["MANIFEST-", "OPTIONS-", "LOG", "bulk-"].iter().any(|start| second.starts_with(start));
+                begins || ["CURRENT", "IDENTITY", "LOCK"].contains(&second) || ends(&[".sst", ".log", ".dbtmp"])
+            }
+            "seal" => ["SUMS", "CURRENT"].contains(&second) || second.starts_with("MANIFEST-"),
+            "traces" => ends(&[".trace"]),
+            "outlines" => ends(&[".outline", ".outlines"]),
+            "tables" => ["FILES", "SCHEMA", "RECHECKED"].contains(&second) || ends(&[".parquet"]),
+            "hulls" => ends(&[".hulls"]),
+            "sent" => !second.is_empty(),
+            "VERSION" | "lock" | journal::NAME => second.is_empty(),
+            _ => false,
+        };
+        is_ours && names.next().is_none()
     }
 
     /// File of a run's trace.
     pub(super) fn trace(&self, run: &str) -> PathBuf {
         self.traces().join(format!("{run}.trace"))
     }
+}
+
+/// Checks that files and folders of a history are files and folders, not links, pipes or devices. The library opens the
+/// files of the store and of its seal by their paths, so these are checked one by one.
+///
+/// # Errors
+/// `H027` one is of another kind.
+fn check_layout(dir: &Path) -> Result<(), Diagnostics> {
+    let below = Below::new(dir);
+    for (name, wanted) in LAYOUT {
+        let path = dir.join(name);
+        match below.kind(&path) {
+            Some(kind) if kind != wanted => return Err(fault::not_plain(dir, &path, kind)),
+            _ => {}
+        }
+    }
+    for folder in ["store", "seal"].map(|name| dir.join(name)) {
+        let entries = below.entries(&folder).map_err(|error| fault::io(dir, "reading the folder", &error))?;
+        if let Some((name, kind)) = entries.iter().find(|(_, kind)| *kind != FileKind::File) {
+            return Err(fault::not_plain(dir, &folder.join(name), *kind));
+        }
+    }
+    Ok(())
+}
+
+/// Opens a file in a folder of a history; the folder was checked when the history was opened.
+pub(super) fn open(path: &Path) -> io::Result<File> {
+    Below::new(path.parent().unwrap_or(path)).open(path)
+}
+
+/// Reads such a file.
+pub(super) fn read(path: &Path) -> io::Result<Vec<u8>> {
+    Below::new(path.parent().unwrap_or(path)).read(path, LONGEST)
 }
 
 /// Whether the folder has a history that this program can read.
@@ -156,15 +242,13 @@ fn has_version(dir: &Path) -> Result<bool, Diagnostics> {
 
 /// The format of the history in a folder. Returns `None` if it has none.
 fn version(dir: &Path) -> Result<Option<u64>, Diagnostics> {
-    let file = dir.join("VERSION");
-    // A pipe or a device of a foreign folder may have no end.
-    if fs::metadata(&file).is_ok_and(|data| !data.is_file() || data.len() > LONGEST_VERSION) {
-        return Err(fault::foreign(dir));
-    }
-    let text = match fs::read_to_string(&file) {
+    let text = match Below::new(dir).read_text(&dir.join("VERSION"), LONGEST_VERSION) {
         Ok(text) => text,
         Err(error) if error.kind() == ErrorKind::NotFound => return Ok(None),
-        Err(error) if error.kind() == ErrorKind::InvalidData => return Err(fault::foreign(dir)),
+        // It is too long, or not text.
+        Err(error) if [ErrorKind::InvalidData, ErrorKind::Other].contains(&error.kind()) => {
+            return Err(fault::foreign(dir));
+        }
         Err(error) => return Err(fault::io(dir, "reading its version", &error)),
     };
     match text.trim().strip_prefix(TITLE).and_then(|number| number.trim().parse::<u64>().ok()) {
@@ -178,20 +262,12 @@ fn version(dir: &Path) -> Result<Option<u64>, Diagnostics> {
 fn holds_other_things(dir: &Path) -> bool {
     let is_ours =
         |name: &str| ["lock", "hulls"].contains(&name) || (name.starts_with("VERSION.") && name.ends_with(".tmp"));
-    fs::read_dir(dir)
-        .into_iter()
-        .flatten()
-        .filter_map(Result::ok)
-        .any(|entry| !entry.file_name().to_str().is_some_and(is_ours))
+    let entries = Below::new(dir).entries(dir).unwrap_or_default();
+    entries.iter().any(|(name, _)| !name.to_str().is_some_and(is_ours))
 }
 
 fn lock(dir: &Path) -> Result<File, Diagnostics> {
-    let file = OpenOptions::new()
-        .create(true)
-        .truncate(false)
-        .write(true)
-        .open(dir.join("lock"))
-        .map_err(|error| fault::io(dir, "locking it", &error))?;
+    let file = Below::new(dir).lock_file(&dir.join("lock")).map_err(|error| fault::io(dir, "locking it", &error))?;
     for _ in 0..TRIES {
         match file.try_lock() {
             Ok(()) => return Ok(file),

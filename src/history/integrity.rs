@@ -3,9 +3,10 @@
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
-use crate::folder::Folder;
+use crate::folder::{self, Folder};
 use crate::salvage::scan;
 use crate::seal::{Found, Seal};
+use crate::tail::Tail;
 use crate::threads::cores;
 use crate::write_run::run_node;
 use crate::{History, RunFilter, detail, fault, journal, pending, trace_file, trace_parts};
@@ -80,6 +81,17 @@ impl History {
             Err(faults) => salvaged(dir, &faults.to_string(), &mut found)?,
         };
         history.compare_traces(&mut found)?;
+        let lost = match history.tail {
+            Tail::Cut => Some("it ends within a record, and no process writes it"),
+            Tail::Missing if !found.unused.is_empty() => Some("it is missing, and traces have no run"),
+            Tail::Whole if found.unused.len() > 1 => Some("its end is missing: several traces have no run"),
+            Tail::Whole | Tail::Missing | Tail::Closed => None,
+        };
+        found.damage.extend(lost.map(|reason| Damage {
+            file: PathBuf::from(journal::NAME),
+            run: None,
+            reason: reason.to_owned(),
+        }));
         found.damage.sort_by(|one, other| (&one.file, &one.run).cmp(&(&other.file, &other.run)));
         Ok((found, history))
     }
@@ -108,7 +120,7 @@ impl History {
         let mut known = BTreeSet::new();
         for run in &runs {
             let file = self.trace_path(&run.run);
-            let reason = match std::fs::read(&file) {
+            let reason = match folder::read(&file) {
                 Ok(bytes) => match trace_file::decode(&bytes) {
                     Ok((_, trace)) if trace.hash == run.trace_hash => fault_of_copy(&run.run, &bytes),
                     Ok((_, trace)) => Some(format!("it is the trace {}, not {}", trace.hash, run.trace_hash)),
@@ -127,8 +139,7 @@ impl History {
             run: None,
             reason,
         }));
-        let folder = std::fs::read_dir(self.folder.traces()).into_iter().flatten();
-        let files = folder.filter_map(|entry| Some(entry.ok()?.path()));
+        let files = self.folder.below().files(&self.folder.traces()).into_iter();
         found.unused = files.filter(|file| !known.contains(file)).map(|file| relative(self.dir(), &file)).collect();
         found.unused.sort();
         Ok(())

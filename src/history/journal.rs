@@ -9,8 +9,8 @@
 //! so far; four bytes each, the lowest first) and the compressed content: terms, and statements as numbers of terms.
 
 use std::collections::{HashMap, HashSet};
-use std::fs::{self, File, OpenOptions};
-use std::io::{self, ErrorKind, Read as _, Seek as _, SeekFrom, Write as _};
+use std::fs::File;
+use std::io::{self, ErrorKind, Seek as _, SeekFrom, Write as _};
 use std::path::{Path, PathBuf};
 
 use flate2::read::DeflateDecoder;
@@ -21,13 +21,17 @@ use oxigraph::model::{BlankNode, GraphName, Literal, NamedNode, NamedOrBlankNode
 use serde::{Deserialize, Serialize};
 
 use crate::chosen::Chosen;
+use crate::inflate::read_expanded;
 use crate::threads::joined;
 use crate::wanted::Wanted;
+use actcheck_base::Below;
 
 /// Name of the file in the folder of a history.
 pub(super) const NAME: &str = "journal";
 /// Size of a record's header. Unit: bytes.
 const HEADER: usize = 16;
+/// Longest journal that is read: its statements go into tables long before. Unit: bytes.
+const LONGEST: u64 = 512 << 20;
 
 /// Fewer records are not worth a thread.
 const FEWEST_RECORDS: usize = 20;
@@ -65,7 +69,7 @@ impl Journal {
         let is_new = self.is_new();
         let file = match self.file.take() {
             Some(file) => file,
-            None => OpenOptions::new().create(true).write(true).truncate(true).open(&self.path)?,
+            None => below(&self.path).emptied(&self.path)?,
         };
         let file = self.file.insert(file);
         let written = file.write_all(record).and_then(|()| if self.synced { file.sync_data() } else { Ok(()) });
@@ -95,7 +99,7 @@ impl Journal {
     /// It can't be removed.
     pub(super) fn remove(&mut self) -> io::Result<()> {
         (self.file, self.length, self.statements) = (None, 0, 0);
-        match fs::remove_file(&self.path) {
+        match below(&self.path).remove(&self.path) {
             Err(error) if error.kind() != ErrorKind::NotFound => Err(error),
             _ => Ok(()),
         }
@@ -108,7 +112,13 @@ fn cut(file: &mut File, length: u64) -> io::Result<()> {
 }
 
 fn sync_folder(file: &Path) -> io::Result<()> {
-    file.parent().map_or(Ok(()), |folder| File::open(folder)?.sync_all())
+    let below = below(file);
+    below.sync_folder(below.root())
+}
+
+/// The folder of the journal.
+fn below(file: &Path) -> Below {
+    Below::new(file.parent().unwrap_or(file))
 }
 
 /// Reads the journal in the folder of a history. Returns nothing if there is none.
@@ -116,7 +126,7 @@ fn sync_folder(file: &Path) -> io::Result<()> {
 /// # Errors
 /// It can't be read.
 pub(super) fn read(dir: &Path) -> io::Result<Vec<u8>> {
-    match fs::read(dir.join(NAME)) {
+    match Below::new(dir).read(&dir.join(NAME), LONGEST) {
         Err(error) if error.kind() == ErrorKind::NotFound => Ok(Vec::new()),
         read => read,
     }
@@ -166,6 +176,13 @@ pub(super) fn statements(bytes: &[u8], threads: usize) -> (Statements, bool) {
     (all, all_whole)
 }
 
+/// Whether bytes follow the complete records of a journal. A process that was killed while it wrote leaves half a record; so
+/// does a copy or a disk that lost the end.
+pub(super) fn is_cut(bytes: &[u8]) -> bool {
+    let complete: usize = records(bytes).flatten().map(|(_, content)| HEADER + content.len()).sum();
+    complete < bytes.len()
+}
+
 /// Returns whether all of a journal can be read.
 pub(super) fn is_whole(bytes: &[u8]) -> bool {
     records(bytes).all(|record| record.is_some())
@@ -189,7 +206,7 @@ fn part_of<'b>(records: impl Iterator<Item = Option<(usize, &'b [u8])>>, wanted:
     for record in records {
         let read = record.and_then(|(count, content)| {
             inflated.clear();
-            DeflateDecoder::new(content).read_to_end(&mut inflated).ok()?;
+            read_expanded(DeflateDecoder::new(content), content.len(), &mut inflated).ok()?;
             decode(&inflated, count, wanted, &mut part)
         });
         is_whole &= read.is_some();

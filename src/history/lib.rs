@@ -45,6 +45,7 @@ mod snapshot;
 mod statements;
 mod store;
 mod syntax_fault;
+mod tail;
 mod terms;
 mod threads;
 mod trace_details;

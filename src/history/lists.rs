@@ -19,11 +19,15 @@ use actcheck_base::Outcome;
 const CAMPAIGNS: &str = "
 SELECT ?campaign (COUNT(?run) AS ?runs) WHERE {
     ?campaign a act:Campaign ; prov:startedAtTime ?started .
+    OPTIONAL { ?campaign act:number ?number }
     OPTIONAL { ?run act:campaign ?campaign }
-} GROUP BY ?campaign ?started ORDER BY ?started ?campaign";
+} GROUP BY ?campaign ?number ?started ORDER BY ?number ?started ?campaign";
 
 const STARTS: &str = "
-SELECT ?campaign WHERE { ?campaign a act:Campaign ; prov:startedAtTime ?started } ORDER BY ?started ?campaign";
+SELECT ?campaign WHERE {
+    ?campaign a act:Campaign ; prov:startedAtTime ?started .
+    OPTIONAL { ?campaign act:number ?number }
+} ORDER BY ?number ?started ?campaign";
 
 const RUNS: &str = "
 SELECT ?run ?campaign ?index ?test ?status ?weight WHERE {
@@ -156,7 +160,7 @@ fn number<T: std::str::FromStr + Default>(row: &Row, column: usize) -> T {
     optional(row, column).unwrap_or_default()
 }
 
-/// All campaigns, sorted by start.
+/// All campaigns, in the order in which they were added to the history: clocks may be wrong.
 pub(super) fn campaigns(store: &Store) -> Result<Vec<CampaignRow>, QueryEvaluationError> {
     let mut rows = Vec::new();
     for row in select(store, CAMPAIGNS, Vec::new())? {

@@ -16,6 +16,7 @@ use crate::pending;
 use crate::salvage::salvage;
 use crate::seal::{Found, Seal};
 use crate::snapshot::{MOST_COMPARED, Snapshot};
+use crate::tail::Tail;
 use crate::threads::cores;
 use crate::wanted::Wanted;
 use crate::{History, fault};
@@ -125,7 +126,10 @@ impl History {
     pub fn open_to_read(dir: &Path) -> Result<Self, Diagnostics> {
         let folder = Folder::to_read(dir)?;
         let opened = read_present(&folder, TRIES)?;
-        Ok(Self::with(opened, folder))
+        let tail = opened.snapshot.as_ref().map_or(Tail::Closed, |snapshot| Tail::of(&folder, &snapshot.journal));
+        let mut history = Self::with(opened, folder);
+        history.tail = tail;
+        Ok(history)
     }
 
     /// Like [`History::open_to_read`], for a damaged history: reads everything that can be read into memory. Returns it
@@ -182,8 +186,12 @@ impl History {
         {
             return Err(fault::damaged_file(folder.dir(), name));
         }
-        let opened = own(&folder)?;
-        let history = Self::with(opened, folder);
+        let journal =
+            journal::read(folder.dir()).map_err(|error| fault::io(folder.dir(), "reading its journal", &error))?;
+        let (tail, opened) = (Tail::of(&folder, &journal), own(&folder)?);
+        drop(journal);
+        let mut history = Self::with(opened, folder);
+        history.tail = tail;
         history.use_threads(threads);
         history.take_over_journal()?;
         Ok(history)
@@ -201,6 +209,7 @@ impl History {
             single_outlines: AtomicUsize::new(0),
             threads: AtomicUsize::new(cores()),
             restore: OnceLock::new(),
+            tail: Tail::Closed,
         }
     }
 
@@ -356,11 +365,11 @@ fn own(folder: &Folder) -> Result<Opened, Diagnostics> {
     let store = Store::open(&path).map_err(|error| fault::store(folder.dir(), "opening its store", &error))?;
     // Each opening leaves a log of over 100 kB, which is only useful to the store's developers; a process that was killed
     // while it wrote tables leaves them under names that the store does not know.
-    for entry in std::fs::read_dir(&path).into_iter().flatten().filter_map(Result::ok) {
-        let name = entry.file_name().to_string_lossy().into_owned();
+    for file in folder.below().files(&path) {
+        let name = file.file_name().unwrap_or_default().to_string_lossy();
         if name.starts_with("LOG.old.") || name.starts_with("bulk-") {
             // Harmless if it remains.
-            let _ = std::fs::remove_file(entry.path());
+            let _ = folder.below().remove(&file);
         }
     }
     let store = OpenStore { store, snapshot: None };

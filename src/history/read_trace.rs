@@ -6,10 +6,11 @@ use oxigraph::model::{GraphNameRef, Literal, QuadRef};
 use oxigraph::store::Store;
 
 use crate::detail::Parts;
+use crate::read::text_of;
 use crate::statements::iri;
 use crate::write_run::run_node;
-use crate::{History, RunRow, fault, trace_file, trace_parts};
-use actcheck_base::{Diagnostic, Diagnostics, Files, RunFacts};
+use crate::{History, RunRow, fault, folder, lists, trace_file, trace_parts};
+use actcheck_base::{Diagnostic, Diagnostics, RunFacts};
 use actcheck_data::{Choice, Trace};
 use actcheck_facts::extract;
 
@@ -25,7 +26,7 @@ impl History {
             let (choices, trace) = self.restored(&id)?;
             return Ok(self.encoded_again(&id, &choices, &trace, trace_file::decode)?.1);
         }
-        Ok(self.decoded(&id, trace_file::decode)?.1)
+        Ok(self.traced(&id, trace_file::decode)?.1)
     }
 
     /// Returns the trace of a run, named as in [`History::resolve`], with the samples of its actions but without the
@@ -42,7 +43,7 @@ impl History {
             let (choices, trace) = self.restored(id)?;
             return Ok(self.encoded_again(id, &choices, &trace, trace_file::decode_sampled)?.1);
         }
-        Ok(self.decoded(id, trace_file::decode_sampled)?.1)
+        Ok(self.traced(id, trace_file::decode_sampled)?.1)
     }
 
     /// Returns the trace of a run of a list without the motion of its bodies, and with the samples of its actions if
@@ -69,7 +70,7 @@ impl History {
     fn states_of(&self, id: &str) -> Result<Trace, Diagnostics> {
         match self.outlined_states(id)? {
             Some((_, trace)) => Ok(trace),
-            None => Ok(self.decoded(id, trace_file::decode_states)?.1),
+            None => Ok(self.traced(id, trace_file::decode_states)?.1),
         }
     }
 
@@ -78,11 +79,7 @@ impl History {
     /// # Errors
     /// As [`History::trace`].
     pub fn choices(&self, name: &str) -> Result<Vec<Choice>, Diagnostics> {
-        let id = self.resolve(name)?;
-        if let Some((choices, _)) = self.outlined_states(&id)? {
-            return Ok(choices);
-        }
-        self.decoded(&id, trace_file::decode_choices)
+        Ok(self.recorded(name)?.0)
     }
 
     /// Returns every choice of a run, named as in [`History::resolve`], and its trace as in [`History::states`].
@@ -93,7 +90,7 @@ impl History {
         let id = self.resolve(name)?;
         match self.outlined_states(&id)? {
             Some(recorded) => Ok(recorded),
-            None => self.decoded(&id, trace_file::decode_states),
+            None => self.traced(&id, trace_file::decode_states),
         }
     }
 
@@ -128,13 +125,37 @@ impl History {
         is_of_run.unwrap_or(false).then_some(parts)
     }
 
+    /// Decodes a run's trace file, and checks that it is the one that was written with the run.
+    fn traced(
+        &self,
+        id: &str,
+        decode: impl FnOnce(&[u8]) -> Result<(Vec<Choice>, Trace), String>,
+    ) -> Result<(Vec<Choice>, Trace), Diagnostics> {
+        let (choices, trace) = self.decoded(id, decode)?;
+        let (run, property) = (run_node(id), iri("act:traceHash"));
+        let store = self.store_with(lists::of_runs)?;
+        let mut hashes = store.quads_for_pattern(
+            Some((&run).into()),
+            Some(property.as_ref()),
+            None,
+            Some(GraphNameRef::DefaultGraph),
+        );
+        match hashes.next().transpose().map_err(|error| self.fault("reading a run", &error))? {
+            Some(quad) if text_of(&quad.object) != trace.hash => {
+                let why = format!("`{}` is the trace of another run than {id}", self.trace_path(id).display());
+                Err(fault::damaged(self.dir(), &why))
+            }
+            _ => Ok((choices, trace)),
+        }
+    }
+
     pub(super) fn decoded<T>(
         &self,
         id: &str,
         decode: impl FnOnce(&[u8]) -> Result<T, String>,
     ) -> Result<T, Diagnostics> {
         let file = self.folder.trace(id);
-        let bytes = Files::Disk.read_bytes(&file).map_err(|error| {
+        let bytes = folder::read(&file).map_err(|error| {
             Diagnostic::error("H009", format!("the trace of run {id} can't be read from `{}`: {error}", file.display()))
                 .help("restore the file from a backup; the store's data on the run is intact")
         })?;

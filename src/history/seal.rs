@@ -5,14 +5,14 @@
 //! end; a seal finds the damage before.
 
 use std::collections::BTreeMap;
-use std::fs::{self, File};
+use std::fs::File;
 use std::io::{self, ErrorKind, Read as _};
+use std::path::Path;
 
 use flate2::Crc;
 
-use crate::folder::Folder;
+use crate::folder::{self, Folder};
 use crate::threads::filtered;
-use actcheck_base::write_atomic;
 
 const TITLE: &str = "actcheck seal 1";
 /// Name of the list.
@@ -47,9 +47,10 @@ pub(super) enum Found {
 impl Seal {
     /// Reads the seal of a folder.
     pub(super) fn read(folder: &Folder) -> Found {
-        let text = match fs::read(folder.seal().join(SUMS)) {
+        let text = match folder::read(&folder.seal().join(SUMS)) {
             Ok(bytes) => String::from_utf8(bytes).unwrap_or_default(),
-            Err(_) => return Found::Missing,
+            Err(error) if error.kind() == ErrorKind::NotFound => return Found::Missing,
+            Err(_) => return Found::Damaged,
         };
         parsed(&text).map_or(Found::Damaged, |sums| Found::Whole(Self { sums }))
     }
@@ -62,25 +63,26 @@ impl Seal {
             Found::Missing | Found::Damaged => BTreeMap::new(),
         };
         let mut sums = BTreeMap::new();
-        for entry in fs::read_dir(folder.store())?.filter_map(Result::ok) {
-            let Ok(name) = entry.file_name().into_string() else { continue };
-            if is_sealed(&name) {
-                let known = earlier.get(&name).filter(|_| name.ends_with(".sst"));
-                sums.insert(name, known.copied().map_or_else(|| sum_of(&mut File::open(entry.path())?, u64::MAX), Ok)?);
+        let below = folder.below();
+        for file in below.files(&folder.store()) {
+            let Some(name) = name_of(&file).filter(|name| is_sealed(name)) else { continue };
+            let known = earlier.get(name).filter(|_| name.ends_with(".sst"));
+            let sum = known.copied().map_or_else(|| sum_of(&mut below.open(&file)?, u64::MAX), Ok)?;
+            sums.insert(name.to_owned(), sum);
+        }
+        below.create_folder(&folder.seal())?;
+        let current = folder::read(&folder.store().join(CURRENT))?;
+        let manifest = manifest_of(&current).ok_or(ErrorKind::InvalidData)?.to_owned();
+        below.write_atomic(&folder.seal().join(&manifest), &folder::read(&folder.store().join(&manifest))?)?;
+        below.write_atomic(&folder.seal().join(CURRENT), &current)?;
+        below.write_atomic(&folder.seal().join(SUMS), listed(&sums).as_bytes())?;
+        for file in below.files(&folder.seal()) {
+            // The copy of an older manifest; harmless if it remains. Files of others are left alone.
+            if name_of(&file).is_some_and(|name| name != manifest && is_manifest(name)) {
+                let _ = below.remove(&file);
             }
         }
-        fs::create_dir_all(folder.seal())?;
-        let current = fs::read(folder.store().join(CURRENT))?;
-        let manifest = manifest_of(&current).unwrap_or_default().to_owned();
-        write_atomic(&folder.seal().join(&manifest), &fs::read(folder.store().join(&manifest))?)?;
-        write_atomic(&folder.seal().join(CURRENT), &current)?;
-        write_atomic(&folder.seal().join(SUMS), listed(&sums).as_bytes())?;
-        for entry in fs::read_dir(folder.seal())?.filter_map(Result::ok) {
-            if ![manifest.as_str(), CURRENT, SUMS].iter().any(|name| entry.file_name() == **name) {
-                // The copy of an older manifest, or a partial file; harmless if it remains.
-                let _ = fs::remove_file(entry.path());
-            }
-        }
+        below.remove_leftovers(&folder.seal());
         Ok(())
     }
 
@@ -107,9 +109,9 @@ impl Seal {
         let is_wrong = |name: &str| {
             let path = folder.store().join(name);
             match name {
-                CURRENT => fs::read(path).map_or(true, |content| self.is_wrong_current(&content)),
+                CURRENT => folder::read(&path).map_or(true, |content| self.is_wrong_current(&content)),
                 _ if name.ends_with(".sst") && !with_tables => false,
-                _ => match File::open(path) {
+                _ => match folder::open(&path) {
                     Ok(mut file) => !matches!(self.is_damaged(name, &mut file), None | Some(Ok(false))),
                     Err(error) => error.kind() != ErrorKind::NotFound,
                 },
@@ -124,7 +126,7 @@ impl Seal {
     pub(super) fn damaged_copies(&self, folder: &Folder) -> Vec<String> {
         let is_copied = |name: &str| name == CURRENT || name.starts_with(MANIFEST);
         let is_wrong = |name: &str, sum: &Sum| {
-            let found = File::open(folder.seal().join(name)).and_then(|mut file| sum_of(&mut file, u64::MAX));
+            let found = folder::open(&folder.seal().join(name)).and_then(|mut file| sum_of(&mut file, u64::MAX));
             // An older manifest has no copy any more.
             found.map_or_else(|error| error.kind() != ErrorKind::NotFound, |found| found != *sum)
         };
@@ -134,9 +136,9 @@ impl Seal {
 
     /// The number of tables of a folder's store that the seal does not list: those of a killed process.
     pub(super) fn unlisted(&self, folder: &Folder) -> usize {
-        let entries = fs::read_dir(folder.store()).into_iter().flatten().filter_map(Result::ok);
-        let names = entries.filter_map(|entry| entry.file_name().into_string().ok());
-        names.filter(|name| name.ends_with(".sst") && !self.sums.contains_key(name)).count()
+        let files = folder.below().files(&folder.store());
+        let names = files.iter().filter_map(|file| name_of(file));
+        names.filter(|name| name.ends_with(".sst") && !self.sums.contains_key(*name)).count()
     }
 
     /// Total size of the listed files. Unit: bytes.
@@ -148,8 +150,16 @@ impl Seal {
 /// The manifest that the content of `CURRENT` names. Returns `None` if it names none.
 pub(super) fn manifest_of(current: &[u8]) -> Option<&str> {
     let name = std::str::from_utf8(current).ok()?.strip_suffix('\n')?;
-    let number = name.strip_prefix(MANIFEST)?;
-    (!number.is_empty() && number.bytes().all(|byte| byte.is_ascii_digit())).then_some(name)
+    is_manifest(name).then_some(name)
+}
+
+fn is_manifest(name: &str) -> bool {
+    let number = name.strip_prefix(MANIFEST);
+    number.is_some_and(|number| !number.is_empty() && number.bytes().all(|byte| byte.is_ascii_digit()))
+}
+
+fn name_of(file: &Path) -> Option<&str> {
+    file.file_name()?.to_str()
 }
 
 /// Whether damage to a file of a store matters: tables, logs and manifests, and which manifest is current.

@@ -6,13 +6,13 @@
 //! after it has written a manifest without it, so the files belong together if the manifest did not change meanwhile.
 
 use std::fs::{self, File};
-use std::io::{self, ErrorKind, Seek as _};
+use std::io::{self, ErrorKind, Read as _, Seek as _};
 use std::path::{Path, PathBuf};
 use std::thread::yield_now;
 use std::time::SystemTime;
 
 use crate::fault;
-use crate::folder::Folder;
+use crate::folder::{self, Folder};
 use crate::journal;
 use crate::seal::{CURRENT, Found, Seal, manifest_of};
 use actcheck_base::{Diagnostics, ScratchFolder, digest_of};
@@ -23,6 +23,9 @@ const TRIES: usize = 200;
 /// Largest store that is compared with its seal before it is read: takes a few tenths of a second. Larger ones are
 /// compared by `actcheck health --integrity`. Unit: bytes.
 pub(super) const MOST_COMPARED: u64 = 1 << 30;
+
+/// Longest log or manifest that is copied. A sparse file in a foreign store must not fill the disk. Unit: bytes.
+const LONGEST_COPIED: u64 = 1 << 30;
 
 /// A store that can be opened for reading at [`Snapshot::store`].
 #[derive(Debug)]
@@ -76,11 +79,11 @@ impl Snapshot {
         let Found::Whole(seal) = Seal::read(folder) else {
             return attempt(folder, &folder.store(), None)?.ok_or_else(|| missing(folder));
         };
-        let current = fs::read(folder.store().join(CURRENT)).unwrap_or_default();
+        let current = folder::read(&folder.store().join(CURRENT)).unwrap_or_default();
         let manifest = manifest_of(&current).map(|name| folder.store().join(name));
         let is_damaged = |path: PathBuf| {
             let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-            File::open(path)
+            folder::open(&path)
                 .map_or(true, |mut file| matches!(seal.is_damaged(&name, &mut file), Some(Ok(true) | Err(_))))
         };
         let damaged = seal.is_wrong_current(&current) || manifest.is_none_or(is_damaged);
@@ -117,11 +120,12 @@ fn attempt(folder: &Folder, small: &Path, seal: Option<&Seal>) -> Result<Option<
     let journal = journal::read(dir).map_err(|error| fault::io(dir, "reading its journal", &error))?;
     let (mut tables, mut size) = (Vec::new(), 0);
     let manifest = manifest_of(&before.manifest).unwrap_or_default();
-    let entries = fs::read_dir(folder.store()).map_err(|error| fault::io(dir, "reading its store", &error))?;
-    let names: Vec<String> = entries.filter_map(|entry| entry.ok()?.file_name().into_string().ok()).collect();
+    let entries =
+        folder.below().entries(&folder.store()).map_err(|error| fault::io(dir, "reading its store", &error))?;
+    let names: Vec<String> = entries.into_iter().filter_map(|(name, _)| name.into_string().ok()).collect();
     for name in names.iter().map(String::as_str).filter(|name| name.ends_with(".sst") || name.ends_with(".log")) {
         let from = folder.store().join(name);
-        let mut file = match File::open(&from) {
+        let mut file = match folder::open(&from) {
             Ok(file) => file,
             // Removed meanwhile; if it is needed, the manifest changes.
             Err(error) if error.kind() == ErrorKind::NotFound => continue,
@@ -143,7 +147,7 @@ fn attempt(folder: &Folder, small: &Path, seal: Option<&Seal>) -> Result<Option<
     }
     for name in [manifest, "IDENTITY"] {
         let from = if name == manifest { small.join(name) } else { folder.store().join(name) };
-        let Ok(mut file) = File::open(from) else { continue };
+        let Ok(mut file) = folder::open(&from) else { continue };
         if let Some(Ok(true)) = seal.and_then(|seal| seal.is_damaged(name, &mut file)) {
             return Err(fault::damaged_file(dir, name));
         }
@@ -165,24 +169,24 @@ fn missing(folder: &Folder) -> Diagnostics {
 
 /// Reads the stamp of a store. Returns `None` if it has no readable manifest.
 fn stamp(folder: &Folder, store: &Path) -> Option<Stamp> {
-    let current = fs::read(store.join(CURRENT)).ok()?;
+    let current = folder::read(&store.join(CURRENT)).ok()?;
     let size = fs::metadata(store.join(manifest_of(&current)?)).ok()?.len();
-    let mut logs: Vec<(String, u64)> = fs::read_dir(store)
-        .ok()?
-        .filter_map(|entry| {
-            let entry = entry.ok()?;
-            let name = entry.file_name().into_string().ok().filter(|name| name.ends_with(".log"))?;
-            Some((name, entry.metadata().ok()?.len()))
-        })
-        .collect();
-    logs.sort();
+    let logs = folder.below().files(store).into_iter().filter_map(|file| {
+        let name = file.file_name()?.to_str().filter(|name| name.ends_with(".log"))?.to_owned();
+        Some((name, fs::metadata(file).ok()?.len()))
+    });
+    let logs: Vec<(String, u64)> = logs.collect();
     let journal = fs::metadata(folder.dir().join(journal::NAME)).map_or(0, |found| found.len());
     let outlines = fs::metadata(folder.outlines()).and_then(|found| found.modified()).ok();
     Some(Stamp { manifest: current, size, logs, journal, outlines })
 }
 
+/// Copies a file into the reader's folder for temporary files.
 fn copy(file: &mut File, to: &Path) -> io::Result<()> {
-    io::copy(file, &mut File::create(to)?).map(drop)
+    if file.metadata()?.len() > LONGEST_COPIED {
+        return Err(io::Error::other("a file of its store is far longer than any that this program writes"));
+    }
+    io::copy(&mut file.take(LONGEST_COPIED), &mut File::create(to)?).map(drop)
 }
 
 /// Makes an open file available under another name, also after its removal.

@@ -17,6 +17,7 @@ use crate::outlines::{LoadedFiles, Outline, Restore, Shelf, View};
 use crate::read::{short_id, subjects, text_of};
 use crate::snapshot::Snapshot;
 use crate::statements::iri;
+use crate::tail::Tail;
 use crate::wanted::Wanted;
 use crate::write_campaign::{self, campaign_node};
 use crate::write_run::run_node;
@@ -50,6 +51,8 @@ pub struct History {
     /// Greatest number of threads that make its tables, and that read lists of runs.
     pub(super) threads: AtomicUsize,
     pub(super) restore: OnceLock<Box<Restore>>,
+    /// The end of the journal when the history was opened.
+    pub(super) tail: Tail,
 }
 
 impl History {
@@ -62,6 +65,11 @@ impl History {
     /// Greatest number of threads.
     pub(super) fn threads(&self) -> usize {
         self.threads.load(Ordering::Relaxed)
+    }
+
+    /// Whether this program writes files of this path into the folder of a history.
+    pub fn writes(path: &Path) -> bool {
+        Folder::writes(path)
     }
 
     /// The folder as the caller gave it.
@@ -89,7 +97,8 @@ impl History {
     pub fn begin_campaign(&self, record: &CampaignRecord) -> Result<(), Diagnostics> {
         self.check_ids("campaign", [&record.id])?;
         self.remove_orphans()?;
-        self.enter_quads(&write_campaign::beginning(record), "writing the campaign")?;
+        let number = self.campaign_ids()?.len() as u64;
+        self.enter_quads(&write_campaign::beginning(record, number), "writing the campaign")?;
         self.flush()
     }
 
@@ -362,7 +371,23 @@ impl History {
         }
     }
 
-    fn campaign_ids(&self) -> Result<Vec<String>, Diagnostics> {
+    /// A warning if campaigns of the history began later than now: the clock was ahead then, or is behind now.
+    ///
+    /// # Errors
+    /// The store can't be read.
+    pub fn clock_warning(&self, now: &str) -> Result<Option<Diagnostic>, Diagnostics> {
+        let campaigns = self.campaigns()?;
+        let Some(ahead) = campaigns.iter().filter(|row| row.started.as_str() > now).max_by_key(|row| &row.started)
+        else {
+            return Ok(None);
+        };
+        let message = format!("campaign {} began at {}, but it is {now} now", ahead.id, ahead.started);
+        let help =
+            "the clock was ahead then, or is behind now: set it; campaigns keep the order in which they were added";
+        Ok(Some(Diagnostic::warning("H032", message).help(help)))
+    }
+
+    pub(super) fn campaign_ids(&self) -> Result<Vec<String>, Diagnostics> {
         self.ids("act:Campaign")
     }
 
@@ -370,10 +395,12 @@ impl History {
     fn remove_orphans(&self) -> Result<(), Diagnostics> {
         self.shelf().clean();
         let mut ended = BTreeMap::new();
-        for entry in std::fs::read_dir(self.folder.traces()).into_iter().flatten().filter_map(Result::ok) {
-            let name = entry.file_name().to_string_lossy().into_owned();
+        let below = self.folder.below();
+        below.remove_leftovers(&self.folder.traces());
+        for file in below.files(&self.folder.traces()) {
+            let name = file.file_name().unwrap_or_default().to_string_lossy();
             let orphan = match name.strip_suffix(".trace") {
-                None => name.ends_with(".tmp"),
+                None => false,
                 Some(run) => {
                     let campaign = run.rsplit_once('-').map_or(run, |(campaign, _)| campaign);
                     if !ended.contains_key(campaign) {
@@ -384,7 +411,7 @@ impl History {
             };
             if orphan {
                 // Harmless if it remains.
-                let _ = std::fs::remove_file(entry.path());
+                let _ = below.remove(&file);
             }
         }
         Ok(())

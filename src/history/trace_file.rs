@@ -10,7 +10,7 @@ use flate2::Compression;
 use flate2::write::GzEncoder;
 
 use crate::frames;
-use crate::inflate::expanded;
+use crate::inflate::{expanded, most_expanded};
 use crate::trace_details::{Cups, Details, Intervals, Marks};
 use actcheck_base::Steps;
 use actcheck_data::{ActionTrace, Choice, Form, Frames, RobotCourse, Samples, SceneMap, Series, Snapshot, Trace};
@@ -20,6 +20,10 @@ use actcheck_data::{ActionTrace, Choice, Form, Frames, RobotCourse, Samples, Sce
 const MAGIC: &[u8; 8] = b"actrace4";
 /// Magic bytes of files whose choices have the indices of candidates, without their names. All else is the same.
 const WITHOUT_CANDIDATES: &[u8; 8] = b"actrace3";
+
+/// Maximum number of samples of an action: limits the memory that a corrupt file can request, whose constant series take a
+/// byte. A long action has some million.
+const MOST_SAMPLES: usize = 1 << 26;
 
 /// First part: choices, states, actions, time between frames, names of tracks, hash. The map, the forms of bodies, the
 /// courses of the robot, [`Details`] and [`Intervals`] follow it, then, of a robot with a suction cup, [`Cups`], and
@@ -106,6 +110,9 @@ fn decode_samples(bytes: &Arc<Vec<u8>>, at: usize) -> Option<(Samples, usize)> {
     let ((period_secs, count, heads), rest): ((f64, u64, Vec<SeriesHead>), &[u8]) =
         postcard::take_from_bytes(bytes.get(at..)?).ok()?;
     let count = usize::try_from(count).ok()?;
+    if count.checked_mul(heads.len())? > MOST_SAMPLES {
+        return None;
+    }
     let mut at = bytes.len() - rest.len();
     let mut series = Vec::with_capacity(heads.len());
     for (thing, other, quantity, steps_per_unit) in heads {
@@ -236,9 +243,13 @@ fn parts(bytes: &[u8]) -> Result<(&[u8], &[u8]), String> {
 /// # Errors
 /// A message that names the damaged part.
 pub(super) fn after_trace(bytes: &[u8]) -> Result<&[u8], String> {
-    let mut decoder = flate2::bufread::GzDecoder::new(parts(bytes)?.1);
-    std::io::copy(&mut decoder, &mut std::io::sink()).map_err(|error| error.to_string())?;
-    Ok(decoder.into_inner())
+    let course = parts(bytes)?.1;
+    let (mut decoder, most) = (flate2::bufread::GzDecoder::new(course), most_expanded(course.len()));
+    let length = std::io::copy(&mut std::io::Read::take(&mut decoder, most), &mut std::io::sink());
+    match length.map_err(|error| error.to_string())? {
+        length if length == most => Err("its motion expands to far more than this program writes".to_owned()),
+        _ => Ok(decoder.into_inner()),
+    }
 }
 
 pub(super) fn compressed(bytes: &[u8]) -> Result<Vec<u8>, String> {

@@ -3,11 +3,11 @@
 //! They are read in a tenth of the time that the store takes, where each is many statements. Programs that know nothing of
 //! the copy do not read it; files without it, and damaged ones, are read from the store.
 
-use std::fs::File;
 use std::io::{Read as _, Seek as _, SeekFrom};
 use std::path::Path;
 
 use crate::detail::Parts;
+use crate::folder;
 use crate::inflate::expanded;
 use crate::trace_file::compressed;
 
@@ -32,7 +32,7 @@ pub(super) fn appended(mut trace: Vec<u8>, hash: &str, parts: &Parts) -> Result<
 /// Reads the copy and the hash of its trace. Returns `None` if the file has none that this program can read; its checksum
 /// shows damage.
 pub(super) fn read(file: &Path) -> Option<(String, Parts)> {
-    let mut file = File::open(file).ok()?;
+    let mut file = folder::open(file).ok()?;
     let end = file.metadata().ok()?.len().checked_sub(TRAILER)?;
     file.seek(SeekFrom::Start(end)).ok()?;
     let mut length = [0; 4];

@@ -6,13 +6,16 @@ use crate::statements::{Statements, count, iri, time};
 use crate::{CampaignEnd, CampaignRecord};
 use actcheck_base::{Outcome, names};
 
+/// The position of a campaign in its history.
+pub(super) const NUMBER: &str = "act:number";
+
 /// A campaign's node.
 pub(super) fn campaign_node(id: &str) -> NamedNode {
     NamedNode::new_unchecked(format!("{}{id}", names::CAMPAIGN))
 }
 
-/// The quads that are written before the first run.
-pub(super) fn beginning(record: &CampaignRecord) -> Vec<Quad> {
+/// The quads that are written before the first run. `number`: of campaigns that the history has already.
+pub(super) fn beginning(record: &CampaignRecord, number: u64) -> Vec<Quad> {
     let mut statements = Statements::default();
     let campaign = campaign_node(&record.id);
     statements
@@ -24,6 +27,7 @@ pub(super) fn beginning(record: &CampaignRecord) -> Vec<Quad> {
         .text("act:configDigest", &record.config_digest)
         .text("act:configPath", &record.config_path)
         .text("act:ontologyDigest", &record.ontology_digest)
+        .has(NUMBER, count(number))
         .has("act:seed", count(record.seed))
         .has("act:plannedRuns", count(record.planned_runs))
         .has("act:repeat", count(u64::from(record.repeat)))

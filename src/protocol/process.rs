@@ -206,10 +206,14 @@ fn guard(child: &Child, folder: &Path) -> std::io::Result<Child> {
     command.process_group(0).stdin(Stdio::piped()).stdout(Stdio::null()).stderr(Stdio::null()).spawn()
 }
 
+/// Longest folder of temporary files: the address of a socket has at most about 100 bytes. Unit: bytes.
+const LONGEST_BASE: usize = 60;
+
 /// Creates a new folder that only this user can access.
 fn private_folder() -> std::io::Result<PathBuf> {
     static NUMBER: AtomicU64 = AtomicU64::new(0);
-    let base = std::env::temp_dir();
+    let base = Some(std::env::temp_dir()).filter(|base| base.as_os_str().len() <= LONGEST_BASE);
+    let base = base.unwrap_or_else(|| PathBuf::from("/tmp"));
     loop {
         let number = NUMBER.fetch_add(1, Ordering::Relaxed);
         let folder = base.join(format!("actcheck-{}-{number}", std::process::id()));

@@ -161,7 +161,7 @@ impl Client {
                     why: format!("{} can't be read: {error}", path.display()),
                     is_temporary: false,
                 };
-                let file = std::fs::File::open(path).map_err(cannot)?;
+                let file = actcheck_base::open_regular(path).map_err(cannot)?;
                 let length = file.metadata().map_err(cannot)?.len();
                 self.run(new.header("content-length", length).body(&file))
             }

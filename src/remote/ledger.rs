@@ -1,11 +1,14 @@
 //! The record of the parts that a store has accepted, so that the same command continues where it was.
 
 use std::collections::HashSet;
-use std::fs::{self, File};
+use std::fs::File;
 use std::io::{self, Read as _, Seek as _, Write as _};
 use std::path::Path;
 
-use actcheck_base::Digest;
+use actcheck_base::{Below, Digest};
+
+/// Longest record that is read: of ten million parts. Unit: bytes.
+const LONGEST: u64 = 330 << 20;
 
 /// A file with one line for each accepted part: the digest of its name and statements.
 #[derive(Debug)]
@@ -40,12 +43,12 @@ impl Ledger {
 
 /// Opens the file at its end. The last line, if a kill left it incomplete, is removed.
 fn open(path: &Path, heading: &str, from_start: bool) -> io::Result<(HashSet<u128>, File)> {
-    if let Some(folder) = path.parent() {
-        fs::create_dir_all(folder)?;
-    }
-    let mut file = File::options().read(true).append(true).create(true).open(path)?;
+    let folder = path.parent().unwrap_or(path);
+    let history = Below::new(folder.parent().unwrap_or(folder));
+    history.create_folder(folder)?;
+    let mut file = history.append(path)?;
     let mut text = Vec::new();
-    file.read_to_end(&mut text)?;
+    (&mut file).take(LONGEST).read_to_end(&mut text)?;
     let text = String::from_utf8_lossy(&text);
     let whole = match text.strip_prefix(heading).filter(|_| !from_start) {
         Some(lines) => lines.rfind('\n').map_or("", |end| &lines[..=end]),

@@ -8,7 +8,10 @@ use std::path::{Path, PathBuf};
 #[cfg(feature = "object-storage")]
 use crate::bucket::Bucket;
 use crate::client::Client;
-use actcheck_base::{Diagnostic, Diagnostics, NewFile};
+use actcheck_base::{Below, Diagnostic, Diagnostics, FileKind, open_regular};
+
+/// Longest file that is read: an index of tables. Unit: bytes.
+const LONGEST: u64 = 64 << 20;
 
 /// Settings of an object storage with the interface of S3.
 #[derive(Clone, Default)]
@@ -59,7 +62,7 @@ impl Place {
         match &self.kind {
             Kind::Folder(folder) => {
                 let mut found = BTreeMap::new();
-                files(folder, "", &mut found).map_err(|error| unusable(folder, &error))?;
+                files(&Below::new(folder), folder, "", &mut found).map_err(|error| unusable(folder, &error))?;
                 Ok(found)
             }
             #[cfg(feature = "object-storage")]
@@ -74,8 +77,8 @@ impl Place {
     pub fn put_file(&self, name: &str, from: &Path) -> Result<(), Diagnostics> {
         match &self.kind {
             Kind::Folder(folder) => {
-                let copied = written(&folder.join(name), |to| {
-                    io::copy(&mut fs::File::open(from)?, to)?;
+                let copied = written(folder, name, |to| {
+                    io::copy(&mut open_regular(from)?, to)?;
                     Ok(())
                 });
                 copied.map_err(|error| unusable(&folder.join(name), &error))
@@ -92,8 +95,8 @@ impl Place {
     pub fn put(&self, name: &str, bytes: &[u8]) -> Result<(), Diagnostics> {
         match &self.kind {
             Kind::Folder(folder) => {
-                let file = folder.join(name);
-                written(&file, |to| to.write_all(bytes)).map_err(|error| unusable(&file, &error))
+                let written = written(folder, name, |to| to.write_all(bytes));
+                written.map_err(|error| unusable(&folder.join(name), &error))
             }
             #[cfg(feature = "object-storage")]
             Kind::Bucket(bucket) => bucket.put(name, bytes),
@@ -106,7 +109,7 @@ impl Place {
     /// As [`Place::list`].
     pub fn get(&self, name: &str) -> Result<Option<Vec<u8>>, Diagnostics> {
         match &self.kind {
-            Kind::Folder(folder) => match fs::read(folder.join(name)) {
+            Kind::Folder(folder) => match Below::new(folder).read(&folder.join(name), LONGEST) {
                 Ok(bytes) => Ok(Some(bytes)),
                 Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(None),
                 Err(error) => Err(unusable(&folder.join(name), &error)),
@@ -122,7 +125,7 @@ impl Place {
     /// As [`Place::list`].
     pub fn remove(&self, name: &str) -> Result<(), Diagnostics> {
         match &self.kind {
-            Kind::Folder(folder) => match fs::remove_file(folder.join(name)) {
+            Kind::Folder(folder) => match Below::new(folder).remove(&folder.join(name)) {
                 Err(error) if error.kind() != io::ErrorKind::NotFound => Err(unusable(&folder.join(name), &error)),
                 _ => Ok(()),
             },
@@ -144,30 +147,26 @@ fn bucket(name: &str, _settings: &BucketSettings, _client: Client) -> Result<Pla
 }
 
 /// Adds the files of a folder, without those that are being written. A missing folder has none.
-fn files(folder: &Path, prefix: &str, found: &mut BTreeMap<String, u64>) -> io::Result<()> {
-    let entries = match fs::read_dir(folder) {
-        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(()),
-        entries => entries?,
-    };
-    for entry in entries {
-        let entry = entry?;
-        let name = format!("{prefix}{}", entry.file_name().to_string_lossy());
-        let metadata = entry.metadata()?;
-        if metadata.is_dir() {
-            files(&entry.path(), &format!("{name}/"), found)?;
-        } else if !name.ends_with(".tmp") {
-            found.insert(name, metadata.len());
+fn files(below: &Below, folder: &Path, prefix: &str, found: &mut BTreeMap<String, u64>) -> io::Result<()> {
+    for (name, kind) in below.entries(folder)? {
+        let path = folder.join(&name);
+        let name = format!("{prefix}{}", name.to_string_lossy());
+        match kind {
+            FileKind::Folder => files(below, &path, &format!("{name}/"), found)?,
+            FileKind::File if !name.ends_with(".tmp") => {
+                found.insert(name, fs::metadata(path)?.len());
+            }
+            _ => {}
         }
     }
     Ok(())
 }
 
 /// Writes a file that appears when it is complete.
-fn written(path: &Path, write: impl FnOnce(&mut fs::File) -> io::Result<()>) -> io::Result<()> {
-    if let Some(folder) = path.parent() {
-        fs::create_dir_all(folder)?;
-    }
-    let new = NewFile::create(path)?;
+fn written(folder: &Path, name: &str, write: impl FnOnce(&mut fs::File) -> io::Result<()>) -> io::Result<()> {
+    let (below, path) = (Below::new(folder), folder.join(name));
+    below.create_folder(path.parent().unwrap_or(folder))?;
+    let new = below.new_file(&path)?;
     write(&mut new.writer()?)?;
     new.finish()
 }

@@ -8,7 +8,7 @@ use polars::prelude::{DataFrame, ParquetWriter, PolarsError};
 
 use crate::dataset::columns::TableSpec;
 use crate::tables::{Cell, series, unwritten};
-use actcheck_base::{Diagnostics, NewFile};
+use actcheck_base::{Below, Diagnostics, NewFile};
 
 /// Approximate maximum number of rows in memory.
 const ROWS_AT_ONCE: usize = 100_000;
@@ -31,7 +31,7 @@ impl Sheet {
         let path = folder.join(spec.file);
         let cells: Vec<Vec<Cell>> = spec.columns.iter().map(|_| Vec::new()).collect();
         let open = || -> Result<(NewFile, BatchedWriter<File>), PolarsError> {
-            let (empty, file) = (frame(&spec, cells.clone(), 0)?, NewFile::create(&path)?);
+            let (empty, file) = (frame(&spec, cells.clone(), 0)?, Below::new(folder).new_file(&path)?);
             let writer = ParquetWriter::new(file.writer()?).batched(empty.schema())?;
             Ok((file, writer))
         };

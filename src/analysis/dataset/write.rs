@@ -12,7 +12,7 @@ use crate::dataset::sheets::Sheets;
 use crate::dataset::{course, fact_source, source};
 use crate::tables::{new_text, outcomes_schema, pending_parquet, unwritten};
 use crate::{Hierarchy, Mirror, TableFilter};
-use actcheck_base::Diagnostics;
+use actcheck_base::{Below, Diagnostics};
 use actcheck_history::{History, RunDetail};
 
 /// Tables with the facts from which outcomes follow.
@@ -112,7 +112,7 @@ fn export(
         }
     }
     sheets.complete()?;
-    let described = new_text(&dataset.schema, &format!("{:#}\n", schema(tables)))?;
+    let described = new_text(&Below::new(folder), &dataset.schema, &format!("{:#}\n", schema(tables)))?;
     // Everything is on the disk: from here on, files only get their names.
     dataset.tables = sheets.finish()?;
     dataset.tables.push(outcomes.finish_table()?);

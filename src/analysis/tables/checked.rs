@@ -1,7 +1,7 @@
 //! The runs of each file of a mirror, so that files that have not changed since need not be read to know them.
 //!
 //! The file `FILES` has a line for each: name, size, time of the last change, number of rows, and the indices of its runs as
-//! `first+step*count`, joined by commas. A line `state` has the state of the history whose runs the files have.
+//! `first+step*count`, joined by commas. A line `state` has the state of the history whose runs the files have, and the last one a digest of the list.
 
 use std::collections::{BTreeMap, HashSet};
 use std::fs;
@@ -9,11 +9,14 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::time::UNIX_EPOCH;
 
-use actcheck_base::write_quickly;
+use crate::tables::table_files::LONGEST;
+use actcheck_base::{Below, digest_of};
 
 const NAME: &str = "FILES";
 /// Begins the line with the state of the history.
 const STATE: &str = "state ";
+/// Begins the last line, with the digest of the others.
+const SUM: &str = "digest ";
 
 /// The runs of one file.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -39,7 +42,9 @@ type Stamp = (u64, u128);
 impl Checked {
     /// Reads the list of a folder. It is empty if it is missing or damaged.
     pub fn read(folder: &Path) -> Self {
-        let text = fs::read_to_string(folder.join(NAME)).unwrap_or_default();
+        let text = Below::new(folder).read_text(&folder.join(NAME), LONGEST).unwrap_or_default();
+        let text =
+            text.rsplit_once(SUM).filter(|(text, sum)| digest_of(text) == sum.trim_end()).map_or("", |(text, _)| text);
         let state = text.lines().find_map(|line| line.strip_prefix(STATE)).map(str::to_owned);
         Self { files: text.lines().filter_map(line).collect(), state, changed: false }
     }
@@ -78,7 +83,7 @@ impl Checked {
     ///
     /// # Errors
     /// The file can't be written; the list was only a shortcut.
-    pub fn write(&mut self, folder: &Path, present: &[PathBuf]) -> io::Result<()> {
+    pub fn write(&mut self, below: &Below, folder: &Path, present: &[PathBuf]) -> io::Result<()> {
         let present: HashSet<&str> = present.iter().filter_map(|file| name_of(file)).collect();
         let before = self.files.len();
         self.files.retain(|name, _| present.contains(name.as_str()));
@@ -89,8 +94,9 @@ impl Checked {
         if let Some(state) = &self.state {
             text.push_str(&format!("{STATE}{state}\n"));
         }
+        let sum = digest_of(&text);
         self.changed = false;
-        write_quickly(&folder.join(NAME), text.as_bytes())
+        below.write_quickly(&folder.join(NAME), format!("{text}{SUM}{sum}\n").as_bytes())
     }
 }
 
@@ -175,10 +181,14 @@ mod tests {
         let runs = FileRuns { rows: 5, indices: vec![0] };
         let mut checked = Checked::read(folder.path());
         checked.set(&file, runs.clone());
-        checked.write(folder.path(), std::slice::from_ref(&file)).expect("it can be written");
+        checked
+            .write(&Below::new(folder.path()), folder.path(), std::slice::from_ref(&file))
+            .expect("it can be written");
         assert_eq!(Checked::read(folder.path()).get(&file), Some(&runs));
         checked.set_state(Some("f00".to_owned()));
-        checked.write(folder.path(), std::slice::from_ref(&file)).expect("it can be written");
+        checked
+            .write(&Below::new(folder.path()), folder.path(), std::slice::from_ref(&file))
+            .expect("it can be written");
         let read = Checked::read(folder.path());
         assert!(read.is_of("f00") && !read.is_of("f0"));
         assert_eq!(read.get(&file), Some(&runs));

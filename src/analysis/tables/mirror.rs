@@ -1,25 +1,29 @@
 //! The table beside a history, stored as several Parquet files. The name of each has its digest, so that damage is noticed.
 
 use std::collections::{BTreeMap, BTreeSet, HashSet};
-use std::fs::{self, File};
+use std::fs::File;
 use std::io::Cursor;
 use std::path::{Path, PathBuf};
 
-use polars::prelude::{DataFrame, ParquetReader, ParquetWriter, PolarsError, SerReader as _};
+use polars::prelude::{DataFrame, ParquetReader, ParquetWriter, PolarsError, SerReader as _, polars_bail};
 
 use crate::TableRun;
 use crate::tables::checked::{Checked, FileRuns};
 use crate::tables::columns::{ColumnKind, columns};
 use crate::tables::frames::Rows;
 use crate::tables::outcomes::TableFilter;
-use crate::tables::table_files::{digest_of_bytes, entries, is_table, is_whole, named, present, tables_of};
-use actcheck_base::{Diagnostic, Diagnostics, NewFile, ScratchFolder, digest_of, write_atomic};
+use crate::tables::table_files::{LONGEST, digest_of_bytes, is_whole, named, present, tables_in, tables_of, whole};
+use actcheck_base::{Below, Diagnostic, Diagnostics, ScratchFolder, digest_of, guarded};
 use actcheck_history::History;
 
 /// Maximum number of runs in a file, and so in memory at once.
 const RUNS_IN_A_FILE: usize = 2_000;
 /// Number of files of a campaign from which they are written anew as one: each look at a running campaign adds a file.
 const MOST_PARTS: usize = 16;
+/// Maximum number of rows of a file: a run has some dozens.
+const MOST_ROWS: usize = 1_000 * RUNS_IN_A_FILE;
+/// Code of the fault for a trace that is missing.
+const MISSING_TRACE: &str = "H009";
 /// File with the digest of the columns.
 pub(super) const SCHEMA: &str = "SCHEMA";
 /// File with the number of judgements that `recheck` had added to each campaign when its files were written.
@@ -30,6 +34,8 @@ const RECHECKED: &str = "RECHECKED";
 pub struct Mirror {
     /// Where new files are written.
     folder: PathBuf,
+    /// The folder of the history, or that of new files if they are elsewhere.
+    below: Below,
     /// Its files, sorted by the start of the campaign, then by the time of writing.
     files: Vec<TableFile>,
     /// The runs of known files.
@@ -61,13 +67,13 @@ enum Place {
 }
 
 impl Place {
-    fn find(folder: &Path) -> Result<Self, Diagnostics> {
+    fn find(below: &Below, folder: &Path) -> Result<Self, Diagnostics> {
         let lock = || -> std::io::Result<File> {
-            fs::create_dir_all(folder)?;
-            let lock = File::open(folder)?;
+            below.create_folder(folder)?;
+            let lock = below.open_folder(folder)?;
             lock.try_lock()?;
             // Whether files can be created there.
-            drop(NewFile::create(&folder.join(SCHEMA))?);
+            drop(below.new_file(&folder.join(SCHEMA))?);
             Ok(lock)
         };
         lock()
@@ -120,7 +126,7 @@ impl Mirror {
         let (before, later) = (rechecked(&tables_of(history)), history.later_counts()?);
         let is_newest = |campaign: &String| before.get(campaign) == later.get(campaign);
         let mut damaged = Vec::new();
-        for file in entries(&tables_of(history)).into_iter().filter(|file| is_table(file)) {
+        for file in tables_in(&tables_of(history)) {
             let is_of_today = named(&file).is_none_or(|name| name.digest.is_some() && is_newest(&name.campaign));
             if is_of_today && !(is_whole(&file) && is_as_stored(history, &file, &known)?) {
                 damaged.push(file);
@@ -131,21 +137,22 @@ impl Mirror {
     }
 
     fn updated(history: &History, tables: &Path, anew: bool) -> Result<(Self, MirrorChange), Diagnostics> {
-        let place = Place::find(tables)?;
-        let (folder, is_beside) = match &place {
+        let below = Below::new(history.dir());
+        let place = Place::find(&below, tables)?;
+        let (folder, below, is_beside) = match &place {
             Place::Scratch(_) if anew => {
                 return Err(unwritten(tables, &"it is read-only, or another process writes it"));
             }
-            Place::Scratch(scratch) => (scratch.path().to_path_buf(), false),
-            Place::Beside { .. } | Place::Given => (tables.to_path_buf(), true),
+            Place::Scratch(scratch) => (scratch.path().to_path_buf(), Below::new(scratch.path()), false),
+            Place::Beside { .. } | Place::Given => (tables.to_path_buf(), below, true),
         };
-        let digest = schema_digest();
-        let is_current = fs::read_to_string(tables.join(SCHEMA)).ok().as_deref() == Some(digest.as_str());
+        let is_current = is_current(tables);
         if is_beside && (anew || !is_current) {
-            clear(tables)?;
-            write_atomic(&tables.join(SCHEMA), digest.as_bytes()).map_err(|error| unwritten(tables, &error))?;
+            clear(&below, tables)?;
+            let written = below.write_atomic(&tables.join(SCHEMA), schema_digest().as_bytes());
+            written.map_err(|error| unwritten(tables, &error))?;
         }
-        let mut mirror = Self { folder, files: Vec::new(), checked: Checked::read(tables), _place: place };
+        let mut mirror = Self { folder, below, files: Vec::new(), checked: Checked::read(tables), _place: place };
         let state = history.state();
         let is_same = state.as_deref().is_some_and(|state| mirror.checked.is_of(state));
         if is_same && is_current && !anew && mirror.has_all(tables, &history.unselected_campaigns()?) {
@@ -153,7 +160,10 @@ impl Mirror {
             return Ok((mirror, MirrorChange { kept, ..MirrorChange::default() }));
         }
         let mut change = MirrorChange::default();
-        let mut present = if anew || !is_current { BTreeMap::new() } else { present(tables, is_beside) };
+        let mut present = if anew || !is_current { BTreeMap::new() } else { present(tables) };
+        if is_beside {
+            mirror.below.remove_leftovers(tables);
+        }
         let (known, later) = (rechecked(tables), history.later_counts()?);
         for (campaign, runs) in history.run_ids()? {
             let mut files = present.remove(&campaign).unwrap_or_default();
@@ -166,13 +176,13 @@ impl Mirror {
         if is_beside && known != later {
             let lines: String = later.iter().map(|(campaign, count)| format!("{campaign} {count}\n")).collect();
             let file = tables.join(RECHECKED);
-            write_atomic(&file, lines.as_bytes()).map_err(|error| unwritten(&file, &error))?;
+            mirror.below.write_atomic(&file, lines.as_bytes()).map_err(|error| unwritten(&file, &error))?;
         }
         if is_beside {
             let present: Vec<PathBuf> = mirror.files.iter().map(|file| file.path.clone()).collect();
             mirror.checked.set_state(state);
             // Without the list, the files are read again.
-            let _ = mirror.checked.write(tables, &present);
+            let _ = mirror.checked.write(&mirror.below, tables, &present);
         }
         Ok((mirror, change))
     }
@@ -180,7 +190,7 @@ impl Mirror {
     /// Adds the files of a folder, unless one has changed since it was checked, was added or removed. `campaigns`: in the
     /// order of the files.
     fn has_all(&mut self, tables: &Path, campaigns: &[String]) -> bool {
-        let mut there = present(tables, false);
+        let mut there = present(tables);
         let files = campaigns.iter().flat_map(|campaign| {
             let files = there.remove(campaign).unwrap_or_default();
             files.into_iter().map(|path| {
@@ -189,7 +199,8 @@ impl Mirror {
             })
         });
         let files: Option<Vec<TableFile>> = files.collect();
-        let has_all = there.is_empty() && files.as_ref().is_some_and(|files| files.len() == self.checked.len());
+        let has_all = there.is_empty()
+            && files.as_ref().is_some_and(|files| files.len() == self.checked.len() && are_whole(files));
         if has_all {
             self.files = files.unwrap_or_default();
         }
@@ -205,9 +216,10 @@ impl Mirror {
         campaign: &str,
         runs: impl IntoIterator<Item = impl Into<TableRun>>,
     ) -> Result<Self, Diagnostics> {
-        fs::create_dir_all(folder).map_err(|error| unwritten(folder, &error))?;
-        let mut mirror =
-            Self { folder: folder.to_path_buf(), files: Vec::new(), checked: Checked::default(), _place: Place::Given };
+        let below = Below::new(folder);
+        below.create_folder(folder).map_err(|error| unwritten(folder, &error))?;
+        let (folder, checked) = (folder.to_path_buf(), Checked::default());
+        let mut mirror = Self { folder, below, files: Vec::new(), checked, _place: Place::Given };
         let mut runs = runs.into_iter().peekable();
         while runs.peek().is_some() {
             let mut rows = Rows::default();
@@ -248,16 +260,16 @@ impl Mirror {
         let known: HashSet<u64> = runs.iter().map(|run| index_of(run)).collect();
         let (mut there, mut kept, mut outdated) = (HashSet::new(), Vec::new(), Vec::new());
         for path in files {
-            if self.checked.get(&path).is_none() {
-                let whole = is_whole(&path);
-                change.damaged += usize::from(!whole);
-                match runs_of(&path) {
-                    Ok(runs) if whole => self.checked.set(&path, runs),
-                    _ => {
-                        outdated.push(path);
-                        continue;
-                    }
+            let is_known = self.checked.get(&path).is_some();
+            let runs = if is_known && is_whole(&path) { None } else { Some(runs_of(&path)) };
+            match runs {
+                Some(Ok(runs)) => self.checked.set(&path, runs),
+                Some(Err(_)) => {
+                    change.damaged += 1;
+                    outdated.push(path);
+                    continue;
                 }
+                None => {}
             }
             let Some(FileRuns { rows, indices }) = self.checked.get(&path) else { continue };
             if indices.iter().all(|index| known.contains(index) && !there.contains(index)) {
@@ -297,7 +309,7 @@ impl Mirror {
         if file.parent() != Some(self.folder.as_path()) {
             return Ok(());
         }
-        fs::remove_file(file).map_err(|error| unwritten(file, &error))
+        self.below.remove(file).map_err(|error| unwritten(file, &error))
     }
 
     /// Writes the rows of some runs to a new file atomically, and adds it.
@@ -311,7 +323,7 @@ impl Mirror {
             ParquetWriter::new(&mut bytes).finish(&mut frame)?;
             let bytes = bytes.into_inner();
             let file = self.folder.join(format!("{campaign}.{number:06}.{}.parquet", digest_of_bytes(&bytes)));
-            write_atomic(&file, &bytes)?;
+            self.below.write_atomic(&file, &bytes)?;
             Ok(file)
         };
         let path = written().map_err(|error| unwritten(&self.folder, &error))?;
@@ -332,7 +344,7 @@ fn index_of(run: &str) -> u64 {
 /// Whether a whole file has the rows that its runs have now.
 fn is_as_stored(history: &History, file: &Path, known: &BTreeSet<String>) -> Result<bool, Diagnostics> {
     let Ok(runs) = ids_of(file) else { return Ok(false) };
-    if !runs.is_subset(known) {
+    if !runs.iter().all(|run| known.contains(run)) {
         return Ok(true);
     }
     let mut rows = Rows::default();
@@ -346,7 +358,7 @@ fn is_as_stored(history: &History, file: &Path, known: &BTreeSet<String>) -> Res
 
 /// Reads the number of later judgements of each campaign from the time when the files were written.
 fn rechecked(tables: &Path) -> BTreeMap<String, u64> {
-    let text = fs::read_to_string(tables.join(RECHECKED)).unwrap_or_default();
+    let text = Below::new(tables).read_text(&tables.join(RECHECKED), LONGEST).unwrap_or_default();
     let line = |line: &str| line.split_once(' ').and_then(|(id, count)| Some((id.to_owned(), count.parse().ok()?)));
     text.lines().filter_map(line).collect()
 }
@@ -364,19 +376,42 @@ fn table_runs(history: &History, runs: &[&String]) -> Vec<Result<TableRun, Diagn
     })
 }
 
-/// Reads a run. Noise and effects are unknown if its trace is missing, damaged, or of an unknown version.
+/// Reads a run. Noise and effects are unknown if its trace is missing.
 fn table_run(history: &History, run: &str) -> Result<TableRun, Diagnostics> {
     let detail = history.newest_run(run)?;
     Ok(match history.recorded(run) {
         Ok((choices, trace)) => TableRun::new(detail, &choices, &trace),
-        Err(_) => detail.into(),
+        Err(faults) if faults.iter().all(|fault| fault.code == MISSING_TRACE) => detail.into(),
+        // Other numbers than without the damage.
+        Err(faults) => return Err(faults),
+    })
+}
+
+/// Whether all files have the digests that their names say.
+fn are_whole(files: &[TableFile]) -> bool {
+    let cores = std::thread::available_parallelism().map_or(1, usize::from);
+    std::thread::scope(|scope| {
+        let check = |files: &'_ [TableFile]| files.iter().all(|file| is_whole(&file.path));
+        let shares = files.chunks(files.len().div_ceil(cores).max(1));
+        let shares: Vec<_> = shares.map(|files| scope.spawn(move || check(files))).collect();
+        // A thread that panics has found no whole file.
+        shares.into_iter().fold(true, |all, share| share.join().unwrap_or(false) && all)
     })
 }
 
 /// Reads the wanted columns of a file, or all of them.
 pub(super) fn read(file: &Path, wanted: Option<&[&str]>) -> Result<DataFrame, PolarsError> {
-    let wanted = wanted.map(|names| names.iter().map(|name| (*name).to_owned()).collect());
-    ParquetReader::new(File::open(file)?).with_columns(wanted).finish()
+    let wanted: Option<Vec<String>> = wanted.map(|names| names.iter().map(|name| (*name).to_owned()).collect());
+    let bytes = whole(file)?;
+    // The digest in the name of a file that another program wrote fits any content.
+    let read = guarded(|| {
+        let mut reader = ParquetReader::new(Cursor::new(bytes)).with_columns(wanted);
+        if reader.num_rows()? > MOST_ROWS {
+            polars_bail!(ComputeError: "it has more rows than any table of this program");
+        }
+        reader.finish()
+    });
+    read.unwrap_or_else(|| polars_bail!(ComputeError: "its content is damaged"))
 }
 
 /// Creates the diagnostic for an unreadable file of a mirror.
@@ -411,10 +446,16 @@ pub(super) fn runs_of(file: &Path) -> Result<FileRuns, PolarsError> {
     Ok(FileRuns { rows: frame.height(), indices })
 }
 
-/// The ids of the runs of a file.
-fn ids_of(file: &Path) -> Result<BTreeSet<String>, PolarsError> {
+/// The ids of the runs of a file, in its order.
+fn ids_of(file: &Path) -> Result<Vec<String>, PolarsError> {
     let frame = read(file, Some(&["run"]))?;
-    let runs = frame.column("run")?.str()?.iter().flatten().map(str::to_owned).collect();
+    let mut runs: Vec<String> = Vec::new();
+    for run in frame.column("run")?.str()?.iter().flatten() {
+        // The rows of a run are adjacent.
+        if runs.last().is_none_or(|last| last != run) {
+            runs.push(run.to_owned());
+        }
+    }
     Ok(runs)
 }
 
@@ -428,6 +469,11 @@ fn kind(kind: ColumnKind) -> &'static str {
     }
 }
 
+/// Whether the files in the folder of a mirror have the columns of this version.
+pub(super) fn is_current(tables: &Path) -> bool {
+    Below::new(tables).read_text(&tables.join(SCHEMA), LONGEST).is_ok_and(|text| text == schema_digest())
+}
+
 /// Digest of the columns, to detect tables written by versions with different columns.
 pub(super) fn schema_digest() -> String {
     let definitions: Vec<String> = columns()
@@ -438,11 +484,7 @@ pub(super) fn schema_digest() -> String {
 }
 
 /// Removes all files of a mirror.
-fn clear(folder: &Path) -> Result<(), Diagnostics> {
-    for path in entries(folder) {
-        if path.extension().is_some_and(|ending| ending == "parquet" || ending == "tmp") {
-            fs::remove_file(&path).map_err(|error| unwritten(&path, &error))?;
-        }
-    }
-    Ok(())
+fn clear(below: &Below, folder: &Path) -> Result<(), Diagnostics> {
+    below.remove_leftovers(folder);
+    tables_in(folder).iter().try_for_each(|path| below.remove(path).map_err(|error| unwritten(path, &error)))
 }

@@ -1,10 +1,9 @@
 //! The files of a mirror: their names, with the digests by which damage is noticed.
 
 use std::collections::BTreeMap;
-use std::fs;
 use std::path::{Path, PathBuf};
 
-use actcheck_base::Digest;
+use actcheck_base::{Below, Digest};
 use actcheck_history::History;
 
 /// The folder of a history's mirror.
@@ -29,10 +28,22 @@ pub(super) fn named(file: &Path) -> Option<TableName> {
     of_today.or_else(|| Some(TableName { campaign: rest.to_owned(), number: last.parse().ok()?, digest: None }))
 }
 
+/// Longest file of a mirror: those of this program have some megabytes. Unit: bytes.
+pub(super) const LONGEST: u64 = 256 << 20;
+
+/// Reads a file that has the digest that its name says. The table library may panic on any other.
+pub(super) fn whole(file: &Path) -> std::io::Result<Vec<u8>> {
+    let bytes = Below::new(file.parent().unwrap_or(file)).read(file, LONGEST)?;
+    let digest = named(file).and_then(|name| name.digest);
+    if digest.is_some_and(|digest| digest_of_bytes(&bytes) == digest) {
+        return Ok(bytes);
+    }
+    Err(std::io::Error::other("it has changed since it was written"))
+}
+
 /// Whether a file has the digest that its name says.
 pub(super) fn is_whole(file: &Path) -> bool {
-    let digest = named(file).and_then(|name| name.digest);
-    digest.is_some_and(|digest| fs::read(file).is_ok_and(|bytes| digest_of_bytes(&bytes) == digest))
+    whole(file).is_ok()
 }
 
 pub(super) fn digest_of_bytes(bytes: &[u8]) -> String {
@@ -41,27 +52,17 @@ pub(super) fn digest_of_bytes(bytes: &[u8]) -> String {
     digest.finish()
 }
 
-pub(super) fn entries(folder: &Path) -> Vec<PathBuf> {
-    fs::read_dir(folder).into_iter().flatten().filter_map(|entry| Some(entry.ok()?.path())).collect()
+/// The regular files in the folder of a mirror that have the name of a table. Others are left alone.
+pub(super) fn tables_in(folder: &Path) -> Vec<PathBuf> {
+    Below::new(folder).files(folder).into_iter().filter(|file| named(file).is_some()).collect()
 }
 
-pub(super) fn is_table(file: &Path) -> bool {
-    file.extension().is_some_and(|ending| ending == "parquet")
-}
-
-/// Returns the files by campaign, in the order of writing. Removes partial files of killed processes, if this process
-/// may change the folder.
-pub(super) fn present(tables: &Path, may_change: bool) -> BTreeMap<String, Vec<PathBuf>> {
+/// Returns the files by campaign, in the order of writing.
+pub(super) fn present(tables: &Path) -> BTreeMap<String, Vec<PathBuf>> {
     let mut found: BTreeMap<String, Vec<PathBuf>> = BTreeMap::new();
-    for path in entries(tables) {
+    for path in tables_in(tables) {
         if let Some(name) = named(&path) {
             found.entry(name.campaign).or_default().push(path);
-        } else if is_table(&path) {
-            // Its name is damaged.
-            found.entry(String::new()).or_default().push(path);
-        } else if may_change && path.extension().is_some_and(|ending| ending == "tmp") {
-            // A failure is harmless.
-            let _ = fs::remove_file(&path);
         }
     }
     found.values_mut().for_each(|files| files.sort());

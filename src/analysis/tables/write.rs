@@ -1,7 +1,7 @@
 //! Export of the table: one file in Parquet or CSV, and a description of its columns.
 
 use std::collections::BTreeSet;
-use std::fs::{self, File};
+use std::fs::File;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
@@ -14,7 +14,7 @@ use crate::tables::columns::{ColumnKind, ColumnRole, columns};
 use crate::tables::frames::{Rows, kinds_columns, with_kinds};
 use crate::tables::mirror::{Mirror, read, unread, unwritten};
 use crate::tables::{Hierarchy, OutcomeTable, TableFilter};
-use actcheck_base::{Diagnostics, NewFile};
+use actcheck_base::{Below, Diagnostics, NewFile};
 
 /// Column that says whether a run counts in rates over the exported rows.
 const COUNTS: &str = "counts";
@@ -104,19 +104,20 @@ fn export(
     name: &str,
     write: impl FnOnce(&Path, File) -> Result<usize, Diagnostics>,
 ) -> Result<Pending, Diagnostics> {
-    fs::create_dir_all(folder).map_err(|error| unwritten(folder, &error))?;
+    let below = Below::new(folder);
+    below.create_folder(folder).map_err(|error| unwritten(folder, &error))?;
     let (table, described) = (folder.join(name), folder.join("schema.json"));
-    let file = NewFile::create(&table).map_err(|error| unwritten(&table, &error))?;
+    let file = below.new_file(&table).map_err(|error| unwritten(&table, &error))?;
     let writer = file.writer().map_err(|error| unwritten(&table, &error))?;
     let rows = write(&table, writer)?;
-    let text = new_text(&described, &format!("{:#}\n", schema()))?;
+    let text = new_text(&below, &described, &format!("{:#}\n", schema()))?;
     Ok(Pending { table: (table, file), described: (described, text), rows })
 }
 
 /// Writes a text without giving the file its name.
-pub(crate) fn new_text(path: &Path, text: &str) -> Result<NewFile, Diagnostics> {
+pub(crate) fn new_text(below: &Below, path: &Path, text: &str) -> Result<NewFile, Diagnostics> {
     let write = || -> std::io::Result<NewFile> {
-        let file = NewFile::create(path)?;
+        let file = below.new_file(path)?;
         file.writer()?.write_all(text.as_bytes())?;
         Ok(file)
     };

@@ -12,12 +12,15 @@ use super::versions::{Version, Versions};
 use super::{BisectArgs, child};
 use crate::compare;
 use actcheck_analysis::Compared;
-use actcheck_base::{Diagnostic, Diagnostics};
+use actcheck_base::{Below, Diagnostic, Diagnostics, read_regular};
 use actcheck_config as config;
 use actcheck_config::Overrides;
 use actcheck_history::{History, RunFilter};
 use actcheck_ontology as ontology;
 use actcheck_rules::RuleBook;
+
+/// Longest configuration. Unit: bytes.
+const LONGEST_CONFIG: u64 = 64 << 20;
 
 /// A configuration or a case, and the way to run it.
 pub struct Scenes<'a> {
@@ -76,12 +79,15 @@ impl<'a> Scenes<'a> {
         let Some(repository) = self.repository else { return Ok((PathBuf::from("."), self.config.to_owned())) };
         let folder = repository.extract(version)?;
         let Some(inside) = repository.inside(self.config) else { return Ok((folder, self.config.to_owned())) };
-        let config = folder.join(&inside);
+        let config = config::resolve_path(&folder, &inside.to_string_lossy());
         // A case is the same at each version. So is a configuration that the version does not have.
         if self.is_case || !config.is_file() {
             let parent = config.parent().filter(|parent| parent.is_dir());
             let parent = parent.ok_or_else(|| Unjudged::Skipped(lacks(&inside).into()))?;
-            std::fs::copy(self.config, &config).map_err(|error| unwritable(parent, &error))?;
+            // A link in the version would lead to the user's files.
+            let copied = read_regular(self.config, LONGEST_CONFIG)
+                .and_then(|text| Below::new(self.scratch).write_quickly(&config, &text));
+            copied.map_err(|error| unwritable(parent, &error))?;
         }
         Ok((folder, config))
     }

@@ -142,6 +142,24 @@ const CODES_H: &[Code] = &[
         "don't use the history; ids have only letters, digits, `-` and `_`",
     ),
     code(
+        "H027",
+        "a file or folder of a history is a link, a pipe or a device",
+        "another person made the history, or a part of it was moved and replaced by a link",
+        "remove it if you do not know its origin; to keep a history elsewhere, move all of it, and name its folder with `--history`",
+    ),
+    code(
+        "H028",
+        "the history of a configuration or of this folder is a link, and is not named on the command line",
+        "`.actcheck`, `[history] dir`, or a folder on the way is a link",
+        "name the folder with `--history` if you know where the link leads; otherwise remove the link",
+    ),
+    code(
+        "H029",
+        "the journal of a history ends early, or runs are missing from it",
+        "a process was killed or lost power while it wrote, the disk was full, or a copy is incomplete",
+        "restore the file `journal` from a backup, or `actcheck run --resume ID` makes the missing runs again",
+    ),
+    code(
         "H030",
         "a query needs too many statements about runs that are kept as outlines",
         "most queries read columns of outlines; facts, any property, paths and blank nodes as values need their statements in the store",
@@ -152,6 +170,12 @@ const CODES_H: &[Code] = &[
         "a run that is kept as an outline can't be simulated again",
         "a model, a rule of the scene or the program changed since, so that another run would result",
         "`actcheck replay` names the changes; the run's outcomes and states are intact",
+    ),
+    code(
+        "H032",
+        "a campaign of the history began later than now",
+        "the machine's clock was ahead then, or is behind now",
+        "set the clock; campaigns keep the order in which they were added, so that the newest is the last one",
     ),
     code(
         "H040",

@@ -7,7 +7,7 @@ use crate::launch::LaunchArgs;
 use crate::launch::plan::Plan;
 use crate::session::{self, Session};
 use crate::work::all_cores;
-use crate::{clock, regressions, run, stop};
+use crate::{clock, output, regressions, run, stop};
 use actcheck_analysis::Mirror;
 use actcheck_base::{Diagnostic, Diagnostics};
 use actcheck_campaign::Env;
@@ -38,7 +38,15 @@ pub(super) fn finish(
     let session = Session { env, history, id, goes_on: true, failed: None, kept, regressions };
     let code = run::campaign(&args.of_whole(), session, stop, |_| ())?;
     if code != stop::INTERRUPTED {
-        plan.remove().map_err(|error| plan.unwritable(&error))?;
+        let left = plan.remove().map_err(|error| plan.unwritable(&error))?;
+        if let Some(first) = left.first() {
+            let message = format!(
+                "{} files remain that the launch did not write, the first is `{}`",
+                left.len(),
+                first.display()
+            );
+            output::print_diagnostics(&Diagnostic::warning("X073", message).help("move or remove them").into());
+        }
     }
     Ok(code)
 }

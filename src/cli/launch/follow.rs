@@ -10,7 +10,7 @@ use crate::launch::record::Record;
 use crate::launch::scheduler::{Job, Look, Place, Scheduler, shell_line};
 use crate::output;
 use crate::progress::Progress;
-use actcheck_base::{Diagnostic, Diagnostics, write_atomic};
+use actcheck_base::{Diagnostic, Diagnostics};
 
 /// Interval between checks for Ctrl-C.
 const TICK: Duration = Duration::from_millis(100);
@@ -144,7 +144,7 @@ fn submit(
         None => {
             recorded(scheduler, round, None, false).write(plan)?;
             for (name, text) in scheduler.files(&job) {
-                let written = write_atomic(&plan.folder.join(name), text.as_bytes());
+                let written = plan.below().write_atomic(&plan.folder.join(name), text.as_bytes());
                 written.map_err(|error| plan.unwritable(&error))?;
             }
             match scheduler.submit(&job) {

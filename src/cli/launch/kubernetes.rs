@@ -10,7 +10,7 @@ use crate::launch::scheduler::{Job, Look, Place, Scheduler, ask, quoted, refused
 use actcheck_base::{Diagnostic, Diagnostics};
 
 /// Name of the manifest in the folder of the launch.
-const MANIFEST: &str = "kubernetes.json";
+pub(super) const MANIFEST: &str = "kubernetes.json";
 /// A finished job is kept for this time, for its pods' events. Unit: seconds.
 const KEPT_SECS: u64 = 86_400;
 /// Reasons of a waiting container that don't go away by themselves.

@@ -1,7 +1,6 @@
 //! Shards as processes of this machine.
 
 use std::collections::VecDeque;
-use std::fs::OpenOptions;
 use std::os::unix::process::CommandExt as _;
 use std::process::{Child, Command, Stdio};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -84,8 +83,7 @@ fn start(plan: &Plan, number: u64) -> Result<Child, Diagnostics> {
         Diagnostic::error("X052", format!("the path of this program can't be found: {error}"))
             .help("start actcheck by its full path")
     })?;
-    let log =
-        OpenOptions::new().create(true).append(true).open(plan.log(number)).and_then(|log| Ok((log.try_clone()?, log)));
+    let log = plan.below().append(&plan.log(number)).and_then(|log| Ok((log.try_clone()?, log)));
     let (out, errors) = log.map_err(|error| plan.unwritable(&error))?;
     let mut command = Command::new(program);
     command.arg("launch-task").arg(&plan.folder).arg(number.to_string()).arg("--with-parent");

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 use std::ffi::OsString;
-use std::fs::{self, File, TryLockError};
+use std::fs::{File, TryLockError};
 use std::io;
 use std::path::{Path, PathBuf};
 use std::thread;
@@ -11,12 +11,14 @@ use std::time::{Duration, Instant};
 use serde_json::{Value, json};
 
 use crate::clock;
-use crate::launch::LaunchArgs;
+use crate::launch::{LaunchArgs, kubernetes, ray, slurm};
 use crate::run_args::RunArgs;
-use actcheck_base::{Diagnostic, Diagnostics, Shard, digest_of, program_digest, write_atomic};
+use actcheck_base::{Below, Diagnostic, Diagnostics, FileKind, Shard, digest_of, program_digest};
 use actcheck_campaign::Env;
 use actcheck_history::History;
 
+/// Names of the files that schedulers write into the folder.
+const SCHEDULER_FILES: [&str; 4] = [slurm::SCRIPT, kubernetes::MANIFEST, ray::SETTINGS, ray::SCRIPT.0];
 /// Interval between attempts to take a shard.
 const INTERVAL: Duration = Duration::from_millis(250);
 
@@ -87,8 +89,7 @@ impl Plan {
     /// # Errors
     /// `X073` the folder has no plan that this program can read.
     pub fn read(folder: &Path) -> Result<Self, Diagnostics> {
-        let value: Option<Value> =
-            fs::read(folder.join("plan.json")).ok().and_then(|text| serde_json::from_slice(&text).ok());
+        let value: Option<Value> = read_below(folder, "plan.json").and_then(|text| serde_json::from_slice(&text).ok());
         value.and_then(|value| Self::of_json(folder, &value)).ok_or_else(|| {
             let message = format!("`{}` has no plan of a launch", folder.display());
             Diagnostic::error("X073", message).help("`actcheck launch CONFIG --shards N` makes one").into()
@@ -131,18 +132,20 @@ impl Plan {
     /// `X073` the folder belongs to another launch, `X074` it can't be written.
     pub fn enter(&mut self) -> Result<File, Diagnostics> {
         let file = self.folder.join("plan.json");
-        if file.exists() {
-            self.find()?;
-        }
+        self.find()?;
         // A launch that was killed while it removed its folder.
-        let _ = fs::remove_dir_all(with_ending(&self.folder, ".merged"));
+        let _ = self.remove_ours(&with_ending(&self.folder, ".merged"));
         // Shards are tried again, with whatever their users repaired.
-        let _ = fs::remove_dir_all(self.folder.join("faults"));
+        let below = self.below();
+        below.files(&self.folder.join("faults")).iter().filter(|file| number_of(file).is_some()).for_each(|file| {
+            let _ = below.remove(file);
+        });
         let folders = ["shards", "done", "faults", "locks", "logs"].map(|name| self.folder.join(name));
-        folders.iter().try_for_each(fs::create_dir_all).map_err(|error| self.unwritable(&error))?;
+        folders.iter().try_for_each(|name| below.create_folder(name)).map_err(|error| self.unwritable(&error))?;
         let alone = self.alone()?;
         if !file.exists() {
-            write_atomic(&file, format!("{:#}\n", self.json()).as_bytes()).map_err(|error| self.unwritable(&error))?;
+            let written = below.write_atomic(&file, format!("{:#}\n", self.json()).as_bytes());
+            written.map_err(|error| self.unwritable(&error))?;
         }
         Ok(alone)
     }
@@ -152,6 +155,7 @@ impl Plan {
     /// # Errors
     /// `X073` that launch has other shards.
     pub fn find(&mut self) -> Result<(), Diagnostics> {
+        self.check_plain()?;
         if self.folder.join("plan.json").exists() {
             let old = Self::read(&self.folder)?;
             self.same_as(&old)?;
@@ -162,7 +166,7 @@ impl Plan {
 
     /// X073 if another process follows this launch.
     fn alone(&self) -> Result<File, Diagnostics> {
-        let file = File::create(self.folder.join("lock")).map_err(|error| self.unwritable(&error))?;
+        let file = self.below().lock_file(&self.folder.join("lock")).map_err(|error| self.unwritable(&error))?;
         match file.try_lock() {
             Err(TryLockError::WouldBlock) => {
                 let message = format!("another `actcheck launch` uses the folder `{}`", self.folder.display());
@@ -178,7 +182,7 @@ impl Plan {
     pub fn hold(&self, number: u64, wait: Duration) -> Result<Option<File>, Diagnostics> {
         let asked = Instant::now();
         let path = self.folder.join("locks").join(number.to_string());
-        let file = File::create(path).map_err(|error| self.unwritable(&error))?;
+        let file = self.below().lock_file(&path).map_err(|error| self.unwritable(&error))?;
         while let Err(TryLockError::WouldBlock) = file.try_lock() {
             if asked.elapsed() > wait {
                 return Ok(None);
@@ -231,7 +235,8 @@ impl Plan {
 
     /// The campaign of a complete shard.
     pub fn done(&self, number: u64) -> Option<String> {
-        fs::read_to_string(self.done_file(number)).ok().filter(|id| !id.is_empty())
+        let id = self.below().read_text(&self.done_file(number), LONGEST).ok();
+        id.filter(|id| !id.is_empty())
     }
 
     /// The file that says that a shard ended with a diagnostic, which another start would not change.
@@ -257,8 +262,7 @@ impl Plan {
     }
 
     fn numbers_in(&self, folder: &str) -> BTreeSet<u64> {
-        let entries = fs::read_dir(self.folder.join(folder)).into_iter().flatten().flatten();
-        entries.filter_map(|entry| entry.file_name().to_str()?.parse().ok()).collect()
+        self.below().files(&self.folder.join(folder)).iter().filter_map(|file| number_of(file)).collect()
     }
 
     /// The options with which a shard runs.
@@ -282,7 +286,7 @@ impl Plan {
     pub fn stored_runs(&self, done: &BTreeSet<u64>) -> u64 {
         let stored = |number: u64| {
             let folder = self.shard_dir(number);
-            let whole = fs::read_dir(folder.join("traces")).map_or(0, Iterator::count) as u64;
+            let whole = self.below().files(&folder.join("traces")).len() as u64;
             whole + History::count_outlines(&folder)
         };
         let of = |number: u64| match self.shard(number) {
@@ -292,14 +296,56 @@ impl Plan {
         (1..=self.shards).map(of).sum()
     }
 
-    /// Removes the folder of a merged launch. It gets another name first, so that no half of it is taken for a launch.
-    pub fn remove(&self) -> io::Result<()> {
+    /// Removes the files of a merged launch. Its folder gets another name first, so that no half of it is taken for a launch.
+    /// Returns the paths of files that others have written there, which remain.
+    pub fn remove(&self) -> io::Result<Vec<PathBuf>> {
         let merged = with_ending(&self.folder, ".merged");
-        if merged.exists() {
-            fs::remove_dir_all(&merged)?;
+        let mut left = self.remove_ours(&merged)?;
+        if left.is_empty() {
+            Self::beside(&self.folder).rename(&self.folder, &merged)?;
+            return self.remove_ours(&merged);
         }
-        fs::rename(&self.folder, &merged)?;
-        fs::remove_dir_all(&merged)
+        left.extend(self.remove_ours(&self.folder)?);
+        Ok(left)
+    }
+
+    fn remove_ours(&self, folder: &Path) -> io::Result<Vec<PathBuf>> {
+        Self::beside(folder).remove_ours(folder, &is_ours)
+    }
+
+    /// The files of the launch.
+    pub fn below(&self) -> Below {
+        Below::new(&self.folder)
+    }
+
+    /// The files beside a folder, which must not be a link: the user named only that of the history.
+    fn beside(folder: &Path) -> Below {
+        Below::new(folder.parent().unwrap_or(Path::new("")))
+    }
+
+    /// Checks that the folder, and everything in it and in its folders, is a file or a folder, not a link, a pipe or a device:
+    /// processes of shards and schedulers open them by their paths.
+    ///
+    /// # Errors
+    /// `X073` something is of another kind.
+    pub fn check_plain(&self) -> Result<(), Diagnostics> {
+        let is_plain = |kind: FileKind| kind == FileKind::File || kind == FileKind::Folder;
+        let folders = ["", "shards", "done", "faults", "locks", "logs"].map(|name| self.folder.join(name));
+        let beside = Self::beside(&self.folder);
+        let top = beside.kind(&self.folder).map(|kind| (self.folder.clone(), kind));
+        let inside = folders.iter().flat_map(|folder| {
+            let entries = beside.entries(folder).unwrap_or_default().into_iter();
+            entries.map(|(name, kind)| (folder.join(name), kind))
+        });
+        match top.into_iter().chain(inside).find(|(_, kind)| !is_plain(*kind)) {
+            None => Ok(()),
+            Some((path, kind)) => {
+                let message =
+                    format!("the folder `{}` can't be used: `{}` is {kind}", self.folder.display(), path.display());
+                let help = "actcheck writes only plain files there, and follows no link: remove it, or name another `--history`";
+                Err(Diagnostic::error("X073", message).help(help).into())
+            }
+        }
     }
 
     /// The plan's file.
@@ -311,6 +357,33 @@ impl Plan {
     pub fn commands(&self) -> String {
         let of = |number| format!("actcheck launch-task {} {number}\n", self.folder.display());
         (1..=self.shards).map(of).collect()
+    }
+}
+
+/// Longest file of a launch that is read as a whole. Unit: bytes.
+const LONGEST: u64 = 1 << 20;
+
+/// Reads a file of a launch. Returns `None` if it can't be read.
+pub(super) fn read_below(folder: &Path, name: &str) -> Option<Vec<u8>> {
+    Below::new(folder).read(&folder.join(name), LONGEST).ok()
+}
+
+/// The number that is the name of a file.
+fn number_of(file: &Path) -> Option<u64> {
+    file.file_name()?.to_str()?.parse().ok()
+}
+
+/// Whether a launch writes a file of this path in its folder.
+fn is_ours(path: &Path) -> bool {
+    let mut names = path.iter().map(|name| name.to_str().unwrap_or_default());
+    let is_number = |name: Option<&str>| name.is_some_and(|name| name.parse::<u64>().is_ok());
+    match names.next() {
+        Some("plan.json" | "job.json" | "lock") => names.next().is_none(),
+        Some("done" | "faults" | "locks") => is_number(names.next()) && names.next().is_none(),
+        Some("logs") => names.next().is_some_and(|name| name.ends_with(".log")) && names.next().is_none(),
+        Some("shards") => is_number(names.next()) && History::writes(&names.collect::<PathBuf>()),
+        Some(name) => SCHEDULER_FILES.contains(&name) && names.next().is_none(),
+        None => false,
     }
 }
 

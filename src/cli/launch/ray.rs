@@ -1,6 +1,5 @@
 //! Ray: one task for each shard, from a Python program that ends with this process.
 
-use std::fs::{File, OpenOptions};
 use std::io::{Read as _, Seek as _, SeekFrom};
 use std::os::unix::process::CommandExt as _;
 use std::path::PathBuf;
@@ -11,12 +10,12 @@ use serde_json::json;
 use crate::launch::args::On;
 use crate::launch::plan::Plan;
 use crate::launch::scheduler::{Job, Look, Place, Scheduler, refused, unstarted};
-use actcheck_base::{Diagnostic, Diagnostics};
+use actcheck_base::{Diagnostic, Diagnostics, open_regular};
 
 /// The Python program, and its name in the folder of the launch. As `ray.py`, it would import itself.
-const SCRIPT: (&str, &str) = ("run_on_ray.py", include_str!("run_on_ray.py"));
+pub(super) const SCRIPT: (&str, &str) = ("run_on_ray.py", include_str!("run_on_ray.py"));
 /// Name of the program's settings in the folder of the launch.
-const SETTINGS: &str = "ray.json";
+pub(super) const SETTINGS: &str = "ray.json";
 /// Maximum length of the end of the program's messages. Unit: bytes.
 const MOST_WORDS: u64 = 1_000;
 /// Exit codes of the program.
@@ -58,7 +57,7 @@ impl Ray {
     /// The end of the messages.
     fn words(&self) -> String {
         let mut text = Vec::new();
-        if let Ok(mut log) = File::open(&self.log) {
+        if let Ok(mut log) = open_regular(&self.log) {
             let length = log.metadata().map_or(0, |about| about.len());
             // A log that can't be read is shown as empty.
             let _ = log.seek(SeekFrom::Start(length.saturating_sub(MOST_WORDS)));
@@ -87,7 +86,7 @@ impl Scheduler for Ray {
     }
 
     fn submit(&mut self, job: &Job<'_>) -> Result<String, Diagnostics> {
-        let log = OpenOptions::new().create(true).write(true).truncate(true).open(&self.log);
+        let log = job.plan.below().emptied(&self.log);
         let log = log.and_then(|log| Ok((log.try_clone()?, log))).map_err(|error| job.plan.unwritable(&error))?;
         let mut command = Command::new(&self.python);
         command.args(&self.command(job)[1..]).stdin(Stdio::piped()).stdout(log.0).stderr(log.1);

@@ -1,13 +1,11 @@
 //! The record of the last submitted job, `job.json` in the folder of the launch: with it, the same command follows the job
 //! again.
 
-use std::fs;
-
 use serde_json::{Value, json};
 
 use crate::launch::args::On;
-use crate::launch::plan::Plan;
-use actcheck_base::{Diagnostic, Diagnostics, write_atomic};
+use crate::launch::plan::{Plan, read_below};
+use actcheck_base::{Diagnostic, Diagnostics};
 
 /// A job, from before its submission until it has ended.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -26,7 +24,7 @@ pub(super) struct Record {
 impl Record {
     /// Reads the record of a launch; `None` if it has submitted no job.
     pub fn read(plan: &Plan) -> Option<Self> {
-        let text = fs::read(plan.folder.join("job.json")).ok()?;
+        let text = read_below(&plan.folder, "job.json")?;
         let value: Value = serde_json::from_slice(&text).ok()?;
         let text = |key: &str| value[key].as_str().map(str::to_owned);
         Some(Self {
@@ -43,7 +41,7 @@ impl Record {
     pub fn write(&self, plan: &Plan) -> Result<(), Diagnostics> {
         let Self { on, round, id, cancel, has_ended } = self;
         let value = json!({"on": on, "round": round, "id": id, "cancel": cancel, "ended": has_ended});
-        let written = write_atomic(&plan.folder.join("job.json"), format!("{value:#}\n").as_bytes());
+        let written = plan.below().write_atomic(&plan.folder.join("job.json"), format!("{value:#}\n").as_bytes());
         written.map_err(|error| plan.unwritable(&error))
     }
 

@@ -10,7 +10,7 @@ use crate::launch::scheduler::{Job, Look, Place, Scheduler, ask, quoted, refused
 use actcheck_base::{Diagnostic, Diagnostics};
 
 /// Name of the script in the folder of the launch.
-const SCRIPT: &str = "slurm.sh";
+pub(super) const SCRIPT: &str = "slurm.sh";
 /// Parts of reasons that don't go away by themselves, in lower case. An array that asks for more cores than any node has is
 /// accepted, and waits for `PartitionConfig`.
 const TROUBLES: [&str; 5] = ["held", "badconstraints", "timelimit", "partitionconfig", "partitionnodelimit"];

@@ -9,7 +9,7 @@ use crate::launch::LaunchTaskArgs;
 use crate::launch::plan::Plan;
 use crate::{output, run, stop};
 use actcheck_analysis::Mirror;
-use actcheck_base::{Diagnostic, Diagnostics, Shard, program_digest, write_atomic};
+use actcheck_base::{Diagnostic, Diagnostics, Shard, program_digest};
 use actcheck_history::History;
 
 /// Time in which an earlier process of the same shard must have ended.
@@ -35,6 +35,7 @@ pub fn task(args: &LaunchTaskArgs) -> Result<u8, Diagnostics> {
         thread::spawn(end_with_parent);
     }
     let plan = Plan::read(&args.folder)?;
+    plan.check_plain()?;
     let shard = plan.shard(args.number).ok_or_else(|| {
         Diagnostic::error("X073", format!("the launch has {} shards, and no shard {}", plan.shards, args.number))
             .help("name a number from 1 to that")
@@ -47,7 +48,7 @@ pub fn task(args: &LaunchTaskArgs) -> Result<u8, Diagnostics> {
         Err(faults) => {
             let text: String = faults.iter().map(|fault| format!("{}: {}\n", fault.code, fault.message)).collect();
             // The exit code says it too.
-            let _ = write_atomic(&plan.fault_file(args.number), text.as_bytes());
+            let _ = plan.below().write_atomic(&plan.fault_file(args.number), text.as_bytes());
             Err(faults)
         }
         done => done,
@@ -80,7 +81,9 @@ fn alone(plan: &Plan, shard: Shard) -> Result<u8, Diagnostics> {
         State::Done(id) => {
             // The merge takes them over. Tables that are missing are made when they are needed.
             let _ = History::open_to_read(&dir).and_then(|history| Mirror::update(&history).map(drop));
-            write_atomic(&plan.done_file(number), id.as_bytes()).map_err(|error| plan.unwritable(&error))?;
+            plan.below()
+                .write_atomic(&plan.done_file(number), id.as_bytes())
+                .map_err(|error| plan.unwritable(&error))?;
             Ok(0)
         }
         State::New | State::Begun(_) => Ok(stop::INTERRUPTED),

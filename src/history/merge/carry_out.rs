@@ -12,11 +12,11 @@ use crate::merge::plan::{MergePlan, PlannedEnd, PlannedMerge};
 use crate::merge::renames::Renames;
 use crate::outlines::Outline;
 use crate::read::text_of;
-use crate::statements::{Statements, iri, time};
-use crate::write_campaign::{self, campaign_node};
+use crate::statements::{Statements, count, iri, time};
+use crate::write_campaign::{self, NUMBER, campaign_node};
 use crate::write_run::run_node;
-use crate::{History, fault};
-use actcheck_base::{Diagnostic, Diagnostics, Files, write_atomic};
+use crate::{History, fault, folder};
+use actcheck_base::{Diagnostic, Diagnostics};
 
 /// The result of a merge.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
@@ -99,6 +99,9 @@ impl Writer<'_> {
             about.text("act:shard", shard);
         }
         about.optional("prov:startedAtTime", work.started.as_deref().map(time));
+        if work.started.is_some() {
+            about.has(NUMBER, count(self.into.campaign_ids()?.len() as u64));
+        }
         let mut quads = statements.quads;
         if let Some((source, id)) = &work.statements {
             quads.extend(self.statements(campaign, *source, id)?);
@@ -109,9 +112,9 @@ impl Writer<'_> {
 
     /// A source's statements about a campaign that the destination lacks, without its start and end.
     fn statements(&self, campaign: &PlannedMerge, source: usize, id: &str) -> Result<Vec<Quad>, Diagnostics> {
-        let [start, path, first] = ["prov:startedAtTime", "act:configPath", "act:firstId"].map(iri);
+        let [start, number, path, first] = ["prov:startedAtTime", NUMBER, "act:configPath", "act:firstId"].map(iri);
         let mut quads = self.about(source, &campaign_node(id))?;
-        quads.retain(|quad| !is_end(quad) && quad.predicate != start);
+        quads.retain(|quad| !is_end(quad) && quad.predicate != start && quad.predicate != number);
         for quad in quads.iter_mut().filter(|quad| quad.predicate == path) {
             let path = relative_path_from(&text_of(&quad.object), self.sources[source].dir(), self.into.dir());
             quad.object = Literal::new_simple_literal(path).into();
@@ -175,8 +178,12 @@ impl Writer<'_> {
             self.merged.runs += 1;
             return Ok(());
         }
-        match Files::Disk.read_bytes(&self.sources[source].trace_path(run)) {
-            Ok(bytes) => write_atomic(&self.into.trace_path(new), &bytes)
+        match folder::read(&self.sources[source].trace_path(run)) {
+            Ok(bytes) => self
+                .into
+                .folder
+                .below()
+                .write_atomic(&self.into.trace_path(new), &bytes)
                 .map_err(|error| fault::io(self.into.dir(), &doing, &error))?,
             Err(_) => self.merged.without_trace.push(new.to_owned()),
         }

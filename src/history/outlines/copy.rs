@@ -1,12 +1,11 @@
 //! Copies files of outlines from one history to another.
 
-use std::fs::File;
 use std::path::{Path, PathBuf};
 
 use crate::outlines::file::Opened;
 use crate::outlines::shelf::{Needed, Unread, read_parts, unread};
-use crate::{History, fault};
-use actcheck_base::{Diagnostics, write_quickly};
+use crate::{History, fault, folder};
+use actcheck_base::{Below, Diagnostics};
 
 impl History {
     /// The files that have many outlines of a campaign, each with the indices of its runs.
@@ -39,13 +38,12 @@ impl History {
             return Ok(None);
         }
         let fault = |error| fault::io(self.dir(), "copying outlines", &error);
-        let bytes = std::fs::read(file).map_err(fault)?;
+        let bytes = folder::read(file).map_err(fault)?;
         let whole = Opened::new(&bytes).and_then(|opened| opened.check());
         whole.map_err(|why| fault::damaged(self.dir(), &format!("`{}`: {why}", file.display())))?;
         // A link takes no space. Files of outlines are never changed, only replaced.
-        if std::fs::hard_link(file, &new).is_err() {
-            write_quickly(&new, &bytes).map_err(fault)?;
-        }
+        let from = Below::new(file.parent().unwrap_or(file));
+        self.folder.below().link(&from, file, &new).map_err(fault)?;
         Ok(Some(new))
     }
 
@@ -54,10 +52,10 @@ impl History {
     /// # Errors
     /// Writing failed: `H005`, `H006`.
     pub(crate) fn sync_outlines(&self, files: &[PathBuf]) -> Result<(), Diagnostics> {
-        let sync = |path: &Path| File::open(path).and_then(|file| file.sync_all());
-        let synced = files.iter().try_for_each(|file| sync(file)).and_then(|()| match files {
+        let sync = |path: &PathBuf| folder::open(path).and_then(|file| file.sync_all());
+        let synced = files.iter().try_for_each(sync).and_then(|()| match files {
             [] => Ok(()),
-            _ => sync(&self.folder.outlines()),
+            _ => self.folder.below().sync_folder(&self.folder.outlines()),
         });
         synced.map_err(|error| fault::io(self.dir(), "copying outlines", &error))
     }

@@ -7,6 +7,7 @@
 
 use oxigraph::model::Quad;
 
+use crate::inflate::read_expanded;
 use crate::journal::{self, Content, Part};
 use crate::outlines::row::Rows;
 use crate::quad_source::RunQuads;
@@ -142,7 +143,10 @@ impl<'a> Opened<'a> {
         if journal::sum_of(self.parts[at]) != self.sums[at] {
             return Err(CHANGED.to_owned());
         }
-        zstd::stream::decode_all(self.parts[at]).map_err(|error| error.to_string())
+        let (part, mut out) = (self.parts[at], Vec::new());
+        let decoder = zstd::stream::read::Decoder::new(part).map_err(|error| error.to_string())?;
+        read_expanded(decoder, part.len(), &mut out)?;
+        Ok(out)
     }
 
     /// Compares all parts with their checksums.

@@ -13,7 +13,7 @@ use crate::outlines::shelf::{IndexSet, Needed, Shelf, Unread, are_apart, unread}
 use crate::quad_source::RunQuads;
 use crate::threads::joined;
 use crate::{History, RunDetail, RunFilter, RunRow, RunVitals, detail, trace_file};
-use crate::{graphs, merge, write_run};
+use crate::{folder, graphs, merge, write_run};
 use actcheck_base::Diagnostics;
 use actcheck_data::{Choice, Trace};
 use actcheck_facts::extract;
@@ -30,7 +30,7 @@ fn place_of(run: &str) -> Option<(&str, u64)> {
 impl History {
     /// The folder of its outlines.
     pub(crate) fn shelf(&self) -> Shelf {
-        Shelf::new(self.folder.outlines())
+        Shelf::new(self.dir())
     }
 
     /// Calls `each` with the outlines that match a filter, by campaign, then by index.
@@ -166,7 +166,7 @@ impl History {
             let known = self.loaded.with(campaign, index);
             for file in known.is_none().then(|| shelf.files_with(campaign, index)).into_iter().flatten() {
                 let damaged = |why| Unread::Damaged(file.clone(), why);
-                let bytes = std::fs::read(&file).map_err(|error| unread(&file, &error))?;
+                let bytes = folder::read(&file).map_err(|error| unread(&file, &error))?;
                 self.loaded.add(Loaded::new(campaign, file.clone(), bytes).map_err(damaged)?);
             }
             let Some(loaded) = known.or_else(|| self.loaded.with(campaign, index)) else { return Ok(None) };
@@ -313,7 +313,7 @@ impl History {
         let (mut seen, mut damaged) = (BTreeSet::new(), Vec::new());
         for file in self.shelf().files(None) {
             let mut examined = || -> Result<(), String> {
-                let bytes = std::fs::read(&file.path).map_err(|error| error.to_string())?;
+                let bytes = folder::read(&file.path).map_err(|error| error.to_string())?;
                 for outline in Opened::new(&bytes)?.outlines()? {
                     let (_, trace) = trace_file::decode_head(&outline.head)?;
                     for outlined in outline.rows.of_campaign(&file.campaign) {

@@ -6,6 +6,7 @@ use std::io::{Read as _, Seek as _, SeekFrom};
 use std::path::PathBuf;
 
 use crate::History;
+use crate::folder;
 use crate::outlines::file::{HEADER, Opened};
 use crate::outlines::shelf::{Unread, unread};
 use crate::vertical::{self, Sheet, Source, Stop};
@@ -47,18 +48,21 @@ impl SheetFile {
     /// It is gone or damaged.
     pub(crate) fn open(&self) -> Result<Sheet<Box<dyn Source>>, Stop> {
         let read = || -> std::io::Result<([u8; HEADER], File)> {
-            let (mut header, mut file) = ([0; HEADER], File::open(&self.path)?);
+            let (mut header, mut file) = ([0; HEADER], folder::open(&self.path)?);
             file.read_exact(&mut header).map(|()| (header, file))
         };
         let (header, file) = read().map_err(|error| stop(unread(&self.path, &error)))?;
         let damaged = |why| Stop::Damaged(self.path.clone(), why);
         let (by_property, place) = Opened::statements_at(&header).map_err(damaged)?;
         let length = place.len();
+        if file.metadata().is_ok_and(|found| found.len() < place.end as u64) {
+            return Err(damaged("it ends too early".to_owned()));
+        }
         if by_property {
             let source = InFile { file, start: place.start, length };
             return Sheet::open(Box::new(source) as Box<dyn Source>, length).map_err(damaged);
         }
-        let bytes = std::fs::read(&self.path).map_err(|error| stop(unread(&self.path, &error)))?;
+        let bytes = folder::read(&self.path).map_err(|error| stop(unread(&self.path, &error)))?;
         let runs = Opened::new(&bytes).and_then(|opened| opened.statements()).map_err(damaged)?;
         let runs: Vec<&[oxigraph::model::Quad]> = runs.iter().map(Vec::as_slice).collect();
         let Some(bytes) = vertical::encode(&runs).map_err(damaged)? else {

@@ -4,14 +4,13 @@
 //! that is killed while it puts single files together leaves runs in both; they count once.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::fs::{self, File};
 use std::io::{self, ErrorKind, Read as _};
 use std::path::{Path, PathBuf};
 
-use crate::folder::Folder;
+use crate::folder::{self, Folder, LONGEST};
 use crate::outlines::file::{HEADER, Opened, Outline, encode};
 use crate::{History, fault};
-use actcheck_base::{Diagnostics, write_atomic, write_quickly};
+use actcheck_base::{Below, Diagnostics};
 
 /// Number of times that a reader looks again if the owner has put a file together with others meanwhile.
 pub(super) const TRIES: usize = 100;
@@ -30,6 +29,7 @@ pub(crate) struct OutlineFile {
 /// The folder of outlines.
 #[derive(Debug, Clone)]
 pub(crate) struct Shelf {
+    below: Below,
     dir: PathBuf,
 }
 
@@ -58,8 +58,9 @@ impl Shelf {
     /// Number of runs of a campaign in a file. Each takes 30 kB of memory while it is written.
     pub(crate) const RUNS_IN_A_FILE: usize = 128;
 
-    pub(crate) fn new(dir: PathBuf) -> Self {
-        Self { dir }
+    /// The outlines in the folder of a history.
+    pub(crate) fn new(history: &Path) -> Self {
+        Self { below: Below::new(history), dir: Folder::outlines_in(history) }
     }
 
     /// Whether there may be outlines.
@@ -69,8 +70,7 @@ impl Shelf {
 
     /// The files, sorted by campaign and index; a larger one before the single ones that it may contain.
     pub(crate) fn files(&self, campaign: Option<&str>) -> Vec<OutlineFile> {
-        let entries = fs::read_dir(&self.dir).into_iter().flatten().filter_map(Result::ok);
-        let mut files: Vec<OutlineFile> = entries.filter_map(|entry| named(entry.path())).collect();
+        let mut files: Vec<OutlineFile> = self.below.files(&self.dir).into_iter().filter_map(named).collect();
         files.retain(|file| campaign.is_none_or(|campaign| campaign == file.campaign));
         files.sort();
         files
@@ -78,26 +78,21 @@ impl Shelf {
 
     /// Removes the partial files of killed processes.
     pub(crate) fn clean(&self) {
-        for entry in fs::read_dir(&self.dir).into_iter().flatten().filter_map(Result::ok) {
-            if entry.file_name().to_string_lossy().ends_with(".tmp") {
-                // Harmless if it remains.
-                let _ = fs::remove_file(entry.path());
-            }
-        }
+        self.below.remove_leftovers(&self.dir);
     }
 
     /// Writes the outline of a run. `synced`: to the disk at once, so that it survives a power cut.
     pub(crate) fn add(&self, campaign: &str, index: u64, outline: &Outline, synced: bool) -> io::Result<()> {
         let bytes = encode(std::slice::from_ref(outline)).map_err(io::Error::other)?;
         let path = self.dir.join(format!("{campaign}-{}.outline", index + 1));
-        if synced { write_atomic(&path, &bytes) } else { write_quickly(&path, &bytes) }
+        if synced { self.below.write_atomic(&path, &bytes) } else { self.below.write_quickly(&path, &bytes) }
     }
 
     /// Writes outlines, sorted by index, in one file.
     pub(crate) fn add_all(&self, campaign: &str, outlines: &[Outline]) -> io::Result<()> {
         let (Some(first), Some(last)) = (index_of(outlines.first()), index_of(outlines.last())) else { return Ok(()) };
         let bytes = encode(outlines).map_err(io::Error::other)?;
-        write_atomic(&self.dir.join(format!("{campaign}.{first:09}-{last:09}.outlines")), &bytes)
+        self.below.write_atomic(&self.dir.join(format!("{campaign}.{first:09}-{last:09}.outlines")), &bytes)
     }
 
     /// Puts the single files of a campaign together.
@@ -114,13 +109,13 @@ impl Shelf {
                 if larger.iter().any(|file| file.has(single.first) && indices(&file.path).contains(&single.first)) {
                     continue;
                 }
-                let bytes = fs::read(&single.path)?;
+                let bytes = folder::read(&single.path)?;
                 let read = Opened::new(&bytes).and_then(|opened| opened.outlines()).map_err(io::Error::other)?;
                 outlines.extend(read);
             }
             self.add_all(campaign, &outlines)?;
             for single in singles {
-                fs::remove_file(&single.path)?;
+                self.below.remove(&single.path)?;
             }
         }
         Ok(())
@@ -208,7 +203,7 @@ impl History {
     pub fn count_outlines(dir: &Path) -> u64 {
         let mut count = 0;
         // A file that can't be read is reported when the history is opened.
-        let _ = Shelf::new(Folder::outlines_in(dir)).each_file(None, Needed::Indices, &mut |_, opened, there| {
+        let _ = Shelf::new(dir).each_file(None, Needed::Indices, &mut |_, opened, there| {
             count += opened.indices()?.iter().filter(|index| !there.contains(index)).count() as u64;
             Ok(())
         });
@@ -254,13 +249,13 @@ pub(super) fn read_parts(path: &Path, needed: Needed) -> io::Result<Vec<u8>> {
     let parts = match needed {
         Needed::Indices => 1,
         Needed::Rows => 2,
-        Needed::All => return fs::read(path),
+        Needed::All => return folder::read(path),
     };
-    let mut file = File::open(path)?;
+    let mut file = folder::open(path)?;
     let mut bytes = vec![0; HEADER];
     file.read_exact(&mut bytes)?;
     let size = Opened::size_of_start(&bytes, parts).unwrap_or(HEADER).max(HEADER) - HEADER;
-    io::Read::take(&mut file, size as u64).read_to_end(&mut bytes)?;
+    io::Read::take(&mut file, (size as u64).min(LONGEST)).read_to_end(&mut bytes)?;
     Ok(bytes)
 }
 

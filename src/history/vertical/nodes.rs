@@ -22,6 +22,11 @@ pub(super) struct Nodes {
     pub profile_of: Vec<u32>,
 }
 
+/// Maximum numbers of nodes and statements of a file: limit the memory that a corrupt one can request. A file of this program has
+/// some hundred thousand.
+const MOST_NODES: usize = 1 << 22;
+const MOST_STATEMENTS: usize = 1 << 24;
+
 /// The structure of a run.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub(super) struct Profile {
@@ -58,11 +63,20 @@ impl Nodes {
         if !fits {
             return None;
         }
-        let mut count = 0u32;
+        // A structure takes few bytes and belongs to any number of runs.
+        let shape = |segment: &(u32, u32)| self.shapes.get(segment.1 as usize).map_or(0, Vec::len);
+        let statements = |profile: &Profile| profile.segments.iter().map(shape).fold(0, usize::saturating_add);
+        let sizes: Vec<(usize, usize)> =
+            self.profiles.iter().map(|profile| (profile.names.len(), statements(profile))).collect();
+        let (mut count, mut all) = (0usize, 0usize);
         for profile in &self.profile_of {
-            count = count.checked_add(u32::try_from(self.profiles.get(*profile as usize)?.names.len()).ok()?)?;
+            let (nodes, statements) = sizes.get(*profile as usize)?;
+            (count, all) = (count.checked_add(*nodes)?, all.checked_add(*statements)?);
+            if count > MOST_NODES || all > MOST_STATEMENTS {
+                return None;
+            }
         }
-        Some(count)
+        u32::try_from(count).ok()
     }
 
     /// The subjects of each chosen property, by their numbers in the file, in the order of the statements. `place`: the

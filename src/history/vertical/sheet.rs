@@ -7,6 +7,7 @@ use oxigraph::model::{BlankNode, GraphName, NamedNode, NamedOrBlankNode, Quad, T
 use zstd::stream::read::Decoder;
 use zstd::zstd_safe::DCtx;
 
+use crate::inflate::read_expanded;
 use crate::journal;
 use crate::statements::iri;
 use crate::vertical::column::Column;
@@ -271,7 +272,7 @@ thread_local! {
 fn unpacked(bytes: &[u8]) -> Result<Vec<u8>, String> {
     CONTEXT.with_borrow_mut(|context| {
         let mut unpacked = Vec::with_capacity(bytes.len() * 4);
-        let read = std::io::Read::read_to_end(&mut Decoder::with_context(bytes, context), &mut unpacked);
-        read.map(|_| unpacked).map_err(|error| error.to_string())
+        read_expanded(Decoder::with_context(bytes, context), bytes.len(), &mut unpacked)?;
+        Ok(unpacked)
     })
 }

@@ -17,9 +17,8 @@ use crate::standalone::program::{Closure, Program};
 use crate::standalone::settings::Settings;
 use crate::standalone::statements::DEFAULT_GRAPH;
 use crate::standalone::table::ColumnKind;
-use crate::standalone::unfinished::Unfinished;
 use crate::syntax::{Statement, Syntax, Transfer};
-use actcheck_base::{Diagnostic, Diagnostics, RuleFault, Span, Term, TermId, did_you_mean};
+use actcheck_base::{Below, Diagnostic, Diagnostics, RuleFault, Span, Term, TermId, did_you_mean};
 
 const FORMATS: [&str; 9] = ["csv", "dsv", "tsv", "rdf", "ntriples", "nquads", "turtle", "trig", "rdfxml"];
 const TABLE_OPTIONS: [&str; 5] = ["resource", "format", "delimiter", "compression", "limit"];
@@ -177,17 +176,15 @@ pub(super) struct Written {
 /// # Errors
 /// The reason why the file can't be written, or `stop` was set.
 pub(super) fn write(export: &Export, folder: &Path, closure: &Closure, stop: &AtomicBool) -> Result<Written, String> {
-    let path = folder.join(&export.path);
+    let (path, below) = (folder.join(&export.path), Below::new(folder));
     let lower = |error: std::io::Error| error.to_string().to_lowercase();
-    if let Some(parent) = path.parent() {
-        std::fs::create_dir_all(parent).map_err(lower)?;
-    }
+    below.create_folder(path.parent().unwrap_or(folder)).map_err(lower)?;
     let mut rows: Vec<&[TermId]> = closure.rows_unsorted(&export.predicate).collect();
     rows.sort_unstable_by(|a, b| a.iter().map(|id| closure.term(*id)).cmp(b.iter().map(|id| closure.term(*id))));
     let rows = rows.into_iter().map(|row| row.iter().map(|id| closure.term(*id)).collect::<Vec<&Term>>());
     let rows = rows.map(|row| if stop.load(Ordering::Relaxed) { Err(RuleFault::Interrupted) } else { Ok(row) });
-    let (unfinished, file) = Unfinished::begin(path).map_err(lower)?;
-    let mut packed = Packed::new(file, export.compression);
+    let new = below.new_file(&path).map_err(lower)?;
+    let mut packed = Packed::new(new.writer().map_err(lower)?, export.compression);
     let written = match &export.content {
         Content::Table { delimiter, columns } => {
             let columns = columns.as_deref();
@@ -197,7 +194,7 @@ pub(super) fn write(export: &Export, folder: &Path, closure: &Closure, stop: &At
     };
     let written = written.map_err(lower)?;
     packed.finish().map_err(lower)?;
-    unfinished.keep().map_err(lower)?;
+    new.finish().map_err(lower)?;
     Ok(written)
 }
 

@@ -14,7 +14,6 @@ mod settings;
 mod sink;
 mod statements;
 mod table;
-mod unfinished;
 
 #[cfg(test)]
 mod tests;
