@@ -219,6 +219,7 @@ impl Decision {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use actcheck_base::{Course, Signal, names};
 
     const RULES: &str = "@prefix ex: <http://example.org/> .
         near(?a, ?b) :- after(?a, ex:x, ?x), after(?b, ex:x, ?y), ?a != ?b, ABS(?x - ?y) < 0.5 .
@@ -297,6 +298,34 @@ mod tests {
         for query in ["ASK { FILTER(RAND() < 0.5) }", "SELECT (NOW() AS ?because) { ?s ?p ?o }"] {
             let found = Rules::builder().build("rules.rq", query).expect_err("it varies");
             assert!(found.iter().any(|fault| fault.code == "R064" && fault.place().is_some()), "{found}");
+        }
+    }
+
+    /// The next sample of a quantity, in the ways in which a property may say it: 20 s of five objects at 60 Hz.
+    #[test]
+    fn a_property_may_compare_each_sample_with_the_next() {
+        let mut course = Course::new(1.0 / 60.0, 1200);
+        for object in 0..5 {
+            let values = (0..1200).map(|sample| f64::from(sample) * 0.001 + f64::from(object)).collect();
+            let key = [names::w("z"), format!("http://example.org/o{object}"), String::new()];
+            course.set(key, Signal::Values(values));
+        }
+        let mut facts = Facts::new();
+        facts.set_course(course);
+        let sample = "sample(?o, ?i, ?z) :- course(?o, w:z, ?t, ?z), ?i = INT(ROUND(?t * 60)) .";
+        for (rules, body) in [
+            ("", "course(?o, w:z, ?t, ?a), course(?o, w:z, ?u, ?b), ROUND(?u * 60) = ROUND(?t * 60) + 1"),
+            ("", "course(?o, w:z, ?t, ?a), ROUND(?t * 60) + 1 = ROUND(?u * 60), course(?o, w:z, ?u, ?b)"),
+            ("", "course(?o, w:z, ?t, ?a), course(?o, w:z, ?u, ?b), ?i = ROUND(?t * 60), ?i + 1 = ROUND(?u * 60)"),
+            (sample, "sample(?o, ?i, ?a), ?j = ?i + 1, sample(?o, ?j, ?b)"),
+            (sample, "sample(?o, ?i, ?a), sample(?o, ?j, ?b), ?i = ?j - 1"),
+            (sample, "sample(?o, ?i, ?a), sample(?o, ?i + 1, ?b)"),
+        ] {
+            let count = "steps(?o, #count(?a)) :- step(?o, ?a) . success(?o) :- steps(?o, 1199) .";
+            let text = format!("{rules} step(?o, ?a) :- {body}, ABS(?b - ?a) < 0.002 . {count}");
+            let rules = Rules::builder().budget(Budget { secs: 5.0, ..Budget::default() }).build("rules.rls", &text);
+            let decision = rules.expect("the rules are valid").judge(&facts);
+            assert_eq!((decision.outcome, decision.witness().len()), (Outcome::Passed, 5), "{text}: {decision:?}");
         }
     }
 

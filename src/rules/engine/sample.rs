@@ -6,7 +6,7 @@
 use std::collections::BTreeSet;
 
 use crate::engine::access::{Access, Own};
-use crate::engine::equal::{given, is_assigned, meeting};
+use crate::engine::equal::{given, is_assigned, meeting, settle};
 use crate::engine::evaluate::Layers;
 use crate::engine::join::equal_range;
 use crate::engine::lower::literal_variables;
@@ -153,7 +153,10 @@ impl Sampler<'_, '_, '_> {
             }
         }
         let open = group.iter().copied().filter(|idx| !partial.tested.contains(idx));
-        let meets = !partial.atoms.is_empty() && meeting(self.rule, open, atom, &partial.bound).is_some();
+        // With the assigned variables, which have no values in a sample.
+        let mut known = partial.bound.clone();
+        settle(self.rule, group, &mut known);
+        let meets = !partial.atoms.is_empty() && meeting(self.rule, open, atom, &known).is_some();
         let one_match = !self.reads_new(partial, &next, group);
         if next.search.is_none() && !partial.sample.is_empty() && self.outputs_are_bound(partial, group) {
             next.search = Some(Search::begin(&mut next));

@@ -54,8 +54,9 @@ pub fn run_as(path: &Path, out_dir: &Path, loading: &Loading) -> Result<Summary,
             Diagnostic::error("R073", message).in_source(&source)
         })?;
         if written.left_out > 0 {
-            let message =
-                format!("{} rows of `{}` are not RDF statements, and were left out", written.left_out, export.predicate);
+            let count = written.left_out;
+            let rows = if count == 1 { "1 row was".to_owned() } else { format!("{count} rows were") };
+            let message = format!("{rows} left out of the export of `{}`: not RDF statements", export.predicate);
             let help = "a subject is an IRI or a blank node, and a predicate an IRI";
             summary.warnings.push(Diagnostic::warning("R075", message).in_source(&source).help(help));
         }

@@ -172,7 +172,7 @@ fn exports_are_tables_or_rdf() {
             "R075 <http://e/a> <http://e/p> _:b .\n",
         ),
         ("@export m :- csv{format = (int, string, skip)} .", "m.csv", "1,\"a,b\"\n"),
-        ("@export m :- tsv{format = (skip, skip, double), limit = 2} .", "m.tsv", "2.5\n1.5\n"),
+        ("@export m :- tsv{format = (skip, skip, double), limit = 2} .", "m.tsv", "1.5\n2.5\n"),
         #[cfg(feature = "gzip")]
         (
             "@export m :- csv{compression = \"gzip\", format = (int, any, any), limit = 1} .",
@@ -202,7 +202,7 @@ fn exports_are_tables_or_rdf() {
 fn wrong_exports_are_reported() {
     for (export, code) in [
         ("@export m :- turtle{} . m(1, 2) .", "R071"),
-        ("@export m :- rdf{resource = \"m.txt\"} . m(1, 2, 3) .", "R070"),
+        ("@export m :- rdf{resource = \"m.abc\"} . m(1, 2, 3) .", "R070"),
         ("@export m :- csv{format = (int)} . m(1, 2) .", "R071"),
         ("@export m :- csv{compression = \"zip\"} . m(1, 2) .", "R071"),
         ("@export m :- ntriples{delimiter = \";\"} . m(1, 2, 3) .", "R071"),
