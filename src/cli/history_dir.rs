@@ -3,7 +3,6 @@
 use std::path::{Path, PathBuf};
 
 use crate::options::HistoryArgs;
-use crate::restore;
 use crate::work::all_cores;
 use actcheck_base::{Diagnostic, Diagnostics};
 use actcheck_history::History;
@@ -24,9 +23,7 @@ pub fn open(args: &HistoryArgs) -> Result<History, Diagnostics> {
 /// # Errors
 /// As [`open`].
 pub fn open_with(args: &HistoryArgs, threads: usize) -> Result<History, Diagnostics> {
-    let history = History::open_existing_with(&folder(args)?, threads)?;
-    restore::allow(&history);
-    Ok(history)
+    History::open_existing_with(&folder(args)?, threads)
 }
 
 /// Like [`open`], but the state of this moment for reading: other processes may read and write the history.
@@ -34,9 +31,7 @@ pub fn open_with(args: &HistoryArgs, threads: usize) -> Result<History, Diagnost
 /// # Errors
 /// As [`open`].
 pub fn open_to_read(args: &HistoryArgs) -> Result<History, Diagnostics> {
-    let history = History::open_to_read(&folder(args)?)?;
-    restore::allow(&history);
-    Ok(history)
+    History::open_to_read(&folder(args)?)
 }
 
 /// Returns the folder of the named history, or of the one that is found.
