@@ -16,6 +16,7 @@ mod collisions;
 mod commands;
 mod compare;
 mod config;
+mod consent;
 mod course_faults;
 mod damage;
 mod dataset;

@@ -37,7 +37,7 @@ const FENCES: [(&str, &[&str]); 31] = [
     ("toml", &["config"]),
     ("roxmltree", &["config"]),
     ("mesh-loader", &["config"]),
-    ("shlex", &["config"]),
+    ("shlex", &["base", "config"]),
     ("nix", &["protocol"]),
     ("statrs", &["search", "analysis"]),
     ("oxigraph", &["rules", "history"]),

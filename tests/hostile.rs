@@ -456,7 +456,7 @@ fn a_history_that_expands_a_thousand_times_is_refused() {
         let file = named(&stranger.history().join("outlines"), "s");
         let bytes = std::fs::read(&file).unwrap();
         let size = |part: usize| u32::from_le_bytes(bytes[8 + 8 * part..][..4].try_into().unwrap()) as usize;
-        let (mut written, mut body, mut at) = (bytes[..8].to_vec(), Vec::new(), 8 + 8 * 4 + 4);
+        let (mut written, mut body, mut at) = (bytes[..8].to_vec(), Vec::<u8>::new(), 8 + 8 * 4 + 4);
         for part in 0..4 {
             let own = if part == bombed { zstd.as_slice() } else { &bytes[at..at + size(part)] };
             at += size(part);

@@ -324,13 +324,17 @@ fn tables_are_copied_completely_and_outdated_ones_are_removed() {
     let told = copied(&words);
     assert!(told.contains("2 tables: 2 were copied"), "{told}");
     let first = files(&to);
+    // Readers take each file of the folder for a table, and make a column of `campaign=ID`.
+    assert!(first.keys().all(|name| name.ends_with(".parquet") && name.contains("/campaign=")), "{:?}", first.keys());
+    let list = std::fs::read_to_string(folder.path().join("to.tables.json")).unwrap();
+    assert!(list.contains("\"name\": \"campaign=") && list.contains("\"columns\""), "{list}");
     assert!(copied(&words).contains("2 tables: 0 were copied"));
     assert_eq!(files(&to), first);
     // A copy that was interrupted: a file is missing, another is short, and there is no list yet. Files of others are kept.
     let tables: Vec<&String> = first.keys().filter(|name| name.ends_with(".parquet")).collect();
     std::fs::remove_file(tables[0]).unwrap();
     std::fs::write(tables[1], "short").unwrap();
-    std::fs::remove_file(to.join("tables.json")).unwrap();
+    std::fs::remove_file(folder.path().join("to.tables.json")).unwrap();
     std::fs::write(to.join("notes.txt"), "mine").unwrap();
     assert!(copied(&words).contains("2 were copied"));
     let mut again = files(&to);

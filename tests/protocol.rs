@@ -351,3 +351,92 @@ fn no_process_is_left_after_the_simulator_ends() {
         nothing_is_left(folder.path());
     }
 }
+
+/// Status and reason of each run of a program with a fault after its actions.
+fn ends_after(kind: &str, of_seeds: bool, tests: &str, jobs: &str) -> Vec<(String, String)> {
+    let seeds = if of_seeds { ", AFTER_SEED = \"1\"" } else { "" };
+    let folder = project("after.py", tests, 6, &format!("max_broken = 100\nenv = {{ AFTER = \"{kind}\"{seeds} }}"));
+    let (_, json, _) = run(folder.path(), &["--jobs", jobs]);
+    nothing_is_left(folder.path());
+    runs(&json).iter().map(|run| (of(run, "status").to_owned(), of(run, "reason").to_owned())).collect()
+}
+
+/// The death of a program after its action was charged to the next run of the same worker: with one worker every second run
+/// was broken, with six none. A second `end` was sometimes a fault, and sometimes the end of the next action.
+#[test]
+fn a_fault_after_an_action_breaks_the_run_of_that_action() {
+    let exits = "it exited with code 0";
+    let talks = "it sent more than one message at a time: it has to wait for each answer";
+    for (kind, reason) in
+        [("exit", exits), ("late exit", exits), ("second end", talks), ("late message", talks), ("command", talks)]
+    {
+        for tests in ["[[\"Pick\"]]", "[[\"Pick\", \"Pick\"]]"] {
+            for jobs in ["1", "6"] {
+                let ends = ends_after(kind, false, tests, jobs);
+                assert_eq!(ends.len(), 6);
+                let is_right = |(status, said): &(String, String)| status == "broken" && said.contains(reason);
+                // A second message may be taken for the first of the next action.
+                let is_broken = |(status, _): &(String, String)| status == "broken";
+                let alone = tests.matches("Pick").count() == 1;
+                assert!(ends.iter().all(|end| is_right(end) || (!alone && is_broken(end))), "{kind}, {jobs}: {ends:?}");
+            }
+        }
+    }
+    let [one, six] = ["1", "6"].map(|jobs| ends_after("exit", true, "[[\"Pick\"]]", jobs));
+    assert_eq!(one, six);
+    let broken = one.iter().filter(|(status, _)| status == "broken").count();
+    assert!((1..6).contains(&broken), "{one:?}");
+}
+
+/// A program that is gone between two runs belongs to none: a new one is started.
+#[test]
+fn a_program_that_ends_between_runs_breaks_none() {
+    for jobs in ["1", "3"] {
+        let ends = ends_after("exit when ready", false, "[[\"Pick\"]]", jobs);
+        assert!(ends.len() == 6 && ends.iter().all(|(status, _)| status == "completed"), "{jobs}: {ends:?}");
+    }
+}
+
+/// A skill that answers slowly went on for hours after the time of its campaign.
+#[test]
+fn the_time_of_a_campaign_ends_a_slow_skill() {
+    let folder = project("after.py", "[[\"Pick\"]]", 3, "timeout_s = 600.0");
+    let slow = "import time, wire\ndef perform(link, begin):\n    while True:\n        time.sleep(2)\n        \
+                if link.ask({'type': 'command', 'ticks': 1})['type'] == 'abort':\n            return None\nwire.serve(perform)\n";
+    std::fs::write(folder.path().join("after.py"), slow).unwrap();
+    let began = std::time::Instant::now();
+    let run = actcheck(folder.path(), &["run", "c.toml", "--time", "3s", "--jobs", "1"]);
+    let took = began.elapsed().as_secs_f64();
+    assert!((3.0..60.0).contains(&took), "{took} s: {}", stderr(&run));
+    assert_eq!(run.status.code(), Some(2), "no run could be judged: {}", stderr(&run));
+    nothing_is_left(folder.path());
+}
+
+/// A process that a program started in a session of its own, without its environment, stayed for ever.
+#[test]
+fn a_process_without_the_environment_ends_with_its_program() {
+    let folder = project("after.py", "[[\"Pick\"]]", 2, "");
+    let skill = "import os, subprocess, wire\ndef perform(link, begin):\n    \
+                 subprocess.Popen(['env', '-i', '/usr/bin/setsid', '/bin/sleep', '600'])\n    \
+                 return {'type': 'end', 'succeeded': True, 'message': ''}\nwire.serve(perform)\n";
+    std::fs::write(folder.path().join("after.py"), skill).unwrap();
+    let (_, json, complaints) = run(folder.path(), &["--jobs", "1"]);
+    assert_eq!(runs(&json).len(), 2, "{complaints}");
+    nothing_is_left(folder.path());
+}
+
+/// The path of a socket has at most 107 bytes.
+#[test]
+fn a_long_path_of_temporary_files_breaks_no_run() {
+    let folder = project("after.py", "[[\"Pick\"]]", 1, "env = { AFTER = \"\" }");
+    let long = folder.path().join("a".repeat(90));
+    std::fs::create_dir(&long).unwrap();
+    let output = Command::new(env!("CARGO_BIN_EXE_actcheck"))
+        .args(["run", "c.toml", "--format", "json"])
+        .current_dir(folder.path())
+        .env("TMPDIR", &long)
+        .output()
+        .unwrap();
+    let json: Value = serde_json::from_str(&stdout(&output)).unwrap_or_else(|_| panic!("{}", stderr(&output)));
+    assert_eq!(of(&runs(&json)[0], "status"), "completed", "{json:#}");
+}

@@ -379,3 +379,81 @@ fn a_file_with_thousands_of_faults_reports_the_first() {
     let found: Diagnostics = config::load_text(source, folder.path(), &Overrides::default()).map(drop).unwrap_err();
     assert!(found.has_errors() && found.iter().count() <= 410, "{}", found.iter().count());
 }
+
+/// `ontology = "/etc/passwd"` printed the lines of that file into the log of a build server.
+#[test]
+fn the_text_of_files_outside_of_the_project_is_not_printed() {
+    let folder = tempfile::tempdir().unwrap();
+    let project = folder.path().join("project");
+    std::fs::create_dir_all(project.join("rules")).unwrap();
+    let secret = folder.path().join("secret");
+    std::fs::write(&secret, "user:correct horse battery staple:0\npassword = correct-horse\n\"correct horse\n")
+        .unwrap();
+    std::os::unix::fs::symlink("../secret", project.join("link.ttl")).unwrap();
+    std::fs::copy(&secret, folder.path().join("secret.toml")).unwrap();
+    std::fs::copy(&secret, folder.path().join("secret.rls")).unwrap();
+    for (key, path) in [
+        ("ontology", secret.display().to_string()),
+        ("ontology", "../secret".to_owned()),
+        ("ontology", "link.ttl".to_owned()),
+        ("[scene]\nrequire", "../secret.rls".to_owned()),
+        ("[robot]\nprofile", "../secret.toml".to_owned()),
+    ] {
+        let text = format!("tests = [[\"Pick\"]]\ntest_count = 1\n{key} = \"{path}\"\n");
+        std::fs::write(project.join("c.toml"), text).unwrap();
+        for (at, config) in [(project.as_path(), "c.toml"), (folder.path(), "project/c.toml")] {
+            let said = refused(at, &["check", config]);
+            assert!(!said.contains("horse"), "{key} = {path}: {said}");
+            assert!(said.contains("secret") || said.contains("link.ttl"), "the file is named: {said}");
+        }
+    }
+    // Excerpts of the project's own files are printed.
+    std::fs::copy(&secret, project.join("own.ttl")).unwrap();
+    std::fs::write(project.join("c.toml"), "ontology = \"own.ttl\"\ntests = [[\"Pick\"]]\ntest_count = 1\n").unwrap();
+    assert!(refused(&project, &["check", "c.toml"]).contains("horse"));
+}
+
+/// With few open files, an intact history was reported as damaged.
+#[test]
+fn too_many_open_files_are_not_damage() {
+    let folder = tempfile::tempdir().unwrap();
+    {
+        let history = History::open(&folder.path().join("h")).unwrap();
+        history.begin_campaign(&sample_campaign("k", 1)).unwrap();
+        (0..20).for_each(|index| history.commit(&sample_run("k", index)).unwrap());
+    }
+    let mut seen = 0;
+    for limit in [12, 16, 20, 24, 32, 48, 64, 96] {
+        for command in ["list --history h", "analyse --history h", "health --integrity --history h"] {
+            let line = format!("ulimit -n {limit}; exec '{}' {command}", env!("CARGO_BIN_EXE_actcheck"));
+            let output = Command::new("sh").args(["-c", &line]).current_dir(folder.path()).output().unwrap();
+            let said = stderr(&output);
+            assert!(
+                !said.contains("H007") && !said.contains("damage") && !said.contains("panicked"),
+                "{limit} {command}: {said}"
+            );
+            seen += usize::from(said.contains("too many files are open"));
+        }
+    }
+    assert!(seen > 0, "a limit was low enough");
+    assert!(!folder.path().join("h/damaged").exists());
+}
+
+/// Values with control characters reached a terminal through a pipe, such as that of `less -R`.
+#[test]
+fn tables_for_people_have_no_control_characters_in_pipes() {
+    let folder = tempfile::tempdir().unwrap();
+    {
+        let history = History::open(&folder.path().join("h")).unwrap();
+        let mut campaign = sample_campaign("k", 1);
+        campaign.name = "\u{1b}]0;title\u{7}\u{1b}[2Jname\u{202e}".to_owned();
+        history.begin_campaign(&campaign).unwrap();
+        history.commit(&sample_run("k", 0)).unwrap();
+    }
+    let ask = ["query", "SELECT ?c ?name { ?c a act:Campaign ; rdfs:label ?name }", "--history", "h"];
+    let text = stdout(&actcheck(folder.path(), &ask));
+    assert!(text.contains("name") && !text.contains(['\u{1b}', '\u{7}', '\u{202e}']), "{text:?}");
+    let json = stdout(&actcheck(folder.path(), &[&ask[..], &["--format", "json"]].concat()));
+    let json: serde_json::Value = serde_json::from_str(&json).unwrap();
+    assert_eq!(json[0]["name"], "\u{1b}]0;title\u{7}\u{1b}[2Jname\u{202e}");
+}

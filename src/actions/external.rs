@@ -21,6 +21,13 @@ pub trait ExternalSkill {
     /// # Errors
     /// [`Interrupt`] if the action has to end, possibly because of the external skill.
     fn perform(&mut self, call: &ActionCall, robot: &mut Operator<'_>) -> Result<ActionReport, Interrupt>;
+
+    /// Ends the run: checks that the skill is ready for another one, so that its faults after the last action belong to this
+    /// run. `is_decided`: the run ended for another reason, so that such a fault is no longer reported.
+    ///
+    /// # Errors
+    /// Returns an error if the skill is not ready.
+    fn end_run(&mut self, is_decided: bool) -> Result<(), ExternalFault>;
 }
 
 /// A fault of an external skill.

@@ -56,6 +56,8 @@ pub fn perform_with(
     let mut actions: Vec<ActionTrace> = Vec::with_capacity(calls.len());
     let mut robot_courses = Vec::with_capacity(calls.len());
     let mut begun = interference.external.as_deref_mut().map_or(Ok(()), |skill| skill.begin_run(world));
+    // The last action that the external skill performed.
+    let mut last_external = None;
     for call in calls {
         let stopped = actions.last().is_some_and(|last| !last.end.lets_run_go_on());
         if stopped {
@@ -68,11 +70,22 @@ pub fn perform_with(
         let (action, course) = match (std::mem::replace(&mut begun, Ok(())), refused) {
             (Err(fault), _) => (never_begun(call, ended_by(fault)), RobotCourse::default()),
             (Ok(()), Some(reason)) => (never_begun(call, ActionEnd::NotPerformed(reason)), RobotCourse::default()),
-            (Ok(()), None) => perform_one(call, (world, choices, &mut memory), budget, &mut interference),
+            (Ok(()), None) => {
+                if interference.external.as_deref().is_some_and(|skill| skill.performs(&call.action)) {
+                    last_external = Some(actions.len());
+                }
+                perform_one(call, (world, choices, &mut memory), budget, &mut interference)
+            }
         };
         actions.push(action);
         robot_courses.push(course);
         snapshots.push(world.snapshot());
+    }
+    if let (Some(skill), Some(last)) = (interference.external.as_deref_mut(), last_external) {
+        let is_decided = actions.last().is_some_and(|last| !last.end.lets_run_go_on());
+        if let Err(fault) = skill.end_run(is_decided) {
+            (actions[last].end, actions[last].report) = (ended_by(fault), None);
+        }
     }
     let tracks = world.tracks();
     let frames = Frames { period_secs: tracks.period_secs, names: tracks.names, rows: tracks.rows };

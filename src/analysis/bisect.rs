@@ -90,13 +90,13 @@ pub fn like_by_outcomes(flips: &[OutcomeFlip], version: &[ComparedRun]) -> Liken
 /// Decides by rates, in the lines in which the second end is worse than the first.
 ///
 /// A version is like the second end if it is worse than the first end in one of them. It is like the first if, in each of
-/// them, it is better than the second end, or not different from the first. See [`ComparedLine::answer`] for the level and
+/// them, it is better than the second end, or not different from the first. See [`Comparison::answer_of`] for the level and
 /// the margin.
 pub fn like_by_rates(ends: [&[ComparedRun]; 2], version: &[ComparedRun], level: f64, margin: f64) -> Likeness {
     let [first, second] = ends;
     let wanted: BTreeSet<Compared> = worse_lines(&compare(first, second, Sampling::Fixed), level, margin);
     let answers = |comparison: &Comparison| -> BTreeMap<Compared, Answer> {
-        comparison.lines.iter().map(|line| (line.of.clone(), line.answer(level, margin))).collect()
+        comparison.lines.iter().map(|line| (line.of.clone(), comparison.answer_of(line, level, margin))).collect()
     };
     let [from_first, from_second] = [first, second].map(|end| answers(&compare(end, version, Sampling::Fixed)));
     if wanted.iter().any(|of| from_first.get(of) == Some(&Answer::Worse)) {
@@ -111,7 +111,7 @@ pub fn like_by_rates(ends: [&[ComparedRun]; 2], version: &[ComparedRun], level: 
 
 /// The subjects in which the second side of a comparison is worse.
 fn worse_lines(comparison: &Comparison, level: f64, margin: f64) -> BTreeSet<Compared> {
-    let worse = |line: &&ComparedLine| line.answer(level, margin) == Answer::Worse;
+    let worse = |line: &&ComparedLine| comparison.answer_of(line, level, margin) == Answer::Worse;
     comparison.lines.iter().filter(worse).map(|line| line.of.clone()).collect()
 }
 

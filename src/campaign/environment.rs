@@ -1,6 +1,6 @@
 //! Prepares and checks everything that a campaign needs before its first run.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use crate::budget::runs_per_test;
@@ -10,7 +10,7 @@ use crate::solids;
 use actcheck_actions as actions;
 use actcheck_base::{Diagnostic, Diagnostics, Source, program_digest};
 use actcheck_config as config;
-use actcheck_config::{Campaign, Launcher, Overrides, Step};
+use actcheck_config::{Campaign, Launcher, Overrides, Starts, Step};
 use actcheck_data::{Choice, ChoiceName, RobotView};
 use actcheck_history::{CampaignRecord, FindingRecord, History, SkillRecord};
 use actcheck_ontology as ontology;
@@ -76,9 +76,8 @@ impl Env {
         let loaded = match config {
             Some(config) => config::load(config, &overrides),
             None => {
-                let path = config::resolve_path(history.dir(), &record.config_path);
-                let source = Source::new(path.display().to_string(), record.config_text.as_str());
-                config::load_text(source, path.parent().unwrap_or(Path::new("")), &overrides).map_err(|mut faults| {
+                let (source, folder) = stored_configuration(history, &record);
+                config::load_text(source, &folder, &overrides).map_err(|mut faults| {
                     let message = format!("this is the configuration of campaign {campaign} as stored in the history");
                     faults.push(
                         Diagnostic::warning("H015", message)
@@ -91,6 +90,17 @@ impl Env {
         let mut loaded = loaded?;
         loaded.test_count = Self::scenes_of_a_test(&loaded, &record);
         Ok((Self::of(loaded, Budget::default())?, record))
+    }
+
+    /// Returns the programs that a campaign of the history starts if it is prepared and run again as
+    /// [`Env::from_history`] does.
+    ///
+    /// # Errors
+    /// `H014` if the history has no such campaign.
+    pub fn starts_from_history(history: &History, campaign: &str) -> Result<Starts, Diagnostics> {
+        let record = history.campaign(campaign)?;
+        let (source, folder) = stored_configuration(history, &record);
+        Ok(config::starts(&source, &folder))
     }
 
     /// Prepares a campaign from a configuration's text instead of a file. Its paths are relative to `folder`.
@@ -260,6 +270,13 @@ impl Env {
     pub(super) fn runs_of_a_test(&self) -> u64 {
         u64::from(self.campaign.test_count) * u64::from(self.campaign.repeat)
     }
+}
+
+/// The configuration of a campaign as the history keeps it, and the folder to which its paths are relative.
+fn stored_configuration(history: &History, record: &CampaignRecord) -> (Source, PathBuf) {
+    let path = config::resolve_path(history.dir(), &record.config_path);
+    let source = Source::new(path.display().to_string(), record.config_text.as_str());
+    (source, path.parent().unwrap_or(Path::new("")).to_owned())
 }
 
 /// The command-line overrides with which a campaign of a history began, except the number of runs.

@@ -2,7 +2,9 @@
 
 use crate::attempt::{Attempt, AttemptFault, time_limit};
 use crate::finished_run::{FinishedRun, RunPlace};
+use crate::replay::cut_secs;
 use crate::{Env, Failure, Planned, RunContext, RunResult};
+use actcheck_actions::Cut;
 use actcheck_base::{Diagnostic, Diagnostics, Outcome};
 use actcheck_history::{Entry, RunRecord, RunStatus};
 
@@ -34,13 +36,22 @@ pub(super) enum Making {
 /// can be built.
 pub(super) fn make_run(env: &Env, campaign: &str, began_secs: f64, planned: Planned, context: &RunContext) -> Making {
     let (mut discards, mut n_overlaps) = (Vec::new(), 0);
+    let last_secs = env.campaign.limits.time_secs.map(|limit| began_secs + limit + overtime_secs(limit));
     for number in 0..SCENES_PER_RUN {
         let choices = || planned.choices(env.campaign.seed, number);
-        let cut = time_limit(env, context);
+        let own = time_limit(env, context);
+        let (cut, ends_campaign) = match (own, last_secs) {
+            (Cut::Clock { at_secs, .. }, Some(last_secs)) if at_secs <= last_secs => (own, false),
+            (_, Some(at_secs)) => (Cut::Clock { secs: context.clock.secs, at_secs }, true),
+            (_, None) => (own, false),
+        };
         let attempt = Attempt { campaign, index: planned.index, choices: &choices, cut };
         match attempt.make(env, context) {
             Ok(run) => {
                 let record = record(run, campaign, &planned, discards, (context.clock.secs)() - began_secs);
+                if ends_campaign && cut_secs(&record.trace).is_some() {
+                    return Making::Interrupted;
+                }
                 return match entry(env, &record) {
                     Ok(entry) => Making::Run(Box::new(MadeRun { record, entry })),
                     Err(faults) => Making::Impossible(faults),
@@ -62,6 +73,12 @@ pub(super) fn make_run(env: &Env, campaign: &str, began_secs: f64, planned: Plan
         SCENES_PER_RUN => env.overlaps_at_start(last, SCENES_PER_RUN).into(),
         _ => no_scene(env, &planned, last).into(),
     })
+}
+
+/// Time for the runs in flight when the time of a campaign is up: usually they end by themselves, so that slow ones count as
+/// others do. After it they are given up: a skill may go on for hours. Unit: seconds.
+fn overtime_secs(limit: f64) -> f64 {
+    (limit / 2.0).clamp(10.0, 60.0)
 }
 
 /// The record of a run, with repetition and weight from its plan. Only the first run of a scene has the discards.

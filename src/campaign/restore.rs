@@ -7,38 +7,40 @@ use crate::attempt::Attempt;
 use crate::replay::{cut_secs, rerun};
 use crate::{Env, RunContext, StoredCampaign};
 use actcheck_actions::Cut;
-use actcheck_base::{Diagnostic, Diagnostics};
+use actcheck_base::Diagnostic;
+use actcheck_config::Starts;
 use actcheck_data::Choices;
-use actcheck_history::{CampaignRecord, History, Restore};
+use actcheck_history::Restore;
 
-/// Decides whether a campaign of a history may be simulated again: it may start a program.
-pub type MayRun = dyn Fn(&Env, &History, &CampaignRecord) -> Result<(), Diagnostics> + Send + Sync;
+/// Decides whether runs of a campaign, by its id, may be simulated again with the programs that this starts.
+pub type MayRun = dyn Fn(&str, &Starts) -> bool + Send + Sync;
 
-/// Returns the function that simulates runs again for [`History::restore_with`]. `on_start` is called with the id of each
-/// run before.
+/// Returns the function that simulates runs again for [`History::restore_with`]. `may_run` is asked once for each campaign;
+/// `on_start` is called with the id of each run before.
 pub fn restorer(
     context: RunContext,
     may_run: Box<MayRun>,
     on_start: impl Fn(&str) + Send + Sync + 'static,
 ) -> Box<Restore> {
     // Preparing a campaign takes longer than a run.
-    let known: Mutex<BTreeMap<String, Arc<StoredCampaign>>> = Mutex::default();
+    let known: Mutex<BTreeMap<String, Option<Arc<StoredCampaign>>>> = Mutex::default();
     Box::new(move |history, run| {
         let detail = history.run(run)?;
         let (choices, was) = history.recorded(run)?;
         let campaign = {
             let mut known = known.lock().unwrap_or_else(PoisonError::into_inner);
             match known.get(&detail.row.campaign) {
-                Some(campaign) => Arc::clone(campaign),
+                Some(campaign) => campaign.clone(),
                 None => {
-                    let (env, record) = Env::from_history(history, &detail.row.campaign, None)?;
-                    may_run(&env, history, &record)?;
-                    let campaign = Arc::new((env, record));
-                    known.insert(detail.row.campaign.clone(), Arc::clone(&campaign));
+                    let id = &detail.row.campaign;
+                    let may = may_run(id, &Env::starts_from_history(history, id)?);
+                    let campaign = if may { Some(Arc::new(Env::from_history(history, id, None)?)) } else { None };
+                    known.insert(id.clone(), campaign.clone());
                     campaign
                 }
             }
         };
+        let Some(campaign) = campaign else { return Ok(None) };
         on_start(run);
         let (env, record) = &*campaign;
         let index = env.index_of(&detail.row.test, &choices)?;
@@ -47,6 +49,6 @@ pub fn restorer(
         let attempt = Attempt { campaign: &record.id, index, choices: &|| Choices::recorded(&choices), cut };
         let made = rerun(env, &attempt, &context)
             .map_err(|why| Diagnostic::error("H031", format!("run {run} can't be simulated again: {why}")))?;
-        Ok((made.choices, made.trace))
+        Ok(Some((made.choices, made.trace)))
     })
 }

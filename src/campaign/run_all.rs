@@ -50,7 +50,7 @@ struct Made {
 ///
 /// Runs are stored in the order of the schedule, whatever the number of workers: the history always has a prefix of the
 /// schedule. Budgets count the runs in the same order, and runs beyond a budget are discarded. `stop`, or the
-/// campaign's time limit, ends it after the runs in flight. If `stop` is also the stop flag of the environment's rule
+/// campaign's time limit, ends it after the runs in flight, which have at most a minute then. If `stop` is also the stop flag of the environment's rule
 /// budget, long rule evaluations are interrupted too. `on_run` is called only for runs that are in the history.
 pub fn run_all(
     env: &Env,

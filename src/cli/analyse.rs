@@ -13,7 +13,7 @@ use actcheck_analysis::{
     Column, Hierarchy, JudgedProperty, Mirror, OutcomeTable, PatternOptions, RATE_COLUMNS, TableFilter, cascades,
     collisions, columns, finding_columns, flaky_scenes, judged, property_findings, table_failure_modes, trend, two_way,
 };
-use actcheck_base::{Diagnostic, Diagnostics, did_you_mean};
+use actcheck_base::{Diagnostic, Diagnostics, ShellLine, did_you_mean};
 use actcheck_history::History;
 use actcheck_ontology::Ontology;
 use actcheck_report::{
@@ -139,9 +139,9 @@ pub(super) struct Question<'a> {
 
 impl Question<'_> {
     /// The options that choose runs and the depth of patterns, as they were typed.
-    fn typed(&self) -> String {
-        let depth = if self.depth < MOST_CONDITIONS { format!(" --depth {}", self.depth) } else { String::new() };
-        self.chosen.typed() + &depth
+    fn typed(&self) -> ShellLine {
+        let typed = self.chosen.typed();
+        if self.depth < MOST_CONDITIONS { typed.option("--depth", self.depth.to_string()) } else { typed }
     }
 }
 
@@ -180,7 +180,7 @@ pub(super) fn analysed(
     let summary = FindingsSummary {
         history: history.dir().display().to_string(),
         program: std::env::args().next().unwrap_or_else(|| "actcheck".to_owned()),
-        options: asked.typed(),
+        options: asked.typed().to_string(),
         campaigns: table.text("campaign").texts.clone(),
         runs: table.text("run").texts.len() as u64,
         sampling,

@@ -9,7 +9,7 @@ use clap::Args;
 use crate::options::HistoryArgs;
 use crate::{history_dir, when, why};
 use actcheck_analysis::{Hierarchy, Sampling, TableFilter};
-use actcheck_base::{Diagnostic, Diagnostics, did_you_mean, names};
+use actcheck_base::{Diagnostic, Diagnostics, ShellLine, did_you_mean, names};
 use actcheck_history::History;
 use actcheck_ontology as ontology;
 use actcheck_ontology::Ontology;
@@ -68,14 +68,12 @@ impl ChosenRuns {
     }
 
     /// The options that choose the runs, as they were typed.
-    pub(super) fn typed(&self) -> String {
-        let mut typed = String::new();
-        let mut add = |name: &str, value: String| typed.push_str(&format!(" --{name} {value}"));
-        self.campaign.iter().for_each(|id| add("campaign", id.clone()));
-        self.since.iter().for_each(|since| add("since", since.clone()));
-        self.ontology.iter().for_each(|file| add("ontology", file.display().to_string()));
-        self.history.history.iter().for_each(|folder| add("history", folder.display().to_string()));
-        typed
+    pub(super) fn typed(&self) -> ShellLine {
+        let Self { campaign, since, ontology, history: HistoryArgs { history } } = self;
+        let typed = campaign.iter().fold(ShellLine::default(), |typed, id| typed.option("--campaign", id));
+        let typed = since.iter().fold(typed, |typed, since| typed.option("--since", since));
+        let typed = ontology.iter().fold(typed, |typed, file| typed.option("--ontology", file));
+        history.iter().fold(typed, |typed, folder| typed.option("--history", folder))
     }
 }
 

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use actcheck_base::{Diagnostic, Files};
+use actcheck_base::{Diagnostic, Files, ShellLine};
 use actcheck_config::Table;
 
 /// Names beyond this number are counted instead of listed.
@@ -32,7 +32,9 @@ pub(super) fn none_given(command: &str) -> Diagnostic {
         None => format!(
             "this folder has none: `actcheck new campaign` writes pick.toml; then `actcheck {command} pick.toml`"
         ),
-        Some(first) => format!("write `actcheck {command} {}`{}", first.display(), others(&here, first)),
+        Some(first) => {
+            format!("write `actcheck {command} {}`{}", ShellLine::default().file(first), others(&here, first))
+        }
     };
     Diagnostic::error("X014", format!("`actcheck {command}` needs a configuration")).help(help)
 }

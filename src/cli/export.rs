@@ -7,9 +7,10 @@ use clap::{ArgGroup, Args};
 use crate::chosen::{self, ChosenRuns};
 use crate::export_sparql::{self, SparqlArgs};
 use crate::export_tables;
-use crate::{output, output_file};
+use crate::trust::TrustArgs;
+use crate::{output, output_file, restore, trust};
 use actcheck_analysis::{Dataset, DatasetRuns, Mirror, export_csv, export_dataset, export_facts, export_parquet};
-use actcheck_base::{Diagnostic, Diagnostics};
+use actcheck_base::{Diagnostic, Diagnostics, ShellLine};
 use actcheck_campaign as campaign;
 use actcheck_campaign::Env;
 use actcheck_history::History;
@@ -38,8 +39,8 @@ pub struct ExportArgs {
     #[arg(long, value_name = "DIR")]
     pub parquet: Option<PathBuf>,
     /// Copy the table of all outcomes, in many files by campaign, into this folder, or into a bucket of an object storage with the
-    /// interface of S3 (s3://BUCKET/PREFIX, in builds with `--features object-storage`): `campaign=ID/….parquet`, and
-    /// `tables.json`, which lists them and describes the columns. Files that are there already are skipped, so the same
+    /// interface of S3 (s3://BUCKET/PREFIX, in builds with `--features object-storage`): `campaign=ID/….parquet`, which
+    /// pandas, polars and DuckDB read as one table, and beside it DIR.tables.json, which lists them and describes the columns. Files that are there already are skipped, so the same
     /// command continues an interrupted copy and brings an earlier one up to date. Each history needs a folder of its own.
     /// Settings: AWS_ACCESS_KEY_ID, AWS_SECRET_ACCESS_KEY, AWS_SESSION_TOKEN, AWS_REGION, AWS_ENDPOINT_URL
     #[arg(long, value_name = "DIR|URL")]
@@ -77,11 +78,15 @@ pub struct ExportArgs {
     /// The runs in the tables, and their history.
     #[command(flatten)]
     pub chosen: ChosenRuns,
+    /// The consent to start programs.
+    #[command(flatten)]
+    pub trust: TrustArgs,
 }
 
 /// Writes a stored run as a configuration, or the history as tables or RDF, or sends it to a store. Returns the exit code.
 pub fn export(args: &ExportArgs) -> Result<u8, Diagnostics> {
     let history = args.chosen.open()?;
+    restore::allow(&history, args.trust.trust);
     if let Some(run) = &args.run {
         export_run(args, &history, run)?;
     }
@@ -152,6 +157,9 @@ fn print_dataset(dataset: &Dataset) {
         "{} describes the columns of these tables of {runs} runs\n",
         dataset.schema.display()
     ));
+    if dataset.withheld > 0 {
+        output::print_prose(&format!("{} of {runs} runs have no rows in the tables of motion\n", dataset.withheld));
+    }
     if dataset.without_course > 0 {
         let note = Diagnostic::warning(
             "X054",
@@ -164,6 +172,9 @@ fn print_dataset(dataset: &Dataset) {
 /// Writes a stored run as a configuration.
 fn export_run(args: &ExportArgs, history: &History, run: &str) -> Result<(), Diagnostics> {
     let run = history.run(run)?;
+    if args.config.is_none() && !args.trust.trust {
+        trust::check_expansion(&run.row.campaign, &Env::starts_from_history(history, &run.row.campaign)?)?;
+    }
     let recalled = Env::from_history(history, &run.row.campaign, args.config.as_deref())?;
     let file = match &args.output {
         Some(file) => file.clone(),
@@ -181,8 +192,8 @@ fn export_run(args: &ExportArgs, history: &History, run: &str) -> Result<(), Dia
         return Ok(());
     }
     if args.output.is_some() { output_file::write(&file, text) } else { output_file::write_in_project(&file, text) }?;
-    let shown = file.display();
-    output::print_prose(&format!("{shown} holds run {}: actcheck run {shown}\n", run.row.run));
+    let again = ShellLine::default().fixed("actcheck run").file(&file);
+    output::print_prose(&format!("{} holds run {}: {again}\n", file.display(), run.row.run));
     Ok(())
 }
 

@@ -115,4 +115,30 @@ mod tests {
         }
         assert!(rest.contains("\nOptions:\n") && rest.contains("Example:"), "{help}");
     }
+
+    /// The page has a row for each command, hidden ones included, and for no others.
+    #[test]
+    fn the_page_about_strangers_lists_every_command_once() {
+        let file = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/strangers.md");
+        let page = std::fs::read_to_string(&file).expect("the page can be read");
+        let rows = page.lines().filter_map(|line| line.strip_prefix("| `")?.split_once("` |"));
+        let mut listed: Vec<String> = rows.map(|(name, _)| name.to_owned()).collect();
+        let mut all: Vec<String> =
+            Arguments::command().get_subcommands().map(|command| command.get_name().to_owned()).collect();
+        listed.sort();
+        all.sort();
+        assert_eq!(listed, all);
+    }
+
+    /// A command that takes the option is one that the page names with it.
+    #[test]
+    fn commands_with_consent_are_those_of_the_page_about_strangers() {
+        let page = include_str!("../../docs/strangers.md");
+        for command in Arguments::command().get_subcommands() {
+            let row = page.lines().find(|line| line.starts_with(&format!("| `{}` |", command.get_name())));
+            let has_option = command.get_arguments().any(|argument| argument.get_long() == Some("trust"));
+            let is_named = row.is_some_and(|row| row.contains("`--trust`") || row.contains("| as `"));
+            assert!(!has_option || is_named, "{}", command.get_name());
+        }
+    }
 }

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use crate::options::HistoryArgs;
 use crate::work::all_cores;
-use crate::{output, restore};
+use crate::output;
 use actcheck_base::{Below, Diagnostic, Diagnostics};
 use actcheck_config as config;
 use actcheck_history::History;
@@ -25,8 +25,7 @@ pub fn open(args: &HistoryArgs) -> Result<History, Diagnostics> {
 /// # Errors
 /// As [`open`].
 pub fn open_with(args: &HistoryArgs, threads: usize) -> Result<History, Diagnostics> {
-    let history = History::open_existing_with(&folder(args)?, threads)?;
-    allowed(history)
+    warned(History::open_existing_with(&folder(args)?, threads)?)
 }
 
 /// Like [`open`], but the state of this moment for reading: other processes may read and write the history.
@@ -34,16 +33,14 @@ pub fn open_with(args: &HistoryArgs, threads: usize) -> Result<History, Diagnost
 /// # Errors
 /// As [`open`].
 pub fn open_to_read(args: &HistoryArgs) -> Result<History, Diagnostics> {
-    let history = History::open_to_read(&folder(args)?)?;
-    allowed(history)
+    warned(History::open_to_read(&folder(args)?)?)
 }
 
 /// An open history, after warnings about its journal.
-fn allowed(history: History) -> Result<History, Diagnostics> {
+fn warned(history: History) -> Result<History, Diagnostics> {
     if let Some(warning) = history.journal_warning()? {
         output::print_diagnostics(&warning.into());
     }
-    restore::allow(&history);
     Ok(history)
 }
 

@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 use crate::options::{Format, HistoryArgs};
 use crate::{history_dir, output};
 use actcheck_analysis::Mirror;
-use actcheck_base::{Diagnostic, Diagnostics};
+use actcheck_base::{Diagnostic, Diagnostics, ShellLine};
 use actcheck_history::{Damage, History, Integrity};
 use actcheck_report::Table;
 
@@ -53,9 +53,9 @@ fn fault(found: &Integrity, mirror: usize, dir: &Path) -> Diagnostic {
     let parts = if parts == 1 { "a part is".to_owned() } else { format!("{parts} parts are") };
     Diagnostic::error("H007", format!("the history `{}` is damaged: {parts} not as written", dir.display())).help(
         format!(
-            "restore the files from a backup; or `actcheck merge --salvage {} --into NEW` copies all readable data, and \
-         `actcheck run --resume ID --history NEW` makes the lost runs again",
-            dir.display()
+            "restore the files from a backup; or `{}` copies all readable data, and \
+             `actcheck run --resume ID --history NEW` makes the lost runs again",
+            ShellLine::default().fixed("actcheck merge --salvage").file(dir).fixed("--into NEW")
         ),
     )
 }

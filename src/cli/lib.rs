@@ -43,6 +43,7 @@ mod new_robot;
 mod options;
 mod output;
 mod output_file;
+mod own_files;
 mod picture;
 mod progress;
 mod query;

@@ -2,6 +2,7 @@
 
 use crate::run_args::Verbosity;
 use crate::terminal;
+use actcheck_base::ShellLine;
 use actcheck_campaign::Env;
 use actcheck_report::{FailureLines, Page, RunSummary};
 
@@ -53,15 +54,15 @@ impl<'a> LiveFailures<'a> {
         let all = self.verbosity == Verbosity::Verbose;
         let Self { program, history, campaign, .. } = &*self;
         if self.failures == MOST_SHOWN + 1 && !all {
-            let failed = if self.all_failed { " --failed" } else { "" };
-            let list = format!("{program} list{failed} --campaign {campaign} --history {history}");
+            let list = ShellLine::new(program).fixed(if self.all_failed { "list --failed" } else { "list" });
+            let list = list.option("--campaign", campaign).option("--history", history);
             return Some(FailureLines::further(&list, self.page));
         }
         if self.failures > MOST_SHOWN && !all {
             return None;
         }
         let name = |iri: &str| self.env.ontology.properties.get(iri).map_or_else(|| iri.to_owned(), |p| p.name.clone());
-        let show = format!("{program} show {} --history {history}", run.id);
+        let show = ShellLine::new(program).fixed("show").word(&run.id).option("--history", history);
         Some(FailureLines { run, show: &show, all, name: &name }.text(self.page))
     }
 }

@@ -6,7 +6,7 @@ use clap::{Args, ValueEnum};
 
 use crate::new_files::NewFiles;
 use crate::output;
-use actcheck_base::{Diagnostic, Diagnostics, Files};
+use actcheck_base::{Diagnostic, Diagnostics, Files, ShellLine};
 use actcheck_config::{CampaignTemplate, campaign_template};
 use actcheck_ontology as ontology;
 
@@ -75,7 +75,7 @@ pub fn campaign(args: &NewCampaignArgs) -> Result<(), Diagnostics> {
     if has(Part::Skill) {
         text.push_str(&format!("{SKILL_FILE} needs Python with the package `actcheck` (in actcheck's wheel, and in its sources in clients/python)\n"));
     }
-    text.push_str(&format!("next: actcheck run {config}\n"));
+    text.push_str(&format!("next: {}\n", ShellLine::default().fixed("actcheck run").file(&config)));
     output::print_prose(&text);
     Ok(())
 }

@@ -7,7 +7,7 @@ use clap::Args;
 
 use crate::new_files::NewFiles;
 use crate::output;
-use actcheck_base::{Diagnostics, Files};
+use actcheck_base::{Diagnostics, Files, ShellLine};
 use actcheck_campaign::proposed_robot;
 use actcheck_config::robot;
 use actcheck_data::RobotProfile;
@@ -73,7 +73,8 @@ pub fn robot(args: &NewRobotArgs) -> Result<(), Diagnostics> {
 /// The profile as TOML, with a comment for each guess. The keys that the program finds on the model whenever it reads the
 /// profile are comments too.
 fn text(profile: &RobotProfile, notes: &BTreeMap<&'static str, String>, args: &NewRobotArgs, folder: &Path) -> String {
-    let title = format!("# Proposed by `actcheck new robot {}`: check each guess.\n", args.model.display());
+    let command = ShellLine::default().fixed("actcheck new robot").file(&args.model);
+    let title = format!("# Proposed by `{command}`: check each guess.\n");
     let stated = lines(&stated(profile, args, folder), notes);
     let found = lines(&found(profile), notes).lines().map(commented).collect::<String>();
     format!(

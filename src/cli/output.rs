@@ -1,11 +1,11 @@
 //! Results to the output stream, diagnostics to the error stream.
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::io::{IsTerminal, Write};
 
 use miette::{GraphicalReportHandler, GraphicalTheme, ThemeCharacters, ThemeStyles};
 
-use crate::terminal;
+use crate::{own_files, terminal};
 use actcheck_base::{Diagnostic, Diagnostics, Severity, printable_in_colour};
 use actcheck_report::Page;
 
@@ -71,9 +71,9 @@ pub fn print_diagnostics(faults: &Diagnostics) {
     let mut text = String::new();
     let page = terminal::of_errors();
     let handler = handler(page);
-    let told = once(faults);
+    let told = first_of_foreign(once(faults));
     for fault in told.iter().take(MOST_PRINTED) {
-        let fault = broken_into_lines(with_file_in_message(fault), page);
+        let fault = broken_into_lines(with_file_in_message(&without_foreign_text(fault)), page);
         if handler.render_report(&mut text, &fault).is_err() {
             text.push_str(&fault.to_string());
         }
@@ -132,6 +132,34 @@ fn broken_into_lines(fault: Diagnostic, page: Page) -> Diagnostic {
     let fill = |text: &str, before: usize| Page { width: width.checked_sub(before), ..page }.fill(text);
     // In front of a message are four columns, such as `  × `, and in front of a help `  help: `.
     Diagnostic { message: fill(&fault.message, 4), help: fault.help.as_deref().map(|help| fill(help, 8)), ..fault }
+}
+
+/// Only the first error of each file outside of the project: messages may quote its words.
+fn first_of_foreign(faults: Vec<Diagnostic>) -> Vec<Diagnostic> {
+    let mut seen: BTreeSet<String> = BTreeSet::new();
+    let mut is_first = |fault: &Diagnostic| match &fault.source {
+        Some(source) if fault.severity == Severity::Error && !own_files::is_own(&source.name) => {
+            seen.insert(source.name.to_string())
+        }
+        _ => true,
+    };
+    faults.into_iter().filter(|fault| is_first(fault)).collect()
+}
+
+/// A fault in a file outside of the project has its place, but no excerpt.
+fn without_foreign_text(fault: &Diagnostic) -> Diagnostic {
+    let is_foreign = fault.source.as_ref().is_some_and(|source| !own_files::is_own(&source.name));
+    match fault.place() {
+        Some(place) if is_foreign && fault.span.is_some() => {
+            // Parsers quote a part of a text that they can't parse.
+            let is_syntax = fault.message.starts_with("this is not ");
+            let problem =
+                fault.message.split_once(": ").filter(|_| is_syntax).map_or(&*fault.message, |(what, _)| what);
+            let message = format!("{place}: {problem}");
+            Diagnostic { source: None, span: None, message, ..fault.clone() }
+        }
+        _ => fault.clone(),
+    }
 }
 
 /// A fault of a whole file has no excerpt with the file's name, so the message names the file.

@@ -42,7 +42,9 @@ impl<'a> Picture<'a> {
     /// # Errors
     /// X006: the run has no state to draw; X007: the file can't be written.
     pub(super) fn draw(&self, history: &History, run: &RunDetail, ontology: Option<&Path>) -> Result<(), Diagnostics> {
-        let trace = history.trace(&run.row.run)?;
+        // Without its motion, the states before and after are drawn.
+        let id = &run.row.run;
+        let trace = history.trace_if_allowed(id)?.map_or_else(|| history.states(id), Ok)?;
         let drawing = run_picture(&Caption { charts: charts(&trace, run, ontology), ..Caption::of(run) }, &trace)
             .ok_or_else(|| {
                 Diagnostic::error("X006", format!("run {} has no state to draw", run.row.run))

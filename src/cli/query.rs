@@ -78,7 +78,7 @@ fn ask_history(args: &QueryArgs, text: &Source) -> Result<(), Diagnostics> {
         (QueryFormat::Csv, _) => TableFormat::Csv,
         (QueryFormat::Json, _) => TableFormat::Json,
     };
-    output::print(&answer_table(&answer, format == TableFormat::Table).render(format, output::page()));
+    output::print(&answer_table(&answer, format).render(format, output::page()));
     if is_empty(&answer) {
         unknown(text);
     }

@@ -32,19 +32,23 @@ fn standard(text: &Source) -> String {
 }
 
 fn print(format: QueryFormat, text: &Source, answer: ForeignAnswer) -> Result<(), Diagnostics> {
-    let short = format == QueryFormat::Text;
+    let of_cells = match format {
+        QueryFormat::Text => TableFormat::Table,
+        QueryFormat::Csv => TableFormat::Csv,
+        QueryFormat::Json | QueryFormat::Turtle => TableFormat::Json,
+    };
     let is_empty = match answer {
         ForeignAnswer::Boolean(value) => {
             print_rows(format, vec!["answer".to_owned()], std::iter::once(Ok(vec![Value::Bool(value)])))?;
             !value
         }
         ForeignAnswer::Table { columns, rows } => {
-            print_rows(format, columns, rows.map(|row| Ok(answer_cells(row?.iter().map(Option::as_ref), short))))?
+            print_rows(format, columns, rows.map(|row| Ok(answer_cells(row?.iter().map(Option::as_ref), of_cells))))?
         }
         ForeignAnswer::Graph(triples) if format == QueryFormat::Turtle => print_turtle(triples)?,
         ForeignAnswer::Graph(triples) => {
             let columns = ["subject", "predicate", "object"].map(str::to_owned).into();
-            print_rows(format, columns, triples.map(|triple| Ok(answer_cells(triple?.iter().map(Some), short))))?
+            print_rows(format, columns, triples.map(|triple| Ok(answer_cells(triple?.iter().map(Some), of_cells))))?
         }
     };
     if is_empty {

@@ -6,6 +6,7 @@ use clap::Args;
 
 use crate::options::{Format, HistoryArgs};
 use crate::progress::Progress;
+use crate::trust::TrustArgs;
 use crate::why::ontology_file;
 use crate::work::all_cores;
 use crate::{clock, history_dir, output, restore, stop};
@@ -39,6 +40,9 @@ pub struct RecheckArgs {
     /// The folder of the history.
     #[command(flatten)]
     pub history: HistoryArgs,
+    /// The consent to start programs.
+    #[command(flatten)]
+    pub trust: TrustArgs,
     /// How it is printed (csv: one line for each outcome that changed or is new)
     #[arg(long, value_name = "FORMAT", value_enum, default_value_t)]
     pub format: Format,
@@ -53,6 +57,7 @@ pub fn recheck(args: &RecheckArgs) -> Result<u8, Diagnostics> {
         || RuleSet::prepare(&files, &path)?.only(&args.properties),
         || {
             let history = history_dir::open_with(&args.history, jobs)?;
+            restore::allow(&history, args.trust.trust);
             let runs = runs(&history, &args.campaigns)?;
             Ok((history, runs))
         },

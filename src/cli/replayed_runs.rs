@@ -18,7 +18,7 @@ pub(super) const MOST_RESTORED: usize = 10;
 const RUNS_OF_A_WORKER: usize = 8;
 
 /// Reads runs in the given order and passes those that were read at once to `take`, until `take` returns
-/// [`ControlFlow::Break`].
+/// [`ControlFlow::Break`]. Leaves out those whose motion a program would have to simulate again without consent.
 ///
 /// # Errors
 /// A run can't be read, or `take` fails.
@@ -31,16 +31,19 @@ pub(super) fn for_each_batch(
     let budget = Budget::default();
     // If the current rules can't be read, there are no explanations; the outcomes come from the history.
     let rules = RuleBook::prepare_within(ontology, &budget).ok();
-    let read = |id: &String| -> Result<ReplayedRun, Diagnostics> {
+    let read = |id: &String| -> Result<Option<ReplayedRun>, Diagnostics> {
         let run = history.newest_run(id)?;
         // A run that broke before its first state has no trace; everything else about it is reported.
-        let trace = unless_damaged(history.trace(id))?;
+        let trace = match unless_damaged(history.trace_if_allowed(id))? {
+            Some(None) => return Ok(None),
+            trace => trace.flatten(),
+        };
         let explained = rules.as_ref().zip(trace.as_ref()).map(|(rules, trace)| explained(trace, rules, &run, &budget));
-        Ok((run, trace, explained.unwrap_or_default()))
+        Ok(Some((run, trace, explained.unwrap_or_default())))
     };
     let order = affordable(history, order)?;
     for runs in order.chunks(all_cores() * RUNS_OF_A_WORKER) {
-        let shares: Vec<Vec<Result<ReplayedRun, Diagnostics>>> = std::thread::scope(|scope| {
+        let shares: Vec<Vec<Result<Option<ReplayedRun>, Diagnostics>>> = std::thread::scope(|scope| {
             let share = |runs: &'_ [String]| runs.iter().map(read).collect();
             let of_each = runs.len().div_ceil(all_cores()).max(1);
             let started: Vec<_> = runs.chunks(of_each).map(|runs| scope.spawn(move || share(runs))).collect();
@@ -49,7 +52,8 @@ pub(super) fn for_each_batch(
                 .map(|share| share.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)))
                 .collect()
         });
-        if take(shares.into_iter().flatten().collect::<Result<_, _>>()?)?.is_break() {
+        let runs = shares.into_iter().flatten().filter_map(Result::transpose).collect::<Result<_, _>>()?;
+        if take(runs)?.is_break() {
             return Ok(());
         }
     }

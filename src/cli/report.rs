@@ -7,7 +7,8 @@ use clap::Args;
 use crate::analyse::{Analysed, Question, analysed};
 use crate::chosen::{ChosenRuns, is_meant};
 use crate::report_formats::{self, FormatArgs};
-use crate::{output, output_file, report_html};
+use crate::trust::TrustArgs;
+use crate::{output, output_file, report_html, restore};
 use actcheck_base::{Diagnostic, Diagnostics};
 use actcheck_history::{History, RunDetail};
 use actcheck_report::HTML_COLUMNS;
@@ -46,6 +47,9 @@ pub struct ReportArgs {
     /// The runs to report, and their history.
     #[command(flatten)]
     pub chosen: ChosenRuns,
+    /// The consent to start programs.
+    #[command(flatten)]
+    pub trust: TrustArgs,
 }
 
 fn megabytes(text: &str) -> Result<f64, String> {
@@ -98,6 +102,7 @@ impl ReportArgs {
 pub fn report(args: &ReportArgs) -> Result<(), Diagnostics> {
     let printed = args.prints()?;
     let history = args.chosen.open()?;
+    restore::allow(&history, args.trust.trust);
     let mut told = report_formats::write(args, &history)?;
     if args.html.is_some() || args.rrd.is_some() {
         told.extend(write_reports_with_replays(args, &history)?);

@@ -10,7 +10,7 @@ use crate::history_dir::unless_damaged;
 use crate::replayed_runs::MOST_RESTORED;
 use crate::report::ReportArgs;
 use crate::{chosen, output, output_file, replayed_runs, show};
-use actcheck_base::{Below, Diagnostics, Outcome};
+use actcheck_base::{Below, Diagnostics, Outcome, ShellLine};
 use actcheck_history::{CampaignRow, History, RunDetail, RunFilter, RunRow, newest_of_alike};
 use actcheck_report::{
     Attachment, Caption, Chart, EarlReport, JunitReport, MarkdownReport, Repetitions, allure_common, allure_results,
@@ -177,6 +177,8 @@ struct AllureFolder<'a> {
     untraced: usize,
     /// Runs that are kept as outlines, with a failure.
     restored: usize,
+    /// Number of these that would have to be simulated again by a program.
+    withheld: usize,
 }
 
 impl<'a> AllureFolder<'a> {
@@ -200,6 +202,7 @@ impl<'a> AllureFolder<'a> {
             results: 0,
             untraced: 0,
             restored: 0,
+            withheld: 0,
         };
         made.write(&allure_common(env!("CARGO_PKG_VERSION"), &ids))?;
         Ok(made)
@@ -223,9 +226,16 @@ impl<'a> AllureFolder<'a> {
         if is_outline && self.restored > MOST_RESTORED {
             return Ok(Vec::new());
         }
-        let Some(trace) = unless_damaged(self.history.trace(&run.row.run))? else {
-            self.untraced += 1;
-            return Ok(Vec::new());
+        let trace = match unless_damaged(self.history.trace_if_allowed(&run.row.run))? {
+            Some(Some(trace)) => trace,
+            Some(None) => {
+                self.withheld += 1;
+                return Ok(Vec::new());
+            }
+            None => {
+                self.untraced += 1;
+                return Ok(Vec::new());
+            }
         };
         let rules = self.rules.as_ref();
         let explained = rules.map(|rules| replayed_runs::explained(&trace, rules, run, &self.budget));
@@ -263,10 +273,10 @@ impl<'a> AllureFolder<'a> {
     }
 
     fn told(&self) -> Vec<String> {
-        let folder = self.folder.display();
-        let mut told = vec![format!("{folder} holds {} results: npx allure generate {folder}", self.results)];
-        if self.restored > MOST_RESTORED {
-            let others = self.restored - MOST_RESTORED;
+        let generate = ShellLine::default().fixed("npx allure generate").file(self.folder);
+        let mut told = vec![format!("{} holds {} results: {generate}", self.folder.display(), self.results)];
+        let others = self.restored.saturating_sub(MOST_RESTORED) + self.withheld;
+        if others > 0 {
             told.push(format!("{others} runs have no pictures and explanations: they are kept as outlines"));
         }
         if self.untraced > 0 {

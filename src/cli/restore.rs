@@ -10,10 +10,12 @@ use actcheck_history::{History, RunRow};
 /// Whether a note has said that runs are simulated again.
 static IS_NOTED: AtomicBool = AtomicBool::new(false);
 
-/// Lets a history simulate runs again. The first time, a note says so.
-pub fn allow(history: &History) {
+/// Lets a history simulate runs again. The first time, a note says so. Programs that this starts need consent
+/// (`is_trusted`): without it, a warning names them, and the motion is missing.
+pub fn allow(history: &History, is_trusted: bool) {
     let context = RunContext { clock: clock::system(), disturb: None };
-    history.restore_with(restorer(context, Box::new(trust::check_stored), move |run| {
+    let may_run = move |campaign: &str, starts: &_| is_trusted || trust::starts_none(campaign, starts);
+    history.restore_with(restorer(context, Box::new(may_run), move |run| {
         if !IS_NOTED.swap(true, Ordering::Relaxed) {
             note(format!("run {run} is kept as an outline: its motion is simulated again"));
         }

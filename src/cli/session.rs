@@ -5,7 +5,7 @@ use std::path::Path;
 use crate::options::HistoryArgs;
 use crate::run_args::RunArgs;
 use crate::{clock, configurations, history_dir, output, regressions, trust};
-use actcheck_base::{Diagnostics, digest_of};
+use actcheck_base::{Diagnostic, Diagnostics, digest_of};
 use actcheck_campaign::{Env, LastFailed, unfinished};
 use actcheck_config as config;
 use actcheck_config::Overrides;
@@ -75,6 +75,7 @@ pub fn open(args: &RunArgs, budget: &Budget, jobs: usize) -> Result<Opened, Diag
     if going_on.is_none() {
         env.check_starts()?;
     }
+    check_shard(&env)?;
     let cases = regressions::prepare(&env, budget)?;
     let (history, resumed) = match going_on {
         Some((history, record)) => (history, Some(record)),
@@ -91,6 +92,13 @@ pub fn open(args: &RunArgs, budget: &Budget, jobs: usize) -> Result<Opened, Diag
         None => (history.next_campaign_id(&digest_of(&env.campaign.source.text), env.campaign.seed)?, false),
     };
     Ok(Opened::Campaign(Box::new(Session { env, history, id, goes_on, failed: None, kept, regressions })))
+}
+
+/// X083: a shard has none of the campaign's runs.
+fn check_shard(env: &Env) -> Result<(), Diagnostics> {
+    let Some(shard) = env.campaign.shard.filter(|_| env.runs_to_make() == 0) else { return Ok(()) };
+    let message = format!("shard {shard} has no runs: the campaign has only {}", env.planned_runs());
+    Err(Diagnostic::error("X083", message).help("divide it into fewer shards, or let it have more runs").into())
 }
 
 /// Prepares the failed runs of a configuration's last campaign.

@@ -7,7 +7,8 @@ use clap::Args;
 
 use crate::options::{Format, HistoryArgs};
 use crate::picture::Picture;
-use crate::{history_dir, output};
+use crate::trust::TrustArgs;
+use crate::{history_dir, output, restore};
 use actcheck_analysis::perceived_sentences;
 use actcheck_base::{Diagnostics, names};
 use actcheck_campaign::made_by_other_physics;
@@ -22,6 +23,9 @@ pub struct ShowArgs {
     /// The folder of the history.
     #[command(flatten)]
     pub history: HistoryArgs,
+    /// The consent to start programs.
+    #[command(flatten)]
+    pub trust: TrustArgs,
     /// Draw the scene before and after the run into this file, as a raster (.png) or vector image (.svg)
     #[arg(long, value_name = "FILE.png")]
     pub picture: Option<PathBuf>,
@@ -37,6 +41,7 @@ pub struct ShowArgs {
 pub fn show(args: &ShowArgs) -> Result<(), Diagnostics> {
     let picture = args.picture.as_deref().map(Picture::new).transpose()?;
     let history = history_dir::open_to_read(&args.history)?;
+    restore::allow(&history, args.trust.trust);
     let run = history.newest_run(&args.run)?;
     // The store has the outcomes, also those of a run whose trace is damaged.
     let (perceived, damage) = match perceived(&history, &run) {

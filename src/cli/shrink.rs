@@ -8,7 +8,7 @@ use clap::Args;
 use crate::options::{Format, HistoryArgs, duration};
 use crate::picture::Picture;
 use crate::work::{all_cores, quietly};
-use crate::{clock, history_dir, output, stop, trust};
+use crate::{clock, history_dir, output, restore, stop, trust};
 use actcheck_base::{Diagnostic, Diagnostics};
 use actcheck_campaign::shrink::{self, Id, Repeat, ShrinkOptions, Shrunk};
 use actcheck_campaign::{Env, RunContext};
@@ -67,6 +67,7 @@ pub fn shrink(args: &ShrinkArgs) -> Result<u8, Diagnostics> {
     if args.config.is_none() && !args.trust {
         trust::check_stored(&env, &history, &record)?;
     }
+    restore::allow(&history, true);
     let context = RunContext { clock: clock::system(), disturb: None };
     let until = args.time.map(|secs| (context.clock.secs)() + secs);
     let asked = stop::on_interrupt(|| eprintln!("stopping; the smallest scene so far follows"));

@@ -1,11 +1,53 @@
 //! Consent to start the program that a case or a history names: both may come from others, and a program may do
-//! anything.
+//! anything. `docs/strangers.md` lists the programs and files of each command.
 
-use actcheck_base::Diagnostics;
+use std::ffi::OsString;
+
+use clap::Args;
+
+use crate::output;
+use actcheck_base::{Diagnostic, Diagnostics, ShellLine};
 use actcheck_campaign::Env;
 use actcheck_config as config;
-use actcheck_config::{Launcher, Overrides};
+use actcheck_config::{Launcher, Overrides, Starts};
 use actcheck_history::{CampaignRecord, History};
+
+/// The consent of a command that reads a history.
+#[derive(Debug, Clone, Copy, Args)]
+pub struct TrustArgs {
+    /// Start the program that the history names, to simulate motion again that the history does not keep
+    #[arg(long)]
+    pub trust: bool,
+}
+
+/// Whether simulating runs of a campaign again starts no program. If it does, a warning names the commands.
+pub fn starts_none(campaign: &str, starts: &Starts) -> bool {
+    let Some(commands) = in_words(starts.expansion.iter().chain(&starts.skill)) else { return true };
+    let message = format!(
+        "the motion of runs of campaign {campaign} is not kept, and simulating it again would start {commands}: it is \
+         left out"
+    );
+    let help = "read the program, then give the same command with `--trust`";
+    output::print_diagnostics(&Diagnostic::warning("X059", message).help(help).into());
+    false
+}
+
+/// Checks that a campaign of a history can be prepared again without consent: no program expands its robot's file.
+///
+/// # Errors
+/// `X059` if one does.
+pub fn check_expansion(campaign: &str, starts: &Starts) -> Result<(), Diagnostics> {
+    let Some(commands) = in_words(&starts.expansion) else { return Ok(()) };
+    let message = format!("reading the configuration of campaign {campaign} starts {commands}");
+    let help = "a xacro file may contain code: read it, then give the same command with `--trust`";
+    Err(Diagnostic::error("X059", message).help(help).into())
+}
+
+fn in_words<'a>(commands: impl IntoIterator<Item = &'a Vec<OsString>>) -> Option<String> {
+    let lines = commands.into_iter().map(|words| format!("`{}`", words.iter().collect::<ShellLine>()));
+    let lines: Vec<String> = lines.collect();
+    (!lines.is_empty()).then(|| lines.join(" and "))
+}
 
 /// Checks that a case can be run without consent: it names no program.
 ///
@@ -36,7 +78,7 @@ fn check(env: &Env, own: Option<&Launcher>, what: &str, help: &str) -> Result<()
         (Launcher::Reference, _) => Ok(()),
         (Launcher::Program(program), Some(Launcher::Program(own))) if program.starts_as(own) => Ok(()),
         (Launcher::Program(program), _) => {
-            let message = format!("{what} starts the program `{}`", program.text);
+            let message = format!("{what} starts the program `{}`", program.words().iter().collect::<ShellLine>());
             Err(env.campaign.fault("X059", "test_launcher", message).help(help).into())
         }
     }

@@ -1,5 +1,6 @@
 //! Points in time on the command line.
 
+use crate::clock;
 use actcheck_config::duration_secs;
 
 /// Parses a day, a point in time or a duration before now. Returns the time as histories store it (RFC 3339, in UTC).
@@ -16,7 +17,7 @@ pub fn parse(text: &str) -> Result<String, String> {
         return Ok(format!("{day}T00:00:00.000Z"));
     }
     let ago = duration_secs(text).ok().and_then(|secs| jiff::SignedDuration::try_from_secs_f64(secs).ok());
-    let then = ago.and_then(|ago| jiff::Timestamp::now().checked_sub(ago).ok());
+    let then = ago.and_then(|ago| clock::timestamp().checked_sub(ago).ok());
     then.map(written).ok_or_else(|| {
         "must be a day (2026-11-21), a time (2026-11-21T18:00:00Z) or a duration before now (90s, 10m, 12h)".to_owned()
     })

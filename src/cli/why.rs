@@ -7,7 +7,8 @@ use std::sync::atomic::AtomicBool;
 use clap::Args;
 
 use crate::options::{HistoryArgs, ProofFormat};
-use crate::{explanations, history_dir, output, show};
+use crate::trust::TrustArgs;
+use crate::{explanations, history_dir, output, restore, show};
 use actcheck_base::{Diagnostic, Diagnostics, Files, Findings, Judgement, Outcome, did_you_mean, names};
 use actcheck_history::{ActionDetail, RunDetail};
 use actcheck_ontology as ontology;
@@ -27,6 +28,9 @@ pub struct WhyArgs {
     /// The folder of the history.
     #[command(flatten)]
     pub history: HistoryArgs,
+    /// The consent to start programs.
+    #[command(flatten)]
+    pub trust: TrustArgs,
     /// How explanations are printed
     #[arg(long, value_name = "FORMAT", value_enum, default_value_t)]
     pub format: ProofFormat,
@@ -36,10 +40,12 @@ pub struct WhyArgs {
 pub fn why(args: &WhyArgs, stop: &Arc<AtomicBool>) -> Result<(), Diagnostics> {
     let budget = Budget { stop: Arc::clone(stop), ..Budget::default() };
     let history = history_dir::open_to_read(&args.history)?;
+    restore::allow(&history, args.trust.trust);
     let run = history.newest_run(&args.run)?;
     let (files, path) = ontology_file(args.ontology.as_deref());
     let rules = RuleBook::prepare_within(&ontology::load(&files, &path)?, &budget)?;
-    let facts = history.facts(&run.row.run, rules.reads_course())?;
+    // Without its motion, properties about time can't be explained, but the others can.
+    let facts = history.allowed_facts(&run.row.run, rules.reads_course())?;
     let perceived = show::perceived(&history, &run)?;
     let mut told = 0;
     let mut table = Table::new(["run", "step", "action", "property", "holds", "margin", "explanation"]);

@@ -26,10 +26,10 @@ pub fn read(source: &Source) -> Result<ObjectModel, Diagnostics> {
         }
         iri
     });
-    let mass_kg = table.number("mass_kg", POSITIVE);
+    let mass_kg = table.number("mass_kg", MASS);
     let friction = table.number("friction", 0.0..=2.0);
     let restitution = table.number("restitution", 0.0..=1.0).unwrap_or(0.0);
-    let size_m = table.numbers("size_m", POSITIVE);
+    let size_m = table.numbers("size_m", LENGTH);
     let parts: Vec<Part> = table.tables("parts").into_iter().filter_map(|part| read_part(part, &mut found)).collect();
     let surface = table.table("surface").and_then(|surface| read_surface(surface, &mut found));
     table.finish(&mut found);
@@ -58,10 +58,12 @@ pub fn read(source: &Source) -> Result<ObjectModel, Diagnostics> {
     found.or(model)
 }
 
-/// Bounds of a mass and of a length of an object: the physics engine can't calculate with much larger numbers. Units:
-/// kilograms, metres.
-const POSITIVE: (std::ops::Bound<f64>, std::ops::Bound<f64>) =
+/// Bounds of a mass: the physics engine can't calculate with much larger numbers. Unit: kilograms.
+const MASS: (std::ops::Bound<f64>, std::ops::Bound<f64>) =
     (std::ops::Bound::Excluded(0.0), std::ops::Bound::Included(1e6));
+/// Bounds of a length of an object: a larger one is most likely in millimetres. Unit: metres.
+const LENGTH: (std::ops::Bound<f64>, std::ops::Bound<f64>) =
+    (std::ops::Bound::Excluded(0.0), std::ops::Bound::Included(1e3));
 
 /// Expands a known prefix, as in `act:Glass`; returns a full IRI unchanged, and `None` if the prefix is unknown.
 pub(crate) fn full_iri(text: &str) -> Option<String> {
@@ -96,20 +98,20 @@ fn read_shape(table: &mut Table) -> Option<Shape> {
     match kind.value.as_str() {
         "box" => {
             table.require(&["size_m"]);
-            Some(Shape::Box { size: table.numbers("size_m", POSITIVE)? })
+            Some(Shape::Box { size: table.numbers("size_m", LENGTH)? })
         }
         "cylinder" => {
             table.require(&["radius_m", "height_m"]);
-            let (radius, height) = (table.number("radius_m", POSITIVE), table.number("height_m", POSITIVE));
+            let (radius, height) = (table.number("radius_m", LENGTH), table.number("height_m", LENGTH));
             Some(Shape::Cylinder { radius: radius?, height: height? })
         }
         "sphere" => {
             table.require(&["radius_m"]);
-            Some(Shape::Sphere { radius: table.number("radius_m", POSITIVE)? })
+            Some(Shape::Sphere { radius: table.number("radius_m", LENGTH)? })
         }
         "capsule" => {
             table.require(&["radius_m", "height_m"]);
-            let (radius, height) = (table.number("radius_m", POSITIVE), table.number("height_m", POSITIVE));
+            let (radius, height) = (table.number("radius_m", LENGTH), table.number("height_m", LENGTH));
             Some(Shape::Capsule { radius: radius?, height: height? })
         }
         "tube" => read_tube(table),
@@ -125,8 +127,8 @@ fn read_shape(table: &mut Table) -> Option<Shape> {
 
 fn read_tube(table: &mut Table) -> Option<Shape> {
     table.require(&["radius_low_m", "radius_high_m", "wall_m", "height_m", "staves"]);
-    let (radius_low, radius_high) = (table.number("radius_low_m", POSITIVE), table.number("radius_high_m", POSITIVE));
-    let (wall, height) = (table.number("wall_m", POSITIVE), table.number("height_m", POSITIVE));
+    let (radius_low, radius_high) = (table.number("radius_low_m", LENGTH), table.number("radius_high_m", LENGTH));
+    let (wall, height) = (table.number("wall_m", LENGTH), table.number("height_m", LENGTH));
     let staves = table.integer("staves", 3..=64).and_then(|count| u32::try_from(count).ok());
     Some(Shape::Tube {
         radius_low: radius_low?,
@@ -139,7 +141,7 @@ fn read_tube(table: &mut Table) -> Option<Shape> {
 
 fn read_surface(mut table: Table, found: &mut Diagnostics) -> Option<Surface> {
     table.require(&["height_m", "size_m"]);
-    let (height_m, size_m) = (table.number("height_m", POSITIVE), table.numbers("size_m", POSITIVE));
+    let (height_m, size_m) = (table.number("height_m", LENGTH), table.numbers("size_m", LENGTH));
     table.finish(found);
     Some(Surface { height_m: height_m?, size_m: size_m? })
 }

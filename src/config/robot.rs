@@ -3,6 +3,7 @@
 use actcheck_base::{Diagnostic, Diagnostics, Digest, Files, Source, digest_of};
 use actcheck_data::RobotProfile;
 use std::collections::BTreeMap;
+use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -65,7 +66,8 @@ pub fn read(files: &Files, path: &Path) -> Result<RobotProfile, Diagnostics> {
 ///
 /// # Errors
 /// All faults of both texts: those of the table reader (`C…`), an unreadable file (W010), a list of the wrong length
-/// (W011), a failed xacro expansion (W012), faults of the URDF and its meshes (W031 to W037, W051), and roles that the
+/// (W011), a failed xacro expansion (W012), an argument for xacro that is not a
+/// value (W013), faults of the URDF and its meshes (W031 to W037, W051), and roles that the
 /// URDF's joints and links can't fill (W050 to W054).
 pub fn read_with(files: &Files, path: &Path, packages: &[PathBuf]) -> Result<RobotProfile, Diagnostics> {
     read_telling(files, path, packages).map(|(profile, _)| profile)
@@ -163,11 +165,20 @@ fn find_urdf<'a>(
 ) -> (Option<(Source, PathBuf)>, Lookup<'a>) {
     let folder = profile.parent().unwrap_or(Path::new(""));
     let own = values(table.strings("package_dirs").unwrap_or_default());
-    let arguments = values(table.strings("xacro_args").unwrap_or_default());
+    let arguments = table.strings("xacro_args").unwrap_or_default();
     let mut folders: Vec<PathBuf> = own.into_iter().map(|written| resolve_path(folder, &written)).collect();
     let Some(written) = table.string("urdf") else { return (None, Lookup { files, folders }) };
     let path = resolve_path(folder, &written.value);
     folders.extend(around(&path, packages));
+    let refused: Vec<_> =
+        arguments.iter().filter_map(|written| Some((written.span.clone(), xacro::refusal(&written.value)?))).collect();
+    if !refused.is_empty() {
+        for (span, Unexpanded { message, help }) in refused {
+            table.fault("W013", span, message, help);
+        }
+        return (None, Lookup { files, folders });
+    }
+    let arguments = values(arguments);
     let urdf = match text_of(files, &path, Inputs { arguments: &arguments, folders: &folders }) {
         Ok(urdf) => Some((urdf, path)),
         Err(Unread::File(code, fault)) => {
@@ -180,6 +191,15 @@ fn find_urdf<'a>(
         }
     };
     (urdf, Lookup { files, folders })
+}
+
+/// The words of the command that reading a profile starts: of `xacro`, if its URDF is to be expanded.
+pub(crate) fn expansion(files: &Files, profile: &Path) -> Option<Vec<OsString>> {
+    let source = files.read(profile).ok()?;
+    let mut table = Table::parse(&source).ok()?;
+    let arguments = values(table.strings("xacro_args").unwrap_or_default());
+    let path = resolve_path(profile.parent().unwrap_or(Path::new("")), &table.string("urdf")?.value);
+    xacro::is_xacro(&path).then(|| xacro::words(&path, &arguments))
 }
 
 /// Folders in which the packages of a robot's file are looked up: those given, then those around the file.
@@ -199,6 +219,9 @@ pub fn bare(
     arguments: &[String],
 ) -> Result<RobotProfile, Diagnostics> {
     let folders = around(path, packages);
+    if let Some(refused) = arguments.iter().find_map(|argument| xacro::refusal(argument)) {
+        return Err(Unread::File("W013", refused).faults());
+    }
     let urdf = text_of(files, path, Inputs { arguments, folders: &folders }).map_err(Unread::faults)?;
     let mut found = Diagnostics::new();
     let read = foreign::robot::read(&urdf, path, &Lookup { files, folders }, &mut found);

@@ -1,14 +1,14 @@
 //! The skills that perform the actions: the reference skills or an external program (`test_launcher`, `[skill]`).
 
 use std::collections::BTreeMap;
-use std::ffi::OsStr;
+use std::ffi::{OsStr, OsString};
 use std::ops::Bound;
 use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 
 use crate::paths::resolve_path;
 use crate::{Located, Table};
-use actcheck_base::{Diagnostic, Diagnostics, Digest, Files, Span};
+use actcheck_base::{Diagnostic, Diagnostics, Digest, Files, ShellLine, Span};
 
 /// The skills that perform the actions.
 #[derive(Debug, Clone, PartialEq)]
@@ -52,6 +52,11 @@ pub struct Skill {
 }
 
 impl Skill {
+    /// The words of its command.
+    pub fn words(&self) -> Vec<OsString> {
+        [self.program.clone().into()].into_iter().chain(self.args.iter().map(OsString::from)).collect()
+    }
+
     /// Returns `true` if both start the same program: with the same arguments and environment, in the same folder.
     pub fn starts_as(&self, other: &Self) -> bool {
         let words = |skill: &Self| -> Vec<PathBuf> {
@@ -264,7 +269,11 @@ fn find_file(name: &str, path: PathBuf, args: Vec<String>) -> Result<Command, Mi
             return Err(Missing {
                 code: "C032",
                 message: format!("{} is not executable", path.display()),
-                help: format!("run `chmod +x {name}`, or name a program that runs it: `test_launcher = \"sh {name}\"`"),
+                help: format!(
+                    "run `{}`, or name a program that runs it: `test_launcher = \"{}\"`",
+                    ShellLine::default().fixed("chmod +x").file(name),
+                    ShellLine::default().fixed("sh").file(name)
+                ),
             });
         }
     };

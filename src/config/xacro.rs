@@ -3,6 +3,7 @@
 //! A xacro file is a program: it may run for ever, and print without end. The program and everything that it starts end
 //! after a minute, and when actcheck ends for any reason.
 
+use std::ffi::OsString;
 use std::io::Read;
 use std::os::unix::process::CommandExt as _;
 use std::path::{Path, PathBuf};
@@ -11,7 +12,7 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
 use std::time::Duration;
 
 use crate::skill::on_path;
-use actcheck_base::{Below, ScratchFolder, Source};
+use actcheck_base::{Below, ScratchFolder, ShellLine, Source};
 
 /// The program, as installed by ROS or by `pip install xacro`.
 const PROGRAM: &str = "xacro";
@@ -27,8 +28,10 @@ const LONGEST: u64 = 16 << 20;
 /// Longest error output that is kept. Unit: bytes.
 const LONGEST_ERROR: u64 = 64 << 10;
 
-/// Runs a command in a process group that is killed when the input ends: that is when actcheck closes it, or ends.
-const GUARDED: &str = r#"exec 3<&0
+/// Runs a command that can write no file (its output is a pipe) in a process group that is killed when the input ends:
+/// that is when actcheck closes it, or ends.
+const GUARDED: &str = r#"ulimit -f 0 || exit 126
+exec 3<&0
 "$@" 3<&- </dev/null &
 program=$!
 { read -r _ <&3; kill -s KILL -- "-$$"; } >/dev/null 2>&1 &
@@ -51,6 +54,28 @@ pub(super) struct Unexpanded {
 /// Whether a file is xacro, by its extension.
 pub(super) fn is_xacro(path: &Path) -> bool {
     path.extension().is_some_and(|ending| ending == "xacro")
+}
+
+/// Returns why an argument is not given to xacro: all but `NAME:=VALUE` are options, which write files, for example.
+pub(super) fn refusal(argument: &str) -> Option<Unexpanded> {
+    let name = argument.split_once(":=").map_or("", |(name, _)| name);
+    let is_name = name.starts_with(|c: char| c.is_alphabetic() || c == '_')
+        && name.chars().all(|c| c.is_alphanumeric() || "_-./".contains(c));
+    (!is_name || argument.contains('\0')).then(|| Unexpanded {
+        message: format!("{argument:?} is not an argument of a xacro file"),
+        help: "write NAME:=VALUE, such as `arm:=left`; options of the program xacro are not accepted".to_owned(),
+    })
+}
+
+/// The words of the command that expands a file.
+pub(super) fn words(path: &Path, arguments: &[String]) -> Vec<OsString> {
+    let words = [OsString::from(PROGRAM), not_an_option(path).into_os_string()];
+    words.into_iter().chain(arguments.iter().map(OsString::from)).collect()
+}
+
+/// A path that the program takes as a file: it begins with no dash, and has no `:=`, which would make it an argument.
+fn not_an_option(path: &Path) -> PathBuf {
+    if path.to_string_lossy().starts_with('-') { Path::new(".").join(path) } else { path.to_owned() }
 }
 
 /// The parts of an expansion besides the file.
@@ -77,7 +102,7 @@ fn expand_with(program: &PathBuf, path: &Path, inputs: Inputs<'_>, limit: Durati
     let output = run(program, path, inputs, limit).map_err(|error| not_started(path, &error.to_string()))?;
     let refused = |message: String| Unexpanded {
         message,
-        help: format!("expand it elsewhere, and name the result: `xacro {shown} > robot.urdf`"),
+        help: format!("expand it elsewhere, and name the result: `{}`", to_copy(path)),
     };
     let Some(output) = output else {
         return Err(refused(format!("xacro did not expand {shown} within {} s", limit.as_secs_f64())));
@@ -91,8 +116,9 @@ fn expand_with(program: &PathBuf, path: &Path, inputs: Inputs<'_>, limit: Durati
         return Err(Unexpanded {
             message: format!("xacro cannot expand {shown}: {}", plain(&said.join("; "))),
             help: format!(
-                "run `xacro {shown}` to see the error; name the folders of the packages that it refers to in \
-                 `package_dirs` of the profile, and its arguments in `xacro_args`"
+                "run `{}` to see the error; name the folders of the packages that it refers to in \
+                 `package_dirs` of the profile, and its arguments in `xacro_args`",
+                words(path, inputs.arguments).iter().collect::<ShellLine>()
             ),
         });
     }
@@ -107,8 +133,13 @@ fn not_started(path: &Path, why: &str) -> Unexpanded {
     let shown = path.display();
     Unexpanded {
         message: format!("cannot start the program `xacro` to expand {shown}: {why}"),
-        help: format!("install it (`pip install xacro`), or expand the file elsewhere: `xacro {shown} > robot.urdf`"),
+        help: format!("install it (`pip install xacro`), or expand the file elsewhere: `{}`", to_copy(path)),
     }
+}
+
+/// The command that expands a file by hand.
+fn to_copy(path: &Path) -> ShellLine {
+    words(path, &[]).iter().collect::<ShellLine>().fixed("> robot.urdf")
 }
 
 /// The output of a program.
@@ -122,7 +153,7 @@ struct Output {
 fn run(program: &PathBuf, path: &Path, inputs: Inputs<'_>, limit: Duration) -> std::io::Result<Option<Output>> {
     let finder = Finder::new()?;
     let mut command = Command::new("/bin/sh");
-    command.args(["-c", GUARDED, "sh"]).arg(program).arg(path).args(inputs.arguments);
+    command.args(["-c", GUARDED, "sh"]).arg(program).args(&words(path, inputs.arguments)[1..]);
     let others = std::env::var_os("PYTHONPATH").filter(|paths| !paths.is_empty());
     let mut paths = finder.0.path().as_os_str().to_owned();
     if let Some(others) = others {
@@ -131,6 +162,8 @@ fn run(program: &PathBuf, path: &Path, inputs: Inputs<'_>, limit: Duration) -> s
     }
     let folders: Vec<String> = inputs.folders.iter().map(|folder| absolute(folder)).collect();
     command.env("PYTHONPATH", paths).env(FOLDERS_VARIABLE, folders.join("\n"));
+    // Compiled modules could not be written.
+    command.env("PYTHONDONTWRITEBYTECODE", "1");
     command.process_group(0).stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
     let mut child = command.spawn()?;
     let received = read_both(&mut child).recv_timeout(limit);
@@ -312,11 +345,12 @@ mod tests {
     fn an_expansion_without_end_is_ended_with_everything_it_started() {
         let folder = tempfile::tempdir().expect("a folder");
         let note = folder.path().join("pids");
-        let script = format!("echo $$ > '{0}'; sleep 1000 & echo $! >> '{0}'; wait", note.display());
+        let script = format!("mkdir '{0}' '{0}'/$$; sleep 1000 & mkdir '{0}'/$!; wait", note.display());
         let fault = expanded(&script, Duration::from_millis(500)).expect_err("it takes too long");
         assert_eq!(fault.message, "xacro did not expand r.urdf.xacro within 0.5 s");
-        let pids = fs::read_to_string(&note).expect("both processes were started");
-        assert_eq!(pids.lines().count(), 2, "{pids}");
+        let names = fs::read_dir(&note).expect("a folder").flatten().map(|entry| entry.file_name());
+        let pids: Vec<String> = names.map(|name| name.to_string_lossy().into_owned()).collect();
+        assert_eq!(pids.len(), 2, "both processes were started: {pids:?}");
         let state = |pid: &str| fs::read_to_string(format!("/proc/{pid}/stat")).unwrap_or_default();
         let is_over = |pid: &str| state(pid).is_empty() || state(pid).contains(") Z ");
         // A signal that was sent may not have been delivered yet.
@@ -326,7 +360,7 @@ mod tests {
                 is_over(pid)
             })
         };
-        assert!(pids.lines().all(ends), "still running: {pids}");
+        assert!(pids.iter().all(|pid| ends(pid)), "still running: {pids:?}");
     }
 
     #[test]

@@ -115,8 +115,21 @@ pub(super) fn damaged_file(dir: &Path, name: &str) -> Diagnostics {
     damaged(dir, &format!("`store/{name}` has changed since it was written"))
 }
 
+/// H006: this process, or the system, has too many open files. Returns `None` if a message has another cause.
+pub(super) fn too_many_files(dir: &Path, message: &str) -> Option<Diagnostics> {
+    if !["Too many open files", "too many open files", "file descriptors"].iter().any(|cause| message.contains(cause)) {
+        return None;
+    }
+    let message = format!("the history `{}` can't be read: too many files are open", dir.display());
+    let help = "allow more, such as with `ulimit -n 1024`, and give the same command again; stored data is complete";
+    Some(Diagnostic::error("H006", message).help(help).into())
+}
+
 /// H007: stored data can't be read any more.
 pub(super) fn damaged(dir: &Path, what: &str) -> Diagnostics {
+    if let Some(fault) = too_many_files(dir, what) {
+        return fault;
+    }
     Diagnostic::error("H007", format!("the history `{}` is damaged: {}", dir.display(), lower(what)))
         .help(
             "`actcheck health --integrity` lists the damage; `actcheck merge --salvage DIR --into NEW` copies all \
@@ -145,6 +158,9 @@ fn failed(dir: &Path, doing: &str, kind: ErrorKind, text: &str) -> Diagnostics {
             "free some space and run again: data stored before is complete; or name another folder with `--history DIR`",
         )
         .into();
+    }
+    if let Some(fault) = too_many_files(dir, text) {
+        return fault;
     }
     if has(&["lock file", "lock hold by"]) {
         return in_use(dir);

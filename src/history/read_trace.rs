@@ -6,6 +6,7 @@ use oxigraph::model::{GraphNameRef, Literal, QuadRef};
 use oxigraph::store::Store;
 
 use crate::detail::Parts;
+use crate::outlines::withheld;
 use crate::read::text_of;
 use crate::statements::iri;
 use crate::write_run::run_node;
@@ -20,13 +21,22 @@ impl History {
     /// # Errors
     /// `H008`: no run has this name. `H009`: the trace file of the run is missing. `H007`: the trace file is damaged.
     pub fn trace(&self, name: &str) -> Result<Trace, Diagnostics> {
+        self.trace_if_allowed(name)?.ok_or_else(|| withheld(name))
+    }
+
+    /// As [`History::trace`], but returns `None` if the run has only an outline and simulating it again would start a
+    /// program without consent.
+    ///
+    /// # Errors
+    /// As [`History::trace`].
+    pub fn trace_if_allowed(&self, name: &str) -> Result<Option<Trace>, Diagnostics> {
         let id = self.resolve(name)?;
         if self.is_outline(&id)? {
+            let Some((choices, trace)) = self.restored(&id)? else { return Ok(None) };
             // With the precision of a stored trace.
-            let (choices, trace) = self.restored(&id)?;
-            return Ok(self.encoded_again(&id, &choices, &trace, trace_file::decode)?.1);
+            return Ok(Some(self.encoded_again(&id, &choices, &trace, trace_file::decode)?.1));
         }
-        Ok(self.traced(&id, trace_file::decode)?.1)
+        Ok(Some(self.traced(&id, trace_file::decode)?.1))
     }
 
     /// Returns the trace of a run, named as in [`History::resolve`], with the samples of its actions but without the
@@ -35,15 +45,17 @@ impl History {
     /// # Errors
     /// As [`History::trace`].
     pub fn sampled(&self, name: &str) -> Result<Trace, Diagnostics> {
-        self.sampled_of(&self.resolve(name)?)
+        let id = self.resolve(name)?;
+        self.sampled_of(&id)?.ok_or_else(|| withheld(&id))
     }
 
-    fn sampled_of(&self, id: &str) -> Result<Trace, Diagnostics> {
+    /// `None`: only an outline is kept, and simulating it again would start a program without consent.
+    fn sampled_of(&self, id: &str) -> Result<Option<Trace>, Diagnostics> {
         if self.is_outline(id)? {
-            let (choices, trace) = self.restored(id)?;
-            return Ok(self.encoded_again(id, &choices, &trace, trace_file::decode_sampled)?.1);
+            let Some((choices, trace)) = self.restored(id)? else { return Ok(None) };
+            return Ok(Some(self.encoded_again(id, &choices, &trace, trace_file::decode_sampled)?.1));
         }
-        Ok(self.traced(id, trace_file::decode_sampled)?.1)
+        Ok(Some(self.traced(id, trace_file::decode_sampled)?.1))
     }
 
     /// Returns the trace of a run of a list without the motion of its bodies, and with the samples of its actions if
@@ -53,7 +65,7 @@ impl History {
     /// As [`History::trace`].
     pub fn trace_of(&self, run: &RunRow, course: bool) -> Result<Trace, Diagnostics> {
         if course {
-            return self.sampled_of(&run.run);
+            return self.sampled_of(&run.run)?.ok_or_else(|| withheld(&run.run));
         }
         self.states_of(&run.run)
     }
@@ -106,6 +118,17 @@ impl History {
         Ok(Self::facts_of(&if course { self.sampled(name)? } else { self.states(name)? }))
     }
 
+    /// As [`History::facts`], but without the quantities over time if the run has only an outline and simulating it again
+    /// would start a program without consent.
+    ///
+    /// # Errors
+    /// As [`History::trace`].
+    pub fn allowed_facts(&self, name: &str, course: bool) -> Result<RunFacts, Diagnostics> {
+        let id = self.resolve(name)?;
+        let sampled = if course { self.sampled_of(&id)? } else { None };
+        Ok(Self::facts_of(&sampled.map_or_else(|| self.states_of(&id), Ok)?))
+    }
+
     /// Returns the facts of a trace: the same as during the run.
     pub fn facts_of(trace: &Trace) -> RunFacts {
         extract(trace)
@@ -156,8 +179,12 @@ impl History {
     ) -> Result<T, Diagnostics> {
         let file = self.folder.trace(id);
         let bytes = folder::read(&file).map_err(|error| {
+            if let Some(fault) = fault::too_many_files(self.dir(), &error.to_string()) {
+                return fault;
+            }
             Diagnostic::error("H009", format!("the trace of run {id} can't be read from `{}`: {error}", file.display()))
                 .help("restore the file from a backup; the store's data on the run is intact")
+                .into()
         })?;
         decode(&bytes).map_err(|why| fault::damaged(self.dir(), &format!("the trace of run {id}: {why}")))
     }

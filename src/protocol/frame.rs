@@ -118,7 +118,7 @@ impl Wire {
             }
         }
         if filled > needed {
-            return Err(broke("it sent more than one message at a time: it has to wait for each answer".to_owned()));
+            return Err(out_of_turn());
         }
         Ok(HEADER..needed)
     }
@@ -179,6 +179,11 @@ fn payload_length(incoming: &[u8]) -> Result<usize, ExternalFault> {
         return Err(broke(format!("it sent a message of {length} bytes; the limit is {FROM_PROGRAM_LIMIT}")));
     }
     Ok(length)
+}
+
+/// The fault of a message out of turn.
+pub fn out_of_turn() -> ExternalFault {
+    broke("it sent more than one message at a time: it has to wait for each answer".to_owned())
 }
 
 fn broke(reason: String) -> ExternalFault {

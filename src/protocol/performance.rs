@@ -82,6 +82,13 @@ impl<'a> Performance<'a> {
         Ok(worker.session.insert(session))
     }
 
+    /// Starts the program if it is not running, and begins the run with it.
+    fn reset(&mut self, world: &World) -> Result<(), ExternalFault> {
+        let RunName { run, index, seed } = self.run.clone();
+        let stop = Arc::clone(&self.stop);
+        self.started(world).and_then(|session| session.reset(&ToProgram::Reset { run: &run, index, seed }, &stop))
+    }
+
     /// Ends the program because of a fault of its own.
     fn give_up(&mut self, fault: ExternalFault) -> ExternalFault {
         if let Some(mut session) = self.lent.worker.session.take() {
@@ -107,12 +114,17 @@ impl<'a> Performance<'a> {
 
 impl ExternalSkill for Performance<'_> {
     fn begin_run(&mut self, world: &World) -> Result<(), ExternalFault> {
-        let RunName { run, index, seed } = self.run.clone();
-        let stop = Arc::clone(&self.stop);
-        let begun =
-            self.started(world).and_then(|session| session.reset(&ToProgram::Reset { run: &run, index, seed }, &stop));
+        let is_reused = self.lent.worker.session.as_ref().is_some_and(|session| session.idle);
+        let mut begun = self.reset(world);
+        let is_stopped = self.stop.load(Ordering::Relaxed);
+        // A program that was ready at the end of its last run and is gone now belongs to no run. If its fault comes from this
+        // run, a new program shows it again.
+        if is_reused && !is_stopped && begun.as_ref().is_err_and(|fault| !fault.late) {
+            self.lent.worker.session.take().map(Session::end);
+            begun = self.reset(world);
+        }
         // A stop ends the wait; the program is not at fault.
-        self.stopped |= begun.is_err() && stop.load(Ordering::Relaxed);
+        self.stopped |= begun.is_err() && self.stop.load(Ordering::Relaxed);
         begun.map_err(|fault| self.give_up(fault))
     }
 
@@ -145,6 +157,24 @@ impl ExternalSkill for Performance<'_> {
                     session.idle = !session.lost;
                 }
                 other
+            }
+        }
+    }
+
+    fn end_run(&mut self, is_decided: bool) -> Result<(), ExternalFault> {
+        let stop = Arc::clone(&self.stop);
+        let RunName { run, index, seed } = self.run.clone();
+        let session = self.lent.worker.session.as_mut().filter(|session| session.idle);
+        let Some(session) = session.filter(|_| !stop.load(Ordering::Relaxed)) else { return Ok(()) };
+        let ready = session.check_ready(&ToProgram::Reset { run: &run, index, seed }, is_decided, &stop);
+        match ready {
+            Err(_) if is_decided => {
+                self.lent.worker.session.take().map(Session::end);
+                Ok(())
+            }
+            ready => {
+                self.stopped |= ready.is_err() && stop.load(Ordering::Relaxed);
+                ready.map_err(|fault| self.give_up(fault))
             }
         }
     }

@@ -1,5 +1,6 @@
 //! A program as a process: its socket, its limits, and the termination of it and all its descendants.
 
+use std::collections::BTreeMap;
 use std::fs::{self, DirBuilder};
 use std::io::ErrorKind;
 use std::os::unix::fs::DirBuilderExt;
@@ -22,6 +23,9 @@ use actcheck_config::Skill;
 const POLL: Duration = Duration::from_millis(5);
 /// Grace period for a process that should exit, in steps of [`POLL`]: one second.
 const GRACE_POLLS: u32 = 200;
+/// Longest path of the folder of temporary files in which a socket can be: the whole path of a socket has at most 107 bytes,
+/// and on some systems 103. Unit: bytes.
+const LONGEST_BASE: usize = 60;
 /// Number of passes that kill escaped processes, in case they start others meanwhile.
 const SWEEPS: usize = 10;
 
@@ -45,6 +49,8 @@ pub struct Process {
     pub output: Output,
     /// Whether the process was ended, so that its id may be reused.
     over: bool,
+    /// Its descendants when they were last looked for, by their ids, with their start times.
+    descendants: BTreeMap<i32, String>,
 }
 
 impl Process {
@@ -84,9 +90,16 @@ impl Process {
         drop(command);
         let output = Output::read(reader);
         match guard(&child, folder) {
-            Ok(guard) => {
-                Ok(Self { child, guard, folder: folder.to_path_buf(), address, listener, output, over: false })
-            }
+            Ok(guard) => Ok(Self {
+                child,
+                guard,
+                folder: folder.to_path_buf(),
+                address,
+                listener,
+                output,
+                over: false,
+                descendants: BTreeMap::new(),
+            }),
             Err(error) => {
                 // It may already have exited.
                 let _ = child.kill();
@@ -160,16 +173,37 @@ impl Process {
         self.ends_within(GRACE_POLLS);
     }
 
+    /// Looks for its descendants: once it has ended, those that left its group and its environment can't be found.
+    pub fn notice_descendants(&mut self) {
+        let Ok(leader) = i32::try_from(self.child.id()) else { return };
+        let mut parents: Vec<i32> = self.descendants.keys().copied().chain([leader]).collect();
+        while let Some(parent) = parents.pop() {
+            for child in children_of(parent) {
+                if let (Some(started), false) = (start_time(child), self.descendants.contains_key(&child)) {
+                    self.descendants.insert(child, started);
+                    parents.push(child);
+                }
+            }
+        }
+    }
+
     /// Kills the process and all its descendants. Returns the last lines of its output.
     pub fn end(&mut self) -> Vec<String> {
         if std::mem::replace(&mut self.over, true) {
             return Vec::new();
         }
+        self.notice_descendants();
         if let Ok(leader) = i32::try_from(self.child.id()) {
             // The group may already be empty.
             let _ = killpg(Pid::from_raw(leader), Signal::SIGKILL);
         }
         let _ = self.child.wait();
+        for (pid, started) in std::mem::take(&mut self.descendants) {
+            // Its id may belong to another process by now.
+            if start_time(pid).as_ref() == Some(&started) {
+                let _ = kill(Pid::from_raw(pid), Signal::SIGKILL);
+            }
+        }
         sweep(&self.address);
         let _ = self.guard.kill();
         let _ = self.guard.wait();
@@ -206,14 +240,31 @@ fn guard(child: &Child, folder: &Path) -> std::io::Result<Child> {
     command.process_group(0).stdin(Stdio::piped()).stdout(Stdio::null()).stderr(Stdio::null()).spawn()
 }
 
-/// Longest folder of temporary files: the address of a socket has at most about 100 bytes. Unit: bytes.
-const LONGEST_BASE: usize = 60;
+/// Ids of the children of a process; none where the system has no such list.
+fn children_of(pid: i32) -> Vec<i32> {
+    let threads = fs::read_dir(format!("/proc/{pid}/task")).into_iter().flatten().flatten();
+    let lists = threads.filter_map(|thread| fs::read_to_string(thread.path().join("children")).ok());
+    lists.flat_map(|list| list.split_whitespace().filter_map(|id| id.parse().ok()).collect::<Vec<i32>>()).collect()
+}
+
+/// When a process started, in the system's unit; `None` if it has ended.
+fn start_time(pid: i32) -> Option<String> {
+    let stat = fs::read_to_string(format!("/proc/{pid}/stat")).ok()?;
+    // The name before it may have spaces and brackets.
+    let (_, rest) = stat.rsplit_once(')')?;
+    rest.split_whitespace().nth(19).map(str::to_owned)
+}
+
+/// The folder of temporary files, unless a socket in it would have a path that is too long.
+fn base_of_sockets() -> PathBuf {
+    let base = std::env::temp_dir();
+    if base.as_os_str().len() <= LONGEST_BASE { base } else { PathBuf::from("/tmp") }
+}
 
 /// Creates a new folder that only this user can access.
 fn private_folder() -> std::io::Result<PathBuf> {
     static NUMBER: AtomicU64 = AtomicU64::new(0);
-    let base = Some(std::env::temp_dir()).filter(|base| base.as_os_str().len() <= LONGEST_BASE);
-    let base = base.unwrap_or_else(|| PathBuf::from("/tmp"));
+    let base = base_of_sockets();
     loop {
         let number = NUMBER.fetch_add(1, Ordering::Relaxed);
         let folder = base.join(format!("actcheck-{}-{number}", std::process::id()));

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::ops::Range;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use crate::frame::Wire;
+use crate::frame::{Wire, out_of_turn};
 use crate::hello::{Joints, introduction};
 use crate::message::{Hello, PROTOCOL, Plain, ToProgram, kind_of, parse};
 use crate::process::Process;
@@ -132,6 +132,35 @@ impl Session {
         parse("ready", message).map(|Plain { .. }| ())
     }
 
+    /// Checks after the last action of a run that the program is ready for another run, by the same `reset` once more: it may
+    /// have exited, or sent a message out of turn, at any time after its `end`. `hurried`: waits only briefly.
+    ///
+    /// # Errors
+    /// A fault of the program, or `stop` is set.
+    pub fn check_ready(
+        &mut self,
+        reset: &ToProgram<'_>,
+        hurried: bool,
+        stop: &AtomicBool,
+    ) -> Result<(), ExternalFault> {
+        let patience_secs = self.timeout_secs;
+        self.timeout_secs = if hurried { patience_secs.min(HURRIED_SECS) } else { patience_secs };
+        self.process.notice_descendants();
+        let ready = self.reset_again(reset, stop);
+        self.timeout_secs = patience_secs;
+        ready
+    }
+
+    fn reset_again(&mut self, reset: &ToProgram<'_>, stop: &AtomicBool) -> Result<(), ExternalFault> {
+        self.send(reset, &[])?;
+        let range = self.wait(&|| stop.load(Ordering::Relaxed))?;
+        let message = self.wire.payload(range);
+        if kind_of(message)? != "ready" {
+            return Err(out_of_turn());
+        }
+        parse("ready", message).map(|Plain { .. }| ())
+    }
+
     /// Notifies the program that its action is over, and waits for the acknowledgement: only briefly if `hurried`,
     /// because the time of the run is over.
     ///
@@ -210,6 +239,7 @@ impl Session {
 
     /// Asks the program to exit, waits briefly, and ends it.
     pub fn bye(mut self) {
+        self.process.notice_descendants();
         if self.idle && self.wire.send(&ToProgram::Bye, &[], REFUSAL_SECS).is_ok() {
             self.process.let_end();
         }
@@ -217,7 +247,7 @@ impl Session {
     }
 }
 
-/// Time limit for the acknowledgement that an action is over, if the time of its run is. Unit: seconds.
+/// Time limit for an answer if the time of the run is over. Unit: seconds.
 const HURRIED_SECS: f64 = 1.0;
 /// Time limit for delivering a fault notification. Unit: seconds.
 const REFUSAL_SECS: f64 = 0.2;

@@ -9,7 +9,7 @@ use ureq::{Agent, AsSendBody};
 
 use crate::fault::Fault;
 use crate::response::Response;
-use crate::retry::{is_temporary, wait_after};
+use crate::retry::{LONGEST_ASKED, is_temporary, wait_after};
 use crate::{Address, Credentials};
 
 /// Longest time in which a connection is opened.
@@ -92,7 +92,7 @@ impl Client {
     }
 
     fn retried<T>(&self, request: &Request<'_>, read: impl Fn(Response) -> Result<T, Fault>) -> Result<T, Fault> {
-        let mut tries = 0;
+        let (mut tries, mut waited) = (0, Duration::ZERO);
         loop {
             if self.is_stopped() {
                 return Err(Fault::Stopped);
@@ -112,8 +112,10 @@ impl Client {
                 Fault::Refused { status, retry_after, .. } if is_temporary(*status) => wait_after(tries, *retry_after),
                 _ => None,
             };
+            let wait = wait.filter(|wait| waited + *wait <= LONGEST_ASKED);
             let Some(wait) = wait else { return Err(fault.after(tries)) };
             self.wait(wait)?;
+            waited += wait;
         }
     }
 

@@ -211,6 +211,7 @@ impl App {
             async move { Ok::<_, Infallible>(app.respond(request, doing).await) }
         });
         let mut server = http1::Builder::new();
+        server.auto_date_header(has_date());
         server.timer(TokioTimer::new()).header_read_timeout(PATIENCE).max_buf_size(MOST_HEAD);
         // The error is the client's: it sent no HTTP, was too slow, or has gone away.
         let _ = server.serve_connection(TokioIo::new(stream), service).await;
@@ -310,4 +311,11 @@ impl App {
 
 fn memory_units(bytes: u64) -> u64 {
     bytes.div_ceil(MEMORY_UNIT)
+}
+
+/// Whether the clock shows a time that the header `Date` can have: the library panics before 1970 and after 9999.
+fn has_date() -> bool {
+    const YEAR_10000_SECS: u64 = 253_402_300_800;
+    let since = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH);
+    since.is_ok_and(|since| since.as_secs() < YEAR_10000_SECS - 86_400)
 }

@@ -41,6 +41,8 @@ pub struct Dataset {
     pub runs: usize,
     /// Number of runs whose traces lack the robot's motion, because an earlier version stored them.
     pub without_course: usize,
+    /// Number of runs without motion, because simulating them again would start a program without consent.
+    pub withheld: usize,
     /// Paths of the tables with their numbers of rows.
     pub tables: Vec<(PathBuf, usize)>,
     /// Path of the description of the columns.
@@ -69,11 +71,14 @@ pub fn export_dataset(runs: &DatasetRuns<'_>, folder: &Path, with_course: bool) 
     let further = course::COURSE.into_iter().filter(|_| with_course);
     let tables: Vec<&TableSpec> = FACTS.into_iter().chain(COURSES).chain(further).collect();
     export(runs, &tables, folder, |run, sheets| {
-        let trace = runs.history.trace(&run.row.run)?;
+        let Some(trace) = runs.history.trace_if_allowed(&run.row.run)? else {
+            return add_facts(runs, run, sheets).map(|()| Motion::Withheld);
+        };
         source::add(run, &trace, sheets);
         fact_source::add(run, &trace, runs.hierarchy, sheets);
         let any = source::add_courses(&run.row.run, &trace, sheets);
-        Ok((!with_course || course::add(&run.row.run, &trace, sheets)) && any)
+        let is_whole = (!with_course || course::add(&run.row.run, &trace, sheets)) && any;
+        Ok(if is_whole { Motion::Written } else { Motion::Unrecorded })
     })
 }
 
@@ -82,20 +87,33 @@ pub fn export_dataset(runs: &DatasetRuns<'_>, folder: &Path, with_course: bool) 
 /// # Errors
 /// As [`export_dataset`].
 pub fn export_facts(runs: &DatasetRuns<'_>, folder: &Path) -> Result<Dataset, Diagnostics> {
-    export(runs, &FACTS, folder, |run, sheets| {
-        let trace = runs.history.states(&run.row.run)?;
-        source::add(run, &trace, sheets);
-        fact_source::add(run, &trace, runs.hierarchy, sheets);
-        Ok(true)
-    })
+    export(runs, &FACTS, folder, |run, sheets| add_facts(runs, run, sheets).map(|()| Motion::Written))
 }
 
-/// Writes tables whose rows come from `add`, which returns `false` for a run without motion.
+/// Adds the tables of a run that need no motion.
+fn add_facts(runs: &DatasetRuns<'_>, run: &RunDetail, sheets: &mut Sheets) -> Result<(), Diagnostics> {
+    let trace = runs.history.states(&run.row.run)?;
+    source::add(run, &trace, sheets);
+    fact_source::add(run, &trace, runs.hierarchy, sheets);
+    Ok(())
+}
+
+/// Whether a run's motion is in the dataset, if tables of motion were asked for.
+enum Motion {
+    /// It is.
+    Written,
+    /// The trace has none: an earlier version stored it.
+    Unrecorded,
+    /// Simulating it again would start a program without consent.
+    Withheld,
+}
+
+/// Writes tables whose rows come from `add`.
 fn export(
     runs: &DatasetRuns<'_>,
     tables: &[&TableSpec],
     folder: &Path,
-    mut add: impl FnMut(&RunDetail, &mut Sheets) -> Result<bool, Diagnostics>,
+    mut add: impl FnMut(&RunDetail, &mut Sheets) -> Result<Motion, Diagnostics>,
 ) -> Result<Dataset, Diagnostics> {
     let outcomes = pending_parquet(runs.mirror, runs.filter, runs.hierarchy, folder)?;
     let mut dataset = Dataset { schema: folder.join("schema.json"), ..Dataset::default() };
@@ -107,7 +125,11 @@ fn export(
                 continue;
             }
             dataset.runs += 1;
-            dataset.without_course += usize::from(!add(&detail, &mut sheets)?);
+            match add(&detail, &mut sheets)? {
+                Motion::Written => {}
+                Motion::Unrecorded => dataset.without_course += 1,
+                Motion::Withheld => dataset.withheld += 1,
+            }
             sheets.make_room()?;
         }
     }

@@ -67,7 +67,7 @@ impl<'a> Ends<'a> {
                 text::count(self.flips.len(), "outcome differs", "outcomes differ"),
                 text::count(good.len(), "run", "runs")
             ),
-            By::Rate => text::rates(&comparison, |line| line.answer(LEVEL, 0.0) == Answer::Worse),
+            By::Rate => text::rates(&comparison, |line| comparison.answer_of(line, LEVEL, 0.0) == Answer::Worse),
         }
     }
 
@@ -114,7 +114,9 @@ impl<'a> Ends<'a> {
                 } else {
                     let ends = compare(&good, &bad, Sampling::Fixed);
                     let worse = |of: &Compared| {
-                        ends.lines.iter().any(|line| line.of == *of && line.answer(LEVEL, args.margin) == Answer::Worse)
+                        ends.lines
+                            .iter()
+                            .any(|line| line.of == *of && ends.answer_of(line, LEVEL, args.margin) == Answer::Worse)
                     };
                     text::rates(&compare(&good, runs, Sampling::Fixed), |line| worse(&line.of))
                 };

@@ -68,8 +68,8 @@ pub struct BisectArgs {
     /// The ontology with the rules that judge stored runs, in each revision
     #[arg(long, value_name = "FILE", default_value = "ontology/actions.ttl", conflicts_with = "config")]
     pub ontology: PathBuf,
-    /// Start the program that a case names; only for cases that you trust
-    #[arg(long, requires = "config")]
+    /// Start the program that a case or a history names; only for those that you trust
+    #[arg(long)]
     pub trust: bool,
     /// Number of workers; does not affect results [default: all cores]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]

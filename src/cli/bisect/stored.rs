@@ -9,8 +9,8 @@ use super::BisectArgs;
 use super::judge::{Judged, Unjudged, explain};
 use super::repository::Repository;
 use super::versions::Version;
-use crate::history_dir;
 use crate::work::all_cores;
+use crate::{history_dir, restore};
 use actcheck_analysis::Compared;
 use actcheck_base::{Diagnostic, Diagnostics, Files};
 use actcheck_campaign::{RuleSet, judge_stored};
@@ -33,6 +33,7 @@ impl<'a> Stored<'a> {
     /// Reads the runs of a history, or those that the arguments name.
     pub fn open(args: &BisectArgs, repository: &'a Repository, stop: &'a Arc<AtomicBool>) -> Result<Self, Diagnostics> {
         let history = history_dir::open_to_read(&args.history)?;
+        restore::allow(&history, args.trust);
         let named: Vec<String> = args.runs.iter().map(|name| history.resolve(name)).collect::<Result<_, _>>()?;
         let mut rows = history.runs(&RunFilter::default())?;
         rows.retain(|row| named.is_empty() || named.contains(&row.run));

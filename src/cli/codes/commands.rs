@@ -221,7 +221,7 @@ const CODES_X: &[Code] = &[
         "X059",
         "a case or a history would start a program without consent",
         "it comes from someone else, or the campaign's own program has changed since",
-        "read the program, then run again with `--trust`; or remove the case",
+        "read the program, then give the command again with `--trust`; or remove the case",
     ),
     code("X060", "git can't be started, or failed", "git is not installed", "install git, or use `bisect --programs`"),
     code(
@@ -337,6 +337,12 @@ const CODES_X: &[Code] = &[
         "the program of a shard is not that of its launch",
         "a node or an image has another version of actcheck, which could give other results",
         "use the same program everywhere, or remove the folder of the launch and launch again",
+    ),
+    code(
+        "X083",
+        "a shard has no runs",
+        "the campaign is divided into more shards than it has runs",
+        "divide it into fewer shards, or let it have more runs",
     ),
     code(
         "X090",

@@ -39,8 +39,8 @@ const CODES_H: &[Code] = &[
     code(
         "H006",
         "reading or writing a file of the history failed",
-        "the disk has a fault",
-        "check the disk and run again; stored data is complete",
+        "the disk has a fault, or too many files are open",
+        "check the disk, or raise the limit with `ulimit -n`, and run again; stored data is complete",
     ),
     code(
         "H007",

@@ -44,6 +44,12 @@ const CODES_W: &[Code] = &[
         "add the folder of the package to `package_dirs`",
     ),
     code(
+        "W013",
+        "an argument for a xacro file is not of the form NAME:=VALUE",
+        "it is an option of the program xacro, which could write files",
+        "write `xacro_args = [\"arm:=left\"]`; expand the file by hand if it needs more",
+    ),
+    code(
         "W020",
         "the URDF of the robot can't be used",
         "the file is not a URDF file with one tree of links",

@@ -7,10 +7,10 @@ use std::time::{Duration, Instant};
 use crate::launch::lost::lost;
 use crate::launch::plan::Plan;
 use crate::launch::record::Record;
-use crate::launch::scheduler::{Job, Look, Place, Scheduler, shell_line};
+use crate::launch::scheduler::{Job, Look, Place, Scheduler};
 use crate::output;
 use crate::progress::Progress;
-use actcheck_base::{Diagnostic, Diagnostics};
+use actcheck_base::{Diagnostic, Diagnostics, ShellLine};
 
 /// Interval between checks for Ctrl-C.
 const TICK: Duration = Duration::from_millis(100);
@@ -259,6 +259,6 @@ pub(super) fn dry_run(plan: &Plan, place: &Place, scheduler: &dyn Scheduler) -> 
     let job = Job { plan, name: Record::name(plan, round), shards: plan.missing(), place };
     let files = scheduler.files(&job).into_iter();
     let files = files.map(|(name, text)| format!("# {}\n{text}", plan.folder.join(name).display()));
-    let command = format!("# submitted with\n{}\n", shell_line(&scheduler.command(&job)));
+    let command = format!("# submitted with\n{}\n", scheduler.command(&job).iter().collect::<ShellLine>());
     files.collect::<String>() + &command
 }

@@ -6,8 +6,8 @@ use serde_json::{Value, json};
 
 use crate::launch::args::On;
 use crate::launch::plan::Plan;
-use crate::launch::scheduler::{Job, Look, Place, Scheduler, ask, quoted, refused, words_of};
-use actcheck_base::{Diagnostic, Diagnostics};
+use crate::launch::scheduler::{Job, Look, Place, Scheduler, ask, refused, words_of};
+use actcheck_base::{Diagnostic, Diagnostics, ShellLine};
 
 /// Name of the manifest in the folder of the launch.
 pub(super) const MANIFEST: &str = "kubernetes.json";
@@ -129,7 +129,7 @@ impl Kubernetes {
 
     /// Runs the shard of an index. The process gets the signals to the pod.
     fn script(&self, job: &Job<'_>) -> String {
-        let folder = quoted(&job.plan.folder.display().to_string());
+        let folder = ShellLine::default().in_script(&job.plan.folder);
         let is_whole = job.shards.len() as u64 == job.plan.shards;
         let number = match is_whole {
             true => "n=$((JOB_COMPLETION_INDEX + 1))".to_owned(),
@@ -138,7 +138,8 @@ impl Kubernetes {
                 format!("set -- {}; shift \"$JOB_COMPLETION_INDEX\"; n=$1", shards.join(" "))
             }
         };
-        format!("{number}; exec {} launch-task {folder} \"$n\" >> {folder}/logs/\"$n\".log 2>&1", quoted(&self.program))
+        let program = ShellLine::default().in_script(&self.program);
+        format!("{number}; exec {program} launch-task {folder} \"$n\" >> {folder}/logs/\"$n\".log 2>&1")
     }
 
     fn kubectl(&self, words: &[&str]) -> Vec<String> {

@@ -13,7 +13,7 @@ use serde_json::{Value, json};
 use crate::clock;
 use crate::launch::{LaunchArgs, kubernetes, ray, slurm};
 use crate::run_args::RunArgs;
-use actcheck_base::{Below, Diagnostic, Diagnostics, FileKind, Shard, digest_of, program_digest};
+use actcheck_base::{Below, Diagnostic, Diagnostics, FileKind, Shard, ShellLine, digest_of, program_digest};
 use actcheck_campaign::Env;
 use actcheck_history::History;
 
@@ -355,7 +355,8 @@ impl Plan {
 
     /// The commands of the shards.
     pub fn commands(&self) -> String {
-        let of = |number| format!("actcheck launch-task {} {number}\n", self.folder.display());
+        let task = ShellLine::default().fixed("actcheck launch-task").file(&self.folder);
+        let of = |number| format!("{task} {number}\n");
         (1..=self.shards).map(of).collect()
     }
 }

@@ -6,8 +6,8 @@ use std::fmt::Write as _;
 use crate::launch::args::On;
 use crate::launch::plan::Plan;
 use crate::launch::resources::Resources;
-use crate::launch::scheduler::{Job, Look, Place, Scheduler, ask, quoted, refused, words_of};
-use actcheck_base::{Diagnostic, Diagnostics};
+use crate::launch::scheduler::{Job, Look, Place, Scheduler, ask, refused, words_of};
+use actcheck_base::{Diagnostic, Diagnostics, ShellLine};
 
 /// Name of the script in the folder of the launch.
 pub(super) const SCRIPT: &str = "slurm.sh";
@@ -66,8 +66,7 @@ impl Scheduler for Slurm {
     }
 
     fn files(&self, job: &Job<'_>) -> Vec<(&'static str, String)> {
-        let program = quoted(&self.program);
-        let folder = quoted(&job.plan.folder.display().to_string());
+        let task = ShellLine::default().in_script(&self.program).fixed("launch-task").in_script(&job.plan.folder);
         let mut text = format!("#!/bin/sh\n{}", Self::directives(job));
         // A requeue delays a task by two minutes, so it is first tried again here.
         let _ = write!(
@@ -75,7 +74,7 @@ impl Scheduler for Slurm {
             "# A task that ends early is started again, and resumes its shard. Exit code 2 is a fault that would come again.\n\
              try=1\n\
              while :; do\n\
-             \x20   {program} launch-task {folder} \"$SLURM_ARRAY_TASK_ID\"\n\
+             \x20   {task} \"$SLURM_ARRAY_TASK_ID\"\n\
              \x20   code=$?\n\
              \x20   case $code in 0 | 2) exit $code ;; esac\n\
              \x20   [ $try -lt {tries} ] || exit $code\n\

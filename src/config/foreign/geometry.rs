@@ -78,6 +78,13 @@ impl<'a> Shapes<'a> {
                 self.digest.update(&file.bytes);
                 reader.found.extend(file.warnings);
                 let mesh = file.mesh.scaled(scale);
+                let longest = mesh.vertices.iter().flatten().fold(0.0_f64, |most, along| most.max(along.abs()));
+                if longest > xml::LONGEST {
+                    let message =
+                        format!("the mesh reaches {longest:.0} m from its origin, which is beyond {} m", xml::LONGEST);
+                    reader.error("W034", node, message, "lengths are in metres: write `scale` 0.001 for millimetres");
+                    return None;
+                }
                 // With the backs of its faces, a mesh has no volume.
                 let mesh = if mesh.volume() > LEAST_VOLUME { mesh } else { mesh.one_sided() };
                 Some(Shape::Mesh { mesh })
@@ -120,12 +127,12 @@ fn primitive<'n>(
 ) -> Option<Shape> {
     let number = |reader: &mut Reader, name: &str| {
         let (node, text) = written(name, reader)?;
-        reader.numbers::<1>(node, text, Bound::Positive).map(|[number]| number)
+        reader.numbers::<1>(node, text, Bound::Length).map(|[number]| number)
     };
     match kind.tag_name().name() {
         "box" => {
             let (node, text) = written("size", reader)?;
-            Some(Shape::Box { size: reader.numbers(node, text, Bound::Positive)? })
+            Some(Shape::Box { size: reader.numbers(node, text, Bound::Length)? })
         }
         "cylinder" => {
             let (radius, length) = (number(reader, "radius"), number(reader, "length"));
@@ -138,7 +145,7 @@ fn primitive<'n>(
         "sphere" => Some(Shape::Sphere { radius: number(reader, "radius")? }),
         "ellipsoid" => {
             let (node, text) = written("radii", reader)?;
-            Some(Shape::Mesh { mesh: ellipsoid(reader.numbers(node, text, Bound::Positive)?)? })
+            Some(Shape::Mesh { mesh: ellipsoid(reader.numbers(node, text, Bound::Length)?)? })
         }
         "cone" => {
             let (radius, length) = (number(reader, "radius"), number(reader, "length"));

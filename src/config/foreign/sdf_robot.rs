@@ -145,7 +145,7 @@ fn shape(geometry: Node, reader: &mut Reader) -> Option<String> {
     };
     let mut number = |name: &str| {
         let node = reader.required(kind, name)?;
-        reader.number(node, Bound::Positive)
+        reader.number(node, Bound::Length)
     };
     Some(match kind.tag_name().name() {
         "sphere" => format!("<sphere radius=\"{}\"/>", number("radius")?),
@@ -154,12 +154,12 @@ fn shape(geometry: Node, reader: &mut Reader) -> Option<String> {
         }
         "box" => {
             let size = reader.required(kind, "size")?;
-            let [x, y, z] = reader.numbers(size, xml::text(size), Bound::Positive)?;
+            let [x, y, z] = reader.numbers(size, xml::text(size), Bound::Length)?;
             format!("<box size=\"{x} {y} {z}\"/>")
         }
         "ellipsoid" => {
             let radii = reader.required(kind, "radii")?;
-            let [x, y, z] = reader.numbers(radii, xml::text(radii), Bound::Positive)?.map(|radius| 2.0 * radius);
+            let [x, y, z] = reader.numbers(radii, xml::text(radii), Bound::Length)?.map(|radius| 2.0 * radius);
             format!("<box size=\"{x} {y} {z}\"/>")
         }
         "mesh" => {

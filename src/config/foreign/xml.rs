@@ -21,15 +21,19 @@ pub(crate) type Node<'a> = roxmltree::Node<'a, 'a>;
 pub(crate) enum Bound {
     Finite,
     NotNegative,
-    /// A mass, or a length of a body: see [`LARGEST`].
+    /// A mass, or a side of the ground: see [`LARGEST`].
     Positive,
+    /// A length of a body: see [`LONGEST`].
+    Length,
     /// A mass that may be missing: 0 or as [`Bound::Positive`].
     Mass,
 }
 
-/// Largest mass and largest length of a body: no scene of a robot has a thousand tonnes or a thousand kilometres, and the
-/// physics engine can't calculate with much larger numbers. Units: kilograms, metres.
+/// Largest mass of a body and largest side of the ground: no scene of a robot has a thousand tonnes or a thousand kilometres,
+/// and the physics engine can't calculate with much larger numbers. Units: kilograms, metres.
 const LARGEST: f64 = 1e6;
+/// Largest length of a body: a larger one is most likely in millimetres. Unit: metres.
+pub(crate) const LONGEST: f64 = 1e3;
 
 impl Bound {
     fn holds(self, number: f64) -> bool {
@@ -38,6 +42,7 @@ impl Bound {
                 Self::Finite => true,
                 Self::NotNegative => number >= 0.0,
                 Self::Positive => number > 0.0 && number <= LARGEST,
+                Self::Length => number > 0.0 && number <= LONGEST,
                 Self::Mass => (0.0..=LARGEST).contains(&number),
             }
     }
@@ -47,6 +52,7 @@ impl Bound {
             Self::Finite => "finite",
             Self::NotNegative => "at least 0",
             Self::Positive => "above 0 and at most 1000000",
+            Self::Length => "above 0 and at most 1000 (metres)",
             Self::Mass => "at least 0 and at most 1000000",
         }
     }

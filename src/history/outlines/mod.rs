@@ -23,6 +23,7 @@ mod view;
 pub(super) use file::Outline;
 pub(super) use loaded::LoadedFiles;
 pub use restore::Restore;
+pub(crate) use restore::withheld;
 pub(super) use row::Outlined;
 pub(super) use sheets::SheetFile;
 pub(super) use shelf::Shelf;

@@ -140,7 +140,12 @@ impl Native {
         };
         let boolean = |value: Option<bool>| value.map(Cell::Boolean);
         Ok(match self {
-            Self::Place(place) => rows.cell(*place, row),
+            Self::Place(place) => match rows.cell(*place, row) {
+                None if rows.is_bound(*place, row) => {
+                    return unfit("outcomes and their results as values (they are blank nodes)");
+                }
+                cell => cell,
+            },
             Self::Constant(value) => Some(Cell::of(value)),
             Self::Counts(place) => rows.counts(*place, row)?.map(Cell::Boolean),
             Self::Bound(place) => Some(Cell::Boolean(rows.is_bound(*place, row))),

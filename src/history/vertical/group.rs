@@ -63,7 +63,10 @@ impl Rewriter<'_> {
                         _ => None,
                     };
                     match kind {
-                        Some(kind) => need.asked.push(Asked { id, kind, expression: expr.clone() }),
+                        Some(kind) => {
+                            let expression = if kind == Kind::Count { if_bound(expr) } else { expr.clone() };
+                            need.asked.push(Asked { id, kind, expression });
+                        }
                         None => need.exact.extend(used(expr)),
                     }
                 }
@@ -113,6 +116,13 @@ impl Rewriter<'_> {
         }
         Ok((Rewritten::plain(pattern), is_right))
     }
+}
+
+/// A value if a variable has one, even if it is a blank node, whose value no table has. Other expressions stay as they are.
+fn if_bound(expression: &Expression) -> Expression {
+    let Expression::Variable(variable) = expression else { return expression.clone() };
+    let one = Expression::Literal(Literal::from(1));
+    Expression::If(Box::new(Expression::Bound(variable.clone())), Box::new(one), Box::new(expression.clone()))
 }
 
 /// The groups, if each has one row and that has its aggregates: grouping half a million rows takes seconds.

@@ -196,9 +196,14 @@ impl Rewriter<'_> {
         let join = |one: Rewritten, other| one.with(other, |left, right| GraphPattern::Join { left, right });
         let mut all = parts.into_iter().reduce(join).unwrap_or_else(|| Rewritten::plain(GraphPattern::default()));
         let first_optional = items.len() - flat.optionals.len();
+        // Values of aggregates that an optional part did not compute: the parts after it must keep them.
+        let mut untaken: BTreeSet<Variable> = BTreeSet::new();
         for (at, (right, expression)) in std::mem::take(&mut flat.optionals).into_iter().enumerate() {
-            let own = need_of(first_optional + at, &known);
+            let mut own = need_of(first_optional + at, &known);
+            own.exact.extend(untaken.iter().cloned());
             all = self.left_join(all, right, expression, &own, is_empty)?;
+            let left = own.asked.iter().filter(|asked| !all.taken.contains_key(&asked.id));
+            untaken.extend(left.flat_map(|asked| used(&asked.expression)));
         }
         self.conditioned(all, flat.late)
     }

@@ -11,7 +11,7 @@ use crate::html::pack::Pack;
 use crate::json::findings_with;
 use crate::{RateBounds, scene_rule};
 use actcheck_analysis::{FailureMode, Sampling, score_interval};
-use actcheck_base::{Outcome, names};
+use actcheck_base::{Outcome, ShellLine, names};
 use actcheck_history::{CampaignRow, SkillRecord};
 use actcheck_verdict::mean;
 
@@ -25,8 +25,8 @@ pub(super) fn summary(report: &HtmlReport<'_>, slots: &Slots) -> String {
     pack.set("version", report.version);
     pack.set("made", report.made);
     pack.set("history", report.findings.history.as_str());
-    pack.set("program", report.findings.program.as_str());
-    pack.set("options", report.findings.options.as_str());
+    pack.set("program", ShellLine::new(&report.findings.program).to_string());
+    pack.set("of_history", ShellLine::default().option("--history", &report.findings.history).to_string());
     pack.set("outcomes", Outcome::ALL.map(Outcome::word).to_vec());
     pack.set("privileged", SkillRecord::PRIVILEGED);
     pack.set("scores", scores(report));
@@ -81,12 +81,7 @@ fn sentences(findings: &mut Value, report: &HtmlReport<'_>) {
         let confirmed = patterns.zip(&found.patterns.patterns).filter(|(_, pattern)| pattern.confirmed);
         for (number, (shown, pattern)) in (1..).zip(confirmed) {
             if scene_rule(&pattern.conditions, &found.input.parameters, "").is_ok() {
-                shown["more"] = json!(format!(
-                    "{} analyse{} --property {} --scene-rule {number}",
-                    summary.program,
-                    summary.options,
-                    told.name()
-                ));
+                shown["more"] = json!(summary.scene_rule(told.name(), number).to_string());
             }
         }
     }

@@ -46,7 +46,7 @@ pub fn compare_json(summary: &CompareSummary) -> Value {
 
 fn line(line: &ComparedLine, summary: &CompareSummary) -> Value {
     let (action, property) = compared_parts(&line.of);
-    let answer = line.answer(summary.answer_level(), summary.margin);
+    let answer = summary.comparison.answer_of(line, summary.answer_level(), summary.margin);
     let scenes = if let Answer::Underpowered { scenes } = answer { scenes } else { None };
     json!({
         "action": action,

@@ -2,7 +2,7 @@
 
 use crate::{CaseSummary, GuidedSearch};
 use actcheck_analysis::{FailureMode, Interval, Sampling, passes_until_failures};
-use actcheck_base::{Judgement, Outcome, names};
+use actcheck_base::{Judgement, Outcome, ShellLine, names};
 use actcheck_history::{Repetition, RunDetail, RunRecord, RunStatus};
 use actcheck_verdict::{Counts, mean};
 
@@ -247,6 +247,11 @@ impl RunSummary {
 }
 
 impl CampaignSummary {
+    /// The command that lists the runs of its history.
+    pub(crate) fn all_runs(&self) -> ShellLine {
+        ShellLine::new(&self.program).fixed("list").option("--history", &self.history)
+    }
+
     /// The paper's T over all runs. Returns `None` if there are no runs.
     pub fn total_score(&self) -> Option<f64> {
         mean(self.runs.iter().map(|run| run.score))

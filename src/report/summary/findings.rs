@@ -4,7 +4,7 @@ use actcheck_analysis::{
     Cascade, Collisions, Condition, FailureMode, FlakyScene, Interval, Parameter, Pattern, PatternInput, Patterns,
     PropertyFindings, Sampling, Strongest, Trend, TwoWay,
 };
-use actcheck_base::names;
+use actcheck_base::{ShellLine, names};
 use actcheck_verdict::Counts;
 
 /// The output of `actcheck analyse`.
@@ -14,7 +14,7 @@ pub struct FindingsSummary {
     pub history: String,
     /// How the user invoked this program.
     pub program: String,
-    /// Options that select the same runs again, each preceded by a space.
+    /// Options that select the same runs again, quoted for a shell.
     pub options: String,
     /// Ids of the campaigns in order of their start.
     pub campaigns: Vec<String>,
@@ -135,6 +135,14 @@ impl<'a> Causes<'a> {
 
 /// Prefix of the names of realised noise.
 const DRAWN: &str = "sense_";
+
+impl FindingsSummary {
+    /// The command that writes a rule about the scenes of a property's pattern, by the pattern's number.
+    pub(crate) fn scene_rule(&self, property: &str, number: usize) -> ShellLine {
+        let line = ShellLine::new(&self.program).fixed("analyse").option("--property", property);
+        line.option("--scene-rule", number.to_string()).quoted(&self.options)
+    }
+}
 
 /// Formats a proportion, such as `71 %`; values below 10 % have one decimal.
 pub(crate) fn percent(share: f64) -> String {

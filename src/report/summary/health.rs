@@ -1,7 +1,7 @@
 //! A campaign's health, with the names needed to print it.
 
 use actcheck_analysis::{Health, HealthProblem, ParameterCoverage};
-use actcheck_base::{Diagnostic, Diagnostics, names};
+use actcheck_base::{Diagnostic, Diagnostics, ShellLine, names};
 
 /// A campaign's health, with the names that messages refer to.
 #[derive(Debug, Clone, PartialEq)]
@@ -78,7 +78,7 @@ impl HealthSummary {
     }
 
     fn show(&self, run: &str) -> String {
-        format!("{} show {run} --history {}", self.program, self.history)
+        ShellLine::new(&self.program).fixed("show").word(run).option("--history", &self.history).to_string()
     }
 
     /// Pairs of bins over all pairs of parameters: number tried, number expected, total.

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use crate::CampaignSummary;
-use actcheck_base::Outcome;
+use actcheck_base::{Outcome, ShellLine};
 
 /// Minimum number of judgements for a "never" remark: with 4 of 4, the lower bound of the interval is still near one
 /// half.
@@ -110,7 +110,10 @@ impl CampaignSummary {
         // Upper bound of the rate of the outcome that never occurred.
         let most = self.sampling().interval(0, remark.of).map_or(100.0, |interval| interval.high * 100.0);
         let ask = match (&remark.run, labels.first()) {
-            (Some(run), Some(label)) => format!("{} why {run} {label} --history {}", self.program, self.history),
+            (Some(run), Some(label)) => {
+                let why = ShellLine::new(&self.program).fixed("why").word(run).word(label);
+                why.option("--history", &self.history).to_string()
+            }
             _ => String::new(),
         };
         let (count, of) = (remark.count, remark.of);

@@ -49,7 +49,7 @@ pub fn compare_table(summary: &CompareSummary) -> Table {
             line.left_out[0].total().into(),
             ids(&line.worse).into(),
             ids(&line.better).into(),
-            line.answer(summary.answer_level(), summary.margin).word().into(),
+            summary.comparison.answer_of(line, summary.answer_level(), summary.margin).word().into(),
         ]);
     }
     table

@@ -6,6 +6,7 @@ use std::thread;
 use serde_json::{Map, Value};
 
 use crate::text::{Page, align, fit, ruled, stacked};
+use actcheck_base::printable;
 
 /// Tables with more rows are long.
 const LONG: usize = 8192;
@@ -189,7 +190,7 @@ fn csv_lines(rows: impl Iterator<Item = Vec<String>>) -> String {
 fn plain(value: &Value) -> String {
     match value {
         Value::Null => String::new(),
-        Value::String(text) => text.clone(),
+        Value::String(text) => printable(text).into_owned(),
         other => other.to_string(),
     }
 }

@@ -9,7 +9,7 @@ use crate::text::weighted::weighted_text;
 use crate::text::{Page, by_action, command, fit, fitted, regressions_text, ruled};
 use crate::{CampaignSummary, PropertyLine, Proportion, RateBounds, RunSummary};
 use actcheck_analysis::Sampling;
-use actcheck_base::{Outcome, names};
+use actcheck_base::{Outcome, ShellLine, names};
 use actcheck_history::SkillRecord;
 
 /// Maximum number of rows in the table of runs. The text names the command that lists the rest.
@@ -57,7 +57,7 @@ fn runs_table(out: &mut String, summary: &CampaignSummary, page: Page) {
     let left_out = summary.runs.len() - shown.len();
     if left_out > 0 {
         let passed = summary.runs.iter().filter(|run| run.passed()).count();
-        let more = command(format!("{} list --history {}", summary.program, summary.history));
+        let more = command(&summary.all_runs());
         let _ = writeln!(out, "{left_out} more runs ({passed} of all passed): {more}");
     }
 }
@@ -280,11 +280,12 @@ fn failures(out: &mut String, summary: &CampaignSummary) {
                 let _ = writeln!(out, "  {} failed: {label}: {}", action.name, judgement.witness);
             }
         }
-        let more = command(format!("{} show {} --history {}", summary.program, run.id, summary.history));
+        let show = ShellLine::new(&summary.program).fixed("show").word(&run.id).option("--history", &summary.history);
+        let more = command(&show);
         let _ = writeln!(out, "  more: {more}");
     }
     if shown.len() > FAILURES_SHOWN {
-        let more = command(format!("{} list --history {}", summary.program, summary.history));
+        let more = command(&summary.all_runs());
         let _ = writeln!(out, "\n{} more runs did not pass: {more}", shown.len() - FAILURES_SHOWN);
     }
 }

@@ -178,7 +178,7 @@ fn answers(out: &mut String, summary: &CompareSummary) {
     let _ =
         writeln!(out, "\nB is … than A (at the level {level}; rates within {} points count as equal)", 100.0 * margin);
     for line in &summary.comparison.lines {
-        let answer = line.answer(level, margin);
+        let answer = summary.comparison.answer_of(line, level, margin);
         let needed = match answer {
             Answer::Underpowered { scenes: Some(scenes) } => format!(": about {scenes} scenes would decide"),
             Answer::Underpowered { scenes: None } => ": over a million scenes would decide".to_owned(),

@@ -2,7 +2,7 @@
 
 use crate::RunSummary;
 use crate::text::{Page, command};
-use actcheck_base::Outcome;
+use actcheck_base::{Outcome, ShellLine};
 use actcheck_history::RunStatus;
 
 /// Longest reason of a failure in one line; of a longer one, only the first part is printed. Unit: characters.
@@ -13,7 +13,7 @@ pub struct FailureLines<'a> {
     /// The run.
     pub run: &'a RunSummary,
     /// The command that shows the run.
-    pub show: &'a str,
+    pub show: &'a ShellLine,
     /// Whether all its failed properties are printed with their whole reasons.
     pub all: bool,
     /// Returns the name of a property.
@@ -54,7 +54,7 @@ impl FailureLines<'_> {
     }
 
     /// The line after the last failure that is printed. `list` is a command that lists all.
-    pub fn further(list: &str, page: Page) -> String {
+    pub fn further(list: &ShellLine, page: Page) -> String {
         let list = painted(&command(list), "2", page);
         page.set(&format!("… further failures are not printed here (`-v` prints all): {list}\n"))
     }
@@ -81,7 +81,8 @@ mod tests {
 
     fn lines(run: &RunSummary, all: bool, page: Page) -> String {
         let name = |iri: &str| iri.rsplit('#').next().unwrap_or(iri).to_owned();
-        FailureLines { run, show: "actcheck show k7f3-1 --history h", all, name: &name }.text(page)
+        let show = ShellLine::default().fixed("actcheck show k7f3-1 --history h");
+        FailureLines { run, show: &show, all, name: &name }.text(page)
     }
 
     #[test]

@@ -250,12 +250,7 @@ fn evidence(out: &mut String, causes: &Causes<'_>, pattern: &Pattern) {
 fn more_scenes(out: &mut String, report: &PropertyReport, pattern: &Pattern, summary: &FindingsSummary, number: usize) {
     let parameters = &report.findings.input.parameters;
     if scene_rule(&pattern.conditions, parameters, "").is_ok() {
-        let more = command(format!(
-            "{} analyse --property {} --scene-rule {number}{} > more.rls",
-            summary.program,
-            report.name(),
-            summary.options
-        ));
+        let more = command(&summary.scene_rule(report.name(), number).fixed("> more.rls"));
         let _ = writeln!(
             out,
             "     more such scenes: {more}, and `require = \"more.rls\"` under `[scene]` of a configuration in the same \

@@ -4,6 +4,7 @@ use std::fmt::Write as _;
 
 use crate::HealthSummary;
 use crate::text::{Page, command, fitted, ruled};
+use actcheck_base::ShellLine;
 
 /// One line for each warning, for the end of a campaign's summary. Empty if the campaign is healthy.
 pub fn health_lines(summary: &HealthSummary, page: Page) -> String {
@@ -14,8 +15,9 @@ pub fn health_lines(summary: &HealthSummary, page: Page) -> String {
     }
     if !out.is_empty() {
         out.insert(0, '\n');
-        let more = format!("{} health {} --history {}", summary.program, summary.campaign, summary.history);
-        let _ = writeln!(out, "  more: {}", command(more));
+        let more = ShellLine::new(&summary.program).fixed("health").word(&summary.campaign);
+        let more = more.option("--history", &summary.history);
+        let _ = writeln!(out, "  more: {}", command(&more));
     }
     page.set(&out)
 }

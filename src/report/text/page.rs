@@ -2,6 +2,8 @@
 
 use std::ops::Range;
 
+use actcheck_base::{ShellLine, printable_in_colour};
+
 /// Narrowest page whose lines are broken. Unit: columns.
 const NARROWEST: usize = 20;
 /// A space at which no line is broken, as in a command to copy. The finished text has plain spaces.
@@ -17,8 +19,8 @@ pub struct Page {
 }
 
 /// A command to copy, which stays in one line.
-pub(crate) fn command(text: impl AsRef<str>) -> String {
-    text.as_ref().replace(' ', &TIED.to_string())
+pub(crate) fn command(line: &ShellLine) -> String {
+    line.to_string().replace(' ', &TIED.to_string())
 }
 
 impl Page {
@@ -29,7 +31,8 @@ impl Page {
             Some(width) if width >= NARROWEST => text.split_inclusive('\n').map(|line| set_line(line, width)).collect(),
             _ => text.to_owned(),
         };
-        broken.replace(TIED, " ")
+        // Texts of skills, models and histories may have control characters, and pipes often end at a terminal.
+        printable_in_colour(&broken.replace(TIED, " ")).into_owned()
     }
 
     /// As [`Page::set`], but does not indent the rest of a line.
@@ -144,7 +147,9 @@ mod tests {
 
     #[test]
     fn commands_and_text_in_backquotes_stay_in_one_line() {
-        let text = "more: ".to_owned() + &command("actcheck show k7f3-1 --history configs/.actcheck") + "\n";
+        let text = "more: ".to_owned()
+            + &command(&ShellLine::default().fixed("actcheck show k7f3-1 --history configs/.actcheck"))
+            + "\n";
         assert_eq!(set(&text, 30), "more:\n  actcheck show k7f3-1 --history configs/.actcheck\n");
         assert_eq!(Page::default().set(&text), "more: actcheck show k7f3-1 --history configs/.actcheck\n");
         assert_eq!(set("write `seed = 7` (a whole number)", 20), "write `seed = 7` (a\n  whole number)");

@@ -142,7 +142,7 @@ function parameterTable(runs, run) {
 
 /** The commands that show a run that is not in this file. */
 function notHere(summary, id) {
-  const { program, history } = summary, asked = `${quoted(id)} --history ${quoted(history)}`;
+  const { program, of_history } = summary, asked = `${quoted(id)} ${of_history}`;
   return make("div", { class: "note card" }, make("p", {}, "This run has no replay in this file, which only has space for some runs of each failure mode and property. To see it, run:"),
     [`show ${asked} --picture ${quoted(`${id}.png`)}`, `why ${asked}`, `replay ${asked}`].map((words) => make("p", {}, make("code", {}, `${program} ${words}`))));
 }
