@@ -378,6 +378,7 @@ pub(super) fn sum_of(bytes: &[u8]) -> u32 {
 mod tests {
     use super::*;
     use actcheck_base::ScratchFolder;
+    use std::fs::OpenOptions;
 
     /// The statements of two transactions, with every kind of term.
     fn sample() -> [Vec<Quad>; 2] {
