@@ -25,8 +25,8 @@ LEAST, MOST = -(2**63), 2**63 - 1
 
 def facts(rng):
     """Rows by predicate: small integers, and a text, with which no computation has a value."""
-    value = lambda: "x" if rng.random() < 0.08 else rng.randint(-3, 6)
-    rows = {f"e{n}": {(value(), value()) for _ in range(rng.randint(1, 9))} for n in range(4)}
+    value = lambda: "x" if rng.random() < 0.08 else rng.randint(-1, 4)
+    rows = {f"e{n}": {(value(), value()) for _ in range(rng.randint(4, 14))} for n in range(4)}
     rows["big"] = {(rng.randint(0, 2), rng.randint(0, 3), rng.randint(-7, 7)) for _ in range(rng.randint(1, 9))}
     return rows
 

@@ -309,7 +309,11 @@ fn set_parameters(syntax: &mut Syntax, values: &BTreeMap<String, String>) -> Dia
                 is_set = true;
             }
         }
-        if !is_set {
+        // As in Nemo, a program may use a parameter that only the caller sets.
+        if !is_set && syntax.source.text.contains(&format!("${name}")) {
+            let value = Some(Expression { kind: value.kind, span: 0..0 });
+            syntax.statements.insert(0, Statement::Parameter { name: name.clone(), value, span: 0..0 });
+        } else if !is_set {
             let help = did_you_mean(name, known.iter().map(String::as_str));
             found.push(Diagnostic::error("R036", format!("the program has no parameter `${name}`")).help(help));
         }

@@ -238,6 +238,7 @@ fn parameters_have_the_values_that_the_caller_gives() {
         assert!(found.iter().all(|fault| ["R036", "R020"].contains(&fault.code)), "{found}");
     }
     assert!(load("@parameter $limit . q($limit) .", &[]).is_err());
+    assert!(load("q($limit) .", &[("limit", "2")]).is_ok(), "a parameter needs no declaration");
 }
 
 #[test]
