@@ -630,7 +630,7 @@ fn a_damaged_or_missing_trace_is_reported_and_other_data_is_readable() {
 fn traces_without_a_run_are_cleaned_up() {
     let (folder, history) = filled();
     let traces = folder.path().join("history/traces");
-    for orphan in ["z2-99.trace", "gone-1.trace", "z2-7.trace.tmp"] {
+    for orphan in ["z2-99.trace", "gone-1.trace", "z2-7.trace.1-7.tmp"] {
         std::fs::write(traces.join(orphan), "half").unwrap();
     }
     history.begin_campaign(&sample_campaign("b3", 5)).unwrap();

@@ -13,7 +13,7 @@ use crate::history::{sample_campaign, sample_run};
 use crate::support::{actcheck, copy, copy_made_history, copy_open, project_with, stderr, stdout};
 
 /// Time limit of one command. Unit: seconds.
-const MOST_SECS: u64 = 60;
+const MOST_SECS: u64 = 180;
 /// Memory limit of one command. Unit: kilobytes.
 const MOST_KB: u64 = 4_000_000;
 /// A small campaign, in which the robot need not succeed.
@@ -22,7 +22,7 @@ const CONFIG: &str = "tests = [[\"Pick\"]]\ntest_count = 1\n[physics]\nsteps_per
 /// Commands that read or write the history of a project, which they find themselves.
 const COMMANDS: [&[&str]; 13] = [
     &["list"],
-    &["show", "last"],
+    &["show", "@last"],
     &["analyse"],
     &["query", "--named", "failure-rates"],
     &["report", "--html", "out/r.html"],
@@ -232,7 +232,7 @@ fn a_link_that_the_user_names_is_followed() {
 /// `launch` emptied the files that `lock` and `locks/N` led to, and appended to those of `logs/N.log`.
 #[test]
 fn launch_follows_no_link() {
-    let launch: &[&str] = &["launch", "configs/c.toml", "--shards", "2", "--runs", "2", "-q"];
+    let launch: &[&str] = &["launch", "configs/c.toml", "--shards", "2", "--runs", "2", "--tries", "1", "-q"];
     for (place, target) in [
         ("", ""),
         ("/lock", "precious"),
@@ -314,12 +314,13 @@ fn files_in_output_folders_are_not_written_through_links() {
     stranger.unchanged(
         &[
             &["export", "--tables", "tables"],
-            &["export", "last", "--regression"],
+            &["export", "@last", "--regression"],
             &["new", "property", "Upright", "--for", "Pick"],
             &["new", "campaign", "mine", "--with", "ontology"],
         ],
         "folders",
     );
+    std::fs::remove_dir_all(stranger.project().join("ontology")).unwrap();
     // The user may name a link as the file itself.
     symlink("r.html", stranger.project().join("link.html")).unwrap();
     let said = actcheck(&stranger.project(), &["report", "--html", "link.html"]);
@@ -403,7 +404,7 @@ fn outlined(history: &Path) {
 /// 262 kB of outlines expanded to 8 GB.
 #[test]
 fn a_history_that_expands_a_thousand_times_is_refused() {
-    let zeros = vec![0_u8; 600 << 20];
+    let zeros = vec![0_u8; 256 << 20];
     let sum = |bytes: &[u8]| -> [u8; 4] {
         let mut crc = flate2::Crc::new();
         crc.update(bytes);
@@ -517,7 +518,7 @@ fn the_newest_campaign_is_the_last_one_whatever_the_clock() {
     history.commit(&sample_run("b", 1)).unwrap();
     let ids: Vec<String> = history.campaigns().unwrap().into_iter().map(|row| row.id).collect();
     assert_eq!(ids, ["a", "b"]);
-    assert_eq!(history.resolve("last").unwrap(), "b-2");
+    assert_eq!(history.resolve("@last").unwrap(), "b-2");
     drop(history);
     // Also after a merge.
     let merged = actcheck(folder.path(), &["merge", "h", "--into", "all"]);
@@ -572,7 +573,7 @@ fn a_journal_that_lost_its_end_is_reported() {
 
 /// A history that was merged from shards, or whose runs are partly outlines, has its rows in another order than its tables.
 #[test]
-fn the_order_of_rows_is_no_damage() {
+fn another_order_of_rows_is_not_damage() {
     let folder = project_with("[physics]\nsteps_per_second = 60\niterations = 1\n");
     let here = folder.path();
     let text = std::fs::read_to_string(here.join("configs/pick.toml")).unwrap();
