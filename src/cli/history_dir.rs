@@ -3,8 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use crate::options::HistoryArgs;
-use crate::work::all_cores;
 use crate::output;
+use crate::work::all_cores;
 use actcheck_base::{Below, Diagnostic, Diagnostics};
 use actcheck_config as config;
 use actcheck_history::History;
