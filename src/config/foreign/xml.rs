@@ -23,7 +23,7 @@ pub(crate) enum Bound {
     NotNegative,
     /// A mass, or a side of the ground: see [`LARGEST`].
     Positive,
-    /// A length of a body: see [`LONGEST`].
+    /// A length of a body: as [`Bound::Positive`], but see [`LONGEST`].
     Length,
     /// A mass that may be missing: 0 or as [`Bound::Positive`].
     Mass,
@@ -41,8 +41,7 @@ impl Bound {
             && match self {
                 Self::Finite => true,
                 Self::NotNegative => number >= 0.0,
-                Self::Positive => number > 0.0 && number <= LARGEST,
-                Self::Length => number > 0.0 && number <= LONGEST,
+                Self::Positive | Self::Length => number > 0.0 && number <= LARGEST,
                 Self::Mass => (0.0..=LARGEST).contains(&number),
             }
     }
@@ -51,8 +50,7 @@ impl Bound {
         match self {
             Self::Finite => "finite",
             Self::NotNegative => "at least 0",
-            Self::Positive => "above 0 and at most 1000000",
-            Self::Length => "above 0 and at most 1000 (metres)",
+            Self::Positive | Self::Length => "above 0 and at most 1000000",
             Self::Mass => "at least 0 and at most 1000000",
         }
     }
@@ -199,6 +197,12 @@ impl<'a> Reader<'a> {
             return None;
         };
         if numbers.iter().all(|number| bound.holds(*number)) {
+            if bound == Bound::Length && numbers.iter().any(|number| *number > LONGEST) {
+                let message =
+                    format!("`<{}>` is `{}`, which is beyond {LONGEST} m", node.tag_name().name(), short(text));
+                self.error("W034", node, message, "lengths are in metres, not in millimetres");
+                return None;
+            }
             return Some(numbers);
         }
         let message = format!("`<{}>` is `{}`, but must be {}", node.tag_name().name(), short(text), bound.in_words());
