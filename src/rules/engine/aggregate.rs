@@ -115,7 +115,7 @@ fn combine<'a>(kind: AggregateKind, inputs: impl Iterator<Item = &'a Term>, watc
     match kind {
         AggregateKind::Count => Some(Term::Integer(i64::try_from(inputs.count()).ok()?)),
         AggregateKind::Min => numbers(inputs).min_by(by_size).cloned(),
-        AggregateKind::Max => numbers(inputs).max_by(|a, b| by_size(a, b)).cloned(),
+        AggregateKind::Max => numbers(inputs).max_by(by_size).cloned(),
         AggregateKind::Sum => sum(inputs, watch),
     }
 }

@@ -291,7 +291,7 @@ fn quad(row: &[&Term]) -> Option<Quad> {
 enum Packed {
     Plain(BufWriter<File>),
     #[cfg(feature = "gzip")]
-    Gzip(flate2::write::GzEncoder<BufWriter<File>>),
+    Gzip(Box<flate2::write::GzEncoder<BufWriter<File>>>),
 }
 
 impl Packed {
@@ -299,7 +299,9 @@ impl Packed {
         let file = BufWriter::new(file);
         match compression {
             #[cfg(feature = "gzip")]
-            Compression::Gzip => Self::Gzip(flate2::write::GzEncoder::new(file, flate2::Compression::default())),
+            Compression::Gzip => {
+                Self::Gzip(Box::new(flate2::write::GzEncoder::new(file, flate2::Compression::default())))
+            }
             _ => Self::Plain(file),
         }
     }
