@@ -394,8 +394,9 @@ fn are_whole(files: &[TableFile]) -> bool {
         let check = |files: &'_ [TableFile]| files.iter().all(|file| is_whole(&file.path));
         let shares = files.chunks(files.len().div_ceil(cores).max(1));
         let shares: Vec<_> = shares.map(|files| scope.spawn(move || check(files))).collect();
-        // A thread that panics has found no whole file.
-        shares.into_iter().fold(true, |all, share| share.join().unwrap_or(false) && all)
+        // All are joined; a thread that panics has found no whole file.
+        let whole: Vec<bool> = shares.into_iter().map(|share| share.join().unwrap_or(false)).collect();
+        whole.into_iter().all(|whole| whole)
     })
 }
 
