@@ -157,7 +157,6 @@ fn options_that_do_not_exist_or_cannot_be_are_refused() {
     }
     for (export, words) in [
         ("@export p :- csv{quoting = false}", "an export to `csv` has no option `quoting`"),
-        ("@export p :- csv{resource = \"p.csv.gz\"}", "exports are not compressed"),
         ("@export p :- csv{delimiter = \"ab\"}", "`delimiter` must be one character"),
         ("@export p :- dsv{}", "needs a `delimiter`"),
         ("@export p :- csv{} . @export q :- csv{resource = \"./p.csv\"}", "`p.csv` is the file of `q` and of `p`"),

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use actcheck_base::{Diagnostic, Diagnostics};
+use actcheck_base::{Diagnostic, Diagnostics, ShellLine};
 
 /// Resolves a path of a configuration relative to `folder`, without `..` where removing it does not change the target.
 pub fn resolve_path(folder: &Path, written: &str) -> PathBuf {
@@ -38,19 +38,13 @@ pub fn check_unnamed(from: &Path, history: &Path) -> Result<(), Diagnostics> {
         None => Ok(()),
         Some(link) => {
             let message = format!("the history `{}` isn't used: `{}` is a link", history.display(), link.display());
+            let option = ShellLine::default().option("--history", history);
             let help = format!(
-                "if you know where it leads, name the folder on the command line: `--history {}`; otherwise remove the link",
-                quoted(history)
+                "if you know where it leads, name the folder on the command line: `{option}`; otherwise remove the link"
             );
             Err(Diagnostic::error("H028", message).help(help).into())
         }
     }
-}
-
-/// A path as a word of a shell.
-fn quoted(path: &Path) -> String {
-    let text = path.display().to_string();
-    shlex::try_quote(&text).map_or(text.clone(), |quoted| quoted.into_owned())
 }
 
 #[cfg(test)]

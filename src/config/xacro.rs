@@ -30,7 +30,10 @@ const LONGEST_ERROR: u64 = 64 << 10;
 
 /// Runs a command that can write no file (its output is a pipe) in a process group that is killed when the input ends:
 /// that is when actcheck closes it, or ends.
-const GUARDED: &str = r#"ulimit -f 0 || exit 126
+///
+/// A write fails with an error, which the program can report: by default, its signal ends the program without a word.
+const GUARDED: &str = r#"trap '' XFSZ
+ulimit -f 0 || exit 126
 exec 3<&0
 "$@" 3<&- </dev/null &
 program=$!

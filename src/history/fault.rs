@@ -46,6 +46,16 @@ pub(super) fn not_plain(dir: &Path, path: &Path, kind: FileKind) -> Diagnostics 
         .into()
 }
 
+/// H027: a file of the store would fill the memory, or be read for hours.
+pub(super) fn too_long(dir: &Path, path: &Path) -> Diagnostics {
+    let (dir, path) = (dir.display(), path.display());
+    let message =
+        format!("the history `{dir}` can't be used: `{path}` is far longer than any that this program writes");
+    Diagnostic::error("H027", message)
+        .help("remove the file if you do not know its origin; a history elsewhere is named with `--history DIR`")
+        .into()
+}
+
 /// H003: the folder has no history.
 pub(super) fn none_there(dir: &Path) -> Diagnostics {
     Diagnostic::error("H003", format!("there is no history at `{}`", dir.display()))

@@ -11,6 +11,7 @@ use std::path::{Path, PathBuf};
 use std::thread::sleep;
 use std::time::Duration;
 
+use crate::snapshot::LONGEST_COPIED;
 use crate::{fault, journal};
 use actcheck_base::{Below, Diagnostics, FileKind};
 
@@ -217,6 +218,13 @@ fn check_layout(dir: &Path) -> Result<(), Diagnostics> {
         let entries = below.entries(&folder).map_err(|error| fault::io(dir, "reading the folder", &error))?;
         if let Some((name, kind)) = entries.iter().find(|(_, kind)| *kind != FileKind::File) {
             return Err(fault::not_plain(dir, &folder.join(name), *kind));
+        }
+        // RocksDB reads its logs and manifests to their ends before it opens a store.
+        let mut paths = entries.iter().map(|(name, _)| folder.join(name));
+        let is_table = |path: &Path| path.extension().is_some_and(|ending| ending == "sst");
+        let is_long = |path: &Path| path.symlink_metadata().is_ok_and(|found| found.len() > LONGEST_COPIED);
+        if let Some(path) = paths.find(|path| !is_table(path) && is_long(path)) {
+            return Err(fault::too_long(dir, &path));
         }
     }
     Ok(())

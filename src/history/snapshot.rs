@@ -25,7 +25,7 @@ const TRIES: usize = 200;
 pub(super) const MOST_COMPARED: u64 = 1 << 30;
 
 /// Longest log or manifest that is copied. A sparse file in a foreign store must not fill the disk. Unit: bytes.
-const LONGEST_COPIED: u64 = 1 << 30;
+pub(super) const LONGEST_COPIED: u64 = 1 << 30;
 
 /// A store that can be opened for reading at [`Snapshot::store`].
 #[derive(Debug)]

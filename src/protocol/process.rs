@@ -240,7 +240,7 @@ fn guard(child: &Child, folder: &Path) -> std::io::Result<Child> {
     command.process_group(0).stdin(Stdio::piped()).stdout(Stdio::null()).stderr(Stdio::null()).spawn()
 }
 
-/// Ids of the children of a process; none where the system has no such list.
+/// Ids of the children of a process. Empty if the system has no such list.
 fn children_of(pid: i32) -> Vec<i32> {
     let threads = fs::read_dir(format!("/proc/{pid}/task")).into_iter().flatten().flatten();
     let lists = threads.filter_map(|thread| fs::read_to_string(thread.path().join("children")).ok());

@@ -143,7 +143,7 @@ const CODES_H: &[Code] = &[
     ),
     code(
         "H027",
-        "a file or folder of a history is a link, a pipe or a device",
+        "a file or folder of a history is a link, a pipe or a device, or is far longer than any that this program writes",
         "another person made the history, or a part of it was moved and replaced by a link",
         "remove it if you do not know its origin; to keep a history elsewhere, move all of it, and name its folder with `--history`",
     ),

@@ -248,7 +248,7 @@ mod tests {
             (Max, vec![int(1), double(1.0), double(f64::NAN)], Some(double(1.0))),
             (Max, vec![int(huge), double(9.3e18), int(huge - 1)], Some(double(9.3e18))),
             (Max, vec![int(huge), double(9.223372036854775e18), int(huge - 1)], Some(int(huge))),
-            (Max, vec![int(huge), double(9.223372036854775807e18)], Some(double(9.223372036854775807e18))),
+            (Max, vec![int(huge), double(9_223_372_036_854_775_808.0)], Some(double(9_223_372_036_854_775_808.0))),
             (Min, vec![decimal("0.1"), double(0.1), decimal("0.10000000000000000001")], Some(decimal("0.1"))),
             (Max, vec![decimal("0.1"), double(0.1), decimal("0.10000000000000000001")], Some(double(0.1))),
             (Min, vec![decimal("-0.5"), decimal("-0.50000000000000000001")], Some(decimal("-0.50000000000000000001"))),

@@ -94,7 +94,7 @@ pub(crate) fn meeting(
     })
 }
 
-/// What a column of sorted rows holds.
+/// The content of a column of sorted rows.
 #[derive(Debug, Clone, Copy)]
 enum Source {
     Column(usize),

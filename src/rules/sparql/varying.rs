@@ -133,7 +133,7 @@ mod tests {
     }
 
     #[test]
-    fn names_and_texts_are_no_functions() {
+    fn names_and_texts_are_not_functions() {
         for query in ["ASK { ?now w:rand \"NOW()\" ; <http://x/UUID> ?uuid } # RAND()", "not a query with NOW()"] {
             assert!(varying(&Source::new("x.rq", query)).is_none(), "{query}");
         }

@@ -66,7 +66,7 @@ fn warn_of_helpers(checking: &mut Checking<'_>, program: &Program, decisive: Pre
         for literal in &rule.body {
             let Literal::Test { value: Expr::Timed(timed), span } = literal else { continue };
             let mut compares = false;
-            for formula in timed.formulas() {
+            for formula in timed.formulas().iter().filter(|formula| !is_of_the_start(formula)) {
                 formula.visit(&mut |part| compares |= matches!(part, crate::temporal::Formula::Compare { .. }));
             }
             if compares {
@@ -78,6 +78,12 @@ fn warn_of_helpers(checking: &mut Checking<'_>, program: &Program, decisive: Pre
             }
         }
     }
+}
+
+/// Whether a formula is about the first moment alone, such as `eventually[0, 0](…)`: a fact about the scene, which no motion
+/// changes.
+fn is_of_the_start(formula: &crate::temporal::Formula) -> bool {
+    matches!(formula, crate::temporal::Formula::Temporal { from: 0.0, to: 0.0, .. })
 }
 
 /// Returns the conditions of a rule that read formulas; `None` if there are none.
