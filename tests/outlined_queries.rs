@@ -85,7 +85,7 @@ fn named() -> Vec<(String, String)> {
 /// An answer in which numbers that differ by rounding are equal, and rows have no order unless the query sorts them.
 fn comparable(answer: &QueryAnswer, text: &str) -> Vec<String> {
     let value = |term: &Option<Term>| match term {
-        Some(Term::Double(number)) => format!("{number:.10e}"),
+        Some(Term::Double(number)) => format!("{number:.7e}"),
         // Of a mean of integers, the digits end at the same place, and the order of joined texts is not defined.
         Some(Term::String(text)) => {
             let mut words: Vec<&str> = text.split(' ').collect();

@@ -428,7 +428,7 @@ fn a_process_without_the_environment_ends_with_its_program() {
 /// The path of a socket has at most 107 bytes.
 #[test]
 fn a_long_path_of_temporary_files_breaks_no_run() {
-    let folder = project("after.py", "[[\"Pick\"]]", 1, "env = { AFTER = \"\" }");
+    let folder = project("after.py", "[[\"Pick\"]]", 1, "env = { AFTER = \"nothing\" }");
     let long = folder.path().join("a".repeat(90));
     std::fs::create_dir(&long).unwrap();
     let output = Command::new(env!("CARGO_BIN_EXE_actcheck"))

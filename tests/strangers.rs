@@ -329,12 +329,11 @@ fn wait_for(what: &str, holds: impl Fn() -> bool) {
 #[test]
 fn xacro_ends_when_actcheck_is_killed() {
     let folder = tempfile::tempdir().unwrap();
-    let (note, tools) = (folder.path().join("pid"), folder.path().join("tools"));
+    let (notes, tools) = (folder.path().join("pid"), folder.path().join("tools"));
     std::fs::create_dir(&tools).unwrap();
-    script(
-        &tools.join("xacro"),
-        &format!("#!/bin/sh\necho $$ > '{0}.new'\nmv '{0}.new' '{0}'\nwhile :; do sleep 5; done\n", note.display()),
-    );
+    std::fs::create_dir(&notes).unwrap();
+    // It can write nothing into files, but create them.
+    script(&tools.join("xacro"), &format!("#!/bin/sh\n: > '{}'/$$\nwhile :; do sleep 5; done\n", notes.display()));
     let profile = std::fs::read_to_string("models/robots/fixed_arm.toml").unwrap();
     std::fs::write(folder.path().join("r.toml"), profile.replace("fixed_arm.urdf", "r.urdf.xacro")).unwrap();
     std::fs::write(folder.path().join("r.urdf.xacro"), "<robot/>").unwrap();
@@ -343,8 +342,9 @@ fn xacro_ends_when_actcheck_is_killed() {
     let mut command = Command::new(env!("CARGO_BIN_EXE_actcheck"));
     command.args(["check", "c.toml"]).current_dir(folder.path()).env("PATH", path).stdout(Stdio::null());
     let mut running = command.stderr(Stdio::null()).spawn().unwrap();
-    wait_for("xacro is started", || note.exists());
-    let pid = std::fs::read_to_string(&note).unwrap().trim().to_owned();
+    let noted = || std::fs::read_dir(&notes).unwrap().next().map(|entry| entry.unwrap().file_name());
+    wait_for("xacro is started", || noted().is_some());
+    let pid = noted().unwrap().into_string().unwrap();
     assert!(is_running(&pid));
     signal(running.id(), "KILL");
     running.wait().unwrap();

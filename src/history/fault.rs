@@ -127,7 +127,10 @@ pub(super) fn damaged_file(dir: &Path, name: &str) -> Diagnostics {
 
 /// H006: this process, or the system, has too many open files. Returns `None` if a message has another cause.
 pub(super) fn too_many_files(dir: &Path, message: &str) -> Option<Diagnostics> {
-    if !["Too many open files", "too many open files", "file descriptors"].iter().any(|cause| message.contains(cause)) {
+    if !["Too many open files", "too many open files", "file descriptors", "too many files are open"]
+        .iter()
+        .any(|cause| message.contains(cause))
+    {
         return None;
     }
     let message = format!("the history `{}` can't be read: too many files are open", dir.display());
