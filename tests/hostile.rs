@@ -322,9 +322,11 @@ fn files_in_output_folders_are_not_written_through_links() {
     );
     std::fs::remove_dir_all(stranger.project().join("ontology")).unwrap();
     // The user may name a link as the file itself.
+    std::fs::write(stranger.project().join("r.html"), "old").unwrap();
     symlink("r.html", stranger.project().join("link.html")).unwrap();
     let said = actcheck(&stranger.project(), &["report", "--html", "link.html"]);
-    assert!(stranger.project().join("r.html").is_file(), "{}", stderr(&said));
+    let written = std::fs::read_to_string(stranger.project().join("r.html")).unwrap();
+    assert!(written.contains("<html"), "{}", stderr(&said));
 }
 
 /// A history in which a file is a pipe, a device or a link to one stopped every command, or filled the memory.
@@ -356,7 +358,7 @@ fn pipes_and_devices_in_a_history_are_refused() {
     }
     let stranger = Stranger::new();
     outlined(&stranger.history());
-    fifo(&named(&stranger.history().join("outlines"), "s"));
+    fifo(&named(&stranger.history().join("outlines"), ""));
     COMMANDS.iter().for_each(|arguments| drop(ended(&stranger.project(), arguments, "outlines")));
 }
 
@@ -430,7 +432,8 @@ fn a_history_that_expands_a_thousand_times_is_refused() {
         for arguments in [&["show", &run][..], COMMANDS[7], COMMANDS[8], COMMANDS[10]] {
             let output = ended(&stranger.project(), arguments, "trace");
             let text = stdout(&output) + &stderr(&output);
-            let refused = output.status.code() != Some(0) && text.contains("expands to far more");
+            let is_named = text.contains("expands to far more") || text.contains("is the trace of another run");
+            let refused = output.status.code() != Some(0) && is_named;
             assert!(refused || !is_head && output.status.code() == Some(0), "{arguments:?}: {text}");
         }
     }
@@ -454,7 +457,7 @@ fn a_history_that_expands_a_thousand_times_is_refused() {
     for bombed in 0..4 {
         let stranger = Stranger::new();
         outlined(&stranger.history());
-        let file = named(&stranger.history().join("outlines"), "s");
+        let file = named(&stranger.history().join("outlines"), "");
         let bytes = std::fs::read(&file).unwrap();
         let size = |part: usize| u32::from_le_bytes(bytes[8 + 8 * part..][..4].try_into().unwrap()) as usize;
         let (mut written, mut body, mut at) = (bytes[..8].to_vec(), Vec::<u8>::new(), 8 + 8 * 4 + 4);
