@@ -70,7 +70,7 @@ pub fn history(folder: &Path, data: &[u8]) -> Result<(), Diagnostics> {
     let Some((first, content)) = data.split_first() else { return Ok(()) };
     let place = usize::from(*first) % PLACES.len();
     let mut bytes = content.to_vec();
-    if usize::from(*first) / PLACES.len() % 2 == 0 {
+    if (usize::from(*first) / PLACES.len()).is_multiple_of(2) {
         correct(PLACES[place], &mut bytes);
     }
     let file = path(folder, PLACES[place], &bytes);

@@ -15,7 +15,7 @@ use actcheck_history::Restore;
 /// Decides whether runs of a campaign, by its id, may be simulated again with the programs that this starts.
 pub type MayRun = dyn Fn(&str, &Starts) -> bool + Send + Sync;
 
-/// Returns the function that simulates runs again for [`History::restore_with`]. `may_run` is asked once for each campaign;
+/// Returns the function that simulates runs again for `History::restore_with`. `may_run` is asked once for each campaign;
 /// `on_start` is called with the id of each run before.
 pub fn restorer(
     context: RunContext,
