@@ -431,8 +431,8 @@ fn a_history_that_expands_a_thousand_times_is_refused() {
         for arguments in [&["show", &run][..], COMMANDS[7], COMMANDS[8], COMMANDS[10]] {
             let output = ended(&stranger.project(), arguments, "trace");
             let text = stdout(&output) + &stderr(&output);
-            let is_named = text.contains("expands to far more") || text.contains("another run");
-            let refused = output.status.code() != Some(0) && is_named;
+            // A trace whose hash is another is refused before the rest of it expands.
+            let refused = output.status.code() != Some(0) && text.contains("H007");
             assert!(refused || !is_head && output.status.code() == Some(0), "{arguments:?}: {text}");
         }
     }
@@ -475,7 +475,7 @@ fn a_history_that_expands_a_thousand_times_is_refused() {
             ended(&stranger.project(), arguments, "outlines");
         }
         let output = ended(&stranger.project(), COMMANDS[8], "outlines");
-        assert_eq!(output.status.code(), Some(1), "{bombed}: {}{}", stdout(&output), stderr(&output));
+        assert_ne!(output.status.code(), Some(0), "{bombed}: {}{}", stdout(&output), stderr(&output));
     }
 }
 
