@@ -23,7 +23,7 @@ pub trait ExternalSkill {
     fn perform(&mut self, call: &ActionCall, robot: &mut Operator<'_>) -> Result<ActionReport, Interrupt>;
 
     /// Ends the run: checks that the skill is ready for another one, so that its faults after the last action belong to this
-    /// run. `is_decided`: the run ended for another reason, so that such a fault is no longer reported.
+    /// run. With `is_decided`, the run already broke or timed out, and such a fault is not reported.
     ///
     /// # Errors
     /// Returns an error if the skill is not ready.

@@ -130,7 +130,7 @@ impl Below {
         String::from_utf8(self.read(path, most)?).map_err(|error| io::Error::new(ErrorKind::InvalidData, error))
     }
 
-    /// The names in a folder with their kinds, sorted. Empty if there is no such folder.
+    /// The names in a folder with their kinds, sorted. Empty if the folder does not exist.
     ///
     /// # Errors
     /// [`NotPlain`] it is not a folder; it can't be read.

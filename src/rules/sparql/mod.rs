@@ -4,6 +4,7 @@
 
 pub(crate) mod dataset;
 mod ledger;
+mod parsed;
 pub(crate) mod query;
 mod query_text;
 pub(crate) mod snapshot;

@@ -4,7 +4,7 @@ use spargebra::Query;
 use spargebra::algebra::{AggregateExpression, Expression, GraphPattern, OrderExpression, PropertyPathExpression};
 use spargebra::term::{NamedNodePattern, TriplePattern};
 
-use crate::sparql::varying::parsed;
+use crate::sparql::parsed::{parsed, parts};
 use actcheck_base::{CONSTANT_PROPERTIES, names};
 
 /// Graphs with facts that are the same whatever the robot does, by their local names.
@@ -98,26 +98,9 @@ fn changes(pattern: &GraphPattern, graph: Graph) -> bool {
 
 /// Whether an expression may read a fact that an action can change: it may contain `EXISTS`.
 fn decides(expression: &Expression, graph: Graph) -> bool {
-    let of = |part: &Expression| decides(part, graph);
     match expression {
-        Expression::NamedNode(_) | Expression::Literal(_) | Expression::Variable(_) | Expression::Bound(_) => false,
         Expression::Exists(pattern) => changes(pattern, graph),
-        Expression::Or(a, b)
-        | Expression::And(a, b)
-        | Expression::Equal(a, b)
-        | Expression::SameTerm(a, b)
-        | Expression::Greater(a, b)
-        | Expression::GreaterOrEqual(a, b)
-        | Expression::Less(a, b)
-        | Expression::LessOrEqual(a, b)
-        | Expression::Add(a, b)
-        | Expression::Subtract(a, b)
-        | Expression::Multiply(a, b)
-        | Expression::Divide(a, b) => of(a) || of(b),
-        Expression::UnaryPlus(a) | Expression::UnaryMinus(a) | Expression::Not(a) => of(a),
-        Expression::If(a, b, c) => of(a) || of(b) || of(c),
-        Expression::In(a, others) => of(a) || others.iter().any(of),
-        Expression::Coalesce(all) | Expression::FunctionCall(_, all) => all.iter().any(of),
+        _ => parts(expression).into_iter().any(|part| decides(part, graph)),
     }
 }
 

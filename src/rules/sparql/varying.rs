@@ -1,18 +1,11 @@
 //! Functions whose values are not the same each time: a property must be a function of the facts.
 
+use spargebra::Query;
 use spargebra::algebra::{AggregateExpression, Expression, Function, GraphPattern, OrderExpression};
-use spargebra::{Query, SparqlParser};
 
+use crate::sparql::parsed::{parsed, parts};
 use crate::sparql::query_text::scan;
-use actcheck_base::{Diagnostic, Source, names};
-
-/// Parses a query with the known prefixes. Returns `None` if it is invalid.
-pub(crate) fn parsed(text: &str) -> Option<Query> {
-    let parser = names::PREFIXES.iter().fold(SparqlParser::new(), |parser, (prefix, namespace)| {
-        parser.clone().with_prefix(*prefix, *namespace).unwrap_or(parser)
-    });
-    parser.parse_query(text).ok()
-}
+use actcheck_base::{Diagnostic, Source};
 
 /// Returns the error about the first function of a valid query that has another value each time.
 pub(crate) fn varying(source: &Source) -> Option<Diagnostic> {
@@ -84,28 +77,12 @@ fn in_pattern(pattern: &GraphPattern) -> Option<Found> {
 }
 
 fn in_expression(expression: &Expression) -> Option<Found> {
-    let all = |parts: &[&Expression]| parts.iter().find_map(|part| in_expression(part));
-    match expression {
-        Expression::NamedNode(_) | Expression::Literal(_) | Expression::Variable(_) | Expression::Bound(_) => None,
+    let own = match expression {
         Expression::Exists(pattern) => in_pattern(pattern),
-        Expression::Or(a, b)
-        | Expression::And(a, b)
-        | Expression::Equal(a, b)
-        | Expression::SameTerm(a, b)
-        | Expression::Greater(a, b)
-        | Expression::GreaterOrEqual(a, b)
-        | Expression::Less(a, b)
-        | Expression::LessOrEqual(a, b)
-        | Expression::Add(a, b)
-        | Expression::Subtract(a, b)
-        | Expression::Multiply(a, b)
-        | Expression::Divide(a, b) => all(&[a, b]),
-        Expression::UnaryPlus(a) | Expression::UnaryMinus(a) | Expression::Not(a) => in_expression(a),
-        Expression::If(a, b, c) => all(&[a, b, c]),
-        Expression::In(a, others) => in_expression(a).or_else(|| others.iter().find_map(in_expression)),
-        Expression::Coalesce(parts) => parts.iter().find_map(in_expression),
-        Expression::FunctionCall(function, args) => name(function).or_else(|| args.iter().find_map(in_expression)),
-    }
+        Expression::FunctionCall(function, _) => name(function),
+        _ => None,
+    };
+    own.or_else(|| parts(expression).into_iter().find_map(in_expression))
 }
 
 #[cfg(test)]
