@@ -19,7 +19,7 @@ use crate::support::expected::assert_expected;
 use crate::support::{project, root, stderr, stdout};
 
 /// Number of cases at least.
-const LEAST: usize = 8;
+const LEAST: usize = 9;
 /// Asks for the findings of all campaigns.
 const STORED: &str = "SELECT ?code ?text ?place WHERE { ?campaign a act:Campaign ; act:ruleFinding ?found . ?found a act:RuleFinding ; \
                       act:findingCode ?code ; act:findingText ?text . OPTIONAL { ?found act:findingPlace ?place } } \

@@ -178,7 +178,10 @@ fn export_run(args: &ExportArgs, history: &History, run: &str) -> Result<(), Dia
     let recalled = Env::from_history(history, &run.row.campaign, args.config.as_deref())?;
     let file = match &args.output {
         Some(file) => file.clone(),
-        None if args.regression => new_regression(&recalled.0, &run.row.run)?,
+        None if args.regression => {
+            let named = args.config.is_some() || args.trust.trust;
+            new_regression(&recalled.0, &run.row.run, named)?
+        }
         // The other options write only tables.
         None => {
             return Err(Diagnostic::error("X043", format!("run {} needs an output file", run.row.run))
@@ -197,9 +200,15 @@ fn export_run(args: &ExportArgs, history: &History, run: &str) -> Result<(), Dia
     Ok(())
 }
 
-/// Returns the path of a new file in the folder of regressions, which is created if missing.
-fn new_regression(env: &Env, run: &str) -> Result<PathBuf, Diagnostics> {
+/// Returns the path of a new file in the folder of regressions, which is created if missing. Unless the user named the
+/// configuration, the history chooses the folder, so it must be below the present one.
+fn new_regression(env: &Env, run: &str, named: bool) -> Result<PathBuf, Diagnostics> {
     let folder = campaign::regressions_folder(&env.campaign.source)?;
+    if !named && !output_file::is_below_here(&folder) {
+        let message = format!("the history names the folder {}, which is outside the present one", folder.display());
+        let help = "change to the project's folder, or name the configuration with `--config`, or a file with `-o`";
+        return Err(Diagnostic::error("X084", message).help(help).into());
+    }
     let created = output_file::project(&folder).create_folder(&folder);
     created.map_err(|error| output_file::cannot_write(&folder, error))?;
     let file = folder.join(format!("{run}.toml"));

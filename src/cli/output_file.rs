@@ -36,6 +36,22 @@ pub(super) fn project(file: &Path) -> Below {
     Below::new(if is_inside { Path::new("") } else { file.parent().unwrap_or(Path::new("")) })
 }
 
+/// Whether a path leads below the present folder, whatever links its existing part follows.
+pub(super) fn is_below_here(path: &Path) -> bool {
+    let Ok(here) = std::env::current_dir() else { return false };
+    let mut whole = here.clone();
+    for part in path.components() {
+        match part {
+            Component::ParentDir => {
+                whole.pop();
+            }
+            part => whole.push(part),
+        }
+    }
+    let existing = whole.ancestors().find_map(|folder| folder.canonicalize().ok());
+    here.canonicalize().is_ok_and(|here| existing.is_some_and(|existing| existing.starts_with(here)))
+}
+
 /// Creates a folder that the user named, for files that are then written below it.
 ///
 /// # Errors
@@ -57,6 +73,13 @@ mod tests {
     use std::fs;
 
     use super::*;
+
+    #[test]
+    fn a_path_leads_below_the_present_folder_or_not() {
+        for (path, below) in [("", true), ("src/none/x", true), ("none/../src", true), ("..", false), ("/tmp", false)] {
+            assert_eq!(is_below_here(Path::new(path)), below, "{path}");
+        }
+    }
 
     #[test]
     fn a_file_is_replaced_atomically_without_leftovers() {

@@ -60,8 +60,8 @@ struct Waiting {
     importer: Option<(usize, Span)>,
 }
 
-/// Reads a file and its imports, each once. Follows relative paths and [`SHIPPED`], the embedded ontology. Ignores all
-/// other imports: nothing is downloaded.
+/// Reads a file and its imports, each once. Follows relative paths and [`SHIPPED`], the embedded ontology. All other
+/// imports get a warning: nothing is downloaded.
 pub(super) fn read(files: &Files, root: &Path, found: &mut Diagnostics) -> Reading {
     let mut reading = Reading::default();
     let home = Home { files: files.clone(), folder: root.parent().unwrap_or(Path::new("")).to_path_buf() };
@@ -86,7 +86,7 @@ pub(super) fn read(files: &Files, root: &Path, found: &mut Diagnostics) -> Readi
         parse(&source, text, &file_iri::base_of(&relative), &mut reading.statements, found);
         reading.sources.push(source);
         reading.homes.push(home);
-        let mut imports = imports_of(&reading, text);
+        let mut imports = imports_of(&reading, text, found);
         imports.reverse();
         waiting.extend(imports);
     }
@@ -119,22 +119,26 @@ fn unreadable(path: &Path, reason: &str, importer: Option<(&Source, Span)>) -> D
     }
 }
 
-fn imports_of(reading: &Reading, text: usize) -> Vec<Waiting> {
+fn imports_of(reading: &Reading, text: usize, found: &mut Diagnostics) -> Vec<Waiting> {
     let imports = format!("{}imports", names::OWL);
     let of_text =
         reading.statements.iter().filter(|statement| statement.text == text && *statement.predicate == *imports);
-    of_text
-        .filter_map(|statement| {
-            let iri = statement.object.as_iri()?;
-            let importer = Some((text, reading.place(statement, iri)));
-            if iri == SHIPPED {
-                let home = Home { files: Files::Shipped, folder: PathBuf::from(SHIPPED_FOLDER) };
-                return Some(Waiting { home, relative: SHIPPED_ROOT.to_owned(), importer });
-            }
-            let home = reading.homes[text].clone();
-            Some(Waiting { home, relative: file_iri::relative_of(iri)?, importer })
-        })
-        .collect()
+    let mut waiting = Vec::new();
+    for statement in of_text {
+        let span = reading.place(statement, statement.object.as_iri().unwrap_or(&imports));
+        let importer = Some((text, span.clone()));
+        if statement.object.as_iri() == Some(SHIPPED) {
+            let home = Home { files: Files::Shipped, folder: PathBuf::from(SHIPPED_FOLDER) };
+            waiting.push(Waiting { home, relative: SHIPPED_ROOT.to_owned(), importer });
+        } else if let Some(relative) = statement.object.as_iri().and_then(file_iri::relative_of) {
+            waiting.push(Waiting { home: reading.homes[text].clone(), relative, importer });
+        } else {
+            let fault = Diagnostic::warning("O018", "this import is not read: it is not a relative path");
+            let help = format!("keep a copy of the ontology beside this file, and import it as `<name.ttl>`; only <{SHIPPED}> is built in");
+            found.push(fault.at(&reading.sources[text], span).help(help));
+        }
+    }
+    waiting
 }
 
 /// Parses one source. Statements before and after a syntax error are kept.

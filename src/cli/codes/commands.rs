@@ -345,6 +345,12 @@ const CODES_X: &[Code] = &[
         "divide it into fewer shards, or let it have more runs",
     ),
     code(
+        "X084",
+        "a regression would be written outside the present folder",
+        "the history names a configuration elsewhere, and may come from others",
+        "change to the project's folder, name the configuration with `--config`, or a file with `-o`",
+    ),
+    code(
         "X090",
         "an address can't be used",
         "it is not a URL with http, contains a password, or begins with https, which this build lacks",

@@ -103,4 +103,10 @@ const CODES_O: &[Code] = &[
         "the file lies beside linked rule files, but neither `act:verifiedBy` nor `act:ruleLibrary` names it, so that it has no effect",
         "link it with `act:verifiedBy` or `act:ruleLibrary`, or remove it",
     ),
+    code(
+        "O018",
+        "an import of the ontology is not read",
+        "`owl:imports` names an absolute path or a web address; nothing is downloaded",
+        "keep a copy beside the ontology, and import it by its relative path",
+    ),
 ];
