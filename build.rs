@@ -1,4 +1,5 @@
-//! Computes a digest of this program's sources, so that a replay detects a changed program of the same version.
+//! Computes a digest of this program's sources, so that a replay detects a changed program of the
+//! same version.
 
 use std::fs;
 use std::io;
@@ -25,7 +26,12 @@ fn main() -> io::Result<()> {
             digest.update(&text);
         }
     }
-    let hexadecimal: String = digest.finalize().iter().take(16).map(|byte| format!("{byte:02x}")).collect();
+    let hexadecimal: String = digest
+        .finalize()
+        .iter()
+        .take(16)
+        .map(|byte| format!("{byte:02x}"))
+        .collect();
     println!("cargo::rustc-env=ACTCHECK_SOURCES_DIGEST={hexadecimal}");
     Ok(())
 }

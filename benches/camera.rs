@@ -1,9 +1,10 @@
-//! Depth camera: images of 320 × 240 per second on one core, compared with a plain loop of ray casts.
+//! Depth camera: images of 320 × 240 per second on one core, compared with a plain loop of ray
+//! casts.
 //!
-//! The scenes are a table with five objects, the shipped perception campaign, and an apartment, seen by the robot.
-//! Times are CPU times. The goal is at least 60 images per second. The plain loop casts the same rays against each
-//! solid of the first scene with parry and keeps the nearest hit; it leaves out the robot's own links and the floor,
-//! which the camera renders.
+//! The scenes are a table with five objects, the shipped perception campaign, and an apartment,
+//! seen by the robot. Times are CPU times. The goal is at least 60 images per second. The plain
+//! loop casts the same rays against each solid of the first scene with parry and keeps the nearest
+//! hit; it leaves out the robot's own links and the floor, which the camera renders.
 
 mod support;
 
@@ -30,7 +31,11 @@ const TILT_RAD: f64 = -0.5;
 
 fn main() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let (scene, built) = measured("five objects on a table", &root.join("benches/five_others.toml"), None);
+    let (scene, built) = measured(
+        "five objects on a table",
+        &root.join("benches/five_others.toml"),
+        None,
+    );
     let solids = solids(&scene);
     let image = built.look(&mut frame(0));
     let eye = built.kinematics().camera(&built.observe().positions);
@@ -41,10 +46,24 @@ fn main() {
         solids.len(),
         noisy / plain
     );
-    measured("configs/perceive.toml", &root.join("configs/perceive.toml"), None);
-    let world = ("[objectSurface]", "[world]\nworlds = [\"apartment\"]\n\n[objectSurface]");
-    let surfaces = ("\"coffee_table\", \"mini_coffee_table\", \"table\"", "\"dining_table\"");
-    measured("the same in the apartment", &root.join("configs/perceive.toml"), Some([world, surfaces]));
+    measured(
+        "configs/perceive.toml",
+        &root.join("configs/perceive.toml"),
+        None,
+    );
+    let world = (
+        "[objectSurface]",
+        "[world]\nworlds = [\"apartment\"]\n\n[objectSurface]",
+    );
+    let surfaces = (
+        "\"coffee_table\", \"mini_coffee_table\", \"table\"",
+        "\"dining_table\"",
+    );
+    measured(
+        "the same in the apartment",
+        &root.join("configs/perceive.toml"),
+        Some([world, surfaces]),
+    );
 }
 
 /// Builds the first scene of a configuration, after text replacements, and prints the image rate.
@@ -56,9 +75,11 @@ fn measured(name: &str, config: &PathBuf, replaced: Option<[(&str, &str); 2]>) -
     }
     let folder = config.parent().expect("it is in a folder");
     let source = Source::new(config.display().to_string(), text);
-    let env = Env::prepare_text(source, folder, &Overrides::default()).unwrap_or_else(|faults| panic!("{faults}"));
+    let env = Env::prepare_text(source, folder, &Overrides::default())
+        .unwrap_or_else(|faults| panic!("{faults}"));
     let mut choices = Choices::random(env.campaign.seed, 0);
-    let mut scene = scenario::draw(&env.space, 0, &mut choices).expect("there is room on the table");
+    let mut scene =
+        scenario::draw(&env.space, 0, &mut choices).expect("there is room on the table");
     let camera = &mut scene.sensing.camera;
     (camera.range_noise_m, camera.dropout, camera.grazing_rad) = (0.0015, 0.01, 0.1);
     let mut built = world::build(&scene).expect("the shipped models are sound");
@@ -67,7 +88,11 @@ fn measured(name: &str, config: &PathBuf, replaced: Option<[(&str, &str); 2]>) -
     let exact = per_second(PICTURES, || built.look(&mut frame(0)));
     let noisy = per_second(PICTURES, || built.look(&mut frame(7)));
     let images = [built.look(&mut frame(0)), built.look(&mut frame(7))];
-    let seen = images[0].depths.iter().filter(|depth| **depth > 0.0).count();
+    let seen = images[0]
+        .depths
+        .iter()
+        .filter(|depth| **depth > 0.0)
+        .count();
     let pixels = images[0].depths.len();
     println!(
         "{name}: {} × {} pixels, {:.0} % with depth",
@@ -75,7 +100,9 @@ fn measured(name: &str, config: &PathBuf, replaced: Option<[(&str, &str); 2]>) -
         images[0].height,
         seen as f64 / pixels as f64 * 100.0
     );
-    println!("  images per second on one core (at least 60): without noise {exact:.1}, with noise {noisy:.1}");
+    println!(
+        "  images per second on one core (at least 60): without noise {exact:.1}, with noise {noisy:.1}"
+    );
     println!("  digest of the images {}", digest(&images));
     (scene, built)
 }
@@ -83,14 +110,20 @@ fn measured(name: &str, config: &PathBuf, replaced: Option<[(&str, &str); 2]>) -
 /// Digest of images, to check that code changes do not alter them.
 fn digest(images: &[DepthImage]) -> String {
     let mut digest = Digest::new();
-    images.iter().for_each(|image| digest.update_bits(&image.depths));
+    images
+        .iter()
+        .for_each(|image| digest.update_bits(&image.depths));
     digest.finish()
 }
 
 /// Choices of one image, with this noise seed.
 fn frame(number: u32) -> Choices {
     let kind = ChoiceKind::Index { of: 1 << 32 };
-    Choices::recorded(&[Choice { name: ChoiceName::CameraFrame, kind, value: f64::from(number) }])
+    Choices::recorded(&[Choice {
+        name: ChoiceName::CameraFrame,
+        kind,
+        value: f64::from(number),
+    }])
 }
 
 fn per_second<T>(pictures: u32, mut take: impl FnMut() -> T) -> f64 {
@@ -117,10 +150,15 @@ fn solids(scene: &Scene) -> Vec<(parry3d::math::Pose, Box<dyn ParryShape>)> {
         for solid in object.model.solids() {
             let mut pose = object.pose.to_isometry() * solid.pose.to_isometry();
             let shape: Box<dyn ParryShape> = match solid.shape {
-                Shape::Box { size: [x, y, z] } => Box::new(Cuboid::new(vector(x / 2.0, y / 2.0, z / 2.0))),
+                Shape::Box { size: [x, y, z] } => {
+                    Box::new(Cuboid::new(vector(x / 2.0, y / 2.0, z / 2.0)))
+                }
                 Shape::Sphere { radius } => Box::new(Ball::new(radius as f32)),
                 Shape::Cylinder { radius, height } => {
-                    pose.rotation *= UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::FRAC_PI_2);
+                    pose.rotation *= UnitQuaternion::from_axis_angle(
+                        &Vector3::x_axis(),
+                        std::f64::consts::FRAC_PI_2,
+                    );
                     Box::new(Cylinder::new((height / 2.0) as f32, radius as f32))
                 }
                 _ => continue,
@@ -140,10 +178,14 @@ fn plain_picture(
     let mut depths = Vec::with_capacity(image.depths.len());
     for row in 0..image.height {
         for column in 0..image.width {
-            let off = |idx: usize, count: usize| (count as f64 / 2.0 - idx as f64 - 0.5) / image.focal_px;
-            let dir = eye.rotation * Vector3::new(1.0, off(column, image.width), off(row, image.height));
+            let off =
+                |idx: usize, count: usize| (count as f64 / 2.0 - idx as f64 - 0.5) / image.focal_px;
+            let dir =
+                eye.rotation * Vector3::new(1.0, off(column, image.width), off(row, image.height));
             let ray = Ray::new(origin, vector(dir.x, dir.y, dir.z));
-            let casts = solids.iter().filter_map(|(pose, shape)| shape.cast_ray(pose, &ray, 5.0, true));
+            let casts = solids
+                .iter()
+                .filter_map(|(pose, shape)| shape.cast_ray(pose, &ray, 5.0, true));
             depths.push(casts.fold(f32::INFINITY, f32::min));
         }
     }
@@ -156,6 +198,11 @@ fn vector(x: f64, y: f64, z: f64) -> parry3d::math::Vector {
 
 fn placed(pose: &Isometry3<f64>) -> parry3d::math::Pose {
     let q = pose.rotation.quaternion();
-    let rotation = parry3d::math::Rotation::from_xyzw(q.i as f32, q.j as f32, q.k as f32, q.w as f32).normalize();
-    parry3d::math::Pose::from_parts(vector(pose.translation.x, pose.translation.y, pose.translation.z), rotation)
+    let rotation =
+        parry3d::math::Rotation::from_xyzw(q.i as f32, q.j as f32, q.k as f32, q.w as f32)
+            .normalize();
+    parry3d::math::Pose::from_parts(
+        vector(pose.translation.x, pose.translation.y, pose.translation.z),
+        rotation,
+    )
 }

@@ -1,18 +1,18 @@
 //! Pattern mining: speed, false alarms, and time and memory for a million outcomes.
 //!
-//! - `cargo bench --bench patterns`: finds planted patterns in 10,000 runs with twelve parameters and prints the time
-//!   for each, counts false alarms in 100 tables with shuffled failures, then analyses 1,000,000 outcomes from the
-//!   tables on disk and prints time and peak memory. Required: at most 5 alarms, under 10 s and under 1 GB on two
-//!   cores.
-//! - `cargo bench --bench patterns -- tables DIR`: writes the planted tables as CSV for `patterns_peers.py`, which runs
-//!   pysubgroup and SliceLine on them and compares times.
+//! - `cargo bench --bench patterns`: finds planted patterns in 10,000 runs with twelve parameters
+//!   and prints the time for each, counts false alarms in 100 tables with shuffled failures, then
+//!   analyses 1,000,000 outcomes from the tables on disk and prints time and peak memory. Required:
+//!   at most 5 alarms, under 10 s and under 1 GB on two cores.
+//! - `cargo bench --bench patterns -- tables DIR`: writes the planted tables as CSV for
+//!   `patterns_peers.py`, which runs pysubgroup and SliceLine on them and compares times.
 
 use std::path::Path;
 use std::time::Instant;
 
 use actcheck::analysis::{
-    Hierarchy, Mirror, OutcomeTable, PatternInput, PatternOptions, TableFilter, Values, cascades, finding_columns,
-    judged, mine, property_findings, table_failure_modes, trend,
+    Hierarchy, Mirror, OutcomeTable, PatternInput, PatternOptions, TableFilter, Values, cascades,
+    finding_columns, judged, mine, property_findings, table_failure_modes, trend,
 };
 use actcheck::base::Outcome;
 use support::{made_up, planted};
@@ -27,12 +27,26 @@ const RUNS: usize = 10_000;
 const SHUFFLES: u64 = 100;
 /// With five properties each.
 const MANY_RUNS: u64 = 200_000;
-const PROPERTIES: [&str; 5] = ["CloseObject", "MovedObject", "NoGraspCollisions", "ObjectGrasped", "ObjectInGripper"];
+const PROPERTIES: [&str; 5] = [
+    "CloseObject",
+    "MovedObject",
+    "NoGraspCollisions",
+    "ObjectGrasped",
+    "ObjectInGripper",
+];
 
 fn main() {
     // Cargo passes `--bench`.
-    let arguments: Vec<String> = std::env::args().skip(1).filter(|argument| argument != "--bench").collect();
-    match arguments.iter().map(String::as_str).collect::<Vec<&str>>().as_slice() {
+    let arguments: Vec<String> = std::env::args()
+        .skip(1)
+        .filter(|argument| argument != "--bench")
+        .collect();
+    match arguments
+        .iter()
+        .map(String::as_str)
+        .collect::<Vec<&str>>()
+        .as_slice()
+    {
         ["tables", folder] => write_tables(Path::new(folder)),
         _ => {
             planted_patterns();
@@ -44,14 +58,25 @@ fn main() {
 
 fn planted_patterns() {
     println!("{RUNS} runs, 12 parameters, up to 3 conditions");
-    println!("{:20} {:>8} {:>10} {:>14}  found", "planted", "secs", "patterns", "tried");
+    println!(
+        "{:20} {:>8} {:>10} {:>14}  found",
+        "planted", "secs", "patterns", "tried"
+    );
     for (name, planted) in planted::plantings() {
         let input = planted::input(RUNS, 1, &planted);
         let start = Instant::now();
         let found = mine(&input, &PatternOptions::default());
         let secs = start.elapsed().as_secs_f64();
-        let conditions: Vec<String> = found.confirmed().map(|pattern| format!("{:?}", pattern.conditions)).collect();
-        println!("{name:20} {secs:>8.3} {:>10} {:>14}  {}", found.patterns.len(), found.tried, conditions.join(" "));
+        let conditions: Vec<String> = found
+            .confirmed()
+            .map(|pattern| format!("{:?}", pattern.conditions))
+            .collect();
+        println!(
+            "{name:20} {secs:>8.3} {:>10} {:>14}  {}",
+            found.patterns.len(),
+            found.tried,
+            conditions.join(" ")
+        );
     }
 }
 
@@ -59,9 +84,19 @@ fn false_alarms() {
     let input = planted::input(RUNS, 1, &planted::plantings().remove(5).1);
     let start = Instant::now();
     let alarms = (0..SHUFFLES)
-        .filter(|seed| !mine(&planted::shuffled(&input, *seed), &PatternOptions::default()).patterns.is_empty())
+        .filter(|seed| {
+            !mine(
+                &planted::shuffled(&input, *seed),
+                &PatternOptions::default(),
+            )
+            .patterns
+            .is_empty()
+        })
         .count();
-    println!("shuffled failures: patterns in {alarms} of {SHUFFLES} ({:.1} s)", start.elapsed().as_secs_f64());
+    println!(
+        "shuffled failures: patterns in {alarms} of {SHUFFLES} ({:.1} s)",
+        start.elapsed().as_secs_f64()
+    );
 }
 
 fn many_outcomes() {
@@ -71,8 +106,19 @@ fn many_outcomes() {
         made_up::run("k", index, &mut dice, &["Pick"], |target, _, dice| {
             let slips = target.category.ends_with("Bottle") && target.friction < 0.5;
             let of = |(at, name): (usize, &'static str)| {
-                let rate = if slips && at > 2 { 0.6 } else { 0.03 * (at + 1) as f64 };
-                (name, if dice.share() < rate { Outcome::Failed } else { Outcome::Passed })
+                let rate = if slips && at > 2 {
+                    0.6
+                } else {
+                    0.03 * (at + 1) as f64
+                };
+                (
+                    name,
+                    if dice.share() < rate {
+                        Outcome::Failed
+                    } else {
+                        Outcome::Passed
+                    },
+                )
             };
             PROPERTIES.into_iter().enumerate().map(of).collect()
         })
@@ -84,8 +130,8 @@ fn many_outcomes() {
         .sum();
     reset_most_memory();
     let start = Instant::now();
-    let table =
-        OutcomeTable::read(&mirror, &TableFilter::default(), &finding_columns()).expect("the tables can be read");
+    let table = OutcomeTable::read(&mirror, &TableFilter::default(), &finding_columns())
+        .expect("the tables can be read");
     let read = start.elapsed().as_secs_f64();
     let modes = table_failure_modes(&table).len();
     let cascades = cascades(&table, 0.05).len();
@@ -112,7 +158,9 @@ fn reset_most_memory() {
 fn most_memory_mb() -> u64 {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     let most = status.lines().find_map(|line| line.strip_prefix("VmHWM:"));
-    most.and_then(|text| text.split_whitespace().next()?.parse::<u64>().ok()).unwrap_or_default() / 1024
+    most.and_then(|text| text.split_whitespace().next()?.parse::<u64>().ok())
+        .unwrap_or_default()
+        / 1024
 }
 
 fn write_tables(folder: &Path) {
@@ -128,30 +176,57 @@ fn write_tables(folder: &Path) {
     }
 }
 
-/// A CSV table with a column for each parameter and each superclass; the last column is the failure.
+/// A CSV table with a column for each parameter and each superclass; the last column is the
+/// failure.
 fn text(input: &PatternInput) -> String {
     let mut columns: Vec<(String, Vec<String>)> = Vec::new();
     for parameter in &input.parameters {
         match &parameter.values {
             Values::Numbers(numbers) | Values::Angles(numbers) => {
-                columns.push((parameter.name.clone(), numbers.iter().map(|number| format!("{number}")).collect()));
+                columns.push((
+                    parameter.name.clone(),
+                    numbers.iter().map(|number| format!("{number}")).collect(),
+                ));
             }
-            Values::Kinds { of_run, names, above } => {
-                let kind = |of: &Option<u32>| of.map_or(String::new(), |of| names[of as usize].clone());
+            Values::Kinds {
+                of_run,
+                names,
+                above,
+            } => {
+                let kind =
+                    |of: &Option<u32>| of.map_or(String::new(), |of| names[of as usize].clone());
                 columns.push((parameter.name.clone(), of_run.iter().map(kind).collect()));
                 let mut higher: Vec<&String> = above.iter().flatten().collect();
                 higher.sort();
                 higher.dedup();
                 for class in higher {
-                    let is = |of: &Option<u32>| of.is_some_and(|of| above[of as usize].contains(class)).to_string();
+                    let is = |of: &Option<u32>| {
+                        of.is_some_and(|of| above[of as usize].contains(class))
+                            .to_string()
+                    };
                     columns.push((format!("is_{class}"), of_run.iter().map(is).collect()));
                 }
             }
         }
     }
-    columns.push(("failed".to_owned(), input.failed.iter().map(|failed| u8::from(*failed).to_string()).collect()));
+    columns.push((
+        "failed".to_owned(),
+        input
+            .failed
+            .iter()
+            .map(|failed| u8::from(*failed).to_string())
+            .collect(),
+    ));
     let header: Vec<&str> = columns.iter().map(|(name, _)| name.as_str()).collect();
-    let rows = (0..input.len())
-        .map(|run| columns.iter().map(|(_, values)| values[run].as_str()).collect::<Vec<&str>>().join(","));
-    std::iter::once(header.join(",")).chain(rows).map(|line| line + "\n").collect()
+    let rows = (0..input.len()).map(|run| {
+        columns
+            .iter()
+            .map(|(_, values)| values[run].as_str())
+            .collect::<Vec<&str>>()
+            .join(",")
+    });
+    std::iter::once(header.join(","))
+        .chain(rows)
+        .map(|line| line + "\n")
+        .collect()
 }

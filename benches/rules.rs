@@ -1,5 +1,5 @@
-//! Cost of the rule engine, which loads rules at run time, compared with rules compiled by hand; and cost of judging an
-//! action.
+//! Cost of the rule engine, which loads rules at run time, compared with rules compiled by hand;
+//! and cost of judging an action.
 //!
 //! Ratios are measured within one process, because absolute times depend on the machine.
 
@@ -68,14 +68,23 @@ fn closure_by_hand(edges: &[(u32, u32)]) -> usize {
 }
 
 fn budget() -> Budget {
-    Budget { tuples: 100_000_000, secs: 600.0, ..Budget::default() }
+    Budget {
+        tuples: 100_000_000,
+        secs: 600.0,
+        ..Budget::default()
+    }
 }
 
 fn closure_against_datafrog() {
     let edges = edges(2000, 6000);
     let program = closure_program(&edges);
     let mut tuples = (0, 0);
-    let ours = fastest(3, || tuples.0 = program.close(Engine::Fast, &budget()).expect("in its budget").count("p"));
+    let ours = fastest(3, || {
+        tuples.0 = program
+            .close(Engine::Fast, &budget())
+            .expect("in its budget")
+            .count("p")
+    });
     let hand = fastest(3, || tuples.1 = closure_by_hand(&edges));
     assert_eq!(tuples.0, tuples.1);
     println!(
@@ -84,7 +93,10 @@ fn closure_against_datafrog() {
         ours / hand
     );
     if let Some(peak) = peak_bytes() {
-        println!("  peak memory of the process so far: {:.0} bytes per tuple (at most 100)", peak / tuples.0 as f64);
+        println!(
+            "  peak memory of the process so far: {:.0} bytes per tuple (at most 100)",
+            peak / tuples.0 as f64
+        );
     }
 }
 
@@ -92,15 +104,27 @@ fn closure_against_datafrog() {
 fn peak_bytes() -> Option<f64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find(|line| line.starts_with("VmHWM:"))?;
-    line.split_whitespace().nth(1)?.parse::<f64>().ok().map(|kib| kib * 1024.0)
+    line.split_whitespace()
+        .nth(1)?
+        .parse::<f64>()
+        .ok()
+        .map(|kib| kib * 1024.0)
 }
 
 fn closure_grows_linearly() {
     for nodes in [500, 1000, 2000] {
         let program = closure_program(&edges(nodes, nodes * 3));
         let mut tuples = 0;
-        let secs = fastest(3, || tuples = program.close(Engine::Fast, &budget()).expect("in its budget").count("p"));
-        println!("  {tuples} tuples: {:.0} ns per tuple", secs / tuples as f64 * 1e9);
+        let secs = fastest(3, || {
+            tuples = program
+                .close(Engine::Fast, &budget())
+                .expect("in its budget")
+                .count("p")
+        });
+        println!(
+            "  {tuples} tuples: {:.0} ns per tuple",
+            secs / tuples as f64 * 1e9
+        );
     }
 }
 
@@ -112,11 +136,15 @@ fn facts(bodies: usize) -> RunFacts {
         for body in 0..bodies {
             let name = names::obj(&format!("thing_{body}"));
             let mut say = |property: &str, value: Term| {
-                let triple =
-                    [Term::iri(&name), Term::iri(names::w(property)), value].map(|term| facts.terms.intern(term));
+                let triple = [Term::iri(&name), Term::iri(names::w(property)), value]
+                    .map(|term| facts.terms.intern(term));
                 triples.push(triple);
             };
-            let moved = if phase == 1 && body % 3 == 0 { 0.05 } else { 0.0 };
+            let moved = if phase == 1 && body % 3 == 0 {
+                0.05
+            } else {
+                0.0
+            };
             let at = [body as f64 * 0.1 + moved, 0.3, 0.4];
             for (property, value) in ["x", "y", "z"].into_iter().zip(at) {
                 say(property, Term::Double(value));
@@ -127,19 +155,32 @@ fn facts(bodies: usize) -> RunFacts {
             for (property, value) in ["maxX", "maxY", "maxZ"].into_iter().zip(at) {
                 say(property, Term::Double(value + 0.03));
             }
-            for property in ["tilt", "yaw", "qx", "qy", "qz", "mass", "friction", "restitution"] {
+            for property in [
+                "tilt",
+                "yaw",
+                "qx",
+                "qy",
+                "qz",
+                "mass",
+                "friction",
+                "restitution",
+            ] {
                 say(property, Term::Double(0.01 * body as f64));
             }
             say("fixed", Term::Boolean(body == 1));
             say("asleep", Term::Boolean(true));
             say("restsOn", Term::iri(names::obj("thing_1")));
-            say("touches", Term::iri(names::obj(&format!("thing_{}", (body + 1) % bodies))));
+            say(
+                "touches",
+                Term::iri(names::obj(&format!("thing_{}", (body + 1) % bodies))),
+            );
         }
         triples.sort_unstable();
         facts.snapshots.push(triples);
     }
     facts.during.push(Vec::new());
-    let pair = [names::act("pickObject"), names::obj("thing_0")].map(|iri| facts.terms.intern(Term::iri(iri)));
+    let pair = [names::act("pickObject"), names::obj("thing_0")]
+        .map(|iri| facts.terms.intern(Term::iri(iri)));
     facts.parameters.push(vec![pair]);
     facts
 }
@@ -169,41 +210,70 @@ because(?t) :- groups(?a, ?n), ?n > 100, ?t = CONCAT(STR(?a), " touches all") .
 "#;
 
 fn book(rules: Option<&str>) -> (RuleBook, Vec<String>) {
-    let mut ontology =
-        ontology::load(&Files::Shipped, Path::new("ontology/actions.ttl")).expect("the shipped ontology is valid");
+    let mut ontology = ontology::load(&Files::Shipped, Path::new("ontology/actions.ttl"))
+        .expect("the shipped ontology is valid");
     if let Some(text) = rules {
         ontology.libraries.clear();
-        let mut property = ontology.properties.values().next().expect("it has properties").clone();
+        let mut property = ontology
+            .properties
+            .values()
+            .next()
+            .expect("it has properties")
+            .clone();
         property.rule.source = Source::new("twenty.rls", text);
         property.rule.language = RuleLanguage::Datalog;
         property.rule.digest = digest_of(text);
         ontology.properties = BTreeMap::from([(property.iri.clone(), property)]);
     }
     let properties = ontology.properties.keys().cloned().collect();
-    (RuleBook::prepare(&ontology).unwrap_or_else(|faults| panic!("{faults}")), properties)
+    (
+        RuleBook::prepare(&ontology).unwrap_or_else(|faults| panic!("{faults}")),
+        properties,
+    )
 }
 
 fn measure(title: &str, limit_ms: f64, book: &RuleBook, properties: &[String], facts: &RunFacts) {
     let action = facts.action(0).expect("there is one action");
     let count: usize = facts.snapshots.iter().map(Vec::len).sum();
     let mut derived = 0;
-    let secs = fastest(300, || derived += book.judge(&action, properties, &budget()).len());
+    let secs = fastest(300, || {
+        derived += book.judge(&action, properties, &budget()).len()
+    });
     assert!(derived > 0);
-    println!("{title}: {count} facts, {:.3} ms (at most {limit_ms})", secs * 1e3);
+    println!(
+        "{title}: {count} facts, {:.3} ms (at most {limit_ms})",
+        secs * 1e3
+    );
 }
 
 fn twenty_rules() {
     let (book, properties) = book(Some(TWENTY));
     let scene = facts(12);
     let action = scene.action(0).expect("there is one action");
-    let found = book.judge(&action, &properties, &budget()).remove(&properties[0]).expect("it was judged");
-    // The margin depends on negation, arithmetic and two other rules, so it shows that the rules were evaluated.
+    let found = book
+        .judge(&action, &properties, &budget())
+        .remove(&properties[0])
+        .expect("it was judged");
+    // The margin depends on negation, arithmetic and two other rules, so it shows that the rules
+    // were evaluated.
     assert!(found.expect("in its budget").margin.is_some());
     measure("twenty rules", 0.3, &book, &properties, &facts(12));
 }
 
 fn shipped_properties() {
     let (book, properties) = book(None);
-    measure("the shipped properties", 2.0, &book, &properties, &facts(12));
-    measure("the shipped properties", 2.0, &book, &properties, &facts(25));
+    measure(
+        "the shipped properties",
+        2.0,
+        &book,
+        &properties,
+        &facts(12),
+    );
+    measure(
+        "the shipped properties",
+        2.0,
+        &book,
+        &properties,
+        &facts(25),
+    );
 }

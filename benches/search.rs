@@ -1,10 +1,12 @@
-//! Search strategies: samples to the first counterexample, and accuracy of the estimated failure rate.
+//! Search strategies: samples to the first counterexample, and accuracy of the estimated failure
+//! rate.
 //!
-//! Failure regions of known volume are planted in 8 dimensions: a connected one with a margin that leads to it, two
-//! disjoint ones, one with a margin that leads away from it (deceptive), and one with a constant margin (flat).
-//! `benches/search_peers.py` runs VerifAI and Hypothesis on the same functions and prints the same columns. Run with
-//! `cargo bench --bench search -- 200` for 200 seeds; the default is 60. `-- points` prints values of the functions,
-//! with which the script checks its own.
+//! Failure regions of known volume are planted in 8 dimensions: a connected one with a margin that
+//! leads to it, two disjoint ones, one with a margin that leads away from it (deceptive), and one
+//! with a constant margin (flat). `benches/search_peers.py` runs VerifAI and Hypothesis on the same
+//! functions and prints the same columns. Run with `cargo bench --bench search -- 200` for 200
+//! seeds; the default is 60. `-- points` prints values of the functions, with which the script
+//! checks its own.
 
 use actcheck::search::{Dimension, GENERATION, PropertyResult, Search, Space, Strategy};
 
@@ -16,8 +18,8 @@ const MOST_SAMPLES: usize = 10_000;
 /// Number of samples after which the rate is compared with the volume.
 const RATE_SAMPLES: usize = 2_000;
 
-/// Powers of the inverse of the real root of x⁹ = x + 1, whose multiples have low discrepancy in a cube (Roberts,
-/// 2018).
+/// Powers of the inverse of the real root of x⁹ = x + 1, whose multiples have low discrepancy in a
+/// cube (Roberts, 2018).
 const STEPS: [f64; WIDTH] = [
     0.921_599_319_633_983,
     0.849_345_305_949_820,
@@ -39,8 +41,12 @@ enum Shape {
     Flat,
 }
 
-const SHAPES: [(Shape, &str); 4] =
-    [(Shape::Smooth, "smooth"), (Shape::Disjoint, "disjoint"), (Shape::Deceptive, "deceptive"), (Shape::Flat, "flat")];
+const SHAPES: [(Shape, &str); 4] = [
+    (Shape::Smooth, "smooth"),
+    (Shape::Disjoint, "disjoint"),
+    (Shape::Deceptive, "deceptive"),
+    (Shape::Flat, "flat"),
+];
 
 /// A planted region: shape, volume, and the seed of its position.
 #[derive(Clone, Copy)]
@@ -76,14 +82,18 @@ impl Planted {
         (margin, (depth < 0.0).then_some(0))
     }
 
-    /// Radius and centre of a ball of this volume inside the cube. The volume of the unit ball in 8 dimensions is
-    /// π⁴/24.
+    /// Radius and centre of a ball of this volume inside the cube. The volume of the unit ball in 8
+    /// dimensions is π⁴/24.
     fn ball(&self) -> (f64, [f64; WIDTH]) {
         let radius = (self.volume * 24.0 / std::f64::consts::PI.powi(4)).powf(1.0 / 8.0);
-        (radius, std::array::from_fn(|axis| radius + (1.0 - 2.0 * radius) * self.placed(axis, 0)))
+        (
+            radius,
+            std::array::from_fn(|axis| radius + (1.0 - 2.0 * radius) * self.placed(axis, 0)),
+        )
     }
 
-    /// Signed distance from one of two boxes of half the volume each, separated along the first axis.
+    /// Signed distance from one of two boxes of half the volume each, separated along the first
+    /// axis.
     fn box_margin(&self, point: &[f64], which: u64) -> f64 {
         let half = (self.volume / 2.0 / 0.4).powf(1.0 / 7.0) / 2.0;
         let (mut outside, mut inside) = (0.0, f64::NEG_INFINITY);
@@ -97,12 +107,20 @@ impl Planted {
             outside += past.max(0.0).powi(2);
             inside = inside.max(past);
         }
-        if outside > 0.0 { outside.sqrt() } else { inside }
+        if outside > 0.0 {
+            outside.sqrt()
+        } else {
+            inside
+        }
     }
 }
 
 fn distance(a: &[f64], b: &[f64; WIDTH]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum::<f64>().sqrt()
+    a.iter()
+        .zip(b)
+        .map(|(a, b)| (a - b) * (a - b))
+        .sum::<f64>()
+        .sqrt()
 }
 
 /// The result of one search.
@@ -128,7 +146,10 @@ fn search(planted: Planted, strategy: Strategy) -> Outcome {
                 first.get_or_insert(samples);
                 seen[region] |= samples <= RATE_SAMPLES;
             }
-            search.tell(vec![PropertyResult { failed: margin < 0.0, margin: Some(margin) }]);
+            search.tell(vec![PropertyResult {
+                failed: margin < 0.0,
+                margin: Some(margin),
+            }]);
         }
         if samples == RATE_SAMPLES {
             let estimate = search.estimates()[0].expect("the search has results");
@@ -136,7 +157,12 @@ fn search(planted: Planted, strategy: Strategy) -> Outcome {
             rate = estimate.rate;
         }
     }
-    Outcome { first: first.unwrap_or(MOST_SAMPLES), regions: seen.iter().filter(|seen| **seen).count(), covered, rate }
+    Outcome {
+        first: first.unwrap_or(MOST_SAMPLES),
+        regions: seen.iter().filter(|seen| **seen).count(),
+        covered,
+        rate,
+    }
 }
 
 fn median(mut values: Vec<usize>) -> usize {
@@ -147,8 +173,21 @@ fn median(mut values: Vec<usize>) -> usize {
 fn compare(shape: Shape, name: &str, volume: f64, seeds: u64) {
     let mut random = None;
     for strategy in Strategy::ALL {
-        let outcomes: Vec<Outcome> = (0..seeds).map(|seed| search(Planted { shape, volume, seed }, strategy)).collect();
-        let mean = |value: &dyn Fn(&Outcome) -> f64| outcomes.iter().map(value).sum::<f64>() / outcomes.len() as f64;
+        let outcomes: Vec<Outcome> = (0..seeds)
+            .map(|seed| {
+                search(
+                    Planted {
+                        shape,
+                        volume,
+                        seed,
+                    },
+                    strategy,
+                )
+            })
+            .collect();
+        let mean = |value: &dyn Fn(&Outcome) -> f64| {
+            outcomes.iter().map(value).sum::<f64>() / outcomes.len() as f64
+        };
         let first = median(outcomes.iter().map(|outcome| outcome.first).collect());
         let random = *random.get_or_insert(first);
         println!(
@@ -163,21 +202,34 @@ fn compare(shape: Shape, name: &str, volume: f64, seeds: u64) {
     }
 }
 
-/// Prints values of every function at some points, one per line, to check implementations in other languages.
+/// Prints values of every function at some points, one per line, to check implementations in other
+/// languages.
 fn print_points() {
     for (shape, name) in SHAPES {
         for volume in VOLUMES {
             for seed in 0..20_u64 {
-                let planted = Planted { shape, volume, seed };
+                let planted = Planted {
+                    shape,
+                    volume,
+                    seed,
+                };
                 let (_, centre) = planted.ball();
                 // Half of the points are near the centre of the ball, so that some of them fail.
                 let near = |axis: usize| {
                     let random = ((seed + 3) as f64 * STEPS[axis] * 7.0).fract();
-                    if seed % 2 == 0 { random } else { centre[axis] + 0.1 * (random - 0.5) }
+                    if seed % 2 == 0 {
+                        random
+                    } else {
+                        centre[axis] + 0.1 * (random - 0.5)
+                    }
                 };
                 let point: [f64; WIDTH] = std::array::from_fn(near);
                 let numbers: Vec<String> = point.iter().map(f64::to_string).collect();
-                println!("{name} {volume} {seed} {} {}", planted.margin(&point).0, numbers.join(" "));
+                println!(
+                    "{name} {volume} {seed} {} {}",
+                    planted.margin(&point).0,
+                    numbers.join(" ")
+                );
             }
         }
     }
@@ -185,13 +237,21 @@ fn print_points() {
 
 fn main() {
     // Cargo passes `--bench`.
-    let arguments: Vec<String> = std::env::args().skip(1).filter(|argument| !argument.starts_with("--")).collect();
+    let arguments: Vec<String> = std::env::args()
+        .skip(1)
+        .filter(|argument| !argument.starts_with("--"))
+        .collect();
     if arguments.iter().any(|argument| argument == "points") {
         return print_points();
     }
-    let seeds = arguments.iter().find_map(|argument| argument.parse().ok()).unwrap_or(60);
+    let seeds = arguments
+        .iter()
+        .find_map(|argument| argument.parse().ok())
+        .unwrap_or(60);
     println!("{seeds} seeds; rate and regions after {RATE_SAMPLES} samples");
-    println!("function    volume  strategy          median  ratio  regions  in interval    mean rate");
+    println!(
+        "function    volume  strategy          median  ratio  regions  in interval    mean rate"
+    );
     for (shape, name) in SHAPES {
         for volume in VOLUMES {
             compare(shape, name, volume, seeds);

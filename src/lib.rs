@@ -1,8 +1,8 @@
 //! actcheck: QuickCheck for robot actions.
 //!
-//! Generates randomised tabletop scenes, lets a robot act in them in a physics simulation, records the world before,
-//! during and after each action as RDF facts, judges the actions by rules that can be edited without recompiling, and
-//! stores every run.
+//! Generates randomised tabletop scenes, lets a robot act in them in a physics simulation, records
+//! the world before, during and after each action as RDF facts, judges the actions by rules that
+//! can be edited without recompiling, and stores every run.
 //!
 //! # One straight line
 //!
@@ -12,11 +12,11 @@
 //!                                            + SPARQL
 //! ```
 //!
-//! Each stage is a function from the products of earlier stages to its own product; nothing flows back. [`campaign`] runs
-//! the stages; [`cli`] handles arguments, the clock, signals and streams.
+//! Each stage is a function from the products of earlier stages to its own product; nothing flows
+//! back. [`campaign`] runs the stages; [`cli`] handles arguments, the clock, signals and streams.
 //!
-//! Each stage is a crate of its own in the folder of its name (`src/rules` is `actcheck-rules`), so that a part can be used without
-//! the rest of the program.
+//! Each stage is a crate of its own in the folder of its name (`src/rules` is `actcheck-rules`), so
+//! that a part can be used without the rest of the program.
 //!
 //! | crate | purpose | libraries |
 //! | --- | --- | --- |
@@ -40,8 +40,8 @@
 //! | [`remote`] | HTTP client: sends statements to stores of others, asks there; copies files into object storage | ureq, rustls (feature `https`), rusty-s3 (feature `object-storage`) |
 //! | [`cli`] | arguments, exit codes, progress; the one place that prints errors | clap, clap_complete, clap_mangen |
 //!
-//! A crate depends only on crates above it in this table ([`campaign`] on many, [`cli`] on all), and on a listed library only if the
-//! table names it there. `tests/floors.rs` enforces both.
+//! A crate depends only on crates above it in this table ([`campaign`] on many, [`cli`] on all),
+//! and on a listed library only if the table names it there. `tests/floors.rs` enforces both.
 
 #![forbid(unsafe_code)]
 #![warn(missing_docs, clippy::unwrap_used)]

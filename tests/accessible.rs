@@ -29,17 +29,30 @@ type Colours = BTreeMap<String, [f64; 3]>;
 
 /// The colours of each block of a style sheet that sets a `color-scheme`: light first.
 fn themes(style: &str) -> Vec<Colours> {
-    let blocks = style.split('{').skip(1).filter_map(|block| block.split('}').next());
-    blocks.map(colours).filter(|colours| colours.contains_key("paper")).collect()
+    let blocks = style
+        .split('{')
+        .skip(1)
+        .filter_map(|block| block.split('}').next());
+    blocks
+        .map(colours)
+        .filter(|colours| colours.contains_key("paper"))
+        .collect()
 }
 
 fn colours(block: &str) -> Colours {
     let set = block.split(';').filter_map(|line| line.split_once(':'));
-    let named =
-        set.filter_map(|(name, value)| Some((name.trim().strip_prefix("--")?, value.trim().strip_prefix('#')?)));
+    let named = set.filter_map(|(name, value)| {
+        Some((
+            name.trim().strip_prefix("--")?,
+            value.trim().strip_prefix('#')?,
+        ))
+    });
     named
         .map(|(name, hex)| {
-            let digits: Vec<f64> = hex.chars().map(|digit| f64::from(digit.to_digit(16).unwrap())).collect();
+            let digits: Vec<f64> = hex
+                .chars()
+                .map(|digit| f64::from(digit.to_digit(16).unwrap()))
+                .collect();
             let part = |at: usize| match digits.len() {
                 3 => 17.0 * digits[at],
                 _ => 16.0 * digits[2 * at] + digits[2 * at + 1],
@@ -54,7 +67,11 @@ fn contrast(a: [f64; 3], b: [f64; 3]) -> f64 {
     let luminance = |colour: [f64; 3]| {
         let linear = colour.map(|part| {
             let part = part / 255.0;
-            if part <= 0.04045 { part / 12.92 } else { ((part + 0.055) / 1.055).powf(2.4) }
+            if part <= 0.04045 {
+                part / 12.92
+            } else {
+                ((part + 0.055) / 1.055).powf(2.4)
+            }
         });
         0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
     };
@@ -76,11 +93,17 @@ fn holds(colours: &Colours, text: &str, behind: &str) {
 fn every_text_colour_of_the_report_has_enough_contrast() {
     let style = std::fs::read_to_string(root().join("src/report/html/web/colours.css")).unwrap();
     let themes = themes(&style);
-    assert_eq!(themes.len(), 3, "light, dark by the system's preference, dark by choice");
+    assert_eq!(
+        themes.len(),
+        3,
+        "light, dark by the system's preference, dark by choice"
+    );
     assert_eq!(themes[1], themes[2], "both dark themes are the same");
     for theme in &themes {
         for behind in ["paper", "card", "sunk"] {
-            for text in ["ink", "soft", "accent", "passed", "failed", "broken", "timeout"] {
+            for text in [
+                "ink", "soft", "accent", "passed", "failed", "broken", "timeout",
+            ] {
                 holds(theme, text, behind);
             }
         }
@@ -91,8 +114,15 @@ fn every_text_colour_of_the_report_has_enough_contrast() {
         holds(theme, "ink", "quiet");
         // The cells of a heat map, up to the strongest.
         for share in [0.0, 0.23, 0.46] {
-            let cell = mixed(share, theme["failed"], mixed(0.12, theme["passed"], theme["card"]));
-            assert!(contrast(theme["ink"], cell) >= LEAST, "a cell with {share} of the failed colour");
+            let cell = mixed(
+                share,
+                theme["failed"],
+                mixed(0.12, theme["passed"], theme["card"]),
+            );
+            assert!(
+                contrast(theme["ink"], cell) >= LEAST,
+                "a cell with {share} of the failed colour"
+            );
         }
     }
 }
@@ -125,7 +155,10 @@ const NAMELESS: &str = "[...document.querySelectorAll('a[href], button, select, 
 
 /// The report of the shipped picks, in a browser.
 fn opened(folder: &Path) -> Chromium {
-    let output = actcheck(folder, &["report", "--html", "report.html", "--history", "h"]);
+    let output = actcheck(
+        folder,
+        &["report", "--html", "report.html", "--history", "h"],
+    );
     assert!(output.status.success(), "{}", stderr(&output));
     let mut browser = Chromium::start();
     browser.size(1440, 900);
@@ -143,7 +176,11 @@ fn go(browser: &mut Chromium, view: &str) {
 fn failed_run(browser: &mut Chromium) -> String {
     go(browser, "#/runs?outcome=failed&replays=1");
     browser.until("document.querySelector('.rows .row a')");
-    browser.value("document.querySelector('.rows .row a').getAttribute('href')").as_str().unwrap().to_owned()
+    browser
+        .value("document.querySelector('.rows .row a').getAttribute('href')")
+        .as_str()
+        .unwrap()
+        .to_owned()
 }
 
 #[test]
@@ -155,8 +192,9 @@ fn all_controls_and_pictures_have_names() {
         go(&mut browser, view);
         assert_eq!(browser.value(NAMELESS), json!([]), "{view}");
     }
-    let title =
-        browser.value("[document.documentElement.lang, document.title, document.querySelectorAll('main').length]");
+    let title = browser.value(
+        "[document.documentElement.lang, document.title, document.querySelectorAll('main').length]",
+    );
     assert_eq!(title, json!(["en", "actcheck report", 1]));
 }
 

@@ -1,4 +1,5 @@
-//! Objects with joints: drawers, doors and lids load as bodies that move, by the equations of their joints.
+//! Objects with joints: drawers, doors and lids load as bodies that move, by the equations of their
+//! joints.
 
 use std::sync::Arc;
 
@@ -13,8 +14,9 @@ use crate::support::{actcheck, copy, root, stderr, stdout};
 /// A model of `tests/models/articulated`.
 fn model(name: &str) -> Arc<ObjectModel> {
     let folder = root().join("tests/models/articulated");
-    let text =
-        format!("tests = [[\"Pick\"]]\ntest_count = 1\nmodel_dir = \".\"\n[pickObject]\nmodel_list = [\"{name}\"]\n");
+    let text = format!(
+        "tests = [[\"Pick\"]]\ntest_count = 1\nmodel_dir = \".\"\n[pickObject]\nmodel_list = [\"{name}\"]\n"
+    );
     let source = Source::new(folder.join("c.toml").display().to_string(), text);
     let campaign = config::load_text(source, &folder, &Overrides::default()).unwrap();
     Arc::clone(&campaign.models[name])
@@ -46,10 +48,14 @@ fn at(world: &World, id: &str) -> f64 {
 }
 
 fn near(found: f64, expected: f64, tolerance: f64) {
-    assert!((found - expected).abs() <= tolerance, "{found} is not {expected} ± {tolerance}");
+    assert!(
+        (found - expected).abs() <= tolerance,
+        "{found} is not {expected} ± {tolerance}"
+    );
 }
 
-/// A block on a fixed one, with a joint between them whose axis goes through the moving block's middle.
+/// A block on a fixed one, with a joint between them whose axis goes through the moving block's
+/// middle.
 fn block_on_block(joint: PartJoint) -> World {
     let part = MovingPart {
         name: "part".to_owned(),
@@ -58,7 +64,10 @@ fn block_on_block(joint: PartJoint) -> World {
         on: None,
         joint,
     };
-    let whole = ObjectModel { moving: vec![part], ..Arc::unwrap_or_clone(block([0.1, 0.1, 0.5])) };
+    let whole = ObjectModel {
+        moving: vec![part],
+        ..Arc::unwrap_or_clone(block([0.1, 0.1, 0.5]))
+    };
     alone(Arc::new(whole), Role::Platform)
 }
 
@@ -77,19 +86,30 @@ const RAIL: PartJoint = PartJoint {
 #[test]
 fn a_cabinet_of_sdf_has_the_parts_of_its_file() {
     let cabinet = model("cabinet");
-    let names: Vec<&str> = cabinet.moving.iter().map(|part| part.name.as_str()).collect();
+    let names: Vec<&str> = cabinet
+        .moving
+        .iter()
+        .map(|part| part.name.as_str())
+        .collect();
     assert_eq!(names, ["drawer", "door", "letter_flap"]);
     near(cabinet.mass_kg, 20.0, 1e-9);
     assert_eq!(cabinet.parts.len(), 4);
     let [drawer, door, flap] = [0, 1, 2].map(|idx| &cabinet.moving[idx]);
     assert_eq!([drawer.on, door.on, flap.on], [None, None, Some(1)]);
     assert!(drawer.joint.slides && !door.joint.slides);
-    assert_eq!((drawer.joint.range, drawer.joint.damping), ([0.0, 0.25], 3.0));
-    assert_eq!((door.joint.axis, door.joint.friction), ([0.0, 0.0, -1.0], 0.2));
+    assert_eq!(
+        (drawer.joint.range, drawer.joint.damping),
+        ([0.0, 0.25], 3.0)
+    );
+    assert_eq!(
+        (door.joint.axis, door.joint.friction),
+        ([0.0, 0.0, -1.0], 0.2)
+    );
     // The knob is screwed to the door.
     near(door.model.mass_kg, 2.1, 1e-9);
     assert_eq!(door.model.parts.len(), 2);
-    // In the file, the front of the knob is at x = 0.23 and the back of the cabinet at −0.2; the model's origin is between.
+    // In the file, the front of the knob is at x = 0.23 and the back of the cabinet at −0.2; the
+    // model's origin is between.
     near(cabinet.size_m[0], 0.43, 1e-6);
     for (found, expected) in door.joint.anchor_m.iter().zip([0.19 - 0.015, -0.29, 0.3]) {
         near(*found, expected, 1e-6);
@@ -102,11 +122,18 @@ fn closed_parts_stay_closed() {
     for role in [Role::Platform, Role::Other] {
         let mut world = alone(model("cabinet"), role);
         run(&mut world, 2.0);
-        for (part, whole) in [("it_drawer", "it"), ("it_door", "it"), ("it_letter_flap", "it")] {
+        for (part, whole) in [
+            ("it_drawer", "it"),
+            ("it_door", "it"),
+            ("it_letter_flap", "it"),
+        ] {
             near(at(&world, part), 0.0, 2e-3);
             let state = body(&world, part);
             assert_eq!(state.part.as_ref().unwrap().0, whole);
-            assert!(!state.fixed && state.asleep, "{part} does not come to rest as {role:?}");
+            assert!(
+                !state.fixed && state.asleep,
+                "{part} does not come to rest as {role:?}"
+            );
         }
         assert_eq!(body(&world, "it_letter_flap").rests_on, ["it_door"]);
         near(body(&world, "it").pose.position[2], 0.0, 1e-3);
@@ -138,7 +165,10 @@ fn friction_stops_a_drawer_after_its_braking_distance() {
 
 #[test]
 fn stops_hold_a_drawer() {
-    let mut world = block_on_block(PartJoint { range: [-0.1, 0.2], ..RAIL });
+    let mut world = block_on_block(PartJoint {
+        range: [-0.1, 0.2],
+        ..RAIL
+    });
     for (speed, end) in [(1.0, 0.2_f64), (-1.0, -0.1)] {
         assert!(world.poison("it_part", Poison::Velocity([speed, 0.0, 0.0])));
         let mut farthest = 0.0_f64;
@@ -150,11 +180,16 @@ fn stops_hold_a_drawer() {
     }
 }
 
-/// A block that hangs on an axis through its upper edge is a pendulum of the period 2π·√(I / (m·g·l)).
+/// A block that hangs on an axis through its upper edge is a pendulum of the period 2π·√(I /
+/// (m·g·l)).
 #[test]
 fn a_flap_swings_with_the_period_of_a_pendulum() {
-    let mut world =
-        block_on_block(PartJoint { slides: false, axis: [0.0, 1.0, 0.0], anchor_m: [0.0, 0.0, 1.1], ..RAIL });
+    let mut world = block_on_block(PartJoint {
+        slides: false,
+        axis: [0.0, 1.0, 0.0],
+        anchor_m: [0.0, 0.0, 1.1],
+        ..RAIL
+    });
     assert!(world.poison("it_part", Poison::Velocity([0.05, 0.0, 0.0])));
     let inertia = 0.1 * 0.1 / 6.0 + 0.05 * 0.05;
     let period = std::f64::consts::TAU * (inertia / (GRAVITY * 0.05)).sqrt();
@@ -169,7 +204,11 @@ fn a_flap_swings_with_the_period_of_a_pendulum() {
     }
     let halves = crossings.len() as f64 - 1.0;
     assert!(halves >= 6.0, "{crossings:?}");
-    near(2.0 * (crossings[crossings.len() - 1] - crossings[0]) / halves, period, 0.02 * period);
+    near(
+        2.0 * (crossings[crossings.len() - 1] - crossings[0]) / halves,
+        period,
+        0.02 * period,
+    );
 }
 
 /// A lid that was opened falls shut, and stays on its hinge.
@@ -188,7 +227,12 @@ fn the_lid_of_a_chest_falls_shut() {
     }
     assert!(widest > 0.1, "it opened by {widest} rad");
     near(at(&world, "it_lid"), 0.0, 0.01);
-    let BodyState { pose: Pose { position: [x, ..], .. }, .. } = body(&world, "it");
+    let BodyState {
+        pose: Pose {
+            position: [x, ..], ..
+        },
+        ..
+    } = body(&world, "it");
     near(x, 0.0, 0.02);
 }
 
@@ -196,7 +240,10 @@ fn the_lid_of_a_chest_falls_shut() {
 #[test]
 fn a_campaign_with_a_cabinet_knows_its_parts() {
     let folder = tempfile::tempdir().unwrap();
-    copy(&root().join("tests/models/articulated"), &folder.path().join("models"));
+    copy(
+        &root().join("tests/models/articulated"),
+        &folder.path().join("models"),
+    );
     let text = "tests = [[\"Pick\"]]\ntest_count = 2\nseed = 4\nmodel_dir = \"models\"\n[objectSurface]\n\
         object_surfaces = [\"cabinet\"]\n[pickObject]\nmodel_list = [\"can\"]\n[categories]\ncabinet = \"act:Cabinet\"\n";
     std::fs::write(folder.path().join("c.toml"), text).unwrap();
@@ -207,16 +254,28 @@ fn a_campaign_with_a_cabinet_knows_its_parts() {
     let found = actcheck(folder.path(), &["query", query, "--format", "csv"]);
     let found = stdout(&found);
     assert_eq!(found.lines().count(), 4, "{found}");
-    assert!(found.contains("cabinet_1_drawer") && found.contains("actions#Drawer"), "{found}");
+    assert!(
+        found.contains("cabinet_1_drawer") && found.contains("actions#Drawer"),
+        "{found}"
+    );
     let replayed = actcheck(folder.path(), &["replay", "@last"]);
-    assert_eq!(replayed.status.code(), Some(0), "{}{}", stdout(&replayed), stderr(&replayed));
+    assert_eq!(
+        replayed.status.code(),
+        Some(0),
+        "{}{}",
+        stdout(&replayed),
+        stderr(&replayed)
+    );
 }
 
 /// A world includes the cabinet twice: the one that is static there has no moving parts.
 #[test]
 fn parts_move_in_a_world_unless_their_model_is_static_there() {
     let folder = tempfile::tempdir().unwrap();
-    copy(&root().join("tests/models/articulated"), &folder.path().join("models"));
+    copy(
+        &root().join("tests/models/articulated"),
+        &folder.path().join("models"),
+    );
     let include = |name: &str, y: f64, is_static: bool| {
         format!(
             "<include><uri>model://cabinet</uri><name>{name}</name><pose>0 {y} 0 0 0 0</pose>\
@@ -233,6 +292,12 @@ fn parts_move_in_a_world_unless_their_model_is_static_there() {
     let ran = actcheck(folder.path(), &["run", "c.toml"]);
     assert!(matches!(ran.status.code(), Some(0 | 1)), "{}", stderr(&ran));
     let query = "SELECT DISTINCT ?whole { GRAPH ?g { ?part w:partOf ?whole } }";
-    let found = stdout(&actcheck(folder.path(), &["query", query, "--format", "csv"]));
-    assert!(found.contains("kitchen") && found.lines().count() == 2, "{found}");
+    let found = stdout(&actcheck(
+        folder.path(),
+        &["query", query, "--format", "csv"],
+    ));
+    assert!(
+        found.contains("kitchen") && found.lines().count() == 2,
+        "{found}"
+    );
 }

@@ -1,7 +1,8 @@
-//! The report in a browser: headless Chromium reads it, filters it, plays back a failed run, and reports no error.
+//! The report in a browser: headless Chromium reads it, filters it, plays back a failed run, and
+//! reports no error.
 //!
-//! Afterwards, pictures of every view in both themes, and on a phone, are in the folder `report` of Cargo's folder
-//! for tests.
+//! Afterwards, pictures of every view in both themes, and on a phone, are in the folder `report` of
+//! Cargo's folder for tests.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -22,13 +23,25 @@ use actcheck::history::{CampaignEnd, History};
 use actcheck::report::{Explained, PropertyWords, Replays};
 use actcheck::verdict::wilson;
 
-const VIEWS: [&str; 8] = ["/", "/properties", "/modes", "/patterns", "/collisions", "/map", "/history", "/runs"];
+const VIEWS: [&str; 8] = [
+    "/",
+    "/properties",
+    "/modes",
+    "/patterns",
+    "/collisions",
+    "/map",
+    "/history",
+    "/runs",
+];
 const DESKTOP: (u32, u32) = (1280, 860);
 const PHONE: (u32, u32) = (390, 844);
 
 /// The report of the shipped picks, with at least one failure.
 fn reported(folder: &Path) -> PathBuf {
-    let output = actcheck(folder, &["report", "--html", "report.html", "--history", "h"]);
+    let output = actcheck(
+        folder,
+        &["report", "--html", "report.html", "--history", "h"],
+    );
     assert!(output.status.success(), "{}", stderr(&output));
     folder.join("report.html")
 }
@@ -39,14 +52,18 @@ fn json_of(folder: &Path, arguments: &[&str]) -> Value {
     serde_json::from_str(&stdout(&output)).unwrap()
 }
 
-/// Saves a picture for people to look at, and checks that it is not a single colour (such a picture would be far
-/// smaller).
+/// Saves a picture for people to look at, and checks that it is not a single colour (such a picture
+/// would be far smaller).
 fn keep(browser: &mut Chromium, name: &str) -> Vec<u8> {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("report");
     std::fs::create_dir_all(&folder).unwrap();
     let picture = browser.picture();
     std::fs::write(folder.join(format!("{name}.png")), &picture).unwrap();
-    assert!(picture.len() > 8_000, "{name} is nearly empty: {} bytes", picture.len());
+    assert!(
+        picture.len() > 8_000,
+        "{name} is nearly empty: {} bytes",
+        picture.len()
+    );
     picture
 }
 
@@ -73,13 +90,23 @@ fn shows_the_counts_of_the_program(browser: &mut Chromium, file: &Path, folder: 
     let tiles = browser.value(
         "[...document.querySelectorAll('.tile .large')].map((tile) => Number(tile.textContent.replace(/\\D/g, '')))",
     );
-    let counts: Vec<&Value> = Outcome::ALL.iter().map(|outcome| &analysed["outcomes"][outcome.word()]).collect();
+    let counts: Vec<&Value> = Outcome::ALL
+        .iter()
+        .map(|outcome| &analysed["outcomes"][outcome.word()])
+        .collect();
     assert_eq!(tiles, json!(counts));
     for (successes, trials) in [(3u64, 20u64), (0, 7), (7, 7), (811, 1234)] {
         let interval = browser.value(&format!("wilson({successes}, {trials})"));
         let known = wilson(successes, trials).unwrap();
-        for (name, value) in [("rate", known.rate), ("low", known.low), ("high", known.high)] {
-            assert!((interval[name].as_f64().unwrap() - value).abs() < 1e-12, "{successes} of {trials}: {interval}");
+        for (name, value) in [
+            ("rate", known.rate),
+            ("low", known.low),
+            ("high", known.high),
+        ] {
+            assert!(
+                (interval[name].as_f64().unwrap() - value).abs() < 1e-12,
+                "{successes} of {trials}: {interval}"
+            );
         }
     }
     for view in VIEWS {
@@ -92,7 +119,10 @@ fn shows_the_counts_of_the_program(browser: &mut Chromium, file: &Path, folder: 
 fn filters(browser: &mut Chromium, file: &Path, folder: &Path) -> String {
     browser.open(file, "/runs");
     let rows = "document.querySelectorAll('.rows .row').length";
-    let all = json_of(folder, &["list", "--history", "h", "--format", "json"]).as_array().unwrap().len();
+    let all = json_of(folder, &["list", "--history", "h", "--format", "json"])
+        .as_array()
+        .unwrap()
+        .len();
     browser.until(&format!("{rows} === {all}"));
     let set = |name: &str, value: &str, event: &str| {
         format!(
@@ -102,8 +132,11 @@ fn filters(browser: &mut Chromium, file: &Path, folder: &Path) -> String {
     browser.value(&set("outcome", "failed", "change"));
     let failing = browser.value(rows).as_u64().unwrap();
     assert!((1..=all as u64).contains(&failing), "{failing} of {all}");
-    let id =
-        browser.value("document.querySelector('.rows .row .id').firstChild.textContent").as_str().unwrap().to_owned();
+    let id = browser
+        .value("document.querySelector('.rows .row .id').firstChild.textContent")
+        .as_str()
+        .unwrap()
+        .to_owned();
     browser.value(&set("text", &id.to_uppercase(), "input"));
     assert!(browser.value(rows).as_u64().unwrap() >= 1);
     assert_eq!(
@@ -125,15 +158,28 @@ fn watches(browser: &mut Chromium, file: &Path, id: &str) {
     browser.open(file, &format!("/run/{id}"));
     browser.until("document.querySelector('.watch').dataset.ready");
     let slider = "Number(document.querySelector('.slider').value)";
-    let moment = browser.value("document.querySelector('.failure button').textContent.match(/[\\d.]+/)[0]");
+    let moment =
+        browser.value("document.querySelector('.failure button').textContent.match(/[\\d.]+/)[0]");
     let decided: f64 = moment.as_str().unwrap().parse().unwrap();
     let opened = browser.value(slider).as_f64().unwrap();
-    assert!(opened <= decided + 0.06, "the playback opens at {opened}, but the outcome was decided at {decided}");
-    for words in
-        ["details", ".proof .line", ".timeline .action", ".timeline .decided", ".parameters dt", ".pictures canvas"]
-    {
+    assert!(
+        opened <= decided + 0.06,
+        "the playback opens at {opened}, but the outcome was decided at {decided}"
+    );
+    for words in [
+        "details",
+        ".proof .line",
+        ".timeline .action",
+        ".timeline .decided",
+        ".parameters dt",
+        ".pictures canvas",
+    ] {
         assert!(
-            browser.value(&format!("document.querySelectorAll('{words}').length")).as_u64().unwrap() > 0,
+            browser
+                .value(&format!("document.querySelectorAll('{words}').length"))
+                .as_u64()
+                .unwrap()
+                > 0,
             "{words}"
         );
     }
@@ -143,7 +189,12 @@ fn watches(browser: &mut Chromium, file: &Path, id: &str) {
     browser.until(&format!("{slider} > 0.2"));
     browser.value("document.querySelector('.play').click()");
     let stopped = browser.value(slider);
-    assert_eq!(browser.value(&format!("new Promise((done) => setTimeout(() => done({slider}), 200))")), stopped);
+    assert_eq!(
+        browser.value(&format!(
+            "new Promise((done) => setTimeout(() => done({slider}), 200))"
+        )),
+        stopped
+    );
     let colours = "(() => { const from = document.querySelector('.stage'), to = document.createElement('canvas'); \
         [to.width, to.height] = [64, 40]; const pen = to.getContext('2d'); pen.drawImage(from, 0, 0, 64, 40); \
         const bytes = pen.getImageData(0, 0, 64, 40).data; const seen = new Set(); \
@@ -156,9 +207,11 @@ fn watches(browser: &mut Chromium, file: &Path, id: &str) {
 fn is_seen_in_every_size(browser: &mut Chromium, file: &Path, id: &str) {
     let run = format!("/run/{id}");
     let views: Vec<&str> = VIEWS.into_iter().chain([run.as_str()]).collect();
-    for (theme, (width, height), size) in
-        [("light", DESKTOP, "desktop"), ("dark", DESKTOP, "desktop"), ("light", PHONE, "phone")]
-    {
+    for (theme, (width, height), size) in [
+        ("light", DESKTOP, "desktop"),
+        ("dark", DESKTOP, "desktop"),
+        ("light", PHONE, "phone"),
+    ] {
         browser.theme(theme);
         browser.size(width, height);
         for view in &views {
@@ -166,10 +219,19 @@ fn is_seen_in_every_size(browser: &mut Chromium, file: &Path, id: &str) {
             if view.starts_with("/run/") {
                 browser.until("document.querySelector('.watch').dataset.ready");
             }
-            let wide = browser.value("document.documentElement.scrollWidth").as_u64().unwrap();
+            let wide = browser
+                .value("document.documentElement.scrollWidth")
+                .as_u64()
+                .unwrap();
             assert!(wide <= u64::from(width), "{view} is {wide} wide");
             let name = view.trim_start_matches('/').split('/').next().unwrap();
-            keep(browser, &format!("{size}-{theme}-{}", if name.is_empty() { "overview" } else { name }));
+            keep(
+                browser,
+                &format!(
+                    "{size}-{theme}-{}",
+                    if name.is_empty() { "overview" } else { name }
+                ),
+            );
         }
     }
     let paper = "getComputedStyle(document.body).backgroundColor";
@@ -190,7 +252,10 @@ fn hostile(folder: &Path) -> PathBuf {
     let mut dice = Dice::new(7);
     let judge = |_: &_, _: usize, dice: &mut Dice| {
         let outcome = Outcome::ALL[dice.below(6) as usize];
-        vec![("CloseObject", outcome), ("Bad<img src=x onerror='window.hacked=2'>", Outcome::Failed)]
+        vec![
+            ("CloseObject", outcome),
+            ("Bad<img src=x onerror='window.hacked=2'>", Outcome::Failed),
+        ]
     };
     let mut replays = Replays::default();
     let runs: Vec<_> = (0..40)
@@ -207,15 +272,25 @@ fn hostile(folder: &Path) -> PathBuf {
             }
             for action in &mut run.actions {
                 action.message = Some(HOSTILE.to_owned());
-                action.parameters.insert(HOSTILE.to_owned(), vec![HOSTILE.to_owned()]);
-                action.judgements.iter_mut().for_each(|judgement| judgement.witness = HOSTILE.to_owned());
+                action
+                    .parameters
+                    .insert(HOSTILE.to_owned(), vec![HOSTILE.to_owned()]);
+                action
+                    .judgements
+                    .iter_mut()
+                    .for_each(|judgement| judgement.witness = HOSTILE.to_owned());
             }
             if index < 3 {
                 let property = run.actions[0].judgements[1].property.clone();
                 replays.add(
                     &run,
                     None,
-                    &[Explained { step: 1, property, text: HOSTILE.to_owned(), deciding: Vec::new() }],
+                    &[Explained {
+                        step: 1,
+                        property,
+                        text: HOSTILE.to_owned(),
+                        deciding: Vec::new(),
+                    }],
                 );
             }
             run
@@ -239,19 +314,29 @@ fn texts_of_models_rules_and_messages_never_become_markup() {
     let folder = tempfile::tempdir().unwrap();
     let file = hostile(folder.path());
     let page = std::fs::read_to_string(&file).unwrap();
-    assert!(!page.contains("onerror") && !page.contains("textarea"), "the page contains hostile markup");
+    assert!(
+        !page.contains("onerror") && !page.contains("textarea"),
+        "the page contains hostile markup"
+    );
     let mut browser = Chromium::start();
     browser.size(DESKTOP.0, DESKTOP.1);
-    let encoded =
-        "encodeURIComponent([...document.querySelectorAll('.rows .id')].map((it) => it.firstChild.textContent)[0])";
+    let encoded = "encodeURIComponent([...document.querySelectorAll('.rows .id')].map((it) => it.firstChild.textContent)[0])";
     browser.open(&file, "/runs");
     browser.until("document.querySelector('.rows .row')");
     let run = format!("/run/{}", browser.value(encoded).as_str().unwrap());
-    let other =
-        format!("/run/{}", HOSTILE.replace('"', "%22").replace('<', "%3C").replace('>', "%3E").replace(' ', "%20"));
+    let other = format!(
+        "/run/{}",
+        HOSTILE
+            .replace('"', "%22")
+            .replace('<', "%3C")
+            .replace('>', "%3E")
+            .replace(' ', "%20")
+    );
     for view in VIEWS.into_iter().chain([run.as_str(), other.as_str()]) {
         browser.open(&file, view);
-        browser.until("document.querySelector('main h1') && !document.querySelector('.watch .waiting')");
+        browser.until(
+            "document.querySelector('main h1') && !document.querySelector('.watch .waiting')",
+        );
         let found = browser.value(
             "[document.images.length, document.querySelectorAll('main b img, textarea').length, window.hacked ?? 0]",
         );
@@ -260,7 +345,10 @@ fn texts_of_models_rules_and_messages_never_become_markup() {
     browser.open(&file, &run);
     browser.until("document.querySelector('.details .failure')");
     let text = browser.value("document.querySelector('.details').textContent");
-    assert!(text.as_str().unwrap().contains(HOSTILE), "the hostile text is shown as text");
+    assert!(
+        text.as_str().unwrap().contains(HOSTILE),
+        "the hostile text is shown as text"
+    );
     assert!(browser.complaints.is_empty(), "{:#?}", browser.complaints);
 }
 
@@ -268,14 +356,34 @@ fn texts_of_models_rules_and_messages_never_become_markup() {
 fn pushed(folder: &Path) -> String {
     let now = || "2026-08-01T12:00:00Z".to_owned();
     let env = Env::prepare(&folder.join("configs/pick.toml"), &Overrides::default()).unwrap();
-    let fault = FAULTS.into_iter().find(|fault| fault.name == "base-pushed").unwrap();
-    let context = RunContext { clock: Clock { now, secs: || 0.0 }, disturb: None };
-    let input = RunInput { campaign: "k", index: 0, choices: Choices::random(env.campaign.seed, 0) };
+    let fault = FAULTS
+        .into_iter()
+        .find(|fault| fault.name == "base-pushed")
+        .unwrap();
+    let context = RunContext {
+        clock: Clock { now, secs: || 0.0 },
+        disturb: None,
+    };
+    let input = RunInput {
+        campaign: "k",
+        index: 0,
+        choices: Choices::random(env.campaign.seed, 0),
+    };
     let run = run_sabotaged(&env, input, &context, &mut Saboteur::new(fault.sabotage)).unwrap();
     let history = History::open(&folder.join("h")).unwrap();
-    history.begin_campaign(&env.record("k".to_owned(), "pushed".to_owned(), now())).unwrap();
+    history
+        .begin_campaign(&env.record("k".to_owned(), "pushed".to_owned(), now()))
+        .unwrap();
     history.commit(&run).unwrap();
-    history.finish_campaign("k", &CampaignEnd { ended: now(), ..CampaignEnd::default() }).unwrap();
+    history
+        .finish_campaign(
+            "k",
+            &CampaignEnd {
+                ended: now(),
+                ..CampaignEnd::default()
+            },
+        )
+        .unwrap();
     run.id
 }
 
@@ -293,7 +401,10 @@ fn a_replay_marks_the_hardest_contact() {
         let text = browser.value(&format!("document.querySelector('{place}').textContent"));
         let told = text.as_str().unwrap();
         let parts = [" presses coffee_table_1: ", " N, from ", ", at x = "];
-        assert!(parts.iter().all(|part| told.contains(part)), "{place}: {told}");
+        assert!(
+            parts.iter().all(|part| told.contains(part)),
+            "{place}: {told}"
+        );
     }
     browser.value("document.querySelector('.player .pressed button').click()");
     keep(&mut browser, "pressed");

@@ -1,4 +1,5 @@
-//! The main job with the built program: campaigns, their exit codes, and the files and records they leave.
+//! The main job with the built program: campaigns, their exit codes, and the files and records they
+//! leave.
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -21,18 +22,25 @@ fn run_json(folder: &Path, arguments: &[&str]) -> (i32, Value) {
     let output = actcheck(folder, &all);
     let code = output.status.code().unwrap();
     let text = stdout(&output);
-    let json = serde_json::from_str(&text).unwrap_or_else(|e| panic!("{e}: {text}\n{}", stderr(&output)));
+    let json =
+        serde_json::from_str(&text).unwrap_or_else(|e| panic!("{e}: {text}\n{}", stderr(&output)));
     (code, json)
 }
 
-/// The columns of `actcheck list` that must not depend on how or when the runs were made: all except the campaign's
-/// id.
+/// The columns of `actcheck list` that must not depend on how or when the runs were made: all
+/// except the campaign's id.
 fn listed(folder: &Path, history: &str) -> Vec<String> {
     let output = actcheck(folder, &["list", "--history", history, "--format", "csv"]);
     assert!(output.status.success(), "{}", stderr(&output));
     let text = stdout(&output);
-    assert_eq!(text.lines().next(), Some("run,index,test,status,score,trace_hash"));
-    text.lines().skip(1).map(|line| line.split_once(',').unwrap().1.to_owned()).collect()
+    assert_eq!(
+        text.lines().next(),
+        Some("run,index,test,status,score,trace_hash")
+    );
+    text.lines()
+        .skip(1)
+        .map(|line| line.split_once(',').unwrap().1.to_owned())
+        .collect()
 }
 
 fn outcomes(json: &Value) -> Vec<(u64, String, f64)> {
@@ -40,7 +48,11 @@ fn outcomes(json: &Value) -> Vec<(u64, String, f64)> {
     runs.iter()
         .map(|run| {
             let actions = run["actions"].to_string();
-            (run["index"].as_u64().unwrap(), actions, run["score"].as_f64().unwrap())
+            (
+                run["index"].as_u64().unwrap(),
+                actions,
+                run["score"].as_f64().unwrap(),
+            )
         })
         .collect()
 }
@@ -50,17 +62,41 @@ fn the_shipped_pick_has_passed_and_failed_runs_and_exits_with_1() {
     let (made, text) = (shipped("pick"), &shipped("pick").text);
     assert_eq!(made.code, Some(1), "{text}");
     let folder = made.copied();
-    for property in ["CloseObject", "ObjectGrasped", "NoGraspCollisions", "MovedObject", "ObjectInGripper"] {
-        assert!(text.contains(property), "{property} is not in the table:\n{text}");
+    for property in [
+        "CloseObject",
+        "ObjectGrasped",
+        "NoGraspCollisions",
+        "MovedObject",
+        "ObjectInGripper",
+    ] {
+        assert!(
+            text.contains(property),
+            "{property} is not in the table:\n{text}"
+        );
     }
     assert!(text.contains("over 15 runs"), "{text}");
-    assert!(text.contains("actcheck show "), "no suggested command that shows more:\n{text}");
-    let count = actcheck(folder.path(), &["query", "--history", "h", "--format", "csv", COUNT]);
+    assert!(
+        text.contains("actcheck show "),
+        "no suggested command that shows more:\n{text}"
+    );
+    let count = actcheck(
+        folder.path(),
+        &["query", "--history", "h", "--format", "csv", COUNT],
+    );
     assert_eq!(stdout(&count), "n\n15\n", "{}", stderr(&count));
-    let json = actcheck(folder.path(), &["list", "--history", "h", "--format", "json"]);
+    let json = actcheck(
+        folder.path(),
+        &["list", "--history", "h", "--format", "json"],
+    );
     let rows: Vec<Value> = serde_json::from_str(&stdout(&json)).unwrap();
-    assert!(rows.iter().any(|row| row["score"] == 1.0), "no run passed fully");
-    assert!(rows.iter().any(|row| row["score"].as_f64().unwrap() < 1.0), "no run failed");
+    assert!(
+        rows.iter().any(|row| row["score"] == 1.0),
+        "no run passed fully"
+    );
+    assert!(
+        rows.iter().any(|row| row["score"].as_f64().unwrap() < 1.0),
+        "no run failed"
+    );
 }
 
 /// Uses as many runs as needed, at most ninety-six: the test is not about one seed.
@@ -72,48 +108,84 @@ fn a_campaign_shows_several_ways_to_fail() {
     for seed in 7..13 {
         let history = format!("h{seed}");
         let seed = seed.to_string();
-        let (code, json) = run_json(project.path(), &["--runs", "16", "--seed", &seed, "--history", &history]);
+        let (code, json) = run_json(
+            project.path(),
+            &["--runs", "16", "--seed", &seed, "--history", &history],
+        );
         assert!(code <= 1 && json["finished_runs"] == 16, "{json:#}");
-        assert_eq!(json["counts"]["broken"], 0, "a run of the shipped campaign is broken");
-        assert_eq!(json["counts"]["timeout"], 0, "a run of the shipped campaign timed out");
+        assert_eq!(
+            json["counts"]["broken"], 0,
+            "a run of the shipped campaign is broken"
+        );
+        assert_eq!(
+            json["counts"]["timeout"], 0,
+            "a run of the shipped campaign timed out"
+        );
         passed += json["runs_passed"]["count"].as_u64().unwrap();
         finished += 16;
         for run in json["runs"].as_array().unwrap() {
             let outcomes = run["actions"][0]["outcomes"].as_array().unwrap();
-            let failed = outcomes.iter().filter(|outcome| outcome["outcome"] == "failed");
-            modes.insert(failed.map(|outcome| outcome["property"].to_string()).collect());
+            let failed = outcomes
+                .iter()
+                .filter(|outcome| outcome["outcome"] == "failed");
+            modes.insert(
+                failed
+                    .map(|outcome| outcome["property"].to_string())
+                    .collect(),
+            );
         }
         modes.remove(&Vec::new());
         if modes.len() >= 3 && finished >= 32 {
             break;
         }
     }
-    assert!((30..=95).contains(&(100 * passed / finished)), "{passed} of {finished} runs passed fully");
+    assert!(
+        (30..=95).contains(&(100 * passed / finished)),
+        "{passed} of {finished} runs passed fully"
+    );
     assert!(modes.len() >= 3, "only these failure modes: {modes:?}");
 }
 
 #[test]
 fn a_lone_glass_is_picked_with_perfect_sensors() {
     let folder = shipped("lone_glass").copied();
-    let listed = actcheck(folder.path(), &["list", "--history", "h", "--format", "json"]);
+    let listed = actcheck(
+        folder.path(),
+        &["list", "--history", "h", "--format", "json"],
+    );
     let rows: Vec<Value> = serde_json::from_str(&stdout(&listed)).unwrap();
     let passed = rows.iter().filter(|row| row["score"] == 1.0).count();
-    assert!(rows.len() == 20 && passed >= 19, "{passed} of 20 runs passed fully with a lone object and no noise");
+    assert!(
+        rows.len() == 20 && passed >= 19,
+        "{passed} of 20 runs passed fully with a lone object and no noise"
+    );
 }
 
 #[test]
 fn results_do_not_depend_on_the_number_of_workers_or_the_date() {
     let project = project();
-    let one = run_json(project.path(), &["--runs", "4", "--jobs", "1", "--history", "one"]);
-    let two = run_json(project.path(), &["--runs", "4", "--jobs", "2", "--history", "two"]);
-    let again = run_json(project.path(), &["--runs", "4", "--jobs", "2", "--history", "again"]);
+    let one = run_json(
+        project.path(),
+        &["--runs", "4", "--jobs", "1", "--history", "one"],
+    );
+    let two = run_json(
+        project.path(),
+        &["--runs", "4", "--jobs", "2", "--history", "two"],
+    );
+    let again = run_json(
+        project.path(),
+        &["--runs", "4", "--jobs", "2", "--history", "again"],
+    );
     assert_eq!(outcomes(&one.1), outcomes(&two.1));
     assert_eq!(outcomes(&one.1), outcomes(&again.1));
     let lists = ["one", "two", "again"].map(|history| listed(project.path(), history));
     assert_eq!(lists[0].len(), 4);
     assert_eq!(lists[0], lists[1]);
     assert_eq!(lists[0], lists[2]);
-    let other = run_json(project.path(), &["--runs", "2", "--seed", "99", "--history", "other"]);
+    let other = run_json(
+        project.path(),
+        &["--runs", "2", "--seed", "99", "--history", "other"],
+    );
     assert_ne!(outcomes(&one.1)[..2], outcomes(&other.1)[..]);
     assert_ne!(lists[0][..2], listed(project.path(), "other")[..]);
 }
@@ -141,17 +213,27 @@ fn a_new_rule_file_is_used_by_the_next_run_without_recompiling() {
     .unwrap();
     let (code, json) = run_json(project.path(), &["--runs", "2", "--history", "h"]);
     assert_eq!(code, 1);
-    let properties: Vec<&str> =
-        json["properties"].as_array().unwrap().iter().map(|p| p["property"].as_str().unwrap()).collect();
+    let properties: Vec<&str> = json["properties"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|p| p["property"].as_str().unwrap())
+        .collect();
     assert_eq!(properties.len(), 6, "{properties:?}");
-    let new = json["properties"].as_array().unwrap().iter().find(|p| p["property"] == "http://actions#ShortPick");
+    let new = json["properties"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .find(|p| p["property"] == "http://actions#ShortPick");
     assert_eq!(new.unwrap()["counts"]["failed"], 2);
 }
 
 /// The largest number of runs that a progress bar has shown, from its terminal output.
 fn runs_shown(typescript: &Path) -> usize {
     let text = String::from_utf8_lossy(&std::fs::read(typescript).unwrap_or_default()).into_owned();
-    let counts = text.split("/400 runs").filter_map(|before| before.rsplit(' ').next()?.parse().ok());
+    let counts = text
+        .split("/400 runs")
+        .filter_map(|before| before.rsplit(' ').next()?.parse().ok());
     counts.max().unwrap_or(0)
 }
 
@@ -159,11 +241,16 @@ fn runs_shown(typescript: &Path) -> usize {
 fn a_killed_campaign_keeps_all_reported_runs_and_no_partial_run() {
     let project = looking();
     for round in 0..3 {
-        let (history, seen) = (format!("h{round}"), project.path().join(format!("seen{round}")));
+        let (history, seen) = (
+            format!("h{round}"),
+            project.path().join(format!("seen{round}")),
+        );
         let program = env!("CARGO_BIN_EXE_actcheck");
-        // Progress is shown only on terminals; `script` provides one. `exec` keeps the shell's process id.
-        let command =
-            format!("echo $$ > pid{round}; exec {program} run configs/look.toml --runs 400 --history {history}");
+        // Progress is shown only on terminals; `script` provides one. `exec` keeps the shell's
+        // process id.
+        let command = format!(
+            "echo $$ > pid{round}; exec {program} run configs/look.toml --runs 400 --history {history}"
+        );
         let mut child = Command::new("script")
             .args(["-qfc", &command, seen.to_str().unwrap()])
             // Sets `TERM`, since a dumb terminal shows no bar.
@@ -176,24 +263,50 @@ fn a_killed_campaign_keeps_all_reported_runs_and_no_partial_run() {
             .unwrap();
         let start = Instant::now();
         while runs_shown(&seen) < 3 + round {
-            assert!(start.elapsed() < Duration::from_secs(120), "no runs in two minutes");
+            assert!(
+                start.elapsed() < Duration::from_secs(120),
+                "no runs in two minutes"
+            );
             std::thread::sleep(Duration::from_millis(5));
         }
         let kill = format!("kill -9 $(cat pid{round})");
-        assert!(Command::new("sh").args(["-c", &kill]).current_dir(project.path()).status().unwrap().success());
+        assert!(
+            Command::new("sh")
+                .args(["-c", &kill])
+                .current_dir(project.path())
+                .status()
+                .unwrap()
+                .success()
+        );
         child.wait().unwrap();
         let reported = runs_shown(&seen);
         let rows = listed(project.path(), &history);
-        assert!(rows.len() >= reported, "{} of {reported} reported runs are in the history", rows.len());
-        assert!(rows.len() < 400, "the campaign was over before it was killed");
-        // A complete run has its score and hash, its three graphs, and an outcome of each of the three properties.
+        assert!(
+            rows.len() >= reported,
+            "{} of {reported} reported runs are in the history",
+            rows.len()
+        );
+        assert!(
+            rows.len() < 400,
+            "the campaign was over before it was killed"
+        );
+        // A complete run has its score and hash, its three graphs, and an outcome of each of the
+        // three properties.
         let whole = "SELECT ?r WHERE { ?r a act:Run ; act:score ?s ; act:traceHash ?h . \
                      ?e act:ofRun ?r ; act:before ?b ; act:after ?a ; act:during ?d . \
                      ?assertion earl:subject ?e ; earl:result/act:outcome ?o . \
                      FILTER EXISTS { GRAPH ?b { ?x ?y ?z } } FILTER EXISTS { GRAPH ?a { ?x ?y ?z } } \
                      FILTER EXISTS { GRAPH ?d { ?x ?y ?z } } } GROUP BY ?r HAVING (COUNT(?assertion) = 3)";
-        let output = actcheck(project.path(), &["query", "--history", &history, "--format", "csv", whole]);
-        assert_eq!(stdout(&output).lines().count(), rows.len() + 1, "half-written runs\n{}", stderr(&output));
+        let output = actcheck(
+            project.path(),
+            &["query", "--history", &history, "--format", "csv", whole],
+        );
+        assert_eq!(
+            stdout(&output).lines().count(),
+            rows.len() + 1,
+            "half-written runs\n{}",
+            stderr(&output)
+        );
     }
 }
 
@@ -201,7 +314,16 @@ fn a_killed_campaign_keeps_all_reported_runs_and_no_partial_run() {
 fn an_interrupted_campaign_keeps_its_runs_and_says_so() {
     let project = project();
     let child = Command::new(env!("CARGO_BIN_EXE_actcheck"))
-        .args(["run", "configs/pick.toml", "--runs", "400", "--history", "h", "--format", "json"])
+        .args([
+            "run",
+            "configs/pick.toml",
+            "--runs",
+            "400",
+            "--history",
+            "h",
+            "--format",
+            "json",
+        ])
         .current_dir(project.path())
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())
@@ -209,7 +331,10 @@ fn an_interrupted_campaign_keeps_its_runs_and_says_so() {
         .unwrap();
     let start = Instant::now();
     while std::fs::read_dir(project.path().join("h/traces")).map_or(0, Iterator::count) < 2 {
-        assert!(start.elapsed() < Duration::from_secs(120), "no runs in two minutes");
+        assert!(
+            start.elapsed() < Duration::from_secs(120),
+            "no runs in two minutes"
+        );
         std::thread::sleep(Duration::from_millis(20));
     }
     signal(child.id(), "INT");
@@ -226,25 +351,40 @@ fn an_interrupted_campaign_keeps_its_runs_and_says_so() {
 fn a_second_writer_on_the_same_history_is_refused_and_a_reader_is_not() {
     let project = project();
     let mut child = Command::new(env!("CARGO_BIN_EXE_actcheck"))
-        .args(["run", "configs/pick.toml", "--runs", "400", "--history", "h"])
+        .args([
+            "run",
+            "configs/pick.toml",
+            "--runs",
+            "400",
+            "--history",
+            "h",
+        ])
         .current_dir(project.path())
         .stdout(Stdio::null())
         .stderr(Stdio::null())
         .spawn()
         .unwrap();
     let start = Instant::now();
-    // A trace is written before its run is committed, so with more traces than workers at least one run is committed.
+    // A trace is written before its run is committed, so with more traces than workers at least one
+    // run is committed.
     let workers = std::thread::available_parallelism().unwrap().get();
     while std::fs::read_dir(project.path().join("h/traces")).map_or(0, Iterator::count) <= workers {
         assert!(start.elapsed() < Duration::from_secs(120));
         std::thread::sleep(Duration::from_millis(20));
     }
-    let second = actcheck(project.path(), &["run", "configs/pick.toml", "--runs", "1", "--history", "h"]);
+    let second = actcheck(
+        project.path(),
+        &["run", "configs/pick.toml", "--runs", "1", "--history", "h"],
+    );
     let reader = actcheck(project.path(), &["list", "--history", "h"]);
     child.kill().unwrap();
     child.wait().unwrap();
     assert_eq!(second.status.code(), Some(2));
-    assert!(stderr(&second).contains("another process"), "{}", stderr(&second));
+    assert!(
+        stderr(&second).contains("another process"),
+        "{}",
+        stderr(&second)
+    );
     assert_eq!(reader.status.code(), Some(0), "{}", stderr(&reader));
     assert!(!listed(project.path(), "h").is_empty());
 }
@@ -259,9 +399,13 @@ fn embedded_files_are_used_outside_the_repository() {
     )
     .unwrap();
     let output = actcheck(folder.path(), &["run", "mine.toml", "--format", "json"]);
-    let json: Value = serde_json::from_str(&stdout(&output)).unwrap_or_else(|_| panic!("{}", stderr(&output)));
+    let json: Value =
+        serde_json::from_str(&stdout(&output)).unwrap_or_else(|_| panic!("{}", stderr(&output)));
     assert_eq!(json["finished_runs"], 2);
-    assert!(folder.path().join(".actcheck").is_dir(), "the history is beside the configuration");
+    assert!(
+        folder.path().join(".actcheck").is_dir(),
+        "the history is beside the configuration"
+    );
     let found = actcheck(folder.path(), &["list", "--format", "csv"]);
     assert_eq!(stdout(&found).lines().count(), 3, "{}", stderr(&found));
 }
@@ -269,15 +413,29 @@ fn embedded_files_are_used_outside_the_repository() {
 #[test]
 fn invalid_input_exits_with_2_and_names_its_place() {
     let project = project();
-    edit(&project.path().join("configs/pick.toml"), "test_count", "test_cuont");
+    edit(
+        &project.path().join("configs/pick.toml"),
+        "test_count",
+        "test_cuont",
+    );
     let output = actcheck(project.path(), &["run", "configs/pick.toml"]);
     assert_eq!(output.status.code(), Some(2));
     let text = stderr(&output);
-    assert!(text.contains("configs/pick.toml") && text.contains("did you mean `test_count`"), "{text}");
+    assert!(
+        text.contains("configs/pick.toml") && text.contains("did you mean `test_count`"),
+        "{text}"
+    );
     let missing = actcheck(project.path(), &["run", "configs/pcik.toml"]);
     assert_eq!(missing.status.code(), Some(2));
-    assert!(stderr(&missing).contains("configs/pcik.toml"), "{}", stderr(&missing));
-    assert!(!project.path().join("configs/.actcheck").exists(), "a refused campaign must not create a history");
+    assert!(
+        stderr(&missing).contains("configs/pcik.toml"),
+        "{}",
+        stderr(&missing)
+    );
+    assert!(
+        !project.path().join("configs/.actcheck").exists(),
+        "a refused campaign must not create a history"
+    );
 }
 
 #[test]
@@ -285,7 +443,11 @@ fn a_closed_output_pipe_does_not_panic() {
     let project = project();
     let (_, _) = run_json(project.path(), &["--runs", "1", "--history", "h"]);
     let output = Command::new("sh")
-        .args(["-c", "\"$0\" list --history h | true", env!("CARGO_BIN_EXE_actcheck")])
+        .args([
+            "-c",
+            "\"$0\" list --history h | true",
+            env!("CARGO_BIN_EXE_actcheck"),
+        ])
         .current_dir(project.path())
         .output()
         .unwrap();
@@ -302,11 +464,19 @@ fn a_campaign_is_recalled_with_its_original_configuration() {
     let text = "tests = [[\"Pick\"]]\ntest_count = 3\nseed = 4\n[objectSurface]\nobject_surfaces = [\"coffee_table\"]\n\
                 [pickObject]\nmodel_list = [\"glass\"]\n[surfaceObjects]\nmodel_list = [\"mug\"]\ncount = 1\n";
     std::fs::write(&config, text).unwrap();
-    let overrides = Overrides { runs: Some(2), seed: Some(9), ..Overrides::default() };
+    let overrides = Overrides {
+        runs: Some(2),
+        seed: Some(9),
+        ..Overrides::default()
+    };
     let env = Env::prepare(&config, &overrides).unwrap();
     let record = {
         let history = History::open(&env.campaign.history).unwrap();
-        let record = env.record("k7f3".to_owned(), "small".to_owned(), "2026-08-01T12:00:00Z".to_owned());
+        let record = env.record(
+            "k7f3".to_owned(),
+            "small".to_owned(),
+            "2026-08-01T12:00:00Z".to_owned(),
+        );
         history.begin_campaign(&record).unwrap();
         assert_eq!(history.campaign("k7f3").unwrap(), record);
         record
@@ -321,9 +491,18 @@ fn a_campaign_is_recalled_with_its_original_configuration() {
     assert_eq!(recalled, record);
     assert_eq!((again.campaign.seed, again.planned_runs()), (9, 2));
     assert_eq!(again.campaign.candidates["pickObject"], ["glass"]);
-    let edited = Env::from_history(&history, "k7f3", Some(&after.join("small.toml"))).unwrap().0;
+    let edited = Env::from_history(&history, "k7f3", Some(&after.join("small.toml")))
+        .unwrap()
+        .0;
     assert_eq!(edited.campaign.candidates["pickObject"], ["mug"]);
-    let fault =
-        Env::from_history(&history, "k7f4", None).err().expect("no such campaign exists").into_iter().next().unwrap();
-    assert_eq!((fault.code, fault.help.as_deref()), ("H014", Some("did you mean `k7f3`?")));
+    let fault = Env::from_history(&history, "k7f4", None)
+        .err()
+        .expect("no such campaign exists")
+        .into_iter()
+        .next()
+        .unwrap();
+    assert_eq!(
+        (fault.code, fault.help.as_deref()),
+        ("H014", Some("did you mean `k7f3`?"))
+    );
 }

@@ -19,13 +19,19 @@ fn load_text(text: &str) -> Campaign {
 }
 
 fn refused(path: &Path) -> String {
-    config::load(path, &Overrides::default()).unwrap_err().to_string()
+    config::load(path, &Overrides::default())
+        .unwrap_err()
+        .to_string()
 }
 
 #[test]
 fn every_shipped_configuration_loads() {
     let is_config = |path: &PathBuf| path.extension().is_some_and(|ending| ending == "toml");
-    for path in Files::Disk.list(Path::new("configs")).into_iter().filter(is_config) {
+    for path in Files::Disk
+        .list(Path::new("configs"))
+        .into_iter()
+        .filter(is_config)
+    {
         let campaign = load(&path);
         assert!(!campaign.tests.is_empty(), "{}", path.display());
     }
@@ -58,11 +64,25 @@ fn all_parameters_of_the_paper_are_read() {
     let whole = ["MoveTo", "PerceivePlane", "Pick", "Place"].map(Step::plain);
     assert_eq!(campaign.tests[1], whole);
     assert_eq!(campaign.test_count, 15);
-    let Launcher::Program(skill) = &campaign.launcher else { panic!("{:?}", campaign.launcher) };
-    assert_eq!((skill.text.as_str(), skill.args.join(" ")), ("python3 my_robot.py", "my_robot.py".to_owned()));
-    assert_eq!((campaign.nav_obstacles.join(" "), campaign.nav_obstacle_count), ("box bottle".to_owned(), 2));
-    let candidates: Vec<String> =
-        campaign.candidates.iter().map(|(name, values)| format!("{name}: {}", values.join(", "))).collect();
+    let Launcher::Program(skill) = &campaign.launcher else {
+        panic!("{:?}", campaign.launcher)
+    };
+    assert_eq!(
+        (skill.text.as_str(), skill.args.join(" ")),
+        ("python3 my_robot.py", "my_robot.py".to_owned())
+    );
+    assert_eq!(
+        (
+            campaign.nav_obstacles.join(" "),
+            campaign.nav_obstacle_count
+        ),
+        ("box bottle".to_owned(), 2)
+    );
+    let candidates: Vec<String> = campaign
+        .candidates
+        .iter()
+        .map(|(name, values)| format!("{name}: {}", values.join(", ")))
+        .collect();
     assert_eq!(
         candidates,
         [
@@ -80,13 +100,26 @@ fn all_parameters_of_the_paper_are_read() {
 #[test]
 fn shipped_files_are_the_defaults() {
     let campaign = load_text("tests = [[\"Pick\"]]\ntest_count = 1\n");
-    assert_eq!(campaign.ontology, (Files::Shipped, PathBuf::from("ontology/actions.ttl")));
-    assert!(campaign.models.contains_key("glass") && campaign.models["coffee_table"].surface.is_some());
     assert_eq!(
-        campaign.robot.urdf.name.strip_prefix("built-in:").map(|name| name.contains("mobile_manipulator")),
+        campaign.ontology,
+        (Files::Shipped, PathBuf::from("ontology/actions.ttl"))
+    );
+    assert!(
+        campaign.models.contains_key("glass") && campaign.models["coffee_table"].surface.is_some()
+    );
+    assert_eq!(
+        campaign
+            .robot
+            .urdf
+            .name
+            .strip_prefix("built-in:")
+            .map(|name| name.contains("mobile_manipulator")),
         Some(true)
     );
-    assert_eq!((campaign.seed, campaign.other_counts.beside_target), (0, (0, 0)));
+    assert_eq!(
+        (campaign.seed, campaign.other_counts.beside_target),
+        (0, (0, 0))
+    );
     assert_eq!(campaign.launcher, Launcher::Reference);
     assert!(campaign.history.ends_with(".actcheck"));
     assert_eq!(campaign.sensing.position_noise_m, 0.0);
@@ -94,7 +127,8 @@ fn shipped_files_are_the_defaults() {
 
 #[test]
 fn a_single_list_table_may_be_named_after_any_designator() {
-    let campaign = load_text("tests = [[\"Pour\"]]\ntest_count = 1\n[drink]\nkinds = [\"tea\", \"milk\"]\n");
+    let campaign =
+        load_text("tests = [[\"Pour\"]]\ntest_count = 1\n[drink]\nkinds = [\"tea\", \"milk\"]\n");
     assert_eq!(campaign.candidates["drink"], ["tea", "milk"]);
     assert!(campaign.places.contains_key("drink") && campaign.places.contains_key("drink.1"));
 }
@@ -116,12 +150,24 @@ fn the_number_of_other_objects_may_be_exact() {
 #[test]
 fn paths_are_relative_to_the_configuration_and_the_command_line_wins() {
     let campaign = load(Path::new("configs/pick.toml"));
-    assert_eq!(campaign.ontology, (Files::Disk, PathBuf::from("ontology/actions.ttl")));
+    assert_eq!(
+        campaign.ontology,
+        (Files::Disk, PathBuf::from("ontology/actions.ttl"))
+    );
     assert_eq!(campaign.history, Path::new("configs/.actcheck"));
     let history = Some(PathBuf::from("elsewhere"));
-    let overrides = Overrides { runs: Some(2), seed: Some(99), repeat: Some(3), history, ..Overrides::default() };
+    let overrides = Overrides {
+        runs: Some(2),
+        seed: Some(99),
+        repeat: Some(3),
+        history,
+        ..Overrides::default()
+    };
     let campaign = config::load(Path::new("configs/pick.toml"), &overrides).unwrap();
-    assert_eq!((campaign.test_count, campaign.seed, campaign.repeat), (2, 99, 3));
+    assert_eq!(
+        (campaign.test_count, campaign.seed, campaign.repeat),
+        (2, 99, 3)
+    );
     assert_eq!(campaign.history, PathBuf::from("elsewhere"));
 }
 

@@ -1,7 +1,8 @@
 //! Damage to any file of a history is found or harmless, and readable data is saved.
 //!
-//! `ACTCHECK_FLIPS` sets the number of flipped bits; `ACTCHECK_DAMAGED` the number of flips and of truncations of each kind of file, of
-//! which `ACTCHECK_KIND` chooses one, such as `traces/trace`, and `ACTCHECK_SEED` the places.
+//! `ACTCHECK_FLIPS` sets the number of flipped bits; `ACTCHECK_DAMAGED` the number of flips and of
+//! truncations of each kind of file, of which `ACTCHECK_KIND` chooses one, such as `traces/trace`,
+//! and `ACTCHECK_SEED` the places.
 
 use std::collections::BTreeMap;
 use std::io::Read as _;
@@ -21,7 +22,15 @@ const MOST_SECS: u64 = 60;
 /// Questions whose answers must not change.
 const QUESTIONS: [&[&str]; 5] = [
     &["list", "--format", "csv", "--history", "h"],
-    &["query", "--named", "failure-rates", "--format", "csv", "--history", "h"],
+    &[
+        "query",
+        "--named",
+        "failure-rates",
+        "--format",
+        "csv",
+        "--history",
+        "h",
+    ],
     &[
         "query",
         "--format",
@@ -38,7 +47,11 @@ fn files(folder: &Path) -> Vec<PathBuf> {
     let mut found = Vec::new();
     for entry in std::fs::read_dir(folder).unwrap().map(Result::unwrap) {
         let path = entry.path();
-        if path.is_dir() { found.extend(files(&path)) } else { found.push(path) }
+        if path.is_dir() {
+            found.extend(files(&path))
+        } else {
+            found.push(path)
+        }
     }
     found.sort();
     found
@@ -75,7 +88,11 @@ fn asked(folder: &Path, arguments: &[&str]) -> Option<(Option<i32>, String, Stri
             None => std::thread::sleep(Duration::from_millis(5)),
         }
     };
-    Some((status.code(), output.join().unwrap().unwrap(), errors.join().unwrap().unwrap()))
+    Some((
+        status.code(),
+        output.join().unwrap().unwrap(),
+        errors.join().unwrap().unwrap(),
+    ))
 }
 
 /// The answers to all questions; the export's file is read back.
@@ -114,18 +131,31 @@ fn copied() -> tempfile::TempDir {
 fn an_intact_history_passes_its_examination() {
     let folder = copied();
     let output = actcheck(folder.path(), &["health", "--integrity", "--history", "h"]);
-    assert_eq!(output.status.code(), Some(0), "{}{}", stdout(&output), stderr(&output));
-    assert_eq!(stdout(&output), "h: store, 4 traces and mirror are intact\n");
+    assert_eq!(
+        output.status.code(),
+        Some(0),
+        "{}{}",
+        stdout(&output),
+        stderr(&output)
+    );
+    assert_eq!(
+        stdout(&output),
+        "h: store, 4 traces and mirror are intact\n"
+    );
 }
 
-/// A history with every kind of file: runs that are kept whole, outlines, tables, and the journal of a killed process.
+/// A history with every kind of file: runs that are kept whole, outlines, tables, and the journal
+/// of a killed process.
 fn every_kind(folder: &Path) {
     let (live, left) = (folder.join("live"), folder.join("h"));
     copy_made_history(&live);
     let history = History::open(&live).unwrap();
     history.begin_campaign(&sample_campaign("o", 1)).unwrap();
     (0..3).for_each(|index| history.commit_outline(&sample_run("o", index)).unwrap());
-    let end = CampaignEnd { ended: "2026-08-01T13:00:00Z".to_owned(), ..CampaignEnd::default() };
+    let end = CampaignEnd {
+        ended: "2026-08-01T13:00:00Z".to_owned(),
+        ..CampaignEnd::default()
+    };
     history.finish_campaign("o", &end).unwrap();
     drop(history);
     let history = History::open(&live).unwrap();
@@ -149,15 +179,18 @@ const ASKED: [&[&str]; 7] = [
     &["show", "o-2", "--format", "json", "--history", "h"],
 ];
 
-/// The answers; that of an export is its table. `show` is also asked for a run with a trace of a simulation.
+/// The answers; that of an export is its table. `show` is also asked for a run with a trace of a
+/// simulation.
 fn asked_anew(folder: &Path, first: &str) -> Vec<(Option<i32>, String, String)> {
     let _ = std::fs::remove_dir_all(folder.join("out"));
     let show = ["show", first, "--format", "json", "--history", "h"];
     let all = ASKED.into_iter().chain([&show[..]]);
     all.map(|question| {
-        let mut answer = asked(folder, question).unwrap_or_else(|| panic!("{question:?} does not end"));
+        let mut answer =
+            asked(folder, question).unwrap_or_else(|| panic!("{question:?} does not end"));
         if question.contains(&"--csv") {
-            let table = std::fs::read_to_string(folder.join("out/outcomes.csv")).unwrap_or_default();
+            let table =
+                std::fs::read_to_string(folder.join("out/outcomes.csv")).unwrap_or_default();
             let mut lines: Vec<&str> = table.lines().collect();
             lines.sort_unstable();
             answer.1 = lines.join("\n");
@@ -170,16 +203,33 @@ fn asked_anew(folder: &Path, first: &str) -> Vec<(Option<i32>, String, String)> 
 /// The kind of a file of a history: its folder, and its ending or the first word of its name.
 fn kind_of(file: &Path) -> String {
     let name = file.file_name().unwrap().to_string_lossy().into_owned();
-    let kind = file.extension().map_or_else(|| name.clone(), |ending| ending.to_string_lossy().into_owned());
-    let place = file.parent().unwrap().file_name().unwrap().to_string_lossy().into_owned();
+    let kind = file.extension().map_or_else(
+        || name.clone(),
+        |ending| ending.to_string_lossy().into_owned(),
+    );
+    let place = file
+        .parent()
+        .unwrap()
+        .file_name()
+        .unwrap()
+        .to_string_lossy()
+        .into_owned();
     format!("{place}/{}", kind.split('-').next().unwrap())
 }
 
 /// One flipped bit in a trace, and tables made anew from it, gave other numbers with exit code 0.
 #[test]
 fn numbers_made_anew_from_damaged_files_are_the_same_or_refused() {
-    let number = |name: &str, default| std::env::var(name).ok().and_then(|n| n.parse().ok()).unwrap_or(default);
-    let (of_kind, only) = (number("ACTCHECK_DAMAGED", 0usize), std::env::var("ACTCHECK_KIND").ok());
+    let number = |name: &str, default| {
+        std::env::var(name)
+            .ok()
+            .and_then(|n| n.parse().ok())
+            .unwrap_or(default)
+    };
+    let (of_kind, only) = (
+        number("ACTCHECK_DAMAGED", 0usize),
+        std::env::var("ACTCHECK_KIND").ok(),
+    );
     let whole = tempfile::tempdir().unwrap();
     every_kind(whole.path());
     let runs = files(&whole.path().join("h/traces")).into_iter();
@@ -202,8 +252,12 @@ fn numbers_made_anew_from_damaged_files_are_the_same_or_refused() {
     let mut dice = Dice::new(number("ACTCHECK_SEED", 63) as u64);
     // By default, some kinds are damaged in one way and some in the other.
     let cases: Vec<(usize, bool)> = match of_kind {
-        0 => (0..kinds.len()).map(|place| (place, place % 2 == 0)).collect(),
-        many => (0..kinds.len()).flat_map(|place| (0..2 * many).map(move |n| (place, n % 2 == 0))).collect(),
+        0 => (0..kinds.len())
+            .map(|place| (place, place % 2 == 0))
+            .collect(),
+        many => (0..kinds.len())
+            .flat_map(|place| (0..2 * many).map(move |n| (place, n % 2 == 0)))
+            .collect(),
     };
     let mut table: BTreeMap<(String, &str, &str), usize> = BTreeMap::new();
     for (place, is_flip) in cases {
@@ -211,41 +265,70 @@ fn numbers_made_anew_from_damaged_files_are_the_same_or_refused() {
         let folder = tempfile::tempdir().unwrap();
         copy(&keep.path().join("h"), &folder.path().join("h"));
         let of_kind: Vec<&PathBuf> = all.iter().filter(|file| kind_of(file) == *kind).collect();
-        let file = folder.path().join(of_kind[dice.below(of_kind.len() as u64) as usize]);
+        let file = folder
+            .path()
+            .join(of_kind[dice.below(of_kind.len() as u64) as usize]);
         let damage = if is_flip {
             let (at, bit) = flip(&file, &mut dice);
             format!("bit {bit} of byte {at} of {}", file.display())
         } else {
             let length = dice.below(file.metadata().unwrap().len());
-            std::fs::File::options().write(true).open(&file).unwrap().set_len(length).unwrap();
+            std::fs::File::options()
+                .write(true)
+                .open(&file)
+                .unwrap()
+                .set_len(length)
+                .unwrap();
             format!("{} cut to {length} bytes", file.display())
         };
         let mut is_noticed = false;
-        for (idx, (answer, right)) in asked_anew(folder.path(), &first).into_iter().zip(&right).enumerate() {
+        for (idx, (answer, right)) in asked_anew(folder.path(), &first)
+            .into_iter()
+            .zip(&right)
+            .enumerate()
+        {
             let place = format!("{damage}: {:?}", ASKED.get(idx));
             let (code, output, errors) = answer;
             let code = code.unwrap_or_else(|| panic!("{place}: crashed: {errors}"));
-            assert!(code <= 2 && !errors.contains("panicked"), "{place}: {errors}");
+            assert!(
+                code <= 2 && !errors.contains("panicked"),
+                "{place}: {errors}"
+            );
             let same = code == 0 && output == right.1;
             let said = code > 0 || errors.contains("H029");
-            assert!(same || said, "{place}: another answer with exit code 0 and no warning\n{output}\n{}", right.1);
+            assert!(
+                same || said,
+                "{place}: another answer with exit code 0 and no warning\n{output}\n{}",
+                right.1
+            );
             is_noticed |= said;
         }
         let result = if is_noticed { "found" } else { "harmless" };
-        *table.entry((kind.clone(), if is_flip { "flip" } else { "cut" }, result)).or_default() += 1;
+        *table
+            .entry((kind.clone(), if is_flip { "flip" } else { "cut" }, result))
+            .or_default() += 1;
     }
     for ((kind, way, result), times) in table {
         println!("{kind:24} {way:5} {times:4} {result}");
     }
 }
 
-/// No answer after a flipped bit may differ from the right one without an error, take for ever, or come from a crash.
+/// No answer after a flipped bit may differ from the right one without an error, take for ever, or
+/// come from a crash.
 #[test]
 fn a_flipped_bit_in_any_file_is_found_or_harmless() {
-    let flips: usize = std::env::var("ACTCHECK_FLIPS").ok().and_then(|n| n.parse().ok()).unwrap_or(8);
+    let flips: usize = std::env::var("ACTCHECK_FLIPS")
+        .ok()
+        .and_then(|n| n.parse().ok())
+        .unwrap_or(8);
     let whole = copied();
     let right = answers(whole.path());
-    assert!(right.iter().all(|answer| answer.as_ref().is_some_and(|(code, ..)| *code == Some(0))), "{right:?}");
+    assert!(
+        right
+            .iter()
+            .all(|answer| answer.as_ref().is_some_and(|(code, ..)| *code == Some(0))),
+        "{right:?}"
+    );
     let mut dice = Dice::new(19);
     let mut table: BTreeMap<(String, &str), usize> = BTreeMap::new();
     for number in 0..flips {
@@ -264,17 +347,28 @@ fn a_flipped_bit_in_any_file_is_found_or_harmless() {
         let (at, bit) = flip(file, &mut dice);
         let place = format!("bit {bit} of byte {at} of {}", file.display());
         let examined = asked(folder.path(), &["health", "--integrity", "--history", "h"]);
-        let (code, told, errors) = examined.unwrap_or_else(|| panic!("{place}: the examination does not end"));
-        assert!(code.is_some_and(|code| code <= 2), "{place}: {code:?} {errors}");
+        let (code, told, errors) =
+            examined.unwrap_or_else(|| panic!("{place}: the examination does not end"));
+        assert!(
+            code.is_some_and(|code| code <= 2),
+            "{place}: {code:?} {errors}"
+        );
         let found = code != Some(0);
         let mut is_same = true;
         for (idx, (answer, right)) in answers(folder.path()).into_iter().zip(&right).enumerate() {
             let place = format!("{place}: {:?}", QUESTIONS[idx]);
-            let (code, output, errors) = answer.unwrap_or_else(|| panic!("{place}: no answer after {MOST_SECS} s"));
+            let (code, output, errors) =
+                answer.unwrap_or_else(|| panic!("{place}: no answer after {MOST_SECS} s"));
             let code = code.unwrap_or_else(|| panic!("{place}: crashed: {errors}"));
-            assert!(code <= 2 && !errors.contains("panicked"), "{place}: {errors}");
+            assert!(
+                code <= 2 && !errors.contains("panicked"),
+                "{place}: {errors}"
+            );
             let same = code == 0 && output == right.as_ref().unwrap().1;
-            assert!(same || code == 2, "{place}: another answer with exit code 0");
+            assert!(
+                same || code == 2,
+                "{place}: another answer with exit code 0"
+            );
             // The trace of a run is read by few commands; the examination reads all.
             is_same &= same;
         }
@@ -291,16 +385,25 @@ fn a_flipped_bit_in_any_file_is_found_or_harmless() {
     }
 }
 
-/// A trace file has a copy of its run's outcomes. Restored from a backup under a wrong name, it showed those of another run.
+/// A trace file has a copy of its run's outcomes. Restored from a backup under a wrong name, it
+/// showed those of another run.
 #[test]
 fn a_trace_file_of_another_run_does_not_change_outcomes() {
     let folder = copied();
-    let show = |run: &str| stdout(&actcheck(folder.path(), &["show", run, "--history", "h", "--format", "json"]));
+    let show = |run: &str| {
+        stdout(&actcheck(
+            folder.path(),
+            &["show", run, "--history", "h", "--format", "json"],
+        ))
+    };
     let traces: Vec<PathBuf> = files(&folder.path().join("h/traces"));
-    let names: Vec<String> =
-        traces.iter().map(|file| file.file_stem().unwrap().to_string_lossy().into_owned()).collect();
+    let names: Vec<String> = traces
+        .iter()
+        .map(|file| file.file_stem().unwrap().to_string_lossy().into_owned())
+        .collect();
     let before: Vec<String> = names.iter().map(|run| show(run)).collect();
-    let other = (1..traces.len()).find(|at| std::fs::read(&traces[*at]).unwrap() != std::fs::read(&traces[0]).unwrap());
+    let other = (1..traces.len())
+        .find(|at| std::fs::read(&traces[*at]).unwrap() != std::fs::read(&traces[0]).unwrap());
     std::fs::copy(&traces[other.expect("two runs differ")], &traces[0]).unwrap();
     let after: Vec<String> = names.iter().map(|run| show(run)).collect();
     assert_eq!(after, before);
@@ -312,7 +415,12 @@ fn a_damaged_mirror_is_written_anew_and_the_numbers_are_the_same() {
     let question = ["analyse", "--format", "json", "--history", "h"];
     let right = actcheck(folder.path(), &question);
     let tables = folder.path().join("h/tables");
-    let mirror = || files(&tables).into_iter().find(|file| file.extension().is_some_and(|e| e == "parquet")).unwrap();
+    let mirror = || {
+        files(&tables)
+            .into_iter()
+            .find(|file| file.extension().is_some_and(|e| e == "parquet"))
+            .unwrap()
+    };
     let middle = std::fs::metadata(mirror()).unwrap().len() as usize / 2;
     for examine in [false, true] {
         let mut bytes = std::fs::read(mirror()).unwrap();
@@ -321,8 +429,16 @@ fn a_damaged_mirror_is_written_anew_and_the_numbers_are_the_same() {
         if examine {
             let output = actcheck(folder.path(), &["health", "--integrity", "--history", "h"]);
             assert_eq!(output.status.code(), Some(1), "{}", stderr(&output));
-            assert!(stdout(&output).contains("it differs from the store"), "{}", stdout(&output));
-            assert!(stderr(&output).contains("written anew"), "{}", stderr(&output));
+            assert!(
+                stdout(&output).contains("it differs from the store"),
+                "{}",
+                stdout(&output)
+            );
+            assert!(
+                stderr(&output).contains("written anew"),
+                "{}",
+                stderr(&output)
+            );
         }
         let output = actcheck(folder.path(), &question);
         assert_eq!(stdout(&output), stdout(&right), "{}", stderr(&output));
@@ -343,13 +459,26 @@ fn listed(folder: &Path, history: &str) -> Vec<String> {
 fn a_store_without_a_readable_manifest_is_saved_completely() {
     let folder = copied();
     let right = listed(folder.path(), "h");
-    let is_manifest = |file: &PathBuf| file.file_name().unwrap().to_string_lossy().starts_with("MANIFEST");
-    let manifest = files(&folder.path().join("h/store")).into_iter().find(is_manifest).unwrap();
+    let is_manifest = |file: &PathBuf| {
+        file.file_name()
+            .unwrap()
+            .to_string_lossy()
+            .starts_with("MANIFEST")
+    };
+    let manifest = files(&folder.path().join("h/store"))
+        .into_iter()
+        .find(is_manifest)
+        .unwrap();
     std::fs::write(&manifest, b"nothing").unwrap();
     let output = actcheck(folder.path(), &["list", "--history", "h"]);
     assert_eq!(output.status.code(), Some(2));
-    assert!(stderr(&output).contains("H007") && stderr(&output).contains("MANIFEST"), "{}", stderr(&output));
-    // A process that writes must not touch it: the library would remove the tables that the manifest does not list.
+    assert!(
+        stderr(&output).contains("H007") && stderr(&output).contains("MANIFEST"),
+        "{}",
+        stderr(&output)
+    );
+    // A process that writes must not touch it: the library would remove the tables that the
+    // manifest does not list.
     assert!(History::open_existing(&folder.path().join("h")).is_err());
     let output = actcheck(folder.path(), &["merge", "--salvage", "h", "--into", "new"]);
     assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
@@ -361,22 +490,57 @@ fn the_runs_that_a_damaged_table_loses_are_named_and_made_again() {
     let folder = copied();
     let right = listed(folder.path(), "h");
     let is_table = |file: &PathBuf| file.extension().is_some_and(|ending| ending == "sst");
-    let tables: Vec<PathBuf> = files(&folder.path().join("h/store")).into_iter().filter(is_table).collect();
-    let largest = tables.iter().max_by_key(|file| file.metadata().unwrap().len()).unwrap();
+    let tables: Vec<PathBuf> = files(&folder.path().join("h/store"))
+        .into_iter()
+        .filter(is_table)
+        .collect();
+    let largest = tables
+        .iter()
+        .max_by_key(|file| file.metadata().unwrap().len())
+        .unwrap();
     let mut bytes = std::fs::read(largest).unwrap();
     let middle = bytes.len() / 2;
     bytes[middle] ^= 0x10;
     std::fs::write(largest, bytes).unwrap();
     let output = actcheck(folder.path(), &["health", "--integrity", "--history", "h"]);
     assert_eq!(output.status.code(), Some(1), "{}", stderr(&output));
-    assert!(stdout(&output).contains(&*largest.file_name().unwrap().to_string_lossy()), "{}", stdout(&output));
-    assert!(stderr(&output).contains("merge --salvage"), "{}", stderr(&output));
+    assert!(
+        stdout(&output).contains(&*largest.file_name().unwrap().to_string_lossy()),
+        "{}",
+        stdout(&output)
+    );
+    assert!(
+        stderr(&output).contains("merge --salvage"),
+        "{}",
+        stderr(&output)
+    );
     let output = actcheck(folder.path(), &["merge", "--salvage", "h", "--into", "new"]);
-    assert!(output.status.code().is_some_and(|code| code < 2), "{}", stderr(&output));
-    let config = crate::support::root().join("configs/quick.toml").display().to_string();
-    let resumed = actcheck(folder.path(), &["run", &config, "--resume", "--history", "new", "--jobs", "1"]);
+    assert!(
+        output.status.code().is_some_and(|code| code < 2),
+        "{}",
+        stderr(&output)
+    );
+    let config = crate::support::root()
+        .join("configs/quick.toml")
+        .display()
+        .to_string();
+    let resumed = actcheck(
+        folder.path(),
+        &[
+            "run",
+            &config,
+            "--resume",
+            "--history",
+            "new",
+            "--jobs",
+            "1",
+        ],
+    );
     let resumed = stderr(&resumed);
-    let all = History::open_to_read(&folder.path().join("new")).unwrap().runs(&RunFilter::default()).unwrap();
+    let all = History::open_to_read(&folder.path().join("new"))
+        .unwrap()
+        .runs(&RunFilter::default())
+        .unwrap();
     assert_eq!(all.len(), 4, "{resumed}");
     assert_eq!(listed(folder.path(), "new"), right);
 }
@@ -384,20 +548,35 @@ fn the_runs_that_a_damaged_table_loses_are_named_and_made_again() {
 /// Runs a test on a file system with little space, which is removed afterwards.
 fn on_small_disk(megabytes: u32, test: impl FnOnce(&Path) + std::panic::UnwindSafe) {
     let folder = tempfile::tempdir().unwrap();
-    let (path, size) = (folder.path().display().to_string(), format!("size={megabytes}m"));
-    let mounted = Command::new("mount").args(["-t", "tmpfs", "-o", &size, "tmpfs", &path]).status();
+    let (path, size) = (
+        folder.path().display().to_string(),
+        format!("size={megabytes}m"),
+    );
+    let mounted = Command::new("mount")
+        .args(["-t", "tmpfs", "-o", &size, "tmpfs", &path])
+        .status();
     if !mounted.is_ok_and(|status| status.success()) {
-        crate::support::foreign::left_out("a test on a small file system", "it can't be mounted here");
+        crate::support::foreign::left_out(
+            "a test on a small file system",
+            "it can't be mounted here",
+        );
         return;
     }
     let outcome = std::panic::catch_unwind(|| test(folder.path()));
-    assert!(Command::new("umount").arg(&path).status().unwrap().success());
+    assert!(
+        Command::new("umount")
+            .arg(&path)
+            .status()
+            .unwrap()
+            .success()
+    );
     if let Err(panic) = outcome {
         std::panic::resume_unwind(panic);
     }
 }
 
-/// An export to a full disk left half a file under the final name, which other programs took for the whole one.
+/// An export to a full disk left half a file under the final name, which other programs took for
+/// the whole one.
 #[test]
 fn an_export_to_a_full_disk_leaves_no_partial_file() {
     let folder = copied();
@@ -416,9 +595,16 @@ fn an_export_to_a_full_disk_leaves_no_partial_file() {
             // 20 kB are left: less than each of these takes.
             std::fs::write(disk.join("ballast"), vec![1; (1 << 20) - 20_480]).unwrap();
             let output = actcheck(disk, &[export, &["--history", &history]].concat());
-            assert_eq!(output.status.code(), Some(2), "{export:?}: {}", stdout(&output));
-            let left: Vec<PathBuf> =
-                files(disk).into_iter().filter(|file| file.file_name().unwrap() != "ballast").collect();
+            assert_eq!(
+                output.status.code(),
+                Some(2),
+                "{export:?}: {}",
+                stdout(&output)
+            );
+            let left: Vec<PathBuf> = files(disk)
+                .into_iter()
+                .filter(|file| file.file_name().unwrap() != "ballast")
+                .collect();
             assert!(left.is_empty(), "{export:?}: {left:?}");
             let _ = std::fs::remove_dir_all(disk.join("out"));
         }

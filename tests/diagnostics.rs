@@ -1,7 +1,8 @@
 //! Wrong configurations, ontologies and scene spaces, each with all its diagnostics.
 //!
-//! A case is a file below `tests/diagnostics/`; its diagnostics are beside it, in a file of the same name with
-//! `.expected` appended. A new case needs no Rust: run with `UPDATE_EXPECT=1` to write the files, and review them.
+//! A case is a file below `tests/diagnostics/`; its diagnostics are beside it, in a file of the
+//! same name with `.expected` appended. A new case needs no Rust: run with `UPDATE_EXPECT=1` to
+//! write the files, and review them.
 
 use std::path::{Path, PathBuf};
 
@@ -15,14 +16,21 @@ use crate::support::expected::assert_diagnostics;
 fn cases(kind: &str) -> Vec<PathBuf> {
     let folder = Path::new("tests/diagnostics").join(kind);
     let is_case = |path: &PathBuf| {
-        path.extension().is_some_and(|ending| ["toml", "ttl", "owl", "rdf"].iter().any(|e| ending == *e))
+        path.extension()
+            .is_some_and(|ending| ["toml", "ttl", "owl", "rdf"].iter().any(|e| ending == *e))
     };
-    Files::Disk.list(&folder).into_iter().filter(is_case).collect()
+    Files::Disk
+        .list(&folder)
+        .into_iter()
+        .filter(is_case)
+        .collect()
 }
 
 fn check(kind: &str, least: usize, load: impl Fn(&Path) -> Result<(), Diagnostics>) {
     let report = |case: PathBuf| {
-        let diagnostics = load(&case).err().map_or_else(String::new, |found| found.to_string());
+        let diagnostics = load(&case)
+            .err()
+            .map_or_else(String::new, |found| found.to_string());
         (case.with_added_extension("expected"), diagnostics)
     };
     assert_diagnostics(least, cases(kind).into_iter().map(report));
@@ -30,12 +38,16 @@ fn check(kind: &str, least: usize, load: impl Fn(&Path) -> Result<(), Diagnostic
 
 #[test]
 fn all_faults_of_a_configuration_are_reported_at_once() {
-    check("config", 20, |path| config::load(path, &Overrides::default()).map(drop));
+    check("config", 20, |path| {
+        config::load(path, &Overrides::default()).map(drop)
+    });
 }
 
 #[test]
 fn all_faults_of_an_ontology_are_reported_at_once() {
-    check("ontology", 12, |path| ontology::load(&Files::Disk, path).map(drop));
+    check("ontology", 12, |path| {
+        ontology::load(&Files::Disk, path).map(drop)
+    });
 }
 
 #[test]

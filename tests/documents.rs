@@ -1,4 +1,5 @@
-//! The pages of `docs/`: every command is run, every link leads somewhere, and generated pages are up to date.
+//! The pages of `docs/`: every command is run, every link leads somewhere, and generated pages are
+//! up to date.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -45,10 +46,16 @@ fn commands_of_the_page_about_bisection_work() {
     let checkout = Checkout::after_first_run();
     let [author, committer] =
         ["GIT_AUTHOR", "GIT_COMMITTER"].map(|who| [format!("{who}_NAME"), format!("{who}_EMAIL")]);
-    let identity: Vec<(&str, &str)> =
-        author.iter().chain(&committer).map(|name| (name.as_str(), "ada@example.org")).collect();
+    let identity: Vec<(&str, &str)> = author
+        .iter()
+        .chain(&committer)
+        .map(|name| (name.as_str(), "ada@example.org"))
+        .collect();
     let files = "configs/*.toml ontology rules models";
-    checkout.run(&format!("git init --quiet && git add {files} && git commit --quiet --message project"), &identity);
+    checkout.run(
+        &format!("git init --quiet && git add {files} && git commit --quiet --message project"),
+        &identity,
+    );
     commands_work_in(&checkout, "bisect.md", &identity);
 }
 
@@ -101,15 +108,18 @@ fn commands_of_the_page_about_the_whole_task_work() {
 fn pages() -> Vec<String> {
     let entries = std::fs::read_dir(root().join("docs")).unwrap();
     let names = entries.map(|entry| entry.unwrap().file_name().into_string().unwrap());
-    let mut names: Vec<String> = names.filter(|name| name.ends_with(".md") && name != "SUMMARY.md").collect();
+    let mut names: Vec<String> = names
+        .filter(|name| name.ends_with(".md") && name != "SUMMARY.md")
+        .collect();
     names.sort();
     names
 }
 
 #[test]
 fn every_page_with_commands_has_a_test() {
-    let with_commands =
-        pages().into_iter().filter(|page| !blocks(&read(&root().join("docs").join(page)), "sh").is_empty());
+    let with_commands = pages()
+        .into_iter()
+        .filter(|page| !blocks(&read(&root().join("docs").join(page)), "sh").is_empty());
     assert_eq!(with_commands.collect::<Vec<_>>(), WITH_COMMANDS);
 }
 
@@ -119,15 +129,21 @@ fn the_cookbook_answers_twenty_questions() {
     let questions: Vec<&str> = text.split("\n### ").skip(1).collect();
     assert_eq!(questions.len(), 20);
     for question in questions {
-        assert!(!blocks(question, "sh").is_empty(), "no command answers: {}", question.lines().next().unwrap());
+        assert!(
+            !blocks(question, "sh").is_empty(),
+            "no command answers: {}",
+            question.lines().next().unwrap()
+        );
     }
 }
 
 #[test]
 fn the_table_of_contents_lists_every_page_once() {
     let summary = read(&root().join("docs/SUMMARY.md"));
-    let mut listed: Vec<String> =
-        links(&summary).into_iter().map(|link| link.trim_start_matches("./").to_owned()).collect();
+    let mut listed: Vec<String> = links(&summary)
+        .into_iter()
+        .map(|link| link.trim_start_matches("./").to_owned())
+        .collect();
     listed.sort();
     assert_eq!(listed, pages());
 }
@@ -144,8 +160,13 @@ fn links(text: &str) -> Vec<String> {
         })
         .collect();
     let link = Regex::new(r"\]\(([^()\s]+)\)").unwrap();
-    let prose = Regex::new("`[^`]*`").unwrap().replace_all(&prose.join("\n"), "").into_owned();
-    link.captures_iter(&prose).map(|found| found[1].to_owned()).collect()
+    let prose = Regex::new("`[^`]*`")
+        .unwrap()
+        .replace_all(&prose.join("\n"), "")
+        .into_owned();
+    link.captures_iter(&prose)
+        .map(|found| found[1].to_owned())
+        .collect()
 }
 
 /// The anchors of a page's headings, as GitHub and mdBook write them.
@@ -153,7 +174,9 @@ fn anchors(text: &str) -> BTreeSet<String> {
     let headings = text.lines().filter(|line| line.starts_with('#'));
     let anchor = |line: &str| -> String {
         let words = line.trim_start_matches('#').trim().to_lowercase();
-        let kept = words.chars().filter(|c| c.is_alphanumeric() || " -_".contains(*c));
+        let kept = words
+            .chars()
+            .filter(|c| c.is_alphanumeric() || " -_".contains(*c));
         kept.map(|c| if c == ' ' { '-' } else { c }).collect()
     };
     headings.map(anchor).collect()
@@ -186,9 +209,14 @@ fn every_link_of_the_documents_leads_somewhere() {
             }
             checked += 1;
             let (path, anchor) = link.split_once('#').unwrap_or((&link, ""));
-            let target = if path.is_empty() { file.clone() } else { file.parent().unwrap().join(path) };
+            let target = if path.is_empty() {
+                file.clone()
+            } else {
+                file.parent().unwrap().join(path)
+            };
             let leads = target.exists()
-                && (anchor.is_empty() || (target.is_file() && anchors(&read(&target)).contains(anchor)));
+                && (anchor.is_empty()
+                    || (target.is_file() && anchors(&read(&target)).contains(anchor)));
             if !leads {
                 broken.push(format!("{}: {link}", file.display()));
             }
@@ -205,7 +233,8 @@ fn the_configuration_reference_is_up_to_date() {
     assert_expected([(root().join("docs/configuration.md"), page)]);
 }
 
-/// The commands of a workflow: blocks after `run: |`, lines after `run: `, and the items of `script:` lists.
+/// The commands of a workflow: blocks after `run: |`, lines after `run: `, and the items of
+/// `script:` lists.
 fn steps(workflow: &str) -> Vec<String> {
     let indent = |line: &str| line.len() - line.trim_start().len();
     let lines: Vec<&str> = workflow.lines().collect();
@@ -213,8 +242,9 @@ fn steps(workflow: &str) -> Vec<String> {
     for (idx, line) in lines.iter().enumerate() {
         let key = line.trim_start().trim_start_matches("- ");
         let below = || {
-            let inner =
-                lines[idx + 1..].iter().take_while(|next| next.trim().is_empty() || indent(next) > indent(line));
+            let inner = lines[idx + 1..]
+                .iter()
+                .take_while(|next| next.trim().is_empty() || indent(next) > indent(line));
             inner.map(|next| next.trim())
         };
         match key.split_once(": ") {
@@ -232,7 +262,10 @@ fn steps(workflow: &str) -> Vec<String> {
 /// A checkout that is a repository whose main branch has the project, without downloads.
 fn repository() -> Checkout {
     let checkout = Checkout::fresh();
-    script(&checkout.path().join("bin/pip"), "#!/bin/sh\ntest \"$1 $2\" = 'install actcheck.whl'\n");
+    script(
+        &checkout.path().join("bin/pip"),
+        "#!/bin/sh\ntest \"$1 $2\" = 'install actcheck.whl'\n",
+    );
     checkout.run(
         "git init --quiet --initial-branch main && git add configs ontology rules models && \
          git -c user.name=a -c user.email=a@b.c commit --quiet --message project && \
@@ -242,7 +275,8 @@ fn repository() -> Checkout {
     checkout
 }
 
-/// Runs the steps of a workflow before its comparison, each of which must succeed, and returns the comparison.
+/// Runs the steps of a workflow before its comparison, each of which must succeed, and returns the
+/// comparison.
 fn before_the_gate(checkout: &Checkout, name: &str, environment: &[(&str, &str)]) -> String {
     let steps = steps(&read(&root().join("docs/ci").join(name)));
     assert!(steps.len() >= 4, "{steps:#?}");
@@ -254,30 +288,62 @@ fn before_the_gate(checkout: &Checkout, name: &str, environment: &[(&str, &str)]
     gate.clone()
 }
 
-/// The environment of both workflows: a short campaign that shows a large change, and a file in place of the wheel.
-const SHORT: [(&str, &str); 3] = [("CONFIG", "configs/pick.toml"), ("RUNS", "12"), ("ACTCHECK_WHEEL", "actcheck.whl")];
+/// The environment of both workflows: a short campaign that shows a large change, and a file in
+/// place of the wheel.
+const SHORT: [(&str, &str); 3] = [
+    ("CONFIG", "configs/pick.toml"),
+    ("RUNS", "12"),
+    ("ACTCHECK_WHEEL", "actcheck.whl"),
+];
 
 #[test]
 fn the_github_workflow_reports_and_accepts_an_equal_change() {
-    let environment = [&SHORT[..], &[("GITHUB_BASE_REF", "main"), ("GITHUB_STEP_SUMMARY", "summary.md")]].concat();
+    let environment = [
+        &SHORT[..],
+        &[
+            ("GITHUB_BASE_REF", "main"),
+            ("GITHUB_STEP_SUMMARY", "summary.md"),
+        ],
+    ]
+    .concat();
     let checkout = repository();
     let gate = before_the_gate(&checkout, "github.yml", &environment);
     for file in ["report.html", "junit.xml", "summary.md"] {
-        assert!(!read(&checkout.path().join(file)).is_empty(), "{file} is empty");
+        assert!(
+            !read(&checkout.path().join(file)).is_empty(),
+            "{file} is empty"
+        );
     }
     checkout.run(&gate, &environment);
 }
 
 #[test]
 fn the_gitlab_pipeline_reports_and_refuses_a_worse_change() {
-    let environment = [&SHORT[..], &[("CI_MERGE_REQUEST_TARGET_BRANCH_NAME", "main")]].concat();
+    let environment = [
+        &SHORT[..],
+        &[("CI_MERGE_REQUEST_TARGET_BRANCH_NAME", "main")],
+    ]
+    .concat();
     let checkout = repository();
     // The change demands an impossible lift; the base in its own worktree does not.
-    edit(&checkout.path().join("rules/moved_object.rls"), "?d > 0.02", "?d > 20.0");
+    edit(
+        &checkout.path().join("rules/moved_object.rls"),
+        "?d > 0.02",
+        "?d > 20.0",
+    );
     let gate = before_the_gate(&checkout, "gitlab.yml", &environment);
     for file in ["report.html", "junit.xml"] {
-        assert!(!read(&checkout.path().join(file)).is_empty(), "{file} is empty");
+        assert!(
+            !read(&checkout.path().join(file)).is_empty(),
+            "{file} is empty"
+        );
     }
     let output = checkout.shell(&gate, &environment);
-    assert_eq!(output.status.code(), Some(1), "{}{}", stdout(&output), stderr(&output));
+    assert_eq!(
+        output.status.code(),
+        Some(1),
+        "{}{}",
+        stdout(&output),
+        stderr(&output)
+    );
 }

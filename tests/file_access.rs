@@ -1,5 +1,5 @@
-//! Files are written and deleted only through `base::Below`, which follows no link, or `base::NewFile::create` for a file that the
-//! user named.
+//! Files are written and deleted only through `base::Below`, which follows no link, or
+//! `base::NewFile::create` for a file that the user named.
 
 use std::path::{Path, PathBuf};
 
@@ -27,29 +27,57 @@ const FORBIDDEN: [&str; 15] = [
 /// Sources that may use some of them, with the reason.
 const EXCEPTIONS: [(&str, &str); 11] = [
     ("base/below.rs", "creates the folder that the user named"),
-    ("base/write_atomic.rs", "writes a pipe or a device that the user named as the output"),
-    ("base/scratch.rs", "a folder of its own, which only this user can write"),
+    (
+        "base/write_atomic.rs",
+        "writes a pipe or a device that the user named as the output",
+    ),
+    (
+        "base/scratch.rs",
+        "a folder of its own, which only this user can write",
+    ),
     ("history/snapshot.rs", "writes into a scratch folder"),
     ("cli/bisect/child.rs", "writes into a scratch folder"),
     ("cli/bisect/repository.rs", "writes into a scratch folder"),
-    ("cli/bisect/scenes.rs", "removes a history in a scratch folder"),
-    ("protocol/process.rs", "the folder of a socket, which only this user can write, and /proc"),
-    ("rules/standalone/input.rs", "reads a file or a pipe that the user or the program names, within limits"),
+    (
+        "cli/bisect/scenes.rs",
+        "removes a history in a scratch folder",
+    ),
+    (
+        "protocol/process.rs",
+        "the folder of a socket, which only this user can write, and /proc",
+    ),
+    (
+        "rules/standalone/input.rs",
+        "reads a file or a pipe that the user or the program names, within limits",
+    ),
     ("serve/watch.rs", "reads /proc"),
     ("serve/connections.rs", "reads /proc"),
 ];
 
 fn sources(folder: &Path) -> Vec<PathBuf> {
-    let entries = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
-    let found = entries.flat_map(|path| if path.is_dir() { sources(&path) } else { vec![path] });
-    found.filter(|path| path.extension().is_some_and(|ending| ending == "rs")).collect()
+    let entries = std::fs::read_dir(folder)
+        .unwrap()
+        .map(|entry| entry.unwrap().path());
+    let found = entries.flat_map(|path| {
+        if path.is_dir() {
+            sources(&path)
+        } else {
+            vec![path]
+        }
+    });
+    found
+        .filter(|path| path.extension().is_some_and(|ending| ending == "rs"))
+        .collect()
 }
 
 /// The text of a source without comments and tests.
 fn code(path: &Path) -> String {
     let text = std::fs::read_to_string(path).unwrap();
     let own = text.split("#[cfg(test)]\nmod ").next().unwrap_or_default();
-    own.lines().filter(|line| !line.trim_start().starts_with("//")).collect::<Vec<_>>().join("\n")
+    own.lines()
+        .filter(|line| !line.trim_start().starts_with("//"))
+        .collect::<Vec<_>>()
+        .join("\n")
 }
 
 #[test]
@@ -64,17 +92,30 @@ fn files_are_opened_written_and_deleted_without_following_links() {
         let text = code(&path);
         // `NewFile::create` is meant for files that the user named.
         let text = text.replace("NewFile::create", "");
-        let found: Vec<&str> = FORBIDDEN.into_iter().filter(|call| text.contains(call)).collect();
+        let found: Vec<&str> = FORBIDDEN
+            .into_iter()
+            .filter(|call| text.contains(call))
+            .collect();
         if EXCEPTIONS.iter().any(|(exception, _)| *exception == name) {
             needed.push((name, found));
             continue;
         }
-        assert!(found.is_empty(), "{name} uses {found:?}: use `base::Below`, `open_regular` or `read_regular`");
+        assert!(
+            found.is_empty(),
+            "{name} uses {found:?}: use `base::Below`, `open_regular` or `read_regular`"
+        );
     }
     let unneeded: Vec<&str> = EXCEPTIONS
         .into_iter()
-        .filter(|(exception, _)| !needed.iter().any(|(name, found)| name == exception && !found.is_empty()))
+        .filter(|(exception, _)| {
+            !needed
+                .iter()
+                .any(|(name, found)| name == exception && !found.is_empty())
+        })
         .map(|(exception, _)| exception)
         .collect();
-    assert!(unneeded.is_empty(), "exceptions without a use: {unneeded:?}");
+    assert!(
+        unneeded.is_empty(),
+        "exceptions without a use: {unneeded:?}"
+    );
 }

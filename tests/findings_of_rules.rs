@@ -1,8 +1,9 @@
-//! Findings about rules that say nothing: the same from `check`, `run`, `recheck` and `rules`, and kept with the campaign.
+//! Findings about rules that say nothing: the same from `check`, `run`, `recheck` and `rules`, and
+//! kept with the campaign.
 //!
-//! A case is a file `tests/findings_of_rules/NAME.case`, written as those of [`crate::mistakes`], but its line `$` names the
-//! configuration and its ontology; the answers are beside it, in a file of the same name with `.expected` appended. `UPDATE_EXPECT=1`
-//! writes these files.
+//! A case is a file `tests/findings_of_rules/NAME.case`, written as those of [`crate::mistakes`],
+//! but its line `$` names the configuration and its ontology; the answers are beside it, in a file
+//! of the same name with `.expected` appended. `UPDATE_EXPECT=1` writes these files.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -25,7 +26,8 @@ const STORED: &str = "SELECT ?code ?text ?place WHERE { ?campaign a act:Campaign
                       act:findingCode ?code ; act:findingText ?text . OPTIONAL { ?found act:findingPlace ?place } } \
                       ORDER BY ?code ?text";
 
-/// The error stream of a command, or its exit code if there is nothing. The history is in the folder.
+/// The error stream of a command, or its exit code if there is nothing. The history is in the
+/// folder.
 fn told(folder: &Path, arguments: &[&str]) -> (Option<i32>, String, String) {
     let output = Command::new(env!("CARGO_BIN_EXE_actcheck"))
         .args(arguments)
@@ -34,15 +36,22 @@ fn told(folder: &Path, arguments: &[&str]) -> (Option<i32>, String, String) {
         .envs([("NO_COLOR", "1"), ("COLUMNS", "100")])
         .output()
         .unwrap();
-    let plain = |text: String| text.replace(&*folder.canonicalize().unwrap().to_string_lossy(), ".");
-    (output.status.code(), plain(stderr(&output)), plain(stdout(&output)))
+    let plain =
+        |text: String| text.replace(&*folder.canonicalize().unwrap().to_string_lossy(), ".");
+    (
+        output.status.code(),
+        plain(stderr(&output)),
+        plain(stdout(&output)),
+    )
 }
 
 /// The diagnostics of each command; equal ones are given once.
 fn answers(case: &Path) -> String {
     let folder = project();
     let inputs = set_up(&std::fs::read_to_string(case).unwrap(), folder.path());
-    let [config, ontology] = inputs.as_slice() else { panic!("{}: {inputs:?}", case.display()) };
+    let [config, ontology] = inputs.as_slice() else {
+        panic!("{}: {inputs:?}", case.display())
+    };
     let (code, check, _) = told(folder.path(), &["check", config]);
     let mut text = format!("== check, exit code {}\n{check}", code.unwrap());
     let mut say = |name: &str, answer: String| {
@@ -60,21 +69,43 @@ fn answers(case: &Path) -> String {
         return text;
     }
     let recheck = ["recheck", "--jobs", "1", "--ontology", ontology];
-    say("recheck", told(folder.path(), &[&recheck[..], &history].concat()).1);
-    say("rules", told(folder.path(), &[&rules[..], &history].concat()).1);
-    let stored = told(folder.path(), &[&["query", STORED, "--format", "csv"], &history[..]].concat());
+    say(
+        "recheck",
+        told(folder.path(), &[&recheck[..], &history].concat()).1,
+    );
+    say(
+        "rules",
+        told(folder.path(), &[&rules[..], &history].concat()).1,
+    );
+    let stored = told(
+        folder.path(),
+        &[&["query", STORED, "--format", "csv"], &history[..]].concat(),
+    );
     say("kept with the campaign", stored.1 + &stored.2);
     let run = first_run(&folder.path().join("history"));
     let shown = told(folder.path(), &[&["show", &run], &history[..]].concat()).2;
-    let (of_findings, number) = ("finding about the rules", check.matches("\n  help: ").count());
-    assert_eq!(shown.lines().filter(|line| line.starts_with(of_findings)).count(), number, "{shown}");
+    let (of_findings, number) = (
+        "finding about the rules",
+        check.matches("\n  help: ").count(),
+    );
+    assert_eq!(
+        shown
+            .lines()
+            .filter(|line| line.starts_with(of_findings))
+            .count(),
+        number,
+        "{shown}"
+    );
     text
 }
 
 #[test]
 fn every_command_reports_the_same_findings() {
     let folder = root().join("tests/findings_of_rules");
-    let mut cases: Vec<PathBuf> = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();
+    let mut cases: Vec<PathBuf> = std::fs::read_dir(folder)
+        .unwrap()
+        .map(|entry| entry.unwrap().path())
+        .collect();
     cases.retain(|path| path.extension().is_some_and(|ending| ending == "case"));
     assert!(cases.len() >= LEAST, "only {} cases", cases.len());
     let (next, done) = (AtomicUsize::new(0), Mutex::new(BTreeMap::new()));
@@ -83,7 +114,9 @@ fn every_command_reports_the_same_findings() {
             scope.spawn(|| {
                 while let Some(case) = cases.get(next.fetch_add(1, Ordering::Relaxed)) {
                     let answers = answers(case);
-                    done.lock().unwrap().insert(case.with_added_extension("expected"), answers);
+                    done.lock()
+                        .unwrap()
+                        .insert(case.with_added_extension("expected"), answers);
                 }
             });
         }
@@ -95,7 +128,8 @@ fn every_command_reports_the_same_findings() {
 #[test]
 fn the_shipped_ontologies_have_no_findings() {
     for name in ["actions", "extra", "time"] {
-        let found = ontology::load(&Files::Disk, &root().join(format!("ontology/{name}.ttl"))).unwrap();
+        let found =
+            ontology::load(&Files::Disk, &root().join(format!("ontology/{name}.ttl"))).unwrap();
         let book = RuleBook::prepare(&found).unwrap();
         assert!(book.warnings().is_empty(), "{name}: {}", book.warnings());
     }

@@ -1,10 +1,12 @@
-//! Checks the crates under `src/` against the architecture in `src/lib.rs`: a crate depends only on crates above it in
-//! the table, and a library of the field is a dependency only of the crates that the table names.
+//! Checks the crates under `src/` against the architecture in `src/lib.rs`: a crate depends only on
+//! crates above it in the table, and a library of the field is a dependency only of the crates that
+//! the table names.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
-/// Each crate and the crates that it may depend on, in the order of the pipeline. `cli` may depend on all.
+/// Each crate and the crates that it may depend on, in the order of the pipeline. `cli` may depend
+/// on all.
 const FLOORS: [(&str, &[&str]); 18] = [
     ("base", &[]),
     ("data", &["base"]),
@@ -14,7 +16,10 @@ const FLOORS: [(&str, &[&str]); 18] = [
     ("scenario", &["base", "data", "config", "ontology"]),
     ("world", &["base", "data", "scenario"]),
     ("actions", &["base", "data", "scenario", "world"]),
-    ("protocol", &["base", "data", "config", "scenario", "world", "actions"]),
+    (
+        "protocol",
+        &["base", "data", "config", "scenario", "world", "actions"],
+    ),
     ("facts", &["base", "data"]),
     ("rules", &["base", "ontology"]),
     ("verdict", &["base", "ontology"]),
@@ -22,12 +27,15 @@ const FLOORS: [(&str, &[&str]); 18] = [
     (
         "campaign",
         &[
-            "base", "data", "search", "config", "ontology", "scenario", "world", "actions", "protocol", "facts",
-            "rules", "verdict", "history",
+            "base", "data", "search", "config", "ontology", "scenario", "world", "actions",
+            "protocol", "facts", "rules", "verdict", "history",
         ],
     ),
     ("analysis", &["base", "data", "history", "verdict"]),
-    ("report", &["base", "data", "verdict", "history", "analysis"]),
+    (
+        "report",
+        &["base", "data", "verdict", "history", "analysis"],
+    ),
     ("serve", &["base", "history"]),
     ("remote", &["base"]),
 ];
@@ -73,15 +81,20 @@ fn source_folder() -> PathBuf {
 
 /// Names of the folders of `src`.
 fn folders() -> Vec<String> {
-    let entries = std::fs::read_dir(source_folder()).unwrap().map(|entry| entry.unwrap());
+    let entries = std::fs::read_dir(source_folder())
+        .unwrap()
+        .map(|entry| entry.unwrap());
     let folders = entries.filter(|entry| entry.file_type().unwrap().is_dir());
-    let mut names: Vec<String> = folders.map(|entry| entry.file_name().into_string().unwrap()).collect();
+    let mut names: Vec<String> = folders
+        .map(|entry| entry.file_name().into_string().unwrap())
+        .collect();
     names.sort();
     names
 }
 
 fn manifest(path: &Path) -> toml::Table {
-    let text = std::fs::read_to_string(path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
+    let text =
+        std::fs::read_to_string(path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
     text.parse().unwrap()
 }
 
@@ -89,7 +102,10 @@ fn manifest(path: &Path) -> toml::Table {
 fn dependencies(folder: &str) -> BTreeSet<String> {
     let manifest = manifest(&source_folder().join(folder).join("Cargo.toml"));
     let found = manifest.get("dependencies").and_then(toml::Value::as_table);
-    found.into_iter().flat_map(|table| table.keys().cloned()).collect()
+    found
+        .into_iter()
+        .flat_map(|table| table.keys().cloned())
+        .collect()
 }
 
 #[test]
@@ -97,21 +113,33 @@ fn every_crate_depends_only_on_crates_above_it() {
     let mut wrong = Vec::new();
     for (folder, allowed) in FLOORS {
         for dependency in dependencies(folder) {
-            let Some(ours) = dependency.strip_prefix("actcheck-") else { continue };
+            let Some(ours) = dependency.strip_prefix("actcheck-") else {
+                continue;
+            };
             if !allowed.contains(&ours) {
                 wrong.push(format!("src/{folder} depends on `{ours}`"));
             }
         }
     }
-    assert!(wrong.is_empty(), "against the architecture in src/lib.rs:\n{}", wrong.join("\n"));
+    assert!(
+        wrong.is_empty(),
+        "against the architecture in src/lib.rs:\n{}",
+        wrong.join("\n")
+    );
 }
 
 #[test]
 fn the_table_lists_only_crates_above() {
     for (idx, (folder, allowed)) in FLOORS.iter().enumerate() {
         let above: Vec<&str> = FLOORS[..idx].iter().map(|(name, _)| *name).collect();
-        let wrong: Vec<&&str> = allowed.iter().filter(|name| !above.contains(name)).collect();
-        assert!(wrong.is_empty(), "`{folder}` may not depend on {wrong:?}, which come after it");
+        let wrong: Vec<&&str> = allowed
+            .iter()
+            .filter(|name| !above.contains(name))
+            .collect();
+        assert!(
+            wrong.is_empty(),
+            "`{folder}` may not depend on {wrong:?}, which come after it"
+        );
     }
 }
 
@@ -126,18 +154,32 @@ fn every_library_is_used_only_in_its_crates() {
             }
         }
     }
-    assert!(wrong.is_empty(), "against the fences in src/lib.rs:\n{}", wrong.join("\n"));
+    assert!(
+        wrong.is_empty(),
+        "against the fences in src/lib.rs:\n{}",
+        wrong.join("\n")
+    );
 }
 
 #[test]
 fn every_folder_is_a_crate_in_the_table() {
     let workspace = manifest(&Path::new(env!("CARGO_MANIFEST_DIR")).join("Cargo.toml"));
     let members = workspace["workspace"]["members"].as_array().unwrap();
-    let members: BTreeSet<&str> = members.iter().map(|member| member.as_str().unwrap()).collect();
+    let members: BTreeSet<&str> = members
+        .iter()
+        .map(|member| member.as_str().unwrap())
+        .collect();
     for folder in folders() {
-        assert!(folder == "cli" || FLOORS.iter().any(|(name, _)| *name == folder), "no floor for src/{folder}");
-        assert!(members.contains(format!("src/{folder}").as_str()), "src/{folder} is not a member of the workspace");
-        let name = manifest(&source_folder().join(&folder).join("Cargo.toml"))["package"]["name"].clone();
+        assert!(
+            folder == "cli" || FLOORS.iter().any(|(name, _)| *name == folder),
+            "no floor for src/{folder}"
+        );
+        assert!(
+            members.contains(format!("src/{folder}").as_str()),
+            "src/{folder} is not a member of the workspace"
+        );
+        let name =
+            manifest(&source_folder().join(&folder).join("Cargo.toml"))["package"]["name"].clone();
         assert_eq!(name.as_str(), Some(format!("actcheck-{folder}").as_str()));
     }
 }

@@ -21,16 +21,26 @@ const CATEGORIES: [&str; 7] = [
 
 fn parsed(text: &str) -> Vec<Quad> {
     let quads = RdfParser::from_format(RdfFormat::NQuads).for_slice(text);
-    quads.map(|quad| quad.unwrap_or_else(|error| panic!("{error}"))).collect()
+    quads
+        .map(|quad| quad.unwrap_or_else(|error| panic!("{error}")))
+        .collect()
 }
 
 fn decoded(label: &str) -> String {
     let mut bytes = Vec::new();
     let mut rest = label.bytes();
     while let Some(byte) = rest.next() {
-        let mut digit =
-            || char::from(rest.next().unwrap()).to_digit(16).and_then(|digit| u8::try_from(digit).ok()).unwrap();
-        bytes.push(if byte == b'%' { digit() * 16 + digit() } else { byte });
+        let mut digit = || {
+            char::from(rest.next().unwrap())
+                .to_digit(16)
+                .and_then(|digit| u8::try_from(digit).ok())
+                .unwrap()
+        };
+        bytes.push(if byte == b'%' {
+            digit() * 16 + digit()
+        } else {
+            byte
+        });
     }
     String::from_utf8(bytes).unwrap()
 }
@@ -68,7 +78,11 @@ fn an_export_of_a_run_with_foreign_names_can_be_read_again() {
     for file in ["wire.py", "names.py"] {
         std::fs::copy(root().join("tests/protocol").join(file), here.join(file)).unwrap();
     }
-    std::fs::write(here.join("categories.json"), serde_json::to_string(&CATEGORIES).unwrap()).unwrap();
+    std::fs::write(
+        here.join("categories.json"),
+        serde_json::to_string(&CATEGORIES).unwrap(),
+    )
+    .unwrap();
     let message = "done\\u001b[2J\\u001b]0;owned\\u0007 \\u202e\\r";
     let config = format!(
         "tests = [[\"Pick\"]]\ntest_count = 1\ntest_launcher = \"names.py\"\nseed = 7\n\
@@ -78,28 +92,62 @@ fn an_export_of_a_run_with_foreign_names_can_be_read_again() {
     std::fs::write(here.join("c.toml"), config).unwrap();
     let ran = actcheck(here, &["run", "c.toml"]);
     assert_eq!(ran.status.code(), Some(1), "{}", stderr(&ran));
-    let exported = actcheck(here, &["export", "--nquads", "all.nq", "--turtle", "all.ttl", "--history", ".actcheck"]);
+    let exported = actcheck(
+        here,
+        &[
+            "export",
+            "--nquads",
+            "all.nq",
+            "--turtle",
+            "all.ttl",
+            "--history",
+            ".actcheck",
+        ],
+    );
     assert!(exported.status.success(), "{}", stderr(&exported));
     let quads = parsed(&std::fs::read_to_string(here.join("all.nq")).unwrap());
     let turtle = std::fs::read(here.join("all.ttl")).unwrap();
-    assert!(RdfParser::from_format(RdfFormat::Turtle).for_slice(&turtle).all(|quad| quad.is_ok()));
+    assert!(
+        RdfParser::from_format(RdfFormat::Turtle)
+            .for_slice(&turtle)
+            .all(|quad| quad.is_ok())
+    );
     let objects_of = |property: &str| -> Vec<String> {
-        let found = quads.iter().filter(|quad| quad.predicate.as_str().ends_with(property));
+        let found = quads
+            .iter()
+            .filter(|quad| quad.predicate.as_str().ends_with(property));
         found.map(|quad| quad.object.to_string()).collect()
     };
     let seen = objects_of("#seenAs");
     for category in CATEGORIES {
         let expected = format!("<{}>", names::category(category));
-        assert!(seen.contains(&expected), "{expected} is missing in {seen:?}");
+        assert!(
+            seen.contains(&expected),
+            "{expected} is missing in {seen:?}"
+        );
     }
-    assert!(!quads.iter().any(|quad| quad.subject.to_string() == "<http://run>"), "an outcome was injected");
+    assert!(
+        !quads
+            .iter()
+            .any(|quad| quad.subject.to_string() == "<http://run>"),
+        "an outcome was injected"
+    );
     // The skill's message is shown, but does not control the terminal.
-    let shown = actcheck(here, &["list", "--history", ".actcheck", "--format", "json"]);
+    let shown = actcheck(
+        here,
+        &["list", "--history", ".actcheck", "--format", "json"],
+    );
     let runs: serde_json::Value = serde_json::from_str(&stdout(&shown)).unwrap();
     let run = runs[0]["run"].as_str().unwrap();
     let shown = stdout(&actcheck(here, &["show", run, "--history", ".actcheck"]));
-    assert!(shown.contains("done\\u{1b}[2J\\u{1b}]0;owned\\u{7}"), "{shown}");
-    assert!(!shown.chars().any(|c| c.is_control() && c != '\n'), "{shown:?}");
+    assert!(
+        shown.contains("done\\u{1b}[2J\\u{1b}]0;owned\\u{7}"),
+        "{shown}"
+    );
+    assert!(
+        !shown.chars().any(|c| c.is_control() && c != '\n'),
+        "{shown:?}"
+    );
 }
 
 #[test]
@@ -110,7 +158,12 @@ fn escape_sequences_of_a_configuration_are_not_printed() {
     let output = actcheck(folder.path(), &["check", "c.toml"]);
     assert_eq!(output.status.code(), Some(2));
     let said = stderr(&output);
-    assert!(!said.chars().any(|c| (c.is_control() && c != '\n') || c == '\u{202e}'), "{said:?}");
+    assert!(
+        !said
+            .chars()
+            .any(|c| (c.is_control() && c != '\n') || c == '\u{202e}'),
+        "{said:?}"
+    );
 }
 
 #[test]
@@ -119,7 +172,10 @@ fn absurd_masses_and_sizes_are_refused_with_their_place() {
     let objects = folder.path().join("models/objects");
     std::fs::create_dir_all(&objects).unwrap();
     let glass = std::fs::read_to_string(root().join("models/objects/glass.toml")).unwrap();
-    let mass = glass.lines().find(|line| line.starts_with("mass_kg")).unwrap();
+    let mass = glass
+        .lines()
+        .find(|line| line.starts_with("mass_kg"))
+        .unwrap();
     std::fs::write(
         folder.path().join("c.toml"),
         "tests = [[\"Pick\"]]\ntest_count = 1\nmodel_dir = \"models\"\n[pickObject]\nmodel_list = [\"heavy\"]\n",
@@ -130,6 +186,9 @@ fn absurd_masses_and_sizes_are_refused_with_their_place() {
         let output = actcheck(folder.path(), &["check", "c.toml"]);
         let said = stderr(&output);
         assert_eq!(output.status.code(), Some(2), "{written}: {said}");
-        assert!(said.contains("heavy.toml") && said.contains("`mass_kg`"), "{written}: {said}");
+        assert!(
+            said.contains("heavy.toml") && said.contains("`mass_kg`"),
+            "{written}: {said}"
+        );
     }
 }

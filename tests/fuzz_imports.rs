@@ -1,16 +1,15 @@
-//! Damaged files of every import format: each is refused with a place or read as a whole, without a panic, and within
-//! its limits.
+//! Damaged files of every import format: each is refused with a place or read as a whole, without a
+//! panic, and within its limits.
 //!
-//! A few files of each format, or as many as fit into `ACTCHECK_FUZZ_MINUTES` if that is set. A file is a function of
-//! its number.
+//! A few files of each format, or as many as fit into `ACTCHECK_FUZZ_MINUTES` if that is set. A
+//! file is a function of its number.
 
 use actcheck::data::Choices;
 
 use crate::fuzz_corpus::entrances::imports::{FORMATS, import};
 
 /// Files without a fault, by the format's name.
-const TABLE: &str =
-    "1,a\n-2.5e3,\"b \"\"c\"\", d\"\n\n\"\",<http://x#y>\n\"\"\"t\"\"@en\",é\r\n99999999999999999999,\"two\nlines\"\n";
+const TABLE: &str = "1,a\n-2.5e3,\"b \"\"c\"\", d\"\n\n\"\",<http://x#y>\n\"\"\"t\"\"@en\",é\r\n99999999999999999999,\"two\nlines\"\n";
 const TYPED: &str = "id,name,size\n1,\"a, b\",2.5\n-2,c,1e-05\n";
 const LINES: &str = "<http://x#a> <http://x#p> \"t\\u00e9\\n\"@en .\n# c\n_:b <http://x#p> _:c1 .\n<http://x#a> <http://x#q> \"1.50\"^^<http://www.w3.org/2001/XMLSchema#decimal> .\n";
 const QUADS: &str = "<http://x#a> <http://x#p> \"t\" <http://x#g> .\n_:b <http://x#p> _:b _:g .\n<http://x#a> <http://x#p> <http://x#b> .\n";
@@ -66,7 +65,9 @@ fn valid(format: usize) -> Vec<u8> {
         "csv" if options.contains("headers") => TYPED.to_owned(),
         "csv" => TABLE.to_owned(),
         "dsv" => "1;a\n2;\"b\n".to_owned(),
-        "tsv" => TABLE.replace(',', "\t").replace("\"b \"\"c\"\"\t d\"", "\"b\tc\""),
+        "tsv" => TABLE
+            .replace(',', "\t")
+            .replace("\"b \"\"c\"\"\t d\"", "\"b\tc\""),
         "ntriples" => LINES.to_owned(),
         "nquads" => QUADS.to_owned(),
         "turtle" => TURTLE.to_owned(),
@@ -74,7 +75,11 @@ fn valid(format: usize) -> Vec<u8> {
         "json" => JSON.to_owned(),
         _ => XML.to_owned(),
     };
-    if ending.ends_with("gz") { packed(text.as_bytes()) } else { text.into_bytes() }
+    if ending.ends_with("gz") {
+        packed(text.as_bytes())
+    } else {
+        text.into_bytes()
+    }
 }
 
 fn packed(bytes: &[u8]) -> Vec<u8> {
@@ -125,7 +130,11 @@ fn damaged_files_of_all_formats_are_refused_or_read() {
         let valid = valid(format);
         let mut count = 0;
         for number in numbers() {
-            let file = [&[u8::try_from(format).unwrap()], changed(format, &valid, number).as_slice()].concat();
+            let file = [
+                &[u8::try_from(format).unwrap()],
+                changed(format, &valid, number).as_slice(),
+            ]
+            .concat();
             match std::panic::catch_unwind(|| import(&file)) {
                 Ok(fine) => whole += u64::from(fine),
                 Err(_) => {
@@ -142,11 +151,19 @@ fn damaged_files_of_all_formats_are_refused_or_read() {
     assert!(0 < whole && whole < all);
 }
 
-/// The numbers of the files of one format: a few, or as many as fit into its part of `ACTCHECK_FUZZ_MINUTES`.
+/// The numbers of the files of one format: a few, or as many as fit into its part of
+/// `ACTCHECK_FUZZ_MINUTES`.
 fn numbers() -> Box<dyn Iterator<Item = u64>> {
-    let Ok(text) = std::env::var("ACTCHECK_FUZZ_MINUTES") else { return Box::new(0..40) };
-    let minutes: f64 = text.parse().unwrap_or_else(|_| panic!("ACTCHECK_FUZZ_MINUTES is not a number: {text}"));
-    let (start, share) = (std::time::Instant::now(), minutes * 60.0 / FORMATS.len() as f64);
+    let Ok(text) = std::env::var("ACTCHECK_FUZZ_MINUTES") else {
+        return Box::new(0..40);
+    };
+    let minutes: f64 = text
+        .parse()
+        .unwrap_or_else(|_| panic!("ACTCHECK_FUZZ_MINUTES is not a number: {text}"));
+    let (start, share) = (
+        std::time::Instant::now(),
+        minutes * 60.0 / FORMATS.len() as f64,
+    );
     Box::new((0..).take_while(move |_| start.elapsed().as_secs_f64() < share))
 }
 

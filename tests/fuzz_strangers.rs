@@ -1,8 +1,9 @@
-//! Mutated files from others: ontologies, models, robots, cases and histories are read or refused, without a panic, a
-//! hang, or memory beyond bounds, and every diagnostic can be shown. Mutated messages of a program and mutated outputs
-//! of xacro are tested in their crates.
+//! Mutated files from others: ontologies, models, robots, cases and histories are read or refused,
+//! without a panic, a hang, or memory beyond bounds, and every diagnostic can be shown. Mutated
+//! messages of a program and mutated outputs of xacro are tested in their crates.
 //!
-//! `ACTCHECK_FUZZ_MINUTES=10 cargo test --release --locked --test all fuzz_strangers::ontologies -- --nocapture`
+//! `ACTCHECK_FUZZ_MINUTES=10 cargo test --release --locked --test all fuzz_strangers::ontologies --
+//! --nocapture`
 
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
@@ -27,10 +28,17 @@ use crate::support::{actcheck, copy, stderr};
 fn show(found: &Diagnostics) {
     let handler = miette::GraphicalReportHandler::new_themed(miette::GraphicalTheme::none());
     for fault in found.iter().take(200) {
-        assert!(fault.message.chars().count() <= 20_001, "a message of {} bytes", fault.message.len());
+        assert!(
+            fault.message.chars().count() <= 20_001,
+            "a message of {} bytes",
+            fault.message.len()
+        );
         let mut out = String::new();
         handler.render_report(&mut out, fault).unwrap();
-        assert!(fault.span.is_none() || !out.contains("Failed to read"), "{out}");
+        assert!(
+            fault.span.is_none() || !out.contains("Failed to read"),
+            "{out}"
+        );
     }
 }
 
@@ -77,12 +85,25 @@ fn ontologies() {
         "^^xsd:integer",
     ];
     let folder = tempfile::tempdir().unwrap();
-    let seeds = ["tests/data/pick.owl", "tests/data/kinds_of_pick.ttl", "ontology/actions.ttl"];
-    let texts = seeds.map(|name| (name.rsplit('.').next().unwrap(), std::fs::read(name).unwrap()));
+    let seeds = [
+        "tests/data/pick.owl",
+        "tests/data/kinds_of_pick.ttl",
+        "ontology/actions.ttl",
+    ];
+    let texts = seeds.map(|name| {
+        (
+            name.rsplit('.').next().unwrap(),
+            std::fs::read(name).unwrap(),
+        )
+    });
     let others: Vec<&[u8]> = texts.iter().map(|(_, text)| text.as_slice()).collect();
     cases("ontologies", 60, |mut random| {
         let (ending, text) = random.pick(&texts);
-        let tokens = if *ending == "owl" { &XML[..] } else { &TURTLE[..] };
+        let tokens = if *ending == "owl" {
+            &XML[..]
+        } else {
+            &TURTLE[..]
+        };
         let path = folder.path().join(format!("o.{ending}"));
         std::fs::write(&path, random.text(text, tokens, &others)).unwrap();
         if let Err(found) = ontology::load(&Files::Disk, &path) {
@@ -132,11 +153,15 @@ const STL: &str = "solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex
 fn binary_stl() -> Vec<u8> {
     let mut bytes = vec![b' '; 80];
     bytes.extend(2_u32.to_le_bytes());
-    for corners in
-        [[[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]], [[0.0, 0.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0_f32, 0.0]]]
-    {
+    for corners in [
+        [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]],
+        [[0.0, 0.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0_f32, 0.0]],
+    ] {
         bytes.extend([0_u8; 12]);
-        corners.iter().flatten().for_each(|x| bytes.extend(x.to_le_bytes()));
+        corners
+            .iter()
+            .flatten()
+            .for_each(|x| bytes.extend(x.to_le_bytes()));
         bytes.extend([0_u8; 2]);
     }
     bytes
@@ -164,8 +189,12 @@ fn meshes() {
     ];
     let folder = tempfile::tempdir().unwrap();
     let binary = binary_stl();
-    let seeds: [(&str, &[u8]); 4] =
-        [("dae", DAE.as_bytes()), ("obj", OBJ.as_bytes()), ("stl", STL.as_bytes()), ("stl", binary.as_slice())];
+    let seeds: [(&str, &[u8]); 4] = [
+        ("dae", DAE.as_bytes()),
+        ("obj", OBJ.as_bytes()),
+        ("stl", STL.as_bytes()),
+        ("stl", binary.as_slice()),
+    ];
     cases("meshes", 200, |mut random| {
         let (ending, text) = *random.pick(&seeds);
         let mutated = random.text(text, &WORDS, &[DAE.as_bytes()]);
@@ -207,8 +236,10 @@ fn models_and_worlds() {
     let model = with_mesh(folder.path(), "dae", DAE.as_bytes());
     let sdf = std::fs::read(model.join("model.sdf")).unwrap();
     let index = b"<model><name>lamp</name><sdf version=\"1.6\">model.sdf</sdf></model>";
-    let (shelf, kitchen) =
-        (std::fs::read("models/objects/shelf.toml").unwrap(), std::fs::read("models/worlds/kitchen.toml").unwrap());
+    let (shelf, kitchen) = (
+        std::fs::read("models/objects/shelf.toml").unwrap(),
+        std::fs::read("models/worlds/kitchen.toml").unwrap(),
+    );
     let others: [&[u8]; 3] = [&robot, &sdf, &shelf];
     let files: [(&str, &[u8]); 6] = [
         ("objects/lamp/model.sdf", &sdf),
@@ -253,7 +284,11 @@ fn robots() {
         " quat_xyzw=\"0 0 0 0\"",
     ];
     let folder = tempfile::tempdir().unwrap();
-    let seeds = ["models/robots/fixed_arm", "models/robots/mobile_manipulator"].map(|name| {
+    let seeds = [
+        "models/robots/fixed_arm",
+        "models/robots/mobile_manipulator",
+    ]
+    .map(|name| {
         let read = |ending: &str| std::fs::read(format!("{name}.{ending}")).unwrap();
         (name.rsplit('/').next().unwrap(), read("toml"), read("urdf"))
     });
@@ -262,15 +297,26 @@ fn robots() {
         let tokens: Vec<&str> = WORDS.iter().chain(&XML).copied().collect();
         let in_profile = random.below(4) == 0;
         let profile = if in_profile {
-            random.text(profile, &["\n[[postures]]\n", "package_dirs = [\"/\"]\n"], &[])
+            random.text(
+                profile,
+                &["\n[[postures]]\n", "package_dirs = [\"/\"]\n"],
+                &[],
+            )
         } else {
             profile.clone()
         };
-        let urdf = if in_profile { urdf.clone() } else { random.text(urdf, &tokens, &[]) };
+        let urdf = if in_profile {
+            urdf.clone()
+        } else {
+            random.text(urdf, &tokens, &[])
+        };
         std::fs::write(folder.path().join("r.toml"), profile).unwrap();
         std::fs::write(folder.path().join(format!("{name}.urdf")), urdf).unwrap();
         let read = config::load_text(
-            Source::new("c.toml", "tests = [[\"Pick\"]]\ntest_count = 1\n[robot]\nprofile = \"r.toml\"\n"),
+            Source::new(
+                "c.toml",
+                "tests = [[\"Pick\"]]\ntest_count = 1\n[robot]\nprofile = \"r.toml\"\n",
+            ),
             folder.path(),
             &Overrides::default(),
         );
@@ -340,10 +386,15 @@ fn case_files() {
     ];
     let folder = tempfile::tempdir().unwrap();
     let pick = std::fs::read("configs/pick.toml").unwrap();
-    let overrides = Overrides { history: Some(folder.path().join("h")), ..Overrides::default() };
+    let overrides = Overrides {
+        history: Some(folder.path().join("h")),
+        ..Overrides::default()
+    };
     cases("case files", 12, |mut random| {
         let bytes = random.text(CASE.as_bytes(), &WORDS, &[&pick]);
-        let Ok(text) = String::from_utf8(bytes) else { return };
+        let Ok(text) = String::from_utf8(bytes) else {
+            return;
+        };
         match Env::prepare_text(Source::new("case.toml", text), folder.path(), &overrides) {
             Ok(env) => show(&env.warnings()),
             Err(found) => show(&found),
@@ -370,14 +421,27 @@ fn damage(history: &Path, random: &mut Mutations) {
                     "http://actions#",
                 ]);
                 let node = NamedNode::new_unchecked(format!("{namespace}{}", random.pick(&IDS)));
-                if random.below(2) == 0 { other.subject = node.into() } else { other.object = node.into() }
+                if random.below(2) == 0 {
+                    other.subject = node.into()
+                } else {
+                    other.object = node.into()
+                }
             }
             _ => {
                 let written = other.object.to_string();
-                let text = random.text(written.as_bytes(), &["\"", "^^", "1/0", "4/4", "2026-01-01T00:00:00Z"], &[]);
-                let text = String::from_utf8_lossy(&text).chars().take(2_000).collect::<String>();
+                let text = random.text(
+                    written.as_bytes(),
+                    &["\"", "^^", "1/0", "4/4", "2026-01-01T00:00:00Z"],
+                    &[],
+                );
+                let text = String::from_utf8_lossy(&text)
+                    .chars()
+                    .take(2_000)
+                    .collect::<String>();
                 other.object = match &quad.object {
-                    Term::Literal(literal) => Literal::new_typed_literal(text, literal.datatype()).into(),
+                    Term::Literal(literal) => {
+                        Literal::new_typed_literal(text, literal.datatype()).into()
+                    }
                     _ => Literal::new_simple_literal(text).into(),
                 };
             }
@@ -400,7 +464,10 @@ fn damage(history: &Path, random: &mut Mutations) {
 fn merge(theirs: &Path, ours: &Path) -> Result<(), Diagnostics> {
     let sources = [History::open_existing(theirs)?];
     let into = History::open(ours)?;
-    let options = MergeOptions { rename: true, leave_out: Vec::new() };
+    let options = MergeOptions {
+        rename: true,
+        leave_out: Vec::new(),
+    };
     let plan = plan(&sources, Some(&into), &options)?;
     carry_out(&plan, &sources, &into, &AtomicBool::new(false), || ())?;
     for campaign in into.campaigns()? {
@@ -434,9 +501,13 @@ fn merged_histories() {
         if let Err(found) = merge(&inner.join("theirs"), &inner.join("ours")) {
             show(&found);
         }
-        let around = [&outer, &outer.join("b")].map(|folder| std::fs::read_dir(folder).unwrap().count());
+        let around =
+            [&outer, &outer.join("b")].map(|folder| std::fs::read_dir(folder).unwrap().count());
         assert_eq!(around, [1, 1], "a file was written outside of the history");
-        assert_eq!(std::fs::read_dir(&inner).unwrap().count(), if inner.join("ours").exists() { 2 } else { 1 });
+        assert_eq!(
+            std::fs::read_dir(&inner).unwrap().count(),
+            if inner.join("ours").exists() { 2 } else { 1 }
+        );
     });
 }
 
@@ -449,18 +520,37 @@ fn seeds(folder: &Path) -> Vec<Vec<u8>> {
     (3..6).for_each(|index| history.commit_outline(&sample_run("k", index)).unwrap());
     let journal = std::fs::read(live.join("journal")).unwrap();
     history
-        .finish_campaign("k", &CampaignEnd { ended: "2026-08-01T13:00:00Z".to_owned(), ..CampaignEnd::default() })
+        .finish_campaign(
+            "k",
+            &CampaignEnd {
+                ended: "2026-08-01T13:00:00Z".to_owned(),
+                ..CampaignEnd::default()
+            },
+        )
         .unwrap();
     drop(history);
     let (mirror, _) = Mirror::update(&History::open_to_read(&live).unwrap()).unwrap();
     let table = mirror.paths().next().unwrap().1.to_path_buf();
     let outlines = Files::Disk.list(&live.join("outlines"));
     let traces = Files::Disk.list(&live.join("traces"));
-    let files = [live.join("seal/SUMS"), outlines[0].clone(), traces[0].clone(), live.join("tables/FILES"), table];
-    let mut contents: Vec<Vec<u8>> = files.iter().map(|file| std::fs::read(file).unwrap()).collect();
+    let files = [
+        live.join("seal/SUMS"),
+        outlines[0].clone(),
+        traces[0].clone(),
+        live.join("tables/FILES"),
+        table,
+    ];
+    let mut contents: Vec<Vec<u8>> = files
+        .iter()
+        .map(|file| std::fs::read(file).unwrap())
+        .collect();
     contents.insert(1, journal);
     let places = [0, 1, 2, 4, 5, 7];
-    places.into_iter().zip(contents).map(|(place, bytes)| [vec![place], bytes].concat()).collect()
+    places
+        .into_iter()
+        .zip(contents)
+        .map(|(place, bytes)| [vec![place], bytes].concat())
+        .collect()
 }
 
 #[test]
@@ -495,14 +585,31 @@ fn launches_and_caches() {
                 \"seed\": 7, \"shards\": 2, \"jobs\": 1, \"planned\": 4}";
     cases("launches", 6, |mut random| {
         let _ = std::fs::remove_dir_all(&launch);
-        for name in ["done", "faults", "locks", "logs", "shards/1/hulls", "shards/1/traces"] {
+        for name in [
+            "done",
+            "faults",
+            "locks",
+            "logs",
+            "shards/1/hulls",
+            "shards/1/traces",
+        ] {
             std::fs::create_dir_all(launch.join(name)).unwrap();
         }
-        for name in
-            ["plan.json", "job.json", "done/1", "faults/1", "logs/1.log", "shards/1/VERSION", "shards/1/hulls/x.hulls"]
-        {
+        for name in [
+            "plan.json",
+            "job.json",
+            "done/1",
+            "faults/1",
+            "logs/1.log",
+            "shards/1/VERSION",
+            "shards/1/hulls/x.hulls",
+        ] {
             if random.below(2) == 0 {
-                let text = random.text(plan.as_bytes(), &["18446744073709551615", "null", "{", "}"], &[]);
+                let text = random.text(
+                    plan.as_bytes(),
+                    &["18446744073709551615", "null", "{", "}"],
+                    &[],
+                );
                 std::fs::write(launch.join(name), text).unwrap();
             }
         }
@@ -513,7 +620,10 @@ fn launches_and_caches() {
         ] {
             let output = actcheck(here, arguments);
             let said = stderr(&output);
-            assert!(output.status.code().is_some_and(|code| code <= 2) && !said.contains("panicked"), "{said}");
+            assert!(
+                output.status.code().is_some_and(|code| code <= 2) && !said.contains("panicked"),
+                "{said}"
+            );
         }
     });
 }

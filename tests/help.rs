@@ -9,9 +9,18 @@ use crate::support::{actcheck, foreign, root, stderr, stdout};
 /// The commands that the program's help lists.
 fn commands() -> Vec<String> {
     let help = stdout(&actcheck(root(), &["-h"]));
-    let list = help.split("Run:\n").nth(1).and_then(|rest| rest.split("Options:").next()).expect("there is a list");
-    let first =
-        |line: &str| line.strip_prefix("  ")?.split(' ').next().filter(|word| !word.is_empty()).map(str::to_owned);
+    let list = help
+        .split("Run:\n")
+        .nth(1)
+        .and_then(|rest| rest.split("Options:").next())
+        .expect("there is a list");
+    let first = |line: &str| {
+        line.strip_prefix("  ")?
+            .split(' ')
+            .next()
+            .filter(|word| !word.is_empty())
+            .map(str::to_owned)
+    };
     list.lines().filter_map(first).collect()
 }
 
@@ -24,19 +33,44 @@ fn commands_are_listed_in_groups_and_run_comes_first() {
             .filter(|line| line.ends_with(':') && !line.starts_with(' '))
             .map(|line| line.trim_end_matches(':'))
             .collect();
-        assert_eq!(headings, ["Run", "Look", "Judge", "Exchange", "Options", "Example", "Environment"], "{help}");
-        assert!(help.lines().all(|line| line.chars().count() <= 100), "{help}");
+        assert_eq!(
+            headings,
+            [
+                "Run",
+                "Look",
+                "Judge",
+                "Exchange",
+                "Options",
+                "Example",
+                "Environment"
+            ],
+            "{help}"
+        );
+        assert!(
+            help.lines().all(|line| line.chars().count() <= 100),
+            "{help}"
+        );
     }
     assert_eq!(commands()[0], "run");
     let page = stdout(&actcheck(root(), &["man"]));
     let sections: Vec<String> = page
         .lines()
-        .filter_map(|line| Some(line.strip_prefix(".SH \"actcheck ")?.trim_end_matches('"').replace("\\-", "-")))
+        .filter_map(|line| {
+            Some(
+                line.strip_prefix(".SH \"actcheck ")?
+                    .trim_end_matches('"')
+                    .replace("\\-", "-"),
+            )
+        })
         .collect();
     let expected: Vec<String> = commands()
         .into_iter()
         .flat_map(|command| match command.as_str() {
-            "new" => vec!["new campaign".to_owned(), "new property".to_owned(), "new robot".to_owned()],
+            "new" => vec![
+                "new campaign".to_owned(),
+                "new property".to_owned(),
+                "new robot".to_owned(),
+            ],
             _ => vec![command],
         })
         .collect();
@@ -46,7 +80,10 @@ fn commands_are_listed_in_groups_and_run_comes_first() {
 #[test]
 fn explain_knows_every_code_and_suggests_the_nearest() {
     let known = stdout(&actcheck(root(), &["explain", "c003"]));
-    assert!(known.starts_with("C003: ") && known.contains("way out"), "{known}");
+    assert!(
+        known.starts_with("C003: ") && known.contains("way out"),
+        "{known}"
+    );
     let json = |arguments: &[&str]| -> Vec<serde_json::Value> {
         serde_json::from_str(&stdout(&actcheck(root(), arguments))).expect("a JSON array")
     };
@@ -55,17 +92,33 @@ fn explain_knows_every_code_and_suggests_the_nearest() {
     assert!(all.len() > 200, "{}", all.len());
     let list = stdout(&actcheck(root(), &["explain"]));
     for code in &all {
-        assert!(list.contains(&format!("\n  {}  ", code["code"].as_str().unwrap())), "{code}");
+        assert!(
+            list.contains(&format!("\n  {}  ", code["code"].as_str().unwrap())),
+            "{code}"
+        );
     }
-    assert!(stdout(&actcheck(root(), &["explain", "--format", "csv"])).starts_with("code,area,meaning,cause,remedy\n"));
+    assert!(
+        stdout(&actcheck(root(), &["explain", "--format", "csv"]))
+            .starts_with("code,area,meaning,cause,remedy\n")
+    );
     let page = stdout(&actcheck(root(), &["explain", "--format", "markdown"]));
-    assert_eq!(page, std::fs::read_to_string(root().join("src/codes.md")).unwrap(), "src/codes.md is out of date");
-    for (wrong, help) in
-        [("C0003", "did you mean `C003`"), ("R999", "did you mean `R093`"), ("oops", "a letter and three digits")]
-    {
+    assert_eq!(
+        page,
+        std::fs::read_to_string(root().join("src/codes.md")).unwrap(),
+        "src/codes.md is out of date"
+    );
+    for (wrong, help) in [
+        ("C0003", "did you mean `C003`"),
+        ("R999", "did you mean `R093`"),
+        ("oops", "a letter and three digits"),
+    ] {
         let output = actcheck(root(), &["explain", wrong]);
         assert_eq!(output.status.code(), Some(2));
-        assert!(stderr(&output).contains("X017") && stderr(&output).contains(help), "{wrong}: {}", stderr(&output));
+        assert!(
+            stderr(&output).contains("X017") && stderr(&output).contains(help),
+            "{wrong}: {}",
+            stderr(&output)
+        );
     }
 }
 
@@ -77,10 +130,22 @@ fn options_have_one_spelling_in_every_command() {
         let help = stdout(&actcheck(root(), &[&command, "-h"]));
         // Undoes line wrapping.
         let help = help.split_whitespace().collect::<Vec<_>>().join(" ");
-        assert!(!help.contains("SECONDS") && !help.contains("-secs"), "{command}: {help}");
+        assert!(
+            !help.contains("SECONDS") && !help.contains("-secs"),
+            "{command}: {help}"
+        );
         if let Some((_, rest)) = help.split_once("--format <FORMAT>") {
-            let values = rest.split_once("[possible values: ").unwrap_or_else(|| panic!("{command}: {help}")).1;
-            let values: Vec<&str> = values.split(']').next().unwrap().split(',').map(str::trim).collect();
+            let values = rest
+                .split_once("[possible values: ")
+                .unwrap_or_else(|| panic!("{command}: {help}"))
+                .1;
+            let values: Vec<&str> = values
+                .split(']')
+                .next()
+                .unwrap()
+                .split(',')
+                .map(str::trim)
+                .collect();
             assert_eq!(values[..3], ["text", "csv", "json"], "{command}: {help}");
             with_format += 1;
         }
@@ -93,12 +158,19 @@ fn the_help_of_every_command_ends_with_an_example() {
     let commands = commands();
     assert!(commands.len() >= 24, "{commands:?}");
     let below = ["campaign", "property"].map(|kind| vec!["new", kind]);
-    for mut arguments in commands.iter().map(|command| vec![command.as_str()]).chain(below) {
+    for mut arguments in commands
+        .iter()
+        .map(|command| vec![command.as_str()])
+        .chain(below)
+    {
         let example = format!("actcheck {}", arguments.join(" "));
         arguments.push("--help");
         let help = stdout(&actcheck(root(), &arguments));
         let last = help.rsplit("\n\n").next().unwrap();
-        assert!(last.starts_with("Example") && last.contains(&example), "{arguments:?}: {last}");
+        assert!(
+            last.starts_with("Example") && last.contains(&example),
+            "{arguments:?}: {last}"
+        );
     }
 }
 
@@ -112,13 +184,20 @@ fn completions_list_every_command() {
             assert!(script.contains(&command), "{shell} knows no `{command}`");
         }
         assert!(script.contains("until-width"), "{shell} knows no options");
-        assert!(!script.contains("serve-query"), "{shell} offers a hidden command");
+        assert!(
+            !script.contains("serve-query"),
+            "{shell} offers a hidden command"
+        );
         if foreign::has(shell) {
             let folder = tempfile::tempdir().unwrap();
             let file = folder.path().join("script");
             std::fs::write(&file, &script).unwrap();
             let read = Command::new(shell).arg("-n").arg(&file).output().unwrap();
-            assert!(read.status.success() && stderr(&read).is_empty(), "{shell}: {}", stderr(&read));
+            assert!(
+                read.status.success() && stderr(&read).is_empty(),
+                "{shell}: {}",
+                stderr(&read)
+            );
         }
     }
     let wrong = actcheck(root(), &["completions", "tcsh"]);
@@ -129,9 +208,11 @@ fn completions_list_every_command() {
 #[test]
 fn bash_completes_commands_and_options() {
     let script = stdout(&actcheck(root(), &["completions", "bash"]));
-    for (line, offered) in
-        [("actcheck rech", "recheck"), ("actcheck run --unt", "--until-width"), ("actcheck new c", "campaign")]
-    {
+    for (line, offered) in [
+        ("actcheck rech", "recheck"),
+        ("actcheck run --unt", "--until-width"),
+        ("actcheck new c", "campaign"),
+    ] {
         let words: Vec<&str> = line.split(' ').collect();
         let ask = format!(
             "{script}\nCOMP_WORDS=({line}); COMP_CWORD={}; COMP_LINE='{line}'; COMP_POINT={}\n\
@@ -141,8 +222,16 @@ fn bash_completes_commands_and_options() {
             words[words.len() - 1],
             words[words.len() - 2],
         );
-        let output = Command::new("bash").args(["--norc", "-c", &ask]).output().unwrap();
-        assert_eq!(stdout(&output).trim(), offered, "{line}: {}", stderr(&output));
+        let output = Command::new("bash")
+            .args(["--norc", "-c", &ask])
+            .output()
+            .unwrap();
+        assert_eq!(
+            stdout(&output).trim(),
+            offered,
+            "{line}: {}",
+            stderr(&output)
+        );
     }
 }
 
@@ -159,17 +248,28 @@ fn rendered(page: &Path) -> String {
     if !has_groff {
         return std::fs::read_to_string(page).unwrap().replace("\\-", "-");
     }
-    let output = Command::new("groff").args(["-Kutf8", "-man", "-Tutf8", "-P-c", "-ww"]).arg(page).output().unwrap();
-    assert!(output.status.success() && stderr(&output).is_empty(), "{}", stderr(&output));
+    let output = Command::new("groff")
+        .args(["-Kutf8", "-man", "-Tutf8", "-P-c", "-ww"])
+        .arg(page)
+        .output()
+        .unwrap();
+    assert!(
+        output.status.success() && stderr(&output).is_empty(),
+        "{}",
+        stderr(&output)
+    );
     // Bold letters are overstruck.
-    stdout(&output).replace("_\u{8}", "").chars().fold(String::new(), |mut text, c| {
-        if c == '\u{8}' {
-            _ = text.pop()
-        } else {
-            text.push(c)
-        }
-        text
-    })
+    stdout(&output)
+        .replace("_\u{8}", "")
+        .chars()
+        .fold(String::new(), |mut text, c| {
+            if c == '\u{8}' {
+                _ = text.pop()
+            } else {
+                text.push(c)
+            }
+            text
+        })
 }
 
 #[test]
@@ -179,18 +279,34 @@ fn the_manual_has_every_command_with_options_and_examples() {
     std::fs::write(&page, stdout(&actcheck(root(), &["man"]))).unwrap();
     let text = rendered(&page);
     for heading in ["NAME", "SYNOPSIS", "DESCRIPTION", "actcheck new campaign"] {
-        assert!(text.lines().any(|line| line.contains(heading)), "no {heading}:\n{text}");
+        assert!(
+            text.lines().any(|line| line.contains(heading)),
+            "no {heading}:\n{text}"
+        );
     }
     for command in commands().iter().filter(|command| *command != "new") {
-        assert!(text.contains(&format!("actcheck {command}")), "no `{command}` in:\n{text}");
+        assert!(
+            text.contains(&format!("actcheck {command}")),
+            "no `{command}` in:\n{text}"
+        );
     }
     let words = text.split_whitespace().collect::<Vec<_>>().join(" ");
-    assert!(words.contains("--until-width") && words.contains("actcheck run configs/pick.toml --runs 5"), "{words}");
-    assert!(!text.contains("serve-query") && !text.contains("EXTRA"), "{text}");
+    assert!(
+        words.contains("--until-width")
+            && words.contains("actcheck run configs/pick.toml --runs 5"),
+        "{words}"
+    );
+    assert!(
+        !text.contains("serve-query") && !text.contains("EXTRA"),
+        "{text}"
+    );
 
     let printed = stdout(&actcheck(folder.path(), &["man", "--out", "man1"]));
     assert!(printed.contains("man -l man1/actcheck.1"), "{printed}");
-    for command in commands().into_iter().chain(["new-campaign".to_owned(), "new-property".to_owned()]) {
+    for command in commands()
+        .into_iter()
+        .chain(["new-campaign".to_owned(), "new-property".to_owned()])
+    {
         let text = rendered(&folder.path().join(format!("man1/actcheck-{command}.1")));
         assert!(text.contains("DESCRIPTION"), "{text}");
     }

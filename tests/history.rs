@@ -1,5 +1,5 @@
-//! The history: stored data is returned unchanged, writes are atomic, and every fault of the folder is reported
-//! clearly.
+//! The history: stored data is returned unchanged, writes are atomic, and every fault of the folder
+//! is reported clearly.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
@@ -8,12 +8,13 @@ use std::time::Duration;
 
 use actcheck::base::{Diagnostics, Judgement, Outcome, RunFacts, Source, Term, digest_of, names};
 use actcheck::data::{
-    ActionEnd, Camera, Choice, ChoiceKind, ObjectModel, Odometry, Physics, Pose, Quality, RobotProfile, RobotStart,
-    Role, Scene, SceneObject, Sensing,
+    ActionEnd, Camera, Choice, ChoiceKind, ObjectModel, Odometry, Physics, Pose, Quality,
+    RobotProfile, RobotStart, Role, Scene, SceneObject, Sensing,
 };
 use actcheck::facts::extract;
 use actcheck::history::{
-    CampaignEnd, CampaignRecord, Cancel, History, QueryAnswer, RunFilter, RunRecord, RunStatus, SkillRecord,
+    CampaignEnd, CampaignRecord, Cancel, History, QueryAnswer, RunFilter, RunRecord, RunStatus,
+    SkillRecord,
 };
 use tempfile::TempDir;
 
@@ -89,7 +90,12 @@ fn scene() -> Scene {
         map: actcheck::data::SceneMap::default(),
         world: "living room".to_owned(),
         objects: BODIES.iter().enumerate().map(object).collect(),
-        robot: RobotStart { profile: robot(), base: [-0.6, 0.0, 0.1], root_height_m: 0.0, knows: Arc::new([]) },
+        robot: RobotStart {
+            profile: robot(),
+            base: [-0.6, 0.0, 0.1],
+            root_height_m: 0.0,
+            knows: Arc::new([]),
+        },
         designators: sample_trace(0).actions[0].parameters.clone(),
         steps: Vec::new(),
         sensing: Sensing {
@@ -114,7 +120,13 @@ fn scene() -> Scene {
     }
 }
 
-const PROPERTIES: [&str; 5] = ["CloseObject", "MovedObject", "NoGraspCollisions", "ObjectGrasped", "ObjectInGripper"];
+const PROPERTIES: [&str; 5] = [
+    "CloseObject",
+    "MovedObject",
+    "NoGraspCollisions",
+    "ObjectGrasped",
+    "ObjectInGripper",
+];
 
 fn judgement(property: &str, outcome: Outcome) -> Judgement {
     Judgement {
@@ -133,7 +145,11 @@ pub fn sample_run(campaign: &str, index: u64) -> RunRecord {
     let trace = sample_trace(index);
     let failed = index.is_multiple_of(3);
     let outcome = |property: &str| {
-        if failed && property == "ObjectInGripper" { Outcome::Failed } else { Outcome::Passed }
+        if failed && property == "ObjectInGripper" {
+            Outcome::Failed
+        } else {
+            Outcome::Passed
+        }
     };
     let score = if failed { 0.8 } else { 1.0 };
     RunRecord {
@@ -147,17 +163,33 @@ pub fn sample_run(campaign: &str, index: u64) -> RunRecord {
         seed: u64::MAX,
         status: RunStatus::Completed,
         reason: None,
-        program_output: index.is_multiple_of(3).then(|| format!("line 1\nline {index}")),
+        program_output: index
+            .is_multiple_of(3)
+            .then(|| format!("line 1\nline {index}")),
         score,
         action_scores: vec![score],
-        discards: (0..index % 2).map(|_| "found no free place for `plate`".to_owned()).collect(),
-        choices: vec![Choice { name: "target.yaw".into(), kind: ChoiceKind::Normal { sigma: 0.1 }, value: 0.07 }],
+        discards: (0..index % 2)
+            .map(|_| "found no free place for `plate`".to_owned())
+            .collect(),
+        choices: vec![Choice {
+            name: "target.yaw".into(),
+            kind: ChoiceKind::Normal { sigma: 0.1 },
+            value: 0.07,
+        }],
         scene: scene(),
         facts: extract(&trace),
         trace,
         actions: vec![names::act("Pick")],
-        judgements: vec![PROPERTIES.iter().map(|property| judgement(property, outcome(property))).collect()],
-        quality: Some(Quality { deepest_penetration_m: 3e-4, energy_gain_j: 2e-5 }),
+        judgements: vec![
+            PROPERTIES
+                .iter()
+                .map(|property| judgement(property, outcome(property)))
+                .collect(),
+        ],
+        quality: Some(Quality {
+            deepest_penetration_m: 3e-4,
+            energy_gain_j: 2e-5,
+        }),
         started: "2026-08-01T12:00:00Z".to_owned(),
         wall_secs: 1.25,
         elapsed_secs: 2.5,
@@ -174,7 +206,10 @@ pub fn sample_campaign(id: &str, minute: u32) -> CampaignRecord {
         config_path: "../pick.toml".to_owned(),
         ontology_digest: digest_of("ontology"),
         findings: Vec::new(),
-        rules: PROPERTIES.iter().map(|p| (names::act(p), format!("../rules/{p}.rls"), digest_of(p))).collect(),
+        rules: PROPERTIES
+            .iter()
+            .map(|p| (names::act(p), format!("../rules/{p}.rls"), digest_of(p)))
+            .collect(),
         models: vec![("glass".to_owned(), digest_of("glass"))],
         skill: Some(SkillRecord {
             command: "python3 pick.py".to_owned(),
@@ -201,7 +236,9 @@ fn filled() -> (TempDir, History) {
     let folder = tempfile::tempdir().unwrap();
     let history = History::open(&folder.path().join("history")).unwrap();
     for (id, minute, runs) in [("z2", 1, 6), ("a1", 2, 2)] {
-        history.begin_campaign(&sample_campaign(id, minute)).unwrap();
+        history
+            .begin_campaign(&sample_campaign(id, minute))
+            .unwrap();
         for index in (0..runs).rev() {
             history.commit(&sample_run(id, index)).unwrap();
         }
@@ -225,7 +262,12 @@ fn table(history: &History, sparql: &str) -> Vec<Vec<Option<Term>>> {
 
 fn facts_as_terms(facts: &RunFacts) -> Vec<BTreeSet<[Term; 3]>> {
     let term = |id: u32| facts.terms.term(id).clone();
-    facts.snapshots.iter().chain(&facts.during).map(|list| list.iter().map(|t| t.map(term)).collect()).collect()
+    facts
+        .snapshots
+        .iter()
+        .chain(&facts.during)
+        .map(|list| list.iter().map(|t| t.map(term)).collect())
+        .collect()
 }
 
 #[test]
@@ -237,7 +279,10 @@ fn a_stored_run_keeps_its_facts_trace_and_choices() {
     assert_eq!(history.trace("z2-4").unwrap(), record.trace);
     assert_eq!(history.choices("z2-4").unwrap(), record.choices);
     let facts = history.facts("z2-4", false).unwrap();
-    assert_eq!((&facts.snapshots, &facts.during), (&record.facts.snapshots, &record.facts.during));
+    assert_eq!(
+        (&facts.snapshots, &facts.during),
+        (&record.facts.snapshots, &record.facts.during)
+    );
     assert_eq!(facts.parameters, record.facts.parameters);
     assert_eq!(facts_as_terms(&facts), facts_as_terms(&record.facts));
 }
@@ -260,10 +305,16 @@ fn traces_of_the_previous_version_are_read() {
 fn stored_graphs_equal_the_facts_bit_for_bit_except_documented_omissions() {
     let (_folder, history) = filled();
     let record = sample_run("z2", 3);
-    for (graph, all) in ["state/0", "state/1", "1/during"].into_iter().zip(facts_as_terms(&record.facts)) {
+    for (graph, all) in ["state/0", "state/1", "1/during"]
+        .into_iter()
+        .zip(facts_as_terms(&record.facts))
+    {
         let iri = format!("{}z2-4/{graph}", names::RUN);
-        let QueryAnswer::Graph(triples) =
-            history.query(&format!("CONSTRUCT {{ ?s ?p ?o }} WHERE {{ GRAPH <{iri}> {{ ?s ?p ?o }} }}")).unwrap()
+        let QueryAnswer::Graph(triples) = history
+            .query(&format!(
+                "CONSTRUCT {{ ?s ?p ?o }} WHERE {{ GRAPH <{iri}> {{ ?s ?p ?o }} }}"
+            ))
+            .unwrap()
         else {
             panic!("no graph")
         };
@@ -293,7 +344,11 @@ fn stored_graphs_equal_the_facts_bit_for_bit_except_documented_omissions() {
                 "velocity",
             ],
         };
-        assert_eq!(left_out.into_iter().collect::<Vec<_>>(), expected, "{graph}");
+        assert_eq!(
+            left_out.into_iter().collect::<Vec<_>>(),
+            expected,
+            "{graph}"
+        );
     }
 }
 
@@ -307,8 +362,14 @@ fn the_graphs_keep_the_strongest_contact_of_each_pair() {
     );
     let trace = sample_run("z2", 3).trace;
     let strongest = |link: &str| {
-        let of_link = |contact: &&actcheck::data::ContactEpisode| contact.pair[1] == format!("robot/{link}");
-        trace.actions[0].contacts.iter().filter(of_link).map(|contact| contact.max_force_n).fold(0.0, f64::max)
+        let of_link =
+            |contact: &&actcheck::data::ContactEpisode| contact.pair[1] == format!("robot/{link}");
+        trace.actions[0]
+            .contacts
+            .iter()
+            .filter(of_link)
+            .map(|contact| contact.max_force_n)
+            .fold(0.0, f64::max)
     };
     let links = ["finger_left", "finger_right", "hand"];
     assert_eq!(rows.len(), links.len());
@@ -324,9 +385,18 @@ fn a_run_is_shown_with_all_stored_data() {
     let (_folder, history) = filled();
     let record = sample_run("z2", 3);
     let run = history.run("z2-4").unwrap();
-    assert_eq!((run.row.index, run.row.status, run.row.score), (3, RunStatus::Completed, 0.8));
-    assert_eq!((run.row.trace_hash.as_str(), run.row.started.as_str()), (&*record.trace.hash, "2026-08-01T12:00:00Z"));
-    assert_eq!((run.seed, run.wall_secs, run.world.as_str()), (u64::MAX, 1.25, "living room"));
+    assert_eq!(
+        (run.row.index, run.row.status, run.row.score),
+        (3, RunStatus::Completed, 0.8)
+    );
+    assert_eq!(
+        (run.row.trace_hash.as_str(), run.row.started.as_str()),
+        (&*record.trace.hash, "2026-08-01T12:00:00Z")
+    );
+    assert_eq!(
+        (run.seed, run.wall_secs, run.world.as_str()),
+        (u64::MAX, 1.25, "living room")
+    );
     assert_eq!(run.program_version, env!("CARGO_PKG_VERSION"));
     assert_eq!(run.robot_base, [-0.6, 0.0, 0.1]);
     assert_eq!(run.noise["yawNoise"], 0.05);
@@ -334,13 +404,34 @@ fn a_run_is_shown_with_all_stored_data() {
     assert_eq!(run.designators, record.scene.designators);
     let roles: Vec<Role> = run.objects.iter().map(|object| object.role).collect();
     assert_eq!(&roles[..3], [Role::Platform, Role::Target, Role::Other]);
-    let mug = run.objects.iter().find(|object| object.id == "mug_1").unwrap();
-    assert_eq!((mug.model.as_str(), mug.mass_kg, mug.friction, mug.restitution), ("mug", 0.31, 0.7, 0.05));
-    assert!((mug.target_distance_m.unwrap() - 0.2).abs() < 1e-12 && (mug.robot_distance_m - 1.0).abs() < 1e-12);
-    assert_eq!(mug.displacement_m, Some(record.trace.actions[0].extremes[2].max_displacement_m));
+    let mug = run
+        .objects
+        .iter()
+        .find(|object| object.id == "mug_1")
+        .unwrap();
+    assert_eq!(
+        (
+            mug.model.as_str(),
+            mug.mass_kg,
+            mug.friction,
+            mug.restitution
+        ),
+        ("mug", 0.31, 0.7, 0.05)
+    );
+    assert!(
+        (mug.target_distance_m.unwrap() - 0.2).abs() < 1e-12
+            && (mug.robot_distance_m - 1.0).abs() < 1e-12
+    );
+    assert_eq!(
+        mug.displacement_m,
+        Some(record.trace.actions[0].extremes[2].max_displacement_m)
+    );
     assert_eq!(run.objects[1].target_distance_m, None);
     let pick = &run.actions[0];
-    assert_eq!((pick.step, pick.end.as_str(), pick.reported), (1, "completed", Some(true)));
+    assert_eq!(
+        (pick.step, pick.end.as_str(), pick.reported),
+        (1, "completed", Some(true))
+    );
     assert_eq!(pick.message.as_deref(), Some("the object is held"));
     assert_eq!(pick.parameters, record.trace.actions[0].parameters);
     assert_eq!(pick.judgements, record.judgements[0]);
@@ -355,29 +446,76 @@ fn a_broken_run_has_its_reason() {
     record.trace.actions[0].report = None;
     record.facts = extract(&record.trace);
     (record.status, record.reason) = (RunStatus::Broken, Some("a pose is not a number".to_owned()));
-    record.judgements[0].iter_mut().for_each(|judgement| judgement.outcome = Outcome::Broken);
+    record.judgements[0]
+        .iter_mut()
+        .for_each(|judgement| judgement.outcome = Outcome::Broken);
     history.commit(&record).unwrap();
     let run = history.run("a1-8").unwrap();
-    assert_eq!((run.row.status, run.reason.as_deref()), (RunStatus::Broken, Some("a pose is not a number")));
-    assert_eq!((run.actions[0].end.as_str(), run.actions[0].reported), ("broken", None));
-    assert!(run.actions[0].judgements.iter().all(|judgement| judgement.outcome == Outcome::Broken));
-    let broken = RunFilter { status: Some(RunStatus::Broken), ..RunFilter::default() };
+    assert_eq!(
+        (run.row.status, run.reason.as_deref()),
+        (RunStatus::Broken, Some("a pose is not a number"))
+    );
+    assert_eq!(
+        (run.actions[0].end.as_str(), run.actions[0].reported),
+        ("broken", None)
+    );
+    assert!(
+        run.actions[0]
+            .judgements
+            .iter()
+            .all(|judgement| judgement.outcome == Outcome::Broken)
+    );
+    let broken = RunFilter {
+        status: Some(RunStatus::Broken),
+        ..RunFilter::default()
+    };
     assert_eq!(history.runs(&broken).unwrap().len(), 1);
 }
 
 #[test]
 fn lists_are_ordered_and_can_be_filtered() {
     let (_folder, history) = filled();
-    let runs: Vec<String> = history.runs(&RunFilter::default()).unwrap().into_iter().map(|row| row.run).collect();
-    assert_eq!(runs, ["z2-1", "z2-2", "z2-3", "z2-4", "z2-5", "z2-6", "a1-1", "a1-2"]);
-    let filter = RunFilter { campaign: Some("a1".to_owned()), test: Some("Pick".to_owned()), status: None };
+    let runs: Vec<String> = history
+        .runs(&RunFilter::default())
+        .unwrap()
+        .into_iter()
+        .map(|row| row.run)
+        .collect();
+    assert_eq!(
+        runs,
+        [
+            "z2-1", "z2-2", "z2-3", "z2-4", "z2-5", "z2-6", "a1-1", "a1-2"
+        ]
+    );
+    let filter = RunFilter {
+        campaign: Some("a1".to_owned()),
+        test: Some("Pick".to_owned()),
+        status: None,
+    };
     assert_eq!(history.runs(&filter).unwrap().len(), 2);
-    assert!(history.runs(&RunFilter { test: Some("Place".to_owned()), ..filter.clone() }).unwrap().is_empty());
+    assert!(
+        history
+            .runs(&RunFilter {
+                test: Some("Place".to_owned()),
+                ..filter.clone()
+            })
+            .unwrap()
+            .is_empty()
+    );
     let outcomes = history.outcomes(&filter).unwrap();
     assert_eq!(outcomes.len(), 10);
-    let failed: Vec<_> = outcomes.iter().filter(|row| row.outcome == Outcome::Failed).collect();
-    assert_eq!((failed[0].run.as_str(), failed[0].step, failed[0].margin), ("a1-1", 1, Some(-0.04)));
-    assert_eq!((failed[0].property.as_str(), failed.len()), (names::act("ObjectInGripper").as_str(), 1));
+    let failed: Vec<_> = outcomes
+        .iter()
+        .filter(|row| row.outcome == Outcome::Failed)
+        .collect();
+    assert_eq!(
+        (failed[0].run.as_str(), failed[0].step, failed[0].margin),
+        ("a1-1", 1, Some(-0.04))
+    );
+    assert_eq!(
+        (failed[0].property.as_str(), failed.len()),
+        (names::act("ObjectInGripper").as_str(), 1)
+    );
 }
 
 #[test]
@@ -394,24 +532,52 @@ fn a_campaign_is_listed_with_its_end() {
     };
     history.finish_campaign("z2", &end).unwrap();
     let campaigns = history.campaigns().unwrap();
-    let [z2, a1] = campaigns.as_slice() else { panic!("{campaigns:?}") };
-    assert_eq!((z2.id.as_str(), z2.name.as_str(), z2.runs, z2.planned_runs, z2.seed), ("z2", "pick", 6, 6, 7));
-    assert_eq!((z2.score, z2.score_without_broken, z2.interrupted), (Some(0.9), None, false));
+    let [z2, a1] = campaigns.as_slice() else {
+        panic!("{campaigns:?}")
+    };
+    assert_eq!(
+        (
+            z2.id.as_str(),
+            z2.name.as_str(),
+            z2.runs,
+            z2.planned_runs,
+            z2.seed
+        ),
+        ("z2", "pick", 6, 6, 7)
+    );
+    assert_eq!(
+        (z2.score, z2.score_without_broken, z2.interrupted),
+        (Some(0.9), None, false)
+    );
     assert_eq!(z2.ended_by.as_deref(), Some("failures"));
     assert_eq!((&z2.ended, &z2.outcomes), (&Some(end.ended), &end.outcomes));
-    assert_eq!((a1.id.as_str(), a1.runs, a1.interrupted, &a1.ended), ("a1", 2, true, &None));
+    assert_eq!(
+        (a1.id.as_str(), a1.runs, a1.interrupted, &a1.ended),
+        ("a1", 2, true, &None)
+    );
 }
 
 #[test]
 fn a_run_is_found_by_its_id_prefixed_name_or_iri() {
     let (_folder, history) = filled();
-    for name in ["z2-4", "run:z2-4", " z2-4 ", "<https://w3id.org/actcheck/run/z2-4>"] {
+    for name in [
+        "z2-4",
+        "run:z2-4",
+        " z2-4 ",
+        "<https://w3id.org/actcheck/run/z2-4>",
+    ] {
         assert_eq!(history.resolve(name).unwrap(), "z2-4", "{name}");
     }
     let several = history.run("a1").unwrap_err().to_string();
-    assert!(several.contains("H008: `a1` matches 2 runs") && several.contains("a1-1, a1-2"), "{several}");
+    assert!(
+        several.contains("H008: `a1` matches 2 runs") && several.contains("a1-1, a1-2"),
+        "{several}"
+    );
     let none = history.run("zz-4").unwrap_err().to_string();
-    assert!(none.contains("has no run `zz-4`") && none.contains("did you mean `z2-4`?"), "{none}");
+    assert!(
+        none.contains("has no run `zz-4`") && none.contains("did you mean `z2-4`?"),
+        "{none}"
+    );
     assert!(history.run("").is_err());
 }
 
@@ -421,7 +587,10 @@ fn campaign_ids_are_short_new_and_repeatable() {
     let id = history.next_campaign_id("abc", 7).unwrap();
     assert_eq!(id, history.next_campaign_id("abc", 7).unwrap());
     assert_ne!(id, history.next_campaign_id("abc", 8).unwrap());
-    assert!(id.len() == 4 && id.starts_with(|c: char| c.is_ascii_lowercase()), "{id}");
+    assert!(
+        id.len() == 4 && id.starts_with(|c: char| c.is_ascii_lowercase()),
+        "{id}"
+    );
     history.begin_campaign(&sample_campaign(&id, 9)).unwrap();
     assert_ne!(id, history.next_campaign_id("abc", 7).unwrap());
 }
@@ -429,7 +598,10 @@ fn campaign_ids_are_short_new_and_repeatable() {
 #[test]
 fn common_questions_have_short_queries() {
     let (_folder, history) = filled();
-    let count = table(&history, "PREFIX act: <http://actions#> SELECT (COUNT(?r) AS ?n) WHERE { ?r a act:Run }");
+    let count = table(
+        &history,
+        "PREFIX act: <http://actions#> SELECT (COUNT(?r) AS ?n) WHERE { ?r a act:Run }",
+    );
     assert_eq!(count, [[Some(Term::Integer(8))]]);
     let moved = table(
         &history,
@@ -442,19 +614,33 @@ fn common_questions_have_short_queries() {
         "SELECT ?property (COUNT(?e) AS ?n) WHERE { ?a earl:subject ?e ; earl:test ?property ;
            earl:result/earl:outcome earl:failed } GROUP BY ?property",
     );
-    assert_eq!(failed, [[Some(Term::iri(names::act("ObjectInGripper"))), Some(Term::Integer(3))]]);
+    assert_eq!(
+        failed,
+        [[
+            Some(Term::iri(names::act("ObjectInGripper"))),
+            Some(Term::Integer(3))
+        ]]
+    );
     let held = table(
         &history,
         "SELECT ?z WHERE { ?e act:ofRun run:z2-4 ; act:pickObject ?o ; act:after ?g . GRAPH ?g { ?o w:z ?z } }",
     );
     assert_eq!(
         held,
-        [[Some(Term::Double(sample_run("z2", 3).trace.snapshots[1].bodies[1].pose.position[2]))]].map(|row| row.map(
-            |z| z.map(|z| Term::Double(z.number().map_or(f64::NAN, |z| format!("{}", z as f32).parse().unwrap())))
-        ))
+        [[Some(Term::Double(
+            sample_run("z2", 3).trace.snapshots[1].bodies[1]
+                .pose
+                .position[2]
+        ))]]
+        .map(|row| row.map(|z| z.map(|z| Term::Double(
+            z.number()
+                .map_or(f64::NAN, |z| format!("{}", z as f32).parse().unwrap())
+        ))))
     );
     assert_eq!(
-        history.query("ASK { GRAPH ?g { obj:glass_1 w:restsOn w:robot } }").unwrap(),
+        history
+            .query("ASK { GRAPH ?g { obj:glass_1 w:restsOn w:robot } }")
+            .unwrap(),
         QueryAnswer::Boolean(true)
     );
 }
@@ -464,8 +650,11 @@ fn described() -> BTreeSet<String> {
     ["history.ttl", "world.ttl", "actions.ttl"]
         .iter()
         .flat_map(|file| {
-            let text = std::fs::read_to_string(crate::support::root().join("ontology").join(file)).unwrap();
-            text.lines().filter_map(|line| Some(line.split_once(" a ")?.0.to_owned())).collect::<Vec<_>>()
+            let text = std::fs::read_to_string(crate::support::root().join("ontology").join(file))
+                .unwrap();
+            text.lines()
+                .filter_map(|line| Some(line.split_once(" a ")?.0.to_owned()))
+                .collect::<Vec<_>>()
         })
         .collect()
 }
@@ -476,7 +665,10 @@ fn every_term_of_a_history_is_described() {
     let end = CampaignEnd {
         score: Some(1.0),
         score_without_broken: Some(1.0),
-        outcomes: Outcome::ALL.into_iter().map(|outcome| (outcome, 1)).collect(),
+        outcomes: Outcome::ALL
+            .into_iter()
+            .map(|outcome| (outcome, 1))
+            .collect(),
         ended: "2026-08-01T12:09:00Z".to_owned(),
         ended_by: Some("time".to_owned()),
         ..CampaignEnd::default()
@@ -484,10 +676,21 @@ fn every_term_of_a_history_is_described() {
     history.finish_campaign("z2", &end).unwrap();
     let described = described();
     let terms = "SELECT DISTINCT ?t WHERE { { ?s ?t ?o } UNION { ?s a ?t } UNION { GRAPH ?g { ?s ?t ?o } } }";
-    let used: BTreeSet<String> = table(&history, terms).iter().flatten().flatten().map(ToString::to_string).collect();
+    let used: BTreeSet<String> = table(&history, terms)
+        .iter()
+        .flatten()
+        .flatten()
+        .map(ToString::to_string)
+        .collect();
     assert!(used.len() > 70, "{}", used.len());
-    let ours = |term: &&String| term.starts_with("act:") || term.starts_with("w:") || term.starts_with('<');
-    let missing: Vec<&String> = used.iter().filter(ours).filter(|term| !described.contains(*term)).collect();
+    let ours = |term: &&String| {
+        term.starts_with("act:") || term.starts_with("w:") || term.starts_with('<')
+    };
+    let missing: Vec<&String> = used
+        .iter()
+        .filter(ours)
+        .filter(|term| !described.contains(*term))
+        .collect();
     assert!(missing.is_empty(), "not described: {missing:?}");
 }
 
@@ -497,20 +700,41 @@ fn invalid_queries_are_reported_with_their_place() {
     let fault = |text: &str| history.query(text).unwrap_err().to_string();
     let starts = |text: &str, expected: &str| {
         let fault = fault(text);
-        assert!(fault.starts_with(expected) && fault.contains("help: "), "{fault}");
+        assert!(
+            fault.starts_with(expected) && fault.contains("help: "),
+            "{fault}"
+        );
     };
-    starts("SELECT ?r\nWHER { ?r a act:Run }", "H010 query:2:1: this is not a SPARQL query: unexpected `WHER`");
-    starts("SELEC ?r WHERE { ?r a act:Run }", "H010 query:1:1: this is not a SPARQL query: unexpected `SELEC");
-    starts("SELECT ?r WHERE { ?r a act:Run ", "H010 query:1:32: the query ends too early");
+    starts(
+        "SELECT ?r\nWHER { ?r a act:Run }",
+        "H010 query:2:1: this is not a SPARQL query: unexpected `WHER`",
+    );
+    starts(
+        "SELEC ?r WHERE { ?r a act:Run }",
+        "H010 query:1:1: this is not a SPARQL query: unexpected `SELEC",
+    );
+    starts(
+        "SELECT ?r WHERE { ?r a act:Run ",
+        "H010 query:1:32: the query ends too early",
+    );
     starts("", "H010 query:1:1: the query ends too early");
-    starts("SELECT (COUNT(?r) AS ?n WHERE { ?r ?p ?o }", "H010 query:1:25: this is not a SPARQL query");
-    starts("SELECT ?r WHERE { ?r a foo:Run }", "H010 query:1:24: the prefix of `foo:Run` is unknown");
+    starts(
+        "SELECT (COUNT(?r) AS ?n WHERE { ?r ?p ?o }",
+        "H010 query:1:25: this is not a SPARQL query",
+    );
+    starts(
+        "SELECT ?r WHERE { ?r a foo:Run }",
+        "H010 query:1:24: the prefix of `foo:Run` is unknown",
+    );
     starts(
         "SELECT ?x (COUNT(?r) AS ?n) WHERE { ?x ?p ?r }",
         "H010 query:1:46: the SELECT contains a variable that is unbound",
     );
     let update = fault("PREFIX a: <http://a#>\n  insert data { a:b a:c a:d }");
-    assert!(update.starts_with("H011 query:2:3: `INSERT` is an update"), "{update}");
+    assert!(
+        update.starts_with("H011 query:2:3: `INSERT` is an update"),
+        "{update}"
+    );
     let service = fault("SELECT * WHERE { SERVICE <http://localhost/> { ?s ?p ?o } }");
     assert!(service.starts_with("H012"), "{service}");
 }
@@ -530,9 +754,16 @@ fn a_long_query_can_be_stopped() {
     });
     let started = std::time::Instant::now();
     let fault = history.query_from(&text, &cancel).unwrap_err().to_string();
-    assert!(started.elapsed() < Duration::from_secs(2), "{:?}", started.elapsed());
+    assert!(
+        started.elapsed() < Duration::from_secs(2),
+        "{:?}",
+        started.elapsed()
+    );
     waiting.join().unwrap();
-    assert!(fault.starts_with("H013 long.rq: the query was stopped"), "{fault}");
+    assert!(
+        fault.starts_with("H013 long.rq: the query was stopped"),
+        "{fault}"
+    );
 }
 
 #[test]
@@ -540,7 +771,10 @@ fn a_second_owner_is_refused_without_changes() {
     let (folder, history) = filled();
     let dir = folder.path().join("history");
     let fault = code(History::open(&dir));
-    assert!(fault.starts_with("H002") && fault.contains(&dir.display().to_string()), "{fault}");
+    assert!(
+        fault.starts_with("H002") && fault.contains(&dir.display().to_string()),
+        "{fault}"
+    );
     assert_eq!(history.runs(&RunFilter::default()).unwrap().len(), 8);
     drop(history);
     assert!(History::open_existing(&dir).is_ok());
@@ -553,9 +787,19 @@ fn a_history_of_a_newer_program_is_not_changed() {
     let dir = folder.path().join("history");
     std::fs::write(dir.join("VERSION"), "actcheck history 4\n").unwrap();
     let fault = code(History::open(&dir));
-    assert!(fault.starts_with("H004") && fault.contains("update actcheck"), "{fault}");
+    assert!(
+        fault.starts_with("H004") && fault.contains("update actcheck"),
+        "{fault}"
+    );
     std::fs::write(dir.join("VERSION"), "actcheck history 1\n").unwrap();
-    assert_eq!(History::open_existing(&dir).unwrap().runs(&RunFilter::default()).unwrap().len(), 8);
+    assert_eq!(
+        History::open_existing(&dir)
+            .unwrap()
+            .runs(&RunFilter::default())
+            .unwrap()
+            .len(),
+        8
+    );
 }
 
 #[test]
@@ -568,7 +812,10 @@ fn folders_without_a_history_are_refused() {
     assert!(code(History::open(folder.path())).contains("it holds other files"));
     assert!(code(History::open_existing(folder.path())).contains("it holds other files"));
     let file = code(History::open(&folder.path().join("thesis.tex")));
-    assert!(file.starts_with("H001") && file.contains("a file exists at its path"), "{file}");
+    assert!(
+        file.starts_with("H001") && file.contains("a file exists at its path"),
+        "{file}"
+    );
     let below = code(History::open(&folder.path().join("thesis.tex/history")));
     assert!(below.starts_with("H001"), "{below}");
 }
@@ -577,10 +824,14 @@ fn folders_without_a_history_are_refused() {
 fn an_uncreatable_folder_is_reported() {
     // Permission bits don't stop root, so this uses a path where no user can create a folder.
     let fault = code(History::open(Path::new("/proc/actcheck")));
-    assert!(fault.starts_with("H001") && fault.contains("/proc/actcheck"), "{fault}");
+    assert!(
+        fault.starts_with("H001") && fault.contains("/proc/actcheck"),
+        "{fault}"
+    );
 }
 
-/// Runs a test on a small file system of its own, which is removed afterwards. Says so if mounting is not permitted.
+/// Runs a test on a small file system of its own, which is removed afterwards. Says so if mounting
+/// is not permitted.
 fn on_small_disk(test: impl FnOnce(&Path) + std::panic::UnwindSafe) {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().to_str().unwrap();
@@ -596,7 +847,9 @@ fn on_small_disk(test: impl FnOnce(&Path) + std::panic::UnwindSafe) {
 }
 
 fn ran(command: &[&str]) -> bool {
-    let output = std::process::Command::new(command[0]).args(&command[1..]).output();
+    let output = std::process::Command::new(command[0])
+        .args(&command[1..])
+        .output();
     output.is_ok_and(|output| output.status.success())
 }
 
@@ -606,9 +859,16 @@ fn a_read_only_folder_is_reported() {
         let dir = disk.join("history");
         drop(History::open(&dir).unwrap());
         assert!(ran(&["mount", "-o", "remount,ro", disk.to_str().unwrap()]));
-        for result in [History::open(&dir), History::open_existing(&dir), History::open(&disk.join("new"))] {
+        for result in [
+            History::open(&dir),
+            History::open_existing(&dir),
+            History::open(&disk.join("new")),
+        ] {
             let fault = code(result);
-            assert!(fault.starts_with("H001") && fault.contains("read-only"), "{fault}");
+            assert!(
+                fault.starts_with("H001") && fault.contains("read-only"),
+                "{fault}"
+            );
         }
     });
 }
@@ -620,9 +880,21 @@ fn a_damaged_or_missing_trace_is_reported_and_other_data_is_readable() {
     let file = traces.join("z2-1.trace");
     let bytes = std::fs::read(&file).unwrap();
     std::fs::write(&file, &bytes[..bytes.len() / 2]).unwrap();
-    assert!(history.trace("z2-1").unwrap_err().to_string().starts_with("H007"));
+    assert!(
+        history
+            .trace("z2-1")
+            .unwrap_err()
+            .to_string()
+            .starts_with("H007")
+    );
     std::fs::remove_file(&file).unwrap();
-    assert!(history.facts("z2-1", false).unwrap_err().to_string().starts_with("H009"));
+    assert!(
+        history
+            .facts("z2-1", false)
+            .unwrap_err()
+            .to_string()
+            .starts_with("H009")
+    );
     assert_eq!(history.run("z2-1").unwrap().actions.len(), 1);
 }
 
@@ -649,21 +921,35 @@ fn fill_up(dir: &Path) {
     history.begin_campaign(&sample_campaign("a1", 1)).unwrap();
     let mut kept = 0;
     let fault = loop {
-        if let Err(fault) = history.commit(&sample_run("a1", kept)).and_then(|()| history.flush()) {
+        if let Err(fault) = history
+            .commit(&sample_run("a1", kept))
+            .and_then(|()| history.flush())
+        {
             break fault.to_string();
         }
         kept += 1;
         assert!(kept < 1000, "the disk did not fill up");
     };
-    assert!(fault.starts_with("H005") && fault.contains("full") && fault.contains("history"), "{fault}");
+    assert!(
+        fault.starts_with("H005") && fault.contains("full") && fault.contains("history"),
+        "{fault}"
+    );
     drop(history);
-    // Readers need no room in the folder. The next owner needs some: tables take twenty times the size of the journal.
+    // Readers need no room in the folder. The next owner needs some: tables take twenty times the
+    // size of the journal.
     let history = History::open_to_read(dir).unwrap();
     let runs = history.runs(&RunFilter::default()).unwrap();
     // The last one may have been written and not flushed.
-    assert!((kept..=kept + 1).contains(&(runs.len() as u64)), "{} of {kept}", runs.len());
+    assert!(
+        (kept..=kept + 1).contains(&(runs.len() as u64)),
+        "{} of {kept}",
+        runs.len()
+    );
     for run in &runs {
-        assert_eq!(history.run(&run.run).unwrap().actions[0].judgements.len(), PROPERTIES.len());
+        assert_eq!(
+            history.run(&run.run).unwrap().actions[0].judgements.len(),
+            PROPERTIES.len()
+        );
         assert_eq!(history.trace(&run.run).unwrap(), sample_trace(run.index));
     }
     drop(history);
@@ -671,5 +957,12 @@ fn fill_up(dir: &Path) {
     if let Err(fault) = History::open(dir) {
         assert!(fault.to_string().starts_with("H005"), "{fault}");
     }
-    assert_eq!(History::open_to_read(dir).unwrap().runs(&RunFilter::default()).unwrap().len(), runs.len());
+    assert_eq!(
+        History::open_to_read(dir)
+            .unwrap()
+            .runs(&RunFilter::default())
+            .unwrap()
+            .len(),
+        runs.len()
+    );
 }

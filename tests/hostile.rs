@@ -1,5 +1,5 @@
-//! Foreign projects, with links, pipes, devices and bombs in any place: no command changes a file outside,
-//! waits for ever, or fills the memory.
+//! Foreign projects, with links, pipes, devices and bombs in any place: no command changes a file
+//! outside, waits for ever, or fills the memory.
 
 use std::collections::BTreeMap;
 use std::os::unix::fs::{MetadataExt as _, symlink};
@@ -39,9 +39,22 @@ const COMMANDS: [&[&str]; 13] = [
 /// Runs a command with limits on time and memory. Returns `None` if it takes too long.
 fn limited(folder: &Path, arguments: &[&str]) -> Option<Output> {
     let mut command = Command::new("sh");
-    command.args(["-c", "ulimit -v \"$0\"; exec \"$@\"", &MOST_KB.to_string(), env!("CARGO_BIN_EXE_actcheck")]);
-    command.args(arguments).current_dir(folder).env("NO_COLOR", "1").stdin(Stdio::null());
-    let mut child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    command.args([
+        "-c",
+        "ulimit -v \"$0\"; exec \"$@\"",
+        &MOST_KB.to_string(),
+        env!("CARGO_BIN_EXE_actcheck"),
+    ]);
+    command
+        .args(arguments)
+        .current_dir(folder)
+        .env("NO_COLOR", "1")
+        .stdin(Stdio::null());
+    let mut child = command
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
     let started = Instant::now();
     // The output of these commands fits into a pipe.
     while child.try_wait().unwrap().is_none() {
@@ -57,14 +70,20 @@ fn limited(folder: &Path, arguments: &[&str]) -> Option<Output> {
 
 /// A command that ends in time, without a crash.
 fn ended(folder: &Path, arguments: &[&str], place: &str) -> Output {
-    let output = limited(folder, arguments).unwrap_or_else(|| panic!("{place}: {arguments:?} does not end"));
+    let output =
+        limited(folder, arguments).unwrap_or_else(|| panic!("{place}: {arguments:?} does not end"));
     let said = stderr(&output);
-    assert!(output.status.code().is_some_and(|code| code <= 2), "{place}: {arguments:?}: {:?} {said}", output.status);
+    assert!(
+        output.status.code().is_some_and(|code| code <= 2),
+        "{place}: {arguments:?}: {:?} {said}",
+        output.status
+    );
     assert!(!said.contains("panicked"), "{place}: {arguments:?}: {said}");
     output
 }
 
-/// Everything below a folder: content, or the target of a link; permissions, and the time of the last change.
+/// Everything below a folder: content, or the target of a link; permissions, and the time of the
+/// last change.
 fn state(folder: &Path) -> BTreeMap<PathBuf, (Vec<u8>, u32, i64)> {
     let mut found = BTreeMap::new();
     for entry in std::fs::read_dir(folder).unwrap().map(Result::unwrap) {
@@ -73,7 +92,10 @@ fn state(folder: &Path) -> BTreeMap<PathBuf, (Vec<u8>, u32, i64)> {
             found.extend(state(&path));
         }
         let content = match data.file_type() {
-            kind if kind.is_symlink() => std::fs::read_link(&path).unwrap().into_os_string().into_encoded_bytes(),
+            kind if kind.is_symlink() => std::fs::read_link(&path)
+                .unwrap()
+                .into_os_string()
+                .into_encoded_bytes(),
             kind if kind.is_file() => std::fs::read(&path).unwrap(),
             _ => Vec::new(),
         };
@@ -95,7 +117,15 @@ impl Stranger {
             std::fs::create_dir_all(stranger.folder.path().join(part)).unwrap();
         }
         std::fs::write(stranger.project().join("configs/c.toml"), CONFIG).unwrap();
-        for name in ["precious", "photo.tmp", "x.trace", "MANIFEST-000001", "alive", "inner/SUMS", "old.parquet"] {
+        for name in [
+            "precious",
+            "photo.tmp",
+            "x.trace",
+            "MANIFEST-000001",
+            "alive",
+            "inner/SUMS",
+            "old.parquet",
+        ] {
             std::fs::write(stranger.outside().join(name), "precious").unwrap();
         }
         stranger
@@ -130,8 +160,18 @@ impl Stranger {
         let before = state(&self.outside());
         let said = commands.iter().map(|arguments| {
             let output = ended(&self.project(), arguments, place);
-            assert_eq!(state(&self.outside()), before, "{place}: {arguments:?}: {}", stderr(&output));
-            format!("{:?} {}{}", output.status.code(), stdout(&output), stderr(&output))
+            assert_eq!(
+                state(&self.outside()),
+                before,
+                "{place}: {arguments:?}: {}",
+                stderr(&output)
+            );
+            format!(
+                "{:?} {}{}",
+                output.status.code(),
+                stdout(&output),
+                stderr(&output)
+            )
         });
         said.collect()
     }
@@ -143,26 +183,46 @@ fn fifo(path: &Path) {
 }
 
 fn named(folder: &Path, ending: &str) -> PathBuf {
-    let entries = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
-    entries.filter(|path| path.to_string_lossy().ends_with(ending)).min().unwrap()
+    let entries = std::fs::read_dir(folder)
+        .unwrap()
+        .map(|entry| entry.unwrap().path());
+    entries
+        .filter(|path| path.to_string_lossy().ends_with(ending))
+        .min()
+        .unwrap()
 }
 
-/// A pull request with a link in its history made `run` delete every file of the folder that it led to.
+/// A pull request with a link in its history made `run` delete every file of the folder that it led
+/// to.
 #[test]
 fn no_command_follows_a_link_of_a_history() {
     let mut places = vec!["configs/.actcheck".to_owned()];
-    let folders = ["store", "seal", "traces", "outlines", "tables", "hulls", "sent"];
+    let folders = [
+        "store", "seal", "traces", "outlines", "tables", "hulls", "sent",
+    ];
     places.extend(folders.map(|name| format!("configs/.actcheck/{name}")));
     for place in &places {
         let stranger = Stranger::new();
         copy_made_history(&stranger.history());
         stranger.link(place, "");
         let said = stranger.unchanged(&COMMANDS, place);
-        let code = if place.ends_with(".actcheck") { "H028" } else { "H027" };
+        let code = if place.ends_with(".actcheck") {
+            "H028"
+        } else {
+            "H027"
+        };
         assert!(said[0].contains(code), "{place}: {}", said[0]);
     }
-    let files =
-        ["VERSION", "lock", "journal", "seal/SUMS", "store/CURRENT", "store/LOG", "store/LOCK", "store/bulk-1.sst"];
+    let files = [
+        "VERSION",
+        "lock",
+        "journal",
+        "seal/SUMS",
+        "store/CURRENT",
+        "store/LOG",
+        "store/LOCK",
+        "store/bulk-1.sst",
+    ];
     for name in files {
         let stranger = Stranger::new();
         copy_made_history(&stranger.history());
@@ -199,7 +259,11 @@ fn links_in_place_of_single_files_are_neither_followed_nor_written_through() {
     let stranger = Stranger::new();
     copy_made_history(&stranger.history());
     let trace = named(&stranger.history().join("traces"), ".trace");
-    let place = trace.strip_prefix(stranger.project()).unwrap().display().to_string();
+    let place = trace
+        .strip_prefix(stranger.project())
+        .unwrap()
+        .display()
+        .to_string();
     stranger.link(&place, "x.trace");
     stranger.unchanged(&COMMANDS, "a trace");
 }
@@ -216,23 +280,57 @@ fn a_link_that_the_user_names_is_followed() {
         "{}",
         stderr(&said)
     );
-    let said = actcheck(&stranger.project(), &["list", "--history", "configs/.actcheck"]);
+    let said = actcheck(
+        &stranger.project(),
+        &["list", "--history", "configs/.actcheck"],
+    );
     assert_eq!(said.status.code(), Some(0), "{}", stderr(&said));
-    let run = ["run", "configs/c.toml", "--runs", "1", "--history", "configs/.actcheck", "-q"];
-    assert!(actcheck(&stranger.project(), &run).status.code().is_some_and(|code| code < 2));
+    let run = [
+        "run",
+        "configs/c.toml",
+        "--runs",
+        "1",
+        "--history",
+        "configs/.actcheck",
+        "-q",
+    ];
+    assert!(
+        actcheck(&stranger.project(), &run)
+            .status
+            .code()
+            .is_some_and(|code| code < 2)
+    );
     // A folder on the way, named by the configuration.
     let stranger = Stranger::new();
-    std::fs::write(stranger.project().join("configs/c.toml"), format!("{CONFIG}[history]\ndir = \"../deep/h\"\n"))
-        .unwrap();
+    std::fs::write(
+        stranger.project().join("configs/c.toml"),
+        format!("{CONFIG}[history]\ndir = \"../deep/h\"\n"),
+    )
+    .unwrap();
     stranger.link("deep", "");
     let said = stranger.unchanged(&[&["run", "configs/c.toml", "--runs", "1", "-q"]], "deep");
-    assert!(said[0].contains("H028") && said[0].contains("`deep` is a link"), "{}", said[0]);
+    assert!(
+        said[0].contains("H028") && said[0].contains("`deep` is a link"),
+        "{}",
+        said[0]
+    );
 }
 
-/// `launch` emptied the files that `lock` and `locks/N` led to, and appended to those of `logs/N.log`.
+/// `launch` emptied the files that `lock` and `locks/N` led to, and appended to those of
+/// `logs/N.log`.
 #[test]
 fn launch_follows_no_link() {
-    let launch: &[&str] = &["launch", "configs/c.toml", "--shards", "2", "--runs", "2", "--tries", "1", "-q"];
+    let launch: &[&str] = &[
+        "launch",
+        "configs/c.toml",
+        "--shards",
+        "2",
+        "--runs",
+        "2",
+        "--tries",
+        "1",
+        "-q",
+    ];
     for (place, target) in [
         ("", ""),
         ("/lock", "precious"),
@@ -251,7 +349,11 @@ fn launch_follows_no_link() {
         let stranger = Stranger::new();
         stranger.link(&format!("configs/.actcheck.launch{place}"), target);
         let said = stranger.unchanged(&[launch], place);
-        assert!(said[0].contains("X073") || said[0].contains("H027"), "{place}: {}", said[0]);
+        assert!(
+            said[0].contains("X073") || said[0].contains("H027"),
+            "{place}: {}",
+            said[0]
+        );
     }
     // The remains of a launch that was killed at its end: only its own files go.
     let stranger = Stranger::new();
@@ -261,7 +363,11 @@ fn launch_follows_no_link() {
     std::fs::write(merged.join("mine.txt"), "mine").unwrap();
     stranger.link("configs/.actcheck.launch.merged/link", "inner");
     let said = stranger.unchanged(&[launch], "merged");
-    assert!(said[0].contains("X073") && said[0].contains("remain"), "{}", said[0]);
+    assert!(
+        said[0].contains("X073") && said[0].contains("remain"),
+        "{}",
+        said[0]
+    );
     assert!(merged.join("mine.txt").exists() && !merged.join("logs").exists());
     assert!(!stranger.project().join("configs/.actcheck.launch").exists());
 }
@@ -271,7 +377,13 @@ fn launch_follows_no_link() {
 fn only_files_of_the_program_are_deleted() {
     let stranger = Stranger::new();
     copy_made_history(&stranger.history());
-    let mine = ["seal/notes.txt", "traces/notes.tmp", "tables/mine.parquet", "tables/notes.tmp", "outlines/notes.tmp"];
+    let mine = [
+        "seal/notes.txt",
+        "traces/notes.tmp",
+        "tables/mine.parquet",
+        "tables/notes.tmp",
+        "outlines/notes.tmp",
+    ];
     for name in mine {
         let path = stranger.history().join(name);
         std::fs::create_dir_all(path.parent().unwrap()).unwrap();
@@ -281,17 +393,27 @@ fn only_files_of_the_program_are_deleted() {
         ended(&stranger.project(), arguments, "mine");
     }
     for name in mine {
-        assert_eq!(std::fs::read_to_string(stranger.history().join(name)).unwrap(), "mine", "{name}");
+        assert_eq!(
+            std::fs::read_to_string(stranger.history().join(name)).unwrap(),
+            "mine",
+            "{name}"
+        );
     }
 }
 
-/// Output folders may be prepared by others, too: with links under the names of the files that will be written.
+/// Output folders may be prepared by others, too: with links under the names of the files that will
+/// be written.
 #[test]
 fn files_in_output_folders_are_not_written_through_links() {
     let stranger = Stranger::new();
     copy_made_history(&stranger.history());
-    for name in ["out/outcomes.csv", "out/schema.json", "out/actcheck.1", "out/outcomes.parquet", "out/actions.parquet"]
-    {
+    for name in [
+        "out/outcomes.csv",
+        "out/schema.json",
+        "out/actcheck.1",
+        "out/outcomes.parquet",
+        "out/actions.parquet",
+    ] {
         stranger.link(name, "precious");
     }
     let said = stranger.unchanged(
@@ -303,8 +425,18 @@ fn files_in_output_folders_are_not_written_through_links() {
         ],
         "out",
     );
-    assert!(said[0].starts_with("Some(0)") && said[2].starts_with("Some(0)"), "{said:?}");
-    assert!(stranger.project().join("out/outcomes.csv").symlink_metadata().unwrap().is_file());
+    assert!(
+        said[0].starts_with("Some(0)") && said[2].starts_with("Some(0)"),
+        "{said:?}"
+    );
+    assert!(
+        stranger
+            .project()
+            .join("out/outcomes.csv")
+            .symlink_metadata()
+            .unwrap()
+            .is_file()
+    );
     // A folder of results that leads elsewhere.
     stranger.link("tables/outcomes", "inner");
     stranger.link("regressions", "inner");
@@ -331,10 +463,19 @@ fn files_in_output_folders_are_not_written_through_links() {
     assert!(written.contains("<html"), "{}", stderr(&said));
 }
 
-/// A history in which a file is a pipe, a device or a link to one stopped every command, or filled the memory.
+/// A history in which a file is a pipe, a device or a link to one stopped every command, or filled
+/// the memory.
 #[test]
 fn pipes_and_devices_in_a_history_are_refused() {
-    let names = ["seal/SUMS", "store/CURRENT", "store/IDENTITY", "lock", "journal", "VERSION", "store/000001.log"];
+    let names = [
+        "seal/SUMS",
+        "store/CURRENT",
+        "store/IDENTITY",
+        "lock",
+        "journal",
+        "VERSION",
+        "store/000001.log",
+    ];
     for name in names {
         for special in ["pipe", "/dev/zero"] {
             let stranger = Stranger::new();
@@ -348,29 +489,48 @@ fn pipes_and_devices_in_a_history_are_refused() {
             }
             for arguments in [COMMANDS[0], COMMANDS[10], COMMANDS[8], COMMANDS[12]] {
                 let output = ended(&stranger.project(), arguments, name);
-                assert!(stderr(&output).contains("H027"), "{name} {special} {arguments:?}: {}", stderr(&output));
+                assert!(
+                    stderr(&output).contains("H027"),
+                    "{name} {special} {arguments:?}: {}",
+                    stderr(&output)
+                );
             }
         }
     }
-    for (folder, ending) in [("traces", ".trace"), ("tables", ".parquet"), ("tables", "FILES"), ("tables", "SCHEMA")] {
+    for (folder, ending) in [
+        ("traces", ".trace"),
+        ("tables", ".parquet"),
+        ("tables", "FILES"),
+        ("tables", "SCHEMA"),
+    ] {
         let stranger = Stranger::new();
         copy_made_history(&stranger.history());
         fifo(&named(&stranger.history().join(folder), ending));
-        COMMANDS.iter().for_each(|arguments| drop(ended(&stranger.project(), arguments, ending)));
+        COMMANDS
+            .iter()
+            .for_each(|arguments| drop(ended(&stranger.project(), arguments, ending)));
     }
     let stranger = Stranger::new();
     outlined(&stranger.history());
     fifo(&named(&stranger.history().join("outlines"), ""));
-    COMMANDS.iter().for_each(|arguments| drop(ended(&stranger.project(), arguments, "outlines")));
+    COMMANDS
+        .iter()
+        .for_each(|arguments| drop(ended(&stranger.project(), arguments, "outlines")));
 }
 
 /// A sparse file takes no space on a disk, and all memory when it is read.
 #[test]
 fn huge_sparse_files_are_refused() {
-    let mut names: Vec<String> =
-        ["seal/SUMS", "store/CURRENT", "journal", "VERSION", "tables/FILES", "tables/RECHECKED"]
-            .map(str::to_owned)
-            .to_vec();
+    let mut names: Vec<String> = [
+        "seal/SUMS",
+        "store/CURRENT",
+        "journal",
+        "VERSION",
+        "tables/FILES",
+        "tables/RECHECKED",
+    ]
+    .map(str::to_owned)
+    .to_vec();
     names.push("traces/.trace".to_owned());
     names.push("tables/.parquet".to_owned());
     names.push("store/.log".to_owned());
@@ -381,7 +541,12 @@ fn huge_sparse_files_are_refused() {
             Some((folder, ending)) => named(&stranger.history().join(folder), ending),
             None => stranger.history().join(name),
         };
-        let file = std::fs::File::options().write(true).create(true).truncate(false).open(path).unwrap();
+        let file = std::fs::File::options()
+            .write(true)
+            .create(true)
+            .truncate(false)
+            .open(path)
+            .unwrap();
         file.set_len(1 << 40).unwrap();
         for arguments in [COMMANDS[0], COMMANDS[2], COMMANDS[8], COMMANDS[10]] {
             ended(&stranger.project(), arguments, name);
@@ -394,7 +559,11 @@ fn huge_sparse_files_are_refused() {
         let file = std::fs::File::create(stranger.project().join("configs").join(name)).unwrap();
         file.set_len(1 << 40).unwrap();
         let output = ended(&stranger.project(), COMMANDS[11], name);
-        assert!(stderr(&output).contains("longer than"), "{}", stderr(&output));
+        assert!(
+            stderr(&output).contains("longer than"),
+            "{}",
+            stderr(&output)
+        );
     }
 }
 
@@ -427,7 +596,11 @@ fn a_history_that_expands_a_thousand_times_is_refused() {
         let trace = named(&stranger.history().join("traces"), ".trace");
         let bytes = std::fs::read(&trace).unwrap();
         let length = u32::from_le_bytes(bytes[8..12].try_into().unwrap()) as usize;
-        let head = if is_head { bomb.as_slice() } else { &bytes[12..12 + length] };
+        let head = if is_head {
+            bomb.as_slice()
+        } else {
+            &bytes[12..12 + length]
+        };
         let written = [&bytes[..8], &(head.len() as u32).to_le_bytes(), head, &bomb].concat();
         std::fs::write(&trace, written).unwrap();
         let run = trace.file_stem().unwrap().to_string_lossy().into_owned();
@@ -436,35 +609,57 @@ fn a_history_that_expands_a_thousand_times_is_refused() {
             let text = stdout(&output) + &stderr(&output);
             // A trace whose hash is another is refused before the rest of it expands.
             let refused = output.status.code() != Some(0) && text.contains("H007");
-            assert!(refused || !is_head && output.status.code() == Some(0), "{arguments:?}: {text}");
+            assert!(
+                refused || !is_head && output.status.code() == Some(0),
+                "{arguments:?}: {text}"
+            );
         }
     }
-    // A record of the journal: size, number of statements, checksum of the content, checksum of the header.
+    // A record of the journal: size, number of statements, checksum of the content, checksum of the
+    // header.
     let stranger = Stranger::new();
     copy_made_history(&stranger.history());
     let mut encoder = flate2::write::DeflateEncoder::new(Vec::new(), flate2::Compression::fast());
     std::io::Write::write_all(&mut encoder, &zeros).unwrap();
     let content = encoder.finish().unwrap();
-    let mut record: Vec<u8> = [(content.len() as u32).to_le_bytes(), 1_u32.to_le_bytes(), sum(&content)].concat();
+    let mut record: Vec<u8> = [
+        (content.len() as u32).to_le_bytes(),
+        1_u32.to_le_bytes(),
+        sum(&content),
+    ]
+    .concat();
     let header = sum(&record);
     record.extend(header);
     record.extend(content);
     std::fs::write(stranger.history().join("journal"), record).unwrap();
     for arguments in [COMMANDS[0], COMMANDS[8], COMMANDS[10]] {
         let output = ended(&stranger.project(), arguments, "journal");
-        assert_ne!(output.status.code(), Some(0), "{arguments:?}: {}", stdout(&output));
+        assert_ne!(
+            output.status.code(),
+            Some(0),
+            "{arguments:?}: {}",
+            stdout(&output)
+        );
     }
-    // Outlines: eight magic bytes, the size and checksum of each of four parts, the checksum of these.
+    // Outlines: eight magic bytes, the size and checksum of each of four parts, the checksum of
+    // these.
     let zstd = zstd::bulk::compress(&zeros, 1).unwrap();
     for bombed in 0..4 {
         let stranger = Stranger::new();
         outlined(&stranger.history());
         let file = named(&stranger.history().join("outlines"), "");
         let bytes = std::fs::read(&file).unwrap();
-        let size = |part: usize| u32::from_le_bytes(bytes[8 + 8 * part..][..4].try_into().unwrap()) as usize;
-        let (mut written, mut body, mut at) = (bytes[..8].to_vec(), Vec::<u8>::new(), 8 + 8 * 4 + 4);
+        let size = |part: usize| {
+            u32::from_le_bytes(bytes[8 + 8 * part..][..4].try_into().unwrap()) as usize
+        };
+        let (mut written, mut body, mut at) =
+            (bytes[..8].to_vec(), Vec::<u8>::new(), 8 + 8 * 4 + 4);
         for part in 0..4 {
-            let own = if part == bombed { zstd.as_slice() } else { &bytes[at..at + size(part)] };
+            let own = if part == bombed {
+                zstd.as_slice()
+            } else {
+                &bytes[at..at + size(part)]
+            };
             at += size(part);
             written.extend((own.len() as u32).to_le_bytes());
             written.extend(sum(own));
@@ -478,15 +673,27 @@ fn a_history_that_expands_a_thousand_times_is_refused() {
             ended(&stranger.project(), arguments, "outlines");
         }
         let output = ended(&stranger.project(), COMMANDS[8], "outlines");
-        assert_ne!(output.status.code(), Some(0), "{bombed}: {}{}", stdout(&output), stderr(&output));
+        assert_ne!(
+            output.status.code(),
+            Some(0),
+            "{bombed}: {}{}",
+            stdout(&output),
+            stderr(&output)
+        );
     }
 }
 
-/// Pipes, devices and links in place of any file of the project: configuration, ontology, rules, models, regressions.
+/// Pipes, devices and links in place of any file of the project: configuration, ontology, rules,
+/// models, regressions.
 #[test]
 fn a_project_of_pipes_ends_every_command() {
     let folder = project_with("[physics]\n");
-    for name in ["configs/quick.toml", "ontology/actions.ttl", "rules/close_object.rls", "models/objects/glass.toml"] {
+    for name in [
+        "configs/quick.toml",
+        "ontology/actions.ttl",
+        "rules/close_object.rls",
+        "models/objects/glass.toml",
+    ] {
         let path = folder.path().join(name);
         let text = std::fs::read(&path);
         for special in ["pipe", "/dev/zero"] {
@@ -496,7 +703,10 @@ fn a_project_of_pipes_ends_every_command() {
             } else {
                 symlink(special, &path).unwrap();
             }
-            for arguments in [&["check", "configs/quick.toml"][..], &["run", "configs/quick.toml", "--runs", "1"]] {
+            for arguments in [
+                &["check", "configs/quick.toml"][..],
+                &["run", "configs/quick.toml", "--runs", "1"],
+            ] {
                 ended(folder.path(), arguments, name);
             }
             std::fs::remove_file(&path).unwrap();
@@ -507,7 +717,11 @@ fn a_project_of_pipes_ends_every_command() {
     }
     std::fs::create_dir_all(folder.path().join("configs/regressions")).unwrap();
     fifo(&folder.path().join("configs/regressions/theirs.toml"));
-    ended(folder.path(), &["run", "configs/quick.toml", "--runs", "1"], "regressions");
+    ended(
+        folder.path(),
+        &["run", "configs/quick.toml", "--runs", "1"],
+        "regressions",
+    );
 }
 
 /// A newest campaign that began in the future by a wrong clock remained the newest for ever.
@@ -515,13 +729,20 @@ fn a_project_of_pipes_ends_every_command() {
 fn the_newest_campaign_is_the_last_one_whatever_the_clock() {
     let folder = tempfile::tempdir().unwrap();
     let history = History::open(&folder.path().join("h")).unwrap();
-    let ahead =
-        actcheck::history::CampaignRecord { started: "2099-01-01T00:00:00Z".to_owned(), ..sample_campaign("a", 0) };
+    let ahead = actcheck::history::CampaignRecord {
+        started: "2099-01-01T00:00:00Z".to_owned(),
+        ..sample_campaign("a", 0)
+    };
     history.begin_campaign(&ahead).unwrap();
     history.commit(&sample_run("a", 0)).unwrap();
     history.begin_campaign(&sample_campaign("b", 1)).unwrap();
     history.commit(&sample_run("b", 1)).unwrap();
-    let ids: Vec<String> = history.campaigns().unwrap().into_iter().map(|row| row.id).collect();
+    let ids: Vec<String> = history
+        .campaigns()
+        .unwrap()
+        .into_iter()
+        .map(|row| row.id)
+        .collect();
     assert_eq!(ids, ["a", "b"]);
     assert_eq!(history.resolve("@last").unwrap(), "b-2");
     drop(history);
@@ -529,8 +750,15 @@ fn the_newest_campaign_is_the_last_one_whatever_the_clock() {
     let merged = actcheck(folder.path(), &["merge", "h", "--into", "all"]);
     assert_eq!(merged.status.code(), Some(0), "{}", stderr(&merged));
     std::fs::write(folder.path().join("c.toml"), CONFIG).unwrap();
-    let output = actcheck(folder.path(), &["run", "c.toml", "--history", "h", "--runs", "1", "-q"]);
-    assert!(stderr(&output).contains("H032") && stderr(&output).contains("2099-01-01"), "{}", stderr(&output));
+    let output = actcheck(
+        folder.path(),
+        &["run", "c.toml", "--history", "h", "--runs", "1", "-q"],
+    );
+    assert!(
+        stderr(&output).contains("H032") && stderr(&output).contains("2099-01-01"),
+        "{}",
+        stderr(&output)
+    );
     let history = History::open_to_read(&folder.path().join("h")).unwrap();
     assert_eq!(history.campaigns().unwrap().len(), 3);
     assert!(history.campaigns().unwrap()[2].started.starts_with("20"));
@@ -552,48 +780,127 @@ fn a_journal_that_lost_its_end_is_reported() {
     }
     copy_open(&live, &left);
     let said = actcheck(folder.path(), &["list", "--history", "left"]);
-    assert!(said.status.success() && !stderr(&said).contains("H029"), "{}", stderr(&said));
-    let intact = actcheck(folder.path(), &["health", "--integrity", "--history", "left"]);
-    assert_eq!(intact.status.code(), Some(0), "{}{}", stdout(&intact), stderr(&intact));
+    assert!(
+        said.status.success() && !stderr(&said).contains("H029"),
+        "{}",
+        stderr(&said)
+    );
+    let intact = actcheck(
+        folder.path(),
+        &["health", "--integrity", "--history", "left"],
+    );
+    assert_eq!(
+        intact.status.code(),
+        Some(0),
+        "{}{}",
+        stdout(&intact),
+        stderr(&intact)
+    );
     // Within a record, at the end of one, empty, and gone.
-    for length in [Some(ends[2] + 10), Some(ends[7] - 1), Some(ends[3]), Some(0), None] {
+    for length in [
+        Some(ends[2] + 10),
+        Some(ends[7] - 1),
+        Some(ends[3]),
+        Some(0),
+        None,
+    ] {
         let cut = folder.path().join("cut");
         let _ = std::fs::remove_dir_all(&cut);
         copy(&left, &cut);
         match length {
             Some(length) => {
-                std::fs::File::options().write(true).open(cut.join("journal")).unwrap().set_len(length).unwrap();
+                std::fs::File::options()
+                    .write(true)
+                    .open(cut.join("journal"))
+                    .unwrap()
+                    .set_len(length)
+                    .unwrap();
             }
             None => std::fs::remove_file(cut.join("journal")).unwrap(),
         }
         let said = actcheck(folder.path(), &["list", "--history", "cut"]);
-        assert!(stderr(&said).contains("H029"), "{length:?}: {}{}", stdout(&said), stderr(&said));
-        let said = actcheck(folder.path(), &["health", "--integrity", "--history", "cut"]);
-        assert_eq!(said.status.code(), Some(1), "{length:?}: {}{}", stdout(&said), stderr(&said));
-        assert!(stdout(&said).contains("journal"), "{length:?}: {}", stdout(&said));
+        assert!(
+            stderr(&said).contains("H029"),
+            "{length:?}: {}{}",
+            stdout(&said),
+            stderr(&said)
+        );
+        let said = actcheck(
+            folder.path(),
+            &["health", "--integrity", "--history", "cut"],
+        );
+        assert_eq!(
+            said.status.code(),
+            Some(1),
+            "{length:?}: {}{}",
+            stdout(&said),
+            stderr(&said)
+        );
+        assert!(
+            stdout(&said).contains("journal"),
+            "{length:?}: {}",
+            stdout(&said)
+        );
         let said = actcheck(folder.path(), &["recheck", "--history", "cut"]);
-        assert!(stderr(&said).contains("H029"), "{length:?}: {}", stderr(&said));
+        assert!(
+            stderr(&said).contains("H029"),
+            "{length:?}: {}",
+            stderr(&said)
+        );
     }
 }
 
-/// A history that was merged from shards, or whose runs are partly outlines, has its rows in another order than its tables.
+/// A history that was merged from shards, or whose runs are partly outlines, has its rows in
+/// another order than its tables.
 #[test]
 fn another_order_of_rows_is_not_damage() {
     let folder = project_with("[physics]\nsteps_per_second = 60\niterations = 1\n");
     let here = folder.path();
     let text = std::fs::read_to_string(here.join("configs/pick.toml")).unwrap();
-    std::fs::write(here.join("configs/f.toml"), format!("{text}\n[history]\nkeep = \"failures\"\n")).unwrap();
+    std::fs::write(
+        here.join("configs/f.toml"),
+        format!("{text}\n[history]\nkeep = \"failures\"\n"),
+    )
+    .unwrap();
     for shard in ["1", "2"] {
         let part = format!("{shard}/2");
-        let run = ["run", "configs/f.toml", "--runs", "8", "--shard", &part, "--history", shard, "-q"];
+        let run = [
+            "run",
+            "configs/f.toml",
+            "--runs",
+            "8",
+            "--shard",
+            &part,
+            "--history",
+            shard,
+            "-q",
+        ];
         let output = actcheck(here, &run);
-        assert!(output.status.code().is_some_and(|code| code < 2), "{}", stderr(&output));
+        assert!(
+            output.status.code().is_some_and(|code| code < 2),
+            "{}",
+            stderr(&output)
+        );
     }
     let merged = actcheck(here, &["merge", "1", "2", "--into", "all"]);
-    assert!(merged.status.code().is_some_and(|code| code < 2), "{}", stderr(&merged));
+    assert!(
+        merged.status.code().is_some_and(|code| code < 2),
+        "{}",
+        stderr(&merged)
+    );
     for history in ["1", "2", "all"] {
-        assert!(actcheck(here, &["analyse", "--history", history]).status.success());
+        assert!(
+            actcheck(here, &["analyse", "--history", history])
+                .status
+                .success()
+        );
         let output = actcheck(here, &["health", "--integrity", "--history", history]);
-        assert_eq!(output.status.code(), Some(0), "{history}: {}{}", stdout(&output), stderr(&output));
+        assert_eq!(
+            output.status.code(),
+            Some(0),
+            "{history}: {}{}",
+            stdout(&output),
+            stderr(&output)
+        );
     }
 }

@@ -46,7 +46,8 @@ fn naive([s0, e0]: [u64; 2], [s1, e1]: [u64; 2]) -> &'static str {
 }
 
 fn library() -> String {
-    std::fs::read_to_string(root().join("rules/lib/intervals.rls")).expect("the library is readable")
+    std::fs::read_to_string(root().join("rules/lib/intervals.rls"))
+        .expect("the library is readable")
 }
 
 fn rules(text: &str) -> Rules {
@@ -56,15 +57,22 @@ fn rules(text: &str) -> Rules {
         .unwrap_or_else(|found| panic!("{text}: {found}"))
 }
 
-/// Adds a hold of an object; its ends in ticks of 1/60 s, as single-precision decimals like those of facts.
+/// Adds a hold of an object; its ends in ticks of 1/60 s, as single-precision decimals like those
+/// of facts.
 fn add(facts: &mut Facts, name: &str, object: &str, ends: [u64; 2]) {
     let subject = Term::iri(names::w(name));
     let mut set = |property: &str, value: Term| {
-        facts.add(When::During, [subject.clone(), Term::iri(names::w(property)), value]);
+        facts.add(
+            When::During,
+            [subject.clone(), Term::iri(names::w(property)), value],
+        );
     };
     set("heldObject", Term::iri(names::obj(object)));
     for (property, tick) in ["start", "end"].into_iter().zip(ends) {
-        let secs: f64 = (tick as f32 / 60.0).to_string().parse().expect("it is a number");
+        let secs: f64 = (tick as f32 / 60.0)
+            .to_string()
+            .parse()
+            .expect("it is a number");
         set(property, Term::Double(secs));
     }
 }
@@ -72,8 +80,10 @@ fn add(facts: &mut Facts, name: &str, object: &str, ends: [u64; 2]) {
 #[test]
 fn exactly_one_of_allens_relations_holds_for_each_pair_of_intervals() {
     let mut dice = Dice::new(5);
-    let text: Vec<String> =
-        RELATIONS.iter().map(|name| format!("violation(?a, ?b, \"{name}\") :- interval_{name}(?a, ?b) .")).collect();
+    let text: Vec<String> = RELATIONS
+        .iter()
+        .map(|name| format!("violation(?a, ?b, \"{name}\") :- interval_{name}(?a, ?b) ."))
+        .collect();
     let rules = rules(&text.join("\n"));
     let mut seen = BTreeSet::new();
     for _ in 0..400 {
@@ -103,12 +113,20 @@ fn exactly_one_of_allens_relations_holds_for_each_pair_of_intervals() {
 #[test]
 fn the_last_hold_before_an_interval_and_the_length_of_an_interval_are_known() {
     let mut facts = Facts::new();
-    for (name, ends) in [("hold/1", [0, 10]), ("hold/2", [20, 50]), ("hold/3", [60, 70]), ("hold/4", [200, 300])] {
+    for (name, ends) in [
+        ("hold/1", [0, 10]),
+        ("hold/2", [20, 50]),
+        ("hold/3", [60, 70]),
+        ("hold/4", [200, 300]),
+    ] {
         add(&mut facts, name, "cup", ends);
     }
     let holds = |condition: &str| {
         let condition = condition.replace("<hold/", &format!("<{}hold/", names::W));
-        rules(&format!("success(1) :- {condition} .")).judge(&facts).outcome == Outcome::Passed
+        rules(&format!("success(1) :- {condition} ."))
+            .judge(&facts)
+            .outcome
+            == Outcome::Passed
     };
     assert!(holds("last_hold_before(<hold/3>, _, <hold/2>)"));
     assert!(!holds("last_hold_before(<hold/3>, _, <hold/1>)"));
@@ -123,11 +141,20 @@ fn runs_of_earlier_versions_break_properties_that_read_holds() {
     let rules = rules("violation(?i) :- hold_interval(?i, _), lasts(?i, ?d), ?d < 0.5 .");
     let mut facts = Facts::new();
     assert_eq!(rules.judge(&facts).outcome, Outcome::Passed);
-    let action = |local: &str| [Term::iri(names::w("action")), Term::iri(names::w(local)), Term::Boolean(true)];
+    let action = |local: &str| {
+        [
+            Term::iri(names::w("action")),
+            Term::iri(names::w(local)),
+            Term::Boolean(true),
+        ]
+    };
     facts.add(When::During, action("robotMeasured"));
     let decision = rules.judge(&facts);
     assert_eq!(decision.outcome, Outcome::Broken);
-    assert!(format!("{decision:?}").contains("the holds and motions of the action were not recorded"), "{decision:?}");
+    assert!(
+        format!("{decision:?}").contains("the holds and motions of the action were not recorded"),
+        "{decision:?}"
+    );
     facts.add(When::During, action("intervalsRecorded"));
     assert_eq!(rules.judge(&facts).outcome, Outcome::Passed);
 }
@@ -137,13 +164,20 @@ fn runs_of_earlier_versions_break_properties_that_read_holds() {
 fn queries_see_holds_motions_and_phases_in_the_history() {
     let history = made_history();
     let ask = |query: &str| {
-        let output = actcheck(history.path(), &["query", query, "--history", ".", "--format", "csv"]);
+        let output = actcheck(
+            history.path(),
+            &["query", query, "--history", ".", "--format", "csv"],
+        );
         assert!(output.status.success(), "{}", stderr(&output));
         stdout(&output)
     };
-    let phases =
-        ask("SELECT ?name ?start ?end WHERE { GRAPH ?g { ?phase w:phaseName ?name ; w:start ?start ; w:end ?end } }");
-    assert!(phases.lines().count() > 4 && phases.contains("lift"), "{phases}");
+    let phases = ask(
+        "SELECT ?name ?start ?end WHERE { GRAPH ?g { ?phase w:phaseName ?name ; w:start ?start ; w:end ?end } }",
+    );
+    assert!(
+        phases.lines().count() > 4 && phases.contains("lift"),
+        "{phases}"
+    );
     for kind in ["heldObject", "movedObject"] {
         let query = format!(
             "SELECT ?object ?start ?end WHERE {{ GRAPH ?g {{ ?i w:{kind} ?object ; w:start ?start ; w:end ?end

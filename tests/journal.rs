@@ -1,4 +1,5 @@
-//! The journal of a history: its statements can be read at once, survives a kill, and ends in compressed tables.
+//! The journal of a history: its statements can be read at once, survives a kill, and ends in
+//! compressed tables.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -9,7 +10,8 @@ use tempfile::TempDir;
 use crate::history::{sample_campaign, sample_run};
 use crate::support::{actcheck, copy, copy_open, stderr, stdout};
 
-/// The folder of a history with a campaign that has not ended, as its owner left it when it was killed.
+/// The folder of a history with a campaign that has not ended, as its owner left it when it was
+/// killed.
 fn killed(runs: u64) -> (TempDir, PathBuf) {
     let folder = tempfile::tempdir().unwrap();
     let (live, left) = (folder.path().join("live"), folder.path().join("left"));
@@ -21,7 +23,12 @@ fn killed(runs: u64) -> (TempDir, PathBuf) {
 }
 
 fn runs(history: &History) -> Vec<String> {
-    history.runs(&RunFilter::default()).unwrap().into_iter().map(|run| run.run).collect()
+    history
+        .runs(&RunFilter::default())
+        .unwrap()
+        .into_iter()
+        .map(|run| run.run)
+        .collect()
 }
 
 /// All statements of a history as lines.
@@ -29,7 +36,11 @@ fn statements(history: &History) -> BTreeSet<String> {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("all.nq");
     history.write_nquads(&file).unwrap();
-    std::fs::read_to_string(file).unwrap().lines().map(str::to_owned).collect()
+    std::fs::read_to_string(file)
+        .unwrap()
+        .lines()
+        .map(str::to_owned)
+        .collect()
 }
 
 fn size_of(folder: &Path, ending: &str) -> u64 {
@@ -51,7 +62,9 @@ fn the_next_owner_takes_over_the_runs_of_a_killed_one() {
     assert_eq!(statements(&history), before);
     assert!(!left.join("journal").exists());
     // Traces of runs in the journal are not leftovers.
-    history.begin_campaign(&sample_campaign("later", 1)).unwrap();
+    history
+        .begin_campaign(&sample_campaign("later", 1))
+        .unwrap();
     assert!((0..3).all(|index| history.trace(&format!("k-{}", index + 1)).is_ok()));
 }
 
@@ -71,7 +84,10 @@ fn half_a_record_at_the_end_of_a_journal_is_not_a_run() {
     let journal = std::fs::read(left.join("journal")).unwrap();
     std::fs::write(left.join("journal"), &journal[..journal.len() - 1]).unwrap();
     assert_eq!(runs(&History::open_to_read(&left).unwrap()), ["k-1", "k-2"]);
-    assert_eq!(runs(&History::open_existing(&left).unwrap()), ["k-1", "k-2"]);
+    assert_eq!(
+        runs(&History::open_existing(&left).unwrap()),
+        ["k-1", "k-2"]
+    );
 }
 
 #[test]
@@ -84,18 +100,39 @@ fn damage_to_a_journal_is_reported_and_the_other_runs_are_saved() {
     std::fs::write(left.join("journal"), journal).unwrap();
     for opened in [History::open_to_read(&left), History::open_existing(&left)] {
         let fault = opened.err().unwrap().to_string();
-        assert!(fault.starts_with("H007") && fault.contains("journal"), "{fault}");
+        assert!(
+            fault.starts_with("H007") && fault.contains("journal"),
+            "{fault}"
+        );
     }
     let name = left.display().to_string();
-    let output = actcheck(folder.path(), &["health", "--integrity", "--history", &name]);
+    let output = actcheck(
+        folder.path(),
+        &["health", "--integrity", "--history", &name],
+    );
     assert_eq!(output.status.code(), Some(1), "{}", stderr(&output));
-    assert!(stdout(&output).contains("journal") && stdout(&output).contains("k-3"), "{}", stdout(&output));
-    let output = actcheck(folder.path(), &["merge", "--salvage", &name, "--into", "saved"]);
-    assert!(output.status.code().is_some_and(|code| code < 2), "{}", stderr(&output));
-    assert_eq!(runs(&History::open_to_read(&folder.path().join("saved")).unwrap()), ["k-1", "k-2"]);
+    assert!(
+        stdout(&output).contains("journal") && stdout(&output).contains("k-3"),
+        "{}",
+        stdout(&output)
+    );
+    let output = actcheck(
+        folder.path(),
+        &["merge", "--salvage", &name, "--into", "saved"],
+    );
+    assert!(
+        output.status.code().is_some_and(|code| code < 2),
+        "{}",
+        stderr(&output)
+    );
+    assert_eq!(
+        runs(&History::open_to_read(&folder.path().join("saved")).unwrap()),
+        ["k-1", "k-2"]
+    );
 }
 
-/// A statement takes about 240 bytes in tables that are not compressed, and 500 in the store's own log.
+/// A statement takes about 240 bytes in tables that are not compressed, and 500 in the store's own
+/// log.
 #[test]
 fn a_campaign_ends_in_compressed_tables_with_the_same_statements() {
     let folder = tempfile::tempdir().unwrap();
@@ -105,15 +142,25 @@ fn a_campaign_ends_in_compressed_tables_with_the_same_statements() {
     (0..60).for_each(|index| history.commit(&sample_run("k", index)).unwrap());
     let before = statements(&History::open_to_read(&dir).unwrap());
     let journal = dir.join("journal").metadata().unwrap().len();
-    let end = CampaignEnd { ended: "2026-08-01T13:00:00Z".to_owned(), ..CampaignEnd::default() };
+    let end = CampaignEnd {
+        ended: "2026-08-01T13:00:00Z".to_owned(),
+        ..CampaignEnd::default()
+    };
     history.finish_campaign("k", &end).unwrap();
     drop(history);
     let after = statements(&History::open_to_read(&dir).unwrap());
     assert!(before.is_subset(&after) && !dir.join("journal").exists());
-    assert!((1..20).contains(&(after.len() - before.len())), "{}", after.len() - before.len());
+    assert!(
+        (1..20).contains(&(after.len() - before.len())),
+        "{}",
+        after.len() - before.len()
+    );
     let [tables, logs] = [".sst", ".log"].map(|ending| size_of(&dir.join("store"), ending));
     let count = after.len() as u64;
-    assert!(count > 5_000 && tables < 150 * count && logs == 0 && journal < 40 * count, "{count} {tables} {journal}");
+    assert!(
+        count > 5_000 && tables < 150 * count && logs == 0 && journal < 40 * count,
+        "{count} {tables} {journal}"
+    );
 }
 
 /// An earlier program does not know journals: it listed the other runs only.
@@ -132,7 +179,10 @@ fn programs_that_know_no_journal_refuse_a_history_with_one() {
 
 /// The lines of an answer, in any order: those of unsorted rows, with numbers for blank nodes.
 fn answer(history: &History, query: &str) -> Vec<String> {
-    match history.query(query).unwrap_or_else(|fault| panic!("{query}: {fault}")) {
+    match history
+        .query(query)
+        .unwrap_or_else(|fault| panic!("{query}: {fault}"))
+    {
         QueryAnswer::Boolean(value) => vec![value.to_string()],
         QueryAnswer::Table { rows, .. } => {
             let mut rows: Vec<String> = rows.iter().map(|row| format!("{row:?}")).collect();
@@ -172,7 +222,8 @@ const QUERIES: [&str; 25] = [
     "DESCRIBE run:k-2",
 ];
 
-/// A reader takes from the journal the statements that a question needs, and each answer is that of the whole history.
+/// A reader takes from the journal the statements that a question needs, and each answer is that of
+/// the whole history.
 #[test]
 fn answers_from_a_journal_are_those_after_the_end() {
     compare_with_end(&killed(3).1);
@@ -184,7 +235,9 @@ fn answers_from_tables_and_a_journal_are_those_after_the_end() {
     let (live, left) = (folder.path().join("live"), folder.path().join("left"));
     let with = |campaign, minute| {
         let history = History::open(&live).unwrap();
-        history.begin_campaign(&sample_campaign(campaign, minute)).unwrap();
+        history
+            .begin_campaign(&sample_campaign(campaign, minute))
+            .unwrap();
         (0..3).for_each(|index| history.commit(&sample_run(campaign, index)).unwrap());
         history
     };
@@ -205,7 +258,11 @@ fn compare_with_end(left: &Path) {
     for query in QUERIES {
         let expected = answer(&after, query);
         let alone = answer(&open()[0], query);
-        assert_eq!((&alone, &answer(&reader, query)), (&expected, &expected), "{query}");
+        assert_eq!(
+            (&alone, &answer(&reader, query)),
+            (&expected, &expected),
+            "{query}"
+        );
     }
     for run in ["k-1", "k-2", "k-3", "@last", "@last-failed"] {
         let [one, other] = open().map(|history| history.newest_run(run).unwrap());
@@ -216,7 +273,12 @@ fn compare_with_end(left: &Path) {
         assert_eq!(one.newest_run(run).unwrap(), other.newest_run(run).unwrap());
     }
     assert_eq!(statements(&one), statements(&other));
-    let [one, other] = open().map(|history| (history.campaigns().unwrap(), history.counted_runs().unwrap()));
+    let [one, other] = open().map(|history| {
+        (
+            history.campaigns().unwrap(),
+            history.counted_runs().unwrap(),
+        )
+    });
     assert_eq!(one, other);
     let [one, other] = open().map(|history| {
         let rows = history.runs(&RunFilter::default()).unwrap();
@@ -226,24 +288,47 @@ fn compare_with_end(left: &Path) {
     // The campaign has all runs, half of them, or few: each is read in another way.
     for campaign in [None, Some("k"), Some("none")] {
         let all = after.newest_outcomes(&RunFilter::default()).unwrap().rows;
-        let expected: Vec<_> = all.iter().filter(|row| campaign.is_none_or(|id| row.campaign == id)).collect();
+        let expected: Vec<_> = all
+            .iter()
+            .filter(|row| campaign.is_none_or(|id| row.campaign == id))
+            .collect();
         for status in [RunStatus::Completed, RunStatus::Broken] {
             let campaign = campaign.map(str::to_owned);
-            let filter = RunFilter { campaign, status: Some(status), ..RunFilter::default() };
+            let filter = RunFilter {
+                campaign,
+                status: Some(status),
+                ..RunFilter::default()
+            };
             let found = after.outcomes(&filter).unwrap();
-            let all_runs: Vec<_> = after.runs(&filter).unwrap().into_iter().map(|run| run.run).collect();
+            let all_runs: Vec<_> = after
+                .runs(&filter)
+                .unwrap()
+                .into_iter()
+                .map(|run| run.run)
+                .collect();
             assert!(found.iter().all(|row| all_runs.contains(&row.run)));
-            assert_eq!(found.len(), if status == RunStatus::Completed { expected.len() } else { 0 });
+            assert_eq!(
+                found.len(),
+                if status == RunStatus::Completed {
+                    expected.len()
+                } else {
+                    0
+                }
+            );
         }
     }
-    let [one, other] = open().map(|history| history.newest_outcomes(&RunFilter::default()).unwrap());
+    let [one, other] =
+        open().map(|history| history.newest_outcomes(&RunFilter::default()).unwrap());
     assert!(one.rows.len() > 5 && one == other);
     let [one, other] = open().map(|history| {
         let mut vitals = Vec::new();
-        history.each_vitals("k", |run| vitals.push(run.clone())).unwrap();
+        history
+            .each_vitals("k", |run| vitals.push(run.clone()))
+            .unwrap();
         vitals
     });
     assert!(one.len() == 3 && one == other);
-    let [one, other] = open().map(|history| (history.campaign("k").unwrap(), history.run_ids().unwrap()));
+    let [one, other] =
+        open().map(|history| (history.campaign("k").unwrap(), history.run_ids().unwrap()));
     assert_eq!(one, other);
 }

@@ -1,4 +1,5 @@
-//! Campaigns in shards side by side: the results are those of one campaign, whichever process is lost.
+//! Campaigns in shards side by side: the results are those of one campaign, whichever process is
+//! lost.
 
 use std::fs;
 use std::path::Path;
@@ -8,23 +9,52 @@ use std::time::{Duration, Instant};
 use crate::support::look::looking;
 use crate::support::{actcheck, edit, stderr, stdout};
 
-const LAUNCH: [&str; 8] = ["launch", "configs/look.toml", "--runs", "12", "--shards", "4", "--history", "parts"];
+const LAUNCH: [&str; 8] = [
+    "launch",
+    "configs/look.toml",
+    "--runs",
+    "12",
+    "--shards",
+    "4",
+    "--history",
+    "parts",
+];
 
 /// Columns of `actcheck list` without the ids: trace digests, scores and counts of outcomes.
 fn listed(folder: &Path, history: &str) -> Vec<String> {
     let output = actcheck(folder, &["list", "--history", history, "--format", "csv"]);
     assert!(output.status.success(), "{}", stderr(&output));
-    stdout(&output).lines().skip(1).map(|line| line.split_once(',').unwrap().1.to_owned()).collect()
+    stdout(&output)
+        .lines()
+        .skip(1)
+        .map(|line| line.split_once(',').unwrap().1.to_owned())
+        .collect()
 }
 
 /// The exit code of one whole campaign in `whole`.
 fn whole(folder: &Path) -> Option<i32> {
-    actcheck(folder, &["run", "configs/look.toml", "--runs", "12", "--history", "whole"]).status.code()
+    actcheck(
+        folder,
+        &[
+            "run",
+            "configs/look.toml",
+            "--runs",
+            "12",
+            "--history",
+            "whole",
+        ],
+    )
+    .status
+    .code()
 }
 
 fn start(folder: &Path, arguments: &[&str]) -> Child {
     let mut command = Command::new(env!("CARGO_BIN_EXE_actcheck"));
-    command.args(arguments).current_dir(folder).stdout(Stdio::null()).stderr(Stdio::null());
+    command
+        .args(arguments)
+        .current_dir(folder)
+        .stdout(Stdio::null())
+        .stderr(Stdio::null());
     command.spawn().unwrap()
 }
 
@@ -32,7 +62,10 @@ fn start(folder: &Path, arguments: &[&str]) -> Child {
 fn until(condition: impl Fn() -> bool) {
     let began = Instant::now();
     while !condition() {
-        assert!(began.elapsed() < Duration::from_secs(60), "nothing happened");
+        assert!(
+            began.elapsed() < Duration::from_secs(60),
+            "nothing happened"
+        );
         std::thread::sleep(Duration::from_millis(5));
     }
 }
@@ -52,7 +85,12 @@ fn a_launch_equals_one_campaign() {
     assert_eq!(listed(folder, "parts").len(), 12);
     assert!(!folder.join("parts.launch").exists());
     let again = actcheck(folder, &LAUNCH);
-    assert_eq!((again.status.code(), listed(folder, "parts").len()), (code, 12), "{}", stderr(&again));
+    assert_eq!(
+        (again.status.code(), listed(folder, "parts").len()),
+        (code, 12),
+        "{}",
+        stderr(&again)
+    );
 }
 
 /// The launch is killed at several moments; its shards end with it, and the same command continues.
@@ -104,15 +142,39 @@ fn wrong_launches_are_refused() {
     let refused = |arguments: &[&str], text: &str| {
         let output = actcheck(folder, arguments);
         assert_eq!(output.status.code(), Some(2), "{arguments:?}");
-        assert!(stderr(&output).contains(text), "{arguments:?}: {}", stderr(&output));
+        assert!(
+            stderr(&output).contains(text),
+            "{arguments:?}: {}",
+            stderr(&output)
+        );
     };
-    refused(&["launch", "configs/look.toml", "--shards", "0"], "0 is not in 1..");
+    refused(
+        &["launch", "configs/look.toml", "--shards", "0"],
+        "0 is not in 1..",
+    );
     refused(&["launch", "configs/look.toml", "--shards", "16"], "X072");
     refused(&["launch-task", "nowhere", "1"], "X073");
     fs::write(folder.join("taken"), "").unwrap();
-    refused(&["launch", "configs/look.toml", "--shards", "2", "--history", "taken/history"], "X074");
+    refused(
+        &[
+            "launch",
+            "configs/look.toml",
+            "--shards",
+            "2",
+            "--history",
+            "taken/history",
+        ],
+        "X074",
+    );
     let dry = actcheck(folder, &[&LAUNCH[..], &["--dry-run"]].concat());
-    assert_eq!(stdout(&dry).matches("actcheck launch-task parts.launch").count(), 4, "{}", stderr(&dry));
+    assert_eq!(
+        stdout(&dry)
+            .matches("actcheck launch-task parts.launch")
+            .count(),
+        4,
+        "{}",
+        stderr(&dry)
+    );
     assert!(!folder.join("parts.launch").exists());
 
     let mut child = start(folder, &LAUNCH);

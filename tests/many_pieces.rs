@@ -1,4 +1,5 @@
-//! Robots whose links have many convex pieces, as split meshes have: fewer contacts are prepared and solved for them.
+//! Robots whose links have many convex pieces, as split meshes have: fewer contacts are prepared
+//! and solved for them.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -12,7 +13,8 @@ use crate::physics::{block, body, call, object, on_table, scene};
 use crate::shortcuts::stretched;
 use crate::support::line::{env_of, nominal, outcomes, report};
 
-/// A shipped robot's URDF with each finger cut into five boxes, which have the same surface together.
+/// A shipped robot's URDF with each finger cut into five boxes, which have the same surface
+/// together.
 fn cut(urdf: &str) -> String {
     let finger = regex::Regex::new(
         "<collision><origin xyz=\"0 (-?0.006) [0-9.]+\" rpy=\"0 0 0\"/><geometry><box size=\"0.024 0.012 ([0-9.]+)\"/></geometry></collision>",
@@ -36,7 +38,10 @@ fn cut(urdf: &str) -> String {
 /// The robot with another URDF.
 fn changed(profile: &RobotProfile, change: impl Fn(&str) -> String) -> Arc<RobotProfile> {
     let urdf = Source::new("changed.urdf", change(&profile.urdf.text));
-    Arc::new(RobotProfile { urdf, ..profile.clone() })
+    Arc::new(RobotProfile {
+        urdf,
+        ..profile.clone()
+    })
 }
 
 /// The scene with the robot's fingers cut.
@@ -45,7 +50,8 @@ fn with_pieces(mut scene: Scene) -> Scene {
     scene
 }
 
-/// Contacts that can't close in a step are dropped, and others are prepared later: a grasp holds as without that.
+/// Contacts that can't close in a step are dropped, and others are prepared later: a grasp holds as
+/// without that.
 #[test]
 fn fingers_of_many_pieces_hold_like_those_of_one() {
     let table = || on_table(block([0.06, 0.06, 0.15]), 0.3, 0.5);
@@ -53,7 +59,12 @@ fn fingers_of_many_pieces_hold_like_those_of_one() {
         let mut world = build(&scene).expect("the scene is right");
         assert!(world.settle().settled);
         let budget = Budget { action_secs: 60.0 };
-        let trace = perform(&[call("Pick")], &mut world, &mut Choices::random(1, 0), &budget);
+        let trace = perform(
+            &[call("Pick")],
+            &mut world,
+            &mut Choices::random(1, 0),
+            &budget,
+        );
         let report = trace.actions[0].report.as_ref().expect("the skill reports");
         assert!(report.succeeded, "{}", report.message);
         let mut hold = world.hold();
@@ -62,11 +73,25 @@ fn fingers_of_many_pieces_hold_like_those_of_one() {
         let before = in_hand(&world);
         (0..600).for_each(|_| world.step(&hold));
         let slip = (in_hand(&world).translation.vector - before.translation.vector).norm();
-        (body(&world, "thing_1").pose.position[2], slip, world.quality().deepest_penetration_m)
+        (
+            body(&world, "thing_1").pose.position[2],
+            slip,
+            world.quality().deepest_penetration_m,
+        )
     });
     assert!((whole.0 - pieces.0).abs() < 2e-3, "{whole:?} {pieces:?}");
-    assert!(pieces.1 < whole.1 + 1e-4, "slipped by {} m instead of {} m", pieces.1, whole.1);
-    assert!(pieces.2 < whole.2 + 3e-4, "penetrates by {} m instead of {} m", pieces.2, whole.2);
+    assert!(
+        pieces.1 < whole.1 + 1e-4,
+        "slipped by {} m instead of {} m",
+        pieces.1,
+        whole.1
+    );
+    assert!(
+        pieces.2 < whole.2 + 3e-4,
+        "penetrates by {} m instead of {} m",
+        pieces.2,
+        whole.2
+    );
 }
 
 /// Returns the pose of the thing in the frame of the hand.
@@ -75,8 +100,8 @@ fn in_hand(world: &World) -> nalgebra::Isometry3<f64> {
     hand.inverse() * body(world, "thing_1").pose.to_isometry()
 }
 
-/// A bar from 2 m moves farther in a step than the distance within which contacts with slow objects are prepared: it enters the
-/// robot no deeper all the same.
+/// A bar from 2 m moves farther in a step than the distance within which contacts with slow objects
+/// are prepared: it enters the robot no deeper all the same.
 #[test]
 fn a_fast_object_does_not_enter_fingers_of_many_pieces_deeper() {
     let falling = |pieces: bool, height: f64| {
@@ -85,66 +110,111 @@ fn a_fast_object_does_not_enter_fingers_of_many_pieces_deeper() {
         let world = build(&scene).expect("the scene is right");
         let [x, y, z] = world.snapshot().robot.gripper.position;
         let pose = Pose::upright([x + 0.02, y, z + height], 0.0);
-        scene.objects = vec![object("thing_1", block([0.04, 0.4, 0.04]), Role::Target, pose, 0.5, 0.5)];
-        let mut world = build(&if pieces { with_pieces(scene) } else { scene }).expect("the scene is right");
+        scene.objects = vec![object(
+            "thing_1",
+            block([0.04, 0.4, 0.04]),
+            Role::Target,
+            pose,
+            0.5,
+            0.5,
+        )];
+        let mut world =
+            build(&if pieces { with_pieces(scene) } else { scene }).expect("the scene is right");
         let hold = world.hold();
         world.begin_record();
         (0..90).for_each(|_| world.step(&hold));
         let depth_m = world.quality().deepest_penetration_m;
         let contacts = world.end_record().contacts;
-        let is_of_robot = |pair: &[String; 2]| pair[0].starts_with("robot/") && pair[1] == "thing_1";
-        assert!(contacts.iter().any(|contact| is_of_robot(&contact.pair)), "{contacts:?}");
+        let is_of_robot =
+            |pair: &[String; 2]| pair[0].starts_with("robot/") && pair[1] == "thing_1";
+        assert!(
+            contacts.iter().any(|contact| is_of_robot(&contact.pair)),
+            "{contacts:?}"
+        );
         depth_m
     };
-    // How deep a single fall ends depends on the last bit, because the bar tumbles: the median of several counts.
-    for heights in [0.3, 0.8, 1.3, 1.8].map(|lowest| [0.0, 0.1, 0.2, 0.3, 0.4].map(|more| lowest + more)) {
+    // How deep a single fall ends depends on the last bit, because the bar tumbles: the median of
+    // several counts.
+    for heights in
+        [0.3, 0.8, 1.3, 1.8].map(|lowest| [0.0, 0.1, 0.2, 0.3, 0.4].map(|more| lowest + more))
+    {
         let [whole, pieces] = [false, true].map(|pieces| {
             let mut depths = heights.map(|height| falling(pieces, height));
             depths.sort_by(f64::total_cmp);
             depths[2]
         });
-        assert!(pieces < whole + 5e-4, "from {heights:?} m, it enters by {pieces} m instead of {whole} m");
+        assert!(
+            pieces < whole + 5e-4,
+            "from {heights:?} m, it enters by {pieces} m instead of {whole} m"
+        );
     }
 }
 
-/// The engine does not look for contacts of links that can touch nothing. A bar that falls onto a stretched arm enters it no deeper
-/// all the same.
+/// The engine does not look for contacts of links that can touch nothing. A bar that falls onto a
+/// stretched arm enters it no deeper all the same.
 #[test]
 fn a_falling_object_does_not_enter_an_arm_of_many_pieces_deeper() {
     let falling = |pieces: bool, height: f64| {
         let bar = Pose::upright([2.0, 2.0, 0.021], 0.0);
-        let mut scene = scene(vec![object("thing_1", block([0.04, 0.4, 0.04]), Role::Target, bar, 0.5, 0.5)]);
+        let mut scene = scene(vec![object(
+            "thing_1",
+            block([0.04, 0.4, 0.04]),
+            Role::Target,
+            bar,
+            0.5,
+            0.5,
+        )]);
         scene.robot.base = [0.0, 0.0, 0.0];
-        let mut world = build(&if pieces { with_pieces(scene) } else { scene }).expect("the scene is right");
+        let mut world =
+            build(&if pieces { with_pieces(scene) } else { scene }).expect("the scene is right");
         let command = stretched(&world);
         (0..300).for_each(|_| world.step(&command));
         assert!(world.moved_freely());
         let joints = world.kinematics().joints();
-        let wrist = joints.iter().position(|joint| joint.name == "wrist_flex_joint").expect("it has a wrist");
+        let wrist = joints
+            .iter()
+            .position(|joint| joint.name == "wrist_flex_joint")
+            .expect("it has a wrist");
         let links = world.kinematics().links(&world.observe().positions);
-        let [elbow, wrist] = [joints[wrist].parent, wrist + 1].map(|link| links[link].translation.vector);
+        let [elbow, wrist] =
+            [joints[wrist].parent, wrist + 1].map(|link| links[link].translation.vector);
         let above = (elbow + wrist) / 2.0 + nalgebra::Vector3::z() * height;
         assert!(world.poison("thing_1", Poison::Teleport(above.into())));
         world.begin_record();
         (0..90).for_each(|_| world.step(&command));
         let depth_m = world.quality().deepest_penetration_m;
         let contacts = world.end_record().contacts;
-        let is_of_arm = |pair: &[String; 2]| pair[0].starts_with("robot/arm_") && pair[1] == "thing_1";
-        assert!(contacts.iter().any(|contact| is_of_arm(&contact.pair)), "{contacts:?}");
+        let is_of_arm =
+            |pair: &[String; 2]| pair[0].starts_with("robot/arm_") && pair[1] == "thing_1";
+        assert!(
+            contacts.iter().any(|contact| is_of_arm(&contact.pair)),
+            "{contacts:?}"
+        );
         depth_m
     };
     for height in [0.2, 1.0, 2.0] {
         let [whole, pieces] = [false, true].map(|pieces| falling(pieces, height));
-        assert!(pieces < whole + 5e-4, "from {height} m, it enters by {pieces} m instead of {whole} m");
+        assert!(
+            pieces < whole + 5e-4,
+            "from {height} m, it enters by {pieces} m instead of {whole} m"
+        );
     }
 }
 
-/// Shapes are swept beside such fingers only where something outruns the contacts that are prepared.
+/// Shapes are swept beside such fingers only where something outruns the contacts that are
+/// prepared.
 #[test]
 fn only_fast_things_are_swept_beside_fingers_of_many_pieces() {
     let swept = |height: f64, ticks: u32| {
         let pose = Pose::upright([2.0, 0.0, height], 0.0);
-        let mut scene = scene(vec![object("plate_1", block([0.2, 0.2, 0.002]), Role::Other, pose, 0.2, 0.5)]);
+        let mut scene = scene(vec![object(
+            "plate_1",
+            block([0.2, 0.2, 0.002]),
+            Role::Other,
+            pose,
+            0.2,
+            0.5,
+        )]);
         scene.robot.base = [0.0, 0.0, 0.0];
         let mut world = build(&with_pieces(scene)).expect("the scene is right");
         let hold = world.hold();
@@ -168,23 +238,25 @@ fn only_fast_things_are_swept_beside_fingers_of_many_pieces() {
 /// The shipped arm with its root on the table.
 fn arm_on_a_table() -> Scene {
     let path = Path::new("models/robots/fixed_arm.toml");
-    let profile = actcheck::config::robot::read(&Files::Shipped, path).expect("the shipped robot is right");
+    let profile =
+        actcheck::config::robot::read(&Files::Shipped, path).expect("the shipped robot is right");
     let mut scene = on_table(block([0.06, 0.06, 0.15]), 0.3, 0.5);
     scene.robot.profile = Arc::new(profile);
     (scene.robot.base, scene.robot.root_height_m) = ([0.3, 0.0, 0.0], 0.69);
     scene
 }
 
-/// A bar on the wrist is 0.9 mm beside the fingers: at rest, they are as good as apart, but the bar stops them when they turn.
+/// A bar on the wrist is 0.9 mm beside the fingers: at rest, they are as good as apart, but the bar
+/// stops them when they turn.
 #[test]
 fn links_that_are_hardly_apart_leave_only_their_motion_to_the_engine() {
     let mut scene = arm_on_a_table();
     let mut profile = (*scene.robot.profile).clone();
     let bar = "<collision><origin xyz=\"0.0179 0 0.2\"/><geometry><box size=\"0.01 0.3 0.01\"/></geometry></collision>";
-    let text = profile
-        .urdf
-        .text
-        .replace("<link name=\"wrist_pitch_link\">", &format!("<link name=\"wrist_pitch_link\">{bar}"));
+    let text = profile.urdf.text.replace(
+        "<link name=\"wrist_pitch_link\">",
+        &format!("<link name=\"wrist_pitch_link\">{bar}"),
+    );
     assert!(text.contains(bar));
     profile.urdf = Source::new("bar.urdf", text);
     scene.robot.profile = Arc::new(profile);
@@ -194,16 +266,25 @@ fn links_that_are_hardly_apart_leave_only_their_motion_to_the_engine() {
     (0..30).for_each(|_| world.step(&command));
     let [free, .., whole] = world.ticks_by_reach();
     assert!(free > 0 && whole == 0, "{:?}", world.ticks_by_reach());
-    let roll = world.layout().arm.last().copied().expect("the arm has joints");
+    let roll = world
+        .layout()
+        .arm
+        .last()
+        .copied()
+        .expect("the arm has joints");
     let before = world.observe().positions[roll];
     command.positions[roll] += 0.5;
     (0..60).for_each(|_| world.step(&command));
     let turned = world.observe().positions[roll] - before;
-    assert!(turned < 0.1 && world.ticks_by_reach()[3] > 0, "turned by {turned} rad: {:?}", world.ticks_by_reach());
+    assert!(
+        turned < 0.1 && world.ticks_by_reach()[3] > 0,
+        "turned by {turned} rad: {:?}",
+        world.ticks_by_reach()
+    );
 }
 
-/// A fixed robot on a table touches it with its root all the time, and an object beside the root is as near. Its arm moves
-/// without the engine all the same.
+/// A fixed robot on a table touches it with its root all the time, and an object beside the root is
+/// as near. Its arm moves without the engine all the same.
 #[test]
 fn the_root_of_a_fixed_robot_may_touch_things() {
     for beside_m in [0.2, 0.001] {
@@ -217,25 +298,41 @@ fn the_root_of_a_fixed_robot_may_touch_things() {
         command.positions[pan] += 0.2;
         (0..60).for_each(|_| world.step(&command));
         let [free, .., whole] = world.ticks_by_reach();
-        assert!(free > 0 && whole == 0, "{beside_m} m: {:?}", world.ticks_by_reach());
+        assert!(
+            free > 0 && whole == 0,
+            "{beside_m} m: {:?}",
+            world.ticks_by_reach()
+        );
         assert!((world.observe().positions[pan] - command.positions[pan]).abs() < 0.01);
     }
 }
 
-/// A shipped robot's URDF with a twentieth of the masses of its arm, and a tenth of the efforts of the motors there. The arm goes from
-/// this place in the file to the fingers.
+/// A shipped robot's URDF with a twentieth of the masses of its arm, and a tenth of the efforts of
+/// the motors there. The arm goes from this place in the file to the fingers.
 fn light(urdf: &str, first: &str) -> String {
-    let (arm, end) = (urdf.find(first), urdf.find("<joint name=\"finger_left_joint\""));
-    let (arm, end) = (arm.expect("the arm begins there"), end.expect("the arm ends there"));
-    let attributes = regex::Regex::new("(mass value|ixx|iyy|izz|effort)=\"([^\"]+)\"").expect("a sound pattern");
+    let (arm, end) = (
+        urdf.find(first),
+        urdf.find("<joint name=\"finger_left_joint\""),
+    );
+    let (arm, end) = (
+        arm.expect("the arm begins there"),
+        end.expect("the arm ends there"),
+    );
+    let attributes =
+        regex::Regex::new("(mass value|ixx|iyy|izz|effort)=\"([^\"]+)\"").expect("a sound pattern");
     let scaled = attributes.replace_all(&urdf[arm..end], |found: &regex::Captures| {
         let factor = if &found[1] == "effort" { 0.1 } else { 0.05 };
-        format!("{}=\"{}\"", &found[1], factor * found[2].parse::<f64>().expect("a number"))
+        format!(
+            "{}=\"{}\"",
+            &found[1],
+            factor * found[2].parse::<f64>().expect("a number")
+        )
     });
     format!("{}{scaled}{}", &urdf[..arm], &urdf[end..])
 }
 
-/// The fixed arm beside a table with a thing of 0.8 kg. The arm is so light that it sinks under the thing.
+/// The fixed arm beside a table with a thing of 0.8 kg. The arm is so light that it sinks under the
+/// thing.
 fn light_arm() -> Scene {
     let mut scene = arm_on_a_table();
     let thing = &mut scene.objects[1];
@@ -246,42 +343,71 @@ fn light_arm() -> Scene {
     scene
 }
 
-/// The engine never moves the hand of a light arm alone. The arm gives way as it does with four times as many steps, with fingers of
-/// one piece and of five.
+/// The engine never moves the hand of a light arm alone. The arm gives way as it does with four
+/// times as many steps, with fingers of one piece and of five.
 #[test]
 fn a_light_arm_sinks_under_the_object_in_its_hand() {
     for fingers in [|scene| scene, with_pieces] {
-        let [exact, usual] = [(Shortcuts::NONE, 960), (Shortcuts::ALL, 240)].map(|(shortcuts, steps_per_second)| {
-            let mut scene = fingers(light_arm());
-            scene.physics.steps_per_second = steps_per_second;
-            let mut world = build(&scene).expect("the scene is right");
-            world.take_shortcuts(shortcuts);
-            assert!(world.settle().settled);
-            let budget = Budget { action_secs: 60.0 };
-            let trace = perform(&[call("Pick")], &mut world, &mut Choices::random(1, 0), &budget);
-            let report = trace.actions[0].report.as_ref().expect("the skill reports");
-            assert!(report.succeeded, "{}", report.message);
-            let mut hold = world.hold();
-            hold.gripper_opening_m = 0.0;
-            (0..120).for_each(|_| world.step(&hold));
-            assert!(!world.moved_hand_alone());
-            let hand = world.snapshot().robot.gripper.position[2];
-            (hand, in_hand(&world).translation.z, world.quality().deepest_penetration_m)
-        });
-        assert!((exact.0 - usual.0).abs() < 1e-3, "the hands are at {} m and {} m", exact.0, usual.0);
-        assert!((exact.1 - usual.1).abs() < 5e-3, "the things are at {} m and {} m in the hand", exact.1, usual.1);
-        assert!(usual.2 < exact.2 + 3e-4, "penetrates by {} m instead of {} m", usual.2, exact.2);
+        let [exact, usual] =
+            [(Shortcuts::NONE, 960), (Shortcuts::ALL, 240)].map(|(shortcuts, steps_per_second)| {
+                let mut scene = fingers(light_arm());
+                scene.physics.steps_per_second = steps_per_second;
+                let mut world = build(&scene).expect("the scene is right");
+                world.take_shortcuts(shortcuts);
+                assert!(world.settle().settled);
+                let budget = Budget { action_secs: 60.0 };
+                let trace = perform(
+                    &[call("Pick")],
+                    &mut world,
+                    &mut Choices::random(1, 0),
+                    &budget,
+                );
+                let report = trace.actions[0].report.as_ref().expect("the skill reports");
+                assert!(report.succeeded, "{}", report.message);
+                let mut hold = world.hold();
+                hold.gripper_opening_m = 0.0;
+                (0..120).for_each(|_| world.step(&hold));
+                assert!(!world.moved_hand_alone());
+                let hand = world.snapshot().robot.gripper.position[2];
+                (
+                    hand,
+                    in_hand(&world).translation.z,
+                    world.quality().deepest_penetration_m,
+                )
+            });
+        assert!(
+            (exact.0 - usual.0).abs() < 1e-3,
+            "the hands are at {} m and {} m",
+            exact.0,
+            usual.0
+        );
+        assert!(
+            (exact.1 - usual.1).abs() < 5e-3,
+            "the things are at {} m and {} m in the hand",
+            exact.1,
+            usual.1
+        );
+        assert!(
+            usual.2 < exact.2 + 3e-4,
+            "penetrates by {} m instead of {} m",
+            usual.2,
+            exact.2
+        );
     }
 }
 
-/// A mobile robot carries a heavy can through the room and sets it down: with fingers of many pieces, with a light arm, and with both.
+/// A mobile robot carries a heavy can through the room and sets it down: with fingers of many
+/// pieces, with a light arm, and with both.
 #[test]
 fn mobile_robots_place_a_heavy_can() {
     let profile = include_str!("../models/robots/mobile_manipulator.toml");
     let urdf = include_str!("../models/robots/mobile_manipulator.urdf");
     let light = |urdf: &str| light(urdf, "<joint name=\"arm_lift_joint\"");
-    let kinds =
-        [("many pieces", cut(urdf)), ("a light arm", light(urdf)), ("many pieces on a light arm", light(&cut(urdf)))];
+    let kinds = [
+        ("many pieces", cut(urdf)),
+        ("a light arm", light(urdf)),
+        ("many pieces on a light arm", light(&cut(urdf))),
+    ];
     for (kind, urdf) in kinds {
         let folder = tempfile::tempdir().expect("there is room");
         let at = folder.path().join("robot.toml");
@@ -296,7 +422,11 @@ fn mobile_robots_place_a_heavy_can() {
         for step in [0, 1] {
             let mut failed = outcomes(&run, step);
             failed.retain(|_, outcome| *outcome != Outcome::Passed);
-            assert!(failed.is_empty(), "{kind}: {}: {failed:?}", report(&run, step).message);
+            assert!(
+                failed.is_empty(),
+                "{kind}: {}: {failed:?}",
+                report(&run, step).message
+            );
         }
     }
 }

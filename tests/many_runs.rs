@@ -1,11 +1,13 @@
-//! Histories of many runs: merged shards keep their files, lists are read a part at a time, and reports have a sample.
+//! Histories of many runs: merged shards keep their files, lists are read a part at a time, and
+//! reports have a sample.
 
 use std::collections::BTreeSet;
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
 use actcheck::analysis::{
-    Mirror, OutcomeTable, PatternOptions, RATE_COLUMNS, TableFilter, finding_columns, judged, property_findings,
+    Mirror, OutcomeTable, PatternOptions, RATE_COLUMNS, TableFilter, finding_columns, judged,
+    property_findings,
 };
 use actcheck::base::Shard;
 use actcheck::history::merge::{MergeOptions, carry_out, plan};
@@ -26,7 +28,10 @@ const RUNS: u64 = 600;
 const WHOLE: u64 = 50;
 
 fn end() -> CampaignEnd {
-    CampaignEnd { ended: "2026-08-01T13:00:00Z".to_owned(), ..CampaignEnd::default() }
+    CampaignEnd {
+        ended: "2026-08-01T13:00:00Z".to_owned(),
+        ..CampaignEnd::default()
+    }
 }
 
 /// A history with the runs of a shard, or of all.
@@ -35,11 +40,19 @@ fn make(dir: &Path, shard: Option<Shard>) -> History {
     let mut campaign = sample_campaign("k", 0);
     (campaign.planned_runs, campaign.shards) = (RUNS, shard.into_iter().collect());
     history.begin_campaign(&campaign).unwrap();
-    let own: Vec<u64> = (0..RUNS).filter(|index| shard.is_none_or(|shard| shard.has(*index))).collect();
-    let (whole, outlines): (Vec<u64>, Vec<u64>) = own.into_iter().partition(|index| index % WHOLE == 7);
-    whole.into_iter().for_each(|index| history.commit(&sample_run("k", index)).unwrap());
+    let own: Vec<u64> = (0..RUNS)
+        .filter(|index| shard.is_none_or(|shard| shard.has(*index)))
+        .collect();
+    let (whole, outlines): (Vec<u64>, Vec<u64>) =
+        own.into_iter().partition(|index| index % WHOLE == 7);
+    whole
+        .into_iter()
+        .for_each(|index| history.commit(&sample_run("k", index)).unwrap());
     for indices in outlines.chunks(128) {
-        let runs: Vec<RunRecord> = indices.iter().map(|index| sample_run("k", *index)).collect();
+        let runs: Vec<RunRecord> = indices
+            .iter()
+            .map(|index| sample_run("k", *index))
+            .collect();
         history.commit_outlines("k", &runs).unwrap();
     }
     history.finish_campaign("k", &end()).unwrap();
@@ -47,7 +60,9 @@ fn make(dir: &Path, shard: Option<Shard>) -> History {
 }
 
 fn names(folder: &Path, ending: &str) -> BTreeSet<String> {
-    let entries = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap());
+    let entries = std::fs::read_dir(folder)
+        .unwrap()
+        .map(|entry| entry.unwrap().file_name().into_string().unwrap());
     entries.filter(|name| name.ends_with(ending)).collect()
 }
 
@@ -62,26 +77,46 @@ fn files_of_shards_become_files_of_the_merged_history() {
         Mirror::update(&shard).unwrap();
         files.extend(names(&dir.join("outlines"), ".outlines"));
     }
-    let open = |number: u64| History::open_to_read(&folder.path().join(number.to_string())).unwrap();
+    let open =
+        |number: u64| History::open_to_read(&folder.path().join(number.to_string())).unwrap();
     let sources: Vec<History> = (1..=SHARDS).map(open).collect();
     let into = History::open(&folder.path().join("all")).unwrap();
     let planned = plan(&sources, Some(&into), &MergeOptions::default()).unwrap();
     let merged = carry_out(&planned, &sources, &into, &AtomicBool::new(false), || ()).unwrap();
     assert_eq!((merged.runs, merged.interrupted), (RUNS, false));
-    assert_eq!(names(&folder.path().join("all/outlines"), ".outlines"), files);
-    assert_eq!(Mirror::adopt(&planned, &sources, &into).unwrap() as u64, SHARDS);
+    assert_eq!(
+        names(&folder.path().join("all/outlines"), ".outlines"),
+        files
+    );
+    assert_eq!(
+        Mirror::adopt(&planned, &sources, &into).unwrap() as u64,
+        SHARDS
+    );
     let (mirror, change) = Mirror::update(&into).unwrap();
-    assert_eq!((change.kept as u64, change.added, change.damaged), (RUNS, 0, 0));
-    assert_eq!(mirror.rows(&TableFilter::default()), into.outcomes(&RunFilter::default()).unwrap().len());
+    assert_eq!(
+        (change.kept as u64, change.added, change.damaged),
+        (RUNS, 0, 0)
+    );
+    assert_eq!(
+        mirror.rows(&TableFilter::default()),
+        into.outcomes(&RunFilter::default()).unwrap().len()
+    );
 
     let all = RunFilter::default();
     let [runs, wanted] = [&into, &alone].map(|history| history.runs(&all).unwrap());
     assert_eq!(runs, wanted);
     assert_eq!(into.outcomes(&all).unwrap(), alone.outcomes(&all).unwrap());
-    assert_eq!(into.newest_outcomes(&all).unwrap(), alone.newest_outcomes(&all).unwrap());
+    assert_eq!(
+        into.newest_outcomes(&all).unwrap(),
+        alone.newest_outcomes(&all).unwrap()
+    );
     assert_eq!(into.scenes(&runs).unwrap(), alone.scenes(&runs).unwrap());
     for run in ["k-1", "k-2", "k-8", "k-599", "@last"] {
-        assert_eq!(into.newest_run(run).unwrap(), alone.newest_run(run).unwrap(), "{run}");
+        assert_eq!(
+            into.newest_run(run).unwrap(),
+            alone.newest_run(run).unwrap(),
+            "{run}"
+        );
     }
     let mut ids: Vec<String> = runs.iter().map(|run| run.run.clone()).collect();
     into.sort_as_stored("k", &mut ids).unwrap();
@@ -91,7 +126,12 @@ fn files_of_shards_become_files_of_the_merged_history() {
     // Once more: nothing is added, and nothing is lost.
     drop(mirror);
     let again = plan(&sources, Some(&into), &MergeOptions::default()).unwrap();
-    assert_eq!(carry_out(&again, &sources, &into, &AtomicBool::new(false), || ()).unwrap().runs, 0);
+    assert_eq!(
+        carry_out(&again, &sources, &into, &AtomicBool::new(false), || ())
+            .unwrap()
+            .runs,
+        0
+    );
     assert_eq!(into.runs(&all).unwrap(), wanted);
 }
 
@@ -100,7 +140,9 @@ fn a_damaged_file_of_a_shard_is_not_copied() {
     let folder = tempfile::tempdir().unwrap();
     let dir = folder.path().join("1");
     drop(make(&dir, Shard::new(1, SHARDS)));
-    let file = dir.join("outlines").join(names(&dir.join("outlines"), ".outlines").first().unwrap());
+    let file = dir
+        .join("outlines")
+        .join(names(&dir.join("outlines"), ".outlines").first().unwrap());
     let mut bytes = std::fs::read(&file).unwrap();
     let last = bytes.len() - 1;
     bytes[last] ^= 1;
@@ -110,7 +152,13 @@ fn a_damaged_file_of_a_shard_is_not_copied() {
     let planned = plan(&sources, Some(&into), &MergeOptions::default()).unwrap();
     let faults = carry_out(&planned, &sources, &into, &AtomicBool::new(false), || ()).unwrap_err();
     assert_eq!(faults.iter().next().unwrap().code, "H007");
-    assert!(!folder.path().join("all/outlines").join(file.file_name().unwrap()).exists());
+    assert!(
+        !folder
+            .path()
+            .join("all/outlines")
+            .join(file.file_name().unwrap())
+            .exists()
+    );
 }
 
 #[test]
@@ -121,25 +169,49 @@ fn lists_of_many_runs_are_printed_in_parts() {
     history.begin_campaign(&sample_campaign("k", 0)).unwrap();
     let indices: Vec<u64> = (0..MANY).collect();
     for indices in indices.chunks(128) {
-        let runs: Vec<RunRecord> = indices.iter().map(|index| sample_run("k", *index)).collect();
+        let runs: Vec<RunRecord> = indices
+            .iter()
+            .map(|index| sample_run("k", *index))
+            .collect();
         history.commit_outlines("k", &runs).unwrap();
     }
     history.finish_campaign("k", &end()).unwrap();
     drop(history);
     let printed = |format: &str| {
-        let output = actcheck(folder.path(), &["list", "--history", "h", "--format", format]);
+        let output = actcheck(
+            folder.path(),
+            &["list", "--history", "h", "--format", format],
+        );
         assert!(output.status.success(), "{}", stderr(&output));
         stdout(&output)
     };
     let wanted: Vec<String> = (1..=MANY).map(|number| format!("k-{number}")).collect();
     let csv = printed("csv");
-    assert_eq!(csv.lines().skip(1).map(|line| line.split_once(',').unwrap().0).collect::<Vec<_>>(), wanted);
+    assert_eq!(
+        csv.lines()
+            .skip(1)
+            .map(|line| line.split_once(',').unwrap().0)
+            .collect::<Vec<_>>(),
+        wanted
+    );
     let json: Value = serde_json::from_str(&printed("json")).unwrap();
-    let ids: Vec<&str> = json.as_array().unwrap().iter().map(|run| run["run"].as_str().unwrap()).collect();
+    let ids: Vec<&str> = json
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|run| run["run"].as_str().unwrap())
+        .collect();
     assert_eq!(ids, wanted);
     let text = printed("text");
-    let words = text.lines().filter_map(|line| line.split_whitespace().next());
-    assert_eq!(words.filter(|word| word.starts_with("k-")).collect::<Vec<_>>(), wanted);
+    let words = text
+        .lines()
+        .filter_map(|line| line.split_whitespace().next());
+    assert_eq!(
+        words
+            .filter(|word| word.starts_with("k-"))
+            .collect::<Vec<_>>(),
+        wanted
+    );
 }
 
 /// A mirror of ten files.
@@ -165,7 +237,10 @@ fn a_sample_has_files_at_equal_distances_and_rates_are_of_all_runs() {
     let all = OutcomeTable::read(&mirror, &filter, &finding_columns()).unwrap();
     let rates = OutcomeTable::read(&mirror, &filter, &RATE_COLUMNS).unwrap();
     let sample = OutcomeTable::read_sample(&mirror, &filter, &finding_columns(), rows / 5).unwrap();
-    assert_eq!((all.len(), rates.len(), sample.len()), (rows, rows, rows / 5));
+    assert_eq!(
+        (all.len(), rates.len(), sample.len()),
+        (rows, rows, rows / 5)
+    );
     let indices: BTreeSet<u64> = sample
         .text("run")
         .texts
@@ -179,16 +254,23 @@ fn a_sample_has_files_at_equal_distances_and_rates_are_of_all_runs() {
     let options = PatternOptions::default();
     let (of_all, of_sample) = (judged(&rates), judged(&sample));
     let exact = property_findings(&all, &judged(&all)[0], &Default::default(), &options);
-    let found =
-        property_findings(&sample, &of_sample[0], &Default::default(), &options).with_rates_of(&rates, &of_all[0]);
+    let found = property_findings(&sample, &of_sample[0], &Default::default(), &options)
+        .with_rates_of(&rates, &of_all[0]);
     assert_eq!((found.counts, found.failing), (exact.counts, exact.failing));
-    assert_eq!((&found.margins, found.twins, found.repeated), (&exact.margins, exact.twins, exact.repeated));
+    assert_eq!(
+        (&found.margins, found.twins, found.repeated),
+        (&exact.margins, exact.twins, exact.repeated)
+    );
     assert!(found.patterns.runs < exact.patterns.runs);
 }
 
 /// A text without the spaces between its words and digits.
 fn digits(text: &Value) -> String {
-    text.as_str().unwrap().chars().filter(|letter| !letter.is_whitespace()).collect()
+    text.as_str()
+        .unwrap()
+        .chars()
+        .filter(|letter| !letter.is_whitespace())
+        .collect()
 }
 
 /// The page of a sample counts and filters all runs, and shows the parameters of the sampled ones.
@@ -198,12 +280,19 @@ fn a_report_with_a_sample_filters_all_runs() {
     let mirror = mirror(folder.path());
     let filter = TableFilter::default();
     let names: Vec<&str> = finding_columns().into_iter().chain(HTML_COLUMNS).collect();
-    let rates: Vec<&str> = RATE_COLUMNS.into_iter().chain(["index", "repetition", "test", "score"]).collect();
+    let rates: Vec<&str> = RATE_COLUMNS
+        .into_iter()
+        .chain(["index", "repetition", "test", "score"])
+        .collect();
     let all = OutcomeTable::read(&mirror, &filter, &rates).unwrap();
     let sample = OutcomeTable::read_sample(&mirror, &filter, &names, all.len() / 10).unwrap();
     let findings = paged::findings(&sample, "h");
     let modes = paged::findings(&all, "h").modes;
-    let findings = actcheck::report::FindingsSummary { modes, sampled_runs: Some(2_000), ..findings };
+    let findings = actcheck::report::FindingsSummary {
+        modes,
+        sampled_runs: Some(2_000),
+        ..findings
+    };
     let page = html(&HtmlReport {
         version: "0.1.0",
         made: "2026-01-01T00:00:00Z",
@@ -220,7 +309,10 @@ fn a_report_with_a_sample_filters_all_runs() {
     browser.size(1280, 860);
     browser.open(&file, "/");
     let lead = browser.value("document.querySelector('main').textContent");
-    assert!(digits(&lead).contains("20000runs") && digits(&lead).contains("ofasampleof2000runs"), "{lead}");
+    assert!(
+        digits(&lead).contains("20000runs") && digits(&lead).contains("ofasampleof2000runs"),
+        "{lead}"
+    );
     browser.open(&file, "/runs");
     let told = "document.querySelector('.told').textContent";
     assert_eq!(digits(&browser.value(told)), "20000of20000runs");
@@ -228,7 +320,11 @@ fn a_report_with_a_sample_filters_all_runs() {
     assert_eq!(digits(&browser.value(told)), "1of20000runs");
     browser.open(&file, "/runs?outcome=failed");
     let failed = digits(&browser.value(told));
-    let failures = judged(&all).iter().map(|of| of.counts.failed).max().unwrap_or_default();
+    let failures = judged(&all)
+        .iter()
+        .map(|of| of.counts.failed)
+        .max()
+        .unwrap_or_default();
     let shown: u64 = failed.split("of").next().unwrap().parse().unwrap();
     assert!(shown >= failures && shown < 20_000, "{failed}");
     // The last row can be reached.
@@ -237,10 +333,19 @@ fn a_report_with_a_sample_filters_all_runs() {
     browser.until("document.querySelector('.row.active .id a')?.textContent === 'k-20000'");
     // A run of the sample has its parameters; another has its outcomes.
     browser.open(&file, "/run/k-20000");
-    assert_ne!(browser.value("document.querySelectorAll('.parameters div').length"), 0);
+    assert_ne!(
+        browser.value("document.querySelectorAll('.parameters div').length"),
+        0
+    );
     browser.open(&file, "/run/k-1");
-    assert_eq!(browser.value("document.querySelectorAll('.parameters div').length"), 0);
-    assert_ne!(browser.value("document.querySelectorAll('.outcomes li').length"), 0);
+    assert_eq!(
+        browser.value("document.querySelectorAll('.parameters div').length"),
+        0
+    );
+    assert_ne!(
+        browser.value("document.querySelectorAll('.outcomes li').length"),
+        0
+    );
     for view in ["/properties", "/modes", "/patterns", "/map", "/history"] {
         browser.open(&file, view);
     }

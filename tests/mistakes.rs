@@ -1,7 +1,9 @@
-//! Mistakes that people make at the command line, each with everything that the program prints about it.
+//! Mistakes that people make at the command line, each with everything that the program prints
+//! about it.
 //!
-//! A case is a file `tests/diagnostics/mistakes/AREA/NAME.case`; the output is beside it, in a file of the same name with
-//! `.expected` appended. `UPDATE_EXPECT=1` writes these files. A case runs in a copy of the shipped project:
+//! A case is a file `tests/diagnostics/mistakes/AREA/NAME.case`; the output is beside it, in a file
+//! of the same name with `.expected` appended. `UPDATE_EXPECT=1` writes these files. A case runs in
+//! a copy of the shipped project:
 //!
 //! ```text
 //! # What the person did.
@@ -32,7 +34,10 @@ const RUN: &str = "k7f3-1";
 fn cases() -> Vec<PathBuf> {
     let folder = root().join("tests/diagnostics/mistakes");
     let list = |folder: &Path| -> Vec<PathBuf> {
-        std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect()
+        std::fs::read_dir(folder)
+            .unwrap()
+            .map(|entry| entry.unwrap().path())
+            .collect()
     };
     let mut cases: Vec<PathBuf> = list(&folder).iter().flat_map(|area| list(area)).collect();
     cases.retain(|path| path.extension().is_some_and(|ending| ending == "case"));
@@ -61,9 +66,13 @@ pub fn set_up(text: &str, folder: &Path) -> Vec<String> {
             Some(file) => {
                 let lines: Vec<&str> = body.lines().collect();
                 for pair in lines.chunks(2) {
-                    let [from, to] = pair else { panic!("{title}: a line without its replacement") };
+                    let [from, to] = pair else {
+                        panic!("{title}: a line without its replacement")
+                    };
                     let text = |line: &str, sign: char| {
-                        let text = line.strip_prefix(sign).unwrap_or_else(|| panic!("{title}: {line}"));
+                        let text = line
+                            .strip_prefix(sign)
+                            .unwrap_or_else(|| panic!("{title}: {line}"));
                         text.strip_prefix(' ').unwrap_or(text).replace('⏎', "\n")
                     };
                     edit(&folder.join(file), &text(from, '-'), &text(to, '+'));
@@ -76,7 +85,10 @@ pub fn set_up(text: &str, folder: &Path) -> Vec<String> {
             }
         }
     }
-    let command = head.lines().find_map(|line| line.strip_prefix("$ ")).expect("a line `$ COMMAND`");
+    let command = head
+        .lines()
+        .find_map(|line| line.strip_prefix("$ "))
+        .expect("a line `$ COMMAND`");
     // Every other part is in quotes.
     let parts = command.split('"').enumerate();
     let words = |(idx, part): (usize, &str)| match idx % 2 {
@@ -96,9 +108,15 @@ fn printed(case: &Path, history: &Path, run: &str) -> String {
     if text.contains("(history)") {
         copy(history, &folder.path().join(".actcheck"));
     }
-    let campaign = |id: &str| id.rsplit_once('-').map_or(id, |(campaign, _)| campaign).to_owned();
+    let campaign = |id: &str| {
+        id.rsplit_once('-')
+            .map_or(id, |(campaign, _)| campaign)
+            .to_owned()
+    };
     let (of_run, shown) = (campaign(run), campaign(RUN));
-    let arguments = set_up(&text, folder.path()).into_iter().map(|word| word.replace(&shown, &of_run));
+    let arguments = set_up(&text, folder.path())
+        .into_iter()
+        .map(|word| word.replace(&shown, &of_run));
     let output = Command::new(env!("CARGO_BIN_EXE_actcheck"))
         .args(arguments)
         .current_dir(folder.path())
@@ -106,14 +124,20 @@ fn printed(case: &Path, history: &Path, run: &str) -> String {
         .envs([("NO_COLOR", "1"), ("COLUMNS", "100")])
         .output()
         .unwrap();
-    let code = output.status.code().map_or("none".to_owned(), |code| code.to_string());
+    let code = output
+        .status
+        .code()
+        .map_or("none".to_owned(), |code| code.to_string());
     let all = format!("exit code {code}\n{}{}", stdout(&output), stderr(&output));
     let folder = folder.path().canonicalize().unwrap();
     let program = env!("CARGO_BIN_EXE_actcheck");
-    all.replace(&*folder.to_string_lossy(), ".").replace(program, "actcheck").replace(&of_run, &shown)
+    all.replace(&*folder.to_string_lossy(), ".")
+        .replace(program, "actcheck")
+        .replace(&of_run, &shown)
 }
 
-/// Read each output as somebody who has never seen it: is it clear what is wrong, where, and what to do?
+/// Read each output as somebody who has never seen it: is it clear what is wrong, where, and what
+/// to do?
 #[test]
 fn every_mistake_is_answered_with_its_place_and_a_way_out() {
     let cases = cases();
@@ -127,7 +151,9 @@ fn every_mistake_is_answered_with_its_place_and_a_way_out() {
             scope.spawn(|| {
                 while let Some(case) = cases.get(next.fetch_add(1, Ordering::Relaxed)) {
                     let printed = printed(case, history.path(), &run);
-                    done.lock().unwrap().insert(case.with_added_extension("expected"), printed);
+                    done.lock()
+                        .unwrap()
+                        .insert(case.with_added_extension("expected"), printed);
                 }
             });
         }

@@ -1,4 +1,5 @@
-//! Truncated and garbled inputs are refused or read, without a panic, and every message can be shown with its place.
+//! Truncated and garbled inputs are refused or read, without a panic, and every message can be
+//! shown with its place.
 
 use std::path::Path;
 
@@ -14,18 +15,28 @@ fn show(found: &Diagnostics) {
     for fault in found.iter() {
         let mut out = String::new();
         handler.render_report(&mut out, fault).unwrap();
-        assert!(out.contains(&fault.message.chars().take(10).collect::<String>()), "{out}");
-        assert!(fault.span.is_none() || !out.contains("Failed to read"), "{out}");
+        assert!(
+            out.contains(&fault.message.chars().take(10).collect::<String>()),
+            "{out}"
+        );
+        assert!(
+            fault.span.is_none() || !out.contains("Failed to read"),
+            "{out}"
+        );
     }
 }
 
 /// A text with a few bytes removed, duplicated, moved or replaced; deterministic for each number.
 fn garbled(text: &str, number: u64) -> String {
-    const STRANGE: [&str; 12] = ["\"", "[", "]", "<", ">", ".", "\n", "\u{0}", "é🦀", "\u{feff}", "#", "&"];
+    const STRANGE: [&str; 12] = [
+        "\"", "[", "]", "<", ">", ".", "\n", "\u{0}", "é🦀", "\u{feff}", "#", "&",
+    ];
     let mut choices = Choices::random(number, 0);
     let mut chars: Vec<char> = text.chars().collect();
     for _ in 0..=choices.index("edits".into(), 3) {
-        let at = choices.index("at".into(), chars.len().max(1)).min(chars.len());
+        let at = choices
+            .index("at".into(), chars.len().max(1))
+            .min(chars.len());
         let length = choices.index("length".into(), 40).min(chars.len() - at);
         match choices.index("how".into(), 4) {
             0 => drop(chars.drain(at..at + length)),
@@ -34,7 +45,10 @@ fn garbled(text: &str, number: u64) -> String {
                 let copy: Vec<char> = chars[at..at + length].to_vec();
                 chars.splice(at..at, copy);
             }
-            _ => drop(chars.splice(at..at, STRANGE[choices.index("strange".into(), STRANGE.len())].chars())),
+            _ => drop(chars.splice(
+                at..at,
+                STRANGE[choices.index("strange".into(), STRANGE.len())].chars(),
+            )),
         }
     }
     chars.into_iter().collect()
@@ -43,7 +57,9 @@ fn garbled(text: &str, number: u64) -> String {
 #[test]
 fn garbled_configurations_do_not_panic() {
     let text = std::fs::read_to_string("configs/pick.toml").unwrap();
-    let text = text.replace("ontology = \"../ontology/actions.ttl\"", "").replace("model_dir = \"../models\"", "");
+    let text = text
+        .replace("ontology = \"../ontology/actions.ttl\"", "")
+        .replace("model_dir = \"../models\"", "");
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("c.toml");
     let ontology = ontology::load(&Files::Shipped, Path::new("ontology/actions.ttl")).unwrap();
@@ -68,7 +84,11 @@ fn garbled_configurations_do_not_panic() {
 fn garbled_ontologies_do_not_panic() {
     let folder = tempfile::tempdir().unwrap();
     std::fs::create_dir(folder.path().join("rules")).unwrap();
-    for name in ["tests/data/pick.owl", "tests/data/kinds_of_pick.ttl", "ontology/actions.ttl"] {
+    for name in [
+        "tests/data/pick.owl",
+        "tests/data/kinds_of_pick.ttl",
+        "ontology/actions.ttl",
+    ] {
         let text = std::fs::read_to_string(name).unwrap();
         let ending = name.rsplit('.').next().unwrap();
         let path = folder.path().join(format!("o.{ending}"));
@@ -85,9 +105,11 @@ fn byte_order_marks_and_windows_line_ends_are_read() {
     let folder = tempfile::tempdir().unwrap();
     let ontology = "\u{feff}@prefix act: <http://actions#> .\r\nact:Wait a act:Action .\r\n";
     std::fs::write(folder.path().join("o.ttl"), ontology).unwrap();
-    let ontology = ontology::load(&Files::Disk, &folder.path().join("o.ttl")).unwrap_or_else(|found| panic!("{found}"));
+    let ontology = ontology::load(&Files::Disk, &folder.path().join("o.ttl"))
+        .unwrap_or_else(|found| panic!("{found}"));
     assert!(ontology.actions.contains_key("Wait"));
     let config = "\u{feff}tests = [[\"Wait\"]]\r\ntest_count = 1\r\n";
     std::fs::write(folder.path().join("c.toml"), config).unwrap();
-    config::load(&folder.path().join("c.toml"), &Overrides::default()).unwrap_or_else(|found| panic!("{found}"));
+    config::load(&folder.path().join("c.toml"), &Overrides::default())
+        .unwrap_or_else(|found| panic!("{found}"));
 }

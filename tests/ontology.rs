@@ -17,15 +17,35 @@ fn locals(iris: &[String]) -> Vec<&str> {
 fn the_shipped_ontology_has_the_five_properties_of_pick() {
     let ontology = load("ontology/actions.ttl");
     let pick = &ontology.actions["Pick"];
-    let five = ["CloseObject", "ObjectGrasped", "NoGraspCollisions", "MovedObject", "ObjectInGripper"];
+    let five = [
+        "CloseObject",
+        "ObjectGrasped",
+        "NoGraspCollisions",
+        "MovedObject",
+        "ObjectInGripper",
+    ];
     assert_eq!(locals(&pick.success_properties), five);
     assert!(pick.parameters.contains("pickObject") && pick.parameters.contains("surfaceObjects"));
-    assert_eq!(ontology.actions.keys().collect::<Vec<_>>(), ["MoveTo", "PerceivePlane", "Pick", "Place"]);
+    assert_eq!(
+        ontology.actions.keys().collect::<Vec<_>>(),
+        ["MoveTo", "PerceivePlane", "Pick", "Place"]
+    );
     let moved = &ontology.properties["http://actions#MovedObject"];
-    assert_eq!((moved.name.as_str(), moved.unit.as_deref()), ("MovedObject", Some("m")));
-    assert_eq!((moved.rule.path.as_str(), moved.rule.language), ("../rules/moved_object.rls", RuleLanguage::Datalog));
+    assert_eq!(
+        (moved.name.as_str(), moved.unit.as_deref()),
+        ("MovedObject", Some("m"))
+    );
+    assert_eq!(
+        (moved.rule.path.as_str(), moved.rule.language),
+        ("../rules/moved_object.rls", RuleLanguage::Datalog)
+    );
     assert!(moved.rule.source.text.contains("success("));
-    assert_eq!(ontology.properties["http://actions#ObjectGrasped"].rule.language, RuleLanguage::Sparql);
+    assert_eq!(
+        ontology.properties["http://actions#ObjectGrasped"]
+            .rule
+            .language,
+        RuleLanguage::Sparql
+    );
     assert!(!ontology.libraries.is_empty());
 }
 
@@ -37,7 +57,10 @@ fn every_shipped_term_has_a_label_and_comment() {
         if iri.starts_with(names::ACT) || iri.starts_with(names::W) {
             assert!(term.label.is_some() && term.comment.is_some(), "{iri}");
             let comment = term.comment.as_deref().unwrap();
-            assert!(comment.ends_with('.') || comment.ends_with(')'), "{iri}: {comment}");
+            assert!(
+                comment.ends_with('.') || comment.ends_with(')'),
+                "{iri}: {comment}"
+            );
         }
     }
 }
@@ -55,8 +78,14 @@ fn the_embedded_ontology_equals_the_one_on_disk() {
 #[test]
 fn the_world_vocabulary_has_units() {
     let ontology = load("ontology/actions.ttl");
-    for (name, unit) in [("x", "m"), ("yaw", "rad"), ("vx", "m/s"), ("wz", "rad/s"), ("mass", "kg"), ("maxForce", "N")]
-    {
+    for (name, unit) in [
+        ("x", "m"),
+        ("yaw", "rad"),
+        ("vx", "m/s"),
+        ("wz", "rad/s"),
+        ("mass", "kg"),
+        ("maxForce", "N"),
+    ] {
         let term = &ontology.vocabulary.terms[&names::w(name)];
         assert!(term.is_property, "{name}");
         assert_eq!(term.unit.as_deref(), Some(unit), "{name}");
@@ -78,20 +107,37 @@ fn categories_form_a_hierarchy() {
 #[test]
 fn rdf_xml_is_read_like_turtle() {
     let ontology = load("tests/data/pick.owl");
-    assert_eq!(locals(&ontology.actions["Pick"].success_properties), ["MovedObject", "ObjectGrasped"]);
-    assert_eq!(ontology.properties["http://actions#MovedObject"].rule.path, "../../rules/moved_object.rls");
+    assert_eq!(
+        locals(&ontology.actions["Pick"].success_properties),
+        ["MovedObject", "ObjectGrasped"]
+    );
+    assert_eq!(
+        ontology.properties["http://actions#MovedObject"].rule.path,
+        "../../rules/moved_object.rls"
+    );
 }
 
-/// The published listing of Pick names a parameter `pickOject`. It can be read, and the fault is reported.
+/// The published listing of Pick names a parameter `pickOject`. It can be read, and the fault is
+/// reported.
 #[test]
 fn a_misspelt_parameter_is_reported_with_a_suggestion() {
-    let found = ontology::load(&Files::Disk, Path::new("tests/data/pick_misspelt.owl")).unwrap_err();
+    let found =
+        ontology::load(&Files::Disk, Path::new("tests/data/pick_misspelt.owl")).unwrap_err();
     let first = found.iter().next().unwrap();
-    assert_eq!((first.code, first.place().as_deref()), ("O008", Some("tests/data/pick_misspelt.owl:21:48")));
-    assert_eq!(first.message, "the action `Pick` has the parameter `pickOject`, which is not declared");
+    assert_eq!(
+        (first.code, first.place().as_deref()),
+        ("O008", Some("tests/data/pick_misspelt.owl:21:48"))
+    );
+    assert_eq!(
+        first.message,
+        "the action `Pick` has the parameter `pickOject`, which is not declared"
+    );
     assert_eq!(first.help.as_deref(), Some("did you mean `pickObject`?"));
     // The property's own requirement is the only other fault.
-    assert_eq!(found.iter().map(|fault| fault.code).collect::<Vec<_>>(), ["O008", "O007"]);
+    assert_eq!(
+        found.iter().map(|fault| fault.code).collect::<Vec<_>>(),
+        ["O008", "O007"]
+    );
 }
 
 #[test]
@@ -101,12 +147,21 @@ fn an_action_inherits_statements_of_its_classes() {
     assert_eq!(of("Wave"), ["Reported"]);
     assert_eq!(of("Pick"), ["Reported", "Moved", "Held"]);
     assert_eq!(of("CarefulPick"), ["Reported", "Moved", "Held"]);
-    assert!(ontology.actions["CarefulPick"].parameters.contains("pickObject"));
+    assert!(
+        ontology.actions["CarefulPick"]
+            .parameters
+            .contains("pickObject")
+    );
     assert_eq!(ontology.actions["CarefulPick"].label, "Pick with care");
     // Classes themselves are not actions.
     assert_eq!(ontology.actions.len(), 3);
     assert_eq!(ontology.sources.len(), 2);
-    assert_eq!(ontology.vocabulary.terms[&names::w("wobble")].unit.as_deref(), Some("rad"));
+    assert_eq!(
+        ontology.vocabulary.terms[&names::w("wobble")]
+            .unit
+            .as_deref(),
+        Some("rad")
+    );
 }
 
 /// The same text gives the same statements, in any folder and at every reading.
@@ -121,14 +176,28 @@ fn statements_are_reproducible_and_free_of_machine_paths() {
     for name in ["kinds_of_pick.ttl", "kinds_of_pick_words.ttl"] {
         copy(&format!("tests/data/{name}"), &format!("a b/deep/{name}"));
     }
-    for name in ["object_grasped.rq", "moved_object.rls", "object_in_gripper.rls"] {
+    for name in [
+        "object_grasped.rq",
+        "moved_object.rls",
+        "object_in_gripper.rls",
+    ] {
         copy(&format!("rules/{name}"), &format!("rules/{name}"));
     }
     let here = load("tests/data/kinds_of_pick.ttl");
-    let there = ontology::load(&Files::Disk, &folder.path().join("a b/deep/kinds_of_pick.ttl")).unwrap();
+    let there = ontology::load(
+        &Files::Disk,
+        &folder.path().join("a b/deep/kinds_of_pick.ttl"),
+    )
+    .unwrap();
     assert_eq!(here.triples, there.triples);
     assert_eq!(here.digest, there.digest);
-    let paths = |ontology: &Ontology| ontology.properties.values().map(|p| p.rule.path.clone()).collect::<Vec<_>>();
+    let paths = |ontology: &Ontology| {
+        ontology
+            .properties
+            .values()
+            .map(|p| p.rule.path.clone())
+            .collect::<Vec<_>>()
+    };
     assert_eq!(paths(&here), paths(&there));
     let shown = |term: &Term| term.to_string().contains(folder.path().to_str().unwrap());
     assert!(!there.triples.iter().flatten().any(shown));
@@ -145,7 +214,10 @@ fn file_names_with_spaces_and_special_characters_are_found() {
     let path = folder.path().join("my ontology.ttl");
     std::fs::write(&path, text).unwrap();
     let ontology = ontology::load(&Files::Disk, &path).unwrap();
-    assert_eq!(ontology.properties["http://actions#Up"].rule.path, "my rules/50% höher.rls");
+    assert_eq!(
+        ontology.properties["http://actions#Up"].rule.path,
+        "my rules/50% höher.rls"
+    );
 }
 
 /// A user's ontology adds a property to the shipped ones, in a folder outside this repository.
@@ -157,10 +229,21 @@ fn the_embedded_ontology_can_be_imported_from_any_folder() {
                 <> a owl:Ontology ; owl:imports <https://w3id.org/actcheck/ontology> .\n\
                 act:Quick a act:Property ; act:verifiedBy <quick.rls> .\nact:Pick act:successProperty act:Quick .\n";
     std::fs::write(folder.path().join("mine.ttl"), text).unwrap();
-    let mine = ontology::load(&Files::Disk, &folder.path().join("mine.ttl")).unwrap_or_else(|found| panic!("{found}"));
+    let mine = ontology::load(&Files::Disk, &folder.path().join("mine.ttl"))
+        .unwrap_or_else(|found| panic!("{found}"));
     assert_eq!(mine.actions["Pick"].success_properties.len(), 6);
-    let source = |name: &str| mine.properties[&names::act(name)].rule.source.name.to_string();
+    let source = |name: &str| {
+        mine.properties[&names::act(name)]
+            .rule
+            .source
+            .name
+            .to_string()
+    };
     assert_eq!(source("MovedObject"), "built-in:rules/moved_object.rls");
     assert!(source("Quick").ends_with("quick.rls") && !source("Quick").starts_with("built-in:"));
-    assert!(mine.libraries.iter().all(|library| library.source.name.starts_with("built-in:rules/lib/")));
+    assert!(
+        mine.libraries
+            .iter()
+            .all(|library| library.source.name.starts_with("built-in:rules/lib/"))
+    );
 }

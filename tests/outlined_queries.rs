@@ -1,4 +1,5 @@
-//! Queries over outlines have the answers of the same runs kept whole: every named query, and many others.
+//! Queries over outlines have the answers of the same runs kept whole: every named query, and many
+//! others.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -15,27 +16,52 @@ use crate::history::{sample_campaign, sample_run};
 /// A file of many runs, and some single ones.
 const RUNS: u64 = 150;
 
-/// Runs with different outcomes, margins, scenes and times; some are twins, repetitions, broken or shrunk.
+/// Runs with different outcomes, margins, scenes and times; some are twins, repetitions, broken or
+/// shrunk.
 fn run(campaign: &str, index: u64) -> RunRecord {
     let mut run = sample_run(campaign, index);
     let mut dice = ChaCha8Rng::seed_from_u64(index / 2 + u64::from(campaign == "m"));
     let mut next = || f64::from(dice.next_u32()) / f64::from(u32::MAX);
-    run.started =
-        format!("2026-08-0{}T12:{:02}:{:02}.{:03}Z", 1 + index % 3, index % 7, index % 60, index * 100 % 1000);
-    run.repetition = (campaign == "k").then_some(Repetition { scene: index / 2, number: index % 2 });
+    run.started = format!(
+        "2026-08-0{}T12:{:02}:{:02}.{:03}Z",
+        1 + index % 3,
+        index % 7,
+        index % 60,
+        index * 100 % 1000
+    );
+    run.repetition = (campaign == "k").then_some(Repetition {
+        scene: index / 2,
+        number: index % 2,
+    });
     run.weight = index.is_multiple_of(4).then(&mut next);
     for object in &mut run.scene.objects {
         object.mass_kg *= 0.5 + next();
         object.friction *= 0.5 + next();
     }
     for judgement in run.judgements.iter_mut().flatten() {
-        judgement.outcome = if next() < 0.3 { Outcome::Failed } else { Outcome::Passed };
-        judgement.margin = (next() < 0.8).then(|| if judgement.outcome == Outcome::Failed { -next() } else { next() });
+        judgement.outcome = if next() < 0.3 {
+            Outcome::Failed
+        } else {
+            Outcome::Passed
+        };
+        judgement.margin = (next() < 0.8).then(|| {
+            if judgement.outcome == Outcome::Failed {
+                -next()
+            } else {
+                next()
+            }
+        });
     }
     // Twins have the same trace.
-    run.trace.hash = format!("{:032x}", 7 + u128::from(index % 40) + if campaign == "m" { 20 } else { 0 });
+    run.trace.hash = format!(
+        "{:032x}",
+        7 + u128::from(index % 40) + if campaign == "m" { 20 } else { 0 }
+    );
     if index % 11 == 5 {
-        (run.status, run.reason) = (RunStatus::Timeout, Some(format!("took over {} s", index % 2)));
+        (run.status, run.reason) = (
+            RunStatus::Timeout,
+            Some(format!("took over {} s", index % 2)),
+        );
     }
     if campaign == "s" {
         run.shrunk_from = Some(format!("k-{}", index + 2));
@@ -49,44 +75,86 @@ fn history(dir: &Path, is_whole: &dyn Fn(u64) -> bool) -> History {
     for (campaign, minute, runs) in [("k", 1, RUNS), ("m", 2, 40), ("s", 3, 3)] {
         let mut record = sample_campaign(campaign, minute);
         if campaign == "m" {
-            record.rules.iter_mut().for_each(|(_, _, digest)| *digest = format!("{digest}2"));
+            record
+                .rules
+                .iter_mut()
+                .for_each(|(_, _, digest)| *digest = format!("{digest}2"));
         }
         history.begin_campaign(&record).unwrap();
         for index in 0..runs {
             let run = run(campaign, index);
-            if is_whole(index) { history.commit(&run).unwrap() } else { history.commit_outline(&run).unwrap() }
+            if is_whole(index) {
+                history.commit(&run).unwrap()
+            } else {
+                history.commit_outline(&run).unwrap()
+            }
         }
         if campaign == "k" {
             let ended = "2026-08-05T13:00:00Z".to_owned();
-            history.finish_campaign(campaign, &CampaignEnd { ended, ..CampaignEnd::default() }).unwrap();
+            history
+                .finish_campaign(
+                    campaign,
+                    &CampaignEnd {
+                        ended,
+                        ..CampaignEnd::default()
+                    },
+                )
+                .unwrap();
         }
     }
     let property = names::act("ObjectInGripper");
     let mut rechecks = Vec::new();
     for index in [3, 4, 90] {
         let id = format!("k-{index}");
-        let before = NewestJudgements::of(&history).read(&id, 1, std::slice::from_ref(&property)).unwrap().remove(0);
+        let before = NewestJudgements::of(&history)
+            .read(&id, 1, std::slice::from_ref(&property))
+            .unwrap()
+            .remove(0);
         let mut now = before.judgement.clone();
-        now.outcome = if now.outcome == Outcome::Passed { Outcome::Failed } else { Outcome::Passed };
-        rechecks.push(Recheck { run: id, step: 1, action: names::act("Pick"), before: Some(before), now });
+        now.outcome = if now.outcome == Outcome::Passed {
+            Outcome::Failed
+        } else {
+            Outcome::Passed
+        };
+        rechecks.push(Recheck {
+            run: id,
+            step: 1,
+            action: names::act("Pick"),
+            before: Some(before),
+            now,
+        });
     }
-    history.commit_rechecks(&rechecks, "2026-08-09T00:00:00Z").unwrap();
+    history
+        .commit_rechecks(&rechecks, "2026-08-09T00:00:00Z")
+        .unwrap();
     drop(history);
     History::open_to_read(dir).unwrap()
 }
 
 fn named() -> Vec<(String, String)> {
-    let mut files: Vec<PathBuf> =
-        std::fs::read_dir("ontology/queries").unwrap().map(|entry| entry.unwrap().path()).collect();
+    let mut files: Vec<PathBuf> = std::fs::read_dir("ontology/queries")
+        .unwrap()
+        .map(|entry| entry.unwrap().path())
+        .collect();
     files.sort();
-    files.into_iter().map(|file| (file.display().to_string(), std::fs::read_to_string(&file).unwrap())).collect()
+    files
+        .into_iter()
+        .map(|file| {
+            (
+                file.display().to_string(),
+                std::fs::read_to_string(&file).unwrap(),
+            )
+        })
+        .collect()
 }
 
-/// An answer in which numbers that differ by rounding are equal, and rows have no order unless the query sorts them.
+/// An answer in which numbers that differ by rounding are equal, and rows have no order unless the
+/// query sorts them.
 fn comparable(answer: &QueryAnswer, text: &str) -> Vec<String> {
     let value = |term: &Option<Term>| match term {
         Some(Term::Double(number)) => format!("{number:.7e}"),
-        // Of a mean of integers, the digits end at the same place, and the order of joined texts is not defined.
+        // Of a mean of integers, the digits end at the same place, and the order of joined texts is
+        // not defined.
         Some(Term::String(text)) => {
             let mut words: Vec<&str> = text.split(' ').collect();
             words.sort_unstable();
@@ -97,7 +165,9 @@ fn comparable(answer: &QueryAnswer, text: &str) -> Vec<String> {
     let mut rows: Vec<String> = match answer {
         QueryAnswer::Table { columns, rows } => {
             assert!(!columns.is_empty());
-            rows.iter().map(|row| row.iter().map(value).collect::<Vec<_>>().join(" | ")).collect()
+            rows.iter()
+                .map(|row| row.iter().map(value).collect::<Vec<_>>().join(" | "))
+                .collect()
         }
         other => vec![format!("{other:?}")],
     };
@@ -174,12 +244,21 @@ fn composed(dice: &mut ChaCha8Rng) -> String {
     ];
     let two = [of(&patterns), of(&patterns)].join(" ");
     let has = |name: &str| two.contains(name);
-    let keys: Vec<&str> =
-        ["?status", "?c", "?o", "?p", "?role"].into_iter().filter(|name| has(name) && of(&["0", "1"]) == "1").collect();
-    let numbers: Vec<&str> = ["?i", "?kg", "?m"].into_iter().filter(|name| has(name)).collect();
+    let keys: Vec<&str> = ["?status", "?c", "?o", "?p", "?role"]
+        .into_iter()
+        .filter(|name| has(name) && of(&["0", "1"]) == "1")
+        .collect();
+    let numbers: Vec<&str> = ["?i", "?kg", "?m"]
+        .into_iter()
+        .filter(|name| has(name))
+        .collect();
     let mut conditions = String::new();
     if has("?i") && of(&["0", "1"]) == "1" {
-        conditions.push_str(of(&["FILTER(?i < 50)", "FILTER(?i >= 20 && ?i != 31)", "FILTER(act:counts(?run))"]));
+        conditions.push_str(of(&[
+            "FILTER(?i < 50)",
+            "FILTER(?i >= 20 && ?i != 31)",
+            "FILTER(act:counts(?run))",
+        ]));
     }
     if has("?o") && of(&["0", "1"]) == "1" {
         conditions.push_str(of(&[
@@ -188,35 +267,71 @@ fn composed(dice: &mut ChaCha8Rng) -> String {
             "FILTER(?o IN ('passed', 'failed'))",
         ]));
     }
-    let mut counted: Vec<&str> = ["?run", "?e", "?a", "?r", "?x"].into_iter().filter(|name| has(name)).collect();
+    let mut counted: Vec<&str> = ["?run", "?e", "?a", "?r", "?x"]
+        .into_iter()
+        .filter(|name| has(name))
+        .collect();
     let mut further: Vec<(&str, &str)> = Vec::new();
     for optional in [
         ("?c", "OPTIONAL { ?c act:plannedRuns ?planned }", "?planned"),
         ("?status", "OPTIONAL { ?run act:score ?score }", "?score"),
-        ("?status", "OPTIONAL { ?run act:weight ?weight FILTER(?weight > 0.3) }", "?weight"),
+        (
+            "?status",
+            "OPTIONAL { ?run act:weight ?weight FILTER(?weight > 0.3) }",
+            "?weight",
+        ),
         ("?r", "OPTIONAL { ?r act:margin ?margin }", "?margin"),
-        ("?c", "OPTIONAL { ?c rdfs:label ?label . ?c act:seed ?seed }", "?seed"),
+        (
+            "?c",
+            "OPTIONAL { ?c rdfs:label ?label . ?c act:seed ?seed }",
+            "?seed",
+        ),
     ] {
         let (needs, text, value) = optional;
         if has(needs) && of(&["0", "0", "1"]) == "1" {
-            further.insert(if of(&["0", "1"]) == "1" { 0 } else { further.len() }, (text, value));
+            further.insert(
+                if of(&["0", "1"]) == "1" {
+                    0
+                } else {
+                    further.len()
+                },
+                (text, value),
+            );
         }
     }
-    further.iter().for_each(|(text, _)| conditions.push_str(text));
+    further
+        .iter()
+        .for_each(|(text, _)| conditions.push_str(text));
     let mut selected: Vec<String> = keys.iter().map(|key| (*key).to_owned()).collect();
     selected.push("(COUNT(*) AS ?n)".to_owned());
     for (at, number) in numbers.iter().enumerate() {
-        selected.push(format!("({}({number}) AS ?v{at})", of(&["SUM", "AVG", "MIN", "MAX", "COUNT"])));
+        selected.push(format!(
+            "({}({number}) AS ?v{at})",
+            of(&["SUM", "AVG", "MIN", "MAX", "COUNT"])
+        ));
     }
     for (at, (_, value)) in further.iter().enumerate() {
-        selected.push(format!("({}({value}) AS ?f{at})", of(&["SUM", "AVG", "MIN", "MAX", "COUNT", "COUNT"])));
+        selected.push(format!(
+            "({}({value}) AS ?f{at})",
+            of(&["SUM", "AVG", "MIN", "MAX", "COUNT", "COUNT"])
+        ));
     }
     counted.retain(|_| of(&["0", "0", "1"]) == "1");
     for (at, node) in counted.iter().enumerate() {
-        selected.push(format!("(COUNT({}{node}) AS ?c{at})", of(&["", "", "DISTINCT "])));
+        selected.push(format!(
+            "(COUNT({}{node}) AS ?c{at})",
+            of(&["", "", "DISTINCT "])
+        ));
     }
-    let group = if keys.is_empty() { String::new() } else { format!("GROUP BY {}", keys.join(" ")) };
-    format!("SELECT {} {{ {two} {conditions} }} {group}", selected.join(" "))
+    let group = if keys.is_empty() {
+        String::new()
+    } else {
+        format!("GROUP BY {}", keys.join(" "))
+    };
+    format!(
+        "SELECT {} {{ {two} {conditions} }} {group}",
+        selected.join(" ")
+    )
 }
 
 #[test]
@@ -228,15 +343,33 @@ fn queries_over_outlines_have_the_answers_of_whole_runs() {
         history(&folder.path().join("mixed"), &|index| index % 3 == 0),
     ];
     let mut queries = named();
-    queries.extend(QUERIES.iter().map(|text| ((*text).to_owned(), (*text).to_owned())));
+    queries.extend(
+        QUERIES
+            .iter()
+            .map(|text| ((*text).to_owned(), (*text).to_owned())),
+    );
     let mut dice = ChaCha8Rng::seed_from_u64(25);
-    queries.extend((0..120).map(|_| composed(&mut dice)).map(|text| (text.clone(), text)));
+    queries.extend(
+        (0..120)
+            .map(|_| composed(&mut dice))
+            .map(|text| (text.clone(), text)),
+    );
     let mut sizes: BTreeMap<&str, usize> = BTreeMap::new();
     for (name, text) in &queries {
-        let wanted = comparable(&whole.query(text).unwrap_or_else(|faults| panic!("{name}: {faults}")), text);
+        let wanted = comparable(
+            &whole
+                .query(text)
+                .unwrap_or_else(|faults| panic!("{name}: {faults}")),
+            text,
+        );
         sizes.insert(name, wanted.len());
         for (other, kept) in others.iter().zip(["outlines", "mixed"]) {
-            let found = comparable(&other.query(text).unwrap_or_else(|faults| panic!("{name}: {faults}")), text);
+            let found = comparable(
+                &other
+                    .query(text)
+                    .unwrap_or_else(|faults| panic!("{name}: {faults}")),
+                text,
+            );
             assert_eq!(found, wanted, "{kept}: {name}");
         }
     }

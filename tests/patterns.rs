@@ -14,12 +14,28 @@ fn same(found: &Condition, planted: &Condition) -> bool {
     };
     match (found, planted) {
         (
-            Condition::Range { parameter: a, low: low_a, high: high_a },
-            Condition::Range { parameter: b, low: low_b, high: high_b },
+            Condition::Range {
+                parameter: a,
+                low: low_a,
+                high: high_a,
+            },
+            Condition::Range {
+                parameter: b,
+                low: low_b,
+                high: high_b,
+            },
         ) => a == b && near(*low_a, *low_b) && near(*high_a, *high_b),
         (
-            Condition::Arc { parameter: a, from: from_a, to: to_a },
-            Condition::Arc { parameter: b, from: from_b, to: to_b },
+            Condition::Arc {
+                parameter: a,
+                from: from_a,
+                to: to_a,
+            },
+            Condition::Arc {
+                parameter: b,
+                from: from_b,
+                to: to_b,
+            },
         ) => a == b && near(Some(*from_a), Some(*from_b)) && near(Some(*to_a), Some(*to_b)),
         _ => found == planted,
     }
@@ -27,11 +43,20 @@ fn same(found: &Condition, planted: &Condition) -> bool {
 
 fn is(found: &Pattern, planted: &[Condition]) -> bool {
     found.conditions.len() == planted.len()
-        && planted.iter().all(|wanted| found.conditions.iter().any(|condition| same(condition, wanted)))
+        && planted.iter().all(|wanted| {
+            found
+                .conditions
+                .iter()
+                .any(|condition| same(condition, wanted))
+        })
 }
 
 fn conditions(found: &Patterns) -> Vec<&Vec<Condition>> {
-    found.patterns.iter().map(|pattern| &pattern.conditions).collect()
+    found
+        .patterns
+        .iter()
+        .map(|pattern| &pattern.conditions)
+        .collect()
 }
 
 #[test]
@@ -41,9 +66,18 @@ fn only_planted_patterns_are_found_in_ten_thousand_runs() {
             let found = mine(&input(10_000, seed, &planted), &PatternOptions::default());
             for wanted in &planted {
                 let confirmed = found.confirmed().any(|pattern| is(pattern, wanted));
-                assert!(confirmed, "{name}, seed {seed}: {wanted:?} is not in {:#?}", conditions(&found));
+                assert!(
+                    confirmed,
+                    "{name}, seed {seed}: {wanted:?} is not in {:#?}",
+                    conditions(&found)
+                );
             }
-            assert_eq!(found.patterns.len(), planted.len(), "{name}, seed {seed}: {:#?}", conditions(&found));
+            assert_eq!(
+                found.patterns.len(),
+                planted.len(),
+                "{name}, seed {seed}: {:#?}",
+                conditions(&found)
+            );
         }
     }
 }
@@ -54,22 +88,49 @@ fn the_figures_of_a_pattern_agree_with_the_runs() {
     let input = input(10_000, 5, &planted);
     let found = mine(&input, &PatternOptions::default());
     let pattern = &found.patterns[0];
-    let holds: Vec<Vec<bool>> = pattern.conditions.iter().map(|condition| condition.holds(&input)).collect();
-    let runs: Vec<usize> = (0..input.len()).filter(|run| holds.iter().all(|holds| holds[*run])).collect();
+    let holds: Vec<Vec<bool>> = pattern
+        .conditions
+        .iter()
+        .map(|condition| condition.holds(&input))
+        .collect();
+    let runs: Vec<usize> = (0..input.len())
+        .filter(|run| holds.iter().all(|holds| holds[*run]))
+        .collect();
     assert_eq!(pattern.runs, runs);
     let failed = runs.iter().filter(|run| input.failed[**run]).count() as u64;
-    assert_eq!((pattern.all.failed_in, pattern.all.passed_in), (failed, runs.len() as u64 - failed));
+    assert_eq!(
+        (pattern.all.failed_in, pattern.all.passed_in),
+        (failed, runs.len() as u64 - failed)
+    );
     assert_eq!(pattern.all.failed_in + pattern.all.failed_out, found.failed);
     let overall = found.failed as f64 / 10_000.0;
     assert!((pattern.lift - pattern.rate.rate / overall).abs() < 1e-12);
-    assert!((pattern.wracc - runs.len() as f64 / 10_000.0 * (pattern.rate.rate - overall)).abs() < 1e-12);
-    assert!(pattern.p < pattern.q && pattern.q < 1e-30 && pattern.p_held_out < 1e-10, "{pattern:?}");
+    assert!(
+        (pattern.wracc - runs.len() as f64 / 10_000.0 * (pattern.rate.rate - overall)).abs()
+            < 1e-12
+    );
+    assert!(
+        pattern.p < pattern.q && pattern.q < 1e-30 && pattern.p_held_out < 1e-10,
+        "{pattern:?}"
+    );
     let searched = pattern.searched;
-    let looked_at = searched.failed_in + searched.passed_in + searched.failed_out + searched.passed_out;
-    assert_eq!(looked_at, 10_000 - found.held_out, "the first pattern is searched in all runs that are not held out");
+    let looked_at =
+        searched.failed_in + searched.passed_in + searched.failed_out + searched.passed_out;
+    assert_eq!(
+        looked_at,
+        10_000 - found.held_out,
+        "the first pattern is searched in all runs that are not held out"
+    );
     let kept = (0..input.len()).filter(|run| input.held_out[*run] && pattern.runs.contains(run));
-    assert_eq!(pattern.held_out.failed_in + pattern.held_out.passed_in, kept.count() as u64);
-    assert!((3_200..3_500).contains(&found.held_out), "{}", found.held_out);
+    assert_eq!(
+        pattern.held_out.failed_in + pattern.held_out.passed_in,
+        kept.count() as u64
+    );
+    assert!(
+        (3_200..3_500).contains(&found.held_out),
+        "{}",
+        found.held_out
+    );
 }
 
 #[test]
@@ -78,7 +139,11 @@ fn shuffled_failures_have_no_pattern() {
     for runs in [300, 1_000, 4_000] {
         let input = input(runs, 9, &planted);
         let alarms = (0..100)
-            .filter(|seed| !mine(&shuffled(&input, *seed), &PatternOptions::default()).patterns.is_empty())
+            .filter(|seed| {
+                !mine(&shuffled(&input, *seed), &PatternOptions::default())
+                    .patterns
+                    .is_empty()
+            })
             .count();
         assert!(alarms <= 5, "{alarms} of 100 with {runs} runs");
     }

@@ -1,4 +1,5 @@
-//! Pictures of real runs, with the built program: PNG pixels, well-formed SVG, and refusal of other file extensions.
+//! Pictures of real runs, with the built program: PNG pixels, well-formed SVG, and refusal of other
+//! file extensions.
 
 use std::path::Path;
 
@@ -14,9 +15,28 @@ use crate::support::{actcheck, edit, project, stderr, stdout};
 
 /// The id of the first run of a new campaign.
 fn first_run(folder: &Path, config: &str) -> String {
-    let output = actcheck(folder, &["run", config, "--runs", "1", "--history", "h", "--format", "csv"]);
+    let output = actcheck(
+        folder,
+        &[
+            "run",
+            config,
+            "--runs",
+            "1",
+            "--history",
+            "h",
+            "--format",
+            "csv",
+        ],
+    );
     assert!(output.status.code() < Some(2), "{}", stderr(&output));
-    stdout(&output).lines().nth(1).unwrap().split(',').next().unwrap().to_owned()
+    stdout(&output)
+        .lines()
+        .nth(1)
+        .unwrap()
+        .split(',')
+        .next()
+        .unwrap()
+        .to_owned()
 }
 
 fn draw(folder: &Path, run: &str, file: &str) -> Vec<u8> {
@@ -30,9 +50,18 @@ fn a_pick_is_drawn_as_png_and_svg() {
     let project = project();
     let run = first_run(project.path(), "configs/pick.toml");
     let picture = Pixmap::decode_png(&draw(project.path(), &run, "pick.PNG")).unwrap();
-    assert!(picture.width() == 2400 && picture.height() > 1200, "{} × {}", picture.width(), picture.height());
+    assert!(
+        picture.width() == 2400 && picture.height() > 1200,
+        "{} × {}",
+        picture.width(),
+        picture.height()
+    );
     let count = |is: &dyn Fn([u8; 3]) -> bool| {
-        picture.pixels().iter().filter(|pixel| is([pixel.red(), pixel.green(), pixel.blue()])).count()
+        picture
+            .pixels()
+            .iter()
+            .filter(|pixel| is([pixel.red(), pixel.green(), pixel.blue()]))
+            .count()
     };
     // Text, percepts, and the path of the hand.
     assert!(count(&|rgb| rgb == [0x1c, 0x24, 0x30]) > 1000);
@@ -42,10 +71,20 @@ fn a_pick_is_drawn_as_png_and_svg() {
     let lines = String::from_utf8(draw(project.path(), &run, "pick.svg")).unwrap();
     let tree = roxmltree::Document::parse(&lines).unwrap();
     let words: Vec<&str> = tree.descendants().filter_map(|node| node.text()).collect();
-    for word in ["glass_1", "coffee_table_1", "robot", "before, from above   x → y ↑"] {
+    for word in [
+        "glass_1",
+        "coffee_table_1",
+        "robot",
+        "before, from above   x → y ↑",
+    ] {
         assert!(words.contains(&word), "{word}: {words:?}");
     }
-    assert!(words.iter().any(|word| word.starts_with(&format!("{run} · Pick"))), "{words:?}");
+    assert!(
+        words
+            .iter()
+            .any(|word| word.starts_with(&format!("{run} · Pick"))),
+        "{words:?}"
+    );
     // The same run gives the same picture.
     assert_eq!(draw(project.path(), &run, "again.svg"), lines.as_bytes());
 }
@@ -63,33 +102,88 @@ fn a_world_is_drawn_with_its_rooms_places_and_walls() {
     let lines = String::from_utf8(draw(project.path(), &run, "world.svg")).unwrap();
     let tree = roxmltree::Document::parse(&lines).unwrap();
     let words: Vec<&str> = tree.descendants().filter_map(|node| node.text()).collect();
-    for word in
-        ["kitchen", "living_room", "passage", "sofa", "dining_table", "before, the whole world from above   x → y ↑"]
-    {
+    for word in [
+        "kitchen",
+        "living_room",
+        "passage",
+        "sofa",
+        "dining_table",
+        "before, the whole world from above   x → y ↑",
+    ] {
         assert!(words.contains(&word), "{word}: {words:?}");
     }
-    assert!(words.iter().any(|word| word.starts_with("seen: ")), "{words:?}");
+    assert!(
+        words.iter().any(|word| word.starts_with("seen: ")),
+        "{words:?}"
+    );
 }
 
 /// A robot that was pushed against a table: the picture shows where.
 #[test]
 fn the_hardest_contact_is_marked_with_its_time_and_position() {
     let project = project();
-    let env = Env::prepare(&project.path().join("configs/pick.toml"), &Overrides::default()).unwrap();
-    let fault = FAULTS.into_iter().find(|fault| fault.name == "base-pushed").unwrap();
-    let context = RunContext { clock: Clock { now: String::new, secs: || 0.0 }, disturb: None };
-    let input = RunInput { campaign: "k", index: 0, choices: Choices::random(env.campaign.seed, 0) };
+    let env = Env::prepare(
+        &project.path().join("configs/pick.toml"),
+        &Overrides::default(),
+    )
+    .unwrap();
+    let fault = FAULTS
+        .into_iter()
+        .find(|fault| fault.name == "base-pushed")
+        .unwrap();
+    let context = RunContext {
+        clock: Clock {
+            now: String::new,
+            secs: || 0.0,
+        },
+        disturb: None,
+    };
+    let input = RunInput {
+        campaign: "k",
+        index: 0,
+        choices: Choices::random(env.campaign.seed, 0),
+    };
     let run = run_sabotaged(&env, input, &context, &mut Saboteur::new(fault.sabotage)).unwrap();
-    let roles = run.scene.objects.iter().map(|object| (object.id.clone(), object.role)).collect();
-    let drawing = run_picture(&Caption { roles, ..Caption::default() }, &run.trace).unwrap();
+    let roles = run
+        .scene
+        .objects
+        .iter()
+        .map(|object| (object.id.clone(), object.role))
+        .collect();
+    let drawing = run_picture(
+        &Caption {
+            roles,
+            ..Caption::default()
+        },
+        &run.trace,
+    )
+    .unwrap();
     let lines = drawing.to_svg();
     let tree = roxmltree::Document::parse(&lines).unwrap();
     let words: Vec<&str> = tree.descendants().filter_map(|node| node.text()).collect();
-    let marks: Vec<&&str> = words.iter().filter(|word| word.contains(" presses coffee_table_1: ")).collect();
-    let headed = marks.iter().find(|word| word.starts_with("hardest contact: ")).expect("the header has the contact");
-    assert!(headed.contains(" N, from ") && headed.contains(", at x = "), "{headed}");
-    let label = marks.iter().find(|word| word.ends_with(" N")).expect("the mark has a label");
-    let force: f64 = label.trim_end_matches(" N").rsplit(' ').next().unwrap().parse().unwrap();
+    let marks: Vec<&&str> = words
+        .iter()
+        .filter(|word| word.contains(" presses coffee_table_1: "))
+        .collect();
+    let headed = marks
+        .iter()
+        .find(|word| word.starts_with("hardest contact: "))
+        .expect("the header has the contact");
+    assert!(
+        headed.contains(" N, from ") && headed.contains(", at x = "),
+        "{headed}"
+    );
+    let label = marks
+        .iter()
+        .find(|word| word.ends_with(" N"))
+        .expect("the mark has a label");
+    let force: f64 = label
+        .trim_end_matches(" N")
+        .rsplit(' ')
+        .next()
+        .unwrap()
+        .parse()
+        .unwrap();
     assert!(force >= 70.0, "{label}");
     assert!(words.contains(&"hardest unwanted contact"), "{words:?}");
 }
@@ -98,9 +192,15 @@ fn the_hardest_contact_is_marked_with_its_time_and_position() {
 fn other_file_extensions_are_refused_before_any_work() {
     let folder = tempfile::tempdir().unwrap();
     for file in ["run.jpg", "run", "run.png.gz"] {
-        let output = actcheck(folder.path(), &["show", "abcd-1", "--history", "h", "--picture", file]);
+        let output = actcheck(
+            folder.path(),
+            &["show", "abcd-1", "--history", "h", "--picture", file],
+        );
         let said = stderr(&output);
         assert_eq!(output.status.code(), Some(2));
-        assert!(said.contains("X012") && said.contains(".png or .svg"), "{said}");
+        assert!(
+            said.contains("X012") && said.contains(".png or .svg"),
+            "{said}"
+        );
     }
 }

@@ -1,4 +1,5 @@
-//! Readers of a history neither wait for a process that writes it nor disturb it, and need no permission to write.
+//! Readers of a history neither wait for a process that writes it nor disturb it, and need no
+//! permission to write.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -19,7 +20,11 @@ fn files(folder: &Path) -> BTreeSet<PathBuf> {
     let mut found = BTreeSet::new();
     for entry in std::fs::read_dir(folder).unwrap().map(Result::unwrap) {
         let path = entry.path();
-        if path.is_dir() { found.extend(files(&path)) } else { found.extend([path]) }
+        if path.is_dir() {
+            found.extend(files(&path))
+        } else {
+            found.extend([path])
+        }
     }
     found
 }
@@ -39,7 +44,10 @@ fn reading(run: &str) -> Vec<Vec<String>> {
         format!("replay {run} --history h"),
         "merge h --into out/merged".to_owned(),
     ];
-    commands.iter().map(|command| command.split(' ').map(str::to_owned).collect()).collect()
+    commands
+        .iter()
+        .map(|command| command.split(' ').map(str::to_owned).collect())
+        .collect()
 }
 
 fn ran(folder: &Path, command: &[String]) -> Output {
@@ -52,8 +60,16 @@ fn ran(folder: &Path, command: &[String]) -> Output {
 fn read_by_all(folder: &Path, run: &str) {
     for command in reading(run) {
         let output = ran(folder, &command);
-        assert!(output.status.code().is_some_and(|code| code < 2), "{command:?}: {}", stderr(&output));
-        assert!(!output.stdout.is_empty(), "{command:?}: {}", stderr(&output));
+        assert!(
+            output.status.code().is_some_and(|code| code < 2),
+            "{command:?}: {}",
+            stderr(&output)
+        );
+        assert!(
+            !output.stdout.is_empty(),
+            "{command:?}: {}",
+            stderr(&output)
+        );
     }
 }
 
@@ -69,19 +85,28 @@ fn a_reader_sees_the_state_of_its_opening_while_the_history_grows() {
     let reader = History::open_to_read(&dir).unwrap();
     assert_eq!(runs(&reader), 3);
     assert!(!reader.refresh().unwrap());
-    // The owner writes, flushes, merges its tables and removes old ones; the reader still reads all of its own.
+    // The owner writes, flushes, merges its tables and removes old ones; the reader still reads all
+    // of its own.
     for round in 0..6 {
         owner.commit(&sample_run("a1", 3 + round)).unwrap();
         owner.flush().unwrap();
         let during = History::open_to_read(&dir).unwrap();
         assert_eq!(runs(&during), 4 + round as usize);
     }
-    owner.finish_campaign("a1", &CampaignEnd::default()).unwrap();
+    owner
+        .finish_campaign("a1", &CampaignEnd::default())
+        .unwrap();
     drop(owner);
     drop(History::open_existing(&dir).unwrap());
     assert_eq!(runs(&reader), 3);
     reader.write_nquads(&folder.path().join("all.nq")).unwrap();
-    assert!(std::fs::read_to_string(folder.path().join("all.nq")).unwrap().lines().count() > 100);
+    assert!(
+        std::fs::read_to_string(folder.path().join("all.nq"))
+            .unwrap()
+            .lines()
+            .count()
+            > 100
+    );
     assert!(reader.refresh().unwrap());
     assert_eq!(runs(&reader), 9);
 }
@@ -111,7 +136,9 @@ fn a_reader_waits_until_a_new_history_is_created() {
             let opened = loop {
                 match History::open_to_read(&dir) {
                     // Not even begun.
-                    Err(faults) if faults.iter().all(|fault| fault.code == "H003") => std::thread::yield_now(),
+                    Err(faults) if faults.iter().all(|fault| fault.code == "H003") => {
+                        std::thread::yield_now()
+                    }
                     other => break other,
                 }
             };
@@ -143,13 +170,22 @@ fn a_read_only_history_can_be_read_by_every_reading_command() {
     let folder = tempfile::tempdir().unwrap();
     let (dir, kept) = (folder.path().join("h"), folder.path().join("kept"));
     copy_made_history(&kept);
-    let run = History::open_to_read(&kept).unwrap().runs(&RunFilter::default()).unwrap().remove(0).run;
+    let run = History::open_to_read(&kept)
+        .unwrap()
+        .runs(&RunFilter::default())
+        .unwrap()
+        .remove(0)
+        .run;
     // Without its mirror, which commands can't write there.
     std::fs::remove_dir_all(kept.join("tables")).unwrap();
     let before = files(&kept);
     std::fs::create_dir(&dir).unwrap();
-    let mount =
-        |arguments: &[&str]| Command::new("mount").args(arguments).status().is_ok_and(|status| status.success());
+    let mount = |arguments: &[&str]| {
+        Command::new("mount")
+            .args(arguments)
+            .status()
+            .is_ok_and(|status| status.success())
+    };
     let (from, to) = (kept.display().to_string(), dir.display().to_string());
     if !mount(&["--bind", &from, &to]) || !mount(&["-o", "remount,bind,ro", &to]) {
         let _ = Command::new("umount").arg(&to).status();
@@ -170,7 +206,16 @@ fn a_run_starts_and_ends_beside_readers_in_a_loop() {
     let dir = folder.path().join("h");
     copy_made_history(&dir);
     let name = dir.display().to_string();
-    let arguments = ["run", "configs/quick.toml", "--runs", "3", "--jobs", "1", "--history", &name];
+    let arguments = [
+        "run",
+        "configs/quick.toml",
+        "--runs",
+        "3",
+        "--jobs",
+        "1",
+        "--history",
+        &name,
+    ];
     let mut writer = Command::new(env!("CARGO_BIN_EXE_actcheck"))
         .args(arguments)
         .current_dir(root())
@@ -180,7 +225,10 @@ fn a_run_starts_and_ends_beside_readers_in_a_loop() {
         .unwrap();
     let mut seen = Vec::new();
     let status = loop {
-        let listed = actcheck(folder.path(), &["list", "--history", "h", "--format", "csv"]);
+        let listed = actcheck(
+            folder.path(),
+            &["list", "--history", "h", "--format", "csv"],
+        );
         assert!(listed.status.success(), "{}", stderr(&listed));
         seen.push(stdout(&listed).lines().count() - 1);
         if let Some(status) = writer.try_wait().unwrap() {
@@ -192,7 +240,8 @@ fn a_run_starts_and_ends_beside_readers_in_a_loop() {
     assert_eq!(runs(&History::open_to_read(&dir).unwrap()), 7);
 }
 
-/// A reader loads the statements of a run from the journal when they are asked for: others may have more than the first one.
+/// A reader loads the statements of a run from the journal when they are asked for: others may have
+/// more than the first one.
 #[test]
 fn a_property_that_only_some_waiting_runs_have_is_found_in_these() {
     let folder = tempfile::tempdir().unwrap();
@@ -210,5 +259,8 @@ fn a_property_that_only_some_waiting_runs_have_is_found_in_these() {
     let newest = NewestJudgements::of(&reader);
     let found = |id: &str| newest.read(id, 1, std::slice::from_ref(&property)).unwrap();
     assert_eq!(found(&sample_run("k", 0).id), []);
-    assert_eq!(found(&sample_run("k", 1).id)[0].judgement, sample_run("k", 1).judgements[0][0]);
+    assert_eq!(
+        found(&sample_run("k", 1).id)[0].judgement,
+        sample_run("k", 1).judgements[0][0]
+    );
 }

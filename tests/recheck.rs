@@ -1,4 +1,5 @@
-//! Judging stored runs again: equal to simulating them again, without duplicates, partial writes or losses.
+//! Judging stored runs again: equal to simulating them again, without duplicates, partial writes or
+//! losses.
 
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -39,30 +40,54 @@ const NEWEST: &str = "SELECT ?index ?property ?outcome ?margin ?witness WHERE {
 const OWN: &str = "SELECT ?index ?property ?outcome ?margin ?witness WHERE {
     ?a earl:subject ?e ; earl:test ?property ; earl:result ?r . ?r act:outcome ?outcome ; act:witness ?witness .
     OPTIONAL { ?r act:margin ?margin } ?e act:ofRun/act:index ?index } ORDER BY ?index ?property";
-const RECHECKED: &str = "SELECT (COUNT(*) AS ?n) WHERE { GRAPH act:rechecked { ?a a earl:Assertion } }";
+const RECHECKED: &str =
+    "SELECT (COUNT(*) AS ?n) WHERE { GRAPH act:rechecked { ?a a earl:Assertion } }";
 
 fn add_property(folder: &Path) {
     std::fs::write(folder.join("rules/stays_upright.rls"), NEW_RULE).unwrap();
     let ontology = folder.join("ontology/actions.ttl");
-    std::fs::write(&ontology, std::fs::read_to_string(&ontology).unwrap() + NEW_ENTRY).unwrap();
+    std::fs::write(
+        &ontology,
+        std::fs::read_to_string(&ontology).unwrap() + NEW_ENTRY,
+    )
+    .unwrap();
 }
 
 /// The object must move farther than in any pick.
 fn change_rule(folder: &Path) {
-    edit(&folder.join("rules/moved_object.rls"), "?d > 0.02", "?d > 0.45");
-    edit(&folder.join("rules/moved_object.rls"), "?d - 0.02", "?d - 0.45");
+    edit(
+        &folder.join("rules/moved_object.rls"),
+        "?d > 0.02",
+        "?d > 0.45",
+    );
+    edit(
+        &folder.join("rules/moved_object.rls"),
+        "?d - 0.02",
+        "?d - 0.45",
+    );
 }
 
 fn ask(folder: &Path, history: &str, query: &str) -> String {
-    let output = actcheck(folder, &["query", "--history", history, "--format", "csv", query]);
+    let output = actcheck(
+        folder,
+        &["query", "--history", history, "--format", "csv", query],
+    );
     assert!(output.status.success(), "{}", stderr(&output));
     stdout(&output)
 }
 
 fn recheck_json(folder: &Path, arguments: &[&str]) -> (i32, Value) {
-    let output = actcheck(folder, &[&["recheck", "--history", "h", "--format", "json"], arguments].concat());
+    let output = actcheck(
+        folder,
+        &[
+            &["recheck", "--history", "h", "--format", "json"],
+            arguments,
+        ]
+        .concat(),
+    );
     let text = stdout(&output);
-    let json = serde_json::from_str(&text).unwrap_or_else(|e| panic!("{e}: {text}\n{}", stderr(&output)));
+    let json =
+        serde_json::from_str(&text).unwrap_or_else(|e| panic!("{e}: {text}\n{}", stderr(&output)));
     (output.status.code().unwrap(), json)
 }
 
@@ -70,7 +95,10 @@ fn recheck_json(folder: &Path, arguments: &[&str]) -> (i32, Value) {
 fn a_recheck_equals_a_new_simulation() {
     let project = project();
     let folder = project.path();
-    actcheck(folder, &["run", "configs/pick.toml", "--runs", "6", "--history", "h"]);
+    actcheck(
+        folder,
+        &["run", "configs/pick.toml", "--runs", "6", "--history", "h"],
+    );
     let own = ask(folder, "h", OWN);
     let listed = stdout(&actcheck(folder, &["list", "--history", "h"]));
     add_property(folder);
@@ -79,7 +107,11 @@ fn a_recheck_equals_a_new_simulation() {
     assert_eq!((code, &json["runs"]), (1, &Value::from(6)));
     let line = |name: &str| {
         let lines = json["properties"].as_array().unwrap();
-        lines.iter().find(|line| line["property"] == names::act(name)).unwrap().clone()
+        lines
+            .iter()
+            .find(|line| line["property"] == names::act(name))
+            .unwrap()
+            .clone()
     };
     assert_eq!(line("StaysUpright")["new"], 6);
     assert_eq!(line("CloseObject")["before"], line("CloseObject")["now"]);
@@ -87,16 +119,45 @@ fn a_recheck_equals_a_new_simulation() {
     assert!(changed > 0, "{json:#}");
     let changes = json["changes"].as_array().unwrap();
     assert_eq!(changes.len() as u64, 6 + changed);
-    let moved = changes.iter().find(|change| change["before"] == "passed").unwrap();
-    assert_eq!((&moved["now"], &moved["property"]), (&Value::from("failed"), &Value::from(names::act("MovedObject"))));
-    assert!(moved["why"].as_str().unwrap().starts_with("rule changed "), "{moved}");
+    let moved = changes
+        .iter()
+        .find(|change| change["before"] == "passed")
+        .unwrap();
+    assert_eq!(
+        (&moved["now"], &moved["property"]),
+        (
+            &Value::from("failed"),
+            &Value::from(names::act("MovedObject"))
+        )
+    );
+    assert!(
+        moved["why"].as_str().unwrap().starts_with("rule changed "),
+        "{moved}"
+    );
 
-    actcheck(folder, &["run", "configs/pick.toml", "--runs", "6", "--history", "again"]);
+    actcheck(
+        folder,
+        &[
+            "run",
+            "configs/pick.toml",
+            "--runs",
+            "6",
+            "--history",
+            "again",
+        ],
+    );
     let newest = ask(folder, "h", NEWEST);
     assert_eq!(newest.lines().count(), 1 + 6 * 6);
     assert_eq!(newest, ask(folder, "again", OWN));
-    assert_eq!(ask(folder, "h", OWN), own, "the campaign's own outcomes changed");
-    assert_eq!(stdout(&actcheck(folder, &["list", "--history", "h"])), listed);
+    assert_eq!(
+        ask(folder, "h", OWN),
+        own,
+        "the campaign's own outcomes changed"
+    );
+    assert_eq!(
+        stdout(&actcheck(folder, &["list", "--history", "h"])),
+        listed
+    );
 }
 
 /// Rules about time read the samples that the campaign judged, bit for bit.
@@ -104,22 +165,52 @@ fn a_recheck_equals_a_new_simulation() {
 fn a_recheck_by_formulas_equals_a_campaign_that_judges_them() {
     let project = project();
     let folder = project.path();
-    actcheck(folder, &["run", "configs/pick.toml", "--runs", "4", "--history", "h"]);
-    let judged = actcheck(folder, &["recheck", "--history", "h", "--ontology", "ontology/time.ttl"]);
+    actcheck(
+        folder,
+        &["run", "configs/pick.toml", "--runs", "4", "--history", "h"],
+    );
+    let judged = actcheck(
+        folder,
+        &[
+            "recheck",
+            "--history",
+            "h",
+            "--ontology",
+            "ontology/time.ttl",
+        ],
+    );
     assert!(judged.status.code() < Some(2), "{}", stderr(&judged));
-    edit(&folder.join("configs/pick.toml"), "../ontology/actions.ttl", "../ontology/time.ttl");
-    actcheck(folder, &["run", "configs/pick.toml", "--runs", "4", "--history", "again"]);
+    edit(
+        &folder.join("configs/pick.toml"),
+        "../ontology/actions.ttl",
+        "../ontology/time.ttl",
+    );
+    actcheck(
+        folder,
+        &[
+            "run",
+            "configs/pick.toml",
+            "--runs",
+            "4",
+            "--history",
+            "again",
+        ],
+    );
     let newest = ask(folder, "h", NEWEST);
     assert!(newest.lines().count() > 4 * 15, "{newest}");
     assert_eq!(newest, ask(folder, "again", OWN));
 }
 
-/// Holds, motions and phases come from the same samples, although a recheck by them reads no samples.
+/// Holds, motions and phases come from the same samples, although a recheck by them reads no
+/// samples.
 #[test]
 fn a_recheck_by_intervals_equals_a_campaign_that_judges_them() {
     let project = project();
     let folder = project.path();
-    actcheck(folder, &["run", "configs/pick.toml", "--runs", "3", "--history", "h"]);
+    actcheck(
+        folder,
+        &["run", "configs/pick.toml", "--runs", "3", "--history", "h"],
+    );
     let rules =
         "success(?h, ?from, ?to) :- parameter(act:pickObject, ?o), hold_interval(?h, ?o), interval(?h, ?from, ?to),
         phase_interval(?lift, \"lift\"), interval_within(?lift, ?h) .";
@@ -128,17 +219,36 @@ fn a_recheck_by_intervals_equals_a_campaign_that_judges_them() {
     let prefix = "PREFIX w: <https://w3id.org/actcheck/world#>\n";
     std::fs::write(folder.join("rules/moves.rq"), format!("{prefix}{query}")).unwrap();
     let property = |name: &str, file: &str| {
-        format!("act:{name} a act:Property ; rdfs:label \"{name}\" ; act:verifiedBy <../rules/{file}> .\n")
+        format!(
+            "act:{name} a act:Property ; rdfs:label \"{name}\" ; act:verifiedBy <../rules/{file}> .\n"
+        )
     };
     let entries = property("HeldInLift", "held_in_lift.rls") + &property("Moves", "moves.rq");
     let ontology = folder.join("ontology/actions.ttl");
     let text = std::fs::read_to_string(&ontology).unwrap() + &entries;
-    std::fs::write(&ontology, text + "act:Pick act:successProperty act:HeldInLift, act:Moves .\n").unwrap();
+    std::fs::write(
+        &ontology,
+        text + "act:Pick act:successProperty act:HeldInLift, act:Moves .\n",
+    )
+    .unwrap();
     let judged = actcheck(folder, &["recheck", "--history", "h"]);
     assert!(judged.status.code() < Some(2), "{}", stderr(&judged));
-    actcheck(folder, &["run", "configs/pick.toml", "--runs", "3", "--history", "again"]);
+    actcheck(
+        folder,
+        &[
+            "run",
+            "configs/pick.toml",
+            "--runs",
+            "3",
+            "--history",
+            "again",
+        ],
+    );
     let newest = ask(folder, "h", NEWEST);
-    assert!(newest.contains("Moves") && newest.contains("start ="), "{newest}");
+    assert!(
+        newest.contains("Moves") && newest.contains("start ="),
+        "{newest}"
+    );
     assert_eq!(newest, ask(folder, "again", OWN));
 }
 
@@ -146,10 +256,19 @@ fn a_recheck_by_intervals_equals_a_campaign_that_judges_them() {
 fn a_recheck_uses_current_or_older_rules_and_writes_no_duplicates() {
     let project = project();
     let folder = project.path();
-    actcheck(folder, &["run", "configs/pick.toml", "--runs", "4", "--history", "h"]);
+    actcheck(
+        folder,
+        &["run", "configs/pick.toml", "--runs", "4", "--history", "h"],
+    );
     let own = ask(folder, "h", OWN);
     let (_, json) = recheck_json(folder, &[]);
-    assert_eq!((json["changes"].as_array().unwrap().len(), ask(folder, "h", RECHECKED)), (0, "n\n0\n".to_owned()));
+    assert_eq!(
+        (
+            json["changes"].as_array().unwrap().len(),
+            ask(folder, "h", RECHECKED)
+        ),
+        (0, "n\n0\n".to_owned())
+    );
     for name in ["ontology", "rules"] {
         copy(&folder.join(name), &folder.join("old").join(name));
     }
@@ -159,7 +278,13 @@ fn a_recheck_uses_current_or_older_rules_and_writes_no_duplicates() {
     let count = ask(folder, "h", RECHECKED);
     assert_eq!(count, "n\n4\n");
     let (_, json) = recheck_json(folder, &["MovedObject"]);
-    assert_eq!((json["changes"].as_array().unwrap().len(), ask(folder, "h", RECHECKED)), (0, count));
+    assert_eq!(
+        (
+            json["changes"].as_array().unwrap().len(),
+            ask(folder, "h", RECHECKED)
+        ),
+        (0, count)
+    );
     assert_ne!(ask(folder, "h", NEWEST), own);
     for _ in 0..2 {
         recheck_json(folder, &["--as-of-rules", "old"]);
@@ -179,10 +304,24 @@ fn every_command_knows_a_property_and_an_outcome_after_a_recheck() {
     let folder = project.path();
     let said = |arguments: &[&str]| {
         let output = actcheck(folder, &[arguments, &["--history", "h"]].concat());
-        assert!(output.status.success(), "{arguments:?}: {}", stderr(&output));
+        assert!(
+            output.status.success(),
+            "{arguments:?}: {}",
+            stderr(&output)
+        );
         stdout(&output)
     };
-    let output = actcheck(folder, &["run", "configs/lone_glass.toml", "--runs", "2", "--history", "h"]);
+    let output = actcheck(
+        folder,
+        &[
+            "run",
+            "configs/lone_glass.toml",
+            "--runs",
+            "2",
+            "--history",
+            "h",
+        ],
+    );
     assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
     // The tables beside the history are made before it is judged again.
     said(&["analyse"]);
@@ -190,35 +329,69 @@ fn every_command_knows_a_property_and_an_outcome_after_a_recheck() {
     change_rule(folder);
     recheck_json(folder, &[]);
     let ontology = ["--ontology", "ontology/actions.ttl"];
-    let rules: Value = serde_json::from_str(&said(&[&["rules", "--format", "json"], &ontology[..]].concat())).unwrap();
+    let rules: Value = serde_json::from_str(&said(
+        &[&["rules", "--format", "json"], &ontology[..]].concat(),
+    ))
+    .unwrap();
     let counts = |name: &str| {
-        let row = rules.as_array().unwrap().iter().find(|row| row["property"] == name).unwrap();
+        let row = rules
+            .as_array()
+            .unwrap()
+            .iter()
+            .find(|row| row["property"] == name)
+            .unwrap();
         [&row["passed"], &row["failed"]].map(|count| count.as_u64().unwrap())
     };
     let (upright, moved) = (counts("StaysUpright"), counts("MovedObject"));
-    assert_eq!((upright[0] + upright[1], moved[0] + moved[1]), (2, 2), "{rules:#}");
-    assert!(moved[1] > 0, "every pick moves its object so far: {rules:#}");
+    assert_eq!(
+        (upright[0] + upright[1], moved[0] + moved[1]),
+        (2, 2),
+        "{rules:#}"
+    );
+    assert!(
+        moved[1] > 0,
+        "every pick moves its object so far: {rules:#}"
+    );
 
-    let list = said(&["list", "--property", "MovedObject", "--failed", "--format", "csv"]);
+    let list = said(&[
+        "list",
+        "--property",
+        "MovedObject",
+        "--failed",
+        "--format",
+        "csv",
+    ]);
     assert_eq!(list.lines().count() as u64, moved[1] + 1, "{list}");
     let run = list.lines().nth(1).unwrap().split(',').next().unwrap();
     let shown = said(&["show", run]);
-    assert!(shown.contains("StaysUpright") && shown.contains("MovedObject"), "{shown}");
     assert!(
-        shown.contains("judged again by `actcheck recheck`: MovedObject was passed, StaysUpright is new"),
+        shown.contains("StaysUpright") && shown.contains("MovedObject"),
+        "{shown}"
+    );
+    assert!(
+        shown.contains(
+            "judged again by `actcheck recheck`: MovedObject was passed, StaysUpright is new"
+        ),
         "{shown}"
     );
     assert!(said(&["why", run, "StaysUpright"]).contains("StaysUpright"));
     let markdown = said(&["report", "--markdown"]);
     assert!(
-        markdown.contains("| StaysUpright |") && markdown.contains(&format!(" ({} of 2) |", moved[0])),
+        markdown.contains("| StaysUpright |")
+            && markdown.contains(&format!(" ({} of 2) |", moved[0])),
         "{markdown}"
     );
     for name in ["StaysUpright", "MovedObject"] {
         let [passed, failed] = counts(name);
-        let found: Value = serde_json::from_str(&said(&["analyse", "--property", name, "--format", "json"])).unwrap();
+        let found: Value =
+            serde_json::from_str(&said(&["analyse", "--property", name, "--format", "json"]))
+                .unwrap();
         let outcomes = &found["properties"][0]["outcomes"];
-        assert_eq!([&outcomes["passed"], &outcomes["failed"]], [passed, failed], "{found:#}");
+        assert_eq!(
+            [&outcomes["passed"], &outcomes["failed"]],
+            [passed, failed],
+            "{found:#}"
+        );
     }
     assert!(said(&["health", "--integrity"]).contains("intact"));
 }
@@ -235,12 +408,27 @@ fn impossible_rechecks_are_refused_without_writes() {
         let output = actcheck(folder, &[&["recheck"], arguments].concat());
         let text = stderr(&output);
         assert_eq!(output.status.code(), Some(2), "{arguments:?} {text}");
-        wanted.iter().for_each(|wanted| assert!(text.contains(wanted), "no `{wanted}` in {text}"));
+        wanted
+            .iter()
+            .for_each(|wanted| assert!(text.contains(wanted), "no `{wanted}` in {text}"));
     };
-    fails(&["MovedObjekt", "Banana", "--history", "h"], &["X037", "did you mean `MovedObject`?", "`Banana`"]);
-    fails(&["--campaign", "kk", "--history", "h"], &["X033", "did you mean `k`?"]);
-    fails(&["--as-of-rules", "models", "--history", "h"], &["X032", "models"]);
-    edit(&folder.join("rules/close_object.rls"), "success(", "success((");
+    fails(
+        &["MovedObjekt", "Banana", "--history", "h"],
+        &["X037", "did you mean `MovedObject`?", "`Banana`"],
+    );
+    fails(
+        &["--campaign", "kk", "--history", "h"],
+        &["X033", "did you mean `k`?"],
+    );
+    fails(
+        &["--as-of-rules", "models", "--history", "h"],
+        &["X032", "models"],
+    );
+    edit(
+        &folder.join("rules/close_object.rls"),
+        "success(",
+        "success((",
+    );
     fails(&["MovedObject", "--history", "h"], &["close_object.rls"]);
     assert_eq!(ask(folder, "h", RECHECKED), "n\n0\n");
     drop(History::open(&folder.join("empty")).unwrap());
@@ -256,15 +444,25 @@ fn filled(runs: u64) -> (TempDir, History, RuleSet) {
     let history = History::open(&project.path().join("h")).unwrap();
     history.begin_campaign(&sample_campaign("k", 0)).unwrap();
     (0..runs).for_each(|index| history.commit(&sample_run("k", index)).unwrap());
-    let rules = RuleSet::prepare(&Files::Disk, &project.path().join("ontology/actions.ttl")).unwrap();
+    let rules =
+        RuleSet::prepare(&Files::Disk, &project.path().join("ontology/actions.ttl")).unwrap();
     (project, history, rules)
 }
 
 /// Judges everything in batches of four; stops after a given number of batches.
-fn judge(history: &History, rules: &RuleSet, jobs: usize, batches: usize) -> (RecheckEnd, Vec<Recheck>) {
+fn judge(
+    history: &History,
+    rules: &RuleSet,
+    jobs: usize,
+    batches: usize,
+) -> (RecheckEnd, Vec<Recheck>) {
     let stop = AtomicBool::new(false);
     let runs = history.runs(&RunFilter::default()).unwrap();
-    let options = RecheckOptions { jobs, batch: 4, at: "2026-08-02T12:00:00Z".to_owned() };
+    let options = RecheckOptions {
+        jobs,
+        batch: 4,
+        at: "2026-08-02T12:00:00Z".to_owned(),
+    };
     let (mut judged, mut seen) = (Vec::new(), 0);
     let end = recheck(
         history,
@@ -295,24 +493,44 @@ fn a_stopped_recheck_keeps_whole_batches_and_can_continue() {
     let (end, judged) = judge(&history, &rules, 2, 1);
     assert!(matches!(end.ending, Ending::Interrupted), "{end:?}");
     assert!(end.judged >= 4 && end.judged < 14, "{end:?}");
-    assert_eq!((judged.len() as u64, kept(&history)), (end.judged, end.judged));
+    assert_eq!(
+        (judged.len() as u64, kept(&history)),
+        (end.judged, end.judged)
+    );
     let (end, again) = judge(&history, &rules, 1, usize::MAX);
-    assert!(matches!(end.ending, Ending::Finished) && end.judged == 14, "{end:?}");
+    assert!(
+        matches!(end.ending, Ending::Finished) && end.judged == 14,
+        "{end:?}"
+    );
     assert_eq!(kept(&history), 14);
-    assert_eq!(again.iter().filter(|recheck| recheck.is_news()).count() as u64, 14 - judged.len() as u64);
+    assert_eq!(
+        again.iter().filter(|recheck| recheck.is_news()).count() as u64,
+        14 - judged.len() as u64
+    );
     let order: Vec<&str> = again.iter().map(|recheck| recheck.run.as_str()).collect();
-    assert_eq!(order, (1..=14).map(|number| format!("k-{number}")).collect::<Vec<_>>());
+    assert_eq!(
+        order,
+        (1..=14)
+            .map(|number| format!("k-{number}"))
+            .collect::<Vec<_>>()
+    );
 }
 
-/// New judgements go to the tables of the store together, at the end. Readers see them before, and so does the next owner
-/// if this one is killed.
+/// New judgements go to the tables of the store together, at the end. Readers see them before, and
+/// so does the next owner if this one is killed.
 #[test]
 fn judgements_that_are_not_in_tables_yet_are_read_and_survive_a_kill() {
     let (folder, history, rules) = filled(6);
     let rules = rules.only(&["StaysUpright".to_owned()]).unwrap();
     let runs = history.runs(&RunFilter::default()).unwrap();
-    let judged = |history: &History| judge_stored(history, &runs, &rules, 1, &AtomicBool::new(false)).unwrap().0;
-    history.commit_rechecks(&judged(&history), "2026-08-02T12:00:00Z").unwrap();
+    let judged = |history: &History| {
+        judge_stored(history, &runs, &rules, 1, &AtomicBool::new(false))
+            .unwrap()
+            .0
+    };
+    history
+        .commit_rechecks(&judged(&history), "2026-08-02T12:00:00Z")
+        .unwrap();
     assert!(folder.path().join("h/journal").exists());
     assert_eq!(kept(&History::open_to_read(history.dir()).unwrap()), 6);
     let left = folder.path().join("left");
@@ -343,12 +561,21 @@ fn broken_and_timed_out_actions_keep_their_outcomes() {
     record.trace.actions[0].end = ActionEnd::Broken("a pose is not a number".to_owned());
     record.facts = extract(&record.trace);
     record.status = RunStatus::Broken;
-    record.judgements[0].iter_mut().for_each(|judgement| judgement.outcome = Outcome::Broken);
+    record.judgements[0]
+        .iter_mut()
+        .for_each(|judgement| judgement.outcome = Outcome::Broken);
     history.commit(&record).unwrap();
     let (_, judged) = judge(&history, &rules, 1, usize::MAX);
-    let broken: Vec<&Recheck> = judged.iter().filter(|recheck| recheck.run == "k-8").collect();
+    let broken: Vec<&Recheck> = judged
+        .iter()
+        .filter(|recheck| recheck.run == "k-8")
+        .collect();
     assert_eq!(broken.len(), 6);
-    assert!(broken.iter().all(|recheck| recheck.now.outcome == Outcome::Broken));
+    assert!(
+        broken
+            .iter()
+            .all(|recheck| recheck.now.outcome == Outcome::Broken)
+    );
     let news: Vec<&&Recheck> = broken.iter().filter(|recheck| recheck.is_news()).collect();
     assert_eq!(news.len(), 1, "{news:?}");
     assert_eq!(news[0].now.property, names::act("StaysUpright"));
@@ -361,14 +588,28 @@ fn an_unreadable_run_does_not_stop_the_others() {
     std::fs::remove_file(folder.path().join("h/traces/k-3.trace")).unwrap();
     std::fs::write(folder.path().join("h/traces/k-5.trace"), "no trace").unwrap();
     let (end, judged) = judge(&history, &rules, 2, usize::MAX);
-    assert!(matches!(end.ending, Ending::Finished) && end.judged == 4, "{end:?}");
+    assert!(
+        matches!(end.ending, Ending::Finished) && end.judged == 4,
+        "{end:?}"
+    );
     let codes: Vec<&str> = end.faults.iter().map(|fault| fault.code).collect();
     assert_eq!(codes, ["H009", "H007"]);
-    assert!(judged.iter().all(|recheck| !["k-3", "k-5"].contains(&recheck.run.as_str())));
+    assert!(
+        judged
+            .iter()
+            .all(|recheck| !["k-3", "k-5"].contains(&recheck.run.as_str()))
+    );
     drop(history);
-    let output = actcheck(folder.path(), &["recheck", "--history", "h", "--format", "csv"]);
+    let output = actcheck(
+        folder.path(),
+        &["recheck", "--history", "h", "--format", "csv"],
+    );
     assert_eq!(output.status.code(), Some(2));
-    assert!(stderr(&output).contains("k-3") && stderr(&output).contains("k-5"), "{}", stderr(&output));
+    assert!(
+        stderr(&output).contains("k-3") && stderr(&output).contains("k-5"),
+        "{}",
+        stderr(&output)
+    );
 }
 
 #[test]
@@ -378,12 +619,23 @@ fn each_judgement_records_its_rules_and_time() {
     let query = "SELECT ?property ?at ?digest ?old WHERE { GRAPH act:rechecked { ?a earl:test ?property ;
         act:recheckedAt ?at ; earl:result/act:ruleDigest ?digest }
         OPTIONAL { GRAPH act:rechecked { ?a act:supersedes ?b } ?b earl:result/act:ruleDigest ?old } } ORDER BY ?property";
-    let Ok(QueryAnswer::Table { rows, .. }) = history.query(query) else { panic!("no table") };
+    let Ok(QueryAnswer::Table { rows, .. }) = history.query(query) else {
+        panic!("no table")
+    };
     assert_eq!(rows.len(), 6);
     for row in &rows {
         let property = row[0].as_ref().and_then(Term::as_iri).unwrap().to_owned();
-        assert!(row[1].as_ref().is_some_and(|at| at.to_string().contains("2026-08-02T12:00:00Z")), "{row:?}");
-        assert_eq!(row[3].is_some(), property != names::act("StaysUpright"), "{row:?}");
+        assert!(
+            row[1]
+                .as_ref()
+                .is_some_and(|at| at.to_string().contains("2026-08-02T12:00:00Z")),
+            "{row:?}"
+        );
+        assert_eq!(
+            row[3].is_some(),
+            property != names::act("StaysUpright"),
+            "{row:?}"
+        );
         assert_ne!(row[2], row[3]);
     }
 }

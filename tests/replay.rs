@@ -9,8 +9,21 @@ use crate::support::{actcheck, edit, project, stderr, stdout};
 
 /// The only campaign of a new history, with the given number of runs of the shipped pick.
 fn campaign(folder: &Path, runs: &str) -> String {
-    let output = actcheck(folder, &["run", "configs/pick.toml", "--runs", runs, "--history", "h", "--format", "json"]);
-    let json: Value = serde_json::from_str(&stdout(&output)).unwrap_or_else(|_| panic!("{}", stderr(&output)));
+    let output = actcheck(
+        folder,
+        &[
+            "run",
+            "configs/pick.toml",
+            "--runs",
+            runs,
+            "--history",
+            "h",
+            "--format",
+            "json",
+        ],
+    );
+    let json: Value =
+        serde_json::from_str(&stdout(&output)).unwrap_or_else(|_| panic!("{}", stderr(&output)));
     json["campaign"].as_str().unwrap().to_owned()
 }
 
@@ -18,7 +31,8 @@ fn replayed(folder: &Path, arguments: &[&str]) -> (i32, Value) {
     let mut all = vec!["replay", "--history", "h", "--format", "json"];
     all.extend(arguments);
     let output = actcheck(folder, &all);
-    let json = serde_json::from_str(&stdout(&output)).unwrap_or_else(|_| panic!("{}", stderr(&output)));
+    let json =
+        serde_json::from_str(&stdout(&output)).unwrap_or_else(|_| panic!("{}", stderr(&output)));
     (output.status.code().unwrap(), json)
 }
 
@@ -26,7 +40,10 @@ fn replayed(folder: &Path, arguments: &[&str]) -> (i32, Value) {
 fn replay_reproduces_stored_runs_in_a_new_process_with_any_number_of_workers() {
     let project = project();
     let id = campaign(project.path(), "6");
-    let (code, one) = replayed(project.path(), &["--campaign", &id, "--jobs", "1", "--exact"]);
+    let (code, one) = replayed(
+        project.path(),
+        &["--campaign", &id, "--jobs", "1", "--exact"],
+    );
     let (_, two) = replayed(project.path(), &["--campaign", &id, "--jobs", "2"]);
     assert_eq!(code, 0, "{one:#}");
     assert_eq!(one, two);
@@ -37,8 +54,15 @@ fn replay_reproduces_stored_runs_in_a_new_process_with_any_number_of_workers() {
         assert_eq!(run["outcomes"].as_array().unwrap().len(), 0, "{run:#}");
         assert_eq!(run["changes"].as_array().unwrap().len(), 0, "{run:#}");
     }
-    let text = actcheck(project.path(), &["replay", &format!("{id}-1"), "--history", "h"]);
-    assert!(stdout(&text).contains("the same, every bit of every state"), "{}", stdout(&text));
+    let text = actcheck(
+        project.path(),
+        &["replay", &format!("{id}-1"), "--history", "h"],
+    );
+    assert!(
+        stdout(&text).contains("the same, every bit of every state"),
+        "{}",
+        stdout(&text)
+    );
 }
 
 #[test]
@@ -46,17 +70,45 @@ fn random_runs_are_the_same_with_one_and_two_workers() {
     let project = looking();
     let arguments = ["run", "configs/look.toml", "--runs", "12", "--history", "h"];
     assert_ne!(actcheck(project.path(), &arguments).status.code(), Some(2));
-    let (code, one) = replayed(project.path(), &["--sample", "10", "--jobs", "1", "--exact"]);
-    let (_, two) = replayed(project.path(), &["--sample", "10", "--jobs", "2", "--exact"]);
+    let (code, one) = replayed(
+        project.path(),
+        &["--sample", "10", "--jobs", "1", "--exact"],
+    );
+    let (_, two) = replayed(
+        project.path(),
+        &["--sample", "10", "--jobs", "2", "--exact"],
+    );
     assert_eq!((code, &one), (0, &two), "{one:#}");
     let runs = one.as_array().unwrap();
     assert_eq!(runs.iter().filter(|run| run["same"] == true).count(), 10);
     let (_, other) = replayed(project.path(), &["--sample", "2", "--seed", "1"]);
-    let names = |list: &Value| list.as_array().unwrap().iter().map(|run| run["run"].clone()).collect::<Vec<_>>();
-    assert_ne!(names(&other), names(&replayed(project.path(), &["--sample", "2", "--seed", "2"]).1));
-    let digest = ["query", "SELECT ?d WHERE { ?c act:programDigest ?d }", "--history", "h", "--format", "csv"];
+    let names = |list: &Value| {
+        list.as_array()
+            .unwrap()
+            .iter()
+            .map(|run| run["run"].clone())
+            .collect::<Vec<_>>()
+    };
+    assert_ne!(
+        names(&other),
+        names(&replayed(project.path(), &["--sample", "2", "--seed", "2"]).1)
+    );
+    let digest = [
+        "query",
+        "SELECT ?d WHERE { ?c act:programDigest ?d }",
+        "--history",
+        "h",
+        "--format",
+        "csv",
+    ];
     let answer = stdout(&actcheck(project.path(), &digest));
-    assert!(answer.lines().nth(1).is_some_and(|digest| digest.len() == 32), "{answer}");
+    assert!(
+        answer
+            .lines()
+            .nth(1)
+            .is_some_and(|digest| digest.len() == 32),
+        "{answer}"
+    );
 }
 
 #[test]
@@ -64,20 +116,36 @@ fn a_changed_model_is_named_with_the_first_difference() {
     let project = project();
     let id = campaign(project.path(), "1");
     let run = format!("{id}-1");
-    edit(&project.path().join("models/objects/glass.toml"), "mass_kg = ", "mass_kg = 1");
+    edit(
+        &project.path().join("models/objects/glass.toml"),
+        "mass_kg = ",
+        "mass_kg = 1",
+    );
     let (code, json) = replayed(project.path(), &[&run, "--exact"]);
     assert_eq!(code, 1, "{json:#}");
     let replay = &json[0];
     assert_eq!(replay["same"], false);
     assert_eq!(replay["difference"]["body"], "glass_1", "{replay:#}");
     assert_eq!(replay["difference"]["quantity"], "mass", "{replay:#}");
-    assert!(replay["difference"]["by"].as_f64().unwrap() > 0.0, "{replay:#}");
+    assert!(
+        replay["difference"]["by"].as_f64().unwrap() > 0.0,
+        "{replay:#}"
+    );
     let changes = replay["changes"].as_array().unwrap();
     assert_eq!(changes.len(), 1, "{replay:#}");
-    assert_eq!((changes[0]["kind"].as_str(), changes[0]["name"].as_str()), (Some("model"), Some("glass")));
+    assert_eq!(
+        (changes[0]["kind"].as_str(), changes[0]["name"].as_str()),
+        (Some("model"), Some("glass"))
+    );
     assert_ne!(changes[0]["was"], changes[0]["is"]);
-    let text = stdout(&actcheck(project.path(), &["replay", &run, "--history", "h"]));
-    assert!(text.contains("mass of glass_1") && text.contains("changed since: model `glass`"), "{text}");
+    let text = stdout(&actcheck(
+        project.path(),
+        &["replay", &run, "--history", "h"],
+    ));
+    assert!(
+        text.contains("mass of glass_1") && text.contains("changed since: model `glass`"),
+        "{text}"
+    );
 }
 
 #[test]
@@ -88,13 +156,31 @@ fn mismatched_choices_are_refused_by_name_or_clamped() {
     std::fs::copy(project.path().join("configs/pick.toml"), &other).unwrap();
     edit(&other, "mass_scale = [0.7, 1.3]", "mass_scale = [2.0, 3.0]");
     let config = ["--config", "configs/other.toml"];
-    let exact = actcheck(project.path(), &["replay", &run, "--history", "h", config[0], config[1], "--exact"]);
+    let exact = actcheck(
+        project.path(),
+        &[
+            "replay",
+            &run,
+            "--history",
+            "h",
+            config[0],
+            config[1],
+            "--exact",
+        ],
+    );
     assert_eq!(exact.status.code(), Some(2));
-    assert!(stderr(&exact).contains("S042") && stderr(&exact).contains("target.mass_scale"), "{}", stderr(&exact));
+    assert!(
+        stderr(&exact).contains("S042") && stderr(&exact).contains("target.mass_scale"),
+        "{}",
+        stderr(&exact)
+    );
     let (code, json) = replayed(project.path(), &[&run, config[0], config[1], "--nearest"]);
     assert_eq!(code, 1, "{json:#}");
     let choices = json[0]["choices"].to_string();
-    assert!(choices.contains("`target.mass_scale` was") && choices.contains("is 2"), "{choices}");
+    assert!(
+        choices.contains("`target.mass_scale` was") && choices.contains("is 2"),
+        "{choices}"
+    );
     assert_eq!(json[0]["changes"][0]["kind"], "configuration", "{json:#}");
 }
 
@@ -112,9 +198,18 @@ fn other_rules_change_outcomes_but_not_the_trace() {
     .unwrap();
     let (code, json) = replayed(project.path(), &["--campaign", &id]);
     assert_eq!(code, 0, "{json:#}");
-    let changed: Vec<&Value> =
-        json.as_array().unwrap().iter().flat_map(|run| run["outcomes"].as_array().unwrap()).collect();
-    assert!(changed.iter().any(|change| change["was"] == "passed" && change["is"] == "failed"), "{json:#}");
+    let changed: Vec<&Value> = json
+        .as_array()
+        .unwrap()
+        .iter()
+        .flat_map(|run| run["outcomes"].as_array().unwrap())
+        .collect();
+    assert!(
+        changed
+            .iter()
+            .any(|change| change["was"] == "passed" && change["is"] == "failed"),
+        "{json:#}"
+    );
     assert_eq!(json[0]["changes"][0]["kind"], "rule", "{json:#}");
 }
 
@@ -124,12 +219,19 @@ fn runs_that_cannot_be_replayed_are_refused_with_the_reason() {
     // A shipped model would take the place of one of its name.
     let objects = project.path().join("models/objects");
     std::fs::rename(objects.join("glass.toml"), objects.join("tumbler.toml")).unwrap();
-    edit(&project.path().join("configs/pick.toml"), "[\"glass\"]", "[\"tumbler\"]");
+    edit(
+        &project.path().join("configs/pick.toml"),
+        "[\"glass\"]",
+        "[\"tumbler\"]",
+    );
     let run = format!("{}-1", campaign(project.path(), "1"));
     let unknown = actcheck(project.path(), &["replay", "zzzz-9", "--history", "h"]);
     assert_eq!(unknown.status.code(), Some(2));
     assert!(stderr(&unknown).contains("H008"), "{}", stderr(&unknown));
-    let none = actcheck(project.path(), &["replay", "--campaign", "zzzz", "--history", "h"]);
+    let none = actcheck(
+        project.path(),
+        &["replay", "--campaign", "zzzz", "--history", "h"],
+    );
     assert_eq!(none.status.code(), Some(2));
     assert!(stderr(&none).contains("H014"), "{}", stderr(&none));
     std::fs::remove_file(objects.join("tumbler.toml")).unwrap();

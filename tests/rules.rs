@@ -1,9 +1,10 @@
 //! Rule files over facts: every folder of `tests/rules/` is a case.
 //!
-//! A case holds `rules.rls` or `rules.rq` (or `shipped`, the name of a file in `rules/`), optionally its own
-//! libraries (`lib*.rls`; the default is the shipped ones), `facts.trig` with the graphs `act:before`, `act:after`,
-//! `act:during` and `act:parameters` (statements `act:pickObject act:value obj:…`), and `expected`: the findings, or
-//! the diagnostics. `UPDATE_EXPECT=1` rewrites `expected`.
+//! A case holds `rules.rls` or `rules.rq` (or `shipped`, the name of a file in `rules/`),
+//! optionally its own libraries (`lib*.rls`; the default is the shipped ones), `facts.trig` with
+//! the graphs `act:before`, `act:after`, `act:during` and `act:parameters` (statements
+//! `act:pickObject act:value obj:…`), and `expected`: the findings, or the diagnostics.
+//! `UPDATE_EXPECT=1` rewrites `expected`.
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -18,8 +19,13 @@ use crate::support::expected::assert_expected;
 pub const TESTED: &str = "http://actions#Tested";
 
 fn root() -> PathBuf {
-    // The package may be in another folder than the tests; the working directory of tests is the package's.
-    ["tests/rules", "../../main/tests/rules"].map(PathBuf::from).into_iter().find(|path| path.is_dir()).unwrap()
+    // The package may be in another folder than the tests; the working directory of tests is the
+    // package's.
+    ["tests/rules", "../../main/tests/rules"]
+        .map(PathBuf::from)
+        .into_iter()
+        .find(|path| path.is_dir())
+        .unwrap()
 }
 
 fn rule_file(path: &Path) -> RuleFile {
@@ -32,7 +38,10 @@ fn rule_file(path: &Path) -> RuleFile {
 pub fn ontology_of(case: &Path) -> Ontology {
     let mut ontology = shipped_ontology();
     let shipped = root().join("../../rules");
-    let mut libraries: Vec<PathBuf> = list(case).into_iter().filter(|path| is_library(path)).collect();
+    let mut libraries: Vec<PathBuf> = list(case)
+        .into_iter()
+        .filter(|path| is_library(path))
+        .collect();
     if libraries.is_empty() {
         libraries = list(&shipped.join("lib"))
             .into_iter()
@@ -43,12 +52,18 @@ pub fn ontology_of(case: &Path) -> Ontology {
     ontology.libraries = libraries.iter().map(|path| rule_file(path)).collect();
     let rule = match std::fs::read_to_string(case.join("shipped")) {
         Ok(name) => rule_file(&shipped.join(name.trim())),
-        Err(_) => {
-            rule_file(&["rules.rls", "rules.rq"].map(|name| case.join(name)).into_iter().find(|p| p.is_file()).unwrap())
-        }
+        Err(_) => rule_file(
+            &["rules.rls", "rules.rq"]
+                .map(|name| case.join(name))
+                .into_iter()
+                .find(|p| p.is_file())
+                .unwrap(),
+        ),
     };
-    let of_shipped =
-        ontology.properties.values().find(|property| property.rule.path.ends_with(&format!("/{}", rule.path)));
+    let of_shipped = ontology
+        .properties
+        .values()
+        .find(|property| property.rule.path.ends_with(&format!("/{}", rule.path)));
     let unit = of_shipped.map_or(Some("m".to_owned()), |property| property.unit.clone());
     ontology.properties = tested(rule, unit);
     ontology
@@ -73,7 +88,10 @@ fn is_library(path: &Path) -> bool {
 }
 
 fn list(folder: &Path) -> Vec<PathBuf> {
-    let mut paths: Vec<PathBuf> = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();
+    let mut paths: Vec<PathBuf> = std::fs::read_dir(folder)
+        .unwrap()
+        .map(|entry| entry.unwrap().path())
+        .collect();
     paths.sort();
     paths
 }
@@ -94,7 +112,9 @@ fn term(term: &oxigraph::model::Term) -> Term {
 
 /// Converts a term; a literal keeps its language, its datatype, and a form that is not canonical.
 fn exact(of: &oxigraph::model::Term) -> Term {
-    let oxigraph::model::Term::Literal(literal) = of else { return term(of) };
+    let oxigraph::model::Term::Literal(literal) = of else {
+        return term(of);
+    };
     let (text, datatype) = (literal.value(), literal.datatype().as_str());
     if let Some(tag) = literal.language() {
         return Term::LangString(text.into(), tag.into());
@@ -117,13 +137,22 @@ pub fn facts_of(case: &Path) -> RunFacts {
         parameters: vec![vec![]],
         ..Default::default()
     };
-    let prefixes: String =
-        names::PREFIXES.iter().map(|(prefix, iri)| format!("@prefix {prefix}: <{iri}> .\n")).collect();
+    let prefixes: String = names::PREFIXES
+        .iter()
+        .map(|(prefix, iri)| format!("@prefix {prefix}: <{iri}> .\n"))
+        .collect();
     let text = prefixes + &std::fs::read_to_string(case.join("facts.trig")).unwrap_or_default();
-    for quad in oxigraph::io::RdfParser::from_format(oxigraph::io::RdfFormat::TriG).for_slice(&text) {
+    for quad in oxigraph::io::RdfParser::from_format(oxigraph::io::RdfFormat::TriG).for_slice(&text)
+    {
         let quad = quad.unwrap();
-        let parts = [quad.subject.into(), quad.predicate.into(), quad.object].map(|t| facts.terms.intern(term(&t)));
-        match quad.graph_name.to_string().trim_matches(['<', '>']).strip_prefix(names::ACT) {
+        let parts = [quad.subject.into(), quad.predicate.into(), quad.object]
+            .map(|t| facts.terms.intern(term(&t)));
+        match quad
+            .graph_name
+            .to_string()
+            .trim_matches(['<', '>'])
+            .strip_prefix(names::ACT)
+        {
             Some("before") => facts.snapshots[0].push(parts),
             Some("after") => facts.snapshots[1].push(parts),
             Some("during") => facts.during[0].push(parts),
@@ -131,7 +160,11 @@ pub fn facts_of(case: &Path) -> RunFacts {
             other => panic!("unknown graph {other:?}"),
         }
     }
-    facts.snapshots.iter_mut().chain(&mut facts.during).for_each(|triples| triples.sort_unstable());
+    facts
+        .snapshots
+        .iter_mut()
+        .chain(&mut facts.during)
+        .for_each(|triples| triples.sort_unstable());
     facts
 }
 
@@ -148,7 +181,11 @@ fn shown(findings: &Findings) -> String {
         writeln!(out, "because: {because}").unwrap();
     }
     for row in &findings.witness {
-        let values: Vec<String> = row.values.iter().map(|(name, term)| format!("{name}={term}")).collect();
+        let values: Vec<String> = row
+            .values
+            .iter()
+            .map(|(name, term)| format!("{name}={term}"))
+            .collect();
         writeln!(out, "{}({})", row.predicate, values.join(", ")).unwrap();
     }
     if findings.witness_count > findings.witness.len() {
@@ -158,8 +195,14 @@ fn shown(findings: &Findings) -> String {
 }
 
 fn judged(book: &RuleBook, facts: &ActionFacts<'_>) -> Result<Findings, RuleFault> {
-    let budget = Budget { tuples: 100_000, secs: 2.0, ..Budget::default() };
-    book.judge(facts, &[TESTED.to_owned()], &budget).remove(TESTED).unwrap()
+    let budget = Budget {
+        tuples: 100_000,
+        secs: 2.0,
+        ..Budget::default()
+    };
+    book.judge(facts, &[TESTED.to_owned()], &budget)
+        .remove(TESTED)
+        .unwrap()
 }
 
 fn outcome(case: &Path) -> String {
@@ -178,12 +221,19 @@ fn outcome(case: &Path) -> String {
 }
 
 pub fn cases() -> Vec<PathBuf> {
-    list(&root()).into_iter().filter(|path| path.is_dir()).collect()
+    list(&root())
+        .into_iter()
+        .filter(|path| path.is_dir())
+        .collect()
 }
 
 #[test]
 fn every_case_gives_its_expected_findings() {
-    assert_expected(cases().iter().map(|case| (case.join("expected"), outcome(case))));
+    assert_expected(
+        cases()
+            .iter()
+            .map(|case| (case.join("expected"), outcome(case))),
+    );
 }
 
 /// Each shipped property, and each case that has a file `explained`.
@@ -194,18 +244,26 @@ fn every_explanation_is_as_expected() {
     assert_expected(cases.iter().map(|case| {
         let book = RuleBook::prepare(&ontology_of(case)).unwrap();
         let facts = facts_of(case);
-        let explanation = book.explain(&facts.action(0).unwrap(), TESTED, &Budget::default()).unwrap();
+        let explanation = book
+            .explain(&facts.action(0).unwrap(), TESTED, &Budget::default())
+            .unwrap();
         let text = explanation.to_text();
         assert!(explanation.to_dot().ends_with("}\n"));
-        assert_eq!(explanation.to_json()["holds"], explanation.findings.unwrap().holds);
+        assert_eq!(
+            explanation.to_json()["holds"],
+            explanation.findings.unwrap().holds
+        );
         (case.join("explained"), text)
     }));
 }
 
-/// Statements of one line, parsed as Turtle; a final statement with a literal as subject is parsed separately.
+/// Statements of one line, parsed as Turtle; a final statement with a literal as subject is parsed
+/// separately.
 fn statements(text: &str) -> Vec<[Term; 3]> {
-    let mut prefixes: String =
-        names::PREFIXES.iter().map(|(prefix, iri)| format!("@prefix {prefix}: <{iri}> .\n")).collect();
+    let mut prefixes: String = names::PREFIXES
+        .iter()
+        .map(|(prefix, iri)| format!("@prefix {prefix}: <{iri}> .\n"))
+        .collect();
     prefixes.push_str("@prefix : <https://example.org/> .\n");
     let text = format!("{prefixes}{text} .");
     oxigraph::io::RdfParser::from_format(oxigraph::io::RdfFormat::Turtle)
@@ -220,7 +278,9 @@ fn statements(text: &str) -> Vec<[Term; 3]> {
 fn owl(triples: &[[Term; 3]]) -> Program {
     let text = std::fs::read_to_string(root().join("../../rules/lib/owl-rl.rls")).unwrap();
     let mut program = Program::load(&Source::new("owl-rl.rls", text), Path::new("")).unwrap();
-    program.add_facts("triple", triples.iter().map(|triple| triple.as_slice())).unwrap();
+    program
+        .add_facts("triple", triples.iter().map(|triple| triple.as_slice()))
+        .unwrap();
     program
 }
 
@@ -229,27 +289,58 @@ fn every_owl_2_rl_rule_derives_its_conclusions() {
     let text = std::fs::read_to_string(root().join("owl-rl.txt")).unwrap();
     let rules = std::fs::read_to_string(root().join("../../rules/lib/owl-rl.rls")).unwrap();
     let mut tested = 0;
-    for line in text.lines().filter(|line| !line.starts_with('#') && !line.is_empty()) {
-        let [name, given, wanted] = line.split(" | ").collect::<Vec<_>>()[..] else { panic!("{line}") };
+    for line in text
+        .lines()
+        .filter(|line| !line.starts_with('#') && !line.is_empty())
+    {
+        let [name, given, wanted] = line.split(" | ").collect::<Vec<_>>()[..] else {
+            panic!("{line}")
+        };
         let given = statements(given);
         let program = owl(&given);
-        assert!(rules.contains(&format!("#[name(\"{name}\")]")), "{name} is not a rule");
+        assert!(
+            rules.contains(&format!("#[name(\"{name}\")]")),
+            "{name} is not a rule"
+        );
         if wanted == "contradiction" {
-            let found = program.explain(&format!("contradiction(\"{name}\", _, _)"), &Budget::default()).unwrap();
+            let found = program
+                .explain(
+                    &format!("contradiction(\"{name}\", _, _)"),
+                    &Budget::default(),
+                )
+                .unwrap();
             assert!(!found.proofs.is_empty(), "{line}");
-            assert!(owl_closure(&given).unwrap_err().to_string().contains(name), "{line}");
+            assert!(
+                owl_closure(&given).unwrap_err().to_string().contains(name),
+                "{line}"
+            );
             for left_out in 0..given.len() {
                 // Statements that make up a list or a double value stay.
-                let rest: Vec<_> =
-                    given.iter().enumerate().filter(|(idx, _)| *idx != left_out).map(|(_, t)| t.clone()).collect();
+                let rest: Vec<_> = given
+                    .iter()
+                    .enumerate()
+                    .filter(|(idx, _)| *idx != left_out)
+                    .map(|(_, t)| t.clone())
+                    .collect();
                 let part_of_list = given[left_out][1].to_string().contains("rdf:");
-                assert!(part_of_list || owl_closure(&rest).is_ok(), "{line} without {:?}", given[left_out]);
+                assert!(
+                    part_of_list || owl_closure(&rest).is_ok(),
+                    "{line} without {:?}",
+                    given[left_out]
+                );
             }
         } else {
-            let goal = match wanted.split_once(" a ").or(wanted.split_once(" owl:sameAs ")) {
+            let goal = match wanted
+                .split_once(" a ")
+                .or(wanted.split_once(" owl:sameAs "))
+            {
                 // Turtle does not allow a literal as subject.
                 Some(("1", object)) => {
-                    let property = if wanted.contains(" a ") { "rdf:type" } else { "owl:sameAs" };
+                    let property = if wanted.contains(" a ") {
+                        "rdf:type"
+                    } else {
+                        "owl:sameAs"
+                    };
                     format!("t(1, {property}, {object})")
                 }
                 _ => {
@@ -258,17 +349,27 @@ fn every_owl_2_rl_rule_derives_its_conclusions() {
                 }
             };
             let found = program.explain(&goal, &Budget::default()).unwrap();
-            let [proof] = found.proofs.as_slice() else { panic!("{line}: {}", found.to_text()) };
-            // Most triples of the closure are first those that the rules for paths and equal things continue.
+            let [proof] = found.proofs.as_slice() else {
+                panic!("{line}: {}", found.to_text())
+            };
+            // Most triples of the closure are first those that the rules for paths and equal things
+            // continue.
             let support = match &proof.support {
-                Support::Rule { rule, premises } if rule.name.is_none() => match premises.as_slice() {
-                    [Premise::Proof(only)] => &only.support,
-                    _ => &proof.support,
-                },
+                Support::Rule { rule, premises } if rule.name.is_none() => {
+                    match premises.as_slice() {
+                        [Premise::Proof(only)] => &only.support,
+                        _ => &proof.support,
+                    }
+                }
                 support => support,
             };
             if let Support::Rule { rule, .. } = support {
-                assert!(rule.name.as_deref() == Some(name), "{line}: by {:?}\n{}", rule.name, found.to_text());
+                assert!(
+                    rule.name.as_deref() == Some(name),
+                    "{line}: by {:?}\n{}",
+                    rule.name,
+                    found.to_text()
+                );
             }
         }
         tested += 1;
@@ -281,10 +382,12 @@ fn every_owl_2_rl_rule_derives_its_conclusions() {
     assert_eq!(tested, named.len());
 }
 
-/// Literals are compared by value and checked against their range, also as the ontology's reader returns them.
+/// Literals are compared by value and checked against their range, also as the ontology's reader
+/// returns them.
 #[test]
 fn owl_compares_literals_by_value() {
-    let functional = |a: &str, b: &str| format!(":p a owl:FunctionalProperty . :a :p {a} . :a :p {b}");
+    let functional =
+        |a: &str, b: &str| format!(":p a owl:FunctionalProperty . :a :p {a} . :a :p {b}");
     let ranged = |range: &str, value: &str| format!(":p rdfs:range {range} . :a :p {value}");
     for (text, consistent) in [
         (functional("\"a\"", "\"a\"^^xsd:token"), true),
@@ -348,10 +451,14 @@ fn owl_compares_literals_by_value() {
 #[test]
 fn an_inconsistent_ontology_is_refused_with_the_proof() {
     let mut ontology = ontology_of(&root().join("moved_object_passes"));
-    ontology.triples.extend(statements("w:Body owl:disjointWith w:Robot . w:robot a w:Body"));
+    ontology.triples.extend(statements(
+        "w:Body owl:disjointWith w:Robot . w:robot a w:Body",
+    ));
     let faults = RuleBook::prepare(&ontology).unwrap_err().to_string();
     assert!(
-        faults.contains("R080") && faults.contains("cax-dw") && faults.contains("t(w:robot, rdf:type, w:Body)"),
+        faults.contains("R080")
+            && faults.contains("cax-dw")
+            && faults.contains("t(w:robot, rdf:type, w:Body)"),
         "{faults}"
     );
 }
@@ -374,7 +481,9 @@ fn examples() -> Vec<(String, String)> {
 /// Without one of the rules for the other order, a library reads one side.
 #[test]
 fn shipped_rules_read_both_sides_of_contacts_and_a_lost_one_is_noticed() {
-    let load = |name: &str| ontology::load(&Files::Disk, &root().join("../../ontology").join(name)).unwrap();
+    let load = |name: &str| {
+        ontology::load(&Files::Disk, &root().join("../../ontology").join(name)).unwrap()
+    };
     let one_sided = |ontology: &Ontology| {
         let book = RuleBook::prepare(ontology).unwrap();
         book.warnings()
@@ -398,7 +507,11 @@ fn shipped_rules_read_both_sides_of_contacts_and_a_lost_one_is_noticed() {
             let text = &library.source.text;
             let Some(at) = text.find(lost) else { continue };
             // From the line that begins a rule to its end.
-            let start = if lost.starts_with(' ') { text[..at - 1].rfind('\n').unwrap() + 1 } else { at };
+            let start = if lost.starts_with(' ') {
+                text[..at - 1].rfind('\n').unwrap() + 1
+            } else {
+                at
+            };
             let end = at + text[at..].find(" .\n").unwrap() + 3;
             let text = format!("{}{}", &text[..start], &text[end..]);
             *library = RuleFile::new(Source::new(library.source.name.to_string(), text));
@@ -416,13 +529,19 @@ fn every_example_of_the_readme_runs() {
     let mut counts = std::collections::BTreeMap::new();
     for (words, text) in examples() {
         *counts.entry(words.clone()).or_insert(0) += 1;
-        let ending = if words.starts_with("sparql") { "rq" } else { "rls" };
-        let file = |name: &str| RuleFile::new(Source::new(format!("{name}.{ending}"), text.clone()));
+        let ending = if words.starts_with("sparql") {
+            "rq"
+        } else {
+            "rls"
+        };
+        let file =
+            |name: &str| RuleFile::new(Source::new(format!("{name}.{ending}"), text.clone()));
         let mut ontology = shipped_ontology();
         match words.as_str() {
             "prolog property" | "sparql property" => {
                 ontology.properties = tested(file("example"), Some("m".to_owned()));
-                let book = RuleBook::prepare(&ontology).unwrap_or_else(|faults| panic!("{faults}\n{text}"));
+                let book = RuleBook::prepare(&ontology)
+                    .unwrap_or_else(|faults| panic!("{faults}\n{text}"));
                 let findings = judged(&book, &facts.action(0).unwrap()).unwrap();
                 assert!(
                     findings.holds && book.warnings().is_empty(),
@@ -436,22 +555,59 @@ fn every_example_of_the_readme_runs() {
                 assert!(RuleBook::prepare(&ontology).is_ok());
             }
             "prolog program" => {
-                let program = Program::load(&Source::new("example", text.clone()), Path::new("")).unwrap();
-                let closure = program.close(actcheck::rules::standalone::Engine::Fast, &Budget::default()).unwrap();
-                assert_eq!(closure.tuples("whole"), [[Term::iri("https://example.org/set")]]);
+                let program =
+                    Program::load(&Source::new("example", text.clone()), Path::new("")).unwrap();
+                let closure = program
+                    .close(
+                        actcheck::rules::standalone::Engine::Fast,
+                        &Budget::default(),
+                    )
+                    .unwrap();
+                assert_eq!(
+                    closure.tuples("whole"),
+                    [[Term::iri("https://example.org/set")]]
+                );
                 assert_eq!(closure.tuples("told"), [[Term::string("set has 3 parts")]]);
                 assert!(program.warnings.is_empty(), "{}", program.warnings);
             }
             "prolog program with new things" => {
-                let program = Program::load(&Source::new("example", text.clone()), Path::new("")).unwrap();
-                let closure = program.close(actcheck::rules::standalone::Engine::Fast, &Budget::default()).unwrap();
-                let shown = |tuple: Vec<Term>| tuple.iter().map(Term::to_string).collect::<Vec<_>>().join(", ");
+                let program =
+                    Program::load(&Source::new("example", text.clone()), Path::new("")).unwrap();
+                let closure = program
+                    .close(
+                        actcheck::rules::standalone::Engine::Fast,
+                        &Budget::default(),
+                    )
+                    .unwrap();
+                let shown = |tuple: Vec<Term>| {
+                    tuple
+                        .iter()
+                        .map(Term::to_string)
+                        .collect::<Vec<_>>()
+                        .join(", ")
+                };
                 let parts: Vec<String> = closure.tuples("part").into_iter().map(shown).collect();
-                assert_eq!(parts, ["_:0, \"cup\"", "_:0, \"plate\"", "_:1, \"plate\"", "_:1, \"spoon\""]);
+                assert_eq!(
+                    parts,
+                    [
+                        "_:0, \"cup\"",
+                        "_:0, \"plate\"",
+                        "_:1, \"plate\"",
+                        "_:1, \"spoon\""
+                    ]
+                );
                 assert_eq!(closure.tuples("contacts"), [[Term::Integer(2)]]);
                 assert!(program.warnings.is_empty(), "{}", program.warnings);
             }
-            "turtle" => assert_eq!(statements(text.replace("<..", "<file:").trim_end().trim_end_matches('.')).len(), 6),
+            "turtle" => assert_eq!(
+                statements(
+                    text.replace("<..", "<file:")
+                        .trim_end()
+                        .trim_end_matches('.')
+                )
+                .len(),
+                6
+            ),
             "text" => {}
             other => panic!("what is {other}?"),
         }
@@ -463,8 +619,10 @@ fn every_example_of_the_readme_runs() {
 #[test]
 fn hostile_texts_are_handled_in_bounded_time() {
     let long_chain = format!("p(1) . q(?x) :- p(?y), ?x = {}1 .", "?y + ".repeat(20_000));
-    let many_rules: String =
-        (0..1000).map(|n| format!("p{}(?x) :- p{n}(?x) .\n", n + 1)).collect::<String>() + "p0(1) .";
+    let many_rules: String = (0..1000)
+        .map(|n| format!("p{}(?x) :- p{n}(?x) .\n", n + 1))
+        .collect::<String>()
+        + "p0(1) .";
     let texts = [
         long_chain,
         many_rules,
@@ -485,8 +643,15 @@ fn hostile_texts_are_handled_in_bounded_time() {
         let started = std::time::Instant::now();
         let start: String = text.chars().take(40).collect();
         if let Ok(program) = Program::load(&Source::new("hostile.rls", text), Path::new("")) {
-            let _ = program.close(actcheck::rules::standalone::Engine::Fast, &Budget::default());
+            let _ = program.close(
+                actcheck::rules::standalone::Engine::Fast,
+                &Budget::default(),
+            );
         }
-        assert!(started.elapsed().as_secs() < 20, "{start} took {:?}", started.elapsed());
+        assert!(
+            started.elapsed().as_secs() < 20,
+            "{start} took {:?}",
+            started.elapsed()
+        );
     }
 }

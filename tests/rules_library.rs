@@ -3,7 +3,8 @@
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// Returns the target folder of this test program, in which the compiled dependencies can be reused.
+/// Returns the target folder of this test program, in which the compiled dependencies can be
+/// reused.
 fn target() -> PathBuf {
     let program = std::env::current_exe().unwrap();
     // `<target>/release/deps/all-…`
@@ -17,12 +18,15 @@ fn a_program_outside_the_workspace_judges_and_explains() {
         .args(["run", "--quiet", "--locked", "--offline", "--manifest-path"])
         .arg(&manifest)
         .env("CARGO_TARGET_DIR", target())
-        // `.ci/timed` sets it for the test program. Build scripts would notice it and rebuild dependencies, here and in
-        // the next build.
+        // `.ci/timed` sets it for the test program. Build scripts would notice it and rebuild
+        // dependencies, here and in the next build.
         .env_remove("RUSTC_BOOTSTRAP")
         .output()
         .unwrap();
-    let (out, err) = (String::from_utf8_lossy(&run.stdout), String::from_utf8_lossy(&run.stderr));
+    let (out, err) = (
+        String::from_utf8_lossy(&run.stdout),
+        String::from_utf8_lossy(&run.stderr),
+    );
     assert!(run.status.success(), "{err}");
     let expected = "\
 failed: violation(glass = <http://example.org/glass2>)

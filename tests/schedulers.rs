@@ -1,5 +1,5 @@
-//! Launches on schedulers: their files, and substitutes for their commands that run the shards as processes. The substitutes
-//! are in `tests/data/launch/schedulers`.
+//! Launches on schedulers: their files, and substitutes for their commands that run the shards as
+//! processes. The substitutes are in `tests/data/launch/schedulers`.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -14,9 +14,23 @@ use crate::support::expected::assert_expected;
 use crate::support::look::looking;
 use crate::support::{actcheck, root, signal, stderr, stdout};
 
-const LAUNCH: [&str; 8] = ["launch", "configs/look.toml", "--runs", "12", "--shards", "4", "--history", "parts"];
+const LAUNCH: [&str; 8] = [
+    "launch",
+    "configs/look.toml",
+    "--runs",
+    "12",
+    "--shards",
+    "4",
+    "--history",
+    "parts",
+];
 const SLURM: [&str; 4] = ["--on", "slurm", "--resources", "cpus=1"];
-const KUBERNETES: [&str; 4] = ["--on", "kubernetes", "--resources", "image=actcheck:0.1.0,volume=projects"];
+const KUBERNETES: [&str; 4] = [
+    "--on",
+    "kubernetes",
+    "--resources",
+    "image=actcheck:0.1.0,volume=projects",
+];
 const RAY: [&str; 4] = ["--on", "ray", "--resources", "cpus=1"];
 
 fn data() -> PathBuf {
@@ -33,8 +47,15 @@ impl Site {
     fn new() -> Self {
         let state = tempfile::tempdir().unwrap();
         // The image of the pods has actcheck on its search path.
-        std::os::unix::fs::symlink(env!("CARGO_BIN_EXE_actcheck"), state.path().join("actcheck")).unwrap();
-        Self { project: looking(), state }
+        std::os::unix::fs::symlink(
+            env!("CARGO_BIN_EXE_actcheck"),
+            state.path().join("actcheck"),
+        )
+        .unwrap();
+        Self {
+            project: looking(),
+            state,
+        }
     }
 
     fn folder(&self) -> &Path {
@@ -44,9 +65,21 @@ impl Site {
     fn command(&self, on: &[&str]) -> Command {
         let mut command = Command::new(env!("CARGO_BIN_EXE_actcheck"));
         let fakes = data().join("schedulers");
-        let path = format!("{}:{}:{}", fakes.display(), self.state.path().display(), std::env::var("PATH").unwrap());
-        command.args(LAUNCH).args(on).current_dir(self.folder()).env("NO_COLOR", "1").env("PATH", path);
-        command.env("SCHEDULER", self.state.path()).env("PYTHONPATH", fakes.join("ray"));
+        let path = format!(
+            "{}:{}:{}",
+            fakes.display(),
+            self.state.path().display(),
+            std::env::var("PATH").unwrap()
+        );
+        command
+            .args(LAUNCH)
+            .args(on)
+            .current_dir(self.folder())
+            .env("NO_COLOR", "1")
+            .env("PATH", path);
+        command
+            .env("SCHEDULER", self.state.path())
+            .env("PYTHONPATH", fakes.join("ray"));
         command.env("PYTHONDONTWRITEBYTECODE", "1");
         command
     }
@@ -56,7 +89,11 @@ impl Site {
     }
 
     fn start(&self, on: &[&str]) -> Child {
-        self.command(on).stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap()
+        self.command(on)
+            .stdout(Stdio::null())
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap()
     }
 
     /// Loses a task in its middle.
@@ -70,15 +107,37 @@ impl Site {
 
     /// Columns of `actcheck list` without the ids: trace digests, scores and counts of outcomes.
     fn listed(&self, history: &str) -> Vec<String> {
-        let output = actcheck(self.folder(), &["list", "--history", history, "--format", "csv"]);
+        let output = actcheck(
+            self.folder(),
+            &["list", "--history", history, "--format", "csv"],
+        );
         assert!(output.status.success(), "{}", stderr(&output));
-        stdout(&output).lines().skip(1).map(|line| line.split_once(',').unwrap().1.to_owned()).collect()
+        stdout(&output)
+            .lines()
+            .skip(1)
+            .map(|line| line.split_once(',').unwrap().1.to_owned())
+            .collect()
     }
 
     /// The launch must give the results of one campaign.
     fn must_equal_whole(&self, output: &Output) {
-        let whole = actcheck(self.folder(), &["run", "configs/look.toml", "--runs", "12", "--history", "whole"]);
-        assert_eq!(output.status.code(), whole.status.code(), "{}", stderr(output));
+        let whole = actcheck(
+            self.folder(),
+            &[
+                "run",
+                "configs/look.toml",
+                "--runs",
+                "12",
+                "--history",
+                "whole",
+            ],
+        );
+        assert_eq!(
+            output.status.code(),
+            whole.status.code(),
+            "{}",
+            stderr(output)
+        );
         assert_eq!(self.listed("parts"), self.listed("whole"));
         assert_eq!(self.listed("parts").len(), 12);
         assert!(!self.folder().join("parts.launch").exists());
@@ -88,7 +147,10 @@ impl Site {
 fn until(condition: impl Fn() -> bool) {
     let began = Instant::now();
     while !condition() {
-        assert!(began.elapsed() < Duration::from_secs(60), "nothing happened");
+        assert!(
+            began.elapsed() < Duration::from_secs(60),
+            "nothing happened"
+        );
         std::thread::sleep(Duration::from_millis(5));
     }
 }
@@ -108,13 +170,21 @@ fn a_slurm_array_equals_one_campaign_and_a_lost_task_runs_again() {
     let output = site.launch(&SLURM);
     site.must_equal_whole(&output);
     let said = stderr(&output);
-    assert!(said.contains("4 shards are job 101 of Slurm; `scancel 101` ends it"), "{said}");
+    assert!(
+        said.contains("4 shards are job 101 of Slurm; `scancel 101` ends it"),
+        "{said}"
+    );
     if said.contains("job 101 ended with 1 incomplete shards") {
-        assert!(site.state("102.sh").contains("#SBATCH --array=2\n"), "{}", site.state("102.sh"));
+        assert!(
+            site.state("102.sh").contains("#SBATCH --array=2\n"),
+            "{}",
+            site.state("102.sh")
+        );
     }
 }
 
-/// Ctrl-C leaves the job alone. The same command follows it, also if the answer to its submission was not recorded.
+/// Ctrl-C leaves the job alone. The same command follows it, also if the answer to its submission
+/// was not recorded.
 #[test]
 fn an_interrupted_launch_follows_its_job_again() {
     let site = Site::new();
@@ -124,8 +194,14 @@ fn an_interrupted_launch_follows_its_job_again() {
     let said = interrupted(child);
     assert!(said.contains("job 101 of Slurm goes on"), "{said}");
     let elsewhere = site.launch(&["--on", "local"]);
-    assert!(stderr(&elsewhere).contains("X073"), "{}", stderr(&elsewhere));
-    let text = fs::read_to_string(&record).unwrap().replace("\"101\"", "null");
+    assert!(
+        stderr(&elsewhere).contains("X073"),
+        "{}",
+        stderr(&elsewhere)
+    );
+    let text = fs::read_to_string(&record)
+        .unwrap()
+        .replace("\"101\"", "null");
     fs::write(&record, text).unwrap();
     let output = site.launch(&SLURM);
     site.must_equal_whole(&output);
@@ -139,7 +215,11 @@ fn an_indexed_job_equals_one_campaign_and_a_lost_pod_runs_again() {
     let output = site.launch(&KUBERNETES);
     site.must_equal_whole(&output);
     let pods = site.state("pods");
-    assert_eq!(pods.lines().filter(|line| line.ends_with(" 0")).count(), 4, "{pods}");
+    assert_eq!(
+        pods.lines().filter(|line| line.ends_with(" 0")).count(),
+        4,
+        "{pods}"
+    );
 }
 
 /// A pod that ends with a lasting diagnostic is not started again, and the others are completed.
@@ -158,12 +238,27 @@ fn a_lasting_diagnostic_in_a_pod_is_reported_once() {
     let (said, pods) = (stderr(&output), site.state("pods"));
     if is_early {
         assert_eq!(output.status.code(), Some(2), "{said}");
-        assert!(said.contains("X075") && said.contains("shard 4/4 could not be completed"), "{said}");
-        assert_eq!(pods.lines().filter(|line| line.ends_with(" 3 2")).count(), 1, "{pods}");
+        assert!(
+            said.contains("X075") && said.contains("shard 4/4 could not be completed"),
+            "{said}"
+        );
+        assert_eq!(
+            pods.lines().filter(|line| line.ends_with(" 3 2")).count(),
+            1,
+            "{pods}"
+        );
         fs::remove_dir_all(launch.join("shards/4")).unwrap();
         site.must_equal_whole(&site.launch(&KUBERNETES));
         // Only the missing shard is in the second job.
-        assert_eq!(site.state("pods").lines().filter(|line| line.contains("-2 ")).count(), 1, "{}", site.state("pods"));
+        assert_eq!(
+            site.state("pods")
+                .lines()
+                .filter(|line| line.contains("-2 "))
+                .count(),
+            1,
+            "{}",
+            site.state("pods")
+        );
     }
 }
 
@@ -192,25 +287,66 @@ fn faults_of_schedulers_are_reported() {
     let site = Site::new();
     let refused = |output: Output, code: &str, text: &str| {
         assert_eq!(output.status.code(), Some(2), "{code}: {}", stderr(&output));
-        let said = stderr(&output).split_whitespace().collect::<Vec<_>>().join(" ");
-        assert!(said.contains(code) && said.contains(text), "{code} {text}: {said}");
+        let said = stderr(&output)
+            .split_whitespace()
+            .collect::<Vec<_>>()
+            .join(" ");
+        assert!(
+            said.contains(code) && said.contains(text),
+            "{code} {text}: {said}"
+        );
     };
-    fs::write(site.state.path().join("refusal"), "error: invalid partition specified: shrt\n").unwrap();
-    refused(site.launch(&SLURM), "X078", "invalid partition specified: shrt");
-    refused(site.launch(&KUBERNETES), "X078", "invalid partition specified: shrt");
-    refused(site.launch(&["--on", "ray", "--resources", "address=10.0.0.1:1"]), "X078", "any running Ray instance");
-    for (on, program) in [(&SLURM, "sbatch"), (&KUBERNETES, "kubectl"), (&RAY, "python3")] {
-        let output = site.command(on).env("PATH", site.state.path()).output().unwrap();
+    fs::write(
+        site.state.path().join("refusal"),
+        "error: invalid partition specified: shrt\n",
+    )
+    .unwrap();
+    refused(
+        site.launch(&SLURM),
+        "X078",
+        "invalid partition specified: shrt",
+    );
+    refused(
+        site.launch(&KUBERNETES),
+        "X078",
+        "invalid partition specified: shrt",
+    );
+    refused(
+        site.launch(&["--on", "ray", "--resources", "address=10.0.0.1:1"]),
+        "X078",
+        "any running Ray instance",
+    );
+    for (on, program) in [
+        (&SLURM, "sbatch"),
+        (&KUBERNETES, "kubectl"),
+        (&RAY, "python3"),
+    ] {
+        let output = site
+            .command(on)
+            .env("PATH", site.state.path())
+            .output()
+            .unwrap();
         refused(output, "X077", &format!("`{program}` of"));
     }
-    fs::write(site.state.path().join("ray.py"), "raise ImportError('No module named ray')\n").unwrap();
-    let output = site.command(&RAY).env("PYTHONPATH", site.state.path()).output().unwrap();
+    fs::write(
+        site.state.path().join("ray.py"),
+        "raise ImportError('No module named ray')\n",
+    )
+    .unwrap();
+    let output = site
+        .command(&RAY)
+        .env("PYTHONPATH", site.state.path())
+        .output()
+        .unwrap();
     refused(output, "X077", "No module named ray");
 
     let wrong = |on: &str, resources: &str| {
         let output = site.launch(&["--dry-run", "--on", on, "--resources", resources]);
         assert_eq!(output.status.code(), Some(2), "{on} {resources}");
-        stderr(&output).split_whitespace().collect::<Vec<_>>().join(" ")
+        stderr(&output)
+            .split_whitespace()
+            .collect::<Vec<_>>()
+            .join(" ")
     };
     for (on, resources, text) in [
         ("slurm", "cpu=2", "did you mean `cpus`?"),
@@ -222,10 +358,17 @@ fn faults_of_schedulers_are_reported() {
         ("slurm", "image=x", "use `--on kubernetes`"),
         ("local", "memory=4G", "has no meaning with `--on local`"),
         ("kubernetes", "image=x", "needs the key `volume`"),
-        ("kubernetes", "image=x,volume=y,mount=/nowhere", "is not on the volume"),
+        (
+            "kubernetes",
+            "image=x,volume=y,mount=/nowhere",
+            "is not on the volume",
+        ),
     ] {
         let said = wrong(on, resources);
-        assert!(said.contains("X076") && said.contains(text), "{on} {resources}: {said}");
+        assert!(
+            said.contains("X076") && said.contains(text),
+            "{on} {resources}: {said}"
+        );
     }
 }
 
@@ -239,8 +382,14 @@ fn another_program_is_refused() {
     child.kill().unwrap();
     child.wait().unwrap();
     let text = fs::read_to_string(&plan).unwrap();
-    fs::write(&plan, Regex::new("\"program\": \"[0-9a-f]*\"").unwrap().replace(&text, "\"program\": \"0\"").as_bytes())
-        .unwrap();
+    fs::write(
+        &plan,
+        Regex::new("\"program\": \"[0-9a-f]*\"")
+            .unwrap()
+            .replace(&text, "\"program\": \"0\"")
+            .as_bytes(),
+    )
+    .unwrap();
     let output = actcheck(site.folder(), &["launch-task", "parts.launch", "4"]);
     assert_eq!(output.status.code(), Some(2));
     assert!(stderr(&output).contains("X082"), "{}", stderr(&output));
@@ -252,15 +401,24 @@ fn dry_run(site: &Site, on: &[&str]) -> String {
     let output = site.launch(&[on, &["--dry-run", "--parallel", "2"]].concat());
     assert!(output.status.success(), "{}", stderr(&output));
     assert!(!site.folder().join("parts.launch").exists());
-    let text = stdout(&output).replace(&site.folder().canonicalize().unwrap().display().to_string(), "/project");
+    let text = stdout(&output).replace(
+        &site.folder().canonicalize().unwrap().display().to_string(),
+        "/project",
+    );
     let text = text.replace(env!("CARGO_BIN_EXE_actcheck"), "/bin/actcheck");
-    let text =
-        Regex::new("\"program\": \"[0-9a-f]+\"").unwrap().replace_all(&text, "\"program\": \"DIGEST\"").into_owned();
+    let text = Regex::new("\"program\": \"[0-9a-f]+\"")
+        .unwrap()
+        .replace_all(&text, "\"program\": \"DIGEST\"")
+        .into_owned();
     let text = Regex::new("\"config_digest\": \"[0-9a-f]+\"")
         .unwrap()
         .replace_all(&text, "\"config_digest\": \"DIGEST\"")
         .into_owned();
-    let id = Regex::new("\"id\": \"([0-9a-f]{8})\"").unwrap().captures(&text).unwrap()[1].to_owned();
+    let id = Regex::new("\"id\": \"([0-9a-f]{8})\"")
+        .unwrap()
+        .captures(&text)
+        .unwrap()[1]
+        .to_owned();
     text.replace(&id, "ID")
 }
 
@@ -268,66 +426,122 @@ fn dry_run(site: &Site, on: &[&str]) -> String {
 fn files_of_schedulers_are_printed() {
     let site = Site::new();
     let few = ["--on", "slurm"];
-    let slurm = ["--on", "slurm", "--resources", "cpus=2,memory=4G,time=90m,partition=short,account=robots"];
+    let slurm = [
+        "--on",
+        "slurm",
+        "--resources",
+        "cpus=2,memory=4G,time=90m,partition=short,account=robots",
+    ];
     let more = "image=actcheck:0.1.0,volume=projects,cpus=2,memory=4G,time=90m,namespace=robots";
     let kubernetes = ["--on", "kubernetes", "--resources", more];
-    let ray = ["--on", "ray", "--resources", "cpus=2,memory=4G,address=10.0.0.1:6379,python=/opt/ray/bin/python3"];
+    let ray = [
+        "--on",
+        "ray",
+        "--resources",
+        "cpus=2,memory=4G,address=10.0.0.1:6379,python=/opt/ray/bin/python3",
+    ];
     let file = |name: &str| data().join(format!("{name}.txt"));
     assert_expected([
         (file("slurm_few"), dry_run(&site, &few)),
         (file("slurm"), dry_run(&site, &slurm)),
         (file("kubernetes_few"), dry_run(&site, &KUBERNETES)),
         (file("kubernetes"), dry_run(&site, &kubernetes)),
-        (file("ray"), dry_run(&site, &ray).split("# parts.launch/run_on_ray.py").next().unwrap().to_owned()),
+        (
+            file("ray"),
+            dry_run(&site, &ray)
+                .split("# parts.launch/run_on_ray.py")
+                .next()
+                .unwrap()
+                .to_owned(),
+        ),
     ]);
 }
 
-/// The manifests keep the rules of the published schema of `batch/v1`: `kubernetes_job.json` has the keys and types of the
-/// objects that a manifest may use. The further rules are those that the server checks.
+/// The manifests keep the rules of the published schema of `batch/v1`: `kubernetes_job.json` has
+/// the keys and types of the objects that a manifest may use. The further rules are those that the
+/// server checks.
 #[test]
 fn manifests_keep_the_rules_of_indexed_jobs() {
-    let schema: Value = serde_json::from_str(&fs::read_to_string(data().join("kubernetes_job.json")).unwrap()).unwrap();
+    let schema: Value =
+        serde_json::from_str(&fs::read_to_string(data().join("kubernetes_job.json")).unwrap())
+            .unwrap();
     let dns = Regex::new("^[a-z0-9]([-a-z0-9]*[a-z0-9])?$").unwrap();
     for name in ["kubernetes_few", "kubernetes"] {
         let text = fs::read_to_string(data().join(format!("{name}.txt"))).unwrap();
-        let manifest = text.split("kubernetes.json\n").nth(1).unwrap().split("\n# submitted").next().unwrap();
+        let manifest = text
+            .split("kubernetes.json\n")
+            .nth(1)
+            .unwrap()
+            .split("\n# submitted")
+            .next()
+            .unwrap();
         let job: Value = serde_json::from_str(manifest).unwrap();
         has_type(&job, &Value::from("Job"), &schema, "Job");
 
-        assert_eq!((&job["apiVersion"], &job["kind"]), (&Value::from("batch/v1"), &Value::from("Job")));
+        assert_eq!(
+            (&job["apiVersion"], &job["kind"]),
+            (&Value::from("batch/v1"), &Value::from("Job"))
+        );
         let spec = &job["spec"];
         let pod = &spec["template"]["spec"];
         let container = &pod["containers"][0];
-        // Retries by index need indices, and a failure policy needs pods that are not restarted in place.
+        // Retries by index need indices, and a failure policy needs pods that are not restarted in
+        // place.
         assert_eq!(spec["completionMode"], "Indexed");
         assert!(spec["backoffLimitPerIndex"].is_u64());
         assert_eq!(pod["restartPolicy"], "Never");
         // With a failure policy, this must be absent or `Failed`.
         assert!(spec["podReplacementPolicy"].is_null());
         for rule in spec["podFailurePolicy"]["rules"].as_array().unwrap() {
-            assert!(["FailIndex", "FailJob", "Ignore", "Count"].contains(&rule["action"].as_str().unwrap()));
+            assert!(
+                ["FailIndex", "FailJob", "Ignore", "Count"]
+                    .contains(&rule["action"].as_str().unwrap())
+            );
             let has = [&rule["onExitCodes"], &rule["onPodConditions"]].map(|part| !part.is_null());
             assert!(has[0] != has[1], "{rule}");
             if has[0] {
                 assert_eq!(rule["onExitCodes"]["containerName"], container["name"]);
-                assert!(!rule["onExitCodes"]["values"].as_array().unwrap().contains(&Value::from(0)));
+                assert!(
+                    !rule["onExitCodes"]["values"]
+                        .as_array()
+                        .unwrap()
+                        .contains(&Value::from(0))
+                );
             }
         }
-        let mounts: Vec<&Value> =
-            container["volumeMounts"].as_array().unwrap().iter().map(|mount| &mount["name"]).collect();
-        let volumes: Vec<&Value> = pod["volumes"].as_array().unwrap().iter().map(|volume| &volume["name"]).collect();
+        let mounts: Vec<&Value> = container["volumeMounts"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .map(|mount| &mount["name"])
+            .collect();
+        let volumes: Vec<&Value> = pod["volumes"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .map(|volume| &volume["name"])
+            .collect();
         assert_eq!(mounts, volumes);
         // A pod's host name is the job's with its index, at most 63 characters of DNS.
-        let name = job["metadata"]["name"].as_str().unwrap().replace("ID", "01234567");
+        let name = job["metadata"]["name"]
+            .as_str()
+            .unwrap()
+            .replace("ID", "01234567");
         assert!(dns.is_match(&name) && name.len() <= 55, "{name}");
     }
 }
 
-/// Checks a value against a type of the schema: the name of a basic type or an object, a list, or a map.
+/// Checks a value against a type of the schema: the name of a basic type or an object, a list, or a
+/// map.
 fn has_type(value: &Value, kind: &Value, schema: &Value, place: &str) {
     match kind {
         Value::Array(kinds) => {
-            for (idx, item) in value.as_array().unwrap_or_else(|| panic!("{place}")).iter().enumerate() {
+            for (idx, item) in value
+                .as_array()
+                .unwrap_or_else(|| panic!("{place}"))
+                .iter()
+                .enumerate()
+            {
                 has_type(item, &kinds[0], schema, &format!("{place}[{idx}]"));
             }
         }
@@ -343,7 +557,10 @@ fn has_type(value: &Value, kind: &Value, schema: &Value, place: &str) {
             let object = &schema[kind.as_str().unwrap()];
             let has = value.as_object().unwrap_or_else(|| panic!("{place}"));
             for key in object["required"].as_array().unwrap() {
-                assert!(has.contains_key(key.as_str().unwrap()), "{place} lacks {key}");
+                assert!(
+                    has.contains_key(key.as_str().unwrap()),
+                    "{place} lacks {key}"
+                );
             }
             for (key, item) in has {
                 let kind = &object["properties"][key];

@@ -5,7 +5,9 @@ use std::path::Path;
 use std::process::Command;
 
 use actcheck::base::{Diagnostics, Files, Keep, Severity};
-use actcheck::config::{self, Campaign, CampaignTemplate, Launcher, Overrides, SCHEMA, campaign_template};
+use actcheck::config::{
+    self, Campaign, CampaignTemplate, Launcher, Overrides, SCHEMA, campaign_template,
+};
 use actcheck::search::Strategy;
 use serde_json::Value as Json;
 use toml::Value;
@@ -101,7 +103,9 @@ fn schema() -> Json {
 }
 
 fn parsed(text: &str) -> toml::Table {
-    text.replace("ROOT", root().to_str().unwrap()).parse().unwrap()
+    text.replace("ROOT", root().to_str().unwrap())
+        .parse()
+        .unwrap()
 }
 
 fn load(folder: &Path, table: &toml::Table) -> Result<Campaign, Diagnostics> {
@@ -113,15 +117,24 @@ fn load(folder: &Path, table: &toml::Table) -> Result<Campaign, Diagnostics> {
 /// The program's errors, without warnings: code and message.
 fn faults(folder: &Path, table: &toml::Table) -> Vec<(&'static str, String)> {
     let found = load(folder, table).err().unwrap_or_default();
-    let errors = found.iter().filter(|fault| fault.severity == Severity::Error);
-    errors.map(|fault| (fault.code, fault.message.clone())).collect()
+    let errors = found
+        .iter()
+        .filter(|fault| fault.severity == Severity::Error);
+    errors
+        .map(|fault| (fault.code, fault.message.clone()))
+        .collect()
 }
 
 /// A part of the schema with its reference resolved.
 fn resolved(part: &Json) -> Json {
     let mut part = part.clone();
-    let Some(reference) = part.get("$ref").and_then(Json::as_str).map(str::to_owned) else { return part };
-    let target = schema().pointer(reference.trim_start_matches('#')).expect("the reference can be resolved").clone();
+    let Some(reference) = part.get("$ref").and_then(Json::as_str).map(str::to_owned) else {
+        return part;
+    };
+    let target = schema()
+        .pointer(reference.trim_start_matches('#'))
+        .expect("the reference can be resolved")
+        .clone();
     let own = part.as_object_mut().unwrap();
     for (key, value) in target.as_object().unwrap() {
         own.entry(key.clone()).or_insert(value.clone());
@@ -133,7 +146,9 @@ fn resolved(part: &Json) -> Json {
 fn tables() -> BTreeMap<Vec<String>, Json> {
     fn walk(path: Vec<String>, part: &Json, tables: &mut BTreeMap<Vec<String>, Json>) {
         let part = resolved(part);
-        let Some(properties) = part.get("properties").and_then(Json::as_object) else { return };
+        let Some(properties) = part.get("properties").and_then(Json::as_object) else {
+            return;
+        };
         for (key, inner) in properties {
             walk(path.iter().chain([key]).cloned().collect(), inner, tables);
         }
@@ -149,14 +164,22 @@ fn leaves() -> Vec<(Vec<String>, Json)> {
     let tables = tables();
     let each = tables.iter().flat_map(|(path, table)| {
         let properties = table["properties"].as_object().unwrap();
-        properties.iter().map(|(key, part)| (path.iter().chain([key]).cloned().collect::<Vec<_>>(), resolved(part)))
+        properties.iter().map(|(key, part)| {
+            (
+                path.iter().chain([key]).cloned().collect::<Vec<_>>(),
+                resolved(part),
+            )
+        })
     });
-    each.filter(|(path, _)| !tables.contains_key(path)).collect()
+    each.filter(|(path, _)| !tables.contains_key(path))
+        .collect()
 }
 
 /// The table at a path.
 fn table_at<'a>(root: &'a mut toml::Table, path: &[String]) -> &'a mut toml::Table {
-    path.iter().fold(root, |table, key| table[key].as_table_mut().expect("the table exists"))
+    path.iter().fold(root, |table, key| {
+        table[key].as_table_mut().expect("the table exists")
+    })
 }
 
 fn with(text: &str, path: &[String], value: Value) -> toml::Table {
@@ -171,7 +194,8 @@ fn moment() -> Value {
     Value::Datetime("1979-05-27T07:32:00Z".parse().unwrap())
 }
 
-/// Configurations refused by the schema, by file name with the reason. Returns `None` if Python is not available.
+/// Configurations refused by the schema, by file name with the reason. Returns `None` if Python is
+/// not available.
 fn refused_by_schema(folder: &Path) -> Option<BTreeMap<String, String>> {
     let output = Command::new(foreign::python()?)
         .arg(root().join("tests/foreign/check_campaigns.py"))
@@ -182,13 +206,20 @@ fn refused_by_schema(folder: &Path) -> Option<BTreeMap<String, String>> {
     assert!(output.status.success(), "{}", stderr(&output));
     let lines = stdout(&output);
     let parts = lines.lines().filter_map(|line| line.split_once('\t'));
-    Some(parts.map(|(name, reason)| (name.to_owned(), reason.to_owned())).collect())
+    Some(
+        parts
+            .map(|(name, reason)| (name.to_owned(), reason.to_owned()))
+            .collect(),
+    )
 }
 
 #[test]
 fn the_program_prints_the_schema() {
     let output = actcheck(root(), &["schema"]);
-    assert_eq!(stdout(&output), std::fs::read_to_string(root().join("configs/campaign.schema.json")).unwrap());
+    assert_eq!(
+        stdout(&output),
+        std::fs::read_to_string(root().join("configs/campaign.schema.json")).unwrap()
+    );
 }
 
 #[test]
@@ -196,18 +227,47 @@ fn every_schema_key_is_accepted_by_the_program_and_described() {
     let folder = tempfile::tempdir().unwrap();
     let found = load(folder.path(), &parsed(EVERY_KEY));
     assert!(found.is_ok(), "{}", found.unwrap_err());
-    for (path, part) in leaves().into_iter().chain(tables()).filter(|(path, _)| !path.is_empty()) {
+    for (path, part) in leaves()
+        .into_iter()
+        .chain(tables())
+        .filter(|(path, _)| !path.is_empty())
+    {
         let name = path.join(".");
-        assert!(part["description"].as_str().is_some_and(|text| text.ends_with('.')), "{name} has no description");
-        let unit =
-            [("_m", "metres"), ("_rad", "radians"), ("_secs", "seconds"), ("_s", "seconds"), ("_mb", "megabytes")];
+        assert!(
+            part["description"]
+                .as_str()
+                .is_some_and(|text| text.ends_with('.')),
+            "{name} has no description"
+        );
+        let unit = [
+            ("_m", "metres"),
+            ("_rad", "radians"),
+            ("_secs", "seconds"),
+            ("_s", "seconds"),
+            ("_mb", "megabytes"),
+        ];
         if let Some((_, unit)) = unit.into_iter().find(|(ending, _)| name.ends_with(ending)) {
-            assert!(part["description"].as_str().unwrap().contains(&format!("Unit: {unit}")), "{name} has no unit");
+            assert!(
+                part["description"]
+                    .as_str()
+                    .unwrap()
+                    .contains(&format!("Unit: {unit}")),
+                "{name} has no unit"
+            );
         }
         let said = faults(folder.path(), &with(EVERY_KEY, &path, moment()));
         let is_named = |message: &str| message.contains(&format!("`{name}`"));
-        assert!(said.iter().any(|(code, message)| *code == "C004" && is_named(message)), "{name}: {said:?}");
-        assert!(!said.iter().any(|(code, message)| *code == "C003" && is_named(message)), "{name}: {said:?}");
+        assert!(
+            said.iter()
+                .any(|(code, message)| *code == "C004" && is_named(message)),
+            "{name}: {said:?}"
+        );
+        assert!(
+            !said
+                .iter()
+                .any(|(code, message)| *code == "C003" && is_named(message)),
+            "{name}: {said:?}"
+        );
     }
 }
 
@@ -216,21 +276,44 @@ fn every_schema_key_is_accepted_by_the_program_and_described() {
 fn every_key_of_the_program_is_in_the_schema() {
     let folder = tempfile::tempdir().unwrap();
     for (path, part) in tables() {
-        let unknown: Vec<String> = path.iter().cloned().chain(["qqqqqqqqqqqq".to_owned()]).collect();
-        let said = load(folder.path(), &with(EVERY_KEY, &unknown, Value::Boolean(true))).unwrap_err();
-        let fault = said.iter().find(|fault| fault.code == "C003").unwrap_or_else(|| panic!("{path:?}: {said}"));
-        let known =
-            fault.help.as_deref().unwrap().strip_prefix("known names: ").expect("the key resembles no known key");
+        let unknown: Vec<String> = path
+            .iter()
+            .cloned()
+            .chain(["qqqqqqqqqqqq".to_owned()])
+            .collect();
+        let said = load(
+            folder.path(),
+            &with(EVERY_KEY, &unknown, Value::Boolean(true)),
+        )
+        .unwrap_err();
+        let fault = said
+            .iter()
+            .find(|fault| fault.code == "C003")
+            .unwrap_or_else(|| panic!("{path:?}: {said}"));
+        let known = fault
+            .help
+            .as_deref()
+            .unwrap()
+            .strip_prefix("known names: ")
+            .expect("the key resembles no known key");
         let known: BTreeSet<&str> = known.split(", ").collect();
         let properties = part["properties"].as_object().unwrap();
-        assert_eq!(known, properties.keys().map(String::as_str).collect(), "[{}]", path.join("."));
+        assert_eq!(
+            known,
+            properties.keys().map(String::as_str).collect(),
+            "[{}]",
+            path.join(".")
+        );
     }
 }
 
 #[test]
 fn words_equal_the_programs() {
     let names = schema()["properties"]["search"]["properties"]["strategy"]["enum"].clone();
-    assert_eq!(names, Json::from(Strategy::ALL.map(Strategy::name).to_vec()));
+    assert_eq!(
+        names,
+        Json::from(Strategy::ALL.map(Strategy::name).to_vec())
+    );
     let ways = schema()["properties"]["history"]["properties"]["keep"]["enum"].clone();
     assert_eq!(ways, Json::from(Keep::ALL.map(Keep::word).to_vec()));
 }
@@ -242,27 +325,51 @@ fn schema_defaults_equal_the_programs() {
     let (few, mut all) = (parsed(FEW_KEYS), parsed(FEW_KEYS));
     let mut written = 0;
     for (path, part) in leaves() {
-        let Some(default) = part.get("default") else { continue };
+        let Some(default) = part.get("default") else {
+            continue;
+        };
         let (key, tables) = path.split_last().unwrap();
         let value = Value::try_from(default).unwrap();
-        written += usize::from(table_at(&mut all, tables).insert(key.clone(), value).is_none());
+        written += usize::from(
+            table_at(&mut all, tables)
+                .insert(key.clone(), value)
+                .is_none(),
+        );
     }
     assert!(written > 40, "{written}");
     let launcher = all.insert("test_launcher".to_owned(), few["test_launcher"].clone());
     assert_eq!(launcher, Some(Value::from("reference")));
     assert_eq!(
-        load(folder.path(), &parsed("tests = [[\"Pick\"]]\ntest_count = 1")).unwrap().launcher,
+        load(
+            folder.path(),
+            &parsed("tests = [[\"Pick\"]]\ntest_count = 1")
+        )
+        .unwrap()
+        .launcher,
         Launcher::Reference
     );
-    let [few, all] = [few, all].map(|table| load(folder.path(), &table).unwrap_or_else(|found| panic!("{found}")));
+    let [few, all] = [few, all]
+        .map(|table| load(folder.path(), &table).unwrap_or_else(|found| panic!("{found}")));
     assert_eq!(few.physics, all.physics);
     assert_eq!(few.sensing, all.sensing);
     assert_eq!((few.budget, few.limits), (all.budget, all.limits));
     assert_eq!((few.other_counts, few.lying), (all.other_counts, all.lying));
-    assert_eq!((few.seed, few.repeat, few.search), (all.seed, all.repeat, all.search));
-    assert_eq!((few.nav_obstacles, few.nav_obstacle_count), (all.nav_obstacles, all.nav_obstacle_count));
-    assert_eq!((few.launcher, few.robot, few.history), (all.launcher, all.robot, all.history));
-    assert_eq!((few.keeping, few.sync_each_run), (all.keeping, all.sync_each_run));
+    assert_eq!(
+        (few.seed, few.repeat, few.search),
+        (all.seed, all.repeat, all.search)
+    );
+    assert_eq!(
+        (few.nav_obstacles, few.nav_obstacle_count),
+        (all.nav_obstacles, all.nav_obstacle_count)
+    );
+    assert_eq!(
+        (few.launcher, few.robot, few.history),
+        (all.launcher, all.robot, all.history)
+    );
+    assert_eq!(
+        (few.keeping, few.sync_each_run),
+        (all.keeping, all.sync_each_run)
+    );
 }
 
 #[test]
@@ -272,17 +379,43 @@ fn shipped_new_and_exported_configurations_match_the_schema() {
     for config in Files::Disk.list(&root().join("configs")) {
         std::fs::copy(&config, here(config.file_name().unwrap().to_str().unwrap())).unwrap();
     }
-    for (name, is_used, skill) in [("new", false, None), ("new_with_all", true, Some("skills/pick.py"))] {
-        let new = CampaignTemplate { name, ontology: is_used, models: is_used, skill };
+    for (name, is_used, skill) in [
+        ("new", false, None),
+        ("new_with_all", true, Some("skills/pick.py")),
+    ] {
+        let new = CampaignTemplate {
+            name,
+            ontology: is_used,
+            models: is_used,
+            skill,
+        };
         std::fs::write(here(&format!("{name}.toml")), campaign_template(&new)).unwrap();
     }
     let history = here("h").display().to_string();
     copy_made_history(Path::new(&history));
-    let list = stdout(&actcheck(root(), &["list", "--history", &history, "--format", "csv"]));
-    let run = list.lines().nth(1).and_then(|line| line.split(',').next()).expect("the campaign has a run");
+    let list = stdout(&actcheck(
+        root(),
+        &["list", "--history", &history, "--format", "csv"],
+    ));
+    let run = list
+        .lines()
+        .nth(1)
+        .and_then(|line| line.split(',').next())
+        .expect("the campaign has a run");
     let case = here("case.toml").display().to_string();
-    let export =
-        actcheck(root(), &["export", run, "--history", &history, "--config", "configs/quick.toml", "-o", &case]);
+    let export = actcheck(
+        root(),
+        &[
+            "export",
+            run,
+            "--history",
+            &history,
+            "--config",
+            "configs/quick.toml",
+            "-o",
+            &case,
+        ],
+    );
     assert!(export.status.success(), "{}", stderr(&export));
     assert!(Files::Disk.list(folder.path()).len() >= 11);
     if let Some(refused) = refused_by_schema(folder.path()) {
@@ -293,7 +426,10 @@ fn shipped_new_and_exported_configurations_match_the_schema() {
 /// Values at the limits of a key's range, and beyond.
 fn trials(part: &Json) -> Vec<Value> {
     if let Some(forms) = part.get("anyOf").and_then(Json::as_array) {
-        return forms.iter().flat_map(|form| trials(&resolved(form))).collect();
+        return forms
+            .iter()
+            .flat_map(|form| trials(&resolved(form)))
+            .collect();
     }
     match part["type"].as_str() {
         Some("integer") => integers(part).into_iter().map(Value::from).collect(),
@@ -301,21 +437,32 @@ fn trials(part: &Json) -> Vec<Value> {
         Some("string") => ["", "  ", "no-such-word"].map(Value::from).to_vec(),
         Some("boolean") => vec![Value::from(true), Value::from(1), Value::from("true")],
         Some("array") => lists(part),
-        Some("object") => vec![Value::from(1), Value::Table([("a".to_owned(), moment())].into_iter().collect())],
+        Some("object") => vec![
+            Value::from(1),
+            Value::Table([("a".to_owned(), moment())].into_iter().collect()),
+        ],
         other => panic!("{other:?}"),
     }
 }
 
 fn integers(part: &Json) -> Vec<i64> {
-    let bounds = ["minimum", "maximum"].into_iter().filter_map(|key| part.get(key)?.as_i64());
-    let near = bounds.flat_map(|bound| [bound.checked_sub(1), Some(bound), bound.checked_add(1)]).flatten();
-    near.chain([i64::MIN, -1, 0, 61, 1 << 40, i64::MAX]).collect()
+    let bounds = ["minimum", "maximum"]
+        .into_iter()
+        .filter_map(|key| part.get(key)?.as_i64());
+    let near = bounds
+        .flat_map(|bound| [bound.checked_sub(1), Some(bound), bound.checked_add(1)])
+        .flatten();
+    near.chain([i64::MIN, -1, 0, 61, 1 << 40, i64::MAX])
+        .collect()
 }
 
 fn numbers(part: &Json) -> Vec<f64> {
     let keys = ["minimum", "exclusiveMinimum", "maximum", "exclusiveMaximum"];
     let bounds = keys.into_iter().filter_map(|key| part.get(key)?.as_f64());
-    bounds.flat_map(|bound| [bound - 1e-9, bound, bound + 1e-9]).chain([-1e15, 0.0, 1e15]).collect()
+    bounds
+        .flat_map(|bound| [bound - 1e-9, bound, bound + 1e-9])
+        .chain([-1e15, 0.0, 1e15])
+        .collect()
 }
 
 /// Lists of equal elements, of several lengths.
@@ -324,7 +471,10 @@ fn lists(part: &Json) -> Vec<Value> {
     let mut trials = trials(&item);
     trials.push(moment());
     let length = part.get("minItems").and_then(Json::as_u64).unwrap_or(1) as usize;
-    let mut lists: Vec<Value> = trials.iter().map(|element| Value::Array(vec![element.clone(); length])).collect();
+    let mut lists: Vec<Value> = trials
+        .iter()
+        .map(|element| Value::Array(vec![element.clone(); length]))
+        .collect();
     let fits = match item["type"].as_str() {
         Some("string") => return [lists, vec![Value::Array(Vec::new())]].concat(),
         Some("array") => return [lists, vec![Value::Array(Vec::new())]].concat(),
@@ -335,40 +485,69 @@ fn lists(part: &Json) -> Vec<Value> {
     lists
 }
 
-/// Changed configurations with a description of each change: every key with values at its limits and of wrong types,
-/// unknown and missing keys.
+/// Changed configurations with a description of each change: every key with values at its limits
+/// and of wrong types, unknown and missing keys.
 fn changed() -> Vec<(String, toml::Table)> {
     let mut changed = Vec::new();
     for (path, part) in leaves() {
         for value in trials(&part).into_iter().chain([moment()]) {
-            changed.push((format!("{} = {value}", path.join(".")), with(EVERY_KEY, &path, value)));
+            changed.push((
+                format!("{} = {value}", path.join(".")),
+                with(EVERY_KEY, &path, value),
+            ));
         }
     }
     for (path, part) in tables() {
         let unknown: Vec<String> = path.iter().cloned().chain(["unknown".to_owned()]).collect();
         for value in [Value::from(1), moment(), Value::Table(toml::Table::new())] {
-            changed.push((format!("{} = {value}", unknown.join(".")), with(EVERY_KEY, &unknown, value)));
+            changed.push((
+                format!("{} = {value}", unknown.join(".")),
+                with(EVERY_KEY, &unknown, value),
+            ));
         }
-        let required = part.get("required").and_then(Json::as_array).cloned().unwrap_or_default();
+        let required = part
+            .get("required")
+            .and_then(Json::as_array)
+            .cloned()
+            .unwrap_or_default();
         let dependent = part.get("dependentRequired").and_then(Json::as_object);
-        let dependent = dependent.map(|keys| keys.keys().map(|key| Json::from(key.as_str())).collect::<Vec<_>>());
+        let dependent = dependent.map(|keys| {
+            keys.keys()
+                .map(|key| Json::from(key.as_str()))
+                .collect::<Vec<_>>()
+        });
         for key in required.into_iter().chain(dependent.unwrap_or_default()) {
             let mut table = parsed(EVERY_KEY);
             table_at(&mut table, &path).remove(key.as_str().unwrap());
             changed.push((format!("{}.{key} is missing", path.join(".")), table));
         }
     }
-    for text in ["a = []", "a = [\"\"]", "a = [\"tea\"]", "a = [1]", "a = \"tea\"", "a = [\"tea\"], b = [\"milk\"]", ""]
-    {
-        let table = format!("drink = {{ {text} }}").parse::<toml::Table>().unwrap();
-        changed.push((format!("drink: {text}"), with(EVERY_KEY, &["drink".to_owned()], table["drink"].clone())));
+    for text in [
+        "a = []",
+        "a = [\"\"]",
+        "a = [\"tea\"]",
+        "a = [1]",
+        "a = \"tea\"",
+        "a = [\"tea\"], b = [\"milk\"]",
+        "",
+    ] {
+        let table = format!("drink = {{ {text} }}")
+            .parse::<toml::Table>()
+            .unwrap();
+        changed.push((
+            format!("drink: {text}"),
+            with(EVERY_KEY, &["drink".to_owned()], table["drink"].clone()),
+        ));
     }
     changed
 }
 
-/// Faults that a schema can't express: relations between keys, existence of files and names, and durations.
+/// Faults that a schema can't express: relations between keys, existence of files and names, and
+/// durations.
 fn is_beyond_a_schema(code: &str, message: &str) -> bool {
-    let names_and_files = ["C008", "C009", "C010", "C011", "C012", "C020", "C021", "C031", "C034", "C015"];
+    let names_and_files = [
+        "C008", "C009", "C010", "C011", "C012", "C020", "C021", "C031", "C034", "C015",
+    ];
     names_and_files.contains(&code)
         || message.contains("is not a duration")
         || message.contains("there is no obstacle to choose")
@@ -390,12 +569,28 @@ fn schema_and_program_refuse_the_same_changes() {
         std::fs::write(written.path().join(&name), format!("# {change}\n{table}")).unwrap();
         refused.insert(name, said);
     }
-    let Some(by_schema) = refused_by_schema(written.path()) else { return };
-    let differ = changed.iter().zip(&refused).filter_map(|((change, _), (name, said))| {
-        let schema = by_schema.get(name);
-        (schema.is_some() == said.is_empty()).then(|| format!("{change}\n  program: {said:?}\n  schema: {schema:?}"))
-    });
+    let Some(by_schema) = refused_by_schema(written.path()) else {
+        return;
+    };
+    let differ = changed
+        .iter()
+        .zip(&refused)
+        .filter_map(|((change, _), (name, said))| {
+            let schema = by_schema.get(name);
+            (schema.is_some() == said.is_empty())
+                .then(|| format!("{change}\n  program: {said:?}\n  schema: {schema:?}"))
+        });
     let differ: Vec<String> = differ.collect();
-    assert!(differ.is_empty(), "{} of {}:\n{}", differ.len(), changed.len(), differ.join("\n"));
-    assert!(by_schema.len() * 3 > changed.len() && by_schema.len() < changed.len(), "{} are refused", by_schema.len());
+    assert!(
+        differ.is_empty(),
+        "{} of {}:\n{}",
+        differ.len(),
+        changed.len(),
+        differ.join("\n")
+    );
+    assert!(
+        by_schema.len() * 3 > changed.len() && by_schema.len() < changed.len(),
+        "{} are refused",
+        by_schema.len()
+    );
 }

@@ -39,23 +39,46 @@ fn quantile(choice: &Choice) -> f64 {
     }
 }
 
-/// The result of a made-up robot in a planned run: it fails in the most crowded fifth of the scenes with the base in
-/// the nearer quarter. If the base is far to one side, the scene can't be built and is not simulated.
+/// The result of a made-up robot in a planned run: it fails in the most crowded fifth of the scenes
+/// with the base in the nearer quarter. If the base is far to one side, the scene can't be built
+/// and is not simulated.
 fn made_up(env: &Env, planned: &Planned) -> RunResult {
     for attempt in 0.. {
         let mut choices = planned.choices(env.campaign.seed, attempt);
         if scenario::draw(&env.space, 0, &mut choices).is_err() {
             continue;
         }
-        let at = |name: ChoiceName| quantile(choices.made().iter().find(|choice| choice.name == name).unwrap());
+        let at = |name: ChoiceName| {
+            quantile(
+                choices
+                    .made()
+                    .iter()
+                    .find(|choice| choice.name == name)
+                    .unwrap(),
+            )
+        };
         if at(ChoiceName::Robot(StartAxis::Side)) > 0.7 {
             continue;
         }
-        let margin = (0.8 - at(ChoiceName::OtherCount)).max(at(ChoiceName::Robot(StartAxis::Gap)) - 0.25);
-        let outcome = if margin < 0.0 { Outcome::Failed } else { Outcome::Passed };
-        let said = |property: &str| PropertyOutcome { property: property.to_owned(), outcome, margin: Some(margin) };
-        let outcomes = ["CloseObject", "MovedObject"].map(|name| said(&format!("http://actions#{name}")));
-        return RunResult { index: planned.index, discards: attempt, outcomes: outcomes.to_vec() };
+        let margin =
+            (0.8 - at(ChoiceName::OtherCount)).max(at(ChoiceName::Robot(StartAxis::Gap)) - 0.25);
+        let outcome = if margin < 0.0 {
+            Outcome::Failed
+        } else {
+            Outcome::Passed
+        };
+        let said = |property: &str| PropertyOutcome {
+            property: property.to_owned(),
+            outcome,
+            margin: Some(margin),
+        };
+        let outcomes =
+            ["CloseObject", "MovedObject"].map(|name| said(&format!("http://actions#{name}")));
+        return RunResult {
+            index: planned.index,
+            discards: attempt,
+            outcomes: outcomes.to_vec(),
+        };
     }
     unreachable!("some scenes can be built")
 }
@@ -80,12 +103,23 @@ fn chosen_scenes_depend_on_the_seed_and_the_results() {
         let env = pick(90, 3, 1, strategy);
         let (batches, _) = made_up_campaign(&env);
         assert_eq!(batches, made_up_campaign(&env).0, "{strategy:?}");
-        let indices: Vec<u64> = batches.iter().flatten().map(|planned| planned.index).collect();
+        let indices: Vec<u64> = batches
+            .iter()
+            .flatten()
+            .map(|planned| planned.index)
+            .collect();
         assert_eq!(indices, (0..90).collect::<Vec<_>>(), "{strategy:?}");
         if strategy != Strategy::Random {
-            assert!(batches.iter().all(|batch| batch.len() <= GENERATION), "{strategy:?}");
+            assert!(
+                batches.iter().all(|batch| batch.len() <= GENERATION),
+                "{strategy:?}"
+            );
             // Random scenes are not planned but drawn from the seed, when they are made.
-            assert_ne!(batches, made_up_campaign(&pick(90, 4, 1, strategy)).0, "{strategy:?}");
+            assert_ne!(
+                batches,
+                made_up_campaign(&pick(90, 4, 1, strategy)).0,
+                "{strategy:?}"
+            );
         }
         // A robot that never fails, with margins, leads to other scenes.
         let mut other = schedule_of(&env);
@@ -99,7 +133,8 @@ fn chosen_scenes_depend_on_the_seed_and_the_results() {
                 .map(|planned| {
                     let mut result = made_up(&env, planned);
                     result.outcomes.iter_mut().for_each(|outcome| {
-                        (outcome.outcome, outcome.margin) = (Outcome::Passed, Some(1.0 + planned.index as f64));
+                        (outcome.outcome, outcome.margin) =
+                            (Outcome::Passed, Some(1.0 + planned.index as f64));
                     });
                     result
                 })
@@ -109,7 +144,8 @@ fn chosen_scenes_depend_on_the_seed_and_the_results() {
     }
 }
 
-/// Of the scenes that can be built, 0.2 · 0.25 fail, whichever were sampled and however many can't be built.
+/// Of the scenes that can be built, 0.2 · 0.25 fail, whichever were sampled and however many can't
+/// be built.
 #[test]
 fn weighted_rates_estimate_the_configured_distribution() {
     const SEEDS: u64 = 60;
@@ -119,13 +155,22 @@ fn weighted_rates_estimate_the_configured_distribution() {
             let env = pick(110, seed, 1, strategy);
             let (batches, schedule) = made_up_campaign(&env);
             let rates = schedule.rates();
-            let moved = rates.iter().find(|rate| rate.property.ends_with("MovedObject")).unwrap();
+            let moved = rates
+                .iter()
+                .find(|rate| rate.property.ends_with("MovedObject"))
+                .unwrap();
             assert_eq!((moved.test.as_str(), moved.scenes), ("Pick", 110));
             mean += moved.failing.rate / SEEDS as f64;
             held += u64::from((moved.failing.low..=moved.failing.high).contains(&0.05));
-            let all = batches.iter().flatten().map(|planned| made_up(&env, planned).outcomes[0].outcome);
+            let all = batches
+                .iter()
+                .flatten()
+                .map(|planned| made_up(&env, planned).outcomes[0].outcome);
             failing += all.filter(|outcome| *outcome == Outcome::Failed).count();
-            let weights = batches.iter().flatten().map(|planned| planned.steering.as_ref().unwrap().weight.unwrap());
+            let weights = batches
+                .iter()
+                .flatten()
+                .map(|planned| planned.steering.as_ref().unwrap().weight.unwrap());
             assert!(weights.into_iter().all(|weight| weight > 0.0));
         }
         assert!((mean - 0.05).abs() < 0.012, "{strategy:?}: {mean}");
@@ -143,9 +188,19 @@ fn repetitions_of_a_searched_scene_share_it_and_differ_in_noise() {
     assert_eq!(planned.len(), 90);
     for scene in planned.chunks(3) {
         let steering = scene[0].steering.as_ref().unwrap();
-        assert!(scene.iter().all(|run| run.steering.as_ref().unwrap() == steering));
-        assert!(steering.quantiles.keys().all(|name| !name.is_noise()), "{steering:?}");
-        assert_eq!(scene.iter().map(|run| run.repetition).collect::<Vec<_>>(), [Some(0), Some(1), Some(2)]);
+        assert!(
+            scene
+                .iter()
+                .all(|run| run.steering.as_ref().unwrap() == steering)
+        );
+        assert!(
+            steering.quantiles.keys().all(|name| !name.is_noise()),
+            "{steering:?}"
+        );
+        assert_eq!(
+            scene.iter().map(|run| run.repetition).collect::<Vec<_>>(),
+            [Some(0), Some(1), Some(2)]
+        );
     }
     // Counts scenes, not runs.
     assert!(schedule.rates().iter().all(|rate| rate.scenes == 30));
@@ -156,21 +211,49 @@ fn json(folder: &Path, arguments: &[&str]) -> Value {
     serde_json::from_str(&stdout(&output)).unwrap_or_else(|_| panic!("{}", stderr(&output)))
 }
 
-/// Real runs: a whole generation and the beginning of the next, with one worker and with two, and from the file.
+/// Real runs: a whole generation and the beginning of the next, with one worker and with two, and
+/// from the file.
 #[test]
 fn a_guided_campaign_is_the_same_with_any_number_of_workers() {
     let project = looking();
     let folder = project.path();
     let run = ["run", "configs/look.toml", "--runs", "22"];
-    let results = json(folder, &[&run[..], &["--strategy", "boundary", "--jobs", "1", "--history", "one"]].concat());
-    edit(&folder.join("configs/look.toml"), "[camera]", "[search]\nstrategy = \"boundary\"\n\n[camera]");
-    let text = stdout(&actcheck(folder, &[&run[..], &["--jobs", "2", "--history", "two"]].concat()));
-    let list = |history: &str| json(folder, &["list", "--history", history]).as_array().unwrap().clone();
+    let results = json(
+        folder,
+        &[
+            &run[..],
+            &["--strategy", "boundary", "--jobs", "1", "--history", "one"],
+        ]
+        .concat(),
+    );
+    edit(
+        &folder.join("configs/look.toml"),
+        "[camera]",
+        "[search]\nstrategy = \"boundary\"\n\n[camera]",
+    );
+    let text = stdout(&actcheck(
+        folder,
+        &[&run[..], &["--jobs", "2", "--history", "two"]].concat(),
+    ));
+    let list = |history: &str| {
+        json(folder, &["list", "--history", history])
+            .as_array()
+            .unwrap()
+            .clone()
+    };
     let (one, two) = (list("one"), list("two"));
-    let of = |rows: &[Value], key: &str| rows.iter().map(|row| row[key].clone()).collect::<Vec<_>>();
+    let of =
+        |rows: &[Value], key: &str| rows.iter().map(|row| row[key].clone()).collect::<Vec<_>>();
     assert_eq!(of(&one, "trace_hash"), of(&two, "trace_hash"));
     assert_eq!(of(&one, "weight"), of(&two, "weight"));
-    assert_eq!(of(&one, "weight").iter().map(Value::to_string).collect::<BTreeSet<_>>().len(), 22);
+    assert_eq!(
+        of(&one, "weight")
+            .iter()
+            .map(Value::to_string)
+            .collect::<BTreeSet<_>>()
+            .len(),
+        22
+    );
 
     // Killed and resumed: earlier results are given to the search again.
     let mut child = Command::new(env!("CARGO_BIN_EXE_actcheck"))
@@ -181,7 +264,10 @@ fn a_guided_campaign_is_the_same_with_any_number_of_workers() {
         .spawn()
         .unwrap();
     while std::fs::read_dir(folder.join("three/traces")).map_or(0, Iterator::count) < 8 {
-        assert!(child.try_wait().unwrap().is_none(), "it must not end before it is killed");
+        assert!(
+            child.try_wait().unwrap().is_none(),
+            "it must not end before it is killed"
+        );
         std::thread::sleep(Duration::from_millis(5));
     }
     child.kill().unwrap();
@@ -192,40 +278,80 @@ fn a_guided_campaign_is_the_same_with_any_number_of_workers() {
     assert_eq!(of(&one, "weight"), of(&three, "weight"));
     assert_eq!(resumed["search"], results["search"]);
 
-    assert!(text.contains("are not failure rates") && text.contains("weighted, 22 scenes"), "{text}");
+    assert!(
+        text.contains("are not failure rates") && text.contains("weighted, 22 scenes"),
+        "{text}"
+    );
     assert_eq!(
-        (&results["search"]["strategy"], &results["search"]["counts_are_rates"]),
+        (
+            &results["search"]["strategy"],
+            &results["search"]["counts_are_rates"]
+        ),
         (&"boundary".into(), &false.into())
     );
-    let rates = results["search"]["weighted_failure_rates"].as_array().unwrap();
+    let rates = results["search"]["weighted_failure_rates"]
+        .as_array()
+        .unwrap();
     assert_eq!(rates.len(), 3);
     let weights: BTreeMap<String, f64> = results["runs"]
         .as_array()
         .unwrap()
         .iter()
-        .map(|run| (run["run"].as_str().unwrap().to_owned(), run["weight"].as_f64().unwrap()))
+        .map(|run| {
+            (
+                run["run"].as_str().unwrap().to_owned(),
+                run["weight"].as_f64().unwrap(),
+            )
+        })
         .collect();
     for rate in rates {
         // The weights are those of the runs: the rate is their sum over the failed runs.
         let failing = results["runs"].as_array().unwrap().iter().filter(|run| {
             let outcomes = run["actions"][0]["outcomes"].as_array().unwrap();
-            outcomes.iter().any(|outcome| outcome["property"] == rate["property"] && outcome["outcome"] == "failed")
+            outcomes.iter().any(|outcome| {
+                outcome["property"] == rate["property"] && outcome["outcome"] == "failed"
+            })
         });
-        let sum: f64 = failing.map(|run| weights[run["run"].as_str().unwrap()]).sum();
-        assert!((rate["rate"].as_f64().unwrap() - (sum / 22.0).min(1.0)).abs() < 1e-9, "{rate}");
+        let sum: f64 = failing
+            .map(|run| weights[run["run"].as_str().unwrap()])
+            .sum();
+        assert!(
+            (rate["rate"].as_f64().unwrap() - (sum / 22.0).min(1.0)).abs() < 1e-9,
+            "{rate}"
+        );
     }
-    let some: Vec<&str> = one.iter().step_by(7).map(|row| row["run"].as_str().unwrap()).collect();
-    let replayed = actcheck(folder, &[&["replay", "--history", "one"], &some[..]].concat());
-    assert_eq!(replayed.status.code(), Some(0), "{}{}", stdout(&replayed), stderr(&replayed));
+    let some: Vec<&str> = one
+        .iter()
+        .step_by(7)
+        .map(|row| row["run"].as_str().unwrap())
+        .collect();
+    let replayed = actcheck(
+        folder,
+        &[&["replay", "--history", "one"], &some[..]].concat(),
+    );
+    assert_eq!(
+        replayed.status.code(),
+        Some(0),
+        "{}{}",
+        stdout(&replayed),
+        stderr(&replayed)
+    );
     let shown = stdout(&actcheck(folder, &["show", some[0], "--history", "one"]));
     assert!(shown.contains("importance weight"), "{shown}");
 }
 
 #[test]
 fn an_unknown_strategy_is_refused_with_the_known_names() {
-    let refused = actcheck(Path::new("."), &["run", "configs/pick.toml", "--strategy", "boundry"]);
+    let refused = actcheck(
+        Path::new("."),
+        &["run", "configs/pick.toml", "--strategy", "boundry"],
+    );
     assert_eq!(refused.status.code(), Some(2));
-    assert!(stderr(&refused).contains("did you mean `boundary`"), "{}", stderr(&refused));
+    assert!(
+        stderr(&refused).contains("did you mean `boundary`"),
+        "{}",
+        stderr(&refused)
+    );
 }
 
 /// Shards do not share results, and the interval width of counted runs does not apply here.
@@ -233,14 +359,37 @@ fn an_unknown_strategy_is_refused_with_the_known_names() {
 fn options_that_conflict_with_a_search_are_refused() {
     let project = project();
     for other in [["--shard", "1/2"], ["--until-width", "0.2"]] {
-        let refused =
-            actcheck(project.path(), &[&["run", "configs/pick.toml", "--strategy", "bandit"], &other[..]].concat());
+        let refused = actcheck(
+            project.path(),
+            &[
+                &["run", "configs/pick.toml", "--strategy", "bandit"],
+                &other[..],
+            ]
+            .concat(),
+        );
         assert_eq!(refused.status.code(), Some(2), "{other:?}");
         assert!(stderr(&refused).contains("S024"), "{}", stderr(&refused));
     }
-    let allowed =
-        ["run", "configs/pick.toml", "--runs", "2", "--strategy", "halton", "--shard", "1/2", "--history", "h"];
+    let allowed = [
+        "run",
+        "configs/pick.toml",
+        "--runs",
+        "2",
+        "--strategy",
+        "halton",
+        "--shard",
+        "1/2",
+        "--history",
+        "h",
+    ];
     assert_ne!(actcheck(project.path(), &allowed).status.code(), Some(2));
-    let refused = actcheck(project.path(), &["run", "--resume", "--strategy", "bandit", "--history", "h"]);
-    assert_eq!(refused.status.code(), Some(2), "a campaign resumes with its strategy");
+    let refused = actcheck(
+        project.path(),
+        &["run", "--resume", "--strategy", "bandit", "--history", "h"],
+    );
+    assert_eq!(
+        refused.status.code(),
+        Some(2),
+        "a campaign resumes with its strategy"
+    );
 }

@@ -12,7 +12,14 @@ use crate::support::{actcheck, copy_made_history, foreign, made_history, signal,
 
 /// A server with narrow limits.
 fn limited() -> Server {
-    Server::alone(&["--max-time", "3s", "--max-rows", "1000", "--max-queries", "64"])
+    Server::alone(&[
+        "--max-time",
+        "3s",
+        "--max-rows",
+        "1000",
+        "--max-queries",
+        "64",
+    ])
 }
 
 const RUNS: &str = "SELECT ?run ?index { ?run a act:Run ; act:index ?index } ORDER BY ?index";
@@ -21,14 +28,39 @@ const RUNS: &str = "SELECT ?run ?index { ?run a act:Run ; act:index ?index } ORD
 fn answers_have_the_requested_media_type() {
     let server = limited();
     for (accept, media_type, piece) in [
-        ("", "application/sparql-results+json", "\"vars\":[\"run\",\"index\"]"),
-        ("application/sparql-results+xml", "application/sparql-results+xml", "<variable name=\"index\"/>"),
-        ("text/csv", "text/csv; charset=utf-8", "run,index\r\nhttps://w3id.org/actcheck/run/"),
-        ("text/tab-separated-values", "text/tab-separated-values; charset=utf-8", "?run\t?index"),
-        ("text/html, */*;q=0.1", "application/sparql-results+json", "bindings"),
+        (
+            "",
+            "application/sparql-results+json",
+            "\"vars\":[\"run\",\"index\"]",
+        ),
+        (
+            "application/sparql-results+xml",
+            "application/sparql-results+xml",
+            "<variable name=\"index\"/>",
+        ),
+        (
+            "text/csv",
+            "text/csv; charset=utf-8",
+            "run,index\r\nhttps://w3id.org/actcheck/run/",
+        ),
+        (
+            "text/tab-separated-values",
+            "text/tab-separated-values; charset=utf-8",
+            "?run\t?index",
+        ),
+        (
+            "text/html, */*;q=0.1",
+            "application/sparql-results+json",
+            "bindings",
+        ),
     ] {
         let reply = server.ask(RUNS, accept);
-        assert_eq!((reply.status, reply.media_type()), (200, media_type), "{accept}: {}", reply.body);
+        assert_eq!(
+            (reply.status, reply.media_type()),
+            (200, media_type),
+            "{accept}: {}",
+            reply.body
+        );
         assert!(reply.body.contains(piece), "{accept}: {}", reply.body);
         assert_eq!(reply.headers["x-content-type-options"], "nosniff");
         assert!(reply.headers["content-security-policy"].contains("default-src 'none'"));
@@ -37,16 +69,30 @@ fn answers_have_the_requested_media_type() {
     let graph = "CONSTRUCT { ?run a prov:Activity } WHERE { ?run a act:Run }";
     for (accept, media_type, piece) in [
         ("*/*", "text/turtle; charset=utf-8", "prov:Activity"),
-        ("application/n-triples", "application/n-triples", "<http://www.w3.org/ns/prov#Activity> ."),
+        (
+            "application/n-triples",
+            "application/n-triples",
+            "<http://www.w3.org/ns/prov#Activity> .",
+        ),
         ("application/rdf+xml", "application/rdf+xml", "<rdf:RDF"),
     ] {
         let reply = server.ask(graph, accept);
-        assert_eq!((reply.status, reply.media_type()), (200, media_type), "{accept}: {}", reply.body);
+        assert_eq!(
+            (reply.status, reply.media_type()),
+            (200, media_type),
+            "{accept}: {}",
+            reply.body
+        );
         assert!(reply.body.contains(piece), "{accept}: {}", reply.body);
     }
     assert_eq!(server.ask(graph, "text/csv").status, 406);
     assert_eq!(server.ask(RUNS, "image/png").status, 406);
-    assert!(server.ask("ASK { ?run a act:Run }", "").body.contains("\"boolean\":true"));
+    assert!(
+        server
+            .ask("ASK { ?run a act:Run }", "")
+            .body
+            .contains("\"boolean\":true")
+    );
 }
 
 #[test]
@@ -71,16 +117,29 @@ fn invalid_queries_are_refused_with_their_place() {
     let server = limited();
     let reply = server.ask("SELECT * WHERE { ?a ?b }", "*/*");
     assert_eq!(reply.status, 400);
-    assert!(reply.body.contains("query:1:") && reply.body.contains("H010"), "{}", reply.body);
+    assert!(
+        reply.body.contains("query:1:") && reply.body.contains("H010"),
+        "{}",
+        reply.body
+    );
     assert_eq!(server.get("/sparql").status, 400);
     assert_eq!(server.get("/sparql?query=a&query=b").status, 400);
-    assert_eq!(server.get("/sparql?query=ASK%7B%7D&default-graph-uri=http://a").status, 400);
+    assert_eq!(
+        server
+            .get("/sparql?query=ASK%7B%7D&default-graph-uri=http://a")
+            .status,
+        400
+    );
 }
 
 #[test]
 fn updates_are_refused() {
     let server = limited();
-    let count = || server.ask("SELECT (COUNT(*) AS ?n) { ?s ?p ?o }", "text/csv").body;
+    let count = || {
+        server
+            .ask("SELECT (COUNT(*) AS ?n) { ?s ?p ?o }", "text/csv")
+            .body
+    };
     let before = count();
     for text in [
         "DELETE WHERE { ?s ?p ?o }",
@@ -92,12 +151,28 @@ fn updates_are_refused() {
         assert_eq!(server.ask(text, "*/*").status, 403, "{text}");
     }
     let form = ("Content-Type", "application/x-www-form-urlencoded");
-    assert_eq!(server.request("POST", "/sparql", &[form], b"update=DROP+ALL").status, 403);
+    assert_eq!(
+        server
+            .request("POST", "/sparql", &[form], b"update=DROP+ALL")
+            .status,
+        403
+    );
     assert_eq!(server.get("/sparql?update=DROP+ALL").status, 403);
     let update = ("Content-Type", "application/sparql-update");
-    assert_eq!(server.request("POST", "/sparql", &[update], b"DROP ALL").status, 403);
-    assert_eq!(server.request("PUT", "/sparql?graph=a", &[], b"x").status, 405);
-    assert_eq!(server.request("DELETE", "/sparql?default", &[], b"").status, 405);
+    assert_eq!(
+        server
+            .request("POST", "/sparql", &[update], b"DROP ALL")
+            .status,
+        403
+    );
+    assert_eq!(
+        server.request("PUT", "/sparql?graph=a", &[], b"x").status,
+        405
+    );
+    assert_eq!(
+        server.request("DELETE", "/sparql?default", &[], b"").status,
+        405
+    );
     assert_eq!(count(), before);
 }
 
@@ -109,21 +184,39 @@ fn service_clauses_and_remote_graphs_are_refused() {
     other.set_nonblocking(true).unwrap();
     let there = format!("http://{}/sparql", other.local_addr().unwrap());
     for service in ["SERVICE", "SERVICE SILENT", "service silent"] {
-        let reply = server.ask(&format!("SELECT * {{ {service} <{there}> {{ ?s ?p ?o }} }}"), "*/*");
+        let reply = server.ask(
+            &format!("SELECT * {{ {service} <{there}> {{ ?s ?p ?o }} }}"),
+            "*/*",
+        );
         assert_eq!(reply.status, 403, "{}", reply.body);
         assert!(reply.body.contains("H017"), "{}", reply.body);
     }
     // Escapes hide the keyword from a reader, and still no host is contacted.
-    let hidden = server.ask(&format!("SELECT * {{ \\u0053ERVICE SILENT <{there}> {{ ?s ?p ?o }} }}"), "text/csv");
-    assert!(hidden.status != 200 || hidden.body.lines().count() <= 2, "{hidden:?}");
+    let hidden = server.ask(
+        &format!("SELECT * {{ \\u0053ERVICE SILENT <{there}> {{ ?s ?p ?o }} }}"),
+        "text/csv",
+    );
+    assert!(
+        hidden.status != 200 || hidden.body.lines().count() <= 2,
+        "{hidden:?}"
+    );
     for from in [there.as_str(), "file:///etc/passwd"] {
-        let reply = server.ask(&format!("SELECT * FROM <{from}> {{ ?s ?p ?o }}"), "text/csv");
-        assert_eq!((reply.status, reply.body.lines().count()), (200, 1), "such a graph is empty: {}", reply.body);
+        let reply = server.ask(
+            &format!("SELECT * FROM <{from}> {{ ?s ?p ?o }}"),
+            "text/csv",
+        );
+        assert_eq!(
+            (reply.status, reply.body.lines().count()),
+            (200, 1),
+            "such a graph is empty: {}",
+            reply.body
+        );
     }
     assert!(other.accept().is_err(), "a connection was made");
 }
 
-/// Joins that would take days, in which the evaluator does not check for cancellation, and queries that crash it.
+/// Joins that would take days, in which the evaluator does not check for cancellation, and queries
+/// that crash it.
 #[test]
 fn long_queries_are_stopped_and_do_not_block_others() {
     let server = limited();
@@ -134,7 +227,10 @@ fn long_queries_are_stopped_and_do_not_block_others() {
         "SELECT * { ?a ?b ?c . ?d ?e ?f . ?g ?h ?i } ORDER BY ?i ?f",
     ];
     std::thread::scope(|scope| {
-        let asked: Vec<_> = long.iter().map(|query| scope.spawn(|| server.ask(query, "*/*"))).collect();
+        let asked: Vec<_> = long
+            .iter()
+            .map(|query| scope.spawn(|| server.ask(query, "*/*")))
+            .collect();
         assert_eq!(server.ask("ASK {}", "*/*").status, 200);
         for reply in asked {
             let reply = reply.join().unwrap();
@@ -143,14 +239,21 @@ fn long_queries_are_stopped_and_do_not_block_others() {
             assert!(reply.body.contains("took"), "{}", reply.body);
         }
     });
-    assert!(began.elapsed() < Duration::from_secs(60), "the limit is 3 s");
+    assert!(
+        began.elapsed() < Duration::from_secs(60),
+        "the limit is 3 s"
+    );
     assert_eq!(server.ask("ASK {}", "*/*").status, 200);
 }
 
 #[test]
 fn a_query_that_is_nested_too_deeply_is_refused() {
     let server = limited();
-    let nested = format!("SELECT * {{ FILTER({}1{}) }}", "(".repeat(100_000), ")".repeat(100_000));
+    let nested = format!(
+        "SELECT * {{ FILTER({}1{}) }}",
+        "(".repeat(100_000),
+        ")".repeat(100_000)
+    );
     let reply = server.ask(&nested, "*/*");
     assert_eq!(reply.status, 403, "{}", reply.body);
     assert!(reply.body.contains("levels deep"), "{}", reply.body);
@@ -163,7 +266,10 @@ fn huge_answers_are_refused() {
     let reply = server.ask("SELECT * { ?a ?b ?c . ?d ?e ?f }", "*/*");
     assert_eq!(reply.status, 403);
     assert!(reply.body.contains("more than 1000 rows"), "{}", reply.body);
-    let reply = server.ask("CONSTRUCT { ?a ?b ?f } WHERE { ?a ?b ?c . ?d ?e ?f }", "*/*");
+    let reply = server.ask(
+        "CONSTRUCT { ?a ?b ?f } WHERE { ?a ?b ?c . ?d ?e ?f }",
+        "*/*",
+    );
     assert_eq!(reply.status, 403, "{}", reply.body);
     // Few rows, each of them large.
     let small = Server::alone(&["--max-mb", "1"]);
@@ -172,7 +278,11 @@ fn huge_answers_are_refused() {
                    BIND(CONCAT(?d,?d,?d,?d,?d,?d,?d,?d) AS ?e) BIND(CONCAT(?e,?e,?e,?e,?e,?e,?e,?e) AS ?t) }";
     let reply = small.ask(doubled, "text/csv");
     assert_eq!(reply.status, 500);
-    assert!(reply.body.contains("larger than 1 MB"), "{}", &reply.body[..reply.body.len().min(200)]);
+    assert!(
+        reply.body.contains("larger than 1 MB"),
+        "{}",
+        &reply.body[..reply.body.len().min(200)]
+    );
 }
 
 #[test]
@@ -194,8 +304,17 @@ fn path_traversal_is_refused() {
         "/query.js.map",
     ] {
         let reply = server.get(target);
-        assert!([400, 404].contains(&reply.status), "{target}: {} {}", reply.status, reply.body);
-        assert!(!reply.body.contains("root:") && !reply.body.contains("actcheck history"), "{target}: {}", reply.body);
+        assert!(
+            [400, 404].contains(&reply.status),
+            "{target}: {} {}",
+            reply.status,
+            reply.body
+        );
+        assert!(
+            !reply.body.contains("root:") && !reply.body.contains("actcheck history"),
+            "{target}: {}",
+            reply.body
+        );
     }
     // The absolute form of a request target, and invalid targets.
     assert!(server.get("http://evil.example/sparql").status >= 400);
@@ -207,7 +326,10 @@ fn path_traversal_is_refused() {
         "GET / HTTP/1.1\r\nHost: a b\r\nX\r\n\r\n",
     ] {
         let reply = server.garbage(raw.as_bytes());
-        assert!(reply.status == 0 || reply.status >= 400, "{raw:?}: {reply:?}");
+        assert!(
+            reply.status == 0 || reply.status >= 400,
+            "{raw:?}: {reply:?}"
+        );
     }
     assert_eq!(server.get("/").status, 200);
 }
@@ -221,13 +343,27 @@ fn huge_bodies_are_refused_unread() {
         )
     };
     // Announced and never sent.
-    assert_eq!(server.raw(headers("Content-Length: 1000000000000").as_bytes()).status, 413);
+    assert_eq!(
+        server
+            .raw(headers("Content-Length: 1000000000000").as_bytes())
+            .status,
+        413
+    );
     // Sent piece by piece, without a length.
     let mut stream = server.connect();
-    stream.write_all(headers("Transfer-Encoding: chunked").as_bytes()).unwrap();
-    let piece = [format!("{:x}\r\n", 1 << 16).into_bytes(), vec![b' '; 1 << 16], b"\r\n".to_vec()].concat();
+    stream
+        .write_all(headers("Transfer-Encoding: chunked").as_bytes())
+        .unwrap();
+    let piece = [
+        format!("{:x}\r\n", 1 << 16).into_bytes(),
+        vec![b' '; 1 << 16],
+        b"\r\n".to_vec(),
+    ]
+    .concat();
     // The server closes before everything is sent.
-    let sent = (0..1000).take_while(|_| stream.write_all(&piece).is_ok()).count();
+    let sent = (0..1000)
+        .take_while(|_| stream.write_all(&piece).is_ok())
+        .count();
     assert!(sent < 1000, "64 MB were read");
     assert_eq!(server.ask("ASK {}", "*/*").status, 200);
 }
@@ -238,7 +374,9 @@ fn slow_clients_are_disconnected_and_do_not_block_others() {
     // More connections than processors; none of them ever sends a complete request.
     let mut silent: Vec<TcpStream> = (0..20).map(|_| server.connect()).collect();
     for stream in &mut silent {
-        stream.write_all(b"POST /sparql HTTP/1.1\r\nHost: localhost\r\nContent-Length: 10\r\n").unwrap();
+        stream
+            .write_all(b"POST /sparql HTTP/1.1\r\nHost: localhost\r\nContent-Length: 10\r\n")
+            .unwrap();
     }
     let mut half = server.connect();
     half.write_all(b"POST /sparql HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/sparql-query\r\nContent-Length: 10\r\n\r\nASK")
@@ -256,27 +394,43 @@ fn slow_clients_are_disconnected_and_do_not_block_others() {
 fn requests_from_other_sites_are_refused() {
     let server = limited();
     let target = "/sparql?query=ASK%7B%7D";
-    let with = |name: &str, value: &str| server.request("GET", target, &[(name, value)], b"").status;
+    let with =
+        |name: &str, value: &str| server.request("GET", target, &[(name, value)], b"").status;
     assert_eq!(with("Host", "evil.example"), 421);
     assert_eq!(with("Host", "127.0.0.1.evil.example:7878"), 421);
     assert_eq!(with("Origin", "http://evil.example"), 403);
     assert_eq!(with("Origin", "null"), 403);
-    assert_eq!(with("Origin", &format!("http://localhost:{}", server.port)), 200);
+    assert_eq!(
+        with("Origin", &format!("http://localhost:{}", server.port)),
+        200
+    );
     assert_eq!(with("Sec-Fetch-Site", "cross-site"), 403);
     assert_eq!(with("Sec-Fetch-Site", "same-site"), 403);
     assert_eq!(with("Sec-Fetch-Site", "same-origin"), 200);
     assert_eq!(with("Sec-Fetch-Site", "none"), 200);
-    assert_eq!(server.get(&format!("http://evil.example{target}")).status, 421);
+    assert_eq!(
+        server.get(&format!("http://evil.example{target}")).status,
+        421
+    );
     let hosts = [("Host", "localhost"), ("Host", "evil.example")];
     assert_eq!(server.request("GET", target, &hosts, b"").status, 400);
-    assert_eq!(server.raw(b"GET / HTTP/1.1\r\nConnection: close\r\n\r\n").status, 400, "missing host");
+    assert_eq!(
+        server
+            .raw(b"GET / HTTP/1.1\r\nConnection: close\r\n\r\n")
+            .status,
+        400,
+        "missing host"
+    );
 }
 
 #[test]
 fn the_page_and_the_report_are_served() {
     let server = limited();
     let page = server.get("/");
-    assert_eq!((page.status, page.media_type()), (200, "text/html; charset=utf-8"));
+    assert_eq!(
+        (page.status, page.media_type()),
+        (200, "text/html; charset=utf-8")
+    );
     assert!(
         page.body.contains("data-query=") && page.body.contains("worst-failures"),
         "the page lists the shipped queries"
@@ -284,10 +438,18 @@ fn the_page_and_the_report_are_served() {
     assert!(page.headers["content-security-policy"].contains("script-src 'self'"));
     for asset in ["/style.css", "/query.js"] {
         let reply = server.get(asset);
-        assert!(reply.status == 200 && reply.body.len() > 500 && page.body.contains(asset), "{asset}");
+        assert!(
+            reply.status == 200 && reply.body.len() > 500 && page.body.contains(asset),
+            "{asset}"
+        );
     }
     let report = server.get("/report");
-    assert_eq!((report.status, report.media_type()), (200, "text/html; charset=utf-8"), "{}", report.body);
+    assert_eq!(
+        (report.status, report.media_type()),
+        (200, "text/html; charset=utf-8"),
+        "{}",
+        report.body
+    );
     assert!(report.body.contains("</html>") && report.body.len() > 10_000);
     assert!(report.headers["content-security-policy"].contains("default-src 'none'"));
     assert_eq!(server.request("POST", "/", &[], b"x").status, 405);
@@ -309,13 +471,33 @@ fn a_second_process_can_use_the_history_beside_the_server() {
     assert_eq!(runs(&server), before);
     drop(reader);
     let name = history.display().to_string();
-    let output = actcheck(crate::support::root(), &["list", "--history", &name, "--format", "csv"]);
-    assert!(output.status.success() && stdout(&output).lines().count() == before + 1, "{}", stderr(&output));
+    let output = actcheck(
+        crate::support::root(),
+        &["list", "--history", &name, "--format", "csv"],
+    );
+    assert!(
+        output.status.success() && stdout(&output).lines().count() == before + 1,
+        "{}",
+        stderr(&output)
+    );
     let ran = actcheck(
         crate::support::root(),
-        &["run", "configs/quick.toml", "--runs", "1", "--jobs", "1", "--history", &name],
+        &[
+            "run",
+            "configs/quick.toml",
+            "--runs",
+            "1",
+            "--jobs",
+            "1",
+            "--history",
+            &name,
+        ],
     );
-    assert!(ran.status.code().is_some_and(|code| code < 2), "{}", stderr(&ran));
+    assert!(
+        ran.status.code().is_some_and(|code| code < 2),
+        "{}",
+        stderr(&ran)
+    );
     // On a busy machine, the server looks for changes less often.
     let is_visible = (0..200).any(|_| {
         std::thread::sleep(std::time::Duration::from_millis(50));
@@ -326,7 +508,12 @@ fn a_second_process_can_use_the_history_beside_the_server() {
     // While another process writes, the answers come from a snapshot.
     let _owner = actcheck::history::History::open_existing(&history).unwrap();
     let reply = server.ask(RUNS, "text/csv");
-    assert_eq!((reply.status, reply.body.lines().count()), (200, before + 2), "{}", reply.body);
+    assert_eq!(
+        (reply.status, reply.body.lines().count()),
+        (200, before + 2),
+        "{}",
+        reply.body
+    );
 }
 
 #[test]
@@ -337,7 +524,10 @@ fn ctrl_c_stops_the_server_cleanly() {
     assert_eq!(server.process.wait().unwrap().code(), Some(0));
     let mut said = String::new();
     server.output.read_to_string(&mut said).unwrap();
-    assert!(said.starts_with("0 requests served, 1 refused, 0 failed; 99 % of them within "), "{said}");
+    assert!(
+        said.starts_with("0 requests served, 1 refused, 0 failed; 99 % of them within "),
+        "{said}"
+    );
     assert!(TcpStream::connect(("127.0.0.1", server.port)).is_err());
 }
 
@@ -349,16 +539,52 @@ fn servers_that_cannot_start_report_the_reason() {
     let history = own.path().display().to_string();
     for (arguments, fault) in [
         (vec!["serve", "--history", "nowhere"], "H003"),
-        (vec!["serve", "--history", &history, "--port", &server.port.to_string()], "X053"),
-        (vec!["serve", "--history", &history, "--bind", "192.0.2.1", "--port", "0"], "X053"),
-        (vec!["serve", "--history", &history, "--max-secs", "0"], "above zero"),
-        (vec!["serve", "--history", &history, "--max-time", "25h"], "at most a day"),
-        (vec!["serve", "--history", &history, "--max-time", "soon"], "not a duration"),
-        (vec!["serve", "--history", &history, "--bind", "localhost"], "invalid"),
+        (
+            vec![
+                "serve",
+                "--history",
+                &history,
+                "--port",
+                &server.port.to_string(),
+            ],
+            "X053",
+        ),
+        (
+            vec![
+                "serve",
+                "--history",
+                &history,
+                "--bind",
+                "192.0.2.1",
+                "--port",
+                "0",
+            ],
+            "X053",
+        ),
+        (
+            vec!["serve", "--history", &history, "--max-secs", "0"],
+            "above zero",
+        ),
+        (
+            vec!["serve", "--history", &history, "--max-time", "25h"],
+            "at most a day",
+        ),
+        (
+            vec!["serve", "--history", &history, "--max-time", "soon"],
+            "not a duration",
+        ),
+        (
+            vec!["serve", "--history", &history, "--bind", "localhost"],
+            "invalid",
+        ),
     ] {
         let output = actcheck(folder.path(), &arguments);
         assert_eq!(output.status.code(), Some(2), "{arguments:?}");
-        assert!(stderr(&output).contains(fault), "{arguments:?}: {}", stderr(&output));
+        assert!(
+            stderr(&output).contains(fault),
+            "{arguments:?}: {}",
+            stderr(&output)
+        );
     }
 }
 
@@ -380,17 +606,31 @@ fn external_clients_work() {
             ])
             .output()
             .unwrap();
-        assert!(output.status.success() && stdout(&output).starts_with("run,index\r\n"), "{output:?}");
+        assert!(
+            output.status.success() && stdout(&output).starts_with("run,index\r\n"),
+            "{output:?}"
+        );
         let get = Command::new("curl")
-            .args(["--silent", "--get", "-H", "Accept: application/n-triples", "--data-urlencode"])
-            .args(["query=CONSTRUCT { ?s a act:Run } { ?s a act:Run }", &endpoint])
+            .args([
+                "--silent",
+                "--get",
+                "-H",
+                "Accept: application/n-triples",
+                "--data-urlencode",
+            ])
+            .args([
+                "query=CONSTRUCT { ?s a act:Run } { ?s a act:Run }",
+                &endpoint,
+            ])
             .output()
             .unwrap();
         assert!(stdout(&get).contains("<http://actions#Run> ."), "{get:?}");
     } else {
         foreign::left_out("curl against the endpoint", "curl is not installed");
     }
-    let Some(python) = foreign::python() else { return };
+    let Some(python) = foreign::python() else {
+        return;
+    };
     let output = Command::new(python)
         .arg(crate::support::root().join("tests/foreign/ask.py"))
         .args([&endpoint, RUNS])
@@ -400,5 +640,9 @@ fn external_clients_work() {
     let printed: Value = serde_json::from_slice(&output.stdout).unwrap();
     assert_eq!(printed["GET"], printed["POST"]);
     assert!(printed["GET"].as_u64().is_some_and(|rows| rows > 0));
-    assert!(printed["triples"].as_u64().is_some_and(|triples| triples > 0));
+    assert!(
+        printed["triples"]
+            .as_u64()
+            .is_some_and(|triples| triples > 0)
+    );
 }

@@ -14,7 +14,10 @@ fn next_response(stream: &mut BufReader<TcpStream>) -> (u16, String) {
     let (mut status, mut length) = (0, 0);
     loop {
         let mut line = String::new();
-        assert!(stream.read_line(&mut line).unwrap() > 0, "the connection was closed");
+        assert!(
+            stream.read_line(&mut line).unwrap() > 0,
+            "the connection was closed"
+        );
         if let Some(code) = line.strip_prefix("HTTP/1.1 ") {
             status = code[..3].parse().unwrap();
         }
@@ -48,30 +51,51 @@ fn connections_stay_open_and_memory_stays_flat() {
     let after = server.memory_mb();
     assert!(after <= before + 20, "{before} MB, then {after} MB");
     let health: Value = serde_json::from_str(&server.get("/health").body).unwrap();
-    assert_eq!((health["served"].as_u64(), health["refused"].as_u64()), (Some(2500), Some(0)), "{health}");
-    assert!(health["p99_ms"].as_f64().is_some_and(|ms| ms > 0.0), "{health}");
+    assert_eq!(
+        (health["served"].as_u64(), health["refused"].as_u64()),
+        (Some(2500), Some(0)),
+        "{health}"
+    );
+    assert!(
+        health["p99_ms"].as_f64().is_some_and(|ms| ms > 0.0),
+        "{health}"
+    );
 }
 
 #[test]
 fn queries_that_need_much_memory_end_without_harm_to_the_server() {
     let server = Server::alone(&["--max-memory-mb", "200", "--max-queries", "2"]);
     // Doubles a string 36 times: 64 GB.
-    let doubled: String = (0..36).map(|n| format!("BIND(CONCAT(?x{n}, ?x{n}) AS ?x{}) ", n + 1)).collect();
+    let doubled: String = (0..36)
+        .map(|n| format!("BIND(CONCAT(?x{n}, ?x{n}) AS ?x{}) ", n + 1))
+        .collect();
     let text = format!("SELECT (STRLEN(?x36) AS ?n) {{ BIND('0123456789' AS ?x0) {doubled} }}");
     let rows = "SELECT * { ?a ?b ?c . ?d ?e ?f . ?g ?h ?i } ORDER BY ?i ?f";
     assert_eq!(server.ask(RUNS, "").status, 200);
     let before = server.memory_mb();
     std::thread::scope(|scope| {
-        let bombs: Vec<_> = (0..2).map(|_| scope.spawn(|| server.ask(&text, "*/*"))).collect();
-        let large: Vec<_> = (0..2).map(|_| scope.spawn(|| server.ask(rows, "*/*"))).collect();
+        let bombs: Vec<_> = (0..2)
+            .map(|_| scope.spawn(|| server.ask(&text, "*/*")))
+            .collect();
+        let large: Vec<_> = (0..2)
+            .map(|_| scope.spawn(|| server.ask(rows, "*/*")))
+            .collect();
         // Light queries are answered meanwhile.
         assert_eq!(server.ask(RUNS, "").status, 200);
         for reply in bombs.into_iter().map(|bomb| bomb.join().unwrap()) {
-            assert!(reply.status == 403 && reply.body.contains("texts that are too long"), "{}", reply.body);
+            assert!(
+                reply.status == 403 && reply.body.contains("texts that are too long"),
+                "{}",
+                reply.body
+            );
         }
         for reply in large.into_iter().map(|large| large.join().unwrap()) {
             // On a slow machine, the time limit is reached first.
-            assert!([500, 504].contains(&reply.status) && reply.body.contains("took"), "{}", reply.body);
+            assert!(
+                [500, 504].contains(&reply.status) && reply.body.contains("took"),
+                "{}",
+                reply.body
+            );
         }
     });
     let after = server.memory_mb();
@@ -88,12 +112,17 @@ fn none_of_many_clients_is_refused() {
         let clients: Vec<_> = (0..64)
             .map(|number| {
                 let server = &server;
-                scope.spawn(move || server.ask(if number % 2 == 0 { RUNS } else { heavy }, "text/csv"))
+                scope.spawn(move || {
+                    server.ask(if number % 2 == 0 { RUNS } else { heavy }, "text/csv")
+                })
             })
             .collect();
         for client in clients {
             let reply = client.join().unwrap();
-            assert!(reply.status == 200 && reply.body.contains("/run/"), "{reply:?}");
+            assert!(
+                reply.status == 200 && reply.body.contains("/run/"),
+                "{reply:?}"
+            );
         }
     });
 }
@@ -117,8 +146,12 @@ fn clients_that_never_finish_a_request_do_not_delay_others() {
         assert_eq!(server.ask(RUNS, "").status, 200);
     }
     let health: Value = serde_json::from_str(&server.get("/health").body).unwrap();
-    // Had a query waited for one of these clients, it would have taken until the client is disconnected.
-    assert!(health["p99_ms"].as_f64().is_some_and(|ms| ms < 9_000.0), "{health}");
+    // Had a query waited for one of these clients, it would have taken until the client is
+    // disconnected.
+    assert!(
+        health["p99_ms"].as_f64().is_some_and(|ms| ms < 9_000.0),
+        "{health}"
+    );
     drop(open);
 }
 
@@ -127,6 +160,13 @@ fn long_queries_can_be_sent_by_get() {
     let server = Server::alone(&[]);
     let padded = |length: usize| format!("/sparql?query=ASK%7B%7D%23{}", "x".repeat(length));
     // A request line of 64 KiB.
-    assert_eq!(server.get(&padded(65_536 - "GET /sparql?query=ASK%7B%7D%23 HTTP/1.1\r\n".len())).status, 200);
+    assert_eq!(
+        server
+            .get(&padded(
+                65_536 - "GET /sparql?query=ASK%7B%7D%23 HTTP/1.1\r\n".len()
+            ))
+            .status,
+        200
+    );
     assert_eq!(server.get(&padded(100_000)).status, 414);
 }

@@ -13,7 +13,12 @@ fn picked(model: &Arc<ObjectModel>, shortcuts: Shortcuts) -> (Trace, World) {
     let mut world = build(&on_table(Arc::clone(model), 0.3, 0.5)).expect("the scene is right");
     world.take_shortcuts(shortcuts);
     assert!(world.settle().settled);
-    let trace = perform(&[call("Pick")], &mut world, &mut Choices::random(1, 0), &Budget { action_secs: 60.0 });
+    let trace = perform(
+        &[call("Pick")],
+        &mut world,
+        &mut Choices::random(1, 0),
+        &Budget { action_secs: 60.0 },
+    );
     (trace, world)
 }
 
@@ -32,8 +37,14 @@ fn a_hand_alone_grasps_and_holds_like_the_whole_robot() {
         let report = trace.actions[0].report.as_ref().expect("the skill reports");
         assert!(report.succeeded, "{}", report.message);
         let [_, _, alone, whole] = world.ticks_by_reach();
-        assert_eq!((alone > 0, whole > 0), (shortcuts == Shortcuts::ALL, shortcuts == Shortcuts::NONE));
-        let heights = [world.snapshot().robot.gripper.position[2], body(&world, "thing_1").pose.position[2]];
+        assert_eq!(
+            (alone > 0, whole > 0),
+            (shortcuts == Shortcuts::ALL, shortcuts == Shortcuts::NONE)
+        );
+        let heights = [
+            world.snapshot().robot.gripper.position[2],
+            body(&world, "thing_1").pose.position[2],
+        ];
         let mut hold = world.hold();
         hold.gripper_opening_m = 0.0;
         (0..60).for_each(|_| world.step(&hold));
@@ -41,32 +52,62 @@ fn a_hand_alone_grasps_and_holds_like_the_whole_robot() {
         (0..600).for_each(|_| world.step(&hold));
         let after = in_hand(&world);
         let slip = (after.translation.vector - before.translation.vector).norm();
-        found.push((heights, slip, after.rotation.angle_to(&before.rotation), world.quality().deepest_penetration_m));
+        found.push((
+            heights,
+            slip,
+            after.rotation.angle_to(&before.rotation),
+            world.quality().deepest_penetration_m,
+        ));
     }
-    let [([hand, thing], slip, tilt, depth), ([hand_alone, thing_alone], slip_alone, tilt_alone, depth_alone)] =
-        found[..]
+    let [
+        ([hand, thing], slip, tilt, depth),
+        ([hand_alone, thing_alone], slip_alone, tilt_alone, depth_alone),
+    ] = found[..]
     else {
         panic!("two worlds")
     };
     assert!((hand - hand_alone).abs() < 1e-3, "{hand} and {hand_alone}");
     // With two substeps, things creep down while the whole robot lifts them.
-    assert!(thing_alone > thing - 1e-3, "{thing_alone} instead of {thing}");
-    assert!(slip_alone < slip + 5e-5, "slipped by {slip_alone} m instead of {slip} m");
-    assert!(tilt_alone < tilt + 2e-3, "tilted by {tilt_alone} instead of {tilt}");
-    assert!(depth_alone < depth + 2e-4, "penetrates by {depth_alone} m instead of {depth} m");
+    assert!(
+        thing_alone > thing - 1e-3,
+        "{thing_alone} instead of {thing}"
+    );
+    assert!(
+        slip_alone < slip + 5e-5,
+        "slipped by {slip_alone} m instead of {slip} m"
+    );
+    assert!(
+        tilt_alone < tilt + 2e-3,
+        "tilted by {tilt_alone} instead of {tilt}"
+    );
+    assert!(
+        depth_alone < depth + 2e-4,
+        "penetrates by {depth_alone} m instead of {depth} m"
+    );
 }
 
-/// Shapes are swept only where something fast can meet something fixed: a pick without sweeps is the same bit by bit.
+/// Shapes are swept only where something fast can meet something fixed: a pick without sweeps is
+/// the same bit by bit.
 #[test]
 fn a_pick_is_the_same_without_needless_sweeps() {
     let model = block([0.06, 0.06, 0.15]);
     let of = |few_sweeps: bool| {
-        let (trace, world) = picked(&model, Shortcuts { few_sweeps, ..Shortcuts::ALL });
+        let (trace, world) = picked(
+            &model,
+            Shortcuts {
+                few_sweeps,
+                ..Shortcuts::ALL
+            },
+        );
         (format!("{trace:?}"), world.swept())
     };
     let [(always, swept), (seldom, swept_at_last)] = [of(false), of(true)];
     assert_eq!(always, seldom);
-    assert_eq!((swept, swept_at_last), (true, false), "the thing hangs in the hand");
+    assert_eq!(
+        (swept, swept_at_last),
+        (true, false),
+        "the thing hangs in the hand"
+    );
 }
 
 /// A plate of 2 mm that falls on the floor moves 4 cm in each step.
@@ -84,7 +125,10 @@ fn a_fast_thing_does_not_pass_through_the_floor() {
         )]);
         dropped.robot.base = [0.0, 0.0, 0.0];
         let mut world = build(&dropped).expect("the scene is right");
-        world.take_shortcuts(Shortcuts { few_sweeps, ..Shortcuts::ALL });
+        world.take_shortcuts(Shortcuts {
+            few_sweeps,
+            ..Shortcuts::ALL
+        });
         let hold = world.hold();
         let mut n_swept = 0;
         for _ in 0..120 {
@@ -97,10 +141,16 @@ fn a_fast_thing_does_not_pass_through_the_floor() {
         found.push((body(&world, "plate_1").pose, n_swept));
     }
     assert_eq!(found[0].0, found[1].0);
-    assert!(found[0].1 == 120 && (1..100).contains(&found[1].1), "swept in {} and {} ticks", found[0].1, found[1].1);
+    assert!(
+        found[0].1 == 120 && (1..100).contains(&found[1].1),
+        "swept in {} and {} ticks",
+        found[0].1,
+        found[1].1
+    );
 }
 
-/// The arm stretched forwards, with a level hand: lift, flexion, roll, flexion and roll of the wrist.
+/// The arm stretched forwards, with a level hand: lift, flexion, roll, flexion and roll of the
+/// wrist.
 const LEVEL: [f64; 5] = [0.3, -1.25, 0.0, -0.32, 0.0];
 /// Gap between this hand and a block under it. Unit: metres.
 const GAP_M: f64 = 0.1;
@@ -114,7 +164,14 @@ fn block_below() -> Scene {
     (0..300).for_each(|_| world.step(&command));
     let [x, y, height] = world.snapshot().robot.gripper.position;
     let model = block([0.2, 0.2, height - GAP_M]);
-    scene.objects = vec![object("block_1", model, Role::Other, Pose::upright([x, y, 0.0], 0.0), 5.0, 0.5)];
+    scene.objects = vec![object(
+        "block_1",
+        model,
+        Role::Other,
+        Pose::upright([x, y, 0.0], 0.0),
+        5.0,
+        0.5,
+    )];
     scene
 }
 
@@ -146,17 +203,41 @@ fn a_hand_that_is_pushed_hard_gets_its_arm_back() {
         (0..240).for_each(|_| world.step(&command));
         assert_eq!(world.fault(), None);
         let record = world.end_record();
-        let force = record.contacts.iter().filter(|contact| contact.pair.contains(&"block_1".to_owned()));
-        let pressed = force.filter(|contact| contact.pair.iter().any(|name| name.starts_with("robot/")));
-        let most = pressed.map(|contact| contact.max_force_n).fold(0.0, f64::max);
+        let force = record
+            .contacts
+            .iter()
+            .filter(|contact| contact.pair.contains(&"block_1".to_owned()));
+        let pressed =
+            force.filter(|contact| contact.pair.iter().any(|name| name.starts_with("robot/")));
+        let most = pressed
+            .map(|contact| contact.max_force_n)
+            .fold(0.0, f64::max);
         let positions = world.observe().positions;
-        found.push((most, positions[lift], world.quality().deepest_penetration_m, world.ticks_by_reach()));
+        found.push((
+            most,
+            positions[lift],
+            world.quality().deepest_penetration_m,
+            world.ticks_by_reach(),
+        ));
     }
-    let [(force, stopped, depth, _), (force_alone, stopped_alone, depth_alone, ticks)] = found[..] else {
+    let [
+        (force, stopped, depth, _),
+        (force_alone, stopped_alone, depth_alone, ticks),
+    ] = found[..]
+    else {
         panic!("two worlds")
     };
     assert!(ticks[3] > 60, "the whole robot presses: {ticks:?}");
-    assert!(force > 50.0 && (force_alone / force - 1.0).abs() < 0.3, "{force_alone} N instead of {force} N");
-    assert!((stopped - stopped_alone).abs() < 2e-3, "stopped at {stopped_alone} instead of {stopped}");
-    assert!(depth_alone < depth + 1e-3, "penetrates by {depth_alone} m instead of {depth} m");
+    assert!(
+        force > 50.0 && (force_alone / force - 1.0).abs() < 0.3,
+        "{force_alone} N instead of {force} N"
+    );
+    assert!(
+        (stopped - stopped_alone).abs() < 2e-3,
+        "stopped at {stopped_alone} instead of {stopped}"
+    );
+    assert!(
+        depth_alone < depth + 1e-3,
+        "penetrates by {depth_alone} m instead of {depth} m"
+    );
 }

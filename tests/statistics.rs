@@ -26,7 +26,10 @@ fn counts(case: &Value) -> [u64; 4] {
 #[track_caller]
 fn close(found: f64, wanted: &Value, case: &Value) {
     let wanted = wanted.as_f64().unwrap();
-    assert!((found - wanted).abs() <= CLOSE, "{found} instead of {wanted}: {case}");
+    assert!(
+        (found - wanted).abs() <= CLOSE,
+        "{found} instead of {wanted}: {case}"
+    );
 }
 
 /// Small probabilities must be accurate in their relative error too.
@@ -35,7 +38,10 @@ fn close_relatively(found: f64, wanted: &Value, case: &Value) {
     close(found, wanted, case);
     let wanted = wanted.as_f64().unwrap();
     if wanted > 1e-290 {
-        assert!((found / wanted - 1.0).abs() <= 1e-8, "{found:e} instead of {wanted:e}: {case}");
+        assert!(
+            (found / wanted - 1.0).abs() <= 1e-8,
+            "{found:e} instead of {wanted:e}: {case}"
+        );
     }
 }
 
@@ -52,20 +58,35 @@ fn wilsons_interval_equals_statsmodels() {
 fn fishers_test_equals_scipys() {
     for case in known("fisher") {
         let [failed_in, passed_in, failed_out, passed_out] = counts(&case);
-        let test = TwoByTwo { failed_in, passed_in, failed_out, passed_out }.fisher();
+        let test = TwoByTwo {
+            failed_in,
+            passed_in,
+            failed_out,
+            passed_out,
+        }
+        .fisher();
         close_relatively(test.greater, &case["greater"], &case);
         close_relatively(test.less, &case["less"], &case);
         close_relatively(test.two_sided, &case["two_sided"], &case);
     }
     let nothing = TwoByTwo::default().fisher();
-    assert_eq!((nothing.greater, nothing.less, nothing.two_sided), (1.0, 1.0, 1.0));
+    assert_eq!(
+        (nothing.greater, nothing.less, nothing.two_sided),
+        (1.0, 1.0, 1.0)
+    );
 }
 
 #[test]
 fn mcnemars_test_equals_statsmodels() {
     for case in known("paired") {
         let [both, only_first, only_second, neither] = counts(&case);
-        let test = PairedTable { both, only_first, only_second, neither }.test();
+        let test = PairedTable {
+            both,
+            only_first,
+            only_second,
+            neither,
+        }
+        .test();
         close(test.two_sided, &case["two_sided"], &case);
     }
 }
@@ -74,15 +95,26 @@ fn mcnemars_test_equals_statsmodels() {
 fn corrections_equal_statsmodels() {
     for case in known("corrected") {
         let numbers = |key: &str| -> Vec<f64> {
-            case[key].as_array().unwrap().iter().map(|number| number.as_f64().unwrap()).collect()
+            case[key]
+                .as_array()
+                .unwrap()
+                .iter()
+                .map(|number| number.as_f64().unwrap())
+                .collect()
         };
         let given = numbers("probabilities");
         let found = benjamini_hochberg(&given, given.len() as u64);
         assert_eq!(found.len(), given.len());
-        for (found, wanted) in found.into_iter().zip(case["benjamini_hochberg"].as_array().unwrap()) {
+        for (found, wanted) in found
+            .into_iter()
+            .zip(case["benjamini_hochberg"].as_array().unwrap())
+        {
             close(found, wanted, &case);
         }
-        for (found, wanted) in holm(&given).into_iter().zip(case["holm"].as_array().unwrap()) {
+        for (found, wanted) in holm(&given)
+            .into_iter()
+            .zip(case["holm"].as_array().unwrap())
+        {
             close(found, wanted, &case);
         }
     }

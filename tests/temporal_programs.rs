@@ -1,5 +1,6 @@
-//! Programs with recursion, negation and formulas about time against an evaluator that follows the definitions: sets that
-//! grow until nothing is new, and a formula that asks every moment of its interval.
+//! Programs with recursion, negation and formulas about time against an evaluator that follows the
+//! definitions: sets that grow until nothing is new, and a formula that asks every moment of its
+//! interval.
 
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
@@ -33,15 +34,27 @@ type Signals = Vec<[Vec<i32>; 2]>;
 
 impl Formula {
     fn text(&self) -> String {
-        let interval =
-            |interval: &Option<[usize; 2]>| interval.map(|[from, to]| format!("[{from}, {to}]")).unwrap_or_default();
+        let interval = |interval: &Option<[usize; 2]>| {
+            interval
+                .map(|[from, to]| format!("[{from}, {to}]"))
+                .unwrap_or_default()
+        };
         match self {
             Self::Compare(left, op, right) => format!("{} {op} {}", left.text(), right.text()),
             Self::Not(inner) => format!("~({})", inner.text()),
-            Self::Both(left, word, right) => format!("(({}) {word} ({}))", left.text(), right.text()),
-            Self::Unary(word, bounds, inner) => format!("{word}{}({})", interval(bounds), inner.text()),
+            Self::Both(left, word, right) => {
+                format!("(({}) {word} ({}))", left.text(), right.text())
+            }
+            Self::Unary(word, bounds, inner) => {
+                format!("{word}{}({})", interval(bounds), inner.text())
+            }
             Self::Binary(word, bounds, left, right) => {
-                format!("{word}{}({}, {})", interval(bounds), left.text(), right.text())
+                format!(
+                    "{word}{}({}, {})",
+                    interval(bounds),
+                    left.text(),
+                    right.text()
+                )
             }
         }
     }
@@ -54,7 +67,9 @@ impl Formula {
         };
         let earlier = |bounds: &Option<[usize; 2]>| -> Vec<usize> {
             let [from, to] = bounds.unwrap_or([0, SAMPLES]);
-            (0..=at).filter(|moment| (from..=to).contains(&(at - moment))).collect()
+            (0..=at)
+                .filter(|moment| (from..=to).contains(&(at - moment)))
+                .collect()
         };
         match self {
             Self::Compare(left, op, right) => {
@@ -80,22 +95,32 @@ impl Formula {
             Self::Unary(word, bounds, inner) => match *word {
                 "always" => later(bounds).all(|moment| inner.holds(moment, of)),
                 "eventually" => later(bounds).any(|moment| inner.holds(moment, of)),
-                "historically" => earlier(bounds).into_iter().all(|moment| inner.holds(moment, of)),
-                _ => earlier(bounds).into_iter().any(|moment| inner.holds(moment, of)),
+                "historically" => earlier(bounds)
+                    .into_iter()
+                    .all(|moment| inner.holds(moment, of)),
+                _ => earlier(bounds)
+                    .into_iter()
+                    .any(|moment| inner.holds(moment, of)),
             },
-            Self::Binary("until", bounds, left, right) => {
-                later(bounds).any(|moment| right.holds(moment, of) && (at..moment).all(|before| left.holds(before, of)))
-            }
-            Self::Binary(_, bounds, left, right) => earlier(bounds)
-                .into_iter()
-                .any(|moment| right.holds(moment, of) && (moment + 1..=at).all(|after| left.holds(after, of))),
+            Self::Binary("until", bounds, left, right) => later(bounds).any(|moment| {
+                right.holds(moment, of) && (at..moment).all(|before| left.holds(before, of))
+            }),
+            Self::Binary(_, bounds, left, right) => earlier(bounds).into_iter().any(|moment| {
+                right.holds(moment, of) && (moment + 1..=at).all(|after| left.holds(after, of))
+            }),
         }
     }
 
     /// The moment at which the formula is read as a condition.
     fn moment(&self) -> usize {
-        let (Self::Unary(word, ..) | Self::Binary(word, ..)) = self else { return 0 };
-        if matches!(*word, "historically" | "once" | "since") { SAMPLES - 1 } else { 0 }
+        let (Self::Unary(word, ..) | Self::Binary(word, ..)) = self else {
+            return 0;
+        };
+        if matches!(*word, "historically" | "once" | "since") {
+            SAMPLES - 1
+        } else {
+            0
+        }
     }
 }
 
@@ -110,10 +135,21 @@ impl Value {
 }
 
 fn formula() -> impl Strategy<Value = Formula> {
-    let signal = || (prop_oneof![Just("a"), Just("b")], 0..2usize).prop_map(|(name, of)| Value::Signal(name, of));
+    let signal = || {
+        (prop_oneof![Just("a"), Just("b")], 0..2usize)
+            .prop_map(|(name, of)| Value::Signal(name, of))
+    };
     let right = prop_oneof![signal(), (-2..3).prop_map(Value::Number)];
-    let op = prop_oneof![Just("<"), Just("<="), Just(">"), Just(">="), Just("="), Just("!=")];
-    let compare = (signal(), op, right).prop_map(|(left, op, right)| Formula::Compare(left, op, right));
+    let op = prop_oneof![
+        Just("<"),
+        Just("<="),
+        Just(">"),
+        Just(">="),
+        Just("="),
+        Just("!=")
+    ];
+    let compare =
+        (signal(), op, right).prop_map(|(left, op, right)| Formula::Compare(left, op, right));
     let inner = compare.prop_recursive(3, 12, 2, |inner| {
         let word = prop_oneof![Just("and"), Just("or"), Just("implies")];
         prop_oneof![
@@ -129,13 +165,38 @@ fn formula() -> impl Strategy<Value = Formula> {
     temporal(inner)
 }
 
-fn temporal(inner: impl Strategy<Value = Formula> + Clone + 'static) -> impl Strategy<Value = Formula> {
-    let bounds = || proptest::option::of((0..4usize, 0..5usize).prop_map(|(from, length)| [from, from + length]));
-    let unary = prop_oneof![Just("always"), Just("eventually"), Just("historically"), Just("once")];
+fn temporal(
+    inner: impl Strategy<Value = Formula> + Clone + 'static,
+) -> impl Strategy<Value = Formula> {
+    let bounds = || {
+        proptest::option::of(
+            (0..4usize, 0..5usize).prop_map(|(from, length)| [from, from + length]),
+        )
+    };
+    let unary = prop_oneof![
+        Just("always"),
+        Just("eventually"),
+        Just("historically"),
+        Just("once")
+    ];
     prop_oneof![
-        (unary, bounds(), inner.clone()).prop_map(|(word, bounds, one)| Formula::Unary(word, bounds, Box::new(one))),
-        (prop_oneof![Just("until"), Just("since")], bounds(), inner.clone(), inner)
-            .prop_map(|(word, bounds, left, right)| Formula::Binary(word, bounds, Box::new(left), Box::new(right))),
+        (unary, bounds(), inner.clone()).prop_map(|(word, bounds, one)| Formula::Unary(
+            word,
+            bounds,
+            Box::new(one)
+        )),
+        (
+            prop_oneof![Just("until"), Just("since")],
+            bounds(),
+            inner.clone(),
+            inner
+        )
+            .prop_map(|(word, bounds, left, right)| Formula::Binary(
+                word,
+                bounds,
+                Box::new(left),
+                Box::new(right)
+            )),
     ]
 }
 
@@ -154,7 +215,9 @@ fn expected(edges: &[(usize, usize)], formulas: &[Formula; 2], signals: &Signals
     loop {
         let more: Vec<usize> = edges
             .iter()
-            .filter(|(from, to)| reached.contains(from) && holds(&formulas[0], signals, [*from, *to]))
+            .filter(|(from, to)| {
+                reached.contains(from) && holds(&formulas[0], signals, [*from, *to])
+            })
             .map(|(_, to)| *to)
             .collect();
         let before = reached.len();
@@ -163,8 +226,10 @@ fn expected(edges: &[(usize, usize)], formulas: &[Formula; 2], signals: &Signals
             break;
         }
     }
-    let others = (0..NODES).filter(|node| !reached.contains(node) && holds(&formulas[1], signals, [*node, *node]));
-    reached.iter().map(|node| 1 << node).sum::<u32>() + others.map(|node| 1 << (NODES + node)).sum::<u32>()
+    let others = (0..NODES)
+        .filter(|node| !reached.contains(node) && holds(&formulas[1], signals, [*node, *node]));
+    reached.iter().map(|node| 1 << node).sum::<u32>()
+        + others.map(|node| 1 << (NODES + node)).sum::<u32>()
 }
 
 proptest! {

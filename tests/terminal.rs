@@ -13,16 +13,27 @@ fn run(folder: &Path, arguments: &[&str], variables: &[(&str, &str)]) -> Output 
     for name in ["NO_COLOR", "CLICOLOR", "CLICOLOR_FORCE", "COLUMNS", "TERM"] {
         command.env_remove(name);
     }
-    command.args(arguments).envs(variables.iter().copied()).current_dir(folder).output().unwrap()
+    command
+        .args(arguments)
+        .envs(variables.iter().copied())
+        .current_dir(folder)
+        .output()
+        .unwrap()
 }
 
 /// A text without its colours.
 fn plain(text: &str) -> String {
-    regex::Regex::new("\u{1b}\\[[0-9;]*m").unwrap().replace_all(text, "").into_owned()
+    regex::Regex::new("\u{1b}\\[[0-9;]*m")
+        .unwrap()
+        .replace_all(text, "")
+        .into_owned()
 }
 
 fn ids(list: &str) -> Vec<&str> {
-    list.lines().skip(1).filter_map(|line| line.split(',').next()).collect()
+    list.lines()
+        .skip(1)
+        .filter_map(|line| line.split(',').next())
+        .collect()
 }
 
 /// The commands that people look at, over a history in this folder.
@@ -38,13 +49,24 @@ fn looks(run: &str) -> Vec<Vec<&str>> {
         "explain",
         "query --named failure-rates --history .",
     ];
-    commands.map(|command| command.split(' ').map(|word| if word == "RUN" { run } else { word }).collect()).into()
+    commands
+        .map(|command| {
+            command
+                .split(' ')
+                .map(|word| if word == "RUN" { run } else { word })
+                .collect()
+        })
+        .into()
 }
 
 #[test]
 fn every_line_fits_the_terminal_and_no_word_is_broken() {
     let history = made_history();
-    let list = stdout(&run(history.path(), &["list", "--history", ".", "--format", "csv"], &[]));
+    let list = stdout(&run(
+        history.path(),
+        &["list", "--history", ".", "--format", "csv"],
+        &[],
+    ));
     let names = ["ObjectInGripper", "NoGraspCollisions", "PlaneReported"];
     for command in looks(ids(&list)[0]) {
         let wide = stdout(&run(history.path(), &command, &[]));
@@ -54,11 +76,15 @@ fn every_line_fits_the_terminal_and_no_word_is_broken() {
             for line in text.lines() {
                 // A command to copy, or a long name, may be wider than the terminal.
                 let has_long_word = line.split(' ').any(|word| word.chars().count() * 2 > most);
-                let fits = line.trim_end().chars().count() <= most || has_long_word || line.contains('`');
+                let fits =
+                    line.trim_end().chars().count() <= most || has_long_word || line.contains('`');
                 assert!(fits, "{command:?} at {width}: {line}");
             }
             for name in names.iter().filter(|name| wide.contains(**name)) {
-                assert!(text.contains(name), "{command:?} at {width} breaks {name}:\n{text}");
+                assert!(
+                    text.contains(name),
+                    "{command:?} at {width} breaks {name}:\n{text}"
+                );
             }
         }
     }
@@ -67,23 +93,45 @@ fn every_line_fits_the_terminal_and_no_word_is_broken() {
 #[test]
 fn colours_change_no_letter_and_can_be_forbidden() {
     let folder = shipped_project();
-    edit(&folder.path().join("configs/pick.toml"), "seed = 7", "sed = 7");
-    let check = |variables: &[(&str, &str)]| stderr(&run(folder.path(), &["check", "configs/pick.toml"], variables));
+    edit(
+        &folder.path().join("configs/pick.toml"),
+        "seed = 7",
+        "sed = 7",
+    );
+    let check = |variables: &[(&str, &str)]| {
+        stderr(&run(
+            folder.path(),
+            &["check", "configs/pick.toml"],
+            variables,
+        ))
+    };
     let bare = check(&[]);
     assert!(!bare.contains('\u{1b}'), "a pipe has no colours: {bare}");
     let coloured = check(&[("CLICOLOR_FORCE", "1")]);
-    assert!(coloured.contains("\u{1b}[31m"), "the terminal's own red: {coloured:?}");
+    assert!(
+        coloured.contains("\u{1b}[31m"),
+        "the terminal's own red: {coloured:?}"
+    );
     assert_eq!(plain(&coloured), bare);
-    for forbidden in [&[("CLICOLOR_FORCE", "1"), ("NO_COLOR", "1")][..], &[("CLICOLOR", "1")], &[("TERM", "dumb")]] {
+    for forbidden in [
+        &[("CLICOLOR_FORCE", "1"), ("NO_COLOR", "1")][..],
+        &[("CLICOLOR", "1")],
+        &[("TERM", "dumb")],
+    ] {
         assert_eq!(check(forbidden), bare, "{forbidden:?}");
     }
 }
 
-/// `UPDATE_EXPECT=1` writes the files. Look at them in a light and in a dark terminal: `cat` shows the colours.
+/// `UPDATE_EXPECT=1` writes the files. Look at them in a light and in a dark terminal: `cat` shows
+/// the colours.
 #[test]
 fn messages_and_tables_look_as_in_the_files_at_every_width() {
     let folder = shipped_project();
-    edit(&folder.path().join("configs/pick.toml"), "seed = 7", "sed = 7");
+    edit(
+        &folder.path().join("configs/pick.toml"),
+        "seed = 7",
+        "sed = 7",
+    );
     let mut texts = Vec::new();
     for (name, arguments) in [
         ("mistake", &["check", "configs/pick.toml"][..]),
@@ -93,7 +141,11 @@ fn messages_and_tables_look_as_in_the_files_at_every_width() {
     ] {
         for width in ["50", "200"] {
             for (colours, forced) in [("plain", "0"), ("colours", "1")] {
-                let output = run(folder.path(), arguments, &[("COLUMNS", width), ("CLICOLOR_FORCE", forced)]);
+                let output = run(
+                    folder.path(),
+                    arguments,
+                    &[("COLUMNS", width), ("CLICOLOR_FORCE", forced)],
+                );
                 let file = root().join(format!("tests/terminal/{name}.{width}.{colours}"));
                 texts.push((file, stdout(&output) + &stderr(&output)));
             }
@@ -104,40 +156,74 @@ fn messages_and_tables_look_as_in_the_files_at_every_width() {
 
 /// A campaign of twelve runs, each of which breaks at once.
 fn breaking(folder: &Path, more: &[&str], variables: &[(&str, &str)]) -> Output {
-    run(folder, &[&["run", "configs/pick.toml", "--runs", "12", "--history", "h"], more].concat(), variables)
+    run(
+        folder,
+        &[
+            &["run", "configs/pick.toml", "--runs", "12", "--history", "h"],
+            more,
+        ]
+        .concat(),
+        variables,
+    )
 }
 
 #[test]
 fn failures_are_printed_when_they_happen_in_the_order_of_ids_and_a_flood_is_bounded() {
     let project = shipped_project();
     let config = project.path().join("configs/pick.toml");
-    edit(&config, "test_launcher = \"reference\"", "test_launcher = \"sh ../skill.sh\"");
+    edit(
+        &config,
+        "test_launcher = \"reference\"",
+        "test_launcher = \"sh ../skill.sh\"",
+    );
     edit(&config, "[physics]", "[skill]\nmax_broken = 100\n[physics]");
     std::fs::write(project.path().join("skill.sh"), "exit 3\n").unwrap();
     let told = |output: &Output| -> Vec<String> {
-        stderr(output).lines().filter(|line| line.starts_with("broken ")).map(str::to_owned).collect::<Vec<String>>()
+        stderr(output)
+            .lines()
+            .filter(|line| line.starts_with("broken "))
+            .map(str::to_owned)
+            .collect::<Vec<String>>()
     };
     let usual = breaking(project.path(), &["--jobs", "2"], &[]);
     let lines = told(&usual);
     assert_eq!(lines.len(), 10, "{}", stderr(&usual));
-    let numbers: Vec<usize> =
-        lines.iter().map(|line| line.split(['-', ' ']).nth(2).unwrap().parse().unwrap()).collect();
+    let numbers: Vec<usize> = lines
+        .iter()
+        .map(|line| line.split(['-', ' ']).nth(2).unwrap().parse().unwrap())
+        .collect();
     assert_eq!(numbers, (1..=10).collect::<Vec<_>>(), "{lines:?}");
     assert!(lines[0].contains("exited with code 3"), "{}", lines[0]);
     let all = stderr(&usual);
-    assert!(all.contains(" show ") && all.contains("further failures") && all.contains(" list --campaign "), "{all}");
+    assert!(
+        all.contains(" show ")
+            && all.contains("further failures")
+            && all.contains(" list --campaign "),
+        "{all}"
+    );
     let verbose = breaking(project.path(), &["-v"], &[]);
     assert_eq!(told(&verbose).len(), 12, "{}", stderr(&verbose));
     let quiet = breaking(project.path(), &["-q"], &[]);
     assert_eq!(stderr(&quiet), "");
     let result = stdout(&quiet);
     assert!(
-        result.contains("T = ") && result.contains("exited with code 3") && !result.contains("pass rate"),
+        result.contains("T = ")
+            && result.contains("exited with code 3")
+            && !result.contains("pass rate"),
         "{result}"
     );
     let forced = [("CLICOLOR_FORCE", "1"), ("COLUMNS", "50")];
     let narrow = stderr(&breaking(project.path(), &["-v"], &forced));
-    assert!(narrow.starts_with("\u{1b}[33mbroken\u{1b}[0m "), "{narrow:?}");
+    assert!(
+        narrow.starts_with("\u{1b}[33mbroken\u{1b}[0m "),
+        "{narrow:?}"
+    );
     let is_command = |line: &str| line.contains(" show ");
-    assert!(plain(&narrow).lines().all(|line| line.chars().count() <= 50 || is_command(line)), "{}", plain(&narrow));
+    assert!(
+        plain(&narrow)
+            .lines()
+            .all(|line| line.chars().count() <= 50 || is_command(line)),
+        "{}",
+        plain(&narrow)
+    );
 }

@@ -1,4 +1,5 @@
-//! `docs/terms.md` is generated from the comments and labels of the ontology. Run with `UPDATE_EXPECT=1` to write the page.
+//! `docs/terms.md` is generated from the comments and labels of the ontology. Run with
+//! `UPDATE_EXPECT=1` to write the page.
 
 use std::fmt::Write as _;
 
@@ -29,8 +30,14 @@ const PREFIXES: [(&str, &str); 6] = [
 ];
 
 fn short(iri: &str) -> String {
-    let prefix = PREFIXES.iter().find_map(|(prefix, long)| Some(format!("{prefix}{}", iri.strip_prefix(long)?)));
-    prefix.unwrap_or_else(|| iri.rsplit_once("/ontology/").map_or(iri, |(_, file)| file).to_owned())
+    let prefix = PREFIXES
+        .iter()
+        .find_map(|(prefix, long)| Some(format!("{prefix}{}", iri.strip_prefix(long)?)));
+    prefix.unwrap_or_else(|| {
+        iri.rsplit_once("/ontology/")
+            .map_or(iri, |(_, file)| file)
+            .to_owned()
+    })
 }
 
 /// The statements of a file, in its order, with short names.
@@ -39,22 +46,33 @@ struct Statements(Vec<[String; 3]>);
 impl Statements {
     fn read(name: &str) -> Self {
         let text = std::fs::read(root().join("ontology").join(name)).unwrap();
-        let parser = RdfParser::from_format(RdfFormat::Turtle).with_base_iri("https://x/ontology/").unwrap();
+        let parser = RdfParser::from_format(RdfFormat::Turtle)
+            .with_base_iri("https://x/ontology/")
+            .unwrap();
         let quads = parser.for_reader(text.as_slice()).map(|quad| quad.unwrap());
         let statements = quads.filter_map(|quad| {
-            let NamedOrBlankNode::NamedNode(subject) = &quad.subject else { return None };
+            let NamedOrBlankNode::NamedNode(subject) = &quad.subject else {
+                return None;
+            };
             let object = match &quad.object {
                 Term::NamedNode(node) => short(node.as_str()),
                 Term::Literal(literal) => literal.value().to_owned(),
                 _ => return None,
             };
-            Some([short(subject.as_str()), short(quad.predicate.as_str()), object])
+            Some([
+                short(subject.as_str()),
+                short(quad.predicate.as_str()),
+                object,
+            ])
         });
         Self(statements.collect())
     }
 
     fn all(&self, subject: &str, predicate: &str) -> Vec<&str> {
-        let found = self.0.iter().filter(|[s, p, _]| s == subject && p == predicate);
+        let found = self
+            .0
+            .iter()
+            .filter(|[s, p, _]| s == subject && p == predicate);
         found.map(|[_, _, object]| object.as_str()).collect()
     }
 
@@ -74,7 +92,11 @@ fn code(names: &[&str]) -> String {
     if names.is_empty() {
         return "–".to_owned();
     }
-    names.iter().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ")
+    names
+        .iter()
+        .map(|name| format!("`{name}`"))
+        .collect::<Vec<_>>()
+        .join(", ")
 }
 
 fn cell(text: &str) -> &str {
@@ -86,21 +108,34 @@ fn actions(page: &mut String, ontology: &Statements) {
         "\n## Actions\n\n| action | parameters | success properties | meaning |\n| --- | --- | --- | --- |\n",
     );
     for action in ontology.of_class("act:Action") {
-        let [parameters, properties] =
-            ["act:hasParameter", "act:successProperty"].map(|predicate| code(&ontology.all(action, predicate)));
+        let [parameters, properties] = ["act:hasParameter", "act:successProperty"]
+            .map(|predicate| code(&ontology.all(action, predicate)));
         let meaning = ontology.one(action, "rdfs:comment");
-        let _ = writeln!(page, "| `{action}` | {parameters} | {properties} | {} |", cell(meaning));
+        let _ = writeln!(
+            page,
+            "| `{action}` | {parameters} | {properties} | {} |",
+            cell(meaning)
+        );
     }
 }
 
 fn properties(page: &mut String, title: &str, ontology: &Statements) {
-    let _ =
-        write!(page, "\n## {title}\n\n| property | rule | unit of the margin | meaning |\n| --- | --- | --- | --- |\n");
+    let _ = write!(
+        page,
+        "\n## {title}\n\n| property | rule | unit of the margin | meaning |\n| --- | --- | --- | --- |\n"
+    );
     for property in ontology.of_class("act:Property") {
         let rule = ontology.one(property, "act:verifiedBy");
         let rule = rule.rsplit_once("/rules/").map_or(rule, |(_, file)| file);
-        let (unit, meaning) = (ontology.one(property, "act:unit"), ontology.one(property, "rdfs:comment"));
-        let _ = writeln!(page, "| `{property}` | [{rule}](../rules/{rule}) | {} | {meaning} |", cell(unit));
+        let (unit, meaning) = (
+            ontology.one(property, "act:unit"),
+            ontology.one(property, "rdfs:comment"),
+        );
+        let _ = writeln!(
+            page,
+            "| `{property}` | [{rule}](../rules/{rule}) | {} | {meaning} |",
+            cell(unit)
+        );
     }
 }
 
@@ -108,7 +143,11 @@ fn classes(page: &mut String, ontology: &Statements) {
     page.push_str("| class | subclass of | meaning |\n| --- | --- | --- |\n");
     for class in ontology.of_class("owl:Class") {
         let above = code(&ontology.all(class, "rdfs:subClassOf"));
-        let _ = writeln!(page, "| `{class}` | {above} | {} |", cell(ontology.one(class, "rdfs:comment")));
+        let _ = writeln!(
+            page,
+            "| `{class}` | {above} | {} |",
+            cell(ontology.one(class, "rdfs:comment"))
+        );
     }
 }
 
@@ -131,32 +170,60 @@ fn vocabulary(page: &mut String, ontology: &Statements) {
         }
     }
     for (domain, terms) in domains {
-        let title = if domain.is_empty() { "several classes".to_owned() } else { format!("`{domain}`") };
-        let _ = write!(page, "\n### Properties of {title}\n\n| property | value | meaning |\n| --- | --- | --- |\n");
+        let title = if domain.is_empty() {
+            "several classes".to_owned()
+        } else {
+            format!("`{domain}`")
+        };
+        let _ = write!(
+            page,
+            "\n### Properties of {title}\n\n| property | value | meaning |\n| --- | --- | --- |\n"
+        );
         for term in terms {
-            let value = match (ontology.one(term, "w:unit"), ontology.one(term, "rdfs:range")) {
+            let value = match (
+                ontology.one(term, "w:unit"),
+                ontology.one(term, "rdfs:range"),
+            ) {
                 ("", "") => "–".to_owned(),
                 ("", "xsd:string") => "text".to_owned(),
                 ("", range) if range.starts_with("xsd:") => range["xsd:".len()..].to_owned(),
                 ("", range) => format!("`{range}`"),
                 (unit, _) => unit.to_owned(),
             };
-            let _ = writeln!(page, "| `{term}` | {value} | {} |", cell(ontology.one(term, "rdfs:comment")));
+            let _ = writeln!(
+                page,
+                "| `{term}` | {value} | {} |",
+                cell(ontology.one(term, "rdfs:comment"))
+            );
         }
     }
 }
 
 #[test]
 fn the_page_of_terms_is_up_to_date() {
-    let [robot, extra, objects, world, history] =
-        ["actions.ttl", "extra.ttl", "objects.ttl", "world.ttl", "history.ttl"].map(Statements::read);
+    let [robot, extra, objects, world, history] = [
+        "actions.ttl",
+        "extra.ttl",
+        "objects.ttl",
+        "world.ttl",
+        "history.ttl",
+    ]
+    .map(Statements::read);
     let mut page = INTRODUCTION.to_owned();
     actions(&mut page, &robot);
     properties(&mut page, "Success properties", &robot);
-    properties(&mut page, "Further properties, of `ontology/extra.ttl`", &extra);
+    properties(
+        &mut page,
+        "Further properties, of `ontology/extra.ttl`",
+        &extra,
+    );
     page.push_str("\n## Designators\n\n| designator | meaning |\n| --- | --- |\n");
     for designator in robot.of_class("act:PropertyParameter") {
-        let _ = writeln!(page, "| `{designator}` | {} |", cell(robot.one(designator, "rdfs:comment")));
+        let _ = writeln!(
+            page,
+            "| `{designator}` | {} |",
+            cell(robot.one(designator, "rdfs:comment"))
+        );
     }
     page.push_str("\n## Structure of an ontology\n\n");
     vocabulary(&mut page, &robot);
@@ -167,7 +234,11 @@ fn the_page_of_terms_is_up_to_date() {
     page.push_str("\n### Individuals\n\n| name | class | meaning |\n| --- | --- | --- |\n");
     for class in world.of_class("owl:Class") {
         for name in world.of_class(class) {
-            let _ = writeln!(page, "| `{name}` | `{class}` | {} |", world.one(name, "rdfs:comment"));
+            let _ = writeln!(
+                page,
+                "| `{name}` | `{class}` | {} |",
+                world.one(name, "rdfs:comment")
+            );
         }
     }
     page.push_str("\n## Histories: campaigns, runs and outcomes\n\n");

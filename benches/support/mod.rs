@@ -5,7 +5,8 @@ use std::time::Instant;
 
 static START: LazyLock<Instant> = LazyLock::new(Instant::now);
 
-/// CPU time of this thread; wall time if the system does not report it (other than Linux). Unit: seconds.
+/// CPU time of this thread; wall time if the system does not report it (other than Linux). Unit:
+/// seconds.
 pub fn thread_secs() -> f64 {
     let stat = std::fs::read_to_string("/proc/thread-self/schedstat").ok();
     let nanoseconds = stat.and_then(|text| text.split_whitespace().next()?.parse::<f64>().ok());

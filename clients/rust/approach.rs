@@ -1,5 +1,5 @@
-//! A skill in Rust: drives up to the object to pick and gives up there. It needs only a socket and JSON, not the
-//! actcheck crate.
+//! A skill in Rust: drives up to the object to pick and gives up there. It needs only a socket and
+//! JSON, not the actcheck crate.
 //!
 //!     cargo build --release --example approach
 //!     actcheck run my.toml         # with test_launcher = "target/release/examples/approach"
@@ -19,7 +19,10 @@ const TURNING: f64 = 1.5;
 fn main() -> std::io::Result<()> {
     link::serve(&["Pick"], |link, begin| {
         let wanted = begin["parameters"]["pickObject"][0].clone();
-        let Some(seen) = link.ask(&json!({ "type": "ask", "what": "objects", "of": wanted }))? else { return Ok(None) };
+        let Some(seen) = link.ask(&json!({ "type": "ask", "what": "objects", "of": wanted }))?
+        else {
+            return Ok(None);
+        };
         let at = number::<3>(&seen["objects"][0]["pose"]["position_m"]);
         let mut base = begin["observation"]["base"].clone();
         loop {
@@ -31,12 +34,17 @@ fn main() -> std::io::Result<()> {
                 break;
             }
             let speed = (away - BEFORE_M).clamp(0.0, FASTEST) * aside.cos().max(0.0);
-            let command = json!({ "type": "command", "base_velocity": [speed + 0.01, 0.0, TURNING * aside] });
-            let Some(observation) = link.ask(&command)? else { return Ok(None) };
+            let command =
+                json!({ "type": "command", "base_velocity": [speed + 0.01, 0.0, TURNING * aside] });
+            let Some(observation) = link.ask(&command)? else {
+                return Ok(None);
+            };
             base = observation["base"].clone();
         }
         let still = json!({ "type": "command", "ticks": 30, "base_velocity": [0.0, 0.0, 0.0] });
-        let Some(_) = link.ask(&still)? else { return Ok(None) };
+        let Some(_) = link.ask(&still)? else {
+            return Ok(None);
+        };
         Ok(Some(
             json!({ "type": "end", "succeeded": false, "message": format!("reached {wanted}, but has no grasp skill") }),
         ))

@@ -1,5 +1,5 @@
-//! Entry point of the fuzz target `history`: a file of a history that another program wrote is refused or read, quickly and
-//! without a panic.
+//! Entry point of the fuzz target `history`: a file of a history that another program wrote is
+//! refused or read, quickly and without a panic.
 
 use std::path::{Path, PathBuf};
 
@@ -18,7 +18,8 @@ pub const PLACES: [&str; 8] = [
     "tables/RECHECKED",
     "tables/parquet",
 ];
-/// Size of a record's header in a journal, and of the table in a file of outlines after its magic bytes. Unit: bytes.
+/// Size of a record's header in a journal, and of the table in a file of outlines after its magic
+/// bytes. Unit: bytes.
 const RECORD: usize = 16;
 const OUTLINES: usize = 8 + 4 * 8 + 4;
 
@@ -52,7 +53,9 @@ pub fn made(folder: &Path) {
         program_digest: String::new(),
         physics: None,
     };
-    history.begin_campaign(&record).expect("the folder can be written");
+    history
+        .begin_campaign(&record)
+        .expect("the folder can be written");
     drop(history);
     for name in ["outlines", "tables"] {
         std::fs::create_dir_all(folder.join(name)).expect("the folder can be written");
@@ -61,13 +64,16 @@ pub fn made(folder: &Path) {
     std::fs::write(folder.join("VERSION"), version).expect("the folder can be written");
 }
 
-/// Writes a file of a history, asks for everything that is read from it, and removes it. The first byte of the data chooses the
-/// place, and whether checksums are corrected, so that the bytes behind them are reached.
+/// Writes a file of a history, asks for everything that is read from it, and removes it. The first
+/// byte of the data chooses the place, and whether checksums are corrected, so that the bytes
+/// behind them are reached.
 ///
 /// # Panics
 /// The folder can't be written, or the library panics.
 pub fn history(folder: &Path, data: &[u8]) -> Result<(), Diagnostics> {
-    let Some((first, content)) = data.split_first() else { return Ok(()) };
+    let Some((first, content)) = data.split_first() else {
+        return Ok(());
+    };
     let place = usize::from(*first) % PLACES.len();
     let mut bytes = content.to_vec();
     if (usize::from(*first) / PLACES.len()).is_multiple_of(2) {
@@ -105,7 +111,9 @@ fn ask(folder: &Path) -> Result<(), Diagnostics> {
 
 /// Makes the checksums of a file fit its content.
 fn correct(place: &str, bytes: &mut Vec<u8>) {
-    let word = |bytes: &[u8], at: usize| u32::from_le_bytes([bytes[at], bytes[at + 1], bytes[at + 2], bytes[at + 3]]);
+    let word = |bytes: &[u8], at: usize| {
+        u32::from_le_bytes([bytes[at], bytes[at + 1], bytes[at + 2], bytes[at + 3]])
+    };
     match place {
         "seal/SUMS" => {
             let sum = crc(bytes);
@@ -144,6 +152,12 @@ fn correct(place: &str, bytes: &mut Vec<u8>) {
 /// The checksum CRC-32.
 fn crc(bytes: &[u8]) -> u32 {
     !bytes.iter().fold(!0_u32, |sum, byte| {
-        (0..8).fold(sum ^ u32::from(*byte), |sum, _| if sum & 1 == 1 { (sum >> 1) ^ 0xedb8_8320 } else { sum >> 1 })
+        (0..8).fold(sum ^ u32::from(*byte), |sum, _| {
+            if sum & 1 == 1 {
+                (sum >> 1) ^ 0xedb8_8320
+            } else {
+                sum >> 1
+            }
+        })
     })
 }

@@ -12,7 +12,8 @@ pub struct ActionCall {
 }
 
 impl ActionCall {
-    /// The first value of a designator. Returns `None` if the call has no such designator or it has no value.
+    /// The first value of a designator. Returns `None` if the call has no such designator or it has
+    /// no value.
     pub fn value(&self, designator: &str) -> Option<&str> {
         self.parameters.get(designator)?.first().map(String::as_str)
     }

@@ -1,4 +1,5 @@
-//! Targets from an external controller, and the ticks it requests: positions, velocities and efforts per joint.
+//! Targets from an external controller, and the ticks it requests: positions, velocities and
+//! efforts per joint.
 //!
 //! A velocity is a moving setpoint that the position controllers follow, as on most robots.
 
@@ -7,8 +8,9 @@ use crate::operator::{Interrupt, Operator};
 use actcheck_data::Camera;
 use actcheck_world::Sighting;
 
-/// How far a moving setpoint may run ahead of a blocked joint, as time at the joint's velocity limit. Unit: seconds. A
-/// smaller value makes the joint feel weak, a larger one makes it jerk when it comes free.
+/// How far a moving setpoint may run ahead of a blocked joint, as time at the joint's velocity
+/// limit. Unit: seconds. A smaller value makes the joint feel weak, a larger one makes it jerk when
+/// it comes free.
 const AHEAD_SECS: f64 = 0.1;
 
 /// New targets. Anything not named keeps its previous target.
@@ -18,7 +20,8 @@ pub struct Controls {
     pub positions: Vec<(usize, f64)>,
     /// Target velocities by joint index. Units: m/s or rad/s.
     pub velocities: Vec<(usize, f64)>,
-    /// Motor efforts by joint index, on top of gravity compensation. Units: newtons or newton metres.
+    /// Motor efforts by joint index, on top of gravity compensation. Units: newtons or newton
+    /// metres.
     pub efforts: Vec<(usize, f64)>,
     /// Base velocity: forwards, left, and turning left. Frame: the base's. Units: m/s, rad/s.
     pub base_velocity: Option<[f64; 3]>,
@@ -40,7 +43,9 @@ impl Operator<'_> {
     pub fn steer(&mut self, controls: &Controls) {
         let named = |joint: usize| {
             let lists = [&controls.positions, &controls.velocities, &controls.efforts];
-            lists.iter().any(|list| list.iter().any(|(named, _)| *named == joint))
+            lists
+                .iter()
+                .any(|list| list.iter().any(|(named, _)| *named == joint))
         };
         self.drives.velocities.retain(|(joint, _)| !named(*joint));
         self.command.efforts.retain(|(joint, _)| !named(*joint));
@@ -49,8 +54,12 @@ impl Operator<'_> {
                 self.drives.base = None;
             }
             if controls.base_velocity.is_some() {
-                self.drives.velocities.retain(|(joint, _)| !base.contains(joint));
-                self.command.efforts.retain(|(joint, _)| !base.contains(joint));
+                self.drives
+                    .velocities
+                    .retain(|(joint, _)| !base.contains(joint));
+                self.command
+                    .efforts
+                    .retain(|(joint, _)| !base.contains(joint));
                 self.drives.base = controls.base_velocity;
             }
         }
@@ -88,12 +97,14 @@ impl Operator<'_> {
         self.command.grip_force_n
     }
 
-    /// The object perceived earlier in this run that best matches this id. Returns `None` if there were no percepts or
-    /// none matches.
+    /// The object perceived earlier in this run that best matches this id. Returns `None` if there
+    /// were no percepts or none matches.
     pub fn recall(&self, id: &str) -> Option<Sighting> {
         let perceived = self.memory().perceived.as_ref()?;
         let kind = self.kind_of(id)?;
-        memory::recall(perceived, id, &kind, &self.base().translation.vector).ok().map(|(thing, _)| thing)
+        memory::recall(perceived, id, &kind, &self.base().translation.vector)
+            .ok()
+            .map(|(thing, _)| thing)
     }
 
     /// The depth camera.
@@ -101,23 +112,30 @@ impl Operator<'_> {
         self.world.camera()
     }
 
-    /// True poses of all objects. For external programs that the campaign allows to see ground truth; reference skills
-    /// must not use it.
+    /// True poses of all objects. For external programs that the campaign allows to see ground
+    /// truth; reference skills must not use it.
     pub fn truth(&self) -> Vec<Sighting> {
         self.world.truth()
     }
 
     /// Advances the setpoints of all joints with a velocity by one tick.
     fn drive(&mut self) {
-        if self.drives.velocities.is_empty() && self.drives.base.is_none() && self.command.efforts.is_empty() {
+        if self.drives.velocities.is_empty()
+            && self.drives.base.is_none()
+            && self.command.efforts.is_empty()
+        {
             return;
         }
         let tick = self.tick_secs();
         let observed = self.observe().positions;
         for (joint, speed) in &self.drives.velocities {
             let known = self.world.kinematics().joints().get(*joint);
-            let (Some(known), Some(is)) = (known, observed.get(*joint)) else { continue };
-            let Some(setpoint) = self.command.positions.get_mut(*joint) else { continue };
+            let (Some(known), Some(is)) = (known, observed.get(*joint)) else {
+                continue;
+            };
+            let Some(setpoint) = self.command.positions.get_mut(*joint) else {
+                continue;
+            };
             let ahead = known.velocity * AHEAD_SECS;
             let speed = speed.clamp(-known.velocity, known.velocity);
             let moved = (*setpoint + speed * tick).clamp(is - ahead, is + ahead);
@@ -125,13 +143,17 @@ impl Operator<'_> {
         }
         // For effort-controlled joints, the position setpoint follows the observed position.
         for (joint, _) in &self.command.efforts {
-            if let (Some(setpoint), Some(is)) = (self.command.positions.get_mut(*joint), observed.get(*joint)) {
+            if let (Some(setpoint), Some(is)) =
+                (self.command.positions.get_mut(*joint), observed.get(*joint))
+            {
                 *setpoint = *is;
             }
         }
-        if let (Some([forward, left, turn]), Some(base), Some([x, y, heading])) =
-            (self.drives.base, self.layout().base, self.world.aimed_base())
-        {
+        if let (Some([forward, left, turn]), Some(base), Some([x, y, heading])) = (
+            self.drives.base,
+            self.layout().base,
+            self.world.aimed_base(),
+        ) {
             let (sin, cos) = (libm::sin(heading), libm::cos(heading));
             let moved = [
                 x + (forward * cos - left * sin) * tick,

@@ -13,7 +13,8 @@ pub enum Cut {
         /// The moment, by the same clock.
         at_secs: f64,
     },
-    /// At this simulated time since the scene was built. This reproduces exactly a run that the clock cut off.
+    /// At this simulated time since the scene was built. This reproduces exactly a run that the
+    /// clock cut off.
     Simulated {
         /// Unit: seconds.
         at_secs: f64,

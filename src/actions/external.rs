@@ -7,7 +7,8 @@ use actcheck_world::World;
 
 /// Performs actions with a skill that is not part of actcheck.
 pub trait ExternalSkill {
-    /// Begins a run in this world. The external skill learns no more about the world than a robot knows about itself.
+    /// Begins a run in this world. The external skill learns no more about the world than a robot
+    /// knows about itself.
     ///
     /// # Errors
     /// Returns an error if the run can't be performed; its first action then ends for this reason.
@@ -20,10 +21,15 @@ pub trait ExternalSkill {
     ///
     /// # Errors
     /// [`Interrupt`] if the action has to end, possibly because of the external skill.
-    fn perform(&mut self, call: &ActionCall, robot: &mut Operator<'_>) -> Result<ActionReport, Interrupt>;
+    fn perform(
+        &mut self,
+        call: &ActionCall,
+        robot: &mut Operator<'_>,
+    ) -> Result<ActionReport, Interrupt>;
 
-    /// Ends the run: checks that the skill is ready for another one, so that its faults after the last action belong to this
-    /// run. With `is_decided`, the run already broke or timed out, and such a fault is not reported.
+    /// Ends the run: checks that the skill is ready for another one, so that its faults after the
+    /// last action belong to this run. With `is_decided`, the run already broke or timed out, and
+    /// such a fault is not reported.
     ///
     /// # Errors
     /// Returns an error if the skill is not ready.

@@ -5,29 +5,32 @@ use nalgebra::{Point3, Vector3};
 use actcheck_scenario::Outline;
 use actcheck_world::{Command, World};
 
-/// Time for a forced motion in one direction. Unit: seconds. The slowest joint of a slim mobile manipulator moves half
-/// a metre in 2.5 s.
+/// Time for a forced motion in one direction. Unit: seconds. The slowest joint of a slim mobile
+/// manipulator moves half a metre in 2.5 s.
 const FORCED_SECS: f64 = 5.0;
 /// Time for which the base presses against furniture. Unit: seconds.
 const PRESSED_SECS: f64 = 1.0;
-/// Smallest depth of the arm in the head. Unit: metres. Four times the depth that counts as a collision.
+/// Smallest depth of the arm in the head. Unit: metres. Four times the depth that counts as a
+/// collision.
 const DEPTH_M: f64 = 0.02;
 /// Tolerance within which a posture is reached. Units: metres or radians.
 const REACHED: f64 = 0.01;
 /// Numbers of positions tried of a joint of the arm, and of the head's pan and tilt.
 const TRIED: [u32; 3] = [9, 7, 3];
-/// Horizontal distance from the base's centre within which the arm stays, clear of the furniture in front of it. Unit:
-/// metres.
+/// Horizontal distance from the base's centre within which the arm stays, clear of the furniture in
+/// front of it. Unit: metres.
 const WITHIN_M: f64 = 0.5;
 /// Distance between checked points of the arm. Unit: metres.
 const SPACING_M: f64 = 0.05;
 /// Effort of a runaway motor as a multiple of its limit.
 const RUNAWAY: f64 = 3.0;
 
-/// Drives the base against the nearest furniture, presses for a moment, and drives it back. Returns whether it pressed
-/// furniture.
+/// Drives the base against the nearest furniture, presses for a moment, and drives it back. Returns
+/// whether it pressed furniture.
 pub fn push_base(world: &mut World) -> bool {
-    let (Some(base), Some(by)) = (world.layout().base, to_furniture(world)) else { return false };
+    let (Some(base), Some(by)) = (world.layout().base, to_furniture(world)) else {
+        return false;
+    };
     let rest = world.hold();
     let mut pushed = rest.clone();
     pushed.positions[base[0]] += by.x;
@@ -49,7 +52,11 @@ fn to_furniture(world: &World) -> Option<Vector3<f64>> {
         let pose = outline.pose.to_isometry();
         let local = pose.inverse() * Point3::new(x, y, 0.0);
         let [half_x, half_y] = outline.size_m.map(|side| side / 2.0);
-        pose * Point3::new(local.x.clamp(-half_x, half_x), local.y.clamp(-half_y, half_y), 0.0) - Point3::new(x, y, 0.0)
+        pose * Point3::new(
+            local.x.clamp(-half_x, half_x),
+            local.y.clamp(-half_y, half_y),
+            0.0,
+        ) - Point3::new(x, y, 0.0)
     };
     let ways = world.floor_plan().outlines.iter().map(way);
     ways.min_by(|a, b| a.norm().total_cmp(&b.norm()))
@@ -57,14 +64,22 @@ fn to_furniture(world: &World) -> Option<Vector3<f64>> {
 
 fn presses_furniture(world: &World) -> bool {
     let bodies = world.snapshot().bodies;
-    bodies.iter().any(|body| body.fixed && body.touches.iter().any(|other| other == "robot"))
+    bodies
+        .iter()
+        .any(|body| body.fixed && body.touches.iter().any(|other| other == "robot"))
 }
 
-/// Moves the arm through the head, with links that pass through each other, and back. Returns whether it got there.
+/// Moves the arm through the head, with links that pass through each other, and back. Returns
+/// whether it got there.
 pub fn arm_through_head(world: &mut World) -> bool {
     let rest = world.hold();
-    let Some(positions) = posture_in_head(world, &rest.positions) else { return false };
-    let inside = Command { positions, ..rest.clone() };
+    let Some(positions) = posture_in_head(world, &rest.positions) else {
+        return false;
+    };
+    let inside = Command {
+        positions,
+        ..rest.clone()
+    };
     world.let_links_pass(true);
     advance(world, &inside, |world| is_at(world, &inside));
     let arrived = is_at(world, &inside);
@@ -73,16 +88,22 @@ pub fn arm_through_head(world: &mut World) -> bool {
     arrived
 }
 
-/// The posture, with one joint of the arm and the head elsewhere, in which the arm is deepest in the head. Returns
-/// `None` if it is never deep enough.
+/// The posture, with one joint of the arm and the head elsewhere, in which the arm is deepest in
+/// the head. Returns `None` if it is never deep enough.
 fn posture_in_head(world: &World, from: &[f64]) -> Option<Vec<f64>> {
     let (kinematics, layout) = (world.kinematics(), world.layout());
     let (shoulder, neck) = (*layout.arm.first()?, *layout.head.first()?);
     let mut best: Option<(f64, Vec<f64>)> = None;
     for joint in &layout.arm {
-        for posture in spread(world, from, &[&[*joint][..], layout.head.as_slice()].concat()) {
+        for posture in spread(
+            world,
+            from,
+            &[&[*joint][..], layout.head.as_slice()].concat(),
+        ) {
             let depth = kinematics.depth_between(&posture, shoulder, neck);
-            let is_deeper = best.as_ref().map_or(depth >= DEPTH_M, |(deepest, _)| depth > *deepest);
+            let is_deeper = best
+                .as_ref()
+                .map_or(depth >= DEPTH_M, |(deepest, _)| depth > *deepest);
             if is_deeper && is_within_reach(world, &posture) {
                 best = Some((depth, posture));
             }
@@ -96,14 +117,18 @@ fn spread(world: &World, from: &[f64], joints: &[usize]) -> Vec<Vec<f64>> {
     let mut postures = vec![from.to_vec()];
     for (joint, tried) in joints.iter().zip(TRIED) {
         let limits = &world.kinematics().joints()[*joint];
-        let position =
-            |step: u32| limits.lower + (limits.upper - limits.lower) * f64::from(step) / f64::from(tried - 1);
+        let position = |step: u32| {
+            limits.lower + (limits.upper - limits.lower) * f64::from(step) / f64::from(tried - 1)
+        };
         let moved = |posture: &Vec<f64>, step: u32| {
             let mut posture = posture.clone();
             posture[*joint] = position(step);
             posture
         };
-        postures = postures.iter().flat_map(|posture| (0..tried).map(move |step| moved(posture, step))).collect();
+        postures = postures
+            .iter()
+            .flat_map(|posture| (0..tried).map(move |step| moved(posture, step)))
+            .collect();
     }
     postures
 }
@@ -111,9 +136,16 @@ fn spread(world: &World, from: &[f64], joints: &[usize]) -> Vec<Vec<f64>> {
 /// Whether the whole robot is near its base.
 fn is_within_reach(world: &World, posture: &[f64]) -> bool {
     let links = world.kinematics().links(posture);
-    let middle = world.layout().base.map_or(links[0], |[.., heading]| links[heading + 1]).translation.vector;
+    let middle = world
+        .layout()
+        .base
+        .map_or(links[0], |[.., heading]| links[heading + 1])
+        .translation
+        .vector;
     let points = world.kinematics().surface_points(SPACING_M);
-    points.into_iter().all(|(link, point)| ((links[link] * point).coords - middle).xy().norm() <= WITHIN_M)
+    points
+        .into_iter()
+        .all(|(link, point)| ((links[link] * point).coords - middle).xy().norm() <= WITHIN_M)
 }
 
 /// Returns the arm's last joint and the effort with which its motor runs away, beyond its limit.
@@ -139,5 +171,7 @@ fn is_at(world: &World, command: &Command) -> bool {
     let gripper = &world.layout().gripper;
     let positions = world.observe().positions;
     let joints = positions.iter().zip(&command.positions).enumerate();
-    joints.filter(|(idx, _)| !gripper.contains(*idx)).all(|(_, (is, wanted))| (is - wanted).abs() < REACHED)
+    joints
+        .filter(|(idx, _)| !gripper.contains(*idx))
+        .all(|(_, (is, wanted))| (is - wanted).abs() < REACHED)
 }

@@ -14,7 +14,8 @@ use crate::rim;
 use actcheck_data::{Choices, Rim};
 use actcheck_world::{GRAVITY, World};
 
-/// Effects of the load smaller than this don't count: the joint carries nothing of it. Unit: metres, or 1.
+/// Effects of the load smaller than this don't count: the joint carries nothing of it. Unit:
+/// metres, or 1.
 const LEVER_M: f64 = 1e-3;
 
 /// A planned pick.
@@ -47,18 +48,34 @@ pub fn takes_rim(rim: &Rim, max_opening_m: f64) -> bool {
     rim::opening_m(rim, max_opening_m).is_some()
 }
 
-/// Plans a pick of an object with the abstract detector, as the reference skill does at the start of a run.
+/// Plans a pick of an object with the abstract detector, as the reference skill does at the start
+/// of a run.
 ///
 /// # Errors
 /// The reason for which the skill would fail.
-pub fn foresee_pick(target: &str, world: &mut World, choices: &mut Choices) -> Result<ForeseenPick, String> {
+pub fn foresee_pick(
+    target: &str,
+    world: &mut World,
+    choices: &mut Choices,
+) -> Result<ForeseenPick, String> {
     world.localise(choices);
     let mut memory = Memory::default();
-    let mut robot = Operator::new(world, choices, &mut memory, f64::INFINITY, (Cut::Never, None));
-    let seen = robot.see(target).ok_or_else(|| format!("{target} was not seen"))?;
+    let mut robot = Operator::new(
+        world,
+        choices,
+        &mut memory,
+        f64::INFINITY,
+        (Cut::Never, None),
+    );
+    let seen = robot
+        .see(target)
+        .ok_or_else(|| format!("{target} was not seen"))?;
     let others = robot.see_others(target);
     let plan = planned(&seen, &others, &mut robot)?;
-    let posture = plan.lift.last().map_or_else(|| robot.commanded().to_vec(), Clone::clone);
+    let posture = plan
+        .lift
+        .last()
+        .map_or_else(|| robot.commanded().to_vec(), Clone::clone);
     Ok(payload(&robot, &posture))
 }
 
@@ -67,7 +84,10 @@ fn payload(robot: &Operator<'_>, posture: &[f64]) -> ForeseenPick {
     let kinematics = robot.kinematics();
     let own = kinematics.holding_efforts(posture);
     let (_, jacobian) = kinematics.grasp_jacobian(posture);
-    let mut found = ForeseenPick { payload_kg: f64::INFINITY, weakest: String::new() };
+    let mut found = ForeseenPick {
+        payload_kg: f64::INFINITY,
+        weakest: String::new(),
+    };
     for idx in &robot.layout().arm {
         let joint = &kinematics.joints()[*idx];
         let lever_m = jacobian[*idx].z;
@@ -78,7 +98,10 @@ fn payload(robot: &Operator<'_>, posture: &[f64]) -> ForeseenPick {
         let spare = joint.effort - own[*idx] * lever_m.signum();
         let payload_kg = (spare / (lever_m.abs() * GRAVITY)).max(0.0);
         if payload_kg < found.payload_kg {
-            found = ForeseenPick { payload_kg, weakest: joint.name.clone() };
+            found = ForeseenPick {
+                payload_kg,
+                weakest: joint.name.clone(),
+            };
         }
     }
     found
@@ -87,10 +110,19 @@ fn payload(robot: &Operator<'_>, posture: &[f64]) -> ForeseenPick {
 /// Turns the head towards a point, in thought. Frame: world.
 pub fn foresee_view(world: &World, point_m: [f64; 3]) -> ForeseenView {
     let (kinematics, point) = (world.kinematics(), Point3::from(point_m));
-    let turned = towards(kinematics, world.layout(), &world.observe().positions, &point);
+    let turned = towards(
+        kinematics,
+        world.layout(),
+        &world.observe().positions,
+        &point,
+    );
     let camera = kinematics.camera(&turned);
     let seen = camera.inverse() * point;
     let off_rad = [libm::atan2(seen.y, seen.x), libm::atan2(seen.z, seen.x)];
     let above: Vector3<f64> = camera.translation.vector - point.coords;
-    ForeseenView { above_m: above.z, range_m: above.norm(), off_rad }
+    ForeseenView {
+        above_m: above.z,
+        range_m: above.norm(),
+        off_rad,
+    }
 }

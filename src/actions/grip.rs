@@ -3,7 +3,8 @@
 use crate::operator::{Interrupt, Operator};
 use actcheck_world::Observation;
 
-/// A smaller gap means that the fingers met with nothing between them. Unit: metres. Three times the usual noise.
+/// A smaller gap means that the fingers met with nothing between them. Unit: metres. Three times
+/// the usual noise.
 pub const EMPTY_M: f64 = 0.006;
 /// Longest time for the fingers to close. Unit: seconds.
 const CLOSE_SECS: f64 = 2.5;
@@ -11,12 +12,14 @@ const CLOSE_SECS: f64 = 2.5;
 const STALLED: f64 = 0.003;
 /// Share of the grip force that stalled fingers must exert.
 const FELT_SHARE: f64 = 0.7;
-/// Fingers that close further by this much have lost their hold. Unit: metres. A mug that turns between the fingers
-/// until they lie flat gives way by less.
+/// Fingers that close further by this much have lost their hold. Unit: metres. A mug that turns
+/// between the fingers until they lie flat gives way by less.
 const GAVE_WAY_M: f64 = 0.012;
-/// Share of the grip force below which nothing resists the fingers. Half of the share for stalled fingers.
+/// Share of the grip force below which nothing resists the fingers. Half of the share for stalled
+/// fingers.
 const WEAK_SHARE: f64 = 0.35;
-/// Control ticks after which a weak hold counts as lost: braking weakens it for a shorter time. A tenth of a second.
+/// Control ticks after which a weak hold counts as lost: braking weakens it for a shorter time. A
+/// tenth of a second.
 const WEAK_TICKS: u32 = 6;
 
 /// Closes the fingers until they stall. Returns `true` if they stalled on something.
@@ -29,8 +32,16 @@ pub fn close(robot: &mut Operator<'_>) -> Result<bool, Interrupt> {
     let mut still_ticks = 0;
     while robot.elapsed_secs() < until && still_ticks < 10 {
         robot.wait(1e-3)?;
-        let speed = robot.layout().gripper.speeds(&robot.observe().velocities).map(f64::abs);
-        still_ticks = if speed[0].max(speed[1]) < STALLED && feels(robot) { still_ticks + 1 } else { 0 };
+        let speed = robot
+            .layout()
+            .gripper
+            .speeds(&robot.observe().velocities)
+            .map(f64::abs);
+        still_ticks = if speed[0].max(speed[1]) < STALLED && feels(robot) {
+            still_ticks + 1
+        } else {
+            0
+        };
     }
     Ok(feels(robot))
 }
@@ -42,7 +53,10 @@ pub fn feels(robot: &Operator<'_>) -> bool {
 
 /// Whether both observed finger efforts are close to the commanded force.
 pub fn feels_in(observed: &Observation, grip_force_n: f64) -> bool {
-    observed.finger_efforts_n.iter().all(|effort| *effort > FELT_SHARE * grip_force_n)
+    observed
+        .finger_efforts_n
+        .iter()
+        .all(|effort| *effort > FELT_SHARE * grip_force_n)
 }
 
 /// Checks at every tick whether a hand still holds the object it closed on.
@@ -59,17 +73,31 @@ impl GripWatch {
     /// Starts from the current observation, with fingers commanded to press with this force.
     pub fn new(observed: &Observation, grip_force_n: f64) -> Self {
         let weak_n = WEAK_SHARE * grip_force_n;
-        Self { opening_m: observed.gripper_opening_m, weak_n, weak_ticks: 0, slipped: false, load_n: 0.0 }
+        Self {
+            opening_m: observed.gripper_opening_m,
+            weak_n,
+            weak_ticks: 0,
+            slipped: false,
+            load_n: 0.0,
+        }
     }
 
-    /// The same for a wall of this thickness: a vessel that is held at its rim turns until its wall lies between the fingers.
+    /// The same for a wall of this thickness: a vessel that is held at its rim turns until its wall
+    /// lies between the fingers.
     pub fn of_wall(self, wall_m: f64) -> Self {
-        Self { opening_m: wall_m / 2.0 + GAVE_WAY_M, ..self }
+        Self {
+            opening_m: wall_m / 2.0 + GAVE_WAY_M,
+            ..self
+        }
     }
 
-    /// Updates with the observation of the next control tick, and the force that the arm carries then. Unit: newtons.
+    /// Updates with the observation of the next control tick, and the force that the arm carries
+    /// then. Unit: newtons.
     pub fn look(&mut self, observed: &Observation, load_n: f64) {
-        let weak = observed.finger_efforts_n.iter().any(|effort| *effort < self.weak_n);
+        let weak = observed
+            .finger_efforts_n
+            .iter()
+            .any(|effort| *effort < self.weak_n);
         if !weak {
             self.load_n = if self.slipped { self.load_n } else { load_n };
         } else if self.weak_ticks == 0 && !self.slipped {
@@ -98,7 +126,14 @@ mod tests {
 
     fn felt(gripper_opening_m: f64, effort: f64) -> Observation {
         let (positions, velocities, loads) = (Vec::new(), Vec::new(), Vec::new());
-        Observation { time_secs: 0.0, positions, velocities, gripper_opening_m, finger_efforts_n: [effort, 7.0], loads }
+        Observation {
+            time_secs: 0.0,
+            positions,
+            velocities,
+            gripper_opening_m,
+            finger_efforts_n: [effort, 7.0],
+            loads,
+        }
     }
 
     #[test]

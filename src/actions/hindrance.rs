@@ -1,4 +1,5 @@
-//! Reasons why grasps can't be planned, and the sentence about the grasp that came nearest to a plan.
+//! Reasons why grasps can't be planned, and the sentence about the grasp that came nearest to a
+//! plan.
 //!
 //! Never: plans, or decides how much clearance is needed.
 
@@ -16,17 +17,20 @@ pub enum Hindrance {
     Dearer,
     /// No joint positions bring the hand there.
     OutOfReach,
-    /// The open hand would touch the object before it closes. The planner then looks for other grasps.
+    /// The open hand would touch the object before it closes. The planner then looks for other
+    /// grasps.
     Touches,
     /// The arm can't move the hand straight to the object or up from it.
     NoLift,
-    /// The arm would collide with the robot. `links` are the two that come too close, if the postures were found.
+    /// The arm would collide with the robot. `links` are the two that come too close, if the
+    /// postures were found.
     Itself { links: Option<(usize, usize)> },
     /// The base has no free path to its place.
     NoRoute,
     /// The arm has no free path to its posture.
     NoPath,
-    /// A posture is too close to furniture or objects. `lack_m` is the clearance that it lacks. Unit: metres.
+    /// A posture is too close to furniture or objects. `lack_m` is the clearance that it lacks.
+    /// Unit: metres.
     Blocked { posture: Vec<f64>, lack_m: f64 },
 }
 
@@ -54,7 +58,10 @@ pub struct Nearest(Option<Hindrance>);
 impl Nearest {
     /// Keeps the hindrance if its grasp came nearer to a plan than the others so far.
     pub fn note(&mut self, hindrance: Hindrance) {
-        let is_nearer = self.0.as_ref().is_none_or(|kept| kept.progress() < hindrance.progress());
+        let is_nearer = self
+            .0
+            .as_ref()
+            .is_none_or(|kept| kept.progress() < hindrance.progress());
         if is_nearer {
             self.0 = Some(hindrance);
         }
@@ -62,7 +69,10 @@ impl Nearest {
 
     /// Whether no posture brought the hand to the object.
     pub fn is_out_of_reach(&self) -> bool {
-        matches!(self.0, None | Some(Hindrance::Dearer | Hindrance::OutOfReach))
+        matches!(
+            self.0,
+            None | Some(Hindrance::Dearer | Hindrance::OutOfReach)
+        )
     }
 
     /// The reason for the action's report.
@@ -70,14 +80,25 @@ impl Nearest {
         let why = match &self.0 {
             None | Some(Hindrance::Dearer | Hindrance::Touches) => return NO_WAY.to_owned(),
             Some(Hindrance::OutOfReach) => out_of_reach(thing, around.furniture),
-            Some(Hindrance::NoLift) => "the arm reaches it but can't lift it straight up".to_owned(),
-            Some(Hindrance::Itself { links: None }) => "the arm would collide with the robot".to_owned(),
-            Some(Hindrance::Itself { links: Some((first, second)) }) => {
-                let [first, second] = [first, second].map(|link| around.kinematics.link_name(*link));
+            Some(Hindrance::NoLift) => {
+                "the arm reaches it but can't lift it straight up".to_owned()
+            }
+            Some(Hindrance::Itself { links: None }) => {
+                "the arm would collide with the robot".to_owned()
+            }
+            Some(Hindrance::Itself {
+                links: Some((first, second)),
+            }) => {
+                let [first, second] =
+                    [first, second].map(|link| around.kinematics.link_name(*link));
                 format!("the arm would collide with the robot, {second} with {first}")
             }
-            Some(Hindrance::NoRoute) => "the base has no free path to where the arm reaches it".to_owned(),
-            Some(Hindrance::NoPath) => "the arm found no free path to where it reaches it".to_owned(),
+            Some(Hindrance::NoRoute) => {
+                "the base has no free path to where the arm reaches it".to_owned()
+            }
+            Some(Hindrance::NoPath) => {
+                "the arm found no free path to where it reaches it".to_owned()
+            }
             Some(Hindrance::Blocked { posture, .. }) => around.in_the_way(posture),
         };
         format!("{NO_WAY}: {why}")
@@ -108,30 +129,65 @@ impl Surroundings<'_> {
     /// A clause about the link that lacks the most clearance.
     fn in_the_way(&self, posture: &[f64]) -> String {
         let links = self.kinematics.links(posture);
-        let gaps = self.points.iter().flat_map(|points| self.gaps(points, &links[points.link]));
-        let Some(gap) = gaps.max_by(|a, b| (a.needed_m - a.clear_m).total_cmp(&(b.needed_m - b.clear_m))) else {
+        let gaps = self
+            .points
+            .iter()
+            .flat_map(|points| self.gaps(points, &links[points.link]));
+        let Some(gap) =
+            gaps.max_by(|a, b| (a.needed_m - a.clear_m).total_cmp(&(b.needed_m - b.clear_m)))
+        else {
             return "something is in the way".to_owned();
         };
-        let Gap { link, obstacle, clear_m, needed_m } = gap;
+        let Gap {
+            link,
+            obstacle,
+            clear_m,
+            needed_m,
+        } = gap;
         let link = self.kinematics.link_name(link);
-        let needs = if needed_m > 0.0 { format!("needs {}", centimetres(needed_m)) } else { "must be out".to_owned() };
+        let needs = if needed_m > 0.0 {
+            format!("needs {}", centimetres(needed_m))
+        } else {
+            "must be out".to_owned()
+        };
         match clear_m >= 0.0 {
-            true => format!("{link} would be {} from {obstacle} and {needs}", centimetres(clear_m)),
-            false => format!("{link} would be {} inside {obstacle} and {needs}", centimetres(-clear_m)),
+            true => format!(
+                "{link} would be {} from {obstacle} and {needs}",
+                centimetres(clear_m)
+            ),
+            false => format!(
+                "{link} would be {} inside {obstacle} and {needs}",
+                centimetres(-clear_m)
+            ),
         }
     }
 
     fn gaps(&self, points: &LinkPoints, pose: &Isometry3<f64>) -> Vec<Gap<'_>> {
         let link = points.link;
-        let nearest = |distance: &dyn Fn(&Point3<f64>) -> f64| points.nearest(pose, f64::INFINITY, distance);
-        let needed_m = if self.is_hand[link] || !self.arm_farther { FURNITURE_CLEAR_M } else { BODY_CLEAR_M };
+        let nearest =
+            |distance: &dyn Fn(&Point3<f64>) -> f64| points.nearest(pose, f64::INFINITY, distance);
+        let needed_m = if self.is_hand[link] || !self.arm_farther {
+            FURNITURE_CLEAR_M
+        } else {
+            BODY_CLEAR_M
+        };
         let furniture = self.furniture.iter().map(|block| {
             let clear_m = nearest(&|point| block.distance(point));
-            Gap { link, obstacle: &block.id, clear_m, needed_m }
+            Gap {
+                link,
+                obstacle: &block.id,
+                clear_m,
+                needed_m,
+            }
         });
         let things = self.things.iter().map(|pillar| {
             let clear_m = nearest(&|point| pillar.distance(point));
-            Gap { link, obstacle: &pillar.id, clear_m, needed_m: LEAST_CLEAR_M }
+            Gap {
+                link,
+                obstacle: &pillar.id,
+                clear_m,
+                needed_m: LEAST_CLEAR_M,
+            }
         });
         furniture.chain(things).collect()
     }
@@ -139,12 +195,23 @@ impl Surroundings<'_> {
 
 /// A clause with the place of an object that the arm does not reach.
 fn out_of_reach(thing: Option<&Sighting>, furniture: &[Block]) -> String {
-    let Some(thing) = thing else { return "it is out of reach".to_owned() };
+    let Some(thing) = thing else {
+        return "it is out of reach".to_owned();
+    };
     let place = Point3::from(thing.pose.position);
     let below = furniture.iter().find(|block| block.beside(&place) < 0.0);
-    let inwards =
-        below.map(|block| format!(" and {} from the edge of {}", centimetres(-block.beside(&place)), block.id));
-    format!("it is out of reach, {} above the floor{}", centimetres(place.z), inwards.unwrap_or_default())
+    let inwards = below.map(|block| {
+        format!(
+            " and {} from the edge of {}",
+            centimetres(-block.beside(&place)),
+            block.id
+        )
+    });
+    format!(
+        "it is out of reach, {} above the floor{}",
+        centimetres(place.z),
+        inwards.unwrap_or_default()
+    )
 }
 
 fn centimetres(metres: f64) -> String {
@@ -157,9 +224,18 @@ mod tests {
 
     #[test]
     fn the_grasp_that_came_nearest_to_a_plan_is_reported() {
-        let blocked = |lack_m| Hindrance::Blocked { posture: Vec::new(), lack_m };
+        let blocked = |lack_m| Hindrance::Blocked {
+            posture: Vec::new(),
+            lack_m,
+        };
         let mut nearest = Nearest::default();
-        for hindrance in [Hindrance::NoLift, blocked(0.03), Hindrance::OutOfReach, blocked(0.01), blocked(0.02)] {
+        for hindrance in [
+            Hindrance::NoLift,
+            blocked(0.03),
+            Hindrance::OutOfReach,
+            blocked(0.01),
+            blocked(0.02),
+        ] {
             nearest.note(hindrance);
         }
         assert_eq!(nearest.0, Some(blocked(0.01)));

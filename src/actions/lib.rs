@@ -1,4 +1,5 @@
-//! The robot's actions, performed through commands and observations: the reference skills and the recorded trace.
+//! The robot's actions, performed through commands and observations: the reference skills and the
+//! recorded trace.
 //!
 //! Never: reads ground truth inside a skill, judges an action, or knows a property.
 
@@ -39,7 +40,9 @@ pub use controls::Controls;
 pub use cup::lips_on;
 pub use cut::Cut;
 pub use external::{ExternalFault, ExternalSkill};
-pub use foresee::{ForeseenPick, ForeseenView, foresee_pick, foresee_view, needed_opening_m, takes_rim};
+pub use foresee::{
+    ForeseenPick, ForeseenView, foresee_pick, foresee_view, needed_opening_m, takes_rim,
+};
 pub use grip::feels_in;
 pub use memory::Held;
 pub use operator::{Interrupt, Operator};

@@ -21,7 +21,12 @@ pub struct LinkPoints {
 }
 
 /// Whether all points in a sphere are farther than `least` from an obstacle. Unit: metres.
-fn is_beyond(around: &Sphere, pose: &Isometry3<f64>, least: f64, distance: impl Fn(&Point3<f64>) -> f64) -> bool {
+fn is_beyond(
+    around: &Sphere,
+    pose: &Isometry3<f64>,
+    least: f64,
+    distance: impl Fn(&Point3<f64>) -> f64,
+) -> bool {
     distance(&(pose * around.middle)) - around.radius - ROUNDING_M > least
 }
 
@@ -36,37 +41,60 @@ impl LinkPoints {
             }
         }
         let of_link = |(link, mut points): (usize, Vec<Point3<f64>>)| {
-            let clusters = sphere_tree(&mut points, CLUSTER, |point| Sphere { middle: *point, radius: 0.0 });
-            Self { link, points, clusters }
+            let clusters = sphere_tree(&mut points, CLUSTER, |point| Sphere {
+                middle: *point,
+                radius: 0.0,
+            });
+            Self {
+                link,
+                points,
+                clusters,
+            }
         };
         grouped.into_iter().map(of_link).collect()
     }
 
     /// The smaller of `least` and the smallest distance of a point to the obstacle. Unit: metres.
     ///
-    /// `distance` is the signed distance to the obstacle, which must not change by more than the point moves: the
-    /// points in a bounding sphere that is farther than `least` are skipped.
-    pub fn nearest(&self, pose: &Isometry3<f64>, mut least: f64, distance: impl Fn(&Point3<f64>) -> f64) -> f64 {
+    /// `distance` is the signed distance to the obstacle, which must not change by more than the
+    /// point moves: the points in a bounding sphere that is farther than `least` are skipped.
+    pub fn nearest(
+        &self,
+        pose: &Isometry3<f64>,
+        mut least: f64,
+        distance: impl Fn(&Point3<f64>) -> f64,
+    ) -> f64 {
         let mut idx = 0;
         while let Some(cluster) = self.clusters.get(idx) {
             if is_beyond(&cluster.around, pose, least, &distance) {
                 idx = cluster.next;
             } else {
                 let points = &self.points[cluster.things.clone()];
-                least = points.iter().fold(least, |least, point| least.min(distance(&(pose * point))));
+                least = points
+                    .iter()
+                    .fold(least, |least, point| least.min(distance(&(pose * point))));
                 idx += 1;
             }
         }
         least
     }
 
-    /// Whether any point is nearer to the obstacle than this. Unit: metres. See [`LinkPoints::nearest`].
-    pub fn is_nearer(&self, pose: &Isometry3<f64>, least: f64, distance: impl Fn(&Point3<f64>) -> f64) -> bool {
+    /// Whether any point is nearer to the obstacle than this. Unit: metres. See
+    /// [`LinkPoints::nearest`].
+    pub fn is_nearer(
+        &self,
+        pose: &Isometry3<f64>,
+        least: f64,
+        distance: impl Fn(&Point3<f64>) -> f64,
+    ) -> bool {
         let mut idx = 0;
         while let Some(cluster) = self.clusters.get(idx) {
             if is_beyond(&cluster.around, pose, least, &distance) {
                 idx = cluster.next;
-            } else if self.points[cluster.things.clone()].iter().any(|point| distance(&(pose * point)) < least) {
+            } else if self.points[cluster.things.clone()]
+                .iter()
+                .any(|point| distance(&(pose * point)) < least)
+            {
                 return true;
             } else {
                 idx += 1;
@@ -86,18 +114,23 @@ mod tests {
         let at = |n: u32| libm::sin(f64::from(n * n) * 12.9898);
         let point = |n: u32| Point3::new(at(n), at(n + 1000), at(n + 2000));
         for trial in 0..500 {
-            let points: Vec<(usize, Point3<f64>)> =
-                (0..1 + trial % 60).map(|n| ((n % 4) as usize, point(n + 60 * trial))).collect();
+            let points: Vec<(usize, Point3<f64>)> = (0..1 + trial % 60)
+                .map(|n| ((n % 4) as usize, point(n + 60 * trial)))
+                .collect();
             let pose = Isometry3::translation(at(trial), at(trial + 1), at(trial + 2));
             let distance = |near: &Point3<f64>| (near - point(trial + 7)).norm() - 0.3;
             let most = 1.5 + at(trial + 3);
             let links = LinkPoints::grouped(&points);
-            let fast = links.iter().fold(most, |least, link| link.nearest(&pose, least, distance));
+            let fast = links
+                .iter()
+                .fold(most, |least, link| link.nearest(&pose, least, distance));
             let all = points.iter().map(|(_, point)| distance(&(pose * point)));
             let plain = all.fold(f64::INFINITY, f64::min);
             assert_eq!(fast.to_bits(), plain.min(most).to_bits(), "trial {trial}");
             for least in [most, plain + 1e-6, plain] {
-                let is_nearer = links.iter().any(|link| link.is_nearer(&pose, least, distance));
+                let is_nearer = links
+                    .iter()
+                    .any(|link| link.is_nearer(&pose, least, distance));
                 assert_eq!(is_nearer, plain < least, "trial {trial}");
             }
         }

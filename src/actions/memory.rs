@@ -54,7 +54,8 @@ impl Held {
     }
 }
 
-/// Returns the smallest gap between fingers that hold something, or a wall of this thickness. Unit: metres.
+/// Returns the smallest gap between fingers that hold something, or a wall of this thickness. Unit:
+/// metres.
 pub fn least_gap_m(wall_m: Option<f64>) -> f64 {
     wall_m.map_or(EMPTY_M, |wall_m| wall_m / 2.0)
 }
@@ -62,11 +63,11 @@ pub fn least_gap_m(wall_m: Option<f64>) -> f64 {
 /// Weight of the distance against the size mismatch. No unit: both are metres.
 const DISTANCE_SHARE: f64 = 0.02;
 
-/// Chooses the perceived object that best matches the requested one and returns it with all other objects. The surface
-/// is among the others, as furniture that reaches down to the floor.
+/// Chooses the perceived object that best matches the requested one and returns it with all other
+/// objects. The surface is among the others, as furniture that reaches down to the floor.
 ///
-/// Among objects of the requested kind, the one closest to the kind's size is chosen; ties go to the one nearest to
-/// `from`. Frame: world, by the base's belief.
+/// Among objects of the requested kind, the one closest to the kind's size is chosen; ties go to
+/// the one nearest to `from`. Frame: world, by the base's belief.
 ///
 /// # Errors
 /// If nothing of that kind was perceived, a sentence for the action's report.
@@ -78,24 +79,41 @@ pub fn recall(
 ) -> Result<(Sighting, Vec<Sighting>), String> {
     let of_kind = |thing: &&PerceivedThing| thing.category.as_ref() == Some(&kind.category);
     let miss = |thing: &PerceivedThing| {
-        let off: f64 = thing.size_m.iter().zip(kind.size_m).map(|(seen, known)| (seen - known).abs()).sum();
+        let off: f64 = thing
+            .size_m
+            .iter()
+            .zip(kind.size_m)
+            .map(|(seen, known)| (seen - known).abs())
+            .sum();
         off + DISTANCE_SHARE * (Vector3::from(thing.pose.position) - from).norm()
     };
-    let things = perceived.things.iter().enumerate().filter(|(_, thing)| of_kind(thing));
+    let things = perceived
+        .things
+        .iter()
+        .enumerate()
+        .filter(|(_, thing)| of_kind(thing));
     let (chosen, target) = things
         .min_by(|(_, a), (_, b)| miss(a).total_cmp(&miss(b)))
         .ok_or_else(|| format!("no perceived object matches {id}"))?;
-    let others = perceived.things.iter().enumerate().filter(|(idx, _)| *idx != chosen);
+    let others = perceived
+        .things
+        .iter()
+        .enumerate()
+        .filter(|(idx, _)| *idx != chosen);
     let surface = perceived.plane.map(|plane| furniture("surface", &plane));
-    let others = others.map(|(idx, thing)| sighting(format!("thing_{}", idx + 1), thing)).chain(surface);
+    let others = others
+        .map(|(idx, thing)| sighting(format!("thing_{}", idx + 1), thing))
+        .chain(surface);
     Ok((sighting(id.to_owned(), target), others.collect()))
 }
 
-/// The furniture of a map, except the piece whose top was perceived: its percept is more accurate than the map.
+/// The furniture of a map, except the piece whose top was perceived: its percept is more accurate
+/// than the map.
 pub fn elsewhere(map: Vec<Sighting>, perceived: &Perceived) -> Vec<Sighting> {
     let is_other = |piece: &Sighting| {
         perceived.plane.is_none_or(|plane| {
-            let local = piece.pose.to_isometry().inverse() * nalgebra::Point3::from(plane.pose.position);
+            let local =
+                piece.pose.to_isometry().inverse() * nalgebra::Point3::from(plane.pose.position);
             local.x.abs() > piece.size_m[0] / 2.0 || local.y.abs() > piece.size_m[1] / 2.0
         })
     };
@@ -107,7 +125,13 @@ pub fn furniture(id: &str, plane: &PerceivedPlane) -> Sighting {
     let [x, y, height] = plane.pose.position;
     let [width, depth] = plane.size_m;
     let pose = Pose::upright([x, y, 0.0], plane.pose.yaw());
-    Sighting { id: id.to_owned(), pose, size_m: [width, depth, height], furniture: true, angular: false }
+    Sighting {
+        id: id.to_owned(),
+        pose,
+        size_m: [width, depth, height],
+        furniture: true,
+        angular: false,
+    }
 }
 
 /// Edge of the squares that floor cells are merged into. Unit: metres. Two cells of a grid.
@@ -117,7 +141,10 @@ const PIECE_M: f64 = 0.1;
 pub fn obstacles(floor: &[Standing]) -> Vec<Sighting> {
     let mut tops: BTreeMap<[i64; 2], f64> = BTreeMap::new();
     for Standing { at_m, top_m } in floor {
-        #[expect(clippy::cast_possible_truncation, reason = "a few metres of decimetres")]
+        #[expect(
+            clippy::cast_possible_truncation,
+            reason = "a few metres of decimetres"
+        )]
         let square = at_m.map(|along| (along / PIECE_M).floor() as i64);
         let top = tops.entry(square).or_default();
         *top = top.max(*top_m);
@@ -138,7 +165,13 @@ pub fn obstacles(floor: &[Standing]) -> Vec<Sighting> {
 
 /// Converts a percept to a sighting, the format of the abstract detector.
 pub fn sighting(id: String, thing: &PerceivedThing) -> Sighting {
-    Sighting { id, pose: thing.pose, size_m: thing.size_m, furniture: false, angular: false }
+    Sighting {
+        id,
+        pose: thing.pose,
+        size_m: thing.size_m,
+        furniture: false,
+        angular: false,
+    }
 }
 
 #[cfg(test)]
@@ -149,11 +182,18 @@ mod tests {
 
     fn thing(category: Option<&str>, x: f64, height: f64) -> PerceivedThing {
         let pose = Pose::upright([x, 0.0, 0.7], 0.0);
-        PerceivedThing { category: category.map(str::to_owned), pose, size_m: [0.088, 0.088, height] }
+        PerceivedThing {
+            category: category.map(str::to_owned),
+            pose,
+            size_m: [0.088, 0.088, height],
+        }
     }
 
     fn recalled(things: Vec<PerceivedThing>) -> Result<(Sighting, Vec<Sighting>), String> {
-        let plane = PerceivedPlane { pose: Pose::upright([1.0, 0.0, 0.7], 0.3), size_m: [0.6, 0.5] };
+        let plane = PerceivedPlane {
+            pose: Pose::upright([1.0, 0.0, 0.7], 0.3),
+            size_m: [0.6, 0.5],
+        };
         let kind = KnownKind {
             name: "glass".into(),
             category: GLASS.into(),
@@ -161,17 +201,46 @@ mod tests {
             rim: None,
             is_box: false,
         };
-        recall(&Perceived { plane: Some(plane), things, look: None }, "glass_1", &kind, &Vector3::zeros())
+        recall(
+            &Perceived {
+                plane: Some(plane),
+                things,
+                look: None,
+            },
+            "glass_1",
+            &kind,
+            &Vector3::zeros(),
+        )
     }
 
     #[test]
     fn the_best_match_is_chosen_and_the_nearest_of_equal_ones() {
-        let things = vec![thing(None, 0.5, 0.146), thing(Some(GLASS), 1.2, 0.146), thing(Some(GLASS), 1.0, 0.146)];
+        let things = vec![
+            thing(None, 0.5, 0.146),
+            thing(Some(GLASS), 1.2, 0.146),
+            thing(Some(GLASS), 1.0, 0.146),
+        ];
         let (target, others) = recalled(things).expect("two things match");
-        assert_eq!((target.id.as_str(), target.pose.position[0]), ("glass_1", 1.0));
-        assert_eq!(others.iter().map(|other| other.id.as_str()).collect::<Vec<_>>(), ["thing_1", "thing_2", "surface"]);
-        assert_eq!((others[2].size_m, others[2].furniture), ([0.6, 0.5, 0.7], true));
-        let (target, _) = recalled(vec![thing(Some(GLASS), 0.9, 0.14), thing(Some(GLASS), 1.0, 0.146)]).expect("two");
+        assert_eq!(
+            (target.id.as_str(), target.pose.position[0]),
+            ("glass_1", 1.0)
+        );
+        assert_eq!(
+            others
+                .iter()
+                .map(|other| other.id.as_str())
+                .collect::<Vec<_>>(),
+            ["thing_1", "thing_2", "surface"]
+        );
+        assert_eq!(
+            (others[2].size_m, others[2].furniture),
+            ([0.6, 0.5, 0.7], true)
+        );
+        let (target, _) = recalled(vec![
+            thing(Some(GLASS), 0.9, 0.14),
+            thing(Some(GLASS), 1.0, 0.146),
+        ])
+        .expect("two");
         assert_eq!(target.pose.position[0], 1.0);
     }
 
@@ -184,26 +253,51 @@ mod tests {
             furniture: true,
             angular: false,
         };
-        let plane = PerceivedPlane { pose: Pose::upright([1.0, 0.0, 0.7], 0.3), size_m: [0.6, 0.5] };
-        let perceived = Perceived { plane: Some(plane), things: Vec::new(), look: None };
-        assert_eq!(elsewhere(vec![table(1.1), table(3.0)], &perceived), [table(3.0)]);
+        let plane = PerceivedPlane {
+            pose: Pose::upright([1.0, 0.0, 0.7], 0.3),
+            size_m: [0.6, 0.5],
+        };
+        let perceived = Perceived {
+            plane: Some(plane),
+            things: Vec::new(),
+            look: None,
+        };
+        assert_eq!(
+            elsewhere(vec![table(1.1), table(3.0)], &perceived),
+            [table(3.0)]
+        );
         assert_eq!(elsewhere(vec![table(1.1)], &Perceived::default()).len(), 1);
     }
 
     #[test]
     fn floor_pieces_are_merged_into_squares_of_the_largest_height() {
-        let piece = |x: f64, top_m: f64| Standing { at_m: [x, -0.025], top_m };
+        let piece = |x: f64, top_m: f64| Standing {
+            at_m: [x, -0.025],
+            top_m,
+        };
         let found = obstacles(&[piece(0.125, 0.2), piece(0.175, 0.4), piece(0.225, 0.1)]);
-        let told: Vec<([f64; 3], f64)> = found.iter().map(|thing| (thing.pose.position, thing.size_m[2])).collect();
+        let told: Vec<([f64; 3], f64)> = found
+            .iter()
+            .map(|thing| (thing.pose.position, thing.size_m[2]))
+            .collect();
         assert_eq!(found.iter().filter(|thing| thing.furniture).count(), 0);
         assert_eq!(told.len(), 2);
-        for (told, known) in told.iter().zip([([0.15, -0.05, 0.0], 0.4), ([0.25, -0.05, 0.0], 0.1)]) {
-            assert!((Vector3::from(told.0) - Vector3::from(known.0)).norm() < 1e-9 && told.1 == known.1, "{told:?}");
+        for (told, known) in told
+            .iter()
+            .zip([([0.15, -0.05, 0.0], 0.4), ([0.25, -0.05, 0.0], 0.1)])
+        {
+            assert!(
+                (Vector3::from(told.0) - Vector3::from(known.0)).norm() < 1e-9 && told.1 == known.1,
+                "{told:?}"
+            );
         }
     }
 
     #[test]
     fn an_unperceived_object_cannot_be_grasped() {
-        assert_eq!(recalled(vec![thing(None, 0.5, 0.146)]), Err("no perceived object matches glass_1".to_owned()));
+        assert_eq!(
+            recalled(vec![thing(None, 0.5, 0.146)]),
+            Err("no perceived object matches glass_1".to_owned())
+        );
     }
 }

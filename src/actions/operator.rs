@@ -1,4 +1,5 @@
-//! The interface of a skill: joint commands, measurements and noisy perception. Ground truth is not accessible.
+//! The interface of a skill: joint commands, measurements and noisy perception. Ground truth is not
+//! accessible.
 
 use nalgebra::Isometry3;
 
@@ -9,9 +10,13 @@ use crate::pace::Course;
 use crate::place::carried_n;
 use crate::sabotage::IDLE_SECS;
 use crate::{Cut, ExternalFault, Saboteur};
-use actcheck_data::{ActionReport, ChoiceName, Choices, KnownKind, Look, Perceived, Percept, Phase, RobotProfile};
+use actcheck_data::{
+    ActionReport, ChoiceName, Choices, KnownKind, Look, Perceived, Percept, Phase, RobotProfile,
+};
 use actcheck_scenario::FloorPlan;
-use actcheck_world::{Command, DepthImage, JointKind, Kinematics, Layout, Observation, Sighting, World};
+use actcheck_world::{
+    Command, DepthImage, JointKind, Kinematics, Layout, Observation, Sighting, World,
+};
 
 /// Reason why a skill has to stop.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -32,12 +37,13 @@ pub enum Interrupt {
     ExternalSkill(ExternalFault),
 }
 
-/// A joint this far behind its target is held back. Unit: metres. Three times the lag of a joint that carries a load.
+/// A joint this far behind its target is held back. Unit: metres. Three times the lag of a joint
+/// that carries a load.
 const HELD_BACK_M: f64 = 0.03;
 /// As [`HELD_BACK_M`], for revolute joints. Unit: radians.
 const HELD_BACK_RAD: f64 = 0.1;
-/// Time for which the base has to be that far behind: while its pose estimate changes, it falls behind and catches up. Unit:
-/// seconds.
+/// Time for which the base has to be that far behind: while its pose estimate changes, it falls
+/// behind and catches up. Unit: seconds.
 const BASE_BEHIND_SECS: f64 = 0.4;
 /// Time for a robot that gives up to come to rest. Unit: seconds.
 const GIVE_UP_SECS: f64 = 0.5;
@@ -70,8 +76,8 @@ pub struct Operator<'a> {
 }
 
 impl<'a> Operator<'a> {
-    /// The robot at the beginning of an action with a budget of `budget_secs` of simulated time, with optional
-    /// interference.
+    /// The robot at the beginning of an action with a budget of `budget_secs` of simulated time,
+    /// with optional interference.
     pub fn new(
         world: &'a mut World,
         choices: &'a mut Choices,
@@ -104,7 +110,8 @@ impl<'a> Operator<'a> {
         }
     }
 
-    /// Runs a skill, unless the robot is sabotaged into doing nothing. The report can be sabotaged too.
+    /// Runs a skill, unless the robot is sabotaged into doing nothing. The report can be sabotaged
+    /// too.
     ///
     /// # Errors
     /// [`Interrupt`] if the action has to end.
@@ -114,7 +121,10 @@ impl<'a> Operator<'a> {
     ) -> Result<ActionReport, Interrupt> {
         let believed = if self.saboteur.as_deref().is_some_and(Saboteur::idles) {
             self.wait(IDLE_SECS)?;
-            ActionReport { succeeded: false, message: "did nothing".to_owned() }
+            ActionReport {
+                succeeded: false,
+                message: "did nothing".to_owned(),
+            }
         } else {
             match skill(self) {
                 Err(Interrupt::HeldUp(behind)) => self.give_up(&behind)?,
@@ -132,12 +142,18 @@ impl<'a> Operator<'a> {
         self.begin("held back");
         self.command.positions = self.observe().positions;
         self.wait(GIVE_UP_SECS)?;
-        Ok(ActionReport { succeeded: false, message: format!("something holds the robot back: {behind}") })
+        Ok(ActionReport {
+            succeeded: false,
+            message: format!("something holds the robot back: {behind}"),
+        })
     }
 
     /// Begins a phase with this name.
     pub fn begin(&mut self, phase: &str) {
-        self.phases.push(Phase { name: phase.to_owned(), start_secs: self.elapsed_secs() });
+        self.phases.push(Phase {
+            name: phase.to_owned(),
+            start_secs: self.elapsed_secs(),
+        });
     }
 
     /// Simulated time since the action began. Unit: seconds.
@@ -202,7 +218,8 @@ impl<'a> Operator<'a> {
         self.world.floor_plan()
     }
 
-    /// The kind of object that a designator's value refers to. Returns `None` if the scene has no object with this id.
+    /// The kind of object that a designator's value refers to. Returns `None` if the scene has no
+    /// object with this id.
     pub fn kind_of(&self, id: &str) -> Option<KnownKind> {
         self.world.kind_of(id)
     }
@@ -212,13 +229,15 @@ impl<'a> Operator<'a> {
         self.look_at_every(1)
     }
 
-    /// As [`Operator::look`], with only every n-th pixel of every n-th row measured, from the first on.
+    /// As [`Operator::look`], with only every n-th pixel of every n-th row measured, from the first
+    /// on.
     pub fn look_at_every(&mut self, stride: usize) -> DepthImage {
         self.last_look = Some(self.world.current_look());
         self.world.look_at_every(stride, self.choices)
     }
 
-    /// Selects the sequence of postures that an arm planner samples: a number from 0 to 1, recorded like every choice.
+    /// Selects the sequence of postures that an arm planner samples: a number from 0 to 1, recorded
+    /// like every choice.
     pub fn choose_samples(&mut self) -> f64 {
         self.choices.simple(ChoiceName::MotionSamples, 0.0, 1.0)
     }
@@ -228,9 +247,13 @@ impl<'a> Operator<'a> {
         self.memory
     }
 
-    /// Keeps the interpretation of pictures for later actions and for the trace, with the moment of the last picture.
+    /// Keeps the interpretation of pictures for later actions and for the trace, with the moment of
+    /// the last picture.
     pub fn remember(&mut self, perceived: Perceived) {
-        let mut perceived = Perceived { look: self.last_look, ..perceived };
+        let mut perceived = Perceived {
+            look: self.last_look,
+            ..perceived
+        };
         if let Some(saboteur) = &mut self.saboteur {
             perceived = saboteur.perceived(perceived, self.world.known_kinds());
         }
@@ -251,7 +274,8 @@ impl<'a> Operator<'a> {
         self.memory.held = held;
     }
 
-    /// Starts watching whether the held object stays in the hand; if it is held at a wall, with the thickness of this.
+    /// Starts watching whether the held object stays in the hand; if it is held at a wall, with the
+    /// thickness of this.
     pub fn watch_grip(&mut self, wall_m: Option<f64>) {
         let watch = GripWatch::new(&self.observe(), self.profile().grip_force_n);
         self.grip = Some(match wall_m {
@@ -280,24 +304,39 @@ impl<'a> Operator<'a> {
         self.world.map_of_furniture()
     }
 
-    /// Records a percept from the pictures of this action or, without any, from those of an earlier action.
+    /// Records a percept from the pictures of this action or, without any, from those of an earlier
+    /// action.
     pub fn record_percept(&mut self, seen: &Sighting) {
-        let recalled = self.memory.perceived.as_ref().and_then(|perceived| perceived.look);
+        let recalled = self
+            .memory
+            .perceived
+            .as_ref()
+            .and_then(|perceived| perceived.look);
         self.record_percept_of(seen, self.last_look.or(recalled));
     }
 
     fn record_percept_of(&mut self, seen: &Sighting, look: Option<Look>) {
-        self.percepts.push(Percept { id: seen.id.clone(), pose: seen.pose, size_m: seen.size_m, look });
+        self.percepts.push(Percept {
+            id: seen.id.clone(),
+            pose: seen.pose,
+            size_m: seen.size_m,
+            look,
+        });
     }
 
-    /// Looks at one object with an abstract detector: the true pose with noise, and never a missed detection. Returns
-    /// `None` if the scene has no object with this id.
+    /// Looks at one object with an abstract detector: the true pose with noise, and never a missed
+    /// detection. Returns `None` if the scene has no object with this id.
     pub fn see(&mut self, id: &str) -> Option<Sighting> {
         let seen = match &mut self.saboteur {
             None => self.world.perceive(id, self.choices)?,
             Some(saboteur) => {
-                let seen = self.world.perceive(&saboteur.seen_instead(id), self.choices)?;
-                saboteur.sighting(Sighting { id: id.to_owned(), ..seen })
+                let seen = self
+                    .world
+                    .perceive(&saboteur.seen_instead(id), self.choices)?;
+                saboteur.sighting(Sighting {
+                    id: id.to_owned(),
+                    ..seen
+                })
             }
         };
         self.record_percept_of(&seen, Some(self.world.current_look()));
@@ -312,7 +351,10 @@ impl<'a> Operator<'a> {
     /// Looks at every object whose id is accepted.
     pub fn see_where(&mut self, wanted: impl Fn(&str) -> bool) -> Vec<Sighting> {
         let ids = self.world.visible();
-        ids.iter().filter(|id| wanted(id)).filter_map(|id| self.see(id)).collect()
+        ids.iter()
+            .filter(|id| wanted(id))
+            .filter_map(|id| self.see(id))
+            .collect()
     }
 
     /// Senses the gap between the fingers. Unit: metres.
@@ -321,12 +363,14 @@ impl<'a> Operator<'a> {
         match &self.saboteur {
             None => felt,
             // The sabotaged gap plus the sensor's error.
-            Some(_) => felt + self.observe().gripper_opening_m - self.world.observe().gripper_opening_m,
+            Some(_) => {
+                felt + self.observe().gripper_opening_m - self.world.observe().gripper_opening_m
+            }
         }
     }
 
-    /// Moves through joint positions, at rest at both ends, within the joints' velocity limits and in at least
-    /// `least_secs`.
+    /// Moves through joint positions, at rest at both ends, within the joints' velocity limits and
+    /// in at least `least_secs`.
     ///
     /// # Errors
     /// [`Interrupt`] if the action has to end.
@@ -334,7 +378,8 @@ impl<'a> Operator<'a> {
         self.follow_until(path, least_secs, |_| false).map(|_| ())
     }
 
-    /// Like [`Self::follow`], but stops as soon as `enough` returns `true`. Returns whether it stopped early.
+    /// Like [`Self::follow`], but stops as soon as `enough` returns `true`. Returns whether it
+    /// stopped early.
     ///
     /// # Errors
     /// [`Interrupt`] if the action has to end.
@@ -359,7 +404,9 @@ impl<'a> Operator<'a> {
                 return Err(Interrupt::HeldUp(behind));
             }
             match self.held_back(&positions, self.layout().base.iter().flatten()) {
-                Some(behind) if behind_secs > BASE_BEHIND_SECS => return Err(Interrupt::HeldUp(behind)),
+                Some(behind) if behind_secs > BASE_BEHIND_SECS => {
+                    return Err(Interrupt::HeldUp(behind));
+                }
                 Some(_) => behind_secs += tick,
                 None => behind_secs = 0.0,
             }
@@ -371,11 +418,19 @@ impl<'a> Operator<'a> {
     }
 
     /// A sentence about one of these joints that is far behind its target.
-    fn held_back<'b>(&self, positions: &[f64], mut joints: impl Iterator<Item = &'b usize>) -> Option<String> {
+    fn held_back<'b>(
+        &self,
+        positions: &[f64],
+        mut joints: impl Iterator<Item = &'b usize>,
+    ) -> Option<String> {
         joints.find_map(|idx| {
             let idx = *idx;
             let joint = &self.kinematics().joints()[idx];
-            let most = if joint.kind == JointKind::Prismatic { HELD_BACK_M } else { HELD_BACK_RAD };
+            let most = if joint.kind == JointKind::Prismatic {
+                HELD_BACK_M
+            } else {
+                HELD_BACK_RAD
+            };
             let off = (positions[idx] - self.command.positions[idx]).abs();
             (off > most).then(|| {
                 let (off, unit) = match joint.kind {
@@ -416,17 +471,22 @@ impl<'a> Operator<'a> {
         self.command.grip_force_n = self.profile().grip_force_n;
     }
 
-    /// Whether the run is cut off now. Ticks check it; a skill that waits or perceives must check it itself.
+    /// Whether the run is cut off now. Ticks check it; a skill that waits or perceives must check
+    /// it itself.
     ///
     /// # Errors
     /// [`Interrupt::Cut`].
     pub fn check_cut(&self) -> Result<(), Interrupt> {
-        if self.cut.is_due(self.world.time_secs()) { Err(Interrupt::Cut) } else { Ok(()) }
+        if self.cut.is_due(self.world.time_secs()) {
+            Err(Interrupt::Cut)
+        } else {
+            Ok(())
+        }
     }
 
-    /// Counts a request of an external skill for perception, for which no simulated time passes. An action may make one
-    /// for each control tick of its budget, so that a skill that polls without end is ended like one that moves
-    /// without end, and the trace of an action is bounded.
+    /// Counts a request of an external skill for perception, for which no simulated time passes. An
+    /// action may make one for each control tick of its budget, so that a skill that polls without
+    /// end is ended like one that moves without end, and the trace of an action is bounded.
     ///
     /// # Errors
     /// [`Interrupt::Requests`] if there are more, [`Interrupt::Cut`] if the run is cut off.

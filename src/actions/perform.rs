@@ -6,16 +6,21 @@ use crate::operator::{Interrupt, Operator};
 use crate::skills::skill;
 use crate::{ActionCall, ExternalFault, ExternalSkill, Saboteur};
 use actcheck_data::{
-    ActionEnd, ActionReport, ActionTrace, Budget, Choices, ContactEpisode, Extremes, Form, Frames, RobotCourse,
-    SceneMap, Snapshot, Trace,
+    ActionEnd, ActionReport, ActionTrace, Budget, Choices, ContactEpisode, Extremes, Form, Frames,
+    RobotCourse, SceneMap, Snapshot, Trace,
 };
 use actcheck_world::World;
 
 /// Performs the actions in order with the reference skills.
 ///
-/// Faults and exhausted budgets end the run but are returned as data: later actions are recorded as not reached. An
-/// action that reports "failed" does not end the run, as with a real robot.
-pub fn perform(calls: &[ActionCall], world: &mut World, choices: &mut Choices, budget: &Budget) -> Trace {
+/// Faults and exhausted budgets end the run but are returned as data: later actions are recorded as
+/// not reached. An action that reports "failed" does not end the run, as with a real robot.
+pub fn perform(
+    calls: &[ActionCall],
+    world: &mut World,
+    choices: &mut Choices,
+    budget: &Budget,
+) -> Trace {
     perform_with(calls, world, choices, budget, Interference::default())
 }
 
@@ -34,7 +39,8 @@ pub struct Interference<'a> {
 
 /// Decides whether an action may be performed.
 pub trait Gate {
-    /// Returns the reason why an action must not be performed in this state of the world; `None` if it may be.
+    /// Returns the reason why an action must not be performed in this state of the world; `None` if
+    /// it may be.
     fn reason_not_to_perform(&mut self, call: &ActionCall, state: &Snapshot) -> Option<String>;
 }
 
@@ -55,11 +61,16 @@ pub fn perform_with(
     let mut memory = Memory::default();
     let mut actions: Vec<ActionTrace> = Vec::with_capacity(calls.len());
     let mut robot_courses = Vec::with_capacity(calls.len());
-    let mut begun = interference.external.as_deref_mut().map_or(Ok(()), |skill| skill.begin_run(world));
+    let mut begun = interference
+        .external
+        .as_deref_mut()
+        .map_or(Ok(()), |skill| skill.begin_run(world));
     // The last action that the external skill performed.
     let mut last_external = None;
     for call in calls {
-        let stopped = actions.last().is_some_and(|last| !last.end.lets_run_go_on());
+        let stopped = actions
+            .last()
+            .is_some_and(|last| !last.end.lets_run_go_on());
         if stopped {
             actions.push(ActionTrace::not_reached(&call.action, &call.parameters));
             continue;
@@ -69,12 +80,24 @@ pub fn perform_with(
         let refused = refused.and_then(|(gate, state)| gate.reason_not_to_perform(call, state));
         let (action, course) = match (std::mem::replace(&mut begun, Ok(())), refused) {
             (Err(fault), _) => (never_begun(call, ended_by(fault)), RobotCourse::default()),
-            (Ok(()), Some(reason)) => (never_begun(call, ActionEnd::NotPerformed(reason)), RobotCourse::default()),
+            (Ok(()), Some(reason)) => (
+                never_begun(call, ActionEnd::NotPerformed(reason)),
+                RobotCourse::default(),
+            ),
             (Ok(()), None) => {
-                if interference.external.as_deref().is_some_and(|skill| skill.performs(&call.action)) {
+                if interference
+                    .external
+                    .as_deref()
+                    .is_some_and(|skill| skill.performs(&call.action))
+                {
                     last_external = Some(actions.len());
                 }
-                perform_one(call, (world, choices, &mut memory), budget, &mut interference)
+                perform_one(
+                    call,
+                    (world, choices, &mut memory),
+                    budget,
+                    &mut interference,
+                )
             }
         };
         actions.push(action);
@@ -82,15 +105,33 @@ pub fn perform_with(
         snapshots.push(world.snapshot());
     }
     if let (Some(skill), Some(last)) = (interference.external.as_deref_mut(), last_external) {
-        let is_decided = actions.last().is_some_and(|last| !last.end.lets_run_go_on());
+        let is_decided = actions
+            .last()
+            .is_some_and(|last| !last.end.lets_run_go_on());
         if let Err(fault) = skill.end_run(is_decided) {
             (actions[last].end, actions[last].report) = (ended_by(fault), None);
         }
     }
     let tracks = world.tracks();
-    let frames = Frames { period_secs: tracks.period_secs, names: tracks.names, rows: tracks.rows };
-    let forms = world.forms().into_iter().map(|(name, parts)| Form { name, parts }).collect();
-    Trace { snapshots, actions, frames, hash: world.state_digest(), map: SceneMap::default(), forms, robot_courses }
+    let frames = Frames {
+        period_secs: tracks.period_secs,
+        names: tracks.names,
+        rows: tracks.rows,
+    };
+    let forms = world
+        .forms()
+        .into_iter()
+        .map(|(name, parts)| Form { name, parts })
+        .collect();
+    Trace {
+        snapshots,
+        actions,
+        frames,
+        hash: world.state_digest(),
+        map: SceneMap::default(),
+        forms,
+        robot_courses,
+    }
 }
 
 fn perform_one(
@@ -101,16 +142,25 @@ fn perform_one(
 ) -> (ActionTrace, RobotCourse) {
     let began = world.time_secs();
     world.begin_record();
-    let misled = interference.saboteur.as_deref_mut().map(|saboteur| saboteur.begin(call, world));
+    let misled = interference
+        .saboteur
+        .as_deref_mut()
+        .map(|saboteur| saboteur.begin(call, world));
     let understood = misled.as_ref().unwrap_or(call);
     let disturbed = (interference.cut, interference.saboteur.as_deref_mut());
     let mut operator = Operator::new(world, choices, memory, budget.action_secs, disturbed);
-    let external = interference.external.as_deref_mut().filter(|skill| skill.performs(&call.action));
+    let external = interference
+        .external
+        .as_deref_mut()
+        .filter(|skill| skill.performs(&call.action));
     let outcome = match (external, skill(&call.action)) {
         (Some(external), _) => operator.act(|operator| external.perform(understood, operator)),
         (None, Ok(skill)) => operator.act(|operator| skill(understood, operator)),
         (None, Err(unknown)) => {
-            return (never_begun(call, ActionEnd::Broken(unknown.to_string())), RobotCourse::default());
+            return (
+                never_begun(call, ActionEnd::Broken(unknown.to_string())),
+                RobotCourse::default(),
+            );
         }
     };
     let (phases, percepts, perceived) = (operator.phases, operator.percepts, operator.perceived);
@@ -148,11 +198,18 @@ fn perform_one(
 
 /// An action that never began, with the reason.
 fn never_begun(call: &ActionCall, end: ActionEnd) -> ActionTrace {
-    ActionTrace { end, ..ActionTrace::not_reached(&call.action, &call.parameters) }
+    ActionTrace {
+        end,
+        ..ActionTrace::not_reached(&call.action, &call.parameters)
+    }
 }
 
 fn ended_by(fault: ExternalFault) -> ActionEnd {
-    if fault.late { ActionEnd::Timeout(fault.reason) } else { ActionEnd::Broken(fault.reason) }
+    if fault.late {
+        ActionEnd::Timeout(fault.reason)
+    } else {
+        ActionEnd::Broken(fault.reason)
+    }
 }
 
 fn ended(
@@ -165,10 +222,16 @@ fn ended(
         (Ok(report), None) => (ActionEnd::Completed, Some(report)),
         (Err(Interrupt::Cut), None) => (ActionEnd::Cut(cut::REASON.to_owned()), None),
         (Err(Interrupt::Requests(reason)), None) => (ActionEnd::Timeout(reason), None),
-        (Err(Interrupt::Stopped), None) => (ActionEnd::Cut("the campaign was interrupted".to_owned()), None),
+        (Err(Interrupt::Stopped), None) => (
+            ActionEnd::Cut("the campaign was interrupted".to_owned()),
+            None,
+        ),
         (Err(Interrupt::ExternalSkill(fault)), None) => (ended_by(fault), None),
         (Err(_), None) => {
-            let reason = format!("the action took longer than its budget of {} s", budget.action_secs);
+            let reason = format!(
+                "the action took longer than its budget of {} s",
+                budget.action_secs
+            );
             (ActionEnd::Timeout(reason), None)
         }
     }

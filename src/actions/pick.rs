@@ -32,7 +32,13 @@ pub fn pick(call: &ActionCall, robot: &mut Operator<'_>) -> Result<ActionReport,
     robot.begin("perceive");
     robot.wait(LOOK_SECS)?;
     let (seen, others) = match find(target, robot) {
-        Ok((seen, others)) => (Sighting { angular: grasp::is_angular(&seen, robot), ..seen }, others),
+        Ok((seen, others)) => (
+            Sighting {
+                angular: grasp::is_angular(&seen, robot),
+                ..seen
+            },
+            others,
+        ),
         Err(reason) => return Ok(failed(reason)),
     };
     let way = match planned(&seen, &others, robot) {
@@ -43,7 +49,10 @@ pub fn pick(call: &ActionCall, robot: &mut Operator<'_>) -> Result<ActionReport,
     robot.follow(&way.drive, 0.0)?;
     robot.begin("reach");
     let (widest_m, rim) = (grasp::opening_before_m(&seen, robot), rim_of(&seen, robot));
-    robot.set_opening(rim.and_then(|rim| rim::opening_m(&rim, widest_m)).unwrap_or(widest_m));
+    robot.set_opening(
+        rim.and_then(|rim| rim::opening_m(&rim, widest_m))
+            .unwrap_or(widest_m),
+    );
     robot.follow(&way.reach, 0.0)?;
     robot.begin("approach");
     robot.follow(&way.near, 0.0)?;
@@ -63,7 +72,12 @@ pub fn pick(call: &ActionCall, robot: &mut Operator<'_>) -> Result<ActionReport,
     robot.begin("retract");
     robot.follow(&way.retreat, 0.0)?;
     robot.wait(LOOK_SECS)?;
-    let report = report(robot, target, held, memory::least_gap_m(rim.map(|rim| rim.wall_m)));
+    let report = report(
+        robot,
+        target,
+        held,
+        memory::least_gap_m(rim.map(|rim| rim.wall_m)),
+    );
     // The settled object is as wide as the gap between the fingers.
     let opening_m = robot.observe().gripper_opening_m;
     let held = robot.memory().held.clone().filter(|_| report.succeeded);
@@ -75,17 +89,35 @@ pub fn pick(call: &ActionCall, robot: &mut Operator<'_>) -> Result<ActionReport,
 ///
 /// # Errors
 /// The reason for the action's report if it can't be picked.
-pub(super) fn planned(seen: &Sighting, others: &[Sighting], robot: &mut Operator<'_>) -> Result<Plan, String> {
+pub(super) fn planned(
+    seen: &Sighting,
+    others: &[Sighting],
+    robot: &mut Operator<'_>,
+) -> Result<Plan, String> {
     if let Some(suction) = robot.profile().suction {
         let all = cup::grasps(seen, &suction)?;
-        let (tops, sides): (Vec<_>, Vec<_>) = all.iter().cloned().partition(|grasp| grasp.approach == Approach::Top);
+        let (tops, sides): (Vec<_>, Vec<_>) = all
+            .iter()
+            .cloned()
+            .partition(|grasp| grasp.approach == Approach::Top);
         let grasps = if tops.is_empty() { sides } else { tops };
-        let wanted = PlanRequest { grasps: &grasps, all: &all, taken: Some(seen) };
-        return plan::plan(robot, wanted, others).map_err(|reason| format!("{}: {reason}", seen.id));
+        let wanted = PlanRequest {
+            grasps: &grasps,
+            all: &all,
+            taken: Some(seen),
+        };
+        return plan::plan(robot, wanted, others)
+            .map_err(|reason| format!("{}: {reason}", seen.id));
     }
     let max_opening_m = grasp::opening_before_m(seen, robot);
-    let (grasps, all) = (grasp::grasps(seen, max_opening_m), grasp::all_grasps(seen, max_opening_m));
-    let (grasps, all) = (grasp::centred(grasps, seen, robot), grasp::centred(all, seen, robot));
+    let (grasps, all) = (
+        grasp::grasps(seen, max_opening_m),
+        grasp::all_grasps(seen, max_opening_m),
+    );
+    let (grasps, all) = (
+        grasp::centred(grasps, seen, robot),
+        grasp::centred(all, seen, robot),
+    );
     let (grasps, all) = match rim_of(seen, robot) {
         Some(rim) => {
             let at_rim = rim::grasps(seen, &rim, max_opening_m);
@@ -96,46 +128,80 @@ pub(super) fn planned(seen: &Sighting, others: &[Sighting], robot: &mut Operator
     if grasps.is_empty() {
         return Err(format!("{} is too wide for the gripper", seen.id));
     }
-    let wanted = PlanRequest { grasps: &grasps, all: &all, taken: Some(seen) };
+    let wanted = PlanRequest {
+        grasps: &grasps,
+        all: &all,
+        taken: Some(seen),
+    };
     plan::plan(robot, wanted, others).map_err(|reason| format!("{}: {reason}", seen.id))
 }
 
 /// The rim of an upright vessel that is too wide for the hand, as the robot knows its kind.
 fn rim_of(seen: &Sighting, robot: &Operator<'_>) -> Option<Rim> {
     let is_too_wide = grasp::is_tight(seen, robot.profile().max_opening_m);
-    let name = robot.kind_of(&seen.id).filter(|_| is_too_wide && !robot.has_cup())?.name;
-    let rim = robot.known_kinds().iter().find(|kind| kind.name == name)?.rim;
+    let name = robot
+        .kind_of(&seen.id)
+        .filter(|_| is_too_wide && !robot.has_cup())?
+        .name;
+    let rim = robot
+        .known_kinds()
+        .iter()
+        .find(|kind| kind.name == name)?
+        .rim;
     rim.filter(|rim| (seen.size_m[2] - rim.top_m).abs() < UPRIGHT_M)
 }
 
-/// The target and all other objects: as perceived by an earlier action of the run, otherwise from the abstract
-/// detector.
+/// The target and all other objects: as perceived by an earlier action of the run, otherwise from
+/// the abstract detector.
 fn find(target: &str, robot: &mut Operator<'_>) -> Result<(Sighting, Vec<Sighting>), String> {
     if let Some(perceived) = &robot.memory().perceived {
-        let kind = robot.kind_of(target).ok_or_else(|| format!("{target} has no known kind"))?;
-        let (seen, mut others) = memory::recall(perceived, target, &kind, &robot.base().translation.vector)?;
+        let kind = robot
+            .kind_of(target)
+            .ok_or_else(|| format!("{target} has no known kind"))?;
+        let (seen, mut others) =
+            memory::recall(perceived, target, &kind, &robot.base().translation.vector)?;
         others.extend(memory::elsewhere(robot.known_furniture(), perceived));
         others.extend(memory::obstacles(&robot.memory().floor));
         robot.record_percept(&seen);
         return Ok((seen, others));
     }
-    let seen = robot.see(target).ok_or_else(|| format!("{target} was not seen"))?;
+    let seen = robot
+        .see(target)
+        .ok_or_else(|| format!("{target} was not seen"))?;
     let others = robot.see_others(target);
     Ok((seen, others))
 }
 
-/// Looks again with the hand in front of the object and corrects the rest of the plan by the drift of the base since
-/// the first look. Only objects seen in pictures can be looked at again; the abstract detector would only draw a new
-/// error.
-fn put_right(mut way: Plan, seen: Sighting, robot: &mut Operator<'_>) -> Result<(Plan, Sighting), Interrupt> {
-    let plane = robot.memory().perceived.as_ref().and_then(|perceived| perceived.plane);
-    let (Some(plane), Some(kind), Some([x, y, _])) = (plane, robot.kind_of(&seen.id), robot.layout().base) else {
+/// Looks again with the hand in front of the object and corrects the rest of the plan by the drift
+/// of the base since the first look. Only objects seen in pictures can be looked at again; the
+/// abstract detector would only draw a new error.
+fn put_right(
+    mut way: Plan,
+    seen: Sighting,
+    robot: &mut Operator<'_>,
+) -> Result<(Plan, Sighting), Interrupt> {
+    let plane = robot
+        .memory()
+        .perceived
+        .as_ref()
+        .and_then(|perceived| perceived.plane);
+    let (Some(plane), Some(kind), Some([x, y, _])) =
+        (plane, robot.kind_of(&seen.id), robot.layout().base)
+    else {
         return Ok((way, seen));
     };
     robot.begin("look again");
-    let Some(again) = look_again(&seen, &kind, &plane, robot)? else { return Ok((way, seen)) };
+    let Some(again) = look_again(&seen, &kind, &plane, robot)? else {
+        return Ok((way, seen));
+    };
     let [dx, dy] = [0, 1].map(|axis| again.pose.position[axis] - seen.pose.position[axis]);
-    let Plan { near, approach, lift, retreat, .. } = &mut way;
+    let Plan {
+        near,
+        approach,
+        lift,
+        retreat,
+        ..
+    } = &mut way;
     for posture in near.iter_mut().chain(approach).chain(lift).chain(retreat) {
         posture[x] += dx;
         posture[y] += dy;
@@ -175,19 +241,34 @@ fn report(robot: &mut Operator<'_>, target: &str, stalled: bool, thinnest_m: f64
         return failed(format!("the fingers did not close on {target}"));
     }
     if robot.felt_slip() {
-        return failed(format!("{target} slipped out of the hand: its fingers are {:.1} mm apart", gap * 1e3));
+        return failed(format!(
+            "{target} slipped out of the hand: its fingers are {:.1} mm apart",
+            gap * 1e3
+        ));
     }
     if gap < thinnest_m {
-        return failed(format!("the hand is empty: its fingers are {:.1} mm apart", gap * 1e3));
+        return failed(format!(
+            "the hand is empty: its fingers are {:.1} mm apart",
+            gap * 1e3
+        ));
     }
     if !feels(robot) {
         return failed(format!("{target} slipped out of the hand"));
     }
-    let message = format!("holds {target}, the fingers are {:.1} cm apart", gap * 100.0);
-    ActionReport { succeeded: true, message }
+    let message = format!(
+        "holds {target}, the fingers are {:.1} cm apart",
+        gap * 100.0
+    );
+    ActionReport {
+        succeeded: true,
+        message,
+    }
 }
 
 /// A report of failure.
 pub(super) fn failed(message: impl Into<String>) -> ActionReport {
-    ActionReport { succeeded: false, message: message.into() }
+    ActionReport {
+        succeeded: false,
+        message: message.into(),
+    }
 }

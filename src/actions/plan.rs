@@ -39,16 +39,19 @@ pub(super) const APPROACH_M: f64 = 0.12;
 const OFF_EDGE_M: f64 = 0.1;
 /// Longest distance from there to the object. Unit: metres.
 const LONGEST_WAY_M: f64 = 1.2;
-/// Minimum clearance of the hand to furniture: fingertips go down to it to grasp flat objects. Unit: metres.
+/// Minimum clearance of the hand to furniture: fingertips go down to it to grasp flat objects.
+/// Unit: metres.
 pub(super) const FURNITURE_CLEAR_M: f64 = 0.002;
-/// Minimum clearance of the base and the arm to furniture, which only the hand has to come close to. Unit: metres.
+/// Minimum clearance of the base and the arm to furniture, which only the hand has to come close
+/// to. Unit: metres.
 pub(super) const BODY_CLEAR_M: f64 = 0.01;
-/// Clearance of the base and the arm to furniture beyond which more brings no benefit. Unit: metres. Three times the
-/// position error of perceived furniture.
+/// Clearance of the base and the arm to furniture beyond which more brings no benefit. Unit:
+/// metres. Three times the position error of perceived furniture.
 pub(super) const AMPLE_BODY_CLEAR_M: f64 = 0.08;
 /// Clearance to other objects beyond which more brings no benefit. Unit: metres.
 pub(super) const AMPLE_CLEAR_M: f64 = 0.04;
-/// Minimum clearance to other objects: below it, the hand would go through their middle. Unit: metres.
+/// Minimum clearance to other objects: below it, the hand would go through their middle. Unit:
+/// metres.
 pub(super) const LEAST_CLEAR_M: f64 = -0.025;
 /// Distance between points and between postures checked for clearance. Unit: metres.
 const CHECK_M: f64 = 0.03;
@@ -70,25 +73,37 @@ pub(super) const NO_WAY: &str = "no reachable, collision-free path to it was fou
 pub struct PlanRequest<'a> {
     /// Usual grasps, for a mobile robot.
     pub grasps: &'a [Grasp],
-    /// All grasps, for a fixed arm and for cases where none of the usual grasps is free; empty if there are no others.
+    /// All grasps, for a fixed arm and for cases where none of the usual grasps is free; empty if
+    /// there are no others.
     pub all: &'a [Grasp],
-    /// The object to grasp, which is an obstacle until the hand is there. `None` if the hand is full; a fixed arm then
-    /// only moves straight, to keep its load level.
+    /// The object to grasp, which is an obstacle until the hand is there. `None` if the hand is
+    /// full; a fixed arm then only moves straight, to keep its load level.
     pub taken: Option<&'a Sighting>,
 }
 
 /// Returns the best plan among all grasps.
 ///
-/// With a mobile base, the arm unfolds straight, in front of the furniture; if no grasp is possible that way, unusual
-/// grasps and sampled paths are tried, then the hand turned over, then hands at many slants, and last those turned
-/// relative to the base. For a fixed base, see [`standing`].
+/// With a mobile base, the arm unfolds straight, in front of the furniture; if no grasp is possible
+/// that way, unusual grasps and sampled paths are tried, then the hand turned over, then hands at
+/// many slants, and last those turned relative to the base. For a fixed base, see [`standing`].
 ///
 /// # Errors
 /// If there is no plan, the reason as a sentence for the action's report.
-pub fn plan(operator: &mut Operator<'_>, wanted: PlanRequest<'_>, others: &[Sighting]) -> Result<Plan, String> {
-    let Some(base) = operator.layout().base else { return standing::plan(operator, wanted, others) };
+pub fn plan(
+    operator: &mut Operator<'_>,
+    wanted: PlanRequest<'_>,
+    others: &[Sighting],
+) -> Result<Plan, String> {
+    let Some(base) = operator.layout().base else {
+        return standing::plan(operator, wanted, others);
+    };
     let mut nearest = Nearest::default();
-    let found = best(&Planner::new(operator, base, others), wanted.grasps, &mut Samples::new(0.0, 0), &mut nearest);
+    let found = best(
+        &Planner::new(operator, base, others),
+        wanted.grasps,
+        &mut Samples::new(0.0, 0),
+        &mut nearest,
+    );
     if let Some(plan) = found {
         return Ok(plan);
     }
@@ -103,30 +118,50 @@ pub fn plan(operator: &mut Operator<'_>, wanted: PlanRequest<'_>, others: &[Sigh
     let all = [wanted.grasps, wanted.all].concat();
     let mut found = best(&planner, &all, &mut samples, &mut nearest);
     if let (None, Some(thing)) = (&found, wanted.taken) {
-        let mut straight =
-            |planner: &Planner<'_>, grasps: &[Grasp]| best(planner, grasps, &mut Samples::new(0.0, 0), &mut nearest);
+        let mut straight = |planner: &Planner<'_>, grasps: &[Grasp]| {
+            best(planner, grasps, &mut Samples::new(0.0, 0), &mut nearest)
+        };
         found = straight(&planner, &rolled(&all));
         let hand = Hand::new(thing, operator);
         planner.heading_mobility = TURNED_MOBILITY;
-        let slants = if found.is_none() { slant::ahead(thing, &hand, operator) } else { Vec::new() };
-        found = found.or_else(|| straight(&planner, &slants)).or_else(|| straight(&planner, &rolled(&slants)));
+        let slants = if found.is_none() {
+            slant::ahead(thing, &hand, operator)
+        } else {
+            Vec::new()
+        };
+        found = found
+            .or_else(|| straight(&planner, &slants))
+            .or_else(|| straight(&planner, &rolled(&slants)));
         // Where no hand ahead of the base reaches, one aside of it does not either.
         if found.is_none() && !nearest.is_out_of_reach() {
             let slants = slant::aside(thing, &hand, operator);
-            let mut straight = |grasps: &[Grasp]| best(&planner, grasps, &mut Samples::new(0.0, 0), &mut nearest);
+            let mut straight =
+                |grasps: &[Grasp]| best(&planner, grasps, &mut Samples::new(0.0, 0), &mut nearest);
             found = straight(&slants).or_else(|| straight(&rolled(&slants)));
         }
     }
     if found.is_none() && wanted.taken.is_none() {
         // An arm that took the object aside of the base also sets it down there.
-        planner.postures = vec![planner.layout.arm.iter().map(|joint| planner.start[*joint]).collect()];
+        planner.postures = vec![
+            planner
+                .layout
+                .arm
+                .iter()
+                .map(|joint| planner.start[*joint])
+                .collect(),
+        ];
         found = best(&planner, &all, &mut samples, &mut nearest);
     }
     found.ok_or_else(|| nearest.reason(wanted.taken, &planner.surroundings()))
 }
 
 /// The best plan among these grasps.
-fn best(planner: &Planner<'_>, grasps: &[Grasp], samples: &mut Samples, nearest: &mut Nearest) -> Option<Plan> {
+fn best(
+    planner: &Planner<'_>,
+    grasps: &[Grasp],
+    samples: &mut Samples,
+    nearest: &mut Nearest,
+) -> Option<Plan> {
     let mut seeds: Vec<(f64, &Grasp, Vec<f64>)> = Vec::new();
     for grasp in grasps {
         for posture in &planner.postures {
@@ -153,7 +188,8 @@ fn best(planner: &Planner<'_>, grasps: &[Grasp], samples: &mut Samples, nearest:
     best
 }
 
-/// A path of the base to a pose (x, y, heading) with the arm as it is. Returns `None` if there is none.
+/// A path of the base to a pose (x, y, heading) with the arm as it is. Returns `None` if there is
+/// none.
 pub fn drive(operator: &Operator<'_>, to: [f64; 3], others: &[Sighting]) -> Option<Vec<Vec<f64>>> {
     let [x, y, heading] = operator.layout().base?;
     let planner = Planner::new(operator, [x, y, heading], others);
@@ -184,7 +220,8 @@ pub(super) struct Planner<'a> {
     heads: Vec<Vec<f64>>,
     /// Whether each link is moved by the head's joints.
     is_head: Vec<bool>,
-    /// Weight of the base's heading in inverse kinematics, from 0 to 1: 1 if the hand points ahead of the base.
+    /// Weight of the base's heading in inverse kinematics, from 0 to 1: 1 if the hand points ahead
+    /// of the base.
     heading_mobility: f64,
 }
 
@@ -195,8 +232,17 @@ impl<'a> Planner<'a> {
         let points = kinematics.surface_points(CHECK_M);
         let from = Point2::new(start[base[0]], start[base[1]]);
         let furniture = Block::around(&Point3::new(from.x, from.y, 0.0), others);
-        let things: Vec<Pillar> = others.iter().filter(|seen| !seen.furniture).map(Pillar::new).collect();
-        let ground = Ground::new(&furniture, &things, radius(kinematics, base, &start, &points), &from);
+        let things: Vec<Pillar> = others
+            .iter()
+            .filter(|seen| !seen.furniture)
+            .map(Pillar::new)
+            .collect();
+        let ground = Ground::new(
+            &furniture,
+            &things,
+            radius(kinematics, base, &start, &points),
+            &from,
+        );
         let mut postures = operator.profile().postures.clone();
         postures.push(operator.profile().home.clone());
         let itself = SelfContact::new(kinematics, std::slice::from_ref(&start));
@@ -234,14 +280,25 @@ impl<'a> Planner<'a> {
     }
 
     /// A plan near the seed that costs less than `bound`.
-    fn plan(&self, grasp: &Grasp, seed: &[f64], bound: f64, samples: &mut Samples) -> Result<Plan, Hindrance> {
+    fn plan(
+        &self,
+        grasp: &Grasp,
+        seed: &[f64],
+        bound: f64,
+        samples: &mut Samples,
+    ) -> Result<Plan, Hindrance> {
         let back = -Vector3::new(libm::cos(grasp.heading), libm::sin(grasp.heading), 0.0);
-        let way = self.way_out(&grasp.pose.translation.vector, &back).ok_or(Hindrance::OutOfReach)?;
-        // Cost of the drive alone, before inverse kinematics. (Inverse kinematics moves the base by centimetres.)
+        let way = self
+            .way_out(&grasp.pose.translation.vector, &back)
+            .ok_or(Hindrance::OutOfReach)?;
+        // Cost of the drive alone, before inverse kinematics. (Inverse kinematics moves the base by
+        // centimetres.)
         if self.travel_cost(&self.moved(seed, &(back * way))) + grasp.penalty > bound + 0.05 {
             return Err(Hindrance::Dearer);
         }
-        let at_thing = self.solve(seed, &grasp.pose, 1.0).ok_or(Hindrance::OutOfReach)?;
+        let at_thing = self
+            .solve(seed, &grasp.pose, 1.0)
+            .ok_or(Hindrance::OutOfReach)?;
         let (at_thing, lift) = self.lifted(at_thing)?;
         let lifted = lift.last().ok_or(Hindrance::NoLift)?.clone();
         let (near, approach) = match grasp.approach {
@@ -250,33 +307,54 @@ impl<'a> Planner<'a> {
                 (vec![before], vec![at_thing.clone()])
             }
             // Above the object, at the height to which it will be lifted.
-            Approach::Top => {
-                (vec![lifted.clone()], lift.iter().rev().skip(1).cloned().chain([at_thing.clone()]).collect())
-            }
+            Approach::Top => (
+                vec![lifted.clone()],
+                lift.iter()
+                    .rev()
+                    .skip(1)
+                    .cloned()
+                    .chain([at_thing.clone()])
+                    .collect(),
+            ),
         };
         let reach = self.moved(
             &near[0],
-            &(back * (way - if grasp.approach == Approach::Side { APPROACH_M.min(way) } else { 0.0 })),
+            &(back
+                * (way
+                    - if grasp.approach == Approach::Side {
+                        APPROACH_M.min(way)
+                    } else {
+                        0.0
+                    })),
         );
         let drive = self.drive(&reach).ok_or(Hindrance::NoRoute)?;
         let retreat = vec![self.moved(&lifted, &(back * way))];
-        let mut plan = Plan { drive, reach: vec![reach], near, approach, lift, retreat, cost: 0.0 };
+        let mut plan = Plan {
+            drive,
+            reach: vec![reach],
+            near,
+            approach,
+            lift,
+            retreat,
+            cost: 0.0,
+        };
         plan.cost = grasp.penalty + self.cost(&mut plan, bound - grasp.penalty, samples)?;
         Ok(plan)
     }
 
-    /// Whether the hand of a seed points within 45 degrees of the grasp's direction. Not required of a hand that turns
-    /// relative to the base.
+    /// Whether the hand of a seed points within 45 degrees of the grasp's direction. Not required
+    /// of a hand that turns relative to the base.
     fn points_along(&self, seed: &[f64], grasp: &Grasp) -> bool {
         if self.heading_mobility < 1.0 {
             return true;
         }
         let forward = |pose: &Isometry3<f64>| pose.rotation * Vector3::x();
-        forward(&self.kinematics.grasp(seed)).dot(&forward(&grasp.pose)) > std::f64::consts::FRAC_1_SQRT_2
+        forward(&self.kinematics.grasp(seed)).dot(&forward(&grasp.pose))
+            > std::f64::consts::FRAC_1_SQRT_2
     }
 
-    /// The seed of a hand that points aside of the base, with the base turned so that the hand has the grasp's heading.
-    /// `None` if the hand points ahead, or steeply.
+    /// The seed of a hand that points aside of the base, with the base turned so that the hand has
+    /// the grasp's heading. `None` if the hand points ahead, or steeply.
     fn turned(&self, seed: &[f64], grasp: &Grasp) -> Option<Vec<f64>> {
         let heading_of = |pose: &Isometry3<f64>| {
             let forward = pose.rotation * Vector3::x();
@@ -288,8 +366,10 @@ impl<'a> Planner<'a> {
         }
         let mut positions = seed.to_vec();
         let [x, y, heading] = self.base;
-        positions[heading] = self.start[heading] + wrapped(positions[heading] + turn - self.start[heading]);
-        let miss = grasp.pose.translation.vector - self.kinematics.grasp(&positions).translation.vector;
+        positions[heading] =
+            self.start[heading] + wrapped(positions[heading] + turn - self.start[heading]);
+        let miss =
+            grasp.pose.translation.vector - self.kinematics.grasp(&positions).translation.vector;
         positions[x] += miss.x;
         positions[y] += miss.y;
         Some(positions).filter(|turned| self.points_along(turned, grasp))
@@ -302,7 +382,8 @@ impl<'a> Planner<'a> {
         0.4 * way + 0.12 * (positions[heading] - self.start[heading]).abs()
     }
 
-    /// The posture with the base placed so that the hand is over the object with the grasp's heading.
+    /// The posture with the base placed so that the hand is over the object with the grasp's
+    /// heading.
     fn seed(&self, grasp: &Grasp, posture: &[f64]) -> Vec<f64> {
         let mut positions = self.start.clone();
         for (idx, value) in self.layout.arm.iter().zip(posture) {
@@ -311,7 +392,8 @@ impl<'a> Planner<'a> {
         self.layout.gripper.set(&mut positions, grasp.opening_m);
         let [x, y, heading] = self.base;
         positions[heading] += wrapped(grasp.heading - positions[heading]);
-        let miss = grasp.pose.translation.vector - self.kinematics.grasp(&positions).translation.vector;
+        let miss =
+            grasp.pose.translation.vector - self.kinematics.grasp(&positions).translation.vector;
         positions[x] += miss.x;
         positions[y] += miss.y;
         positions
@@ -326,7 +408,14 @@ impl<'a> Planner<'a> {
             mobility[idx] = base_mobility;
         }
         mobility[self.base[2]] *= self.heading_mobility;
-        ik::solve(self.kinematics, seed, &ik::Reach { target: *target, mobility })
+        ik::solve(
+            self.kinematics,
+            seed,
+            &ik::Reach {
+                target: *target,
+                mobility,
+            },
+        )
     }
 
     /// Distance back from the object at which the hand is in front of all furniture. Unit: metres.
@@ -334,7 +423,11 @@ impl<'a> Planner<'a> {
         let mut way = APPROACH_M;
         while way < LONGEST_WAY_M {
             let point = Point3::from(from + back * way);
-            if self.furniture.iter().all(|block| block.beside(&point) >= OFF_EDGE_M) {
+            if self
+                .furniture
+                .iter()
+                .all(|block| block.beside(&point) >= OFF_EDGE_M)
+            {
                 return Some(way);
             }
             way += 0.02;
@@ -359,22 +452,33 @@ impl<'a> Planner<'a> {
     /// A posture and the path straight up from it, with the head out of the arm's way.
     ///
     /// # Errors
-    /// The hindrance if the arm can't follow, or would collide with the robot in every posture of the head.
+    /// The hindrance if the arm can't follow, or would collide with the robot in every posture of
+    /// the head.
     fn lifted(&self, at_thing: Vec<f64>) -> Result<(Vec<f64>, Vec<Vec<f64>>), Hindrance> {
         let mut hindrance = Hindrance::NoLift;
         let touching = |posture: &Vec<f64>| self.itself.touching(&self.kinematics.links(posture));
         for height in LIFTS_M {
-            let Some(lift) = self.vertically(&at_thing, height) else { continue };
+            let Some(lift) = self.vertically(&at_thing, height) else {
+                continue;
+            };
             hindrance = Hindrance::Itself { links: None };
             for head in &self.heads {
                 let at_thing = self.with_head(&at_thing, head);
-                let lift: Vec<Vec<f64>> = lift.iter().map(|posture| self.with_head(posture, head)).collect();
+                let lift: Vec<Vec<f64>> = lift
+                    .iter()
+                    .map(|posture| self.with_head(posture, head))
+                    .collect();
                 let postures = std::iter::once(&at_thing).chain(&lift).enumerate();
-                let touched = postures.into_iter().find_map(|(step, posture)| Some((step, touching(posture)?)));
-                let Some((step, links)) = touched else { return Ok((at_thing, lift)) };
+                let touched = postures
+                    .into_iter()
+                    .find_map(|(step, posture)| Some((step, touching(posture)?)));
+                let Some((step, links)) = touched else {
+                    return Ok((at_thing, lift));
+                };
                 hindrance = Hindrance::Itself { links: Some(links) };
                 if !self.is_head[links.0] && !self.is_head[links.1] {
-                    // No other posture of the head helps, and no other lift if the links touch before it.
+                    // No other posture of the head helps, and no other lift if the links touch
+                    // before it.
                     if step == 0 {
                         return Err(hindrance);
                     }
@@ -387,7 +491,11 @@ impl<'a> Planner<'a> {
 
     fn with_head(&self, posture: &[f64], head: &[f64]) -> Vec<f64> {
         let mut posture = posture.to_vec();
-        self.layout.head.iter().zip(head).for_each(|(joint, position)| posture[*joint] = *position);
+        self.layout
+            .head
+            .iter()
+            .zip(head)
+            .for_each(|(joint, position)| posture[*joint] = *position);
         posture
     }
 
@@ -404,7 +512,8 @@ impl<'a> Planner<'a> {
         Some(path)
     }
 
-    /// The base's path to its pose in `to`, with the arm's initial posture. The head is turned as in `to`.
+    /// The base's path to its pose in `to`, with the arm's initial posture. The head is turned as
+    /// in `to`.
     fn drive(&self, to: &[f64]) -> Option<Vec<Vec<f64>>> {
         let head: Vec<f64> = self.layout.head.iter().map(|joint| to[*joint]).collect();
         let turned = self.with_head(&self.start, &head);
@@ -412,7 +521,10 @@ impl<'a> Planner<'a> {
             return None;
         }
         let [x, y, heading] = self.base;
-        let route = self.ground.route(Point2::new(self.start[x], self.start[y]), Point2::new(to[x], to[y]))?;
+        let route = self.ground.route(
+            Point2::new(self.start[x], self.start[y]),
+            Point2::new(to[x], to[y]),
+        )?;
         let n_legs = route.len() as f64;
         let legs = route.iter().enumerate().map(|(idx, point)| {
             let share = (idx + 1) as f64 / n_legs;
@@ -426,8 +538,8 @@ impl<'a> Planner<'a> {
     }
 }
 
-/// Positions of the head's joints that plans try: the present ones, then each joint in the middle and at both ends of its
-/// range.
+/// Positions of the head's joints that plans try: the present ones, then each joint in the middle
+/// and at both ends of its range.
 fn heads(kinematics: &Kinematics, layout: &Layout, start: &[f64]) -> Vec<Vec<f64>> {
     let mut grid: Vec<Vec<f64>> = vec![Vec::new()];
     for idx in &layout.head {
@@ -435,14 +547,22 @@ fn heads(kinematics: &Kinematics, layout: &Layout, start: &[f64]) -> Vec<Vec<f64
         let lower = joint.lower.max(-QUARTER).min(joint.upper);
         let upper = joint.upper.min(QUARTER).max(joint.lower);
         let positions = [0.0_f64.clamp(lower, upper), lower, upper];
-        grid = grid.iter().flat_map(|head| positions.map(|position| [head.as_slice(), &[position]].concat())).collect();
+        grid = grid
+            .iter()
+            .flat_map(|head| positions.map(|position| [head.as_slice(), &[position]].concat()))
+            .collect();
     }
     grid.insert(0, layout.head.iter().map(|joint| start[*joint]).collect());
     grid
 }
 
 /// Radius of the circle around the base that contains the whole robot. Unit: metres.
-fn radius(kinematics: &Kinematics, [x, y, _]: [usize; 3], positions: &[f64], points: &[(usize, Point3<f64>)]) -> f64 {
+fn radius(
+    kinematics: &Kinematics,
+    [x, y, _]: [usize; 3],
+    positions: &[f64],
+    points: &[(usize, Point3<f64>)],
+) -> f64 {
     let links = kinematics.links(positions);
     let far = |(link, point): &(usize, Point3<f64>)| {
         let point = links[*link] * point;

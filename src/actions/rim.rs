@@ -1,4 +1,5 @@
-//! Grasps of open vessels at their rim: one finger inside, one outside, for those that are too wide for the hand.
+//! Grasps of open vessels at their rim: one finger inside, one outside, for those that are too wide
+//! for the hand.
 
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, PI, TAU};
 
@@ -19,8 +20,13 @@ const FINGER_M: f64 = 0.015;
 /// Number of headings of the base around the vessel.
 const N_HEADINGS: u32 = 24;
 /// Places on the rim relative to the one nearest to the base, each with its penalty. Unit: radians.
-const PLACES: [(f64, f64); 5] =
-    [(0.0, 0.0), (FRAC_PI_4, 0.02), (-FRAC_PI_4, 0.02), (FRAC_PI_2, 0.05), (-FRAC_PI_2, 0.05)];
+const PLACES: [(f64, f64); 5] = [
+    (0.0, 0.0),
+    (FRAC_PI_4, 0.02),
+    (-FRAC_PI_4, 0.02),
+    (FRAC_PI_2, 0.05),
+    (-FRAC_PI_2, 0.05),
+];
 
 /// How a hand with this opening fits on a rim.
 struct Fit {
@@ -38,20 +44,34 @@ fn fit(rim: &Rim, max_opening_m: f64) -> Option<Fit> {
     // A slanted wall touches the inner finger at its tip, and the outer one at the upper end.
     let (inside, outside) = (inner_at(tip_m).min(inner_at(rim.top_m)), rim.radius_m);
     let middle_m = f64::midpoint(inside, outside);
-    // Each finger is half of the opening away from the middle: the inner one must not meet the wall opposite.
+    // Each finger is half of the opening away from the middle: the inner one must not meet the wall
+    // opposite.
     let opening_m = max_opening_m.min(2.0 * (middle_m + inside - FINGER_M - ROOM_M));
     let fits = tip_m <= rim.top_m - REACH_M / 2.0 && opening_m >= outside - inside + 2.0 * ROOM_M;
-    fits.then_some(Fit { tip_m, middle_m, opening_m })
+    fits.then_some(Fit {
+        tip_m,
+        middle_m,
+        opening_m,
+    })
 }
 
-/// Returns the gap between the fingers before they take a rim. Returns `None` if they can't. Unit: metres.
+/// Returns the gap between the fingers before they take a rim. Returns `None` if they can't. Unit:
+/// metres.
 pub(crate) fn opening_m(rim: &Rim, max_opening_m: f64) -> Option<f64> {
     fit(rim, max_opening_m).map(|fit| fit.opening_m)
 }
 
-/// All grasps of a vessel at its rim, with the hand pointing straight down. Empty if a finger does not fit inside.
+/// All grasps of a vessel at its rim, with the hand pointing straight down. Empty if a finger does
+/// not fit inside.
 pub(crate) fn grasps(thing: &Sighting, rim: &Rim, max_opening_m: f64) -> Vec<Grasp> {
-    let Some(Fit { tip_m, middle_m, opening_m }) = fit(rim, max_opening_m) else { return Vec::new() };
+    let Some(Fit {
+        tip_m,
+        middle_m,
+        opening_m,
+    }) = fit(rim, max_opening_m)
+    else {
+        return Vec::new();
+    };
     let headings = (0..N_HEADINGS).map(|idx| TAU * f64::from(idx) / f64::from(N_HEADINGS));
     let at = |heading: f64| {
         PLACES.into_iter().flat_map(move |(aside, penalty)| {
@@ -61,7 +81,13 @@ pub(crate) fn grasps(thing: &Sighting, rim: &Rim, max_opening_m: f64) -> Vec<Gra
                 let mut pose = hand(thing, tip_m + REACH_M, place + quarter, FRAC_PI_2);
                 pose.translation.vector.x += middle_m * libm::cos(place);
                 pose.translation.vector.y += middle_m * libm::sin(place);
-                Grasp { approach: Approach::Top, pose, heading, opening_m, penalty }
+                Grasp {
+                    approach: Approach::Top,
+                    pose,
+                    heading,
+                    opening_m,
+                    penalty,
+                }
             })
         })
     };
@@ -74,7 +100,13 @@ mod tests {
     use actcheck_data::Pose;
     use nalgebra::{Point3, Vector3};
 
-    const BOWL: Rim = Rim { radius_m: 0.08, top_m: 0.065, slope: 35.0 / 65.0, wall_m: 0.005, floor_m: 0.006 };
+    const BOWL: Rim = Rim {
+        radius_m: 0.08,
+        top_m: 0.065,
+        slope: 35.0 / 65.0,
+        wall_m: 0.005,
+        floor_m: 0.006,
+    };
 
     #[test]
     fn one_finger_is_inside_the_wall_and_one_outside() {
@@ -88,10 +120,16 @@ mod tests {
         let all = grasps(&thing, &BOWL, 0.135);
         assert_eq!(all.len(), 240);
         for grasp in all {
-            assert!((grasp.pose * Vector3::x()).z < -0.999, "the hand points down");
+            assert!(
+                (grasp.pose * Vector3::x()).z < -0.999,
+                "the hand points down"
+            );
             let radii = [-0.5, 0.5].map(|side| {
                 let tip = grasp.pose * Point3::new(REACH_M, side * grasp.opening_m, 0.0);
-                assert!((tip.z - 0.415).abs() < 1e-9, "the tips are above the floor inside");
+                assert!(
+                    (tip.z - 0.415).abs() < 1e-9,
+                    "the tips are above the floor inside"
+                );
                 (tip.xy().coords - nalgebra::Vector2::new(1.0, 0.5)).norm()
             });
             let [inner, outer] = [radii[0].min(radii[1]), radii[0].max(radii[1])];
@@ -103,10 +141,28 @@ mod tests {
     #[test]
     fn plates_and_narrow_vessels_are_not_taken_at_the_rim() {
         assert!(opening_m(&BOWL, 0.08).is_some());
-        assert!(opening_m(&BOWL, 0.04).is_none(), "the hand opens too little");
-        let plate = Rim { radius_m: 0.105, top_m: 0.022, slope: 25.0 / 18.0, wall_m: 0.005, floor_m: 0.008 };
-        assert!(opening_m(&plate, 0.135).is_none(), "the fingers would slip off its slope");
-        let bottle = Rim { radius_m: 0.015, top_m: 0.2, slope: 0.0, wall_m: 0.003, floor_m: 0.005 };
+        assert!(
+            opening_m(&BOWL, 0.04).is_none(),
+            "the hand opens too little"
+        );
+        let plate = Rim {
+            radius_m: 0.105,
+            top_m: 0.022,
+            slope: 25.0 / 18.0,
+            wall_m: 0.005,
+            floor_m: 0.008,
+        };
+        assert!(
+            opening_m(&plate, 0.135).is_none(),
+            "the fingers would slip off its slope"
+        );
+        let bottle = Rim {
+            radius_m: 0.015,
+            top_m: 0.2,
+            slope: 0.0,
+            wall_m: 0.003,
+            floor_m: 0.005,
+        };
         assert!(opening_m(&bottle, 0.135).is_none(), "no finger fits inside");
     }
 }

@@ -25,7 +25,8 @@ pub struct Block {
     height: f64,
 }
 
-/// Height below a piece of furniture's top from which a robot counts as mounted on it. Unit: metres.
+/// Height below a piece of furniture's top from which a robot counts as mounted on it. Unit:
+/// metres.
 const ON_TOP_M: f64 = 0.05;
 
 /// The vertical cylinder around an object.
@@ -52,18 +53,24 @@ impl Block {
         }
     }
 
-    /// The boxes of all perceived furniture, except of a piece around the robot: it is a room, whose box says nothing
-    /// about its walls. `base` is the origin of the robot's base.
+    /// The boxes of all perceived furniture, except of a piece around the robot: it is a room,
+    /// whose box says nothing about its walls. `base` is the origin of the robot's base.
     pub fn around(base: &Point3<f64>, others: &[Sighting]) -> Vec<Self> {
         let furniture = others.iter().filter(|seen| seen.furniture).map(Self::new);
-        furniture.filter(|block| block.beside(base) >= 0.0 || base.z > block.height - ON_TOP_M).collect()
+        furniture
+            .filter(|block| block.beside(base) >= 0.0 || base.z > block.height - ON_TOP_M)
+            .collect()
     }
 
     /// Horizontal distance to the outline, negative inside. Unit: metres.
     pub fn beside(&self, point: &Point3<f64>) -> f64 {
         let local = self.from_world * point;
         let (dx, dy) = (local.x.abs() - self.half[0], local.y.abs() - self.half[1]);
-        if dx > 0.0 && dy > 0.0 { length(dx, dy) } else { dx.max(dy) }
+        if dx > 0.0 && dy > 0.0 {
+            length(dx, dy)
+        } else {
+            dx.max(dy)
+        }
     }
 
     /// Distance to the box (a lower bound near its upper edges), negative inside. Unit: metres.
@@ -74,7 +81,8 @@ impl Block {
     /// Points beyond its corners: straight lines between neighbouring points keep the distance.
     fn corners(&self, out: f64) -> [Point2<f64>; 4] {
         let (x, y) = (self.half[0] + out, self.half[1] + out);
-        [(x, y), (x, -y), (-x, y), (-x, -y)].map(|(x, y)| (self.from_world.inverse() * Point3::new(x, y, 0.0)).xy())
+        [(x, y), (x, -y), (-x, y), (-x, -y)]
+            .map(|(x, y)| (self.from_world.inverse() * Point3::new(x, y, 0.0)).xy())
     }
 }
 
@@ -85,7 +93,13 @@ impl Pillar {
         let [width, depth, height] = seen.size_m;
         // Between the inscribed and the circumscribed circle: corners seldom point at the hand.
         let radius = (width.max(depth) + length(width, depth)) / 4.0;
-        Self { id: seen.id.clone(), centre: Point2::new(x, y), radius, foot, top: foot + height }
+        Self {
+            id: seen.id.clone(),
+            centre: Point2::new(x, y),
+            radius,
+            foot,
+            top: foot + height,
+        }
     }
 
     /// Distance to the cylinder (a lower bound near its edges), negative inside. Unit: metres.
@@ -112,17 +126,28 @@ pub struct Ground {
 }
 
 impl Ground {
-    /// The floor with furniture and objects on it, for a base at `from`. The base may come as close to obstacles as it
-    /// is now, because its load does not extend all around it.
+    /// The floor with furniture and objects on it, for a base at `from`. The base may come as close
+    /// to obstacles as it is now, because its load does not extend all around it.
     pub fn new(blocks: &[Block], pillars: &[Pillar], radius: f64, from: &Point2<f64>) -> Self {
-        let pillars: Vec<Pillar> = pillars.iter().filter(|pillar| pillar.foot < ON_FLOOR_M).cloned().collect();
-        let mut ground = Self { corners: Vec::new(), blocks: blocks.to_vec(), pillars, radius };
+        let pillars: Vec<Pillar> = pillars
+            .iter()
+            .filter(|pillar| pillar.foot < ON_FLOOR_M)
+            .cloned()
+            .collect();
+        let mut ground = Self {
+            corners: Vec::new(),
+            blocks: blocks.to_vec(),
+            pillars,
+            radius,
+        };
         let lack = (-ground.room(from)).clamp(0.0, radius);
         // Keeps a rounding error from shutting the base in.
         ground.radius -= if lack > 0.0 { lack + GRAIN_M } else { 0.0 };
         let out = ground.radius + ROOM_M + CORNER_M;
         let around_blocks = ground.blocks.iter().flat_map(|block| block.corners(out));
-        ground.corners = around_blocks.chain(ground.pillars.iter().flat_map(|pillar| pillar.corners(out))).collect();
+        ground.corners = around_blocks
+            .chain(ground.pillars.iter().flat_map(|pillar| pillar.corners(out)))
+            .collect();
         ground.corners.retain({
             let ground = ground.clone();
             move |corner| ground.room(corner) >= 0.0
@@ -130,7 +155,8 @@ impl Ground {
         ground
     }
 
-    /// The shortest path over at most two corners, without its first point. Returns `None` if no path is free.
+    /// The shortest path over at most two corners, without its first point. Returns `None` if no
+    /// path is free.
     pub fn route(&self, from: Point2<f64>, to: Point2<f64>) -> Option<Vec<Point2<f64>>> {
         if self.free(&from, &to) {
             return Some(vec![to]);
@@ -138,13 +164,24 @@ impl Ground {
         let mut best: Option<(f64, Vec<Point2<f64>>)> = None;
         let mut offer = |way: Vec<Point2<f64>>| {
             let ends = std::iter::once(&from).chain(&way);
-            let total: f64 = ends.zip(&way).map(|(a, b)| length(b.x - a.x, b.y - a.y)).sum();
+            let total: f64 = ends
+                .zip(&way)
+                .map(|(a, b)| length(b.x - a.x, b.y - a.y))
+                .sum();
             if best.as_ref().is_none_or(|(shortest, _)| total < *shortest) {
                 best = Some((total, way));
             }
         };
-        let last: Vec<&Point2<f64>> = self.corners.iter().filter(|corner| self.free(corner, &to)).collect();
-        for first in self.corners.iter().filter(|corner| self.free(&from, corner)) {
+        let last: Vec<&Point2<f64>> = self
+            .corners
+            .iter()
+            .filter(|corner| self.free(corner, &to))
+            .collect();
+        for first in self
+            .corners
+            .iter()
+            .filter(|corner| self.free(&from, corner))
+        {
             for second in &last {
                 if first == *second {
                     offer(vec![*first, to]);
@@ -158,7 +195,11 @@ impl Ground {
 
     fn free(&self, from: &Point2<f64>, to: &Point2<f64>) -> bool {
         let way = to - from;
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a few metres of centimetres")]
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "a few metres of centimetres"
+        )]
         let n_steps = (length(way.x, way.y) / CHECK_M).ceil().clamp(1.0, 1e3) as usize;
         (0..=n_steps).all(|step| self.room(&(from + way * (step as f64 / n_steps as f64))) >= 0.0)
     }
@@ -167,8 +208,10 @@ impl Ground {
     fn room(&self, at: &Point2<f64>) -> f64 {
         let point = Point3::new(at.x, at.y, 0.0);
         let blocks = self.blocks.iter().map(|block| block.beside(&point));
-        let pillars =
-            self.pillars.iter().map(|pillar| length(at.x - pillar.centre.x, at.y - pillar.centre.y) - pillar.radius);
+        let pillars = self
+            .pillars
+            .iter()
+            .map(|pillar| length(at.x - pillar.centre.x, at.y - pillar.centre.y) - pillar.radius);
         blocks.chain(pillars).fold(f64::INFINITY, f64::min) - self.radius - ROOM_M
     }
 }
@@ -190,7 +233,13 @@ mod tests {
 
     fn table() -> Block {
         let pose = Pose::IDENTITY;
-        Block::new(&Sighting { id: "t".to_owned(), pose, size_m: [0.6, 0.6, 0.7], furniture: true, angular: false })
+        Block::new(&Sighting {
+            id: "t".to_owned(),
+            pose,
+            size_m: [0.6, 0.6, 0.7],
+            furniture: true,
+            angular: false,
+        })
     }
 
     #[test]
@@ -205,17 +254,27 @@ mod tests {
         let others = [seen(8.0, 2.5), seen(0.6, 0.7)];
         let blocks = |base| Block::around(&Point3::from(base), &others).len();
         assert_eq!([[1.0, 0.0, 0.0], [5.0, 0.0, 0.0]].map(blocks), [1, 2]);
-        assert_eq!(Block::around(&Point3::new(0.1, 0.0, 0.7), &others[1..]).len(), 1);
+        assert_eq!(
+            Block::around(&Point3::new(0.1, 0.0, 0.7), &others[1..]).len(),
+            1
+        );
     }
 
     #[test]
     fn a_route_around_a_table_passes_its_corners() {
         let ground = Ground::new(&[table()], &[], 0.25, &Point2::new(-1.0, 0.0));
-        let straight = ground.route(Point2::new(-1.0, 0.0), Point2::new(-1.0, 1.0)).expect("nothing is in the way");
+        let straight = ground
+            .route(Point2::new(-1.0, 0.0), Point2::new(-1.0, 1.0))
+            .expect("nothing is in the way");
         assert_eq!(straight.len(), 1);
-        let around = ground.route(Point2::new(-1.0, 0.0), Point2::new(1.0, 0.0)).expect("a detour exists");
+        let around = ground
+            .route(Point2::new(-1.0, 0.0), Point2::new(1.0, 0.0))
+            .expect("a detour exists");
         assert_eq!(around.len(), 3);
-        assert_eq!(ground.route(Point2::new(-1.0, 0.0), Point2::new(0.0, 0.0)), None);
+        assert_eq!(
+            ground.route(Point2::new(-1.0, 0.0), Point2::new(0.0, 0.0)),
+            None
+        );
     }
 
     #[test]

@@ -1,9 +1,11 @@
-//! Deliberate faults between a skill and its robot, and between the robot and the world, to test whether properties
-//! notice them.
+//! Deliberate faults between a skill and its robot, and between the robot and the world, to test
+//! whether properties notice them.
 //!
 //! The skill is unmodified and the recorder sees only physics: neither is informed of the fault.
 
-use crate::whereabouts::{before, body, box_distance, farther, holds, is_above, mistaken, others_by_distance, outside};
+use crate::whereabouts::{
+    before, body, box_distance, farther, holds, is_above, mistaken, others_by_distance, outside,
+};
 use crate::{ActionCall, forced, forced_hand, misperception};
 use actcheck_data::{ActionReport, KnownKind, Perceived, RobotProfile, Snapshot};
 use actcheck_world::{Command, Observation, Perturbation, Sighting, World};
@@ -11,11 +13,12 @@ use actcheck_world::{Command, Observation, Perturbation, Sighting, World};
 /// Designators of the object that the action handles and of the surface it is placed on.
 const OBJECT: &str = "pickObject";
 const PLACE: &str = "placeSurface";
-/// Distance between the hand and the object's bounding box below which the hand is reaching for it. Unit: metres. Every
-/// hand comes this close before it closes, and a neighbour that falls then has already been seen upright.
+/// Distance between the hand and the object's bounding box below which the hand is reaching for it.
+/// Unit: metres. Every hand comes this close before it closes, and a neighbour that falls then has
+/// already been seen upright.
 const REACHING_M: f64 = 0.1;
-/// Height above its place from which an object touched only by the hand counts as carried. Unit: metres. More than half
-/// of the lowest lift: an object dropped there ends far from the hand.
+/// Height above its place from which an object touched only by the hand counts as carried. Unit:
+/// metres. More than half of the lowest lift: an object dropped there ends far from the hand.
 const CARRIED_M: f64 = 0.05;
 /// A base that has moved this far is driving. Unit: metres.
 const DRIVEN_M: f64 = 0.5;
@@ -42,11 +45,11 @@ pub enum Defect {
     Idle,
     /// It mistakes the nearest other object that fits into its hand for the named one.
     WrongObject,
-    /// Its joint and force sensors are frozen at their values at the start of the action; its camera repeats the first
-    /// sighting of each object.
+    /// Its joint and force sensors are frozen at their values at the start of the action; its
+    /// camera repeats the first sighting of each object.
     FrozenSensors,
-    /// It exchanges its percepts of the named object and of another one: the nearest, or the nearest of another kind if
-    /// the camera perceives them.
+    /// It exchanges its percepts of the named object and of another one: the nearest, or the
+    /// nearest of another kind if the camera perceives them.
     SwappedPercepts,
     /// The camera perceives an object, the named one if there is one, as an object of another kind.
     MistakenKind,
@@ -113,7 +116,10 @@ pub enum Accident {
 impl Sabotage {
     /// Whether it needs an object in the hand before the action.
     pub fn needs_load(&self) -> bool {
-        matches!(self.world, Some((Moment::DrivingLoaded, _) | (_, Accident::PushesWithHeld)))
+        matches!(
+            self.world,
+            Some((Moment::DrivingLoaded, _) | (_, Accident::PushesWithHeld))
+        )
     }
 
     /// Whether it can happen to a robot: one without a base can't be pushed against furniture.
@@ -176,7 +182,8 @@ impl Saboteur {
         }
     }
 
-    /// Whether every part of the sabotage took effect: a hand that never held an object can't drop it.
+    /// Whether every part of the sabotage took effect: a hand that never held an object can't drop
+    /// it.
     pub fn came_about(&self) -> bool {
         (self.sabotage.robot.is_none() || self.defective)
             && (self.sabotage.world.is_none() || self.happened)
@@ -185,19 +192,28 @@ impl Saboteur {
 
     /// Begins an action and returns the call as the robot understands it.
     pub(super) fn begin(&mut self, call: &ActionCall, world: &mut World) -> ActionCall {
-        self.armed = self.sabotage.actions.is_empty() || self.sabotage.actions.contains(&call.action.as_str());
+        self.armed = self.sabotage.actions.is_empty()
+            || self.sabotage.actions.contains(&call.action.as_str());
         self.object = call.value(OBJECT).map(str::to_owned);
         self.place = call.value(PLACE).map(str::to_owned);
-        if let (Some((Moment::Starting, accident)), true, false) = (self.sabotage.world, self.armed, self.happened) {
+        if let (Some((Moment::Starting, accident)), true, false) =
+            (self.sabotage.world, self.armed, self.happened)
+        {
             self.happened = self.happen(accident, world);
         }
         let start = world.snapshot();
-        self.kind = self.object.as_deref().and_then(|object| world.kind_of(object));
+        self.kind = self
+            .object
+            .as_deref()
+            .and_then(|object| world.kind_of(object));
         (self.frozen, self.swapped, self.runaway, self.stuck) = (None, None, None, None);
         let mut understood = call.clone();
         match self.sabotage.robot.filter(|_| self.armed) {
             Some(Defect::WrongObject) => {
-                let other = self.object.as_deref().and_then(|object| mistaken(&start, object, world));
+                let other = self
+                    .object
+                    .as_deref()
+                    .and_then(|object| mistaken(&start, object, world));
                 if let Some(other) = other {
                     understood.parameters.insert(OBJECT.to_owned(), vec![other]);
                     self.defective = true;
@@ -211,7 +227,9 @@ impl Saboteur {
             Some(Defect::Idle) => self.defective = true,
             Some(Defect::SwappedPercepts) => {
                 let object = self.object.as_deref().unwrap_or_default();
-                self.swapped = others_by_distance(&start, object).first().map(|other| other.id.clone());
+                self.swapped = others_by_distance(&start, object)
+                    .first()
+                    .map(|other| other.id.clone());
             }
             Some(Defect::MistakenKind | Defect::FalseHeight) | None => {}
         }
@@ -226,7 +244,8 @@ impl Saboteur {
 
     /// Advances one control tick.
     pub(super) fn step(&mut self, world: &mut World, command: &Command) {
-        if let (Some((moment, accident)), true, false) = (self.sabotage.world, self.armed, self.happened)
+        if let (Some((moment, accident)), true, false) =
+            (self.sabotage.world, self.armed, self.happened)
             && self.is_time_for(moment, world)
         {
             self.happened = self.happen(accident, world);
@@ -241,7 +260,9 @@ impl Saboteur {
 
     /// The object that the robot sees in place of the requested one.
     pub(super) fn seen_instead(&mut self, id: &str) -> String {
-        let (Some(object), Some(other)) = (&self.object, &self.swapped) else { return id.to_owned() };
+        let (Some(object), Some(other)) = (&self.object, &self.swapped) else {
+            return id.to_owned();
+        };
         if id == object {
             self.defective = true;
             other.clone()
@@ -257,7 +278,9 @@ impl Saboteur {
         let category = self.kind.as_ref().map(|kind| kind.category.as_str());
         let changed = match self.sabotage.robot.filter(|_| self.armed) {
             Some(Defect::SwappedPercepts) => misperception::swap(&mut honest.things, category),
-            Some(Defect::MistakenKind) => misperception::mistake(&mut honest.things, category, kinds),
+            Some(Defect::MistakenKind) => {
+                misperception::mistake(&mut honest.things, category, kinds)
+            }
             Some(Defect::FalseHeight) => misperception::raise(&mut honest.things),
             _ => false,
         };
@@ -269,7 +292,10 @@ impl Saboteur {
     pub(super) fn observation(&self, honest: Observation) -> Observation {
         match &self.frozen {
             // Time is not measured by a sensor, so it is not frozen.
-            Some(frozen) => Observation { time_secs: honest.time_secs, ..frozen.clone() },
+            Some(frozen) => Observation {
+                time_secs: honest.time_secs,
+                ..frozen.clone()
+            },
             None => honest,
         }
     }
@@ -293,32 +319,45 @@ impl Saboteur {
         match self.sabotage.report {
             Some(succeeded) if self.armed && succeeded != honest.succeeded => {
                 self.lied = true;
-                ActionReport { succeeded, message: if succeeded { "done" } else { "could not do it" }.to_owned() }
+                ActionReport {
+                    succeeded,
+                    message: if succeeded { "done" } else { "could not do it" }.to_owned(),
+                }
             }
             _ => honest,
         }
     }
 
     fn is_time_for(&self, moment: Moment, world: &World) -> bool {
-        let Some(start) = &self.start else { return false };
+        let Some(start) = &self.start else {
+            return false;
+        };
         let now = world.snapshot();
         if matches!(moment, Moment::Driving | Moment::DrivingLoaded) {
             let ([x0, y0, _], [x, y, _]) = (start.robot.base_true, now.robot.base_true);
             let is_loaded = moment == Moment::Driving || forced_hand::in_hand(&now).is_some();
             return is_loaded && libm::hypot(x - x0, y - y0) > DRIVEN_M;
         }
-        let Some(object) = &self.object else { return false };
-        let (Some(was), Some(is)) = (body(start, object), body(&now, object)) else { return false };
+        let Some(object) = &self.object else {
+            return false;
+        };
+        let (Some(was), Some(is)) = (body(start, object), body(&now, object)) else {
+            return false;
+        };
         let hangs = holds(&now, object) && is.touches.iter().all(|other| other == "robot");
         match moment {
             Moment::Reaching => box_distance(is, now.robot.gripper.position) < REACHING_M,
-            Moment::Grasping => holds(&now, object) && is.pose.position[2] - was.pose.position[2] < CARRIED_M,
+            Moment::Grasping => {
+                holds(&now, object) && is.pose.position[2] - was.pose.position[2] < CARRIED_M
+            }
             Moment::Carrying => hangs && is.pose.position[2] - was.pose.position[2] > CARRIED_M,
             Moment::Lowering => {
                 let place = self.place.as_deref().and_then(|place| body(&now, place));
                 hangs && place.is_some_and(|place| is_above(is, place))
             }
-            Moment::LetGo => holds(start, object) && !is.touches.iter().any(|other| other == "robot"),
+            Moment::LetGo => {
+                holds(start, object) && !is.touches.iter().any(|other| other == "robot")
+            }
             Moment::Starting | Moment::Driving | Moment::DrivingLoaded => false,
         }
     }
@@ -337,13 +376,20 @@ impl Saboteur {
                 return there.is_some_and(|there| world.perturb(object, Perturbation::Pose(there)));
             }
             Accident::NeighbourFalls => {
-                let neighbour = others_by_distance(&now, object).first().map(|body| body.id.clone());
+                let neighbour = others_by_distance(&now, object)
+                    .first()
+                    .map(|body| body.id.clone());
                 return neighbour.is_some_and(|id| world.perturb(&id, Perturbation::Fall));
             }
             Accident::InTheWay => {
-                let thing = now.bodies.iter().find(|body| !body.fixed && body.id != object);
-                let there = thing.map(|thing| (thing.id.clone(), before(thing, now.robot.base_true)));
-                return there.is_some_and(|(id, there)| world.perturb(&id, Perturbation::Pose(there)));
+                let thing = now
+                    .bodies
+                    .iter()
+                    .find(|body| !body.fixed && body.id != object);
+                let there =
+                    thing.map(|thing| (thing.id.clone(), before(thing, now.robot.base_true)));
+                return there
+                    .is_some_and(|(id, there)| world.perturb(&id, Perturbation::Pose(there)));
             }
             Accident::CarriedOff => return world.kidnap(outside(world, now.robot.base_true)),
             Accident::PushedIntoFurniture => return forced::push_base(world),
@@ -369,18 +415,29 @@ mod tests {
     use super::*;
 
     fn idle(world: Option<(Moment, Accident)>, report: Option<bool>) -> Saboteur {
-        Saboteur::new(Sabotage { actions: &[], robot: None, world, report })
+        Saboteur::new(Sabotage {
+            actions: &[],
+            robot: None,
+            world,
+            report,
+        })
     }
 
     fn report(succeeded: bool) -> ActionReport {
-        ActionReport { succeeded, message: "done".to_owned() }
+        ActionReport {
+            succeeded,
+            message: "done".to_owned(),
+        }
     }
 
     #[test]
     fn only_a_report_against_the_actions_belief_is_a_lie() {
-        for (told, honest, lied) in
-            [(true, false, true), (true, true, false), (false, true, true), (false, false, false)]
-        {
+        for (told, honest, lied) in [
+            (true, false, true),
+            (true, true, false),
+            (false, true, true),
+            (false, false, false),
+        ] {
             let mut saboteur = idle(None, Some(told));
             saboteur.armed = true;
             assert_eq!(saboteur.report(report(honest)).succeeded, told);

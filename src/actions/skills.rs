@@ -13,8 +13,12 @@ use actcheck_data::ActionReport;
 pub(super) type Skill = fn(&ActionCall, &mut Operator<'_>) -> Result<ActionReport, Interrupt>;
 
 /// The skills by action name, sorted.
-const SKILLS: [(&str, Skill); 4] =
-    [("MoveTo", move_to), ("PerceivePlane", perceive_plane), ("Pick", pick), ("Place", place)];
+const SKILLS: [(&str, Skill); 4] = [
+    ("MoveTo", move_to),
+    ("PerceivePlane", perceive_plane),
+    ("Pick", pick),
+    ("Place", place),
+];
 
 /// An action that no reference skill performs.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -48,7 +52,9 @@ pub fn known_skill(action: &str) -> Result<(), UnknownSkill> {
 /// The reference skill that performs the action.
 pub(super) fn skill(action: &str) -> Result<Skill, UnknownSkill> {
     let found = SKILLS.iter().find(|(known, _)| *known == action);
-    found.map(|(_, skill)| *skill).ok_or_else(|| UnknownSkill { action: action.to_owned() })
+    found.map(|(_, skill)| *skill).ok_or_else(|| UnknownSkill {
+        action: action.to_owned(),
+    })
 }
 
 #[cfg(test)]
@@ -59,6 +65,9 @@ mod tests {
     fn a_mistyped_action_is_refused_with_help() {
         assert!(reference_skills().all(|action| known_skill(action).is_ok()));
         let refused = known_skill("Pikc").expect_err("no such skill");
-        assert_eq!(refused.diagnostic().help.as_deref(), Some("did you mean `Pick`?"));
+        assert_eq!(
+            refused.diagnostic().help.as_deref(),
+            Some("did you mean `Pick`?")
+        );
     }
 }

@@ -6,12 +6,15 @@ use crate::grasp::{Approach, Grasp, rolled};
 use crate::hindrance::{Hindrance, Nearest};
 use crate::motion::{self, ArmSpace, Room, Samples};
 use crate::operator::Operator;
-use crate::plan::{AMPLE_CLEAR_M, APPROACH_M, FURNITURE_CLEAR_M, LEAST_CLEAR_M, LIFTS_M, Plan, PlanRequest};
+use crate::plan::{
+    AMPLE_CLEAR_M, APPROACH_M, FURNITURE_CLEAR_M, LEAST_CLEAR_M, LIFTS_M, Plan, PlanRequest,
+};
 use crate::route::{Block, Pillar, wrapped};
 use crate::slant::{self, Hand};
 use actcheck_world::{JointKind, Kinematics, Layout, Sighting, ik};
 
-/// Samples allowed for one plan over all grasps: half a second's work together with the limit per grasp.
+/// Samples allowed for one plan over all grasps: half a second's work together with the limit per
+/// grasp.
 const MOST_SAMPLES: u32 = 3000;
 /// Samples allowed per grasp.
 const SAMPLES_A_GRASP: u32 = 500;
@@ -27,52 +30,80 @@ const ASIDE_COST: f64 = 0.15;
 const TURNED_COST: f64 = 0.03;
 /// Cost per metre of the arm's path.
 const WAY_COST: f64 = 0.02;
-/// A straight path is rejected if a joint moves further than this between two postures, because the arm flips over.
-/// Unit: radians or metres.
+/// A straight path is rejected if a joint moves further than this between two postures, because the
+/// arm flips over. Unit: radians or metres.
 const LARGEST_STEP: f64 = 0.6;
 /// Step length of a straight path. Unit: metres.
 const STEP_M: f64 = 0.03;
 /// An arm with fewer joints reaches only some orientations at each place.
 const FULL_ARM: usize = 6;
-/// How far such an arm may turn its hand on a straight path. Unit: radians. The sides of a held object then stay between
-/// the fingers.
+/// How far such an arm may turn its hand on a straight path. Unit: radians. The sides of a held
+/// object then stay between the fingers.
 const SMALL_TURN_RAD: f64 = 0.1;
 /// Largest turn: somewhat more than half the angle between two candidates. Unit: radians.
 const LARGEST_TURN_RAD: f64 = 0.2;
-/// Lift heights of an arm on the surface, which is short, and the length of its level approach. Unit: metres.
+/// Lift heights of an arm on the surface, which is short, and the length of its level approach.
+/// Unit: metres.
 const SHORT_LIFTS_M: [f64; 3] = [0.12, 0.09, 0.06];
 const SHORT_APPROACH_M: f64 = 0.08;
-/// How far a hand whose fingers would touch the object is moved across, in order of preference. Unit: metres.
+/// How far a hand whose fingers would touch the object is moved across, in order of preference.
+/// Unit: metres.
 const ASIDE_M: [f64; 5] = [0.0, 0.006, -0.006, 0.012, -0.012];
 /// Clearances at the object and on the way from it.
-const LEAST_ROOM: Room = Room { furniture_m: FURNITURE_CLEAR_M, things_m: LEAST_CLEAR_M };
+const LEAST_ROOM: Room = Room {
+    furniture_m: FURNITURE_CLEAR_M,
+    things_m: LEAST_CLEAR_M,
+};
 /// Distances to retreat with the object, in order of preference. Unit: metres.
 const RETREATS_M: [f64; 2] = [0.1, 0.05];
 
-/// Returns the best plan among all grasps; if there is none, among those with the hand turned over, then among hands at
-/// many slants.
+/// Returns the best plan among all grasps; if there is none, among those with the hand turned over,
+/// then among hands at many slants.
 ///
 /// # Errors
 /// If there is no plan, the reason as a sentence for the action's report.
-pub fn plan(operator: &mut Operator<'_>, wanted: PlanRequest<'_>, others: &[Sighting]) -> Result<Plan, String> {
+pub fn plan(
+    operator: &mut Operator<'_>,
+    wanted: PlanRequest<'_>,
+    others: &[Sighting],
+) -> Result<Plan, String> {
     let mut samples = match wanted.taken {
         Some(_) => Samples::new(operator.choose_samples(), MOST_SAMPLES),
         None => Samples::new(0.0, 0),
     };
     let furniture = Block::around(&operator.base().translation.vector.into(), others);
-    let mut things: Vec<Pillar> = wanted.taken.iter().map(|thing| Pillar::new(thing)).collect();
+    let mut things: Vec<Pillar> = wanted
+        .taken
+        .iter()
+        .map(|thing| Pillar::new(thing))
+        .collect();
     let n_taken = things.len();
-    things.extend(others.iter().filter(|seen| !seen.furniture).map(Pillar::new));
+    things.extend(
+        others
+            .iter()
+            .filter(|seen| !seen.furniture)
+            .map(Pillar::new),
+    );
     // An arm of few joints turns its hand, whose fingers may then come down on the object.
-    let taken = wanted.taken.filter(|_| operator.layout().arm.len() < FULL_ARM);
+    let taken = wanted
+        .taken
+        .filter(|_| operator.layout().arm.len() < FULL_ARM);
     let hand = taken.map(|thing| Hand::new(thing, operator));
     let mut arm = Arm::new(operator, &furniture, (&things, &things[n_taken..]));
     if let Some(thing) = wanted.taken {
         // The fingers close no further than to the object.
         let narrowest_m = thing.size_m[0].min(thing.size_m[1]);
-        arm.closing_m.extend(slant::closing_m(operator).into_iter().filter(|opening_m| *opening_m > narrowest_m));
+        arm.closing_m.extend(
+            slant::closing_m(operator)
+                .into_iter()
+                .filter(|opening_m| *opening_m > narrowest_m),
+        );
     }
-    let all = if wanted.all.is_empty() { wanted.grasps } else { wanted.all };
+    let all = if wanted.all.is_empty() {
+        wanted.grasps
+    } else {
+        wanted.all
+    };
     let mut nearest = Nearest::default();
     let mut next = |arm: &Arm<'_>, grasps: &[Grasp]| best(arm, grasps, &mut samples, &mut nearest);
     let Some(thing) = wanted.taken else {
@@ -82,7 +113,11 @@ pub fn plan(operator: &mut Operator<'_>, wanted: PlanRequest<'_>, others: &[Sigh
     let mut found = None;
     if let Some(hand) = &hand {
         arm.beside = Some((hand, thing));
-        found = first_plan(|grasps| next(&arm, grasps), all, || slant::ahead(thing, hand, operator));
+        found = first_plan(
+            |grasps| next(&arm, grasps),
+            all,
+            || slant::ahead(thing, hand, operator),
+        );
         arm.beside = None;
     }
     let slants = || slant::ahead(thing, &Hand::new(thing, operator), operator);
@@ -90,7 +125,8 @@ pub fn plan(operator: &mut Operator<'_>, wanted: PlanRequest<'_>, others: &[Sigh
     found.ok_or_else(|| nearest.reason(wanted.taken, &arm.meanwhile.surroundings()))
 }
 
-/// The first plan for these grasps, then for those with the hand turned over, then for hands at many slants.
+/// The first plan for these grasps, then for those with the hand turned over, then for hands at
+/// many slants.
 fn first_plan(
     mut plan: impl FnMut(&[Grasp]) -> Option<Plan>,
     all: &[Grasp],
@@ -103,8 +139,16 @@ fn first_plan(
 }
 
 /// The best plan among these grasps.
-fn best(arm: &Arm<'_>, all: &[Grasp], samples: &mut Samples, nearest: &mut Nearest) -> Option<Plan> {
-    let mut grasps: Vec<(f64, &Grasp)> = all.iter().map(|grasp| (arm.least_cost(grasp), grasp)).collect();
+fn best(
+    arm: &Arm<'_>,
+    all: &[Grasp],
+    samples: &mut Samples,
+    nearest: &mut Nearest,
+) -> Option<Plan> {
+    let mut grasps: Vec<(f64, &Grasp)> = all
+        .iter()
+        .map(|grasp| (arm.least_cost(grasp), grasp))
+        .collect();
     grasps.sort_by(|a, b| a.0.total_cmp(&b.0));
     let mut best: Option<Plan> = None;
     for (cost, grasp) in grasps {
@@ -148,11 +192,13 @@ struct Arm<'a> {
     beside: Option<(&'a Hand, &'a Sighting)>,
 }
 
-/// The length of an arm, from its first joint to its last. Poses beyond it need no search for joint positions.
+/// The length of an arm, from its first joint to its last. Poses beyond it need no search for joint
+/// positions.
 struct Span {
     /// The first joint. Frame: world.
     from: Vector3<f64>,
-    /// The last joint in the frame of the grasp, if the arm reaches any orientation of the hand; else the grasp itself.
+    /// The last joint in the frame of the grasp, if the arm reaches any orientation of the hand;
+    /// else the grasp itself.
     end: Point3<f64>,
     /// Greatest distance of the two. Unit: metres.
     length_m: f64,
@@ -164,17 +210,26 @@ impl Span {
         let grasp = kinematics.grasp(start);
         let at = |idx: &usize| links[idx + 1].translation.vector;
         let mut points: Vec<Vector3<f64>> = arm.iter().map(at).collect();
-        let last_turns = arm.last().is_some_and(|idx| kinematics.joints()[*idx].kind == JointKind::Revolute);
+        let last_turns = arm
+            .last()
+            .is_some_and(|idx| kinematics.joints()[*idx].kind == JointKind::Revolute);
         if arm.len() < FULL_ARM || !last_turns {
             points.push(grasp.translation.vector);
         }
         let joints = arm.iter().map(|idx| &kinematics.joints()[*idx]);
         let slides = joints.filter(|joint| joint.kind == JointKind::Prismatic);
         let slides_m: f64 = slides.map(|joint| joint.upper - joint.lower).sum();
-        let links_m: f64 = points.windows(2).map(|pair| (pair[1] - pair[0]).norm()).sum();
+        let links_m: f64 = points
+            .windows(2)
+            .map(|pair| (pair[1] - pair[0]).norm())
+            .sum();
         let end = points.last().copied().unwrap_or_default();
         let from = points.first().copied().unwrap_or_default();
-        Self { from, end: grasp.inverse() * Point3::from(end), length_m: links_m + slides_m + SPAN_MARGIN_M }
+        Self {
+            from,
+            end: grasp.inverse() * Point3::from(end),
+            length_m: links_m + slides_m + SPAN_MARGIN_M,
+        }
     }
 
     /// Whether no posture brings the hand to a pose.
@@ -184,14 +239,21 @@ impl Span {
 }
 
 impl<'a> Arm<'a> {
-    fn new(operator: &'a Operator<'_>, furniture: &'a [Block], (things, others): (&'a [Pillar], &'a [Pillar])) -> Self {
+    fn new(
+        operator: &'a Operator<'_>,
+        furniture: &'a [Block],
+        (things, others): (&'a [Pillar], &'a [Pillar]),
+    ) -> Self {
         let (kinematics, layout) = (operator.kinematics(), operator.layout());
         let start = operator.commanded().to_vec();
         let mut postures = operator.profile().postures.clone();
         postures.push(operator.profile().home.clone());
-        let space = |right: &[Vec<f64>]| ArmSpace::new(kinematics, layout, furniture, things, right);
+        let space =
+            |right: &[Vec<f64>]| ArmSpace::new(kinematics, layout, furniture, things, right);
         let mut opened = start.clone();
-        layout.gripper.set(&mut opened, operator.profile().max_opening_m);
+        layout
+            .gripper
+            .set(&mut opened, operator.profile().max_opening_m);
         let mut before = space(std::slice::from_ref(&start));
         if !before.room(&opened).1 {
             // Fingers that turn wide open come close to the wrist, wherever the arm is.
@@ -231,8 +293,8 @@ impl<'a> Arm<'a> {
         libm::atan2(place.y - root.y, place.x - root.x)
     }
 
-    /// Seeds for inverse kinematics: the profile's postures, turned towards the object if the axis of the arm's first
-    /// joint is vertical.
+    /// Seeds for inverse kinematics: the profile's postures, turned towards the object if the axis
+    /// of the arm's first joint is vertical.
     fn seeds(&self, grasp: &Grasp) -> Vec<Vec<f64>> {
         let place = grasp.pose.translation.vector;
         let seeds = self.postures.iter().map(|posture| {
@@ -241,10 +303,16 @@ impl<'a> Arm<'a> {
                 positions[*idx] = *value;
             }
             self.layout.gripper.set(&mut positions, grasp.opening_m);
-            if let Some(first) = self.layout.arm.first().filter(|first| self.stands_upright(**first)) {
+            if let Some(first) = self
+                .layout
+                .arm
+                .first()
+                .filter(|first| self.stands_upright(**first))
+            {
                 let hand = self.kinematics.grasp(&positions).translation.vector;
                 let joint = &self.kinematics.joints()[*first];
-                let turned = positions[*first] + wrapped(self.bearing(&place) - self.bearing(&hand));
+                let turned =
+                    positions[*first] + wrapped(self.bearing(&place) - self.bearing(&hand));
                 positions[*first] = turned.clamp(joint.lower, joint.upper);
             }
             positions
@@ -268,12 +336,17 @@ impl<'a> Arm<'a> {
         samples: &mut Samples,
     ) -> Result<Plan, Hindrance> {
         let (at_thing, turn) = self.at_thing(seed, grasp)?;
-        let lift = self.lifts_m.iter().find_map(|height| self.straight(&at_thing, &(Vector3::z() * *height)));
+        let lift = self
+            .lifts_m
+            .iter()
+            .find_map(|height| self.straight(&at_thing, &(Vector3::z() * *height)));
         let lift = lift.ok_or(Hindrance::NoLift)?;
         let heading = grasp.heading + turn;
         let back = -Vector3::new(libm::cos(heading), libm::sin(heading), 0.0);
         let mut approach = match grasp.approach {
-            Approach::Side => self.straight(&at_thing, &(back * self.approach_m)).ok_or(Hindrance::NoLift)?,
+            Approach::Side => self
+                .straight(&at_thing, &(back * self.approach_m))
+                .ok_or(Hindrance::NoLift)?,
             Approach::Top => lift.clone(),
         };
         approach.reverse();
@@ -290,9 +363,12 @@ impl<'a> Arm<'a> {
         for posture in legs {
             let (room, clear_of_itself) = self.meanwhile.room(&posture);
             if !clear_of_itself {
-                return Err(Hindrance::Itself { links: self.meanwhile.touching(&posture) });
+                return Err(Hindrance::Itself {
+                    links: self.meanwhile.touching(&posture),
+                });
             }
-            let lack_m = (LEAST_ROOM.furniture_m - room.furniture_m).max(LEAST_ROOM.things_m - room.things_m);
+            let lack_m = (LEAST_ROOM.furniture_m - room.furniture_m)
+                .max(LEAST_ROOM.things_m - room.things_m);
             if !room.holds(LEAST_ROOM) {
                 return Err(Hindrance::Blocked { posture, lack_m });
             }
@@ -303,20 +379,40 @@ impl<'a> Arm<'a> {
             return Err(Hindrance::Dearer);
         }
         let way = self.way(&near, samples).ok_or(Hindrance::NoPath)?;
-        let length: f64 =
-            std::iter::once(&self.start).chain(&way).zip(&way).map(|(from, to)| self.before.span(from, to)).sum();
+        let length: f64 = std::iter::once(&self.start)
+            .chain(&way)
+            .zip(&way)
+            .map(|(from, to)| self.before.span(from, to))
+            .sum();
         let cost = cost + length * WAY_COST;
         let lifted = lift.last().ok_or(Hindrance::NoLift)?;
         let retreat = self.retreat(lifted, &back);
         let (drive, reach) = (Vec::new(), Vec::new());
-        let plan = Plan { drive, reach, near: way, approach, lift, retreat, cost };
-        if cost < bound { Ok(plan) } else { Err(Hindrance::Dearer) }
+        let plan = Plan {
+            drive,
+            reach,
+            near: way,
+            approach,
+            lift,
+            retreat,
+            cost,
+        };
+        if cost < bound {
+            Ok(plan)
+        } else {
+            Err(Hindrance::Dearer)
+        }
     }
 
     /// The path on which the object is drawn back in this direction; empty if something blocks it.
     fn retreat(&self, lifted: &[f64], back: &Vector3<f64>) -> Vec<Vec<f64>> {
-        let is_free = |path: &Vec<Vec<f64>>| path.iter().all(|posture| self.meanwhile.is_free(posture, LEAST_ROOM));
-        let mut ways = RETREATS_M.iter().filter_map(|way| self.straight(lifted, &(back * *way)));
+        let is_free = |path: &Vec<Vec<f64>>| {
+            path.iter()
+                .all(|posture| self.meanwhile.is_free(posture, LEAST_ROOM))
+        };
+        let mut ways = RETREATS_M
+            .iter()
+            .filter_map(|way| self.straight(lifted, &(back * *way)));
         ways.find(is_free).unwrap_or_default()
     }
 
@@ -326,13 +422,21 @@ impl<'a> Arm<'a> {
     /// The hindrance if there is none, or if the open hand would touch the object and may not.
     fn at_thing(&self, seed: &[f64], grasp: &Grasp) -> Result<(Vec<f64>, f64), Hindrance> {
         let mut hindrance = Hindrance::OutOfReach;
-        let aside: &[f64] = if self.beside.is_some() { &ASIDE_M } else { &[0.0] };
+        let aside: &[f64] = if self.beside.is_some() {
+            &ASIDE_M
+        } else {
+            &[0.0]
+        };
         for aside_m in aside.iter().copied() {
             let pose = grasp.pose * Translation3::new(0.0, aside_m, 0.0);
             // Out of reach here is out of reach a centimetre beside it.
-            let found = self.solve_turned(seed, &pose, LARGEST_TURN_RAD).ok_or(hindrance.clone())?;
+            let found = self
+                .solve_turned(seed, &pose, LARGEST_TURN_RAD)
+                .ok_or(hindrance.clone())?;
             // An arm of few joints turns the hand: the pose is another than the grasp's.
-            let touches = |(hand, thing): (&Hand, &Sighting)| !hand.is_beside(&self.kinematics.grasp(&found.0), thing);
+            let touches = |(hand, thing): (&Hand, &Sighting)| {
+                !hand.is_beside(&self.kinematics.grasp(&found.0), thing)
+            };
             if !self.beside.is_some_and(touches) {
                 return Ok(found);
             }
@@ -343,21 +447,37 @@ impl<'a> Arm<'a> {
 
     /// A path from the current posture to another.
     fn way(&self, to: &[f64], samples: &mut Samples) -> Option<Vec<Vec<f64>>> {
-        let wanted = Room { furniture_m: WAY_CLEAR_M, things_m: WAY_CLEAR_M };
+        let wanted = Room {
+            furniture_m: WAY_CLEAR_M,
+            things_m: WAY_CLEAR_M,
+        };
         let start = self.before.room(&self.start).0;
         let mut least = wanted.least(start).least(self.before.room(to).0);
         if start.furniture_m < WAY_CLEAR_M {
-            // A link that only turns above the surface on which the arm is mounted keeps its distance up to rounding.
+            // A link that only turns above the surface on which the arm is mounted keeps its
+            // distance up to rounding.
             least.furniture_m -= TURNING_M;
         }
         if least.furniture_m < 0.0 || least.things_m < LEAST_CLEAR_M {
             return None;
         }
-        motion::way(&self.before, &self.start, to, least, &mut samples.share(SAMPLES_A_GRASP))
+        motion::way(
+            &self.before,
+            &self.start,
+            to,
+            least,
+            &mut samples.share(SAMPLES_A_GRASP),
+        )
     }
 
-    /// Inverse kinematics. An arm of few joints may turn the hand, by as much as `most_rad`; returns the turn.
-    fn solve_turned(&self, seed: &[f64], target: &Isometry3<f64>, most_rad: f64) -> Option<(Vec<f64>, f64)> {
+    /// Inverse kinematics. An arm of few joints may turn the hand, by as much as `most_rad`;
+    /// returns the turn.
+    fn solve_turned(
+        &self,
+        seed: &[f64],
+        target: &Isometry3<f64>,
+        most_rad: f64,
+    ) -> Option<(Vec<f64>, f64)> {
         let reach = self.reach(target, seed.len());
         match self.layout.arm.len() < FULL_ARM {
             true => ik::solve_turned(self.kinematics, seed, &reach, most_rad),
@@ -369,14 +489,21 @@ impl<'a> Arm<'a> {
     fn reach(&self, target: &Isometry3<f64>, n_joints: usize) -> ik::Reach {
         let mut mobility = vec![0.0; n_joints];
         self.layout.arm.iter().for_each(|idx| mobility[*idx] = 1.0);
-        ik::Reach { target: *target, mobility }
+        ik::Reach {
+            target: *target,
+            mobility,
+        }
     }
 
-    /// Postures a few centimetres apart on a straight path of the hand with fixed orientation. Returns `None` if the
-    /// arm can't follow.
+    /// Postures a few centimetres apart on a straight path of the hand with fixed orientation.
+    /// Returns `None` if the arm can't follow.
     fn straight(&self, from: &[f64], by: &Vector3<f64>) -> Option<Vec<Vec<f64>>> {
         let hand = self.kinematics.grasp(from);
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a few steps")]
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "a few steps"
+        )]
         let n_steps = (by.norm() / STEP_M).ceil().clamp(1.0, 100.0) as usize;
         let mut path: Vec<Vec<f64>> = Vec::new();
         for step in 1..=n_steps {
@@ -384,7 +511,11 @@ impl<'a> Arm<'a> {
             target.translation.vector += by * (step as f64 / n_steps as f64);
             let last = path.last().map_or(from, Vec::as_slice);
             let (next, _) = self.solve_turned(last, &target, SMALL_TURN_RAD)?;
-            if next.iter().zip(last).any(|(a, b)| (a - b).abs() > LARGEST_STEP) {
+            if next
+                .iter()
+                .zip(last)
+                .any(|(a, b)| (a - b).abs() > LARGEST_STEP)
+            {
                 return None;
             }
             path.push(next);
@@ -406,8 +537,14 @@ mod tests {
     #[test]
     fn an_arm_retreats_only_as_far_as_the_way_is_free() {
         let path = Path::new("models/robots/fixed_arm.toml");
-        let profile = actcheck_config::robot::read(&Files::Shipped, path).expect("the shipped robot is valid");
-        let start = RobotStart { profile: Arc::new(profile), base: [0.0; 3], root_height_m: 0.0, knows: Arc::new([]) };
+        let profile = actcheck_config::robot::read(&Files::Shipped, path)
+            .expect("the shipped robot is valid");
+        let start = RobotStart {
+            profile: Arc::new(profile),
+            base: [0.0; 3],
+            root_height_m: 0.0,
+            knows: Arc::new([]),
+        };
         let (kinematics, layout, home) = geometry(&start).expect("the shipped robot is valid");
         let mut lifted = home.clone();
         for (idx, value) in layout.arm.iter().zip([0.0, 0.7, 0.0, 1.59, 0.0, 0.85, 0.0]) {
@@ -418,9 +555,23 @@ mod tests {
             // As high as the hand, so that the arm is above it.
             let (position, size_m) = ([hand.x - behind_m - 0.05, 0.0, 0.0], [0.1, 1.0, hand.z]);
             let pose = Pose::upright(position, 0.0);
-            let wall = Sighting { id: "wall".to_owned(), pose, size_m, furniture: true, angular: false };
+            let wall = Sighting {
+                id: "wall".to_owned(),
+                pose,
+                size_m,
+                furniture: true,
+                angular: false,
+            };
             let wall = [Block::new(&wall)];
-            let space = || ArmSpace::new(&kinematics, &layout, &wall, &[], std::slice::from_ref(&home));
+            let space = || {
+                ArmSpace::new(
+                    &kinematics,
+                    &layout,
+                    &wall,
+                    &[],
+                    std::slice::from_ref(&home),
+                )
+            };
             let arm = Arm {
                 kinematics: &kinematics,
                 layout: &layout,

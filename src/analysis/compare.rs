@@ -1,5 +1,5 @@
-//! Compares two campaigns on the same scenes: which properties hold more or less often, and in which scenes outcomes
-//! differ.
+//! Compares two campaigns on the same scenes: which properties hold more or less often, and in
+//! which scenes outcomes differ.
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::sync::Arc;
@@ -14,7 +14,8 @@ use actcheck_verdict::Counts;
 pub enum Compared {
     /// Whole runs. A run passes if at least one property passed and none failed.
     WholeRun,
-    /// Whether the run completed: it passes unless it is broken or timed out. Compared only if a run did not.
+    /// Whether the run completed: it passes unless it is broken or timed out. Compared only if a
+    /// run did not.
     Completion,
     /// A property over all executions of the action in a run.
     Property {
@@ -64,7 +65,8 @@ pub struct ComparedLine {
     pub worse: Vec<(String, String)>,
     /// Runs that failed in the first campaign and passed in the second: IDs of both.
     pub better: Vec<(String, String)>,
-    /// Outcomes of the scenes that were not decided on both sides, in the first and in the second campaign.
+    /// Outcomes of the scenes that were not decided on both sides, in the first and in the second
+    /// campaign.
     pub left_out: [Counts; 2],
 }
 
@@ -87,7 +89,8 @@ pub struct Comparison {
     pub sampling: Sampling,
 }
 
-/// Returns the runs of a campaign for a comparison, sorted by place. Runs without a known scene are left out.
+/// Returns the runs of a campaign for a comparison, sorted by place. Runs without a known scene are
+/// left out.
 pub fn compared_runs(
     runs: &[RunRow],
     scenes: &BTreeMap<String, SceneDigest>,
@@ -106,12 +109,17 @@ pub fn compared_runs(
     let mut found = ComparedRuns::default();
     for row in runs {
         let outcomes = of_run.remove(row.run.as_str()).unwrap_or_default();
-        found.add(JudgedRun { row: row.clone(), scene: scenes.get(&row.run).cloned(), outcomes });
+        found.add(JudgedRun {
+            row: row.clone(),
+            scene: scenes.get(&row.run).cloned(),
+            outcomes,
+        });
     }
     found.sorted()
 }
 
-/// Status and outcomes of a run: the addresses of the texts of each action and property, and the outcome.
+/// Status and outcomes of a run: the addresses of the texts of each action and property, and the
+/// outcome.
 type OutcomeKey = Vec<(usize, usize, u8)>;
 
 /// Collects the runs of a campaign for a comparison.
@@ -119,8 +127,8 @@ type OutcomeKey = Vec<(usize, usize, u8)>;
 pub struct ComparedRuns {
     runs: Vec<ComparedRun>,
     len: usize,
-    /// The outcomes so far, by status and the outcomes of each action and property. The texts are kept, so that addresses
-    /// stay theirs.
+    /// The outcomes so far, by status and the outcomes of each action and property. The texts are
+    /// kept, so that addresses stay theirs.
     known: HashMap<OutcomeKey, Arc<BTreeMap<Compared, Outcome>>>,
     texts: HashMap<usize, Arc<str>>,
 }
@@ -129,10 +137,24 @@ impl ComparedRuns {
     /// Adds a run with its outcomes. One without a known scene only counts.
     pub fn add(&mut self, run: JudgedRun) {
         self.len += 1;
-        let JudgedRun { row, scene: Some(scene), outcomes } = run else { return };
+        let JudgedRun {
+            row,
+            scene: Some(scene),
+            outcomes,
+        } = run
+        else {
+            return;
+        };
         let outcomes = self.shared(row.status, &outcomes);
-        let place = row.repetition.map_or((row.index, 0), |repetition| (repetition.scene, repetition.number));
-        self.runs.push(ComparedRun { run: row.run, place, scene, outcomes });
+        let place = row.repetition.map_or((row.index, 0), |repetition| {
+            (repetition.scene, repetition.number)
+        });
+        self.runs.push(ComparedRun {
+            run: row.run,
+            place,
+            scene,
+            outcomes,
+        });
     }
 
     /// Number of added runs.
@@ -147,15 +169,26 @@ impl ComparedRuns {
 
     /// The runs, sorted by place.
     pub fn sorted(mut self) -> Vec<ComparedRun> {
-        self.runs.sort_by(|a, b| (a.place, &a.run).cmp(&(b.place, &b.run)));
+        self.runs
+            .sort_by(|a, b| (a.place, &a.run).cmp(&(b.place, &b.run)));
         self.runs
     }
 
     /// The outcomes by subject, shared with earlier runs that have the same ones.
-    fn shared(&mut self, status: RunStatus, outcomes: &[JudgedOutcome]) -> Arc<BTreeMap<Compared, Outcome>> {
+    fn shared(
+        &mut self,
+        status: RunStatus,
+        outcomes: &[JudgedOutcome],
+    ) -> Arc<BTreeMap<Compared, Outcome>> {
         let address = |text: &Arc<str>| Arc::as_ptr(text).cast::<u8>() as usize;
         let mut key = vec![(0, 0, status as u8)];
-        key.extend(outcomes.iter().map(|own| (address(&own.action), address(&own.property), own.outcome as u8)));
+        key.extend(outcomes.iter().map(|own| {
+            (
+                address(&own.action),
+                address(&own.property),
+                own.outcome as u8,
+            )
+        }));
         if let Some(known) = self.known.get(&key) {
             return Arc::clone(known);
         }
@@ -171,52 +204,94 @@ impl ComparedRuns {
 fn by_subject(status: RunStatus, outcomes: &[JudgedOutcome]) -> BTreeMap<Compared, Outcome> {
     let mut found: BTreeMap<Compared, Outcome> = BTreeMap::new();
     for own in outcomes {
-        let of = Compared::Property { action: own.action.to_string(), property: own.property.to_string() };
-        let both = found.get(&of).map_or(own.outcome, |before| together(*before, own.outcome));
+        let of = Compared::Property {
+            action: own.action.to_string(),
+            property: own.property.to_string(),
+        };
+        let both = found
+            .get(&of)
+            .map_or(own.outcome, |before| together(*before, own.outcome));
         found.insert(of, both);
     }
     // A broken run is no evidence about the robot, regardless of earlier outcomes.
     let whole = match status {
         RunStatus::Broken => Outcome::Broken,
-        RunStatus::Completed | RunStatus::Timeout => {
-            found.values().copied().reduce(together).unwrap_or(Outcome::Untested)
-        }
+        RunStatus::Completed | RunStatus::Timeout => found
+            .values()
+            .copied()
+            .reduce(together)
+            .unwrap_or(Outcome::Untested),
     };
     found.insert(Compared::WholeRun, whole);
-    let completed = if status == RunStatus::Completed { Outcome::Passed } else { Outcome::Failed };
+    let completed = if status == RunStatus::Completed {
+        Outcome::Passed
+    } else {
+        Outcome::Failed
+    };
     found.insert(Compared::Completion, completed);
     found
 }
 
-/// Combines two outcomes: failed if one failed, else broken, timeout or untested if one is, else passed if one passed.
+/// Combines two outcomes: failed if one failed, else broken, timeout or untested if one is, else
+/// passed if one passed.
 fn together(one: Outcome, other: Outcome) -> Outcome {
-    const STRONGEST_FIRST: [Outcome; 6] =
-        [Outcome::Failed, Outcome::Broken, Outcome::Timeout, Outcome::Untested, Outcome::Passed, Outcome::Inapplicable];
-    STRONGEST_FIRST.into_iter().find(|outcome| [one, other].contains(outcome)).unwrap_or(one)
+    const STRONGEST_FIRST: [Outcome; 6] = [
+        Outcome::Failed,
+        Outcome::Broken,
+        Outcome::Timeout,
+        Outcome::Untested,
+        Outcome::Passed,
+        Outcome::Inapplicable,
+    ];
+    STRONGEST_FIRST
+        .into_iter()
+        .find(|outcome| [one, other].contains(outcome))
+        .unwrap_or(one)
 }
 
 /// Compares two campaigns by pairs of runs with the same place and the same scene.
 ///
-/// If scenes are repeated, a scene passes if all its runs pass: runs of one scene are too alike to be counted
-/// separately. Only repetitions that both sides have are compared. `sampling`: how the number of scenes was decided.
+/// If scenes are repeated, a scene passes if all its runs pass: runs of one scene are too alike to
+/// be counted separately. Only repetitions that both sides have are compared. `sampling`: how the
+/// number of scenes was decided.
 pub fn compare(first: &[ComparedRun], second: &[ComparedRun], sampling: Sampling) -> Comparison {
-    let by_place = |runs: &'_ [ComparedRun]| runs.iter().enumerate().map(|(at, run)| (run.place, at)).collect();
-    let (firsts, seconds): (BTreeMap<_, usize>, BTreeMap<_, usize>) = (by_place(first), by_place(second));
-    let alone = |runs: &[ComparedRun], other: &BTreeMap<(u64, u64), usize>| {
-        runs.iter().filter(|run| !other.contains_key(&run.place)).map(|run| run.run.clone()).collect::<Vec<_>>()
+    let by_place = |runs: &'_ [ComparedRun]| {
+        runs.iter()
+            .enumerate()
+            .map(|(at, run)| (run.place, at))
+            .collect()
     };
-    let met: Vec<[&ComparedRun; 2]> =
-        firsts.iter().filter_map(|(place, at)| Some([&first[*at], &second[*seconds.get(place)?]])).collect();
-    let (same, others): (Vec<_>, Vec<_>) =
-        met.into_iter().partition(|[a, b]| a.scene.arrangement == b.scene.arrangement);
+    let (firsts, seconds): (BTreeMap<_, usize>, BTreeMap<_, usize>) =
+        (by_place(first), by_place(second));
+    let alone = |runs: &[ComparedRun], other: &BTreeMap<(u64, u64), usize>| {
+        runs.iter()
+            .filter(|run| !other.contains_key(&run.place))
+            .map(|run| run.run.clone())
+            .collect::<Vec<_>>()
+    };
+    let met: Vec<[&ComparedRun; 2]> = firsts
+        .iter()
+        .filter_map(|(place, at)| Some([&first[*at], &second[*seconds.get(place)?]]))
+        .collect();
+    let (same, others): (Vec<_>, Vec<_>) = met
+        .into_iter()
+        .partition(|[a, b]| a.scene.arrangement == b.scene.arrangement);
     let pairs = scene_pairs(&same);
-    let judged = [0, 1].map(|side| pairs.iter().flat_map(|pair| pair.outcomes[side].keys().cloned()).collect());
+    let judged = [0, 1].map(|side| {
+        pairs
+            .iter()
+            .flat_map(|pair| pair.outcomes[side].keys().cloned())
+            .collect()
+    });
     let [judged_first, judged_second]: [BTreeSet<Compared>; 2] = judged;
     Comparison {
         pairs: pairs.len() as u64,
         other_physics: pairs.iter().filter(|pair| pair.other_physics).count() as u64,
         alone: [alone(first, &seconds), alone(second, &firsts)],
-        other_scene: others.into_iter().map(|[a, b]| (a.run.clone(), b.run.clone())).collect(),
+        other_scene: others
+            .into_iter()
+            .map(|[a, b]| (a.run.clone(), b.run.clone()))
+            .collect(),
         judged_alone: [
             judged_first.difference(&judged_second).cloned().collect(),
             judged_second.difference(&judged_first).cloned().collect(),
@@ -244,7 +319,10 @@ fn scene_pairs(same: &[[&ComparedRun; 2]]) -> Vec<ScenePair> {
                     let known = Arc::make_mut(known);
                     for (of, outcome) in run.outcomes.iter() {
                         let before = known.get(of).copied();
-                        known.insert(of.clone(), before.map_or(*outcome, |before| together(before, *outcome)));
+                        known.insert(
+                            of.clone(),
+                            before.map_or(*outcome, |before| together(before, *outcome)),
+                        );
                     }
                 }
             }
@@ -267,10 +345,21 @@ fn lines<'a>(
     sampling: Sampling,
 ) -> Vec<ComparedLine> {
     let mut lines: Vec<ComparedLine> = compared.map(|of| line(pairs, of, sampling)).collect();
-    // Without discordant scenes its test can never be significant, so it costs the others no correction (Tarone, 1990).
+    // Without discordant scenes its test can never be significant, so it costs the others no
+    // correction (Tarone, 1990).
     lines.retain(|line| line.of != Compared::Completion || line.table.both < line.table.pairs());
-    let two_sided = holm(&lines.iter().map(|line| line.test.two_sided).collect::<Vec<f64>>());
-    let worse = holm(&lines.iter().map(|line| line.test.second_worse).collect::<Vec<f64>>());
+    let two_sided = holm(
+        &lines
+            .iter()
+            .map(|line| line.test.two_sided)
+            .collect::<Vec<f64>>(),
+    );
+    let worse = holm(
+        &lines
+            .iter()
+            .map(|line| line.test.second_worse)
+            .collect::<Vec<f64>>(),
+    );
     for ((line, two_sided), worse) in lines.iter_mut().zip(two_sided).zip(worse) {
         (line.two_sided_adjusted, line.second_worse_adjusted) = (two_sided, worse);
     }
@@ -281,9 +370,15 @@ fn line(pairs: &[ScenePair], of: &Compared, sampling: Sampling) -> ComparedLine 
     let mut table = PairedTable::default();
     let (mut worse, mut better, mut left_out) = (Vec::new(), Vec::new(), [Counts::default(); 2]);
     for pair in pairs {
-        let outcomes = pair.outcomes.each_ref().map(|known| known.get(of).copied().unwrap_or(Outcome::Untested));
+        let outcomes = pair
+            .outcomes
+            .each_ref()
+            .map(|known| known.get(of).copied().unwrap_or(Outcome::Untested));
         let [Some(a), Some(b)] = outcomes.map(decided) else {
-            left_out.iter_mut().zip(outcomes).for_each(|(counts, outcome)| counts.add(outcome));
+            left_out
+                .iter_mut()
+                .zip(outcomes)
+                .for_each(|(counts, outcome)| counts.add(outcome));
             continue;
         };
         table.add(a, b);
@@ -317,10 +412,13 @@ fn decided(outcome: Outcome) -> Option<bool> {
 }
 
 impl Comparison {
-    /// Returns the lines in which the second campaign is significantly worse: one-sided, exact, and adjusted so that
-    /// the probability of any false finding is at most `level`.
+    /// Returns the lines in which the second campaign is significantly worse: one-sided, exact, and
+    /// adjusted so that the probability of any false finding is at most `level`.
     pub fn worse_at(&self, level: f64) -> Vec<&ComparedLine> {
-        self.lines.iter().filter(|line| line.second_worse_adjusted <= level).collect()
+        self.lines
+            .iter()
+            .filter(|line| line.second_worse_adjusted <= level)
+            .collect()
     }
 }
 
@@ -330,9 +428,13 @@ mod tests {
     use crate::sample_rows::{outcome_row, run_row};
 
     fn run(index: u64, arrangement: &str, outcomes: &[(&str, Outcome)]) -> ComparedRun {
-        let scene = SceneDigest { arrangement: arrangement.to_owned(), physics: String::new() };
+        let scene = SceneDigest {
+            arrangement: arrangement.to_owned(),
+            physics: String::new(),
+        };
         let row = run_row(index);
-        let outcome = |(property, outcome): &(&str, Outcome)| outcome_row(index, property, *outcome);
+        let outcome =
+            |(property, outcome): &(&str, Outcome)| outcome_row(index, property, *outcome);
         let outcomes: Vec<OutcomeRow> = outcomes.iter().map(outcome).collect();
         let scenes = BTreeMap::from([(row.run.clone(), scene)]);
         compared_runs(&[row], &scenes, &outcomes).remove(0)
@@ -342,36 +444,72 @@ mod tests {
 
     #[test]
     fn runs_are_paired_by_scene_and_unpaired_ones_are_counted() {
-        let a = [run(0, "x", &[("p", Passed)]), run(1, "y", &[("p", Passed)]), run(2, "z", &[("p", Failed)])];
-        let b = [run(1, "y", &[("p", Failed)]), run(2, "other", &[("p", Failed)]), run(3, "w", &[("p", Passed)])];
+        let a = [
+            run(0, "x", &[("p", Passed)]),
+            run(1, "y", &[("p", Passed)]),
+            run(2, "z", &[("p", Failed)]),
+        ];
+        let b = [
+            run(1, "y", &[("p", Failed)]),
+            run(2, "other", &[("p", Failed)]),
+            run(3, "w", &[("p", Passed)]),
+        ];
         let found = compare(&a, &b, Sampling::Fixed);
         assert_eq!(found.pairs, 1);
-        assert_eq!(found.alone, [vec!["k-1".to_owned()], vec!["k-4".to_owned()]]);
+        assert_eq!(
+            found.alone,
+            [vec!["k-1".to_owned()], vec!["k-4".to_owned()]]
+        );
         assert_eq!(found.other_scene, [("k-3".to_owned(), "k-3".to_owned())]);
         assert_eq!(found.lines.len(), 2);
-        assert!(found.lines.iter().all(|line| line.worse.len() == 1 && line.table.only_first == 1));
+        assert!(
+            found
+                .lines
+                .iter()
+                .all(|line| line.worse.len() == 1 && line.table.only_first == 1)
+        );
     }
 
     #[test]
     fn uninformative_outcomes_are_excluded_on_both_sides_and_counted() {
         let open = [Inapplicable, Broken, Timeout, Untested];
         let runs = |outcomes: &[Outcome]| -> Vec<ComparedRun> {
-            (0u64..).zip(outcomes).map(|(index, outcome)| run(index, "s", &[("p", *outcome)])).collect()
+            (0u64..)
+                .zip(outcomes)
+                .map(|(index, outcome)| run(index, "s", &[("p", *outcome)]))
+                .collect()
         };
         let a = runs(&[&[Passed, Failed][..], &[Passed; 4]].concat());
         let b = runs(&[&[Passed, Passed][..], &open].concat());
         let found = compare(&a, &b, Sampling::Fixed);
         for line in &found.lines {
-            assert_eq!(line.table, PairedTable { both: 1, only_second: 1, ..PairedTable::default() });
-            assert_eq!(line.left_out[0], Counts { passed: 4, ..Counts::default() });
+            assert_eq!(
+                line.table,
+                PairedTable {
+                    both: 1,
+                    only_second: 1,
+                    ..PairedTable::default()
+                }
+            );
+            assert_eq!(
+                line.left_out[0],
+                Counts {
+                    passed: 4,
+                    ..Counts::default()
+                }
+            );
             assert_eq!(line.left_out[1], Counts::of(open));
         }
     }
 
     #[test]
     fn a_run_fails_with_one_failed_property_and_is_open_with_one_undecided() {
-        let whole = |outcomes: &[(&str, Outcome)]| run(0, "s", outcomes).outcomes[&Compared::WholeRun];
-        assert_eq!(whole(&[("p", Passed), ("q", Failed), ("r", Timeout)]), Failed);
+        let whole =
+            |outcomes: &[(&str, Outcome)]| run(0, "s", outcomes).outcomes[&Compared::WholeRun];
+        assert_eq!(
+            whole(&[("p", Passed), ("q", Failed), ("r", Timeout)]),
+            Failed
+        );
         assert_eq!(whole(&[("p", Passed), ("q", Timeout)]), Timeout);
         assert_eq!(whole(&[("p", Passed), ("q", Inapplicable)]), Passed);
         assert_eq!(whole(&[("p", Inapplicable)]), Inapplicable);
@@ -384,17 +522,34 @@ mod tests {
             let scenes = (0u64..).zip(outcomes).flat_map(|(scene, outcomes)| {
                 (0u64..).zip(*outcomes).map(move |(number, outcome)| {
                     let index = 10 * scene + number;
-                    ComparedRun { place: (scene, number), ..run(index, "s", &[("p", *outcome)]) }
+                    ComparedRun {
+                        place: (scene, number),
+                        ..run(index, "s", &[("p", *outcome)])
+                    }
                 })
             });
             scenes.collect()
         };
-        let a = runs(&[&[Passed, Passed, Failed], &[Passed, Passed, Passed], &[Passed, Broken, Passed]]);
+        let a = runs(&[
+            &[Passed, Passed, Failed],
+            &[Passed, Passed, Passed],
+            &[Passed, Broken, Passed],
+        ]);
         let b = runs(&[&[Passed, Passed], &[Passed, Failed], &[Passed, Passed]]);
         let found = compare(&a, &b, Sampling::Fixed);
-        assert_eq!((found.pairs, found.alone[0].len(), found.alone[1].len()), (3, 3, 0));
+        assert_eq!(
+            (found.pairs, found.alone[0].len(), found.alone[1].len()),
+            (3, 3, 0)
+        );
         for line in &found.lines {
-            assert_eq!(line.table, PairedTable { both: 1, only_first: 1, ..PairedTable::default() });
+            assert_eq!(
+                line.table,
+                PairedTable {
+                    both: 1,
+                    only_first: 1,
+                    ..PairedTable::default()
+                }
+            );
             assert_eq!(
                 (line.worse.as_slice(), line.left_out[0].broken),
                 (&[("k-11".to_owned(), "k-11".to_owned())][..], 1)
@@ -402,17 +557,34 @@ mod tests {
         }
     }
 
-    /// Regression: a program that crashed or hung whenever it would have failed was not worse than one that failed.
+    /// Regression: a program that crashed or hung whenever it would have failed was not worse than
+    /// one that failed.
     #[test]
     fn a_rise_of_runs_that_do_not_complete_is_worse() {
         let runs = |lost: u64, outcome: Outcome, status: RunStatus| -> Vec<ComparedRun> {
             let one = |index: u64| {
                 let mut row = run_row(index);
                 let is_lost = index < lost;
-                row.status = if is_lost { status } else { RunStatus::Completed };
-                let scene = SceneDigest { arrangement: "s".to_owned(), physics: String::new() };
-                let outcomes = [outcome_row(index, "p", if is_lost { outcome } else { Passed })];
-                compared_runs(&[row.clone()], &BTreeMap::from([(row.run, scene)]), &outcomes).remove(0)
+                row.status = if is_lost {
+                    status
+                } else {
+                    RunStatus::Completed
+                };
+                let scene = SceneDigest {
+                    arrangement: "s".to_owned(),
+                    physics: String::new(),
+                };
+                let outcomes = [outcome_row(
+                    index,
+                    "p",
+                    if is_lost { outcome } else { Passed },
+                )];
+                compared_runs(
+                    &[row.clone()],
+                    &BTreeMap::from([(row.run, scene)]),
+                    &outcomes,
+                )
+                .remove(0)
             };
             (0..30).map(one).collect()
         };
@@ -420,14 +592,32 @@ mod tests {
         for (outcome, status) in [(Broken, RunStatus::Broken), (Timeout, RunStatus::Timeout)] {
             let crashing = runs(8, outcome, status);
             let found = compare(&none, &crashing, Sampling::Fixed);
-            let worse: Vec<&Compared> = found.worse_at(0.05).into_iter().map(|line| &line.of).collect();
+            let worse: Vec<&Compared> = found
+                .worse_at(0.05)
+                .into_iter()
+                .map(|line| &line.of)
+                .collect();
             assert_eq!(worse, [&Compared::Completion], "{found:?}");
-            // Two more such runs may be chance, an equal number does not count, and fewer are better.
-            for first in [runs(6, outcome, status), crashing.clone(), runs(20, outcome, status)] {
-                assert!(compare(&first, &crashing, Sampling::Fixed).worse_at(0.05).is_empty());
+            // Two more such runs may be chance, an equal number does not count, and fewer are
+            // better.
+            for first in [
+                runs(6, outcome, status),
+                crashing.clone(),
+                runs(20, outcome, status),
+            ] {
+                assert!(
+                    compare(&first, &crashing, Sampling::Fixed)
+                        .worse_at(0.05)
+                        .is_empty()
+                );
             }
         }
-        assert!(compare(&none, &none, Sampling::Fixed).lines.iter().all(|line| line.of != Compared::Completion));
+        assert!(
+            compare(&none, &none, Sampling::Fixed)
+                .lines
+                .iter()
+                .all(|line| line.of != Compared::Completion)
+        );
     }
 
     #[test]
@@ -443,7 +633,10 @@ mod tests {
                 })
                 .collect()
         };
-        assert_eq!(found.judged_alone.each_ref().map(|list| names(list)), [["old"], ["new"]]);
+        assert_eq!(
+            found.judged_alone.each_ref().map(|list| names(list)),
+            [["old"], ["new"]]
+        );
         assert_eq!(found.lines.len(), 2);
     }
 }

@@ -1,7 +1,7 @@
 //! Coverage of the scene space by a campaign, compared with the same number of random draws.
 //!
-//! Every choice falls into a bin; all bins of a parameter are equally probable. Parameters that differ only in their
-//! object are pooled: `other.3.x` and `other.5.x` are `other.*.x`.
+//! Every choice falls into a bin; all bins of a parameter are equally probable. Parameters that
+//! differ only in their object are pooled: `other.3.x` and `other.5.x` are `other.*.x`.
 
 use std::collections::{BTreeMap, HashMap};
 use std::sync::Arc;
@@ -10,8 +10,8 @@ use statrs::distribution::{Binomial, DiscreteCDF};
 
 use actcheck_data::{Choice, ChoiceKind, ChoiceName};
 
-/// Number of bins of a numeric parameter. Fifths show gaps in the middle and at both ends, and a hundred draws fill
-/// them.
+/// Number of bins of a numeric parameter. Fifths show gaps in the middle and at both ends, and a
+/// hundred draws fill them.
 const BINS: usize = 5;
 /// A choice with more options than this is treated as a number, because no campaign tries them all.
 const MOST_BINS: usize = 1000;
@@ -55,7 +55,8 @@ pub struct ParameterCoverage {
     pub name: String,
     /// Number of choices.
     pub draws: u64,
-    /// Choices in each bin. Shape: one entry for each option, or for each fifth of the distribution.
+    /// Choices in each bin. Shape: one entry for each option, or for each fifth of the
+    /// distribution.
     pub counts: Vec<u64>,
     /// Expected number of bins hit by the same number of random draws.
     pub expected_hits: f64,
@@ -101,13 +102,16 @@ impl Binned<'_> {
 }
 
 impl Coverage {
-    /// Counts the choices of one run. Of repeated choices only the last one counts, because the scene uses it.
+    /// Counts the choices of one run. Of repeated choices only the last one counts, because the
+    /// scene uses it.
     pub fn add(&mut self, choices: &[Choice]) {
         for choice in choices {
             self.text_of(&choice.name);
         }
-        let mut last: Vec<(&Name, &Choice)> =
-            choices.iter().filter_map(|choice| Some((self.names.get(&choice.name)?, choice))).collect();
+        let mut last: Vec<(&Name, &Choice)> = choices
+            .iter()
+            .filter_map(|choice| Some((self.names.get(&choice.name)?, choice)))
+            .collect();
         // Stable, so that the last one of a name is the last one made.
         last.sort_by(|one, other| one.0.text.cmp(&other.0.text));
         let binned: Vec<Binned<'_>> = last
@@ -119,16 +123,23 @@ impl Coverage {
             })
             .collect();
         for one in &binned {
-            let counts = self.parameters.entry(one.parameter()).or_insert_with(|| vec![0; one.bins]);
+            let counts = self
+                .parameters
+                .entry(one.parameter())
+                .or_insert_with(|| vec![0; one.bins]);
             counts[one.bin] += 1;
         }
         for (idx, first) in binned.iter().enumerate() {
             for second in &binned[idx + 1..] {
-                // Noise choices are independent errors of the robot and its sensors, so that their pairs are not counted.
+                // Noise choices are independent errors of the robot and its sensors, so that their
+                // pairs are not counted.
                 let is_noise = first.name.noise || second.name.noise;
                 if !is_noise && first.name.owner == second.name.owner {
                     let key = [first.parameter(), second.parameter()];
-                    let counts = self.pairs.entry(key).or_insert_with(|| vec![0; first.bins * second.bins]);
+                    let counts = self
+                        .pairs
+                        .entry(key)
+                        .or_insert_with(|| vec![0; first.bins * second.bins]);
                     counts[first.bin * second.bins + second.bin] += 1;
                 }
             }
@@ -152,17 +163,24 @@ impl Coverage {
 
     /// Position of a text, which is added if it is new.
     fn position(&mut self, text: &str) -> usize {
-        self.texts.iter().position(|known| **known == *text).unwrap_or_else(|| {
-            self.texts.push(text.into());
-            self.texts.len() - 1
-        })
+        self.texts
+            .iter()
+            .position(|known| **known == *text)
+            .unwrap_or_else(|| {
+                self.texts.push(text.into());
+                self.texts.len() - 1
+            })
     }
 
     /// Returns the coverage of every parameter that can vary, sorted by name.
     pub fn parameters(&self) -> Vec<ParameterCoverage> {
         let bins: usize = self.parameters.values().map(Vec::len).sum();
         let named = |parameter: &Parameter| (&*self.texts[parameter.0], parameter.1);
-        let parameters: BTreeMap<_, _> = self.parameters.iter().map(|(key, counts)| (named(key), counts)).collect();
+        let parameters: BTreeMap<_, _> = self
+            .parameters
+            .iter()
+            .map(|(key, counts)| (named(key), counts))
+            .collect();
         parameters
             .into_iter()
             .map(|((name, _), counts)| {
@@ -172,17 +190,23 @@ impl Coverage {
                     draws,
                     counts: counts.clone(),
                     expected_hits: occupied(counts.len(), draws).0,
-                    neglected: counts.iter().position(|count| is_neglected(*count, draws, counts.len(), bins)),
+                    neglected: counts
+                        .iter()
+                        .position(|count| is_neglected(*count, draws, counts.len(), bins)),
                 }
             })
             .collect()
     }
 
-    /// Returns the coverage of every pair of parameters of the scene or of one object, sorted by name.
+    /// Returns the coverage of every pair of parameters of the scene or of one object, sorted by
+    /// name.
     pub fn pairs(&self) -> Vec<PairCoverage> {
         let named = |parameter: &Parameter| (&*self.texts[parameter.0], parameter.1);
-        let pairs: BTreeMap<_, _> =
-            self.pairs.iter().map(|(key, counts)| (key.each_ref().map(named), counts)).collect();
+        let pairs: BTreeMap<_, _> = self
+            .pairs
+            .iter()
+            .map(|(key, counts)| (key.each_ref().map(named), counts))
+            .collect();
         pairs
             .into_iter()
             .map(|([(first, _), (second, _)], counts)| {
@@ -204,17 +228,18 @@ impl Coverage {
     }
 }
 
-/// Whether a bin's true probability is significantly less than half of a uniform one: at half of it, any of the `bins`
-/// would have so few draws in less than one of a thousand campaigns.
+/// Whether a bin's true probability is significantly less than half of a uniform one: at half of
+/// it, any of the `bins` would have so few draws in less than one of a thousand campaigns.
 fn is_neglected(count: u64, draws: u64, of: usize, bins: usize) -> bool {
     let half = 0.5 / of as f64;
     Binomial::new(half, draws).is_ok_and(|chance| chance.cdf(count) < LEVEL / bins.max(1) as f64)
 }
 
-/// Returns the mean number of `cells` equally probable cells that `draws` draws hit, and an upper bound of its
-/// variance.
+/// Returns the mean number of `cells` equally probable cells that `draws` draws hit, and an upper
+/// bound of its variance.
 ///
-/// The hits are negatively correlated, so the variance of the sum is at most the sum of the variances.
+/// The hits are negatively correlated, so the variance of the sum is at most the sum of the
+/// variances.
 fn occupied(cells: usize, draws: u64) -> (f64, f64) {
     let cells = cells as f64;
     let empty = libm::pow(1.0 - 1.0 / cells, draws as f64);
@@ -223,13 +248,20 @@ fn occupied(cells: usize, draws: u64) -> (f64, f64) {
 
 /// Returns the number of bins of a choice and its bin, or `None` if it had only one option.
 fn binned(choice: &Choice) -> Option<(usize, usize)> {
-    let share = |share: f64| (BINS, ((share * BINS as f64).max(0.0) as usize).min(BINS - 1));
+    let share = |share: f64| {
+        (
+            BINS,
+            ((share * BINS as f64).max(0.0) as usize).min(BINS - 1),
+        )
+    };
     let option = |of: usize| (of, (choice.value.max(0.0) as usize).min(of - 1));
     Some(match &choice.kind {
         &ChoiceKind::Index { of } if of > MOST_BINS => share(choice.value / of as f64),
         &ChoiceKind::Index { of } if of > 1 => option(of),
         ChoiceKind::Candidate { names } if names.len() > 1 => option(names.len()),
-        &ChoiceKind::Real { low, high, .. } if high > low => share((choice.value - low) / (high - low)),
+        &ChoiceKind::Real { low, high, .. } if high > low => {
+            share((choice.value - low) / (high - low))
+        }
         &ChoiceKind::Normal { sigma } if sigma > 0.0 => {
             share(0.5 * libm::erfc(-choice.value / sigma / std::f64::consts::SQRT_2))
         }
@@ -242,8 +274,8 @@ mod tests {
     use super::*;
     use actcheck_data::{ChoiceName, Choices};
 
-    /// Choices of a scene with two objects. `lean` is the number of times that the colour is redrawn if it is the last
-    /// one.
+    /// Choices of a scene with two objects. `lean` is the number of times that the colour is
+    /// redrawn if it is the last one.
     fn scene(index: u64, lean: u32) -> Vec<Choice> {
         let mut choices = Choices::random(5, index);
         for name in ["other.1", "other.2"] {
@@ -260,7 +292,8 @@ mod tests {
         choices.into_made()
     }
 
-    /// A choice among four billion noise patterns of an image must not allocate four billion counters (34 GB).
+    /// A choice among four billion noise patterns of an image must not allocate four billion
+    /// counters (34 GB).
     #[test]
     fn a_choice_among_very_many_values_is_counted_as_a_number() {
         let mut choices = Choices::random(5, 0);
@@ -279,18 +312,46 @@ mod tests {
     #[test]
     fn objects_are_pooled_and_constants_are_not_parameters() {
         let coverage = coverage(10, 0);
-        let names: Vec<String> = coverage.parameters().iter().map(|p| format!("{} {}", p.name, p.draws)).collect();
-        assert_eq!(names, ["colour 10", "other.*.model 20", "other.*.x 20", "sense.*.x 10"]);
-        let pairs: Vec<[String; 2]> = coverage.pairs().into_iter().map(|pair| pair.names).collect();
-        assert_eq!(pairs, [["other.*.model".to_owned(), "other.*.x".to_owned()]]);
+        let names: Vec<String> = coverage
+            .parameters()
+            .iter()
+            .map(|p| format!("{} {}", p.name, p.draws))
+            .collect();
+        assert_eq!(
+            names,
+            [
+                "colour 10",
+                "other.*.model 20",
+                "other.*.x 20",
+                "sense.*.x 10"
+            ]
+        );
+        let pairs: Vec<[String; 2]> = coverage
+            .pairs()
+            .into_iter()
+            .map(|pair| pair.names)
+            .collect();
+        assert_eq!(
+            pairs,
+            [["other.*.model".to_owned(), "other.*.x".to_owned()]]
+        );
     }
 
     #[test]
     fn random_draws_have_no_neglected_values() {
         for runs in [1, 5, 30, 300, 3_000] {
             let coverage = coverage(runs, 0);
-            assert!(coverage.parameters().iter().all(|parameter| parameter.neglected.is_none()), "{runs}");
-            assert!(coverage.pairs().iter().all(|pair| !pair.neglected), "{runs}");
+            assert!(
+                coverage
+                    .parameters()
+                    .iter()
+                    .all(|parameter| parameter.neglected.is_none()),
+                "{runs}"
+            );
+            assert!(
+                coverage.pairs().iter().all(|pair| !pair.neglected),
+                "{runs}"
+            );
         }
     }
 
@@ -298,7 +359,8 @@ mod tests {
     fn the_number_of_hit_bins_matches_its_expectation() {
         let mean = (0..200u64).map(|seed| {
             let mut choices = Choices::random(seed, 1);
-            let hit: std::collections::BTreeSet<usize> = (0..8).map(|_| choices.index("x".into(), 10)).collect();
+            let hit: std::collections::BTreeSet<usize> =
+                (0..8).map(|_| choices.index("x".into(), 10)).collect();
             hit.len() as f64
         });
         let mean = mean.sum::<f64>() / 200.0;
@@ -323,10 +385,19 @@ mod tests {
             let mut choices = Choices::random(5, index);
             let value = choices.real("a".into(), 0.0, 1.0, 0.0);
             let mut made = choices.into_made();
-            made.push(Choice { name: "b".into(), value, ..made[0].clone() });
+            made.push(Choice {
+                name: "b".into(),
+                value,
+                ..made[0].clone()
+            });
             coverage.add(&made);
         }
-        assert!(coverage.parameters().iter().all(|parameter| parameter.neglected.is_none()));
+        assert!(
+            coverage
+                .parameters()
+                .iter()
+                .all(|parameter| parameter.neglected.is_none())
+        );
         let pair = &coverage.pairs()[0];
         assert_eq!((pair.hits, pair.cells, pair.neglected), (5, 25, true));
     }

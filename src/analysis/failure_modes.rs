@@ -19,9 +19,14 @@ pub struct FailureMode {
 
 /// Returns the failure modes, most frequent first, then sorted by their properties.
 ///
-/// Runs in which no property passed or failed tested nothing and are left out. `scenes` maps the IDs of runs to their
-/// scenes, if scenes are repeated. `sampling`: how the number of runs was decided.
-pub fn failure_modes(rows: &[OutcomeRow], scenes: &BTreeMap<String, u64>, sampling: Sampling) -> Vec<FailureMode> {
+/// Runs in which no property passed or failed tested nothing and are left out. `scenes` maps the
+/// IDs of runs to their scenes, if scenes are repeated. `sampling`: how the number of runs was
+/// decided.
+pub fn failure_modes(
+    rows: &[OutcomeRow],
+    scenes: &BTreeMap<String, u64>,
+    sampling: Sampling,
+) -> Vec<FailureMode> {
     let tested = signatures(rows);
     // A run without a known scene counts as a scene of its own.
     let of_scenes = SceneRuns::new(tested.iter().map(|(run, _)| scenes.get(*run).ok_or(*run)));
@@ -34,7 +39,10 @@ pub fn failure_modes(rows: &[OutcomeRow], scenes: &BTreeMap<String, u64>, sampli
         .filter_map(|(failed, places)| {
             Some(FailureMode {
                 failed: failed.iter().map(|iri| (*iri).to_owned()).collect(),
-                runs: places.iter().map(|place| tested[*place].0.to_owned()).collect(),
+                runs: places
+                    .iter()
+                    .map(|place| tested[*place].0.to_owned())
+                    .collect(),
                 share: of_scenes.share(places, sampling)?,
             })
         })
@@ -47,7 +55,10 @@ pub fn failure_modes(rows: &[OutcomeRow], scenes: &BTreeMap<String, u64>, sampli
 /// Returns the runs with decided properties, in the order given, each with its failed properties.
 fn signatures(rows: &[OutcomeRow]) -> Vec<(&str, BTreeSet<&str>)> {
     let mut runs: Vec<(&str, BTreeSet<&str>)> = Vec::new();
-    for row in rows.iter().filter(|row| matches!(row.outcome, Outcome::Passed | Outcome::Failed)) {
+    for row in rows
+        .iter()
+        .filter(|row| matches!(row.outcome, Outcome::Passed | Outcome::Failed))
+    {
         // The rows of a run are contiguous.
         if runs.last().is_none_or(|(run, _)| *run != row.run) {
             runs.push((&row.run, BTreeSet::new()));
@@ -97,16 +108,31 @@ mod tests {
         let plain: Vec<(Vec<&str>, Vec<&str>)> = modes
             .iter()
             .map(|mode| {
-                (mode.failed.iter().map(String::as_str).collect(), mode.runs.iter().map(String::as_str).collect())
+                (
+                    mode.failed.iter().map(String::as_str).collect(),
+                    mode.runs.iter().map(String::as_str).collect(),
+                )
             })
             .collect();
-        assert_eq!(plain, [(vec!["a", "b"], vec!["k-1", "k-3"]), (vec![], vec!["k-2"]), (vec!["a"], vec!["k-5"])]);
+        assert_eq!(
+            plain,
+            [
+                (vec!["a", "b"], vec!["k-1", "k-3"]),
+                (vec![], vec!["k-2"]),
+                (vec!["a"], vec!["k-5"])
+            ]
+        );
         assert_eq!(modes[0].share, wilson(2, 4).expect("four runs"));
-        // Runs of one scene have a smaller effective sample size: the share stays, and its interval is wider.
-        let scenes = [("k-1", 1), ("k-3", 1), ("k-2", 2), ("k-5", 2)].map(|(run, scene)| (run.to_owned(), scene));
+        // Runs of one scene have a smaller effective sample size: the share stays, and its interval
+        // is wider.
+        let scenes = [("k-1", 1), ("k-3", 1), ("k-2", 2), ("k-5", 2)]
+            .map(|(run, scene)| (run.to_owned(), scene));
         let alike = failure_modes(&rows, &scenes.into(), Sampling::Fixed);
         let (alone, alike) = (modes[0].share, alike[0].share);
-        assert!(alike.rate == alone.rate && alike.low < alone.low && alike.high > alone.high, "{alike:?} {alone:?}");
+        assert!(
+            alike.rate == alone.rate && alike.low < alone.low && alike.high > alone.high,
+            "{alike:?} {alone:?}"
+        );
         assert!(failure_modes(&[], &BTreeMap::new(), Sampling::Fixed).is_empty());
         assert!(failure_modes(&rows[7..9], &BTreeMap::new(), Sampling::Fixed).is_empty());
     }

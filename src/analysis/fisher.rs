@@ -1,6 +1,7 @@
 //! Fisher's exact test for 2 × 2 tables.
 
-/// Relative tolerance of table weights: rounding must not separate tables that are equal by symmetry.
+/// Relative tolerance of table weights: rounding must not separate tables that are equal by
+/// symmetry.
 const ALIKE: f64 = 1e-9;
 
 /// Failures and passes within a group and outside it.
@@ -16,7 +17,8 @@ pub struct TwoByTwo {
     pub passed_out: u64,
 }
 
-/// Results of Fisher's exact test: p-values under the hypothesis that the failure rates within and outside are equal.
+/// Results of Fisher's exact test: p-values under the hypothesis that the failure rates within and
+/// outside are equal.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FisherTest {
     /// P-value of at least as many failures within.
@@ -40,10 +42,10 @@ impl TwoByTwo {
 
     /// Performs the exact test.
     ///
-    /// Source: R. A. Fisher, "The logic of inductive inference", Journal of the Royal Statistical Society 98 (1935)
-    /// 39–82. The probabilities are summed from the most probable table outwards, each as a multiple of its neighbour,
-    /// so that small ones keep all their digits (one minus a sum of large ones would lose them). Values below 1e-300
-    /// become 0.
+    /// Source: R. A. Fisher, "The logic of inductive inference", Journal of the Royal Statistical
+    /// Society 98 (1935) 39–82. The probabilities are summed from the most probable table outwards,
+    /// each as a multiple of its neighbour, so that small ones keep all their digits (one minus a
+    /// sum of large ones would lose them). Values below 1e-300 become 0.
     pub fn fisher(&self) -> FisherTest {
         let within = self.failed_in + self.passed_in;
         let failed = self.failed_in + self.failed_out;
@@ -52,23 +54,38 @@ impl TwoByTwo {
         let mode = most_probable(within, failed, all).clamp(least, most);
         // Ratio of the probability with one more failure within to the current one.
         let step = |inside: u64| {
-            let [inside, within, failed, all] = [inside, within, failed, all].map(|count| count as f64);
-            (within - inside) * (failed - inside) / ((inside + 1.0) * (all - within - failed + inside + 1.0))
+            let [inside, within, failed, all] =
+                [inside, within, failed, all].map(|count| count as f64);
+            (within - inside) * (failed - inside)
+                / ((inside + 1.0) * (all - within - failed + inside + 1.0))
         };
         let upwards = [vec![1.0], outwards((mode..most).map(step))].concat();
         let downwards = outwards((least..mode).rev().map(|inside| 1.0 / step(inside)));
         let weight = |inside: u64| {
-            let (side, at) = if inside >= mode { (&upwards, inside - mode) } else { (&downwards, mode - inside - 1) };
-            usize::try_from(at).ok().and_then(|at| side.get(at)).copied().unwrap_or(0.0)
+            let (side, at) = if inside >= mode {
+                (&upwards, inside - mode)
+            } else {
+                (&downwards, mode - inside - 1)
+            };
+            usize::try_from(at)
+                .ok()
+                .and_then(|at| side.get(at))
+                .copied()
+                .unwrap_or(0.0)
         };
-        let upwards_from = |start: u64| (start..=mode + upwards.len() as u64 - 1).rev().map(weight).sum::<f64>();
+        let upwards_from = |start: u64| {
+            (start..=mode + upwards.len() as u64 - 1)
+                .rev()
+                .map(weight)
+                .sum::<f64>()
+        };
         let start = mode.saturating_sub(downwards.len() as u64);
         let downwards_from = |end: u64| (start..=end).map(weight).sum::<f64>();
         let total = upwards_from(start);
         let seen = weight(self.failed_in);
         let rare = |weight: &&f64| **weight <= seen * (1.0 + ALIKE);
-        let two_sided =
-            upwards.iter().rev().filter(rare).sum::<f64>() + downwards.iter().rev().filter(rare).sum::<f64>();
+        let two_sided = upwards.iter().rev().filter(rare).sum::<f64>()
+            + downwards.iter().rev().filter(rare).sum::<f64>();
         let share = |weights: f64| (weights / total).clamp(0.0, 1.0);
         FisherTest {
             greater: share(upwards_from(self.failed_in)),

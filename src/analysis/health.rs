@@ -1,4 +1,5 @@
-//! Health checks of a campaign: discarded scenes, duplicate runs, coverage gaps, slow runs and simulation artefacts.
+//! Health checks of a campaign: discarded scenes, duplicate runs, coverage gaps, slow runs and
+//! simulation artefacts.
 
 use std::collections::hash_map::Entry;
 use std::collections::{BTreeMap, HashMap};
@@ -7,22 +8,26 @@ use crate::{Coverage, PairCoverage, ParameterCoverage};
 use actcheck_base::{Digest, Outcome};
 use actcheck_history::RunVitals;
 
-/// Maximum share of discarded scenes. A crowded table causes up to a tenth; a larger share biases the tested scenes.
+/// Maximum share of discarded scenes. A crowded table causes up to a tenth; a larger share biases
+/// the tested scenes.
 const MOST_DISCARDS: f64 = 0.1;
 /// A property counts as nearly always inapplicable from this share on.
 const MOST_INAPPLICABLE: f64 = 0.9;
 /// Minimum number of judgements for "nearly always".
 const LEAST_JUDGED: u64 = 10;
-/// A run is an outlier if it takes this many times the median. Scenes of one campaign differ by a factor of 4,
+/// A run is an outlier if it takes this many times the median. Scenes of one campaign differ by a
+/// factor of 4,
 const SLOW_FACTOR: f64 = 10.0;
 /// … and this much longer than the median. Unit: seconds. A busy machine delays a run by less.
 const SLOW_SECS: f64 = 10.0;
 /// Minimum number of runs for the detection of slow runs.
 const LEAST_TIMED: usize = 5;
-/// Maximum penetration depth of colliding objects. Unit: metres. A grasp at 240 steps a second penetrates by less than
-/// one millimetre; the walls of cups are 4 mm thick, and at 2 cm objects have passed through each other.
+/// Maximum penetration depth of colliding objects. Unit: metres. A grasp at 240 steps a second
+/// penetrates by less than one millimetre; the walls of cups are 4 mm thick, and at 2 cm objects
+/// have passed through each other.
 const DEEPEST_M: f64 = 0.02;
-/// Maximum unphysical energy gain. Unit: joules. This is enough to throw a full glass (0.3 kg) at more than 1 m/s.
+/// Maximum unphysical energy gain. Unit: joules. This is enough to throw a full glass (0.3 kg) at
+/// more than 1 m/s.
 const MOST_ENERGY_J: f64 = 0.2;
 
 /// Collects the vital data of a campaign's runs.
@@ -39,7 +44,8 @@ pub struct HealthMeter {
     wall: Vec<(f64, String)>,
     deepest: Option<(f64, String)>,
     energy: Option<(f64, String)>,
-    /// By property: the number of inapplicable outcomes, and of those that are inapplicable, passed or failed.
+    /// By property: the number of inapplicable outcomes, and of those that are inapplicable, passed
+    /// or failed.
     judged: BTreeMap<String, (u64, u64)>,
 }
 
@@ -69,16 +75,18 @@ pub struct Health {
 /// A problem that weakens the conclusions of a campaign.
 #[derive(Debug, Clone, PartialEq)]
 pub enum HealthProblem {
-    /// Too many scenes were discarded: number of discarded scenes, number of drawn scenes, run of the first discard
-    /// (from 1) and its reason.
+    /// Too many scenes were discarded: number of discarded scenes, number of drawn scenes, run of
+    /// the first discard (from 1) and its reason.
     Discards(u64, u64, u64, String),
-    /// The property (IRI) was nearly always inapplicable: number of inapplicable judgements, number of judgements.
+    /// The property (IRI) was nearly always inapplicable: number of inapplicable judgements, number
+    /// of judgements.
     Inapplicable(String, u64, u64),
     /// A value or range of a parameter was rarely tried.
     Neglected(ParameterCoverage),
     /// Pairs of values of two parameters were rarely tried.
     PairNeglected(PairCoverage),
-    /// Runs that repeat another run in every choice: their number, and an example with the run that it repeats.
+    /// Runs that repeat another run in every choice: their number, and an example with the run that
+    /// it repeats.
     Duplicates(u64, String, String),
     /// A slow run: its ID, its wall time and the median wall time. Unit: seconds.
     Slow(String, f64, f64),
@@ -93,7 +101,10 @@ impl HealthMeter {
     pub fn add(&mut self, run: &RunVitals) {
         self.runs += 1;
         self.discards += run.discards.len() as u64;
-        let is_first = self.first_discard.as_ref().is_none_or(|(first, _)| run.index + 1 < *first);
+        let is_first = self
+            .first_discard
+            .as_ref()
+            .is_none_or(|(first, _)| run.index + 1 < *first);
         if let (true, Some(reason)) = (is_first, run.discards.first()) {
             self.first_discard = Some((run.index + 1, reason.clone()));
         }
@@ -133,7 +144,11 @@ impl HealthMeter {
         }
         if let Some((not, all)) = self.judged.get_mut(property) {
             *not += count * u64::from(outcome == Outcome::Inapplicable);
-            *all += count * u64::from(matches!(outcome, Outcome::Inapplicable | Outcome::Passed | Outcome::Failed));
+            *all += count
+                * u64::from(matches!(
+                    outcome,
+                    Outcome::Inapplicable | Outcome::Passed | Outcome::Failed
+                ));
         }
     }
 
@@ -168,7 +183,12 @@ impl HealthMeter {
         let drawn = self.runs + self.discards;
         match &self.first_discard {
             Some((run, reason)) if self.discards as f64 > MOST_DISCARDS * drawn as f64 => {
-                vec![HealthProblem::Discards(self.discards, drawn, *run, reason.clone())]
+                vec![HealthProblem::Discards(
+                    self.discards,
+                    drawn,
+                    *run,
+                    reason.clone(),
+                )]
             }
             _ => Vec::new(),
         }
@@ -179,22 +199,37 @@ impl HealthMeter {
         if self.is_weighted {
             return Vec::new();
         }
-        let singles = health.parameters.iter().filter(|parameter| parameter.neglected.is_some());
+        let singles = health
+            .parameters
+            .iter()
+            .filter(|parameter| parameter.neglected.is_some());
         let pairs = health.pairs.iter().filter(|pair| pair.neglected);
-        singles.cloned().map(HealthProblem::Neglected).chain(pairs.cloned().map(HealthProblem::PairNeglected)).collect()
+        singles
+            .cloned()
+            .map(HealthProblem::Neglected)
+            .chain(pairs.cloned().map(HealthProblem::PairNeglected))
+            .collect()
     }
 
     /// The properties that were nearly always inapplicable, sorted by IRI.
     fn inapplicable(&self) -> Vec<HealthProblem> {
-        let nearly_never = |(not, all): (u64, u64)| all >= LEAST_JUDGED && not as f64 >= MOST_INAPPLICABLE * all as f64;
-        let found = self.judged.iter().filter(|(_, counts)| nearly_never(**counts));
-        found.map(|(property, (not, all))| HealthProblem::Inapplicable(property.clone(), *not, *all)).collect()
+        let nearly_never = |(not, all): (u64, u64)| {
+            all >= LEAST_JUDGED && not as f64 >= MOST_INAPPLICABLE * all as f64
+        };
+        let found = self
+            .judged
+            .iter()
+            .filter(|(_, counts)| nearly_never(**counts));
+        found
+            .map(|(property, (not, all))| HealthProblem::Inapplicable(property.clone(), *not, *all))
+            .collect()
     }
 
     fn repeated(&self) -> Vec<HealthProblem> {
         let first = self.duplicates.first();
-        let problem =
-            first.map(|(run, of)| HealthProblem::Duplicates(self.duplicates.len() as u64, run.clone(), of.clone()));
+        let problem = first.map(|(run, of)| {
+            HealthProblem::Duplicates(self.duplicates.len() as u64, run.clone(), of.clone())
+        });
         problem.into_iter().collect()
     }
 }
@@ -219,8 +254,14 @@ fn slow(health: &Health, runs: usize) -> Vec<HealthProblem> {
 }
 
 fn badly_simulated(health: &Health) -> Vec<HealthProblem> {
-    let deep = health.deepest.iter().filter(|(depth, _)| *depth > DEEPEST_M);
-    let hot = health.energy.iter().filter(|(energy, _)| *energy > MOST_ENERGY_J);
+    let deep = health
+        .deepest
+        .iter()
+        .filter(|(depth, _)| *depth > DEEPEST_M);
+    let hot = health
+        .energy
+        .iter()
+        .filter(|(energy, _)| *energy > MOST_ENERGY_J);
     deep.map(|(depth, run)| HealthProblem::Penetration(run.clone(), *depth))
         .chain(hot.map(|(energy, run)| HealthProblem::Energy(run.clone(), *energy)))
         .collect()
@@ -261,7 +302,10 @@ mod tests {
     fn a_healthy_campaign_has_no_warning() {
         assert_eq!(problems(|_| ()), []);
         // Histories of older versions have no simulation data.
-        assert_eq!(problems(|run| (run.deepest_penetration_m, run.energy_gain_j) = (None, None)), []);
+        assert_eq!(
+            problems(|run| (run.deepest_penetration_m, run.energy_gain_j) = (None, None)),
+            []
+        );
     }
 
     #[test]
@@ -270,24 +314,42 @@ mod tests {
         let slow = problems(|run| run.wall_secs += if third(run) { 60.0 } else { 0.0 });
         assert_eq!(slow, [HealthProblem::Slow("k-3".into(), 61.2, 2.1)]);
         let same = problems(|run| run.choices = self::run(run.index.min(17)).choices);
-        assert_eq!(same, [HealthProblem::Duplicates(2, "k-19".into(), "k-18".into())]);
-        let deep = problems(|run| run.deepest_penetration_m = Some(if third(run) { 0.03 } else { 0.0 }));
+        assert_eq!(
+            same,
+            [HealthProblem::Duplicates(2, "k-19".into(), "k-18".into())]
+        );
+        let deep =
+            problems(|run| run.deepest_penetration_m = Some(if third(run) { 0.03 } else { 0.0 }));
         assert_eq!(deep, [HealthProblem::Penetration("k-3".into(), 0.03)]);
         let hot = problems(|run| run.energy_gain_j = Some(if third(run) { 2.0 } else { 0.0 }));
         assert_eq!(hot, [HealthProblem::Energy("k-3".into(), 2.0)]);
-        let crowded = problems(|run| run.discards = vec!["no place".to_owned(); usize::from(run.index % 4 == 1)]);
-        assert_eq!(crowded, [HealthProblem::Discards(5, 25, 2, "no place".into())]);
+        let crowded = problems(|run| {
+            run.discards = vec!["no place".to_owned(); usize::from(run.index % 4 == 1)]
+        });
+        assert_eq!(
+            crowded,
+            [HealthProblem::Discards(5, 25, 2, "no place".into())]
+        );
     }
 
     #[test]
     fn a_property_that_rarely_applies_is_reported() {
         let inapplicable = |applies: u64, all: u64| {
             let mut meter = HealthMeter::default();
-            let outcome = |at| if at < applies { Outcome::Passed } else { Outcome::Inapplicable };
+            let outcome = |at| {
+                if at < applies {
+                    Outcome::Passed
+                } else {
+                    Outcome::Inapplicable
+                }
+            };
             (0..all).for_each(|at| meter.add_outcomes("p", outcome(at), 1));
             meter.inapplicable()
         };
-        assert_eq!(inapplicable(1, 10), [HealthProblem::Inapplicable("p".into(), 9, 10)]);
+        assert_eq!(
+            inapplicable(1, 10),
+            [HealthProblem::Inapplicable("p".into(), 9, 10)]
+        );
         assert_eq!(inapplicable(2, 10), []);
         assert_eq!(inapplicable(0, 9), []);
     }

@@ -1,16 +1,16 @@
-//! Mutation testing of properties: which properties detect which faults, from paired outcomes of the same scenes
-//! without and with each fault.
+//! Mutation testing of properties: which properties detect which faults, from paired outcomes of
+//! the same scenes without and with each fault.
 
 use std::collections::BTreeMap;
 
 use crate::PairedTable;
 use actcheck_base::Outcome;
 
-/// Significance level at which a property notices a fault: of all pairs of a property and an unrelated fault, at most
-/// one in a hundred counts as noticed.
+/// Significance level at which a property notices a fault: of all pairs of a property and an
+/// unrelated fault, at most one in a hundred counts as noticed.
 pub const LEVEL: f64 = 0.01;
-/// Minimum number of scenes that passed without the fault. With fewer, even failures in all of them would not be
-/// significant (½⁷ < 0.01 < ½⁶).
+/// Minimum number of scenes that passed without the fault. With fewer, even failures in all of them
+/// would not be significant (½⁷ < 0.01 < ½⁶).
 const LEAST_SCENES: u64 = 7;
 
 /// A scene with one fault, or without a fault.
@@ -52,8 +52,8 @@ pub struct OracleCell {
     pub newly_failed: u64,
     /// Scenes in which it failed without the fault and passed with it.
     pub newly_passed: u64,
-    /// One-sided p-value of McNemar's exact test: the probability of so many new failures among the changed outcomes if
-    /// the fault had no effect on the property.
+    /// One-sided p-value of McNemar's exact test: the probability of so many new failures among the
+    /// changed outcomes if the fault had no effect on the property.
     pub p: f64,
     /// The conclusion.
     pub notice: Notice,
@@ -68,7 +68,8 @@ pub struct OracleRow {
     pub came_about: u64,
     /// Scenes in which the fault was injected.
     pub scenes: u64,
-    /// Scenes in which the fault occurred and no property failed: the action passes despite the fault.
+    /// Scenes in which the fault occurred and no property failed: the action passes despite the
+    /// fault.
     pub passed_anyway: u64,
     /// One cell for each property.
     pub cells: Vec<OracleCell>,
@@ -94,41 +95,70 @@ pub enum OracleGap {
     PropertyNoticesNothing(String),
     /// The fault occurred in this many scenes, too few to decide whether any property notices it.
     FaultTooRare(String, u64),
-    /// The property passed in this many scenes without a fault, too few to decide whether it notices any.
+    /// The property passed in this many scenes without a fault, too few to decide whether it
+    /// notices any.
     PropertyTooRare(String, u64),
     /// No property fails in this many scenes although the robot does nothing.
     NothingPasses(String, u64),
 }
 
 /// Computes the matrix of faults × properties, both in the given order.
-pub fn oracle_matrix(faults: &[&str], properties: &[String], trials: &[OracleTrial]) -> OracleMatrix {
+pub fn oracle_matrix(
+    faults: &[&str],
+    properties: &[String],
+    trials: &[OracleTrial],
+) -> OracleMatrix {
     let judged = |trial: &&OracleTrial| !trial.outcomes.is_empty();
-    let sound: BTreeMap<u64, &OracleTrial> =
-        trials.iter().filter(judged).filter(|trial| trial.fault.is_none()).map(|trial| (trial.index, trial)).collect();
+    let sound: BTreeMap<u64, &OracleTrial> = trials
+        .iter()
+        .filter(judged)
+        .filter(|trial| trial.fault.is_none())
+        .map(|trial| (trial.index, trial))
+        .collect();
     let rows = faults.iter().map(|fault| {
-        let tried: Vec<&OracleTrial> = trials.iter().filter(|trial| trial.fault.as_deref() == Some(*fault)).collect();
+        let tried: Vec<&OracleTrial> = trials
+            .iter()
+            .filter(|trial| trial.fault.as_deref() == Some(*fault))
+            .collect();
         let came_about: Vec<(&OracleTrial, &OracleTrial)> = tried
             .iter()
             .filter(|trial| trial.came_about && judged(trial))
             .filter_map(|trial| Some((*sound.get(&trial.index)?, *trial)))
             .collect();
-        let passes = |trial: &OracleTrial| trial.outcomes.values().all(|outcome| *outcome != Outcome::Failed);
+        let passes = |trial: &OracleTrial| {
+            trial
+                .outcomes
+                .values()
+                .all(|outcome| *outcome != Outcome::Failed)
+        };
         OracleRow {
             fault: (*fault).to_owned(),
             scenes: tried.len() as u64,
             came_about: came_about.len() as u64,
             passed_anyway: came_about.iter().filter(|(_, with)| passes(with)).count() as u64,
-            cells: properties.iter().map(|property| cell(property, &came_about)).collect(),
+            cells: properties
+                .iter()
+                .map(|property| cell(property, &came_about))
+                .collect(),
         }
     });
     let alone = |property: &String, wanted: Outcome| {
-        sound.values().filter(|trial| trial.outcomes.get(property) == Some(&wanted)).count() as u64
+        sound
+            .values()
+            .filter(|trial| trial.outcomes.get(property) == Some(&wanted))
+            .count() as u64
     };
     OracleMatrix {
         scenes: sound.len() as u64,
         properties: properties
             .iter()
-            .map(|property| (property.clone(), alone(property, Outcome::Passed), alone(property, Outcome::Failed)))
+            .map(|property| {
+                (
+                    property.clone(),
+                    alone(property, Outcome::Passed),
+                    alone(property, Outcome::Failed),
+                )
+            })
             .collect(),
         rows: rows.collect(),
     }
@@ -171,8 +201,8 @@ fn cell(property: &str, pairs: &[(&OracleTrial, &OracleTrial)]) -> OracleCell {
 }
 
 impl OracleMatrix {
-    /// Returns the gaps in fault detection. `idle` is the name of the fault with which the robot does nothing, so that
-    /// no action may pass.
+    /// Returns the gaps in fault detection. `idle` is the name of the fault with which the robot
+    /// does nothing, so that no action may pass.
     pub fn gaps(&self, idle: &str) -> Vec<OracleGap> {
         let mut gaps = Vec::new();
         for row in &self.rows {
@@ -183,11 +213,18 @@ impl OracleMatrix {
                 gaps.push(OracleGap::FaultUnnoticed(row.fault.clone()));
             }
             if row.fault == idle && row.passed_anyway > 0 {
-                gaps.push(OracleGap::NothingPasses(row.fault.clone(), row.passed_anyway));
+                gaps.push(OracleGap::NothingPasses(
+                    row.fault.clone(),
+                    row.passed_anyway,
+                ));
             }
         }
         for (idx, (property, passed, _)) in self.properties.iter().enumerate() {
-            let mut notices = self.rows.iter().filter_map(|row| row.cells.get(idx)).map(|cell| cell.notice);
+            let mut notices = self
+                .rows
+                .iter()
+                .filter_map(|row| row.cells.get(idx))
+                .map(|cell| cell.notice);
             if notices.clone().all(|notice| notice == Notice::TooFew) {
                 gaps.push(OracleGap::PropertyTooRare(property.clone(), *passed));
             } else if !notices.any(|notice| notice == Notice::Noticed) {
@@ -202,11 +239,21 @@ impl OracleMatrix {
 mod tests {
     use super::*;
 
-    /// Scenes whose properties pass without the fault. With it, the named properties fail if the fault occurred.
+    /// Scenes whose properties pass without the fault. With it, the named properties fail if the
+    /// fault occurred.
     fn trials(fault: &str, scenes: u64, came_about: u64, fails: &[&str]) -> Vec<OracleTrial> {
         let outcomes = |failed: &[&str]| {
             ["a", "b"]
-                .map(|name| (name.to_owned(), if failed.contains(&name) { Outcome::Failed } else { Outcome::Passed }))
+                .map(|name| {
+                    (
+                        name.to_owned(),
+                        if failed.contains(&name) {
+                            Outcome::Failed
+                        } else {
+                            Outcome::Passed
+                        },
+                    )
+                })
                 .into_iter()
                 .collect()
         };
@@ -219,7 +266,10 @@ mod tests {
         (0..scenes)
             .flat_map(|index| {
                 let here = index < came_about;
-                [one(index, None, true, &[]), one(index, Some(fault), here, if here { fails } else { &[] })]
+                [
+                    one(index, None, true, &[]),
+                    one(index, Some(fault), here, if here { fails } else { &[] }),
+                ]
             })
             .collect()
     }
@@ -232,9 +282,15 @@ mod tests {
     fn unnoticed_faults_and_blind_properties_are_named() {
         let b = || "b".to_owned();
         assert_eq!(gaps("slip", &trials("slip", 10, 10, &["a", "b"])), []);
-        assert_eq!(gaps("slip", &trials("slip", 10, 10, &["a"])), [OracleGap::PropertyNoticesNothing(b())]);
+        assert_eq!(
+            gaps("slip", &trials("slip", 10, 10, &["a"])),
+            [OracleGap::PropertyNoticesNothing(b())]
+        );
         let none = gaps("slip", &trials("slip", 10, 10, &[]));
-        let (fault, a) = (OracleGap::FaultUnnoticed("slip".into()), OracleGap::PropertyNoticesNothing("a".into()));
+        let (fault, a) = (
+            OracleGap::FaultUnnoticed("slip".into()),
+            OracleGap::PropertyNoticesNothing("a".into()),
+        );
         assert_eq!(none, [fault, a, OracleGap::PropertyNoticesNothing(b())]);
     }
 
@@ -244,14 +300,24 @@ mod tests {
         let matrix = oracle_matrix(&["slip"], &["a".to_owned()], &seldom);
         assert_eq!((matrix.rows[0].came_about, matrix.rows[0].scenes), (3, 10));
         assert_eq!(matrix.rows[0].cells[0].notice, Notice::TooFew);
-        assert!(matrix.gaps("idle").contains(&OracleGap::FaultTooRare("slip".into(), 3)));
+        assert!(
+            matrix
+                .gaps("idle")
+                .contains(&OracleGap::FaultTooRare("slip".into(), 3))
+        );
     }
 
     #[test]
     fn an_idle_robot_must_not_pass() {
         let mut some = trials("idle", 10, 10, &["a", "b"]);
         assert_eq!(gaps("idle", &some), []);
-        some[1].outcomes.values_mut().for_each(|outcome| *outcome = Outcome::Passed);
-        assert_eq!(gaps("idle", &some), [OracleGap::NothingPasses("idle".into(), 1)]);
+        some[1]
+            .outcomes
+            .values_mut()
+            .for_each(|outcome| *outcome = Outcome::Passed);
+        assert_eq!(
+            gaps("idle", &some),
+            [OracleGap::NothingPasses("idle".into(), 1)]
+        );
     }
 }

@@ -39,7 +39,8 @@ pub struct Difference {
 pub struct PairedTest {
     /// McNemar's exact test, two-sided.
     pub two_sided: f64,
-    /// Mid-p value: the observed table has half its weight. Less conservative, closer to the nominal level.
+    /// Mid-p value: the observed table has half its weight. Less conservative, closer to the
+    /// nominal level.
     pub mid_p: f64,
     /// One-sided p-value of "the second is worse".
     pub second_worse: f64,
@@ -68,22 +69,32 @@ impl PairedTable {
 
     /// Computes the difference of the rates, or returns `None` without scenes.
     ///
-    /// The interval is Tango's score interval, which keeps its coverage for few scenes and for tables with zeros.
-    /// Source: T. Tango, "Equivalence test and confidence interval for the difference in proportions for the
-    /// paired-sample design", Statistics in Medicine 17 (1998) 891–908.
+    /// The interval is Tango's score interval, which keeps its coverage for few scenes and for
+    /// tables with zeros. Source: T. Tango, "Equivalence test and confidence interval for the
+    /// difference in proportions for the paired-sample design", Statistics in Medicine 17 (1998)
+    /// 891–908.
     pub fn difference(self) -> Option<Difference> {
         if self.pairs() == 0 {
             return None;
         }
         let value = (self.only_second as f64 - self.only_first as f64) / self.pairs() as f64;
         // The score decreases with the hypothetical difference, and is 0 at the observed one.
-        let low = if value == -1.0 { -1.0 } else { crossing(-1.0, value, |supposed| self.score(supposed) > Z) };
-        let high = if value == 1.0 { 1.0 } else { crossing(value, 1.0, |supposed| self.score(supposed) > -Z) };
+        let low = if value == -1.0 {
+            -1.0
+        } else {
+            crossing(-1.0, value, |supposed| self.score(supposed) > Z)
+        };
+        let high = if value == 1.0 {
+            1.0
+        } else {
+            crossing(value, 1.0, |supposed| self.score(supposed) > -Z)
+        };
         Some(Difference { value, low, high })
     }
 
-    /// As [`PairedTable::difference`], valid for the way in which the number of scenes was decided. If outcomes did, the interval is that of
-    /// the difference of two shares of scenes, of which each keeps to its own interval with 97.5 % at any time.
+    /// As [`PairedTable::difference`], valid for the way in which the number of scenes was decided.
+    /// If outcomes did, the interval is that of the difference of two shares of scenes, of which
+    /// each keeps to its own interval with 97.5 % at any time.
     pub fn difference_by(self, sampling: Sampling) -> Option<Difference> {
         if sampling == Sampling::Fixed {
             return self.difference();
@@ -92,30 +103,45 @@ impl PairedTable {
         let share = |count: u64| anytime_share(count as f64 / pairs, pairs, 0.025);
         let (first, second) = (share(self.only_first)?, share(self.only_second)?);
         let value = (self.only_second as f64 - self.only_first as f64) / pairs;
-        Some(Difference { value, low: second.low - first.high, high: second.high - first.low })
+        Some(Difference {
+            value,
+            low: second.low - first.high,
+            high: second.high - first.low,
+        })
     }
 
     /// As [`PairedTable::test`], valid for the way in which the number of scenes was decided.
     ///
-    /// Source: if neither side is better, the likelihood of the directions of the discordant scenes, averaged over a uniform
-    /// prior of the probability of one direction, divided by that under ½, is a martingale of mean 1. By Ville's inequality,
-    /// its inverse is a valid p-value whenever the runs ended (Robbins, 1970). One-sided: the prior is uniform above ½.
+    /// Source: if neither side is better, the likelihood of the directions of the discordant
+    /// scenes, averaged over a uniform prior of the probability of one direction, divided by that
+    /// under ½, is a martingale of mean 1. By Ville's inequality, its inverse is a valid p-value
+    /// whenever the runs ended (Robbins, 1970). One-sided: the prior is uniform above ½.
     pub fn test_by(self, sampling: Sampling) -> PairedTest {
         if sampling == Sampling::Fixed {
             return self.test();
         }
         let (worse, better) = (self.only_first as f64 + 1.0, self.only_second as f64 + 1.0);
-        let ratio = libm::exp(ln_beta(worse, better) + (worse + better - 2.0) * std::f64::consts::LN_2);
+        let ratio =
+            libm::exp(ln_beta(worse, better) + (worse + better - 2.0) * std::f64::consts::LN_2);
         let above = 2.0 * (1.0 - beta_reg(worse, better, 0.5));
         let p = |ratio: f64| if ratio > 1.0 { 1.0 / ratio } else { 1.0 };
-        PairedTest { two_sided: p(ratio), mid_p: p(ratio), second_worse: p(ratio * above) }
+        PairedTest {
+            two_sided: p(ratio),
+            mid_p: p(ratio),
+            second_worse: p(ratio * above),
+        }
     }
 
-    /// Returns the distance of the observed difference above a hypothetical one in (-1, 1), in standard errors.
+    /// Returns the distance of the observed difference above a hypothetical one in (-1, 1), in
+    /// standard errors.
     fn score(self, supposed: f64) -> f64 {
-        let (n, up, down) = (self.pairs() as f64, self.only_second as f64, self.only_first as f64);
-        // Maximum likelihood estimate of the share of scenes that only the first passes, given the hypothetical
-        // difference: a root of ax² + bx + c.
+        let (n, up, down) = (
+            self.pairs() as f64,
+            self.only_second as f64,
+            self.only_first as f64,
+        );
+        // Maximum likelihood estimate of the share of scenes that only the first passes, given the
+        // hypothetical difference: a root of ax² + bx + c.
         let a = 2.0 * n;
         let b = -up - down + (2.0 * n - up + down) * supposed;
         let c = -down * supposed * (1.0 - supposed);
@@ -123,24 +149,33 @@ impl PairedTable {
         let variance = n * (2.0 * share + supposed * (1.0 - supposed));
         let distance = up - down - n * supposed;
         // Without variance, any difference is infinitely significant.
-        if distance == 0.0 { 0.0 } else { distance / libm::sqrt(variance.max(f64::MIN_POSITIVE)) }
+        if distance == 0.0 {
+            0.0
+        } else {
+            distance / libm::sqrt(variance.max(f64::MIN_POSITIVE))
+        }
     }
 
-    /// Performs McNemar's exact test: if neither side is better, either direction of a discordant scene has probability
-    /// ½.
+    /// Performs McNemar's exact test: if neither side is better, either direction of a discordant
+    /// scene has probability ½.
     ///
-    /// Source: Q. McNemar, Psychometrika 12 (1947) 153–157; its exact form and the mid-p value as in Fagerland,
-    /// Lydersen and Laake, BMC Medical Research Methodology 13 (2013) 91.
+    /// Source: Q. McNemar, Psychometrika 12 (1947) 153–157; its exact form and the mid-p value as
+    /// in Fagerland, Lydersen and Laake, BMC Medical Research Methodology 13 (2013) 91.
     pub fn test(self) -> PairedTest {
         let differing = self.only_first + self.only_second;
         let Ok(coins) = Binomial::new(0.5, differing) else {
-            return PairedTest { two_sided: 1.0, mid_p: 1.0, second_worse: 1.0 };
+            return PairedTest {
+                two_sided: 1.0,
+                mid_p: 1.0,
+                second_worse: 1.0,
+            };
         };
         let at_most = |count: u64| coins.cdf(count).min(1.0);
         let below = |count: u64| count.checked_sub(1).map_or(0.0, at_most);
         let fewer = self.only_first.min(self.only_second);
         let here = at_most(fewer) - below(fewer);
-        // "At least `only_first` discordant scenes" is by symmetry as probable as "at most `only_second`".
+        // "At least `only_first` discordant scenes" is by symmetry as probable as "at most
+        // `only_second`".
         PairedTest {
             two_sided: (2.0 * at_most(fewer)).min(1.0),
             mid_p: (2.0 * at_most(fewer) - here).min(1.0),
@@ -155,7 +190,11 @@ fn crossing(from: f64, to: f64, holds: impl Fn(f64) -> bool) -> f64 {
     // 60 halvings of an interval of at most 2 leave less than the last bit.
     for _ in 0..60 {
         let middle = 0.5 * (holding + failing);
-        if holds(middle) { holding = middle } else { failing = middle }
+        if holds(middle) {
+            holding = middle
+        } else {
+            failing = middle
+        }
     }
     0.5 * (holding + failing)
 }
@@ -165,18 +204,24 @@ mod tests {
     use super::*;
 
     fn table(both: u64, only_first: u64, only_second: u64, neither: u64) -> PairedTable {
-        PairedTable { both, only_first, only_second, neither }
+        PairedTable {
+            both,
+            only_first,
+            only_second,
+            neither,
+        }
     }
 
-    /// The examples of Fagerland, Lydersen and Laake, "Recommended tests and confidence intervals for paired binomial
-    /// proportions", Statistics in Medicine 33 (2014) 2850–2875: airway hyper-responsiveness (Bentur et al. 2009) and
-    /// complete response (Cavo et al. 2012). Their difference is the first rate minus the second, ours the second minus
-    /// the first.
+    /// The examples of Fagerland, Lydersen and Laake, "Recommended tests and confidence intervals
+    /// for paired binomial proportions", Statistics in Medicine 33 (2014) 2850–2875: airway
+    /// hyper-responsiveness (Bentur et al. 2009) and complete response (Cavo et al. 2012). Their
+    /// difference is the first rate minus the second, ours the second minus the first.
     #[test]
     fn results_match_published_examples() {
-        for (table, low, high, exact, mid_p) in
-            [(table(1, 1, 7, 12), 0.026, 0.517, 0.0703, 0.0391), (table(59, 6, 16, 80), 0.0054, 0.124, 0.0525, 0.0347)]
-        {
+        for (table, low, high, exact, mid_p) in [
+            (table(1, 1, 7, 12), 0.026, 0.517, 0.0703, 0.0391),
+            (table(59, 6, 16, 80), 0.0054, 0.124, 0.0525, 0.0347),
+        ] {
             let difference = table.difference().expect("the table has pairs");
             assert!((difference.low - low).abs() < 5e-4, "{difference:?}");
             assert!((difference.high - high).abs() < 5e-4, "{difference:?}");
@@ -199,10 +244,16 @@ mod tests {
             for only_second in 0..=differing {
                 let at_most = row[..=only_second as usize].iter().sum::<u64>() as f64 / all;
                 let test = table(3, differing - only_second, only_second, 5).test();
-                assert!((test.second_worse - at_most).abs() < 1e-12, "{test:?} {at_most}");
+                assert!(
+                    (test.second_worse - at_most).abs() < 1e-12,
+                    "{test:?} {at_most}"
+                );
                 let fewer = only_second.min(differing - only_second) as usize;
                 let two_sided = (2.0 * row[..=fewer].iter().sum::<u64>() as f64 / all).min(1.0);
-                assert!((test.two_sided - two_sided).abs() < 1e-12, "{test:?} {two_sided}");
+                assert!(
+                    (test.two_sided - two_sided).abs() < 1e-12,
+                    "{test:?} {two_sided}"
+                );
                 assert!(test.mid_p <= test.two_sided);
             }
         }
@@ -220,8 +271,14 @@ mod tests {
         ] {
             let difference = table.difference().expect("the table has pairs");
             assert_eq!(difference.value, value);
-            assert!(-1.0 <= difference.low && difference.low <= value, "{difference:?}");
-            assert!(value <= difference.high && difference.high <= 1.0, "{difference:?}");
+            assert!(
+                -1.0 <= difference.low && difference.low <= value,
+                "{difference:?}"
+            );
+            assert!(
+                value <= difference.high && difference.high <= 1.0,
+                "{difference:?}"
+            );
             assert!(difference.high - difference.low > 0.1, "{difference:?}");
         }
     }
@@ -229,7 +286,8 @@ mod tests {
     #[test]
     fn swapping_the_sides_negates_the_difference() {
         let (there, back) = (table(30, 12, 3, 9), table(30, 3, 12, 9));
-        let [there, back] = [there, back].map(|table| table.difference().expect("the table has pairs"));
+        let [there, back] =
+            [there, back].map(|table| table.difference().expect("the table has pairs"));
         assert!((there.low + back.high).abs() < 1e-12 && (there.high + back.low).abs() < 1e-12);
     }
 }

@@ -1,7 +1,9 @@
-//! Files below a folder that others may have written: no link is followed there, and only regular files are opened.
+//! Files below a folder that others may have written: no link is followed there, and only regular
+//! files are opened.
 //!
-//! A history, a launch or a cache may come with a foreign project. A link in it would lead writers and deleters to
-//! any file of the user; a pipe would never answer, and a device or a sparse file would fill the memory.
+//! A history, a launch or a cache may come with a foreign project. A link in it would lead writers
+//! and deleters to any file of the user; a pipe would never answer, and a device or a sparse file
+//! would fill the memory.
 
 use std::ffi::{OsStr, OsString};
 use std::fmt;
@@ -15,7 +17,8 @@ use rustix::fs::{AtFlags, CWD, Dir, FileType, Mode, OFlags};
 
 use crate::write_atomic::{NewFile, is_leftover};
 
-/// The folder itself, which may be a link: the user named it, or the caller has checked it. It need not exist.
+/// The folder itself, which may be a link: the user named it, or the caller has checked it. It need
+/// not exist.
 ///
 /// Every path that its methods take begins with it, and has no `..` after it.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -58,7 +61,8 @@ impl fmt::Display for FileKind {
     }
 }
 
-/// A path that is not used because of its kind: a link, a special file, or a folder in place of a file.
+/// A path that is not used because of its kind: a link, a special file, or a folder in place of a
+/// file.
 #[derive(Debug, thiserror::Error)]
 #[error("`{}` is {kind}, not {}", path.display(), wanted)]
 pub struct NotPlain {
@@ -77,13 +81,20 @@ impl NotPlain {
     }
 
     fn error(path: &Path, kind: FileKind, wanted: FileKind) -> io::Error {
-        io::Error::other(Self { path: path.to_path_buf(), kind, wanted })
+        io::Error::other(Self {
+            path: path.to_path_buf(),
+            kind,
+            wanted,
+        })
     }
 }
 
 const FOLDER: OFlags = OFlags::DIRECTORY.union(OFlags::CLOEXEC);
 /// Opening a pipe does not wait then.
-const PLAIN: OFlags = OFlags::NOFOLLOW.union(OFlags::NONBLOCK).union(OFlags::NOCTTY).union(OFlags::CLOEXEC);
+const PLAIN: OFlags = OFlags::NOFOLLOW
+    .union(OFlags::NONBLOCK)
+    .union(OFlags::NOCTTY)
+    .union(OFlags::CLOEXEC);
 /// Permissions of new files and folders, from which the user's mask takes some.
 const FILE_MODE: Mode = Mode::from_raw_mode(0o666);
 const FOLDER_MODE: Mode = Mode::from_raw_mode(0o777);
@@ -99,7 +110,8 @@ impl Below {
         &self.root
     }
 
-    /// The kind of a path. Returns `None` if there is nothing, or if a folder on the way can't be opened.
+    /// The kind of a path. Returns `None` if there is nothing, or if a folder on the way can't be
+    /// opened.
     pub fn kind(&self, path: &Path) -> Option<FileKind> {
         let (folder, name) = self.folder_of(path).ok()?;
         kind_in(&folder, name).ok()
@@ -127,7 +139,8 @@ impl Below {
     /// # Errors
     /// As [`Below::read`]; it is not text.
     pub fn read_text(&self, path: &Path, most: u64) -> io::Result<String> {
-        String::from_utf8(self.read(path, most)?).map_err(|error| io::Error::new(ErrorKind::InvalidData, error))
+        String::from_utf8(self.read(path, most)?)
+            .map_err(|error| io::Error::new(ErrorKind::InvalidData, error))
     }
 
     /// The names in a folder with their kinds, sorted. Empty if the folder does not exist.
@@ -159,7 +172,10 @@ impl Below {
     /// The paths of the regular files in a folder, sorted. Empty if the folder can't be read.
     pub fn files(&self, folder: &Path) -> Vec<PathBuf> {
         let entries = self.entries(folder).unwrap_or_default().into_iter();
-        entries.filter(|(_, kind)| *kind == FileKind::File).map(|(name, _)| folder.join(name)).collect()
+        entries
+            .filter(|(_, kind)| *kind == FileKind::File)
+            .map(|(name, _)| folder.join(name))
+            .collect()
     }
 
     /// Creates a folder and those on the way that are missing.
@@ -180,7 +196,8 @@ impl Below {
         Ok(())
     }
 
-    /// Creates a file that will have a name here when it is complete: see [`NewFile`]. A link of that name is replaced.
+    /// Creates a file that will have a name here when it is complete: see [`NewFile`]. A link of
+    /// that name is replaced.
     ///
     /// # Errors
     /// As [`Below::open`]; it can't be created.
@@ -200,8 +217,9 @@ impl Below {
         file.finish()
     }
 
-    /// Writes a file that can be made again: other processes see all of it or nothing, but after a power cut it may be
-    /// missing or empty. This takes a hundredth of the time of [`Below::write_atomic`].
+    /// Writes a file that can be made again: other processes see all of it or nothing, but after a
+    /// power cut it may be missing or empty. This takes a hundredth of the time of
+    /// [`Below::write_atomic`].
     ///
     /// # Errors
     /// As [`Below::write_atomic`].
@@ -261,12 +279,17 @@ impl Below {
         Ok(rustix::fs::unlinkat(&folder, name, AtFlags::REMOVEDIR)?)
     }
 
-    /// Removes the regular files below a folder that `is_ours` accepts by their path below it, partial ones, and the folders
-    /// that are empty then. Returns the paths of all that remains, sorted.
+    /// Removes the regular files below a folder that `is_ours` accepts by their path below it,
+    /// partial ones, and the folders that are empty then. Returns the paths of all that remains,
+    /// sorted.
     ///
     /// # Errors
     /// Something can't be removed.
-    pub fn remove_ours(&self, folder: &Path, is_ours: &dyn Fn(&Path) -> bool) -> io::Result<Vec<PathBuf>> {
+    pub fn remove_ours(
+        &self,
+        folder: &Path,
+        is_ours: &dyn Fn(&Path) -> bool,
+    ) -> io::Result<Vec<PathBuf>> {
         let mut left = Vec::new();
         self.remove_below(folder, folder, is_ours, &mut left)?;
         Ok(left)
@@ -289,17 +312,25 @@ impl Below {
             let below = path.strip_prefix(top).unwrap_or(&path);
             match kind {
                 FileKind::Folder => self.remove_below(top, &path, is_ours, left)?,
-                FileKind::File if is_ours(below) || path.file_name().is_some_and(is_leftover) => self.remove(&path)?,
+                FileKind::File if is_ours(below) || path.file_name().is_some_and(is_leftover) => {
+                    self.remove(&path)?
+                }
                 _ => left.push(path),
             }
         }
-        if left.len() == before { self.remove_folder(folder) } else { Ok(()) }
+        if left.len() == before {
+            self.remove_folder(folder)
+        } else {
+            Ok(())
+        }
     }
 
     /// Removes the partial files in a folder that killed processes have left: see [`NewFile`].
     pub fn remove_leftovers(&self, folder: &Path) {
         for path in self.files(folder) {
-            if path.file_name().is_some_and(is_leftover) && self.open(&path).is_ok_and(|file| file.try_lock().is_ok()) {
+            if path.file_name().is_some_and(is_leftover)
+                && self.open(&path).is_ok_and(|file| file.try_lock().is_ok())
+            {
                 // Harmless if it remains.
                 let _ = self.remove(&path);
             }
@@ -315,8 +346,9 @@ impl Below {
         Ok(rustix::fs::renameat(&from, old, &to, new)?)
     }
 
-    /// Gives a regular file that is below another folder a second name here, which takes no space. On another file system,
-    /// copies it. Files that may be linked are never changed, only replaced.
+    /// Gives a regular file that is below another folder a second name here, which takes no space.
+    /// On another file system, copies it. Files that may be linked are never changed, only
+    /// replaced.
     ///
     /// # Errors
     /// As [`Below::open`]; the new name can't be given, for example because it exists.
@@ -380,8 +412,8 @@ impl Below {
     }
 }
 
-/// Opens a file that the user named, or that a file of the project names, for reading: a link is followed. Pipes and devices
-/// are refused.
+/// Opens a file that the user named, or that a file of the project names, for reading: a link is
+/// followed. Pipes and devices are refused.
 ///
 /// # Errors
 /// [`NotPlain`] it is not a regular file; it can't be opened.
@@ -391,7 +423,14 @@ pub fn open_regular(path: &Path) -> io::Result<File> {
     if kind != FileKind::File {
         return Err(NotPlain::error(path, kind, FileKind::File));
     }
-    checked(File::from(rustix::fs::open(path, PLAIN.difference(OFlags::NOFOLLOW), Mode::empty())?), path)
+    checked(
+        File::from(rustix::fs::open(
+            path,
+            PLAIN.difference(OFlags::NOFOLLOW),
+            Mode::empty(),
+        )?),
+        path,
+    )
 }
 
 /// Reads a file of at most `most` bytes as [`open_regular`] opens it.
@@ -412,30 +451,52 @@ fn read_up_to(file: File, most: u64) -> io::Result<Vec<u8>> {
     let mut bytes = Vec::with_capacity(usize::try_from(length).unwrap_or_default());
     // Some files are longer than their metadata says.
     file.take(most + 1).read_to_end(&mut bytes)?;
-    if bytes.len() as u64 > most { Err(too_long()) } else { Ok(bytes) }
+    if bytes.len() as u64 > most {
+        Err(too_long())
+    } else {
+        Ok(bytes)
+    }
 }
 
 pub(crate) fn or_here(path: &Path) -> &Path {
-    if path.as_os_str().is_empty() { Path::new(".") } else { path }
+    if path.as_os_str().is_empty() {
+        Path::new(".")
+    } else {
+        path
+    }
 }
 
 /// Opens a folder that may be a link.
 pub(crate) fn open_root(root: &Path) -> io::Result<OwnedFd> {
-    Ok(rustix::fs::openat(CWD, or_here(root), FOLDER | OFlags::RDONLY, Mode::empty())?)
+    Ok(rustix::fs::openat(
+        CWD,
+        or_here(root),
+        FOLDER | OFlags::RDONLY,
+        Mode::empty(),
+    )?)
 }
 
 /// Opens a folder in a folder.
 fn folder_in(folder: &OwnedFd, name: &OsStr, path: &Path) -> io::Result<OwnedFd> {
-    rustix::fs::openat(folder, name, FOLDER | OFlags::NOFOLLOW | OFlags::RDONLY, Mode::empty()).map_err(|error| {
-        match kind_in(folder, name) {
-            Ok(kind) if kind != FileKind::Folder => NotPlain::error(path, kind, FileKind::Folder),
-            _ => error.into(),
-        }
+    rustix::fs::openat(
+        folder,
+        name,
+        FOLDER | OFlags::NOFOLLOW | OFlags::RDONLY,
+        Mode::empty(),
+    )
+    .map_err(|error| match kind_in(folder, name) {
+        Ok(kind) if kind != FileKind::Folder => NotPlain::error(path, kind, FileKind::Folder),
+        _ => error.into(),
     })
 }
 
 /// Opens a regular file in a folder. `path` is named in the error.
-pub(crate) fn open_in(folder: &OwnedFd, name: &OsStr, path: &Path, flags: OFlags) -> io::Result<File> {
+pub(crate) fn open_in(
+    folder: &OwnedFd,
+    name: &OsStr,
+    path: &Path,
+    flags: OFlags,
+) -> io::Result<File> {
     match kind_in(folder, name) {
         Ok(FileKind::File) => {}
         // Opening a device can have effects.
@@ -450,7 +511,11 @@ pub(crate) fn open_in(folder: &OwnedFd, name: &OsStr, path: &Path, flags: OFlags
 /// The file, if it is a regular one: another process may have replaced it after it was looked at.
 fn checked(file: File, path: &Path) -> io::Result<File> {
     let kind = FileKind::of(FileType::from_raw_mode(rustix::fs::fstat(&file)?.st_mode));
-    if kind == FileKind::File { Ok(file) } else { Err(NotPlain::error(path, kind, FileKind::File)) }
+    if kind == FileKind::File {
+        Ok(file)
+    } else {
+        Err(NotPlain::error(path, kind, FileKind::File))
+    }
 }
 
 fn kind_in(folder: &OwnedFd, name: &OsStr) -> io::Result<FileKind> {
@@ -459,5 +524,8 @@ fn kind_in(folder: &OwnedFd, name: &OsStr) -> io::Result<FileKind> {
 }
 
 fn outside(path: &Path) -> io::Error {
-    io::Error::new(ErrorKind::InvalidInput, format!("`{}` leads out of its folder", path.display()))
+    io::Error::new(
+        ErrorKind::InvalidInput,
+        format!("`{}` leads out of its folder", path.display()),
+    )
 }

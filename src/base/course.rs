@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 
 use crate::Steps;
 
-/// A recorded quantity: its IRI, the thing's IRI, and for quantities of two things the IRI of the second, else an empty
-/// string.
+/// A recorded quantity: its IRI, the thing's IRI, and for quantities of two things the IRI of the
+/// second, else an empty string.
 pub type SignalKey = [String; 3];
 
 /// Samples of one quantity.
@@ -32,7 +32,10 @@ impl Signal {
             Self::Values(values) => values.clone(),
             Self::Steps { per_unit, steps } => {
                 let per_unit = f64::from((*per_unit).max(1));
-                steps.iter().map(|steps| f64::from(*steps) / per_unit).collect()
+                steps
+                    .iter()
+                    .map(|steps| f64::from(*steps) / per_unit)
+                    .collect()
             }
         };
         let last = values.last().copied().unwrap_or(f64::NAN);
@@ -41,7 +44,8 @@ impl Signal {
     }
 }
 
-/// A convex solid of a thing: every point within a distance of the convex hull of some points. Frame: the thing's.
+/// A convex solid of a thing: every point within a distance of the convex hull of some points.
+/// Frame: the thing's.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Solid {
     /// Unit: metres.
@@ -66,20 +70,32 @@ pub struct Course {
 impl Course {
     /// Creates a course without quantities.
     pub fn new(period_secs: f64, count: usize) -> Self {
-        Self { period_secs, count, ..Self::default() }
+        Self {
+            period_secs,
+            count,
+            ..Self::default()
+        }
     }
 
     /// Sets the samples of a quantity. The order of the two things of a pair doesn't matter.
     pub fn set(&mut self, [quantity, first, second]: SignalKey, signal: Signal) {
-        let key =
-            if second.is_empty() || first <= second { [quantity, first, second] } else { [quantity, second, first] };
+        let key = if second.is_empty() || first <= second {
+            [quantity, first, second]
+        } else {
+            [quantity, second, first]
+        };
         self.signals.insert(key, signal);
     }
 
     /// Returns the samples of a quantity; `None` if it was not recorded.
     pub fn get(&self, quantity: &str, first: &str, second: &str) -> Option<&Signal> {
-        let (first, second) = if second.is_empty() || first <= second { (first, second) } else { (second, first) };
-        self.signals.get(&[quantity, first, second].map(str::to_owned))
+        let (first, second) = if second.is_empty() || first <= second {
+            (first, second)
+        } else {
+            (second, first)
+        };
+        self.signals
+            .get(&[quantity, first, second].map(str::to_owned))
     }
 
     /// Sets the solids of a thing, for distances between surfaces.
@@ -115,11 +131,26 @@ mod tests {
     fn a_pair_is_found_in_both_orders_and_things_of_a_quantity_are_listed() {
         let mut course = Course::new(0.5, 3);
         let key = |parts: [&str; 3]| parts.map(str::to_owned);
-        course.set(key(["force", "b", "a"]), Signal::Steps { per_unit: 10, steps: vec![1, 2].into() });
+        course.set(
+            key(["force", "b", "a"]),
+            Signal::Steps {
+                per_unit: 10,
+                steps: vec![1, 2].into(),
+            },
+        );
         course.set(key(["z", "a", ""]), Signal::Constant(4.0));
         assert_eq!(course.get("force", "a", "b"), course.get("force", "b", "a"));
-        assert_eq!(course.get("force", "a", "b").map(|signal| signal.values(3)), Some(vec![0.1, 0.2, 0.2]));
-        assert_eq!(course.of("force").map(|(things, _)| things.to_vec()).collect::<Vec<_>>(), [["a", "b"]]);
+        assert_eq!(
+            course.get("force", "a", "b").map(|signal| signal.values(3)),
+            Some(vec![0.1, 0.2, 0.2])
+        );
+        assert_eq!(
+            course
+                .of("force")
+                .map(|(things, _)| things.to_vec())
+                .collect::<Vec<_>>(),
+            [["a", "b"]]
+        );
         assert_eq!(course.get("x", "a", ""), None);
     }
 }

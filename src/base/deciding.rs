@@ -15,7 +15,8 @@ pub struct DecidingSignal {
     pub values: Vec<f64>,
     /// The value that it is compared with: one for each sample.
     pub limit: Vec<f64>,
-    /// First and last sample of the interval around the moment in which the comparison stays as it is there.
+    /// First and last sample of the interval around the moment in which the comparison stays as it
+    /// is there.
     pub interval: [usize; 2],
     /// The deciding sample.
     pub at: usize,
@@ -35,13 +36,27 @@ impl DecidingSignal {
     /// The limit, if it is the same at every sample.
     pub fn constant_limit(&self) -> Option<f64> {
         let first = *self.limit.first()?;
-        self.limit.iter().all(|value| *value == first).then_some(first)
+        self.limit
+            .iter()
+            .all(|value| *value == first)
+            .then_some(first)
     }
 
     /// Smallest and largest finite value of the quantity and of its limit.
     pub fn range(&self) -> [f64; 2] {
-        let finite = self.values.iter().chain(&self.limit).copied().filter(|value| value.is_finite());
-        let range = finite.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], one| [low.min(one), high.max(one)]);
-        if range[0] <= range[1] { range } else { [0.0, 1.0] }
+        let finite = self
+            .values
+            .iter()
+            .chain(&self.limit)
+            .copied()
+            .filter(|value| value.is_finite());
+        let range = finite.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], one| {
+            [low.min(one), high.max(one)]
+        });
+        if range[0] <= range[1] {
+            range
+        } else {
+            [0.0, 1.0]
+        }
     }
 }

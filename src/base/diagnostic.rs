@@ -50,7 +50,10 @@ impl Diagnostic {
 
     /// Creates a warning without a place.
     pub fn warning(code: &'static str, message: impl Into<String>) -> Self {
-        Self { severity: Severity::Warning, ..Self::error(code, message) }
+        Self {
+            severity: Severity::Warning,
+            ..Self::error(code, message)
+        }
     }
 
     /// Adds a place in a text.
@@ -75,7 +78,8 @@ impl Diagnostic {
         self
     }
 
-    /// Returns `file:line:column`, or only the file if the span is unknown, or `None` without a file.
+    /// Returns `file:line:column`, or only the file if the span is unknown, or `None` without a
+    /// file.
     pub fn place(&self) -> Option<String> {
         let source = self.source.as_ref()?;
         Some(match &self.span {
@@ -105,7 +109,8 @@ fn readable(mut message: String) -> String {
     message
 }
 
-/// Longest message. Unit: characters. A contradiction's proof or a cycle of rules takes a few thousand.
+/// Longest message. Unit: characters. A contradiction's proof or a cycle of rules takes a few
+/// thousand.
 const LONGEST_MESSAGE: usize = 20_000;
 /// Longest part of a text shown before a span, in it, and after it. Unit: bytes.
 const MOST_SHOWN: usize = 300;
@@ -123,19 +128,26 @@ impl miette::Diagnostic for Diagnostic {
     }
 
     fn help<'a>(&'a self) -> Option<Box<dyn fmt::Display + 'a>> {
-        self.help.as_ref().map(|help| Box::new(help) as Box<dyn fmt::Display>)
+        self.help
+            .as_ref()
+            .map(|help| Box::new(help) as Box<dyn fmt::Display>)
     }
 
     fn source_code(&self) -> Option<&dyn miette::SourceCode> {
         // Without a span there is nothing to underline; the message names the file instead.
         self.span.as_ref()?;
-        self.source.as_ref().map(|source| source as &dyn miette::SourceCode)
+        self.source
+            .as_ref()
+            .map(|source| source as &dyn miette::SourceCode)
     }
 
     fn labels(&self) -> Option<Box<dyn Iterator<Item = miette::LabeledSpan> + '_>> {
         let (span, source) = (self.span.clone()?, self.source.as_ref()?);
         let end = source.boundary(span.end.min(span.start.saturating_add(MOST_SHOWN)));
-        Some(Box::new(std::iter::once(miette::LabeledSpan::at(span.start..end.max(span.start), "here"))))
+        Some(Box::new(std::iter::once(miette::LabeledSpan::at(
+            span.start..end.max(span.start),
+            "here",
+        ))))
     }
 }
 
@@ -146,16 +158,26 @@ impl miette::SourceCode for Source {
         context_lines_before: usize,
         context_lines_after: usize,
     ) -> Result<Box<dyn miette::SpanContents<'a> + 'a>, miette::MietteError> {
-        let contents = self.text.as_ref().read_span(span, context_lines_before, context_lines_after)?;
+        let contents =
+            self.text
+                .as_ref()
+                .read_span(span, context_lines_before, context_lines_after)?;
         let whole = contents.span().offset()..contents.span().offset() + contents.data().len();
         let (mut shown, mut line, mut column) = (whole.clone(), contents.line(), contents.column());
         if whole.len() > 3 * MOST_SHOWN {
-            // A line of several megabytes takes minutes to draw: show only the surroundings of the span.
-            shown.start = self.boundary(span.offset().saturating_sub(MOST_SHOWN)).max(whole.start);
-            shown.end = self.boundary(span.offset() + span.len() + MOST_SHOWN).min(whole.end);
+            // A line of several megabytes takes minutes to draw: show only the surroundings of the
+            // span.
+            shown.start = self
+                .boundary(span.offset().saturating_sub(MOST_SHOWN))
+                .max(whole.start);
+            shown.end = self
+                .boundary(span.offset() + span.len() + MOST_SHOWN)
+                .min(whole.end);
             let cut = &self.text[whole.start..shown.start];
             line += cut.matches('\n').count();
-            column = cut.rfind('\n').map_or(column + cut.len(), |idx| cut.len() - idx - 1);
+            column = cut
+                .rfind('\n')
+                .map_or(column + cut.len(), |idx| cut.len() - idx - 1);
         }
         Ok(Box::new(miette::MietteSpanContents::new_named(
             self.name.to_string(),
@@ -210,21 +232,30 @@ impl Diagnostics {
         self.found.iter()
     }
 
-    /// Returns `Ok(value)` if there are no errors, otherwise `Err` with all diagnostics. `Ok` drops warnings.
+    /// Returns `Ok(value)` if there are no errors, otherwise `Err` with all diagnostics. `Ok` drops
+    /// warnings.
     pub fn or<T>(self, value: T) -> Result<T, Diagnostics> {
-        if self.has_errors() { Err(self) } else { Ok(value) }
+        if self.has_errors() {
+            Err(self)
+        } else {
+            Ok(value)
+        }
     }
 }
 
 impl From<Diagnostic> for Diagnostics {
     fn from(diagnostic: Diagnostic) -> Self {
-        Self { found: vec![diagnostic] }
+        Self {
+            found: vec![diagnostic],
+        }
     }
 }
 
 impl FromIterator<Diagnostic> for Diagnostics {
     fn from_iter<T: IntoIterator<Item = Diagnostic>>(faults: T) -> Self {
-        Self { found: faults.into_iter().collect() }
+        Self {
+            found: faults.into_iter().collect(),
+        }
     }
 }
 

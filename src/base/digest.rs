@@ -6,8 +6,8 @@ use sha2::{Digest as _, Sha256};
 
 static PROGRAM_DIGEST: OnceLock<&'static str> = OnceLock::new();
 
-/// Sets the digest of the sources that this program was built from, including its dependencies. Only the first call has
-/// an effect.
+/// Sets the digest of the sources that this program was built from, including its dependencies.
+/// Only the first call has an effect.
 pub fn set_program_digest(sources_digest: &'static str) {
     PROGRAM_DIGEST.get_or_init(|| sources_digest);
 }
@@ -17,8 +17,8 @@ pub fn program_digest() -> &'static str {
     PROGRAM_DIGEST.get().copied().unwrap_or_default()
 }
 
-/// An incremental SHA-256 over parts. Each part is preceded by its length, so that different splits give different
-/// digests.
+/// An incremental SHA-256 over parts. Each part is preceded by its length, so that different splits
+/// give different digests.
 #[derive(Debug, Clone, Default)]
 pub struct Digest(Sha256);
 
@@ -44,7 +44,12 @@ impl Digest {
 
     /// Returns the first 128 bits in hexadecimal.
     pub fn finish(self) -> String {
-        self.0.finalize().iter().take(16).map(|byte| format!("{byte:02x}")).collect()
+        self.0
+            .finalize()
+            .iter()
+            .take(16)
+            .map(|byte| format!("{byte:02x}"))
+            .collect()
     }
 }
 

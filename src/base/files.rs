@@ -30,17 +30,18 @@ impl Files {
 
     fn read_up_to(&self, path: &Path, longest: u64) -> Result<Vec<u8>, String> {
         match self {
-            Self::Shipped => {
-                shipped::read(&slashed(&normalised(path))).ok_or_else(|| "no built-in file has this path".to_owned())
-            }
+            Self::Shipped => shipped::read(&slashed(&normalised(path)))
+                .ok_or_else(|| "no built-in file has this path".to_owned()),
             Self::Disk => read_disk(path, longest),
         }
     }
 
-    /// Reads a text of at most 64 MiB. The source's name is the path, prefixed with `built-in:` for embedded files.
+    /// Reads a text of at most 64 MiB. The source's name is the path, prefixed with `built-in:` for
+    /// embedded files.
     ///
     /// # Errors
-    /// Returns the reason as a lower-case sentence without the path. Devices and pipes are refused: they may have no end.
+    /// Returns the reason as a lower-case sentence without the path. Devices and pipes are refused:
+    /// they may have no end.
     pub fn read(&self, path: &Path) -> Result<Source, String> {
         self.read_text(path, LONGEST_TEXT)
     }
@@ -58,16 +59,21 @@ impl Files {
             Self::Shipped => format!("built-in:{}", slashed(&normalised(path))),
             Self::Disk => path.display().to_string(),
         };
-        let text = String::from_utf8(self.read_up_to(path, longest)?).map_err(|_| "it is not UTF-8 text")?;
+        let text = String::from_utf8(self.read_up_to(path, longest)?)
+            .map_err(|_| "it is not UTF-8 text")?;
         Ok(Source::new(name, text))
     }
 
-    /// Returns the paths of the files directly in a folder, sorted; empty if the folder does not exist.
+    /// Returns the paths of the files directly in a folder, sorted; empty if the folder does not
+    /// exist.
     pub fn list(&self, folder: &Path) -> Vec<PathBuf> {
         let mut paths: Vec<PathBuf> = match self {
             Self::Shipped => {
                 let folder = normalised(folder);
-                shipped::paths().into_iter().filter(|path| path.parent() == Some(&folder)).collect()
+                shipped::paths()
+                    .into_iter()
+                    .filter(|path| path.parent() == Some(&folder))
+                    .collect()
             }
             Self::Disk => std::fs::read_dir(folder)
                 .into_iter()
@@ -89,7 +95,8 @@ impl Files {
         paths
     }
 
-    /// Returns the paths of the direct subfolders of a folder, sorted; empty if the folder does not exist.
+    /// Returns the paths of the direct subfolders of a folder, sorted; empty if the folder does not
+    /// exist.
     pub fn folders(&self, folder: &Path) -> Vec<PathBuf> {
         let mut paths: Vec<PathBuf> = match self {
             Self::Shipped => {
@@ -140,7 +147,10 @@ fn normalised(path: &Path) -> PathBuf {
 }
 
 fn slashed(path: &Path) -> String {
-    path.components().map(|c| c.as_os_str().to_string_lossy()).collect::<Vec<_>>().join("/")
+    path.components()
+        .map(|c| c.as_os_str().to_string_lossy())
+        .collect::<Vec<_>>()
+        .join("/")
 }
 
 fn describe(error: &std::io::Error) -> String {

@@ -11,7 +11,8 @@ pub struct Findings {
     pub applicable: bool,
     /// Whether the property holds.
     pub holds: bool,
-    /// The tuples that prove the outcome: of `success` or `violation`, sorted. At most [`Findings::WITNESS_LIMIT`].
+    /// The tuples that prove the outcome: of `success` or `violation`, sorted. At most
+    /// [`Findings::WITNESS_LIMIT`].
     pub witness: Vec<WitnessRow>,
     /// Total number of such tuples.
     pub witness_count: usize,
@@ -73,7 +74,8 @@ pub enum RuleFault {
 }
 
 impl RuleFault {
-    /// Returns the outcome of a property that could not be decided: `Timeout`, `Broken` or `Untested`.
+    /// Returns the outcome of a property that could not be decided: `Timeout`, `Broken` or
+    /// `Untested`.
     pub fn outcome(&self) -> Outcome {
         match self {
             Self::BudgetSpent(_) => Outcome::Timeout,

@@ -2,7 +2,8 @@
 
 use std::fmt;
 
-/// Outcome of one property in one action execution. The six outcomes are never reduced to pass and fail.
+/// Outcome of one property in one action execution. The six outcomes are never reduced to pass and
+/// fail.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(rename_all = "lowercase"))]
@@ -23,8 +24,14 @@ pub enum Outcome {
 
 impl Outcome {
     /// All six outcomes, in the order of reports.
-    pub const ALL: [Self; 6] =
-        [Self::Passed, Self::Failed, Self::Inapplicable, Self::Broken, Self::Timeout, Self::Untested];
+    pub const ALL: [Self; 6] = [
+        Self::Passed,
+        Self::Failed,
+        Self::Inapplicable,
+        Self::Broken,
+        Self::Timeout,
+        Self::Untested,
+    ];
 
     /// Returns the outcome's name.
     pub fn word(self) -> &'static str {
@@ -71,18 +78,20 @@ pub struct Judgement {
     pub outcome: Outcome,
     /// Distance from flipping, in the property's unit; positive if passed.
     pub margin: Option<f64>,
-    /// Explanation: the rule author's text, or the witness tuples as text, or the reason of a fault.
+    /// Explanation: the rule author's text, or the witness tuples as text, or the reason of a
+    /// fault.
     pub witness: String,
     /// Digest of the rule file that decided. Empty if none did.
     pub rule_digest: String,
-    /// Whether a passed property had already held before the action. If so, it is no evidence about the action.
+    /// Whether a passed property had already held before the action. If so, it is no evidence about
+    /// the action.
     ///
-    /// `None` if this was not checked: if the property did not pass, or if it states that something must not happen,
-    /// which is always the case before an action.
+    /// `None` if this was not checked: if the property did not pass, or if it states that something
+    /// must not happen, which is always the case before an action.
     #[cfg_attr(feature = "serde", serde(default))]
     pub held_before: Option<bool>,
-    /// Whether a passed property would also have passed if the right side of each of its `implies` were false: no left side
-    /// held. If so, the pass is no evidence about the right side.
+    /// Whether a passed property would also have passed if the right side of each of its `implies`
+    /// were false: no left side held. If so, the pass is no evidence about the right side.
     ///
     /// `None` if the property did not pass or has no such `implies`.
     #[cfg_attr(feature = "serde", serde(default))]
@@ -92,10 +101,24 @@ pub struct Judgement {
 impl Judgement {
     /// Whether two judgements are equal in every field. Unlike `==`, two NaN margins are equal.
     pub fn same_as(&self, other: &Self) -> bool {
-        let margin =
-            |of: &Self| of.margin.map(|value| if value.is_nan() { f64::NAN.to_bits() } else { value.to_bits() });
-        let texts = |of: &Self| [of.property.clone(), of.witness.clone(), of.rule_digest.clone()];
-        (self.outcome, self.held_before, self.vacuous) == (other.outcome, other.held_before, other.vacuous)
+        let margin = |of: &Self| {
+            of.margin.map(|value| {
+                if value.is_nan() {
+                    f64::NAN.to_bits()
+                } else {
+                    value.to_bits()
+                }
+            })
+        };
+        let texts = |of: &Self| {
+            [
+                of.property.clone(),
+                of.witness.clone(),
+                of.rule_digest.clone(),
+            ]
+        };
+        (self.outcome, self.held_before, self.vacuous)
+            == (other.outcome, other.held_before, other.vacuous)
             && margin(self) == margin(other)
             && texts(self) == texts(other)
     }

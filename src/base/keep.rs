@@ -8,7 +8,8 @@ pub enum Keep {
     /// Everything of every run.
     #[default]
     All,
-    /// Everything of runs in which a property failed or that did not complete, and the outlines of the others.
+    /// Everything of runs in which a property failed or that did not complete, and the outlines of
+    /// the others.
     Failures,
     /// The outlines of all runs.
     Outcomes,
@@ -38,8 +39,9 @@ pub struct Keeping {
 }
 
 impl Keeping {
-    /// Whether a run is kept whole. Depends on nothing but its arguments, so that shards and resumed campaigns decide
-    /// alike. `seed` is that of the campaign, `index` the position of the run in it.
+    /// Whether a run is kept whole. Depends on nothing but its arguments, so that shards and
+    /// resumed campaigns decide alike. `seed` is that of the campaign, `index` the position of the
+    /// run in it.
     pub fn keeps_whole(&self, seed: u64, index: u64, failed: bool) -> bool {
         match self.keep {
             Keep::All => true,
@@ -67,7 +69,11 @@ mod tests {
     #[test]
     fn about_the_given_share_of_runs_is_kept_whole() {
         let keeping = |keep, whole_share| Keeping { keep, whole_share };
-        let kept = |of: Keeping, failed| (0..10_000).filter(|index| of.keeps_whole(7, *index, failed)).count();
+        let kept = |of: Keeping, failed| {
+            (0..10_000)
+                .filter(|index| of.keeps_whole(7, *index, failed))
+                .count()
+        };
         for keep in [Keep::Failures, Keep::Outcomes] {
             assert_eq!(kept(keeping(keep, 0.0), false), 0);
             assert_eq!(kept(keeping(keep, 1.0), false), 10_000);
@@ -77,7 +83,11 @@ mod tests {
         assert_eq!(kept(keeping(Keep::Failures, 0.0), true), 10_000);
         assert_eq!(kept(keeping(Keep::Outcomes, 0.0), true), 0);
         assert_eq!(kept(keeping(Keep::All, 0.0), false), 10_000);
-        let of = |seed| (0..64).map(|index| keeping(Keep::Outcomes, 0.5).keeps_whole(seed, index, false)).collect();
+        let of = |seed| {
+            (0..64)
+                .map(|index| keeping(Keep::Outcomes, 0.5).keeps_whole(seed, index, false))
+                .collect()
+        };
         let (one, other): (Vec<bool>, Vec<bool>) = (of(1), of(2));
         assert_ne!(one, other);
     }

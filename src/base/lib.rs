@@ -1,4 +1,5 @@
-//! Types shared by all stages: sources and diagnostics, RDF terms, facts, findings, outcomes, and files.
+//! Types shared by all stages: sources and diagnostics, RDF terms, facts, findings, outcomes, and
+//! files.
 //!
 //! Never: reads a configuration, depends on actions, rules or robots, or prints.
 
@@ -45,8 +46,8 @@ pub use keep::{Keep, Keeping};
 pub use panic_guard::guarded;
 pub use printable::{printable, printable_in_colour};
 pub use query_texts::{
-    COUNTED_TEXT, MOST_NESTED_CALLS, TEXT_FUNCTIONS, TextFunction, TextTooLong, bounded_texts, check_calls,
-    check_calls_within, string_end,
+    COUNTED_TEXT, MOST_NESTED_CALLS, TEXT_FUNCTIONS, TextFunction, TextTooLong, bounded_texts,
+    check_calls, check_calls_within, string_end,
 };
 pub use rotation::{tilt_of, yaw_of};
 pub use run_facts::{ActionFacts, CONSTANT_PROPERTIES, RunFacts, Triple};

@@ -30,8 +30,8 @@ pub const PROV: &str = "http://www.w3.org/ns/prov#";
 /// Longest id of a campaign or a run. Unit: bytes.
 const LONGEST_ID: usize = 128;
 
-/// Prefixes that shipped queries and messages may use. If one namespace begins with another, the longer
-/// one comes first.
+/// Prefixes that shipped queries and messages may use. If one namespace begins with another, the
+/// longer one comes first.
 pub const PREFIXES: [(&str, &str); 11] = [
     ("act", ACT),
     ("w", W),
@@ -61,11 +61,14 @@ pub fn obj(id: &str) -> String {
     format!("{OBJ}{id}")
 }
 
-/// Returns `true` if a text can be the id of a campaign or a run: letters, digits, `-` and `_`, beginning with a letter or
-/// digit. Ids are parts of file names, so an id of a foreign history must not lead out of a folder.
+/// Returns `true` if a text can be the id of a campaign or a run: letters, digits, `-` and `_`,
+/// beginning with a letter or digit. Ids are parts of file names, so an id of a foreign history
+/// must not lead out of a folder.
 pub fn is_id(text: &str) -> bool {
     let allowed = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
-    text.len() <= LONGEST_ID && text.starts_with(|c: char| c.is_ascii_alphanumeric()) && text.chars().all(allowed)
+    text.len() <= LONGEST_ID
+        && text.starts_with(|c: char| c.is_ascii_alphanumeric())
+        && text.chars().all(allowed)
 }
 
 /// Returns the local name of an IRI: the part after its last `#` or `/`.
@@ -77,7 +80,9 @@ pub fn local(iri: &str) -> &str {
 pub fn shorten(iri: &str) -> String {
     for (prefix, namespace) in PREFIXES {
         if let Some(rest) = iri.strip_prefix(namespace)
-            && rest.chars().all(|c| c.is_alphanumeric() || "_-".contains(c))
+            && rest
+                .chars()
+                .all(|c| c.is_alphanumeric() || "_-".contains(c))
         {
             return format!("{prefix}:{rest}");
         }
@@ -85,18 +90,26 @@ pub fn shorten(iri: &str) -> String {
     format!("<{iri}>")
 }
 
-/// Whether a text is an absolute IRI that every RDF parser accepts. (A few exotic IRIs are not recognised, such as those
-/// with IPv6 addresses.)
+/// Whether a text is an absolute IRI that every RDF parser accepts. (A few exotic IRIs are not
+/// recognised, such as those with IPv6 addresses.)
 pub fn is_iri(text: &str) -> bool {
-    let Some((scheme, rest)) = text.split_once(':') else { return false };
+    let Some((scheme, rest)) = text.split_once(':') else {
+        return false;
+    };
     let begins = scheme.starts_with(|c: char| c.is_ascii_alphabetic());
-    if !begins || !scheme.chars().all(|c| c.is_ascii_alphanumeric() || "+-.".contains(c)) {
+    if !begins
+        || !scheme
+            .chars()
+            .all(|c| c.is_ascii_alphanumeric() || "+-.".contains(c))
+    {
         return false;
     }
     let named = rest.strip_prefix("//").is_none_or(|rest| {
         let authority = rest.split(['/', '?', '#']).next().unwrap_or_default();
         let (host, port) = authority.split_once(':').unwrap_or((authority, ""));
-        host.chars().all(|c| c.is_alphanumeric() || "-._~".contains(c)) && port.chars().all(|c| c.is_ascii_digit())
+        host.chars()
+            .all(|c| c.is_alphanumeric() || "-._~".contains(c))
+            && port.chars().all(|c| c.is_ascii_digit())
     });
     named && rest.matches('#').count() <= 1 && has_only_iri_characters(rest)
 }
@@ -105,18 +118,26 @@ fn has_only_iri_characters(text: &str) -> bool {
     let mut bytes = text.bytes();
     while let Some(byte) = bytes.next() {
         let escapes = byte != b'%'
-            || [bytes.next(), bytes.next()].iter().all(|digit| digit.is_some_and(|digit| digit.is_ascii_hexdigit()));
+            || [bytes.next(), bytes.next()]
+                .iter()
+                .all(|digit| digit.is_some_and(|digit| digit.is_ascii_hexdigit()));
         if !escapes {
             return false;
         }
     }
-    text.chars().all(|c| c.is_alphanumeric() || "-._~:/?#@!$&'()*+,;=%".contains(c))
+    text.chars()
+        .all(|c| c.is_alphanumeric() || "-._~:/?#@!$&'()*+,;=%".contains(c))
 }
 
-/// Returns the IRI of an object category that a skill named: an IRI as it is, and any other text as a label, which
-/// becomes `w:category/LABEL` with percent-encoding, so that no text can be anything but one IRI.
+/// Returns the IRI of an object category that a skill named: an IRI as it is, and any other text as
+/// a label, which becomes `w:category/LABEL` with percent-encoding, so that no text can be anything
+/// but one IRI.
 pub fn category(named: &str) -> String {
-    if is_iri(named) { named.to_owned() } else { w(&format!("category/{}", escaped(named))) }
+    if is_iri(named) {
+        named.to_owned()
+    } else {
+        w(&format!("category/{}", escaped(named)))
+    }
 }
 
 /// Escapes a name for an IRI: percent-encodes every byte except ASCII letters, digits and `_-.~`.
@@ -163,16 +184,23 @@ mod tests {
 
     #[test]
     fn a_category_is_an_iri_or_becomes_one() {
-        for named in
-            ["http://actions#Glass", "https://w3id.org/x/a%20b?c=d#e", "urn:isbn:1", "act:Größe", "http://a:80/"]
-        {
+        for named in [
+            "http://actions#Glass",
+            "https://w3id.org/x/a%20b?c=d#e",
+            "urn:isbn:1",
+            "act:Größe",
+            "http://a:80/",
+        ] {
             assert_eq!(category(named), named);
         }
         for (named, label) in [
             ("coffee mug", "coffee%20mug"),
             ("mug", "mug"),
             ("", ""),
-            ("http://a> <b> <c> .\n", "http%3A%2F%2Fa%3E%20%3Cb%3E%20%3Cc%3E%20.%0A"),
+            (
+                "http://a> <b> <c> .\n",
+                "http%3A%2F%2Fa%3E%20%3Cb%3E%20%3Cc%3E%20.%0A",
+            ),
             ("http://a#b#c", "http%3A%2F%2Fa%23b%23c"),
             ("http://a/%zz", "http%3A%2F%2Fa%2F%25zz"),
             ("http://a:b/", "http%3A%2F%2Fa%3Ab%2F"),

@@ -7,7 +7,8 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 /// Number of calls that are guarded now, in any thread: a library may panic in a thread of its own.
 static GUARDED: AtomicUsize = AtomicUsize::new(0);
 
-/// Calls a function of a library that panics on damaged data. Returns `None` if it panics; nothing is printed then.
+/// Calls a function of a library that panics on damaged data. Returns `None` if it panics; nothing
+/// is printed then.
 pub fn guarded<T>(call: impl FnOnce() -> T) -> Option<T> {
     static HOOK: Once = Once::new();
     HOOK.call_once(|| {

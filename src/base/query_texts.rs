@@ -1,7 +1,8 @@
 //! The functions of SPARQL that make texts, within a limit.
 //!
-//! Evaluators of SPARQL don't limit texts: 36 nested `BIND(CONCAT(?x, ?x) AS ?y)` make one of 64 GiB. [`bounded_texts`] renames
-//! these functions in a query, so that an evaluator with [`TEXT_FUNCTIONS`] as its own functions refuses long texts.
+//! Evaluators of SPARQL don't limit texts: 36 nested `BIND(CONCAT(?x, ?x) AS ?y)` make one of 64
+//! GiB. [`bounded_texts`] renames these functions in a query, so that an evaluator with
+//! [`TEXT_FUNCTIONS`] as its own functions refuses long texts.
 
 use std::sync::Arc;
 
@@ -14,19 +15,29 @@ use crate::Term;
 #[error("a text is too long")]
 pub struct TextTooLong;
 
-/// A function of SPARQL over its arguments, and the maximum length of its result in bytes. `Ok(None)` is SPARQL's error value.
+/// A function of SPARQL over its arguments, and the maximum length of its result in bytes.
+/// `Ok(None)` is SPARQL's error value.
 pub type TextFunction = fn(&[Term], usize) -> Result<Option<Term>, TextTooLong>;
 
 /// Name and IRI of each function, with its definition.
 pub const TEXT_FUNCTIONS: [(&str, &str, TextFunction); 5] = [
     ("CONCAT", "urn:actcheck:text:concat", concat),
     ("REPLACE", "urn:actcheck:text:replace", replace),
-    ("ENCODE_FOR_URI", "urn:actcheck:text:encode-for-uri", encode_for_uri),
-    ("UCASE", "urn:actcheck:text:ucase", |args, most| changed(args, most, str::to_uppercase)),
-    ("LCASE", "urn:actcheck:text:lcase", |args, most| changed(args, most, str::to_lowercase)),
+    (
+        "ENCODE_FOR_URI",
+        "urn:actcheck:text:encode-for-uri",
+        encode_for_uri,
+    ),
+    ("UCASE", "urn:actcheck:text:ucase", |args, most| {
+        changed(args, most, str::to_uppercase)
+    }),
+    ("LCASE", "urn:actcheck:text:lcase", |args, most| {
+        changed(args, most, str::to_lowercase)
+    }),
 ];
 
-/// IRI of the function around each text that `GROUP_CONCAT` appends: it returns its argument, and counts its length.
+/// IRI of the function around each text that `GROUP_CONCAT` appends: it returns its argument, and
+/// counts its length.
 pub const COUNTED_TEXT: &str = "urn:actcheck:text:counted";
 
 /// Maximum nesting of calls that [`check_calls`] accepts.
@@ -37,8 +48,8 @@ const GROWTH: usize = 3;
 /// Maximum size of a compiled pattern, as in oxigraph. Unit: bytes.
 const PATTERN_LIMIT: usize = 1_000_000;
 
-/// Replaces the calls of [`TEXT_FUNCTIONS`] in a valid query by calls of their IRIs, and adds [`COUNTED_TEXT`] to
-/// `GROUP_CONCAT`.
+/// Replaces the calls of [`TEXT_FUNCTIONS`] in a valid query by calls of their IRIs, and adds
+/// [`COUNTED_TEXT`] to `GROUP_CONCAT`.
 #[must_use]
 pub fn bounded_texts(query: &str) -> String {
     let mut out = String::with_capacity(query.len());
@@ -55,8 +66,8 @@ pub fn bounded_texts(query: &str) -> String {
     out
 }
 
-/// Checks that calls of [`TEXT_FUNCTIONS`] and of functions with IRIs are nested at most [`MOST_NESTED_CALLS`] deep: the
-/// time of oxigraph's parser doubles with each level.
+/// Checks that calls of [`TEXT_FUNCTIONS`] and of functions with IRIs are nested at most
+/// [`MOST_NESTED_CALLS`] deep: the time of oxigraph's parser doubles with each level.
 ///
 /// # Errors
 /// Place of the first call that is deeper, in bytes.
@@ -84,8 +95,8 @@ pub fn check_calls_within(query: &str, most: usize) -> Result<(), usize> {
             _ => {}
         }
         if !token.starts_with('#') && !token.trim().is_empty() {
-            calls =
-                token.len() > 1 && (token.starts_with('<') || token.contains(':')) || text_function(token).is_some();
+            calls = token.len() > 1 && (token.starts_with('<') || token.contains(':'))
+                || text_function(token).is_some();
         }
         rest = after;
     }
@@ -110,7 +121,10 @@ fn split_token(query: &str) -> Option<(&str, &str)> {
 
 /// Returns the IRI of the function with this name.
 fn text_function(name: &str) -> Option<&'static str> {
-    TEXT_FUNCTIONS.iter().find(|(known, ..)| known.eq_ignore_ascii_case(name)).map(|(_, iri, _)| *iri)
+    TEXT_FUNCTIONS
+        .iter()
+        .find(|(known, ..)| known.eq_ignore_ascii_case(name))
+        .map(|(_, iri, _)| *iri)
 }
 
 /// Finds the arguments of `GROUP_CONCAT`.
@@ -156,7 +170,9 @@ impl Counting {
                 }
                 self.depth = self.depth.saturating_sub(usize::from(token == ")"));
             }
-            _ if token.eq_ignore_ascii_case("GROUP_CONCAT") => self.expected = Expected::Parenthesis,
+            _ if token.eq_ignore_ascii_case("GROUP_CONCAT") => {
+                self.expected = Expected::Parenthesis
+            }
             _ => {}
         }
     }
@@ -176,12 +192,16 @@ fn opens(text: &str) -> bool {
     text.starts_with('(')
 }
 
-/// Returns the end of the string in a SPARQL query that begins at `start` with this quotation mark, one or three of them.
-/// Unit: bytes.
+/// Returns the end of the string in a SPARQL query that begins at `start` with this quotation mark,
+/// one or three of them. Unit: bytes.
 #[must_use]
 pub fn string_end(query: &str, start: usize, quote: char) -> usize {
     let triple = quote.to_string().repeat(3);
-    let close = if query[start..].starts_with(&triple) { triple } else { quote.to_string() };
+    let close = if query[start..].starts_with(&triple) {
+        triple
+    } else {
+        quote.to_string()
+    };
     let mut at = start + close.len();
     while let Some(c) = query[at..].chars().next() {
         if query[at..].starts_with(&close) {
@@ -196,7 +216,11 @@ pub fn string_end(query: &str, start: usize, quote: char) -> usize {
 }
 
 fn limited(length: usize, most: usize) -> Result<(), TextTooLong> {
-    if length <= most { Ok(()) } else { Err(TextTooLong) }
+    if length <= most {
+        Ok(())
+    } else {
+        Err(TextTooLong)
+    }
 }
 
 /// Returns the text and language of a string, or `None` for another term.
@@ -216,16 +240,24 @@ fn string(text: String, tag: Option<&Arc<str>>) -> Option<Term> {
 }
 
 fn concat(args: &[Term], most: usize) -> Result<Option<Term>, TextTooLong> {
-    let Some(strings) = args.iter().map(parts).collect::<Option<Vec<_>>>() else { return Ok(None) };
+    let Some(strings) = args.iter().map(parts).collect::<Option<Vec<_>>>() else {
+        return Ok(None);
+    };
     limited(strings.iter().map(|(text, _)| text.len()).sum(), most)?;
     let first = strings.first().and_then(|(_, tag)| *tag);
     let tag = first.filter(|first| strings.iter().all(|(_, tag)| *tag == Some(*first)));
     Ok(string(strings.iter().map(|(text, _)| *text).collect(), tag))
 }
 
-fn changed(args: &[Term], most: usize, change: impl Fn(&str) -> String) -> Result<Option<Term>, TextTooLong> {
+fn changed(
+    args: &[Term],
+    most: usize,
+    change: impl Fn(&str) -> String,
+) -> Result<Option<Term>, TextTooLong> {
     let [arg] = args else { return Ok(None) };
-    let Some((text, tag)) = parts(arg) else { return Ok(None) };
+    let Some((text, tag)) = parts(arg) else {
+        return Ok(None);
+    };
     limited(text.len(), most / GROWTH)?;
     Ok(string(change(text), tag))
 }
@@ -235,7 +267,9 @@ fn encode_for_uri(args: &[Term], most: usize) -> Result<Option<Term>, TextTooLon
         let mut out = String::with_capacity(text.len());
         for byte in text.bytes() {
             match byte {
-                b'a'..=b'z' | b'A'..=b'Z' | b'0'..=b'9' | b'-' | b'_' | b'.' | b'~' => out.push(char::from(byte)),
+                b'a'..=b'z' | b'A'..=b'Z' | b'0'..=b'9' | b'-' | b'_' | b'.' | b'~' => {
+                    out.push(char::from(byte))
+                }
                 _ => out.push_str(&format!("%{byte:02X}")),
             }
         }
@@ -249,18 +283,27 @@ fn encode_for_uri(args: &[Term], most: usize) -> Result<Option<Term>, TextTooLon
 
 fn replace(args: &[Term], most: usize) -> Result<Option<Term>, TextTooLong> {
     let (text, pattern, replacement, flags) = match args {
-        [text, Term::String(pattern), Term::String(replacement)] => (text, pattern, replacement, ""),
-        [text, Term::String(pattern), Term::String(replacement), Term::String(flags)] => {
-            (text, pattern, replacement, flags.as_ref())
+        [text, Term::String(pattern), Term::String(replacement)] => {
+            (text, pattern, replacement, "")
         }
+        [
+            text,
+            Term::String(pattern),
+            Term::String(replacement),
+            Term::String(flags),
+        ] => (text, pattern, replacement, flags.as_ref()),
         _ => return Ok(None),
     };
-    let (Some((text, tag)), Some(pattern)) = (parts(text), compiled(pattern, flags)) else { return Ok(None) };
+    let (Some((text, tag)), Some(pattern)) = (parts(text), compiled(pattern, flags)) else {
+        return Ok(None);
+    };
     let groups = replacement.matches('$').count();
     let (mut out, mut end) = (String::new(), 0);
     for found in pattern.captures_iter(text) {
         let Some(whole) = found.get(0) else { continue };
-        let length = groups.saturating_mul(whole.len()).saturating_add(replacement.len() + whole.start() - end);
+        let length = groups
+            .saturating_mul(whole.len())
+            .saturating_add(replacement.len() + whole.start() - end);
         limited(out.len().saturating_add(length), most)?;
         out.push_str(&text[end..whole.start()]);
         found.expand(replacement, &mut out);
@@ -295,11 +338,23 @@ mod tests {
 
     #[test]
     fn deeply_nested_calls_are_found() {
-        let nested =
-            |call: &str, depth: usize| format!("ASK {{ FILTER({}1{}) }}", call.repeat(depth), ")".repeat(depth));
+        let nested = |call: &str, depth: usize| {
+            format!(
+                "ASK {{ FILTER({}1{}) }}",
+                call.repeat(depth),
+                ")".repeat(depth)
+            )
+        };
         for call in ["CONCAT(", "replace (", "<http://x#f>(", "f:g # (\n("] {
-            assert_eq!(check_calls(&nested(call, MOST_NESTED_CALLS)), Ok(()), "{call}");
-            assert!(check_calls(&nested(call, MOST_NESTED_CALLS + 1)).is_err(), "{call}");
+            assert_eq!(
+                check_calls(&nested(call, MOST_NESTED_CALLS)),
+                Ok(()),
+                "{call}"
+            );
+            assert!(
+                check_calls(&nested(call, MOST_NESTED_CALLS + 1)).is_err(),
+                "{call}"
+            );
         }
         for fine in ["STRLEN(", "(", "\"<f>\" + (", "?x < ("] {
             assert_eq!(check_calls(&nested(fine, 40)), Ok(()), "{fine}");
@@ -312,33 +367,59 @@ mod tests {
         let text = "SELECT ?concat (ConCat (\"CONCAT(\", ?x, ex:UCASE(1)) AS ?y) { # LCASE(\n ?concat <http://x/REPLACE(> 'UCASE(' }";
         let wanted = text.replace("ConCat (", "<urn:actcheck:text:concat> (");
         assert_eq!(bounded_texts(text), wanted);
-        assert_eq!(bounded_texts("replace #(\n(1)"), "<urn:actcheck:text:replace> #(\n(1)");
+        assert_eq!(
+            bounded_texts("replace #(\n(1)"),
+            "<urn:actcheck:text:replace> #(\n(1)"
+        );
         let text = "(GROUP_CONCAT (DISTINCT STR((?x)) ; separator = \";)\") AS ?y) (group_concat(?z) AS ?w)";
-        let wanted =
-            "(GROUP_CONCAT (DISTINCT <C>(STR((?x)) ); separator = \";)\") AS ?y) (group_concat(<C>(?z)) AS ?w)";
-        assert_eq!(bounded_texts(text), wanted.replace("<C>", &format!("<{COUNTED_TEXT}>")));
+        let wanted = "(GROUP_CONCAT (DISTINCT <C>(STR((?x)) ); separator = \";)\") AS ?y) (group_concat(<C>(?z)) AS ?w)";
+        assert_eq!(
+            bounded_texts(text),
+            wanted.replace("<C>", &format!("<{COUNTED_TEXT}>"))
+        );
     }
 
     #[test]
     fn functions_have_the_values_of_sparql() {
         let call = |name: &str, args: &[Term]| {
-            let (.., function) = TEXT_FUNCTIONS.iter().find(|(known, ..)| *known == name).expect("it is in the table");
+            let (.., function) = TEXT_FUNCTIONS
+                .iter()
+                .find(|(known, ..)| *known == name)
+                .expect("it is in the table");
             function(args, 1000).expect("it is short")
         };
         let text = Term::string;
         let german = |text: &str| Term::LangString(text.into(), "de".into());
         assert_eq!(call("CONCAT", &[text("a"), text("b")]), Some(text("ab")));
         assert_eq!(call("CONCAT", &[]), Some(text("")));
-        assert_eq!(call("CONCAT", &[german("a"), german("b")]), Some(german("ab")));
+        assert_eq!(
+            call("CONCAT", &[german("a"), german("b")]),
+            Some(german("ab"))
+        );
         assert_eq!(call("CONCAT", &[german("a"), text("b")]), Some(text("ab")));
         assert_eq!(call("CONCAT", &[text("a"), Term::Integer(1)]), None);
         assert_eq!(call("UCASE", &[german("ä")]), Some(german("Ä")));
         assert_eq!(call("LCASE", &[text("Ä")]), Some(text("ä")));
-        assert_eq!(call("ENCODE_FOR_URI", &[german("a b/c")]), Some(text("a%20b%2Fc")));
-        assert_eq!(call("REPLACE", &[text("abab"), text("a(.)"), text("[$1]")]), Some(text("[b][b]")));
-        assert_eq!(call("REPLACE", &[german("aB"), text("b"), text(""), text("i")]), Some(german("a")));
-        assert_eq!(call("REPLACE", &[text("a.b"), text("."), text("-"), text("q")]), Some(text("a-b")));
-        assert_eq!(call("REPLACE", &[text("a"), text("a"), text("b"), text("?")]), None);
+        assert_eq!(
+            call("ENCODE_FOR_URI", &[german("a b/c")]),
+            Some(text("a%20b%2Fc"))
+        );
+        assert_eq!(
+            call("REPLACE", &[text("abab"), text("a(.)"), text("[$1]")]),
+            Some(text("[b][b]"))
+        );
+        assert_eq!(
+            call("REPLACE", &[german("aB"), text("b"), text(""), text("i")]),
+            Some(german("a"))
+        );
+        assert_eq!(
+            call("REPLACE", &[text("a.b"), text("."), text("-"), text("q")]),
+            Some(text("a-b"))
+        );
+        assert_eq!(
+            call("REPLACE", &[text("a"), text("a"), text("b"), text("?")]),
+            None
+        );
     }
 
     #[test]
@@ -347,10 +428,19 @@ mod tests {
         for (name, args) in [
             ("CONCAT", vec![long(), long()]),
             ("UCASE", vec![long()]),
-            ("REPLACE", vec![long(), Term::string("a"), Term::string("bb")]),
-            ("REPLACE", vec![long(), Term::string("a+"), Term::string("$0$0")]),
+            (
+                "REPLACE",
+                vec![long(), Term::string("a"), Term::string("bb")],
+            ),
+            (
+                "REPLACE",
+                vec![long(), Term::string("a+"), Term::string("$0$0")],
+            ),
         ] {
-            let (.., function) = TEXT_FUNCTIONS.iter().find(|(known, ..)| *known == name).expect("it is in the table");
+            let (.., function) = TEXT_FUNCTIONS
+                .iter()
+                .find(|(known, ..)| *known == name)
+                .expect("it is in the table");
             assert_eq!(function(&args, 1000), Err(TextTooLong), "{name}");
         }
     }

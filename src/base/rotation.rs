@@ -1,6 +1,7 @@
 //! Angles of unit quaternions.
 
-/// Heading: angle of the rotated x axis about the vertical. Unit: radians in (−π, π]. Shape: x, y, z, w.
+/// Heading: angle of the rotated x axis about the vertical. Unit: radians in (−π, π]. Shape: x, y,
+/// z, w.
 pub fn yaw_of([x, y, z, w]: [f64; 4]) -> f64 {
     libm::atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
 }

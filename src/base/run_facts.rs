@@ -51,8 +51,8 @@ impl RunFacts {
     }
 }
 
-/// Properties whose values in the states before and after an action are the same, by their local names in the world
-/// vocabulary.
+/// Properties whose values in the states before and after an action are the same, by their local
+/// names in the world vocabulary.
 pub const CONSTANT_PROPERTIES: [&str; 21] = [
     "friction",
     "fixed",

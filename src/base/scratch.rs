@@ -12,8 +12,8 @@ const PREFIX: &str = "actcheck-scratch-";
 /// File that a living process holds locked.
 const ALIVE: &str = "alive";
 
-/// A private folder among the system's temporary files, removed when the value is dropped. The next process that
-/// creates one removes those of killed processes.
+/// A private folder among the system's temporary files, removed when the value is dropped. The next
+/// process that creates one removes those of killed processes.
 #[derive(Debug)]
 pub struct ScratchFolder {
     path: PathBuf,
@@ -30,7 +30,8 @@ impl ScratchFolder {
         Self::create_in(&std::env::temp_dir())
     }
 
-    /// Creates a folder in a folder that other users may write, too. They can neither look into it nor take its name first.
+    /// Creates a folder in a folder that other users may write, too. They can neither look into it
+    /// nor take its name first.
     ///
     /// # Errors
     /// The folder can't be written.
@@ -47,7 +48,10 @@ impl ScratchFolder {
                     let _ = alive.try_lock();
                     fs::rename(unnamed, path.join(ALIVE))?;
                     remove_leftovers(parent, alive.metadata()?.uid());
-                    return Ok(Self { path, _alive: alive });
+                    return Ok(Self {
+                        path,
+                        _alive: alive,
+                    });
                 }
                 Err(error) if error.kind() == ErrorKind::AlreadyExists => {}
                 Err(error) => return Err(error),
@@ -73,7 +77,8 @@ fn private_folder(path: &Path) -> io::Result<()> {
     fs::DirBuilder::new().mode(0o700).create(path)
 }
 
-/// Removes the folders of this user's killed processes. Another user may have put anything under such a name.
+/// Removes the folders of this user's killed processes. Another user may have put anything under
+/// such a name.
 fn remove_leftovers(parent: &Path, user: u32) {
     let below = Below::new(parent);
     for (name, kind) in below.entries(parent).unwrap_or_default() {
@@ -81,7 +86,11 @@ fn remove_leftovers(parent: &Path, user: u32) {
         let is_ours = kind == FileKind::Folder
             && name.to_str().is_some_and(|name| name.starts_with(PREFIX))
             && fs::symlink_metadata(&path).is_ok_and(|found| found.uid() == user);
-        if is_ours && below.open(&path.join(ALIVE)).is_ok_and(|file| file.try_lock().is_ok()) {
+        if is_ours
+            && below
+                .open(&path.join(ALIVE))
+                .is_ok_and(|file| file.try_lock().is_ok())
+        {
             // Harmless if it remains.
             let _ = fs::remove_dir_all(path);
         }
@@ -115,9 +124,12 @@ mod tests {
             fs::create_dir(folder).expect("it can be created");
         }
         fs::write(outside.join(ALIVE), "").expect("it can be written");
-        let pipe = std::process::Command::new("mkfifo").arg(trap.join(ALIVE)).status();
+        let pipe = std::process::Command::new("mkfifo")
+            .arg(trap.join(ALIVE))
+            .status();
         assert!(pipe.expect("mkfifo is installed").success());
-        std::os::unix::fs::symlink(&outside, parent.join(format!("{PREFIX}1-2"))).expect("links can be made");
+        std::os::unix::fs::symlink(&outside, parent.join(format!("{PREFIX}1-2")))
+            .expect("links can be made");
         let made = ScratchFolder::create_in(&parent).expect("it can be created");
         let mode = fs::metadata(made.path()).expect("it exists").mode();
         assert_eq!(mode & 0o777, 0o700);

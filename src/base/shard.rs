@@ -71,12 +71,20 @@ mod tests {
     #[test]
     fn every_run_is_in_exactly_one_shard() {
         for of in 1..9 {
-            let shards: Vec<Shard> = (1..=of).filter_map(|number| Shard::new(number, of)).collect();
+            let shards: Vec<Shard> = (1..=of)
+                .filter_map(|number| Shard::new(number, of))
+                .collect();
             assert_eq!(shards.len() as u64, of);
             for runs in 0..30 {
-                assert_eq!(shards.iter().map(|shard| shard.share(runs)).sum::<u64>(), runs);
+                assert_eq!(
+                    shards.iter().map(|shard| shard.share(runs)).sum::<u64>(),
+                    runs
+                );
                 for shard in &shards {
-                    assert_eq!(shard.share(runs), (0..runs).filter(|index| shard.has(*index)).count() as u64);
+                    assert_eq!(
+                        shard.share(runs),
+                        (0..runs).filter(|index| shard.has(*index)).count() as u64
+                    );
                 }
                 assert_eq!(shards.iter().filter(|shard| shard.has(runs)).count(), 1);
             }
@@ -86,7 +94,10 @@ mod tests {
     #[test]
     fn invalid_shards_are_rejected() {
         assert_eq!("2/4".parse(), Ok(Shard { number: 2, of: 4 }));
-        assert_eq!("2/4".parse::<Shard>().map(|shard| shard.to_string()), Ok("2/4".to_owned()));
+        assert_eq!(
+            "2/4".parse::<Shard>().map(|shard| shard.to_string()),
+            Ok("2/4".to_owned())
+        );
         for wrong in [
             "",
             "/",

@@ -5,13 +5,14 @@ use std::fmt::{self, Display, Write as _};
 
 /// A command line that a POSIX shell splits into the same words again, whatever they contain.
 ///
-/// Control characters and marks of the direction of writing become escapes in `$'…'`, so that the line is a single one
-/// and a terminal shows it as it is.
+/// Control characters and marks of the direction of writing become escapes in `$'…'`, so that the
+/// line is a single one and a terminal shows it as it is.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct ShellLine(String);
 
 impl ShellLine {
-    /// A line that begins with fixed words of this program, such as `actcheck show`, or with a program's path.
+    /// A line that begins with fixed words of this program, such as `actcheck show`, or with a
+    /// program's path.
     pub fn new(program: &str) -> Self {
         Self::default().word(program)
     }
@@ -30,11 +31,16 @@ impl ShellLine {
         self
     }
 
-    /// Appends the path of a file. If it begins with a dash, `./` is put before it, since it would be taken as an option.
+    /// Appends the path of a file. If it begins with a dash, `./` is put before it, since it would
+    /// be taken as an option.
     pub fn file(self, path: impl AsRef<OsStr>) -> Self {
         let path = path.as_ref().to_string_lossy();
         // A single dash is a stream.
-        if path.starts_with('-') && path.len() > 1 { self.word(format!("./{path}")) } else { self.word(&*path) }
+        if path.starts_with('-') && path.len() > 1 {
+            self.word(format!("./{path}"))
+        } else {
+            self.word(&*path)
+        }
     }
 
     /// Appends an option, such as `--history`, with its value.
@@ -49,8 +55,8 @@ impl ShellLine {
         self.fixed(name).word(&*value)
     }
 
-    /// Appends one word of a script, which is not shown: control characters stay as they are, since `$'…'` is not known to
-    /// each shell.
+    /// Appends one word of a script, which is not shown: control characters stay as they are, since
+    /// `$'…'` is not known to each shell.
     pub fn in_script(mut self, word: impl AsRef<OsStr>) -> Self {
         self.separate();
         let word = word.as_ref().to_string_lossy();
@@ -94,7 +100,8 @@ impl Display for ShellLine {
 /// One word of a shell.
 fn one_word(word: &str) -> String {
     let is_hidden = |c: char| {
-        c.is_control() || matches!(c, '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
+        c.is_control()
+            || matches!(c, '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
     };
     if !word.contains(is_hidden)
         && let Ok(quoted) = shlex::try_quote(word)
@@ -108,7 +115,10 @@ fn one_word(word: &str) -> String {
             '\t' => out.push_str("\\t"),
             '\'' | '\\' => out.extend(['\\', c]),
             // Octal escapes have at most three digits, so a digit may follow.
-            c if is_hidden(c) => c.to_string().bytes().for_each(|byte| out.push_str(&format!("\\{byte:03o}"))),
+            c if is_hidden(c) => c
+                .to_string()
+                .bytes()
+                .for_each(|byte| out.push_str(&format!("\\{byte:03o}"))),
             c => out.push(c),
         }
     }
@@ -139,9 +149,18 @@ mod tests {
     #[test]
     fn a_value_with_a_leading_dash_is_not_an_option() {
         let line = ShellLine::new("actcheck").fixed("show").word("k7f3-1");
-        assert_eq!(line.clone().option("--history", "h").to_string(), "actcheck show k7f3-1 --history h");
-        assert_eq!(line.clone().option("--history", "-h x").to_string(), "actcheck show k7f3-1 --history='-h x'");
-        assert_eq!(line.file("-c.toml").file("-").to_string(), "actcheck show k7f3-1 ./-c.toml -");
+        assert_eq!(
+            line.clone().option("--history", "h").to_string(),
+            "actcheck show k7f3-1 --history h"
+        );
+        assert_eq!(
+            line.clone().option("--history", "-h x").to_string(),
+            "actcheck show k7f3-1 --history='-h x'"
+        );
+        assert_eq!(
+            line.file("-c.toml").file("-").to_string(),
+            "actcheck show k7f3-1 ./-c.toml -"
+        );
     }
 
     #[test]
@@ -157,9 +176,18 @@ mod tests {
             "ü\u{202e}\\n",
             "=x",
         ];
-        let line = ShellLine::new("printf").word("%s\\0").word("").chain_all(&words);
-        let output = std::process::Command::new("bash").args(["-c", &line.to_string()]).output().expect("a shell");
-        let expected: String = std::iter::once("").chain(words).map(|word| format!("{word}\0")).collect();
+        let line = ShellLine::new("printf")
+            .word("%s\\0")
+            .word("")
+            .chain_all(&words);
+        let output = std::process::Command::new("bash")
+            .args(["-c", &line.to_string()])
+            .output()
+            .expect("a shell");
+        let expected: String = std::iter::once("")
+            .chain(words)
+            .map(|word| format!("{word}\0"))
+            .collect();
         assert_eq!(String::from_utf8_lossy(&output.stdout), expected, "{line}");
         assert_eq!(line.to_string().lines().count(), 1);
     }

@@ -20,11 +20,14 @@ mod embedded {
     pub(super) struct Models;
 }
 
-/// Returns the bytes of an embedded file, by its path from the repository's root, or `None` if it does not exist.
+/// Returns the bytes of an embedded file, by its path from the repository's root, or `None` if it
+/// does not exist.
 #[cfg(feature = "shipped")]
 pub(crate) fn read(key: &str) -> Option<Vec<u8>> {
     use embedded::{Models, Ontology, Rules};
-    let file = Ontology::get(key).or_else(|| Rules::get(key)).or_else(|| Models::get(key))?;
+    let file = Ontology::get(key)
+        .or_else(|| Rules::get(key))
+        .or_else(|| Models::get(key))?;
     Some(file.data.into_owned())
 }
 

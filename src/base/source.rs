@@ -20,7 +20,10 @@ pub struct Source {
 impl Source {
     /// Creates a source from its name and text.
     pub fn new(name: impl Into<Arc<str>>, text: impl Into<Arc<str>>) -> Self {
-        Self { name: name.into(), text: text.into() }
+        Self {
+            name: name.into(),
+            text: text.into(),
+        }
     }
 
     /// Returns the line and column of a byte offset. Both count from 1; columns count characters.

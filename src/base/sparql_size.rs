@@ -1,7 +1,8 @@
 //! Limits on the nesting and length of SPARQL queries.
 //!
-//! Parser, optimizer and evaluator call themselves for each level of nesting and for each link of a chain such as
-//! `1 + 1 + …` or `{ … } UNION { … } UNION …`, so a long query could exhaust the stack, which ends the process.
+//! Parser, optimizer and evaluator call themselves for each level of nesting and for each link of a
+//! chain such as `1 + 1 + …` or `{ … } UNION { … } UNION …`, so a long query could exhaust the
+//! stack, which ends the process.
 
 use crate::{Span, string_end};
 
@@ -12,9 +13,12 @@ const NEGATION_LIMIT: usize = 12;
 /// Maximum number of patterns and operators. A thread of 2 MiB bears about 3000.
 const LINK_LIMIT: usize = 1_000;
 /// Keywords that add a link to a chain of patterns or of computed columns.
-const LINKS: [&str; 8] = ["union", "optional", "minus", "bind", "filter", "graph", "as", "exists"];
+const LINKS: [&str; 8] = [
+    "union", "optional", "minus", "bind", "filter", "graph", "as", "exists",
+];
 
-/// Returns the place where a query exceeds a limit and what to say about it, or `None` if it is within all limits.
+/// Returns the place where a query exceeds a limit and what to say about it, or `None` if it is
+/// within all limits.
 ///
 /// ```
 /// use actcheck_base::sparql_excess;
@@ -35,7 +39,11 @@ pub fn sparql_excess(text: &str) -> Option<(Span, String)> {
         let link = match c {
             '(' | '[' | '{' => {
                 let rows = inside.rows || (c == '{' && std::mem::take(&mut rows_follow));
-                open.push(Bracket { round: c == '(', rows, negations: inside.negations + usize::from(negated) });
+                open.push(Bracket {
+                    round: c == '(',
+                    rows,
+                    negations: inside.negations + usize::from(negated),
+                });
                 c == '{'
             }
             ')' | ']' | '}' => {
@@ -52,7 +60,10 @@ pub fn sparql_excess(text: &str) -> Option<(Span, String)> {
         links += usize::from(link && !inside.rows);
         let message = if open.len() > DEPTH_LIMIT {
             format!("the query is nested more than {DEPTH_LIMIT} levels deep")
-        } else if open.last().is_some_and(|bracket| bracket.negations > NEGATION_LIMIT) {
+        } else if open
+            .last()
+            .is_some_and(|bracket| bracket.negations > NEGATION_LIMIT)
+        {
             format!("the query has more than {NEGATION_LIMIT} nested negations")
         } else if links > LINK_LIMIT {
             format!("the query has more than {LINK_LIMIT} patterns and operators")
@@ -73,16 +84,21 @@ struct Bracket {
     negations: usize,
 }
 
-/// Returns the length of the comment, string, IRI, name or character at the start of a text. Unit: bytes.
+/// Returns the length of the comment, string, IRI, name or character at the start of a text. Unit:
+/// bytes.
 fn token_length(text: &str, first: char) -> usize {
     match first {
         '#' => text.find('\n').unwrap_or(text.len()),
         '"' | '\'' => string_end(text, 0, first),
-        '<' => match text[1..].find(|c: char| c == '>' || c == '<' || c == '"' || c.is_whitespace()) {
-            Some(length) if text[1 + length..].starts_with('>') => length + 2,
-            _ => 1,
-        },
-        c if continues_name(c) => text.find(|c: char| !continues_name(c)).unwrap_or(text.len()),
+        '<' => {
+            match text[1..].find(|c: char| c == '>' || c == '<' || c == '"' || c.is_whitespace()) {
+                Some(length) if text[1 + length..].starts_with('>') => length + 2,
+                _ => 1,
+            }
+        }
+        c if continues_name(c) => text
+            .find(|c: char| !continues_name(c))
+            .unwrap_or(text.len()),
         c => c.len_utf8(),
     }
 }
@@ -106,7 +122,8 @@ pub fn unclosed_braces(text: &str) -> Option<String> {
         }
         at += c.len_utf8();
     }
-    (open > closed).then(|| format!("a brace is not closed ({open} are opened, {closed} closed): add `}}`"))
+    (open > closed)
+        .then(|| format!("a brace is not closed ({open} are opened, {closed} closed): add `}}`"))
 }
 
 #[cfg(test)]
@@ -125,12 +142,19 @@ mod tests {
             format!("ASK {{ ?s ?p {}{} }}", "[ ?p ".repeat(n), "]".repeat(n)),
             format!("ASK {{ FILTER({}true) }}", "true || ".repeat(n)),
             format!("ASK {{ FILTER({}1 > 0) }}", "1 + ".repeat(n)),
-            format!("ASK {{ {}{{ ?s ?p ?o }} }}", "{ ?s ?p ?o } UNION ".repeat(n)),
+            format!(
+                "ASK {{ {}{{ ?s ?p ?o }} }}",
+                "{ ?s ?p ?o } UNION ".repeat(n)
+            ),
             format!("ASK {{ {} }}", "?s ?p ?o . ".repeat(n)),
             format!("ASK {{ ?s {}?o ?o }}", "<http://x/p>/".repeat(n)),
             format!("ASK {{ {} }}", "BIND(1 AS ?x) ".repeat(n)),
             format!("SELECT {} {{ }}", "(1 AS ?x) ".repeat(n)),
-            format!("ASK {{ FILTER({}true{}) }}", "! (".repeat(20), ")".repeat(20)),
+            format!(
+                "ASK {{ FILTER({}true{}) }}",
+                "! (".repeat(20),
+                ")".repeat(20)
+            ),
         ] {
             assert!(message(&text).is_some(), "{}", &text[..40]);
         }
@@ -140,10 +164,17 @@ mod tests {
     fn data_strings_and_comments_don_t_count() {
         let n = 5_000;
         for text in [
-            format!("ASK {{ VALUES ?x {{ {} }} }}", "1.5 -2 <http://x/p> ".repeat(n)),
+            format!(
+                "ASK {{ VALUES ?x {{ {} }} }}",
+                "1.5 -2 <http://x/p> ".repeat(n)
+            ),
             format!("ASK {{ VALUES (?x ?y) {{ {} }} }}", "(1 2) ".repeat(n)),
             format!("ASK {{ ?s ?p ?o FILTER(?o IN ({}1)) }}", "1, ".repeat(n)),
-            format!("ASK {{ ?s ?p \"{}\", '''{}''' }}", "{".repeat(n), "(\\'' ".repeat(n)),
+            format!(
+                "ASK {{ ?s ?p \"{}\", '''{}''' }}",
+                "{".repeat(n),
+                "(\\'' ".repeat(n)
+            ),
             format!("ASK {{ ?s ?p ?o # {}\n }}", "(".repeat(n)),
         ] {
             assert_eq!(message(&text), None, "{}", &text[..40]);
@@ -152,7 +183,16 @@ mod tests {
 
     #[test]
     fn unbalanced_text_is_left_to_the_parser() {
-        for text in ["", ")", "ASK }}} {", "ASK { 'x", "<", "\"\\", "VALUES {", "é!("] {
+        for text in [
+            "",
+            ")",
+            "ASK }}} {",
+            "ASK { 'x",
+            "<",
+            "\"\\",
+            "VALUES {",
+            "é!(",
+        ] {
             assert_eq!(message(text), None, "{text}");
         }
     }

@@ -5,8 +5,8 @@ use std::sync::{Arc, OnceLock};
 
 use crate::varint::{ByteReader, put_varint, unzigzag, zigzag};
 
-/// Maximum number of values of one series: limits the memory that a corrupt file can request. A long run has under a
-/// million.
+/// Maximum number of values of one series: limits the memory that a corrupt file can request. A
+/// long run has under a million.
 const MOST_VALUES: usize = 1 << 26;
 
 const CONSTANT: u8 = 0;
@@ -14,8 +14,8 @@ const VARYING: u8 = 1;
 
 /// Samples of one quantity, as numbers of steps of its resolution.
 ///
-/// It is used as a slice. Samples of a stored run stay encoded until they are first read, because rules read few of the
-/// series of a run.
+/// It is used as a slice. Samples of a stored run stay encoded until they are first read, because
+/// rules read few of the series of a run.
 #[derive(Debug, Default)]
 pub struct Steps {
     encoded: Option<Encoded>,
@@ -56,24 +56,38 @@ impl Steps {
         }
     }
 
-    /// Returns the `count` values that [`Steps::encode`] wrote at a position of `bytes`, and the position after them.
-    /// Returns `None` if there are too few bytes for as many values.
+    /// Returns the `count` values that [`Steps::encode`] wrote at a position of `bytes`, and the
+    /// position after them. Returns `None` if there are too few bytes for as many values.
     pub fn encoded(count: usize, bytes: &Arc<Vec<u8>>, at: usize) -> Option<(Self, usize)> {
         if count > MOST_VALUES {
             return None;
         }
-        let mut rest = ByteReader { bytes: bytes.get(at..)? };
+        let mut rest = ByteReader {
+            bytes: bytes.get(at..)?,
+        };
         let numbers = if rest.byte()? == CONSTANT { 1 } else { count };
         rest.skip_varints(numbers)?;
         let end = bytes.len() - rest.bytes.len();
-        let encoded = Encoded { count, bytes: Arc::clone(bytes), part: at..end };
-        Some((Self { encoded: Some(encoded), values: OnceLock::new() }, end))
+        let encoded = Encoded {
+            count,
+            bytes: Arc::clone(bytes),
+            part: at..end,
+        };
+        Some((
+            Self {
+                encoded: Some(encoded),
+                values: OnceLock::new(),
+            },
+            end,
+        ))
     }
 
     fn vec_mut(&mut self) -> &mut Vec<i32> {
         if self.encoded.is_some() || self.values.get().is_none() {
             let values = std::mem::take(&mut self.values).into_inner();
-            let values = values.or_else(|| Some(self.encoded.take()?.decoded())).unwrap_or_default();
+            let values = values
+                .or_else(|| Some(self.encoded.take()?.decoded()))
+                .unwrap_or_default();
             *self = Self::from(values);
         }
         self.values.get_mut().expect("it has values")
@@ -81,10 +95,12 @@ impl Steps {
 }
 
 impl Encoded {
-    /// Decodes the values. The file's checksum was checked when it was read: numbers that can't be encoded values become
-    /// zero.
+    /// Decodes the values. The file's checksum was checked when it was read: numbers that can't be
+    /// encoded values become zero.
     fn decoded(&self) -> Vec<i32> {
-        let mut rest = ByteReader { bytes: &self.bytes[self.part.clone()] };
+        let mut rest = ByteReader {
+            bytes: &self.bytes[self.part.clone()],
+        };
         let kind = rest.byte();
         let mut next = || rest.varint().map_or(0, unzigzag);
         let narrow = |value: i64| i32::try_from(value).unwrap_or(0);
@@ -105,7 +121,11 @@ impl Deref for Steps {
     type Target = [i32];
 
     fn deref(&self) -> &[i32] {
-        self.values.get_or_init(|| self.encoded.as_ref().map_or_else(Vec::new, Encoded::decoded))
+        self.values.get_or_init(|| {
+            self.encoded
+                .as_ref()
+                .map_or_else(Vec::new, Encoded::decoded)
+        })
     }
 }
 
@@ -119,7 +139,10 @@ impl Clone for Steps {
     /// Encoded values stay encoded: their bytes are shared.
     fn clone(&self) -> Self {
         match &self.encoded {
-            Some(encoded) => Self { encoded: Some(encoded.clone()), values: OnceLock::new() },
+            Some(encoded) => Self {
+                encoded: Some(encoded.clone()),
+                values: OnceLock::new(),
+            },
             None => Self::from(self.to_vec()),
         }
     }
@@ -133,7 +156,10 @@ impl PartialEq for Steps {
 
 impl From<Vec<i32>> for Steps {
     fn from(values: Vec<i32>) -> Self {
-        Self { encoded: None, values: OnceLock::from(values) }
+        Self {
+            encoded: None,
+            values: OnceLock::from(values),
+        }
     }
 }
 
@@ -156,7 +182,8 @@ mod tests {
             (0..1300).map(|idx| idx * idx / 50 - 700).collect(),
         ];
         let mut bytes = vec![9, 9];
-        all.iter().for_each(|values| Steps::from(values.clone()).encode(&mut bytes));
+        all.iter()
+            .for_each(|values| Steps::from(values.clone()).encode(&mut bytes));
         let bytes = Arc::new(bytes);
         let mut at = 2;
         for values in all {
@@ -172,7 +199,10 @@ mod tests {
             assert_eq!(*longer, [values.as_slice(), &[3]].concat());
             for end in start..at {
                 let cut = Arc::new(bytes[..end].to_vec());
-                assert!(values.is_empty() || Steps::encoded(values.len(), &cut, start).is_none(), "{end}");
+                assert!(
+                    values.is_empty() || Steps::encoded(values.len(), &cut, start).is_none(),
+                    "{end}"
+                );
             }
         }
         assert_eq!(at, bytes.len());

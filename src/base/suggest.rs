@@ -5,16 +5,20 @@ use crate::meaning;
 /// Longest name that is compared: the time for it grows with the square of its length. Unit: bytes.
 const LONGEST: usize = 200;
 
-/// Returns the candidate that was probably meant by `name`: the one that means the same in the words of the field, or the most
-/// similar one if it is similar enough for a likely typing error, or one with common words. Returns `None` if there is none.
+/// Returns the candidate that was probably meant by `name`: the one that means the same in the
+/// words of the field, or the most similar one if it is similar enough for a likely typing error,
+/// or one with common words. Returns `None` if there is none.
 pub fn nearest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     let fits = |candidate: &&str| name.len() <= LONGEST && candidate.len() <= LONGEST;
     let candidates: Vec<&str> = candidates.into_iter().filter(fits).collect();
     let all = || candidates.iter().copied();
-    meaning::same(name, all()).or_else(|| misspelt(name, all())).or_else(|| meaning::similar(name, all()))
+    meaning::same(name, all())
+        .or_else(|| misspelt(name, all()))
+        .or_else(|| meaning::similar(name, all()))
 }
 
-/// Returns the candidate most similar to `name`, or `None` if none is similar enough for a likely typing error.
+/// Returns the candidate most similar to `name`, or `None` if none is similar enough for a likely
+/// typing error.
 pub fn misspelt<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     candidates
         .into_iter()
@@ -32,7 +36,10 @@ fn similarity(a: &str, b: &str) -> f64 {
 }
 
 /// Returns a help text: the nearest known name, or a list of the known names.
-pub fn did_you_mean<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str> + Clone) -> String {
+pub fn did_you_mean<'a>(
+    name: &str,
+    candidates: impl IntoIterator<Item = &'a str> + Clone,
+) -> String {
     match nearest(name, candidates.clone()) {
         Some(found) => format!("did you mean `{found}`?"),
         None => {

@@ -10,7 +10,8 @@ use hashbrown::HashTable;
 
 use crate::names;
 
-/// An RDF term. Equality compares terms, not values: `1`, `1.0` and `"1"` are three different terms.
+/// An RDF term. Equality compares terms, not values: `1`, `1.0` and `"1"` are three different
+/// terms.
 #[derive(Debug, Clone)]
 pub enum Term {
     /// An absolute IRI. (A bare name of a rule program is a relative IRI, kept as written.)
@@ -23,7 +24,8 @@ pub enum Term {
     LangString(Arc<str>, Arc<str>),
     /// An `xsd:integer` that fits 64 bits.
     Integer(i64),
-    /// An `xsd:decimal` as its canonical text, because binary floating point can't represent it exactly.
+    /// An `xsd:decimal` as its canonical text, because binary floating point can't represent it
+    /// exactly.
     Decimal(Arc<str>),
     /// An `xsd:double`. All NaNs are one term; `0.0` and `-0.0` are two.
     Double(f64),
@@ -79,8 +81,16 @@ impl Term {
 
 /// Maps a double to bits that sort by value. All NaNs map to the same bits.
 fn double_key(value: f64) -> u64 {
-    let bits = if value.is_nan() { f64::NAN.to_bits() } else { value.to_bits() };
-    if bits >> 63 == 1 { !bits } else { bits | (1 << 63) }
+    let bits = if value.is_nan() {
+        f64::NAN.to_bits()
+    } else {
+        value.to_bits()
+    };
+    if bits >> 63 == 1 {
+        !bits
+    } else {
+        bits | (1 << 63)
+    }
 }
 
 impl PartialEq for Term {
@@ -110,7 +120,8 @@ impl Hash for Term {
 }
 
 impl fmt::Display for Term {
-    /// Writes the term as in Turtle, with known prefixes. Doubles have no exponent: `0.9`, not `0.9e0`.
+    /// Writes the term as in Turtle, with known prefixes. Doubles have no exponent: `0.9`, not
+    /// `0.9e0`.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Iri(iri) => f.write_str(&names::shorten(iri)),
@@ -137,7 +148,8 @@ pub struct Terms {
     by_id: Vec<Term>,
     ids: HashTable<TermId>,
     hasher: RandomState,
-    /// IDs of small integers, or [`ABSENT`]: a column of numbers would otherwise jump about in a table of gigabytes.
+    /// IDs of small integers, or [`ABSENT`]: a column of numbers would otherwise jump about in a
+    /// table of gigabytes.
     small: Vec<TermId>,
     /// Memory of the texts. Unit: bytes.
     text_bytes: usize,
@@ -156,7 +168,11 @@ impl Terms {
 
     /// Creates an empty interner with room for this many terms.
     pub fn with_capacity(terms: usize) -> Self {
-        Self { by_id: Vec::with_capacity(terms), ids: HashTable::with_capacity(terms), ..Self::default() }
+        Self {
+            by_id: Vec::with_capacity(terms),
+            ids: HashTable::with_capacity(terms),
+            ..Self::default()
+        }
     }
 
     /// Returns the ID of a term, interning the term if it is new.
@@ -205,11 +221,19 @@ impl Terms {
 
     /// Returns a term's hash, and its ID if it is interned.
     fn find(&self, key: Key<'_>) -> (u64, Option<TermId>) {
-        if let Some(id) = small(key).and_then(|value| self.small.get(value)).filter(|id| **id != ABSENT) {
+        if let Some(id) = small(key)
+            .and_then(|value| self.small.get(value))
+            .filter(|id| **id != ABSENT)
+        {
             return (0, Some(*id));
         }
         let hash = hash(&self.hasher, key);
-        (hash, self.ids.find(hash, |id| self.by_id[*id as usize].key() == key).copied())
+        (
+            hash,
+            self.ids
+                .find(hash, |id| self.by_id[*id as usize].key() == key)
+                .copied(),
+        )
     }
 
     fn add(&mut self, new_hash: u64, term: Term) -> TermId {
@@ -218,8 +242,11 @@ impl Terms {
         // The table has at most two places for each term.
         let place = small(term.key()).filter(|value| *value < 2 * self.by_id.len() + 1024);
         // A shared text has two counters before it.
-        self.text_bytes +=
-            [text, more].iter().filter(|text| !text.is_empty()).map(|text| text.len() + 16).sum::<usize>();
+        self.text_bytes += [text, more]
+            .iter()
+            .filter(|text| !text.is_empty())
+            .map(|text| text.len() + 16)
+            .sum::<usize>();
         self.by_id.push(term);
         if let Some(place) = place {
             if self.small.len() <= place {
@@ -228,7 +255,9 @@ impl Terms {
             self.small[place] = id;
             return id;
         }
-        let Self { by_id, ids, hasher, .. } = self;
+        let Self {
+            by_id, ids, hasher, ..
+        } = self;
         ids.insert_unique(new_hash, id, |id| hash(hasher, by_id[*id as usize].key()));
         id
     }
@@ -236,7 +265,13 @@ impl Terms {
 
 /// Returns the value of an integer that is not negative.
 fn small((kind, _, _, number): Key<'_>) -> Option<usize> {
-    if kind == 4 { usize::try_from(number ^ (1 << 63)).ok().filter(|value| *value >> 63 == 0) } else { None }
+    if kind == 4 {
+        usize::try_from(number ^ (1 << 63))
+            .ok()
+            .filter(|value| *value >> 63 == 0)
+    } else {
+        None
+    }
 }
 
 fn hash(hasher: &RandomState, (kind, text, more, number): Key<'_>) -> u64 {
@@ -256,11 +291,16 @@ mod tests {
     #[test]
     fn terms_of_equal_value_and_different_type_differ() {
         let mut terms = Terms::new();
-        let ids: Vec<TermId> =
-            [Term::Integer(1), Term::Decimal("1.0".into()), Term::Double(1.0), Term::string("1"), Term::Integer(1)]
-                .into_iter()
-                .map(|term| terms.intern(term))
-                .collect();
+        let ids: Vec<TermId> = [
+            Term::Integer(1),
+            Term::Decimal("1.0".into()),
+            Term::Double(1.0),
+            Term::string("1"),
+            Term::Integer(1),
+        ]
+        .into_iter()
+        .map(|term| terms.intern(term))
+        .collect();
         assert_eq!(ids, [0, 1, 2, 3, 0]);
     }
 
@@ -268,8 +308,14 @@ mod tests {
     fn texts_interned_without_a_term_are_the_same_terms() {
         let mut terms = Terms::new();
         let iri = terms.intern(Term::iri("a"));
-        assert_eq!((terms.intern_iri("a"), terms.intern_string("a")), (iri, iri + 1));
-        assert_eq!((terms.intern(Term::string("a")), terms.intern_string("")), (iri + 1, iri + 2));
+        assert_eq!(
+            (terms.intern_iri("a"), terms.intern_string("a")),
+            (iri, iri + 1)
+        );
+        assert_eq!(
+            (terms.intern(Term::string("a")), terms.intern_string("")),
+            (iri + 1, iri + 2)
+        );
         assert_eq!(terms.id(&Term::string("")), Some(iri + 2));
         assert!(terms.bytes() > 3 * size_of::<Term>() && terms.len() == 3);
     }
@@ -278,12 +324,18 @@ mod tests {
     fn integers_of_all_sizes_are_found() {
         let mut terms = Terms::new();
         // Some are too large for the table of small ones, until it has grown.
-        let values: Vec<i64> =
-            [i64::MAX, i64::MIN, -1, 3_000, 5_000].into_iter().chain(0..4_000).chain([1 << 40]).collect();
+        let values: Vec<i64> = [i64::MAX, i64::MIN, -1, 3_000, 5_000]
+            .into_iter()
+            .chain(0..4_000)
+            .chain([1 << 40])
+            .collect();
         for _ in 0..2 {
             for value in &values {
                 let id = terms.intern(Term::Integer(*value));
-                assert_eq!((terms.term(id), terms.id(&Term::Integer(*value))), (&Term::Integer(*value), Some(id)));
+                assert_eq!(
+                    (terms.term(id), terms.id(&Term::Integer(*value))),
+                    (&Term::Integer(*value), Some(id))
+                );
             }
             assert_eq!(terms.len(), 4_005);
         }

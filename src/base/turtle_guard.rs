@@ -56,7 +56,9 @@ impl Brackets {
                 (State::Text(mark), _) => State::Text(mark),
                 (State::LongText(mark, _), b'\\') => State::Escape(Inside::LongText(mark)),
                 (State::LongText(mark, 2), byte) if byte == mark => State::Plain,
-                (State::LongText(mark, count), byte) if byte == mark => State::LongText(mark, count + 1),
+                (State::LongText(mark, count), byte) if byte == mark => {
+                    State::LongText(mark, count + 1)
+                }
                 (State::LongText(mark, _), _) => State::LongText(mark, 0),
                 (State::Begin(mark, 2), byte) if byte == mark => State::LongText(mark, 0),
                 (State::Begin(mark, count), byte) if byte == mark => State::Begin(mark, count + 1),
@@ -107,7 +109,10 @@ pub struct TurtleGuard<R> {
 impl<R: Read> TurtleGuard<R> {
     /// Wraps a reader.
     pub fn new(inner: R) -> Self {
-        Self { inner, brackets: Brackets::default() }
+        Self {
+            inner,
+            brackets: Brackets::default(),
+        }
     }
 }
 
@@ -130,11 +135,15 @@ fn excess() -> String {
 /// # Errors
 /// The diagnostic with this code, at the first bracket that is too deep.
 pub fn check_turtle(source: &Source, code: &'static str) -> Result<(), Diagnostics> {
-    let Some(at) = Brackets::default().read(source.text.as_bytes()) else { return Ok(()) };
-    Err(Diagnostic::error(code, format!("this Turtle is refused: {}", excess()))
-        .at(source, at..at + 1)
-        .help("such a text can exhaust memory; name the inner nodes instead")
-        .into())
+    let Some(at) = Brackets::default().read(source.text.as_bytes()) else {
+        return Ok(());
+    };
+    Err(
+        Diagnostic::error(code, format!("this Turtle is refused: {}", excess()))
+            .at(source, at..at + 1)
+            .help("such a text can exhaust memory; name the inner nodes instead")
+            .into(),
+    )
 }
 
 #[cfg(test)]
@@ -146,11 +155,16 @@ mod tests {
         let depths: Vec<usize> = (1..=text.len())
             .map(|length| {
                 let mut brackets = Brackets::default();
-                text.as_bytes().chunks(length).for_each(|piece| assert_eq!(brackets.read(piece), None));
+                text.as_bytes()
+                    .chunks(length)
+                    .for_each(|piece| assert_eq!(brackets.read(piece), None));
                 brackets.depth
             })
             .collect();
-        assert!(depths.iter().all(|depth| *depth == depths[0]), "{text}: {depths:?}");
+        assert!(
+            depths.iter().all(|depth| *depth == depths[0]),
+            "{text}: {depths:?}"
+        );
         depths[0]
     }
 
@@ -176,8 +190,13 @@ mod tests {
     #[test]
     fn deep_nesting_is_refused_at_its_place() {
         let text = format!("<a> <p>\n{}", "(".repeat(20_000));
-        let found = check_turtle(&Source::new("a.ttl", text), "O013").expect_err("it is too deep").to_string();
-        assert!(found.contains("a.ttl:2:10001") && found.contains("more than 10000 levels"), "{found}");
+        let found = check_turtle(&Source::new("a.ttl", text), "O013")
+            .expect_err("it is too deep")
+            .to_string();
+        assert!(
+            found.contains("a.ttl:2:10001") && found.contains("more than 10000 levels"),
+            "{found}"
+        );
         let text = format!("<a> <p> {}1{} .", "(".repeat(5_000), ")".repeat(5_000)).repeat(4);
         assert!(check_turtle(&Source::new("a.ttl", text), "O013").is_ok());
     }

@@ -67,9 +67,12 @@ impl<'a> ByteReader<'a> {
 
     /// Skips variable-length integers: each ends with a byte below 128.
     pub fn skip_varints(&mut self, mut count: usize) -> Option<()> {
-        // Whole blocks first: counting their ends takes a few instructions, if the compiler need not look for overflows.
+        // Whole blocks first: counting their ends takes a few instructions, if the compiler need
+        // not look for overflows.
         while let Some((block, rest)) = self.bytes.split_first_chunk::<64>() {
-            let ends = block.iter().fold(0u8, |ends, byte| ends.wrapping_add(u8::from(*byte < 0x80)));
+            let ends = block
+                .iter()
+                .fold(0u8, |ends, byte| ends.wrapping_add(u8::from(*byte < 0x80)));
             let ends = usize::from(ends);
             if ends >= count {
                 break;
@@ -91,9 +94,13 @@ mod tests {
 
     #[test]
     fn numbers_are_read_back_and_skipped() {
-        let values: Vec<i64> = (0..300).map(|idx| (i64::MAX >> (idx % 64)) * (1 - 2 * (idx % 2))).collect();
+        let values: Vec<i64> = (0..300)
+            .map(|idx| (i64::MAX >> (idx % 64)) * (1 - 2 * (idx % 2)))
+            .collect();
         let mut bytes = Vec::new();
-        values.iter().for_each(|value| put_varint(&mut bytes, zigzag(*value)));
+        values
+            .iter()
+            .for_each(|value| put_varint(&mut bytes, zigzag(*value)));
         let mut all = ByteReader { bytes: &bytes };
         for (idx, value) in values.iter().enumerate() {
             let mut rest = ByteReader { bytes: &bytes };
@@ -101,7 +108,13 @@ mod tests {
             assert_eq!(rest.bytes.len(), all.bytes.len(), "{idx}");
             assert_eq!(all.varint().map(unzigzag), Some(*value));
         }
-        assert_eq!((all.byte(), ByteReader { bytes: &bytes }.skip_varints(values.len() + 1)), (None, None));
+        assert_eq!(
+            (
+                all.byte(),
+                ByteReader { bytes: &bytes }.skip_varints(values.len() + 1)
+            ),
+            (None, None)
+        );
         assert_eq!(ByteReader { bytes: &[0xff; 20] }.varint(), None);
     }
 }

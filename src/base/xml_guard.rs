@@ -11,9 +11,11 @@ const MAX_TEXT: usize = 64 << 20;
 const MAX_TAG: usize = 1 << 20;
 /// Maximum number of attributes of one tag; parsers compare all pairs.
 const MAX_ATTRIBUTES: usize = 256;
-/// Maximum number of namespaces declared around one place; parsers search all of them for each name.
+/// Maximum number of namespaces declared around one place; parsers search all of them for each
+/// name.
 const MAX_NAMESPACES: usize = 256;
-/// Maximum number of namespaces around all elements that declare one, added up: some parsers copy them each time.
+/// Maximum number of namespaces around all elements that declare one, added up: some parsers copy
+/// them each time.
 const MAX_COPIED_NAMESPACES: usize = 10_000_000;
 /// Maximum number of elements inside each other.
 const MAX_DEPTH: usize = 10_000;
@@ -21,14 +23,17 @@ const MAX_DEPTH: usize = 10_000;
 const MAX_ENTITY: usize = 1 << 16;
 /// Maximum number of entity declarations.
 const MAX_ENTITIES: usize = 10_000;
-/// Entities may together expand to this size, and beyond it to [`MAX_AMPLIFICATION`] times the document. Unit: bytes.
+/// Entities may together expand to this size, and beyond it to [`MAX_AMPLIFICATION`] times the
+/// document. Unit: bytes.
 const FREE_EXPANSION: usize = 8 << 20;
 const MAX_AMPLIFICATION: usize = 100;
 
-/// Reads an XML document in parts: a text with the `<` after it, or a tag up to its `>`. Fails if the document ends
-/// within an element, or demands too much: deep nesting, long tags, many attributes, namespaces or entities.
+/// Reads an XML document in parts: a text with the `<` after it, or a tag up to its `>`. Fails if
+/// the document ends within an element, or demands too much: deep nesting, long tags, many
+/// attributes, namespaces or entities.
 ///
-/// Parsers of RDF/XML treat the end of a cut file as its regular end, and expand entities without a bound.
+/// Parsers of RDF/XML treat the end of a cut file as its regular end, and expand entities without a
+/// bound.
 ///
 /// ```
 /// use std::io::Read;
@@ -103,7 +108,8 @@ impl XmlProgress {
         self.0.borrow().fault.clone()
     }
 
-    /// Returns the reason for which the guard refused the document, unless the document is only incomplete.
+    /// Returns the reason for which the guard refused the document, unless the document is only
+    /// incomplete.
     pub fn excess(&self) -> Option<String> {
         let progress = self.0.borrow();
         progress.fault.clone().filter(|_| !progress.is_cut)
@@ -155,17 +161,25 @@ impl<R: Read> XmlGuard<R> {
             None => &self.part[..],
         };
         // Bytes that continue a character have the high bits `10`.
-        progress.characters += last_line.iter().filter(|byte| **byte & 0xc0 != 0x80).count() as u64;
+        progress.characters += last_line
+            .iter()
+            .filter(|byte| **byte & 0xc0 != 0x80)
+            .count() as u64;
     }
 
     /// Appends bytes up to and including `end`. Returns whether it was found.
     fn until(&mut self, end: u8, limit: usize) -> std::io::Result<bool> {
         let rest = (limit + 1).saturating_sub(self.part.len());
         let before = self.part.len();
-        self.inner.by_ref().take(rest as u64).read_until(end, &mut self.part)?;
+        self.inner
+            .by_ref()
+            .take(rest as u64)
+            .read_until(end, &mut self.part)?;
         self.total += self.part.len() - before;
         if self.part.len() > limit {
-            return Err(self.refuse(format!("a part of the document is larger than {limit} bytes")));
+            return Err(self.refuse(format!(
+                "a part of the document is larger than {limit} bytes"
+            )));
         }
         Ok(self.part.len() > before && self.part.last() == Some(&end))
     }
@@ -183,7 +197,10 @@ impl<R: Read> XmlGuard<R> {
         self.references()?;
         if !self.in_markup && self.part.is_empty() {
             if let Some(open) = self.open.last() {
-                return Err(self.refuse_cut(format!("the file ends inside `<{}>` of line {}", open.name, open.line)));
+                return Err(self.refuse_cut(format!(
+                    "the file ends inside `<{}>` of line {}",
+                    open.name, open.line
+                )));
             }
             if !self.any {
                 return Err(self.refuse_cut("the file has no XML element"));
@@ -204,7 +221,11 @@ impl<R: Read> XmlGuard<R> {
     fn markup(&mut self) -> std::io::Result<()> {
         let (mut seen, mut quote, mut inner) = (0, None, 0);
         loop {
-            let limit = if self.is_long_markup()? { MAX_TEXT } else { MAX_TAG };
+            let limit = if self.is_long_markup()? {
+                MAX_TEXT
+            } else {
+                MAX_TAG
+            };
             if !self.until(b'>', limit)? {
                 return Err(self.refuse_cut("the file ends inside a tag or comment"));
             }
@@ -251,10 +272,14 @@ impl<R: Read> XmlGuard<R> {
         self.references()?;
         let (attributes, namespaces) = attributes(&self.part);
         if self.namespaces + namespaces > MAX_NAMESPACES {
-            return Err(self.refuse(format!("more than {MAX_NAMESPACES} namespaces are declared around one element")));
+            return Err(self.refuse(format!(
+                "more than {MAX_NAMESPACES} namespaces are declared around one element"
+            )));
         }
         if attributes > MAX_ATTRIBUTES {
-            return Err(self.refuse(format!("an element has more than {MAX_ATTRIBUTES} attributes")));
+            return Err(self.refuse(format!(
+                "an element has more than {MAX_ATTRIBUTES} attributes"
+            )));
         }
         if namespaces > 0 {
             self.copied_namespaces += self.namespaces + namespaces;
@@ -272,7 +297,11 @@ impl<R: Read> XmlGuard<R> {
         let end = |byte: &u8| byte.is_ascii_whitespace() || b"/>".contains(byte);
         let name = &self.part[..self.part.iter().position(end).unwrap_or(0).min(80)];
         let line = self.progress.line_and_column().0;
-        self.open.push(Open { name: String::from_utf8_lossy(name).into_owned(), line, namespaces });
+        self.open.push(Open {
+            name: String::from_utf8_lossy(name).into_owned(),
+            line,
+            namespaces,
+        });
         Ok(())
     }
 
@@ -281,24 +310,39 @@ impl<R: Read> XmlGuard<R> {
         if self.entities.is_empty() {
             return Ok(());
         }
-        self.expanded = self.expanded.saturating_add(expansion(&self.part, &self.entities));
+        self.expanded = self
+            .expanded
+            .saturating_add(expansion(&self.part, &self.entities));
         if self.expanded > FREE_EXPANSION && self.expanded / MAX_AMPLIFICATION > self.total {
-            return Err(self.refuse(format!("its entities expand to more than {MAX_AMPLIFICATION} times the document")));
+            return Err(self.refuse(format!(
+                "its entities expand to more than {MAX_AMPLIFICATION} times the document"
+            )));
         }
         Ok(())
     }
 
     /// Computes the sizes of the declared entities, in the order of their declaration.
     fn document_type(&mut self) -> std::io::Result<()> {
-        for declaration in self.part.split(|byte| *byte == b'<').filter_map(|text| text.strip_prefix(b"!ENTITY")) {
+        for declaration in self
+            .part
+            .split(|byte| *byte == b'<')
+            .filter_map(|text| text.strip_prefix(b"!ENTITY"))
+        {
             let declaration = declaration.trim_ascii_start();
-            let declaration = declaration.strip_prefix(b"%").unwrap_or(declaration).trim_ascii_start();
-            let Some(end) = declaration.iter().position(u8::is_ascii_whitespace) else { continue };
+            let declaration = declaration
+                .strip_prefix(b"%")
+                .unwrap_or(declaration)
+                .trim_ascii_start();
+            let Some(end) = declaration.iter().position(u8::is_ascii_whitespace) else {
+                continue;
+            };
             let (name, value) = declaration.split_at(end);
             let size = value.len().saturating_add(expansion(value, &self.entities));
             if size > MAX_ENTITY {
                 let name = String::from_utf8_lossy(&name[..name.len().min(80)]);
-                return Err(self.refuse(format!("the entity `{name}` expands to more than {MAX_ENTITY} bytes")));
+                return Err(self.refuse(format!(
+                    "the entity `{name}` expands to more than {MAX_ENTITY} bytes"
+                )));
             }
             self.entities.insert(name.to_vec(), size);
             if self.entities.len() > MAX_ENTITIES {
@@ -324,8 +368,14 @@ impl<R: Read> Read for XmlGuard<R> {
 /// Returns the size of the entities that a text refers to.
 fn expansion(text: &[u8], entities: &HashMap<Vec<u8>, usize>) -> usize {
     let references = text.split(|byte| *byte == b'&').skip(1);
-    let names = references.filter_map(|rest| rest.iter().position(|byte| *byte == b';').map(|end| &rest[..end]));
-    names.filter_map(|name| entities.get(name)).fold(0, |sum, size| sum.saturating_add(*size))
+    let names = references.filter_map(|rest| {
+        rest.iter()
+            .position(|byte| *byte == b';')
+            .map(|end| &rest[..end])
+    });
+    names
+        .filter_map(|name| entities.get(name))
+        .fold(0, |sum, size| sum.saturating_add(*size))
 }
 
 /// Returns the quote that is open after a byte of a tag, given the one before it.
@@ -363,7 +413,10 @@ mod tests {
         let mut out = String::new();
         match guard.read_to_string(&mut out) {
             Ok(_) => Ok(out),
-            Err(_) => Err((progress.fault().expect("only the guard fails"), progress.line_and_column())),
+            Err(_) => Err((
+                progress.fault().expect("only the guard fails"),
+                progress.line_and_column(),
+            )),
         }
     }
 
@@ -386,9 +439,18 @@ mod tests {
     #[test]
     fn a_cut_document_is_refused_with_its_place() {
         let cut = |text: &str| guarded(text).expect_err("it is cut");
-        assert_eq!(cut("<a>\n<bé>x\n"), ("the file ends inside `<bé>` of line 2".to_owned(), (3, 1)));
-        assert_eq!(cut("<a>\n  <b"), ("the file ends inside a tag or comment".to_owned(), (2, 4)));
-        assert_eq!(cut("<a><!-- >"), ("the file ends inside a tag or comment".to_owned(), (1, 5)));
+        assert_eq!(
+            cut("<a>\n<bé>x\n"),
+            ("the file ends inside `<bé>` of line 2".to_owned(), (3, 1))
+        );
+        assert_eq!(
+            cut("<a>\n  <b"),
+            ("the file ends inside a tag or comment".to_owned(), (2, 4))
+        );
+        assert_eq!(
+            cut("<a><!-- >"),
+            ("the file ends inside a tag or comment".to_owned(), (1, 5))
+        );
         assert_eq!(cut(" "), ("the file has no XML element".to_owned(), (1, 2)));
     }
 
@@ -397,22 +459,41 @@ mod tests {
         let attributes: String = (0..257).map(|n| format!(" a{n}=''")).collect();
         refused(&format!("<a{attributes}/>"), "attributes");
         let namespaces: String = (0..150).map(|n| format!(" xmlns:a{n}=''")).collect();
-        refused(&format!("<a{namespaces}><b{namespaces}/></a>"), "namespaces");
-        assert!(guarded(&format!("<a><b{namespaces}/><b{namespaces}></b></a>")).is_ok(), "of siblings");
+        refused(
+            &format!("<a{namespaces}><b{namespaces}/></a>"),
+            "namespaces",
+        );
+        assert!(
+            guarded(&format!("<a><b{namespaces}/><b{namespaces}></b></a>")).is_ok(),
+            "of siblings"
+        );
         let beside = format!("<a{namespaces}>{}</a>", "<c xmlns='d'/>".repeat(70_000));
         refused(&beside, "too many elements declare namespaces");
         refused(&"<a>".repeat(10_001), "nested");
-        let many: String = (0..10_001).map(|number| format!("<!ENTITY e{number} \"\">")).collect();
-        refused(&format!("<!DOCTYPE a [{many}]><a/>"), "more than 10000 entities");
+        let many: String = (0..10_001)
+            .map(|number| format!("<!ENTITY e{number} \"\">"))
+            .collect();
+        refused(
+            &format!("<!DOCTYPE a [{many}]><a/>"),
+            "more than 10000 entities",
+        );
         refused(&format!("<a b='{}'/>", "x".repeat(MAX_TAG)), "larger than");
-        let bomb: String =
-            (1..9).map(|n| format!("<!ENTITY e{n} \"{}\">", format!("&e{};", n - 1).repeat(10))).collect();
-        refused(&format!("<!DOCTYPE a [<!ENTITY e0 \"ha\">{bomb}]><a>&e8;</a>"), "the entity `e4`");
+        let bomb: String = (1..9)
+            .map(|n| format!("<!ENTITY e{n} \"{}\">", format!("&e{};", n - 1).repeat(10)))
+            .collect();
+        refused(
+            &format!("<!DOCTYPE a [<!ENTITY e0 \"ha\">{bomb}]><a>&e8;</a>"),
+            "the entity `e4`",
+        );
         let entity = format!("<!DOCTYPE a [<!ENTITY e \"{}\">]>", "x".repeat(50_000));
-        refused(&format!("{entity}<a>{}</a>", "&e;<b c='&e;'/>".repeat(1000)), "100 times");
+        refused(
+            &format!("{entity}<a>{}</a>", "&e;<b c='&e;'/>".repeat(1000)),
+            "100 times",
+        );
     }
 
-    /// Each `>` in a value, and each space before a name, was once a reason to look at the whole tag again.
+    /// Each `>` in a value, and each space before a name, was once a reason to look at the whole
+    /// tag again.
     #[test]
     fn long_tags_are_read_in_linear_time() {
         for inside in ["'>>>>'", "'  '   ", "= = ", "\"=\""] {
@@ -427,9 +508,14 @@ mod tests {
     #[test]
     fn endless_parts_are_refused() {
         for begin in ["", "<a>", "<!--"] {
-            let (mut guard, progress) = XmlGuard::new(begin.as_bytes().chain(std::io::repeat(b'x')));
+            let (mut guard, progress) =
+                XmlGuard::new(begin.as_bytes().chain(std::io::repeat(b'x')));
             assert!(std::io::copy(&mut guard, &mut std::io::sink()).is_err());
-            assert!(progress.fault().is_some_and(|fault| fault.contains("larger than 67108864")));
+            assert!(
+                progress
+                    .fault()
+                    .is_some_and(|fault| fault.contains("larger than 67108864"))
+            );
         }
     }
 }

@@ -30,15 +30,30 @@ pub(super) enum AttemptFault {
 
 impl Attempt<'_> {
     /// Makes the run. A simulation crash counts as a run too: every property is `broken`.
-    pub(super) fn make(&self, env: &Env, context: &RunContext) -> Result<FinishedRun, AttemptFault> {
-        let input = || RunInput { campaign: self.campaign, index: self.index, choices: (self.choices)() };
-        let interference = Interference { cut: self.cut, ..Interference::default() };
+    pub(super) fn make(
+        &self,
+        env: &Env,
+        context: &RunContext,
+    ) -> Result<FinishedRun, AttemptFault> {
+        let input = || RunInput {
+            campaign: self.campaign,
+            index: self.index,
+            choices: (self.choices)(),
+        };
+        let interference = Interference {
+            cut: self.cut,
+            ..Interference::default()
+        };
         let start = context.clock.start();
-        match catch_unwind(AssertUnwindSafe(|| simulate(env, input(), context, start.clone(), interference))) {
+        match catch_unwind(AssertUnwindSafe(|| {
+            simulate(env, input(), context, start.clone(), interference)
+        })) {
             Ok(made) => made.map_err(AttemptFault::Failure),
             Err(panic) => {
                 let reason = format!("simulation crashed: {}", panic_text(panic.as_ref()));
-                let recorded = catch_unwind(AssertUnwindSafe(|| crashed(env, input(), context, start, &reason)));
+                let recorded = catch_unwind(AssertUnwindSafe(|| {
+                    crashed(env, input(), context, start, &reason)
+                }));
                 recorded.ok().flatten().ok_or(AttemptFault::Crash(reason))
             }
         }
@@ -48,7 +63,13 @@ impl Attempt<'_> {
 /// The time limit of a run that starts now.
 pub(super) fn time_limit(env: &Env, context: &RunContext) -> Cut {
     let secs = context.clock.secs;
-    env.campaign.limits.run_secs.map_or(Cut::Never, |limit| Cut::Clock { secs, at_secs: secs() + limit })
+    env.campaign
+        .limits
+        .run_secs
+        .map_or(Cut::Never, |limit| Cut::Clock {
+            secs,
+            at_secs: secs() + limit,
+        })
 }
 
 /// The message of a panic.

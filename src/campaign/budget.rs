@@ -8,8 +8,9 @@ use actcheck_verdict::trials_for_width;
 /// Runs per test of a campaign that only time ends: more than any campaign makes.
 const MOST_RUNS: u32 = 10_000_000;
 
-/// Without `--runs`, a campaign that waits for narrow intervals makes at most this many times the runs that a property
-/// decided in every run needs. That is enough for properties that are decided in every fourth run.
+/// Without `--runs`, a campaign that waits for narrow intervals makes at most this many times the
+/// runs that a property decided in every run needs. That is enough for properties that are decided
+/// in every fourth run.
 const WIDTH_RESERVE: u64 = 4;
 
 /// The budget that ended a campaign.
@@ -39,7 +40,10 @@ impl fmt::Display for ExhaustedBudget {
         match self {
             Self::Time(secs) => write!(f, "its time of {secs} s is up (--time)"),
             Self::Width(width) => {
-                write!(f, "the 95 % interval of every property is at most {width} wide (--until-width)")
+                write!(
+                    f,
+                    "the 95 % interval of every property is at most {width} wide (--until-width)"
+                )
             }
             Self::Failures(1) => write!(f, "a run failed (--max-failures 1)"),
             Self::Failures(most) => write!(f, "{most} runs failed (--max-failures)"),
@@ -47,13 +51,17 @@ impl fmt::Display for ExhaustedBudget {
     }
 }
 
-/// Returns the runs of each test if the command line sets a budget but no number of runs, and `None` if the
-/// configuration decides.
+/// Returns the runs of each test if the command line sets a budget but no number of runs, and
+/// `None` if the configuration decides.
 pub(super) fn runs_per_test(overrides: &Overrides) -> Option<u32> {
     match (overrides.runs, overrides.until_width, overrides.time_secs) {
         (None, Some(width), _) => {
             let enough = trials_for_width(width).saturating_mul(WIDTH_RESERVE);
-            Some(u32::try_from(enough).unwrap_or(MOST_RUNS).clamp(1, MOST_RUNS))
+            Some(
+                u32::try_from(enough)
+                    .unwrap_or(MOST_RUNS)
+                    .clamp(1, MOST_RUNS),
+            )
         }
         (None, None, Some(_)) => Some(MOST_RUNS),
         _ => None,
@@ -67,7 +75,12 @@ mod tests {
     #[test]
     fn a_budget_without_a_run_count_has_a_maximum() {
         let asked = |runs, until_width, time_secs| {
-            runs_per_test(&Overrides { runs, until_width, time_secs, ..Overrides::default() })
+            runs_per_test(&Overrides {
+                runs,
+                until_width,
+                time_secs,
+                ..Overrides::default()
+            })
         };
         assert_eq!(asked(None, None, None), None);
         assert_eq!(asked(Some(3), Some(0.1), Some(1.0)), None);

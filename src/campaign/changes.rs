@@ -51,8 +51,8 @@ impl ChangeKind {
     }
 }
 
-/// Returns the differences between the records of two campaigns, sorted by kind and name. Ontology and rules are
-/// included: they change outcomes, though not traces.
+/// Returns the differences between the records of two campaigns, sorted by kind and name. Ontology
+/// and rules are included: they change outcomes, though not traces.
 pub fn changes(was: &CampaignRecord, is: &CampaignRecord) -> Vec<InputChange> {
     let single = |kind, name: &str, was: &str, is: &str| InputChange {
         kind,
@@ -69,17 +69,35 @@ pub fn changes(was: &CampaignRecord, is: &CampaignRecord) -> Vec<InputChange> {
             was: was.physics.map(|version| version.to_string()),
             is: is.physics.map(|version| version.to_string()),
         },
-        single(ChangeKind::Config, &was.name, &was.config_digest, &is.config_digest),
-        single(ChangeKind::Ontology, "all files", &was.ontology_digest, &is.ontology_digest),
+        single(
+            ChangeKind::Config,
+            &was.name,
+            &was.config_digest,
+            &is.config_digest,
+        ),
+        single(
+            ChangeKind::Ontology,
+            "all files",
+            &was.ontology_digest,
+            &is.ontology_digest,
+        ),
     ];
     let skill = |record: &CampaignRecord| {
-        record.skill.iter().map(|skill| (skill.command.clone(), skill.digest.clone())).collect()
+        record
+            .skill
+            .iter()
+            .map(|skill| (skill.command.clone(), skill.digest.clone()))
+            .collect()
     };
     all.extend(named(ChangeKind::Skill, &skill(was), &skill(is)));
     let models = |record: &CampaignRecord| record.models.iter().cloned().collect();
     all.extend(named(ChangeKind::Model, &models(was), &models(is)));
     let rules = |record: &CampaignRecord| {
-        record.rules.iter().map(|(_, path, digest)| (path.clone(), digest.clone())).collect::<BTreeMap<_, _>>()
+        record
+            .rules
+            .iter()
+            .map(|(_, path, digest)| (path.clone(), digest.clone()))
+            .collect::<BTreeMap<_, _>>()
     };
     all.extend(named(ChangeKind::Rule, &rules(was), &rules(is)));
     all.retain(|change| change.was != change.is);
@@ -87,22 +105,39 @@ pub fn changes(was: &CampaignRecord, is: &CampaignRecord) -> Vec<InputChange> {
     all
 }
 
-/// Says that the physics has changed since. Returns `None` if it has not: then the same scene gives the same states.
+/// Says that the physics has changed since. Returns `None` if it has not: then the same scene gives
+/// the same states.
 pub fn other_physics(changes: &[InputChange]) -> Option<String> {
-    let change = changes.iter().find(|change| change.kind == ChangeKind::Physics)?;
-    let number = |version: &Option<String>| version.as_ref().and_then(|version| version.parse::<u32>().ok());
-    let age = if number(&change.was) < number(&change.is) { "older" } else { "newer" };
+    let change = changes
+        .iter()
+        .find(|change| change.kind == ChangeKind::Physics)?;
+    let number = |version: &Option<String>| {
+        version
+            .as_ref()
+            .and_then(|version| version.parse::<u32>().ok())
+    };
+    let age = if number(&change.was) < number(&change.is) {
+        "older"
+    } else {
+        "newer"
+    };
     let version = |version: &Option<String>, word: &str| match version {
         Some(version) => format!("{word}{version}"),
         None => "without a version".to_owned(),
     };
     let (was, is) = (version(&change.was, "version "), version(&change.is, ""));
-    Some(format!("made by {age} physics ({was}; this program has {is})"))
+    Some(format!(
+        "made by {age} physics ({was}; this program has {is})"
+    ))
 }
 
-/// Says that a campaign was made by other physics than this program's. Returns `None` if it was not.
+/// Says that a campaign was made by other physics than this program's. Returns `None` if it was
+/// not.
 pub fn made_by_other_physics(record: &CampaignRecord) -> Option<String> {
-    let is = CampaignRecord { physics: Some(actcheck_world::PHYSICS_VERSION), ..record.clone() };
+    let is = CampaignRecord {
+        physics: Some(actcheck_world::PHYSICS_VERSION),
+        ..record.clone()
+    };
     other_physics(&changes(record, &is))
 }
 
@@ -116,13 +151,22 @@ fn programs(was: &CampaignRecord, is: &CampaignRecord) -> [String; 2] {
 }
 
 /// One entry for each name on either side.
-fn named(kind: ChangeKind, was: &BTreeMap<String, String>, is: &BTreeMap<String, String>) -> Vec<InputChange> {
+fn named(
+    kind: ChangeKind,
+    was: &BTreeMap<String, String>,
+    is: &BTreeMap<String, String>,
+) -> Vec<InputChange> {
     let mut names: Vec<&String> = was.keys().chain(is.keys()).collect();
     names.sort();
     names.dedup();
     names
         .into_iter()
-        .map(|name| InputChange { kind, name: name.clone(), was: was.get(name).cloned(), is: is.get(name).cloned() })
+        .map(|name| InputChange {
+            kind,
+            name: name.clone(),
+            was: was.get(name).cloned(),
+            is: is.get(name).cloned(),
+        })
         .collect()
 }
 
@@ -161,35 +205,78 @@ mod tests {
     #[test]
     fn changed_and_new_skills_are_named() {
         let with = |digest: &str| CampaignRecord {
-            skill: Some(SkillRecord { command: "pick.py".to_owned(), digest: digest.to_owned(), privileged: false }),
+            skill: Some(SkillRecord {
+                command: "pick.py".to_owned(),
+                digest: digest.to_owned(),
+                privileged: false,
+            }),
             ..record("aa")
         };
         let found = changes(&with("1"), &with("2"));
-        let [change] = found.as_slice() else { panic!("{found:?}") };
-        assert_eq!((change.kind.word(), change.name.as_str()), ("skill", "pick.py"));
+        let [change] = found.as_slice() else {
+            panic!("{found:?}")
+        };
+        assert_eq!(
+            (change.kind.word(), change.name.as_str()),
+            ("skill", "pick.py")
+        );
         let found = changes(&record("aa"), &with("2"));
-        let [change] = found.as_slice() else { panic!("{found:?}") };
-        assert_eq!((change.kind, change.was.as_deref(), change.is.as_deref()), (ChangeKind::Skill, None, Some("2")));
+        let [change] = found.as_slice() else {
+            panic!("{found:?}")
+        };
+        assert_eq!(
+            (change.kind, change.was.as_deref(), change.is.as_deref()),
+            (ChangeKind::Skill, None, Some("2"))
+        );
     }
 
     #[test]
     fn physics_without_a_version_is_older() {
-        let (old, two) = (CampaignRecord { physics: None, ..record("aa") }, record("aa"));
-        let three = CampaignRecord { physics: Some(3), ..record("aa") };
+        let (old, two) = (
+            CampaignRecord {
+                physics: None,
+                ..record("aa")
+            },
+            record("aa"),
+        );
+        let three = CampaignRecord {
+            physics: Some(3),
+            ..record("aa")
+        };
         assert_eq!(other_physics(&changes(&two, &two)), None);
         let told = |was, is| other_physics(&changes(was, is)).expect("it changed");
-        assert_eq!(told(&old, &two), "made by older physics (without a version; this program has 2)");
-        assert_eq!(told(&two, &three), "made by older physics (version 2; this program has 3)");
-        assert_eq!(told(&three, &two), "made by newer physics (version 3; this program has 2)");
+        assert_eq!(
+            told(&old, &two),
+            "made by older physics (without a version; this program has 2)"
+        );
+        assert_eq!(
+            told(&two, &three),
+            "made by older physics (version 2; this program has 3)"
+        );
+        assert_eq!(
+            told(&three, &two),
+            "made by newer physics (version 3; this program has 2)"
+        );
     }
 
     #[test]
     fn a_changed_program_of_the_same_version_is_named() {
         let found = changes(&record("aa"), &record("bb"));
-        let [change] = found.as_slice() else { panic!("{found:?}") };
-        assert_eq!((change.kind, change.name.as_str()), (ChangeKind::Program, "actcheck"));
-        assert_eq!((change.was.as_deref(), change.is.as_deref()), (Some("0.1.0 (aa)"), Some("0.1.0 (bb)")));
+        let [change] = found.as_slice() else {
+            panic!("{found:?}")
+        };
+        assert_eq!(
+            (change.kind, change.name.as_str()),
+            (ChangeKind::Program, "actcheck")
+        );
+        assert_eq!(
+            (change.was.as_deref(), change.is.as_deref()),
+            (Some("0.1.0 (aa)"), Some("0.1.0 (bb)"))
+        );
         assert!(changes(&record("aa"), &record("aa")).is_empty());
-        assert!(changes(&record(""), &record("bb")).is_empty(), "an earlier program wrote no digest");
+        assert!(
+            changes(&record(""), &record("bb")).is_empty(),
+            "an earlier program wrote no digest"
+        );
     }
 }

@@ -21,7 +21,8 @@ use actcheck_scenario::Space;
 use actcheck_search::Strategy;
 use actcheck_world as world;
 
-/// A configuration with its ontology, scene space and rules, prepared once and shared by all workers.
+/// A configuration with its ontology, scene space and rules, prepared once and shared by all
+/// workers.
 pub struct Env {
     /// The configuration.
     pub campaign: Campaign,
@@ -37,7 +38,8 @@ pub struct Env {
     pub(super) text: String,
     /// The requirement on scenes, if the configuration has one.
     pub(super) requirement: Option<Requirement>,
-    /// The program that performs actions instead of the reference skills, if the configuration names one.
+    /// The program that performs actions instead of the reference skills, if the configuration
+    /// names one.
     pub(super) programs: Option<Programs>,
 }
 
@@ -45,24 +47,30 @@ impl Env {
     /// Reads and checks everything that a campaign depends on.
     ///
     /// # Errors
-    /// Returns as many faults as can be found at once: those of the configuration, else those of the ontology, else
-    /// those of scene space, rules, robot and skills together.
+    /// Returns as many faults as can be found at once: those of the configuration, else those of
+    /// the ontology, else those of scene space, rules, robot and skills together.
     pub fn prepare(config: &Path, overrides: &Overrides) -> Result<Self, Diagnostics> {
         Self::prepare_within(config, overrides, Budget::default())
     }
 
-    /// Prepares a campaign as [`Env::prepare`] does, with a budget for every evaluation of rules, now and in its runs.
+    /// Prepares a campaign as [`Env::prepare`] does, with a budget for every evaluation of rules,
+    /// now and in its runs.
     ///
     /// # Errors
     /// As [`Env::prepare`], or if the budget is spent.
-    pub fn prepare_within(config: &Path, overrides: &Overrides, rule_budget: Budget) -> Result<Self, Diagnostics> {
+    pub fn prepare_within(
+        config: &Path,
+        overrides: &Overrides,
+        rule_budget: Budget,
+    ) -> Result<Self, Diagnostics> {
         let mut campaign = config::load(config, overrides)?;
         campaign.test_count = runs_per_test(overrides).unwrap_or(campaign.test_count);
         Self::of(campaign, rule_budget)
     }
 
-    /// Prepares a campaign of the history again: with its configuration's text as it was then, and with the present
-    /// ontology, rules and models. If `config` is given, that configuration is used instead.
+    /// Prepares a campaign of the history again: with its configuration's text as it was then, and
+    /// with the present ontology, rules and models. If `config` is given, that configuration is
+    /// used instead.
     ///
     /// # Errors
     /// `H014` if the history has no such campaign; else as [`Env::prepare`].
@@ -92,8 +100,8 @@ impl Env {
         Ok((Self::of(loaded, Budget::default())?, record))
     }
 
-    /// Returns the programs that a campaign of the history starts if it is prepared and run again as
-    /// [`Env::from_history`] does.
+    /// Returns the programs that a campaign of the history starts if it is prepared and run again
+    /// as [`Env::from_history`] does.
     ///
     /// # Errors
     /// `H014` if the history has no such campaign.
@@ -103,21 +111,31 @@ impl Env {
         Ok(config::starts(&source, &folder))
     }
 
-    /// Prepares a campaign from a configuration's text instead of a file. Its paths are relative to `folder`.
+    /// Prepares a campaign from a configuration's text instead of a file. Its paths are relative to
+    /// `folder`.
     ///
     /// # Errors
     /// As [`Env::prepare`].
-    pub fn prepare_text(source: Source, folder: &Path, overrides: &Overrides) -> Result<Self, Diagnostics> {
-        Self::of(config::load_text(source, folder, overrides)?, Budget::default())
+    pub fn prepare_text(
+        source: Source,
+        folder: &Path,
+        overrides: &Overrides,
+    ) -> Result<Self, Diagnostics> {
+        Self::of(
+            config::load_text(source, folder, overrides)?,
+            Budget::default(),
+        )
     }
 
-    /// Returns an index in this campaign whose test has the actions that a stored run performed, plus the last ones
-    /// that its choices left out.
+    /// Returns an index in this campaign whose test has the actions that a stored run performed,
+    /// plus the last ones that its choices left out.
     ///
     /// # Errors
     /// `S040` if the configuration has no such test.
     pub fn index_of(&self, performed: &str, choices: &[Choice]) -> Result<u64, Diagnostics> {
-        let left_out = choices.iter().find(|choice| choice.name == ChoiceName::ActionsLeftOut);
+        let left_out = choices
+            .iter()
+            .find(|choice| choice.name == ChoiceName::ActionsLeftOut);
         let left_out = left_out.map_or(0.0, |choice| choice.value);
         let fits = |test: &Vec<Step>| {
             let done = test.len().checked_sub(left_out as usize);
@@ -126,9 +144,19 @@ impl Env {
         match self.campaign.tests.iter().position(fits) {
             Some(test) => Ok(test as u64 * self.runs_of_a_test()),
             None => {
-                let message = format!("the configuration {} has no test `{performed}`", self.campaign.source.name);
-                let tests: Vec<String> = self.campaign.tests.iter().map(|test| Step::test_name(test)).collect();
-                Err(Diagnostic::error("S040", message).help(format!("its tests: {}", tests.join("; "))).into())
+                let message = format!(
+                    "the configuration {} has no test `{performed}`",
+                    self.campaign.source.name
+                );
+                let tests: Vec<String> = self
+                    .campaign
+                    .tests
+                    .iter()
+                    .map(|test| Step::test_name(test))
+                    .collect();
+                Err(Diagnostic::error("S040", message)
+                    .help(format!("its tests: {}", tests.join("; ")))
+                    .into())
             }
         }
     }
@@ -136,7 +164,9 @@ impl Env {
     /// Number of scenes of each test that a campaign of the history planned.
     pub(super) fn scenes_of_a_test(campaign: &Campaign, record: &CampaignRecord) -> u32 {
         let runs_of_a_scene = campaign.tests.len().max(1) as u64 * u64::from(record.repeat.max(1));
-        u32::try_from(record.planned_runs / runs_of_a_scene).unwrap_or(campaign.test_count).max(1)
+        u32::try_from(record.planned_runs / runs_of_a_scene)
+            .unwrap_or(campaign.test_count)
+            .max(1)
     }
 
     pub(super) fn of(mut campaign: Campaign, rule_budget: Budget) -> Result<Self, Diagnostics> {
@@ -148,13 +178,22 @@ impl Env {
         solids::decompose_meshes(&mut campaign, &mut faults);
         check_search(&campaign, &mut faults);
         check_skills(&campaign, &ontology, &mut faults);
-        if let Err(error) = solids::complete_robot(&mut campaign).and_then(|()| world::check_robot(&campaign.robot)) {
+        if let Err(error) =
+            solids::complete_robot(&mut campaign).and_then(|()| world::check_robot(&campaign.robot))
+        {
             faults.push(error.diagnostic());
         }
-        let space = Space::new(&campaign, &ontology).map_err(|found| faults.extend(found)).ok();
-        let rules = RuleBook::prepare_within(&ontology, &rule_budget).map_err(|found| faults.extend(found)).ok();
+        let space = Space::new(&campaign, &ontology)
+            .map_err(|found| faults.extend(found))
+            .ok();
+        let rules = RuleBook::prepare_within(&ontology, &rule_budget)
+            .map_err(|found| faults.extend(found))
+            .ok();
         let requirement = Requirement::prepare(&campaign, &ontology, &rule_budget);
-        let requirement = requirement.map_err(|found| faults.extend(found)).ok().flatten();
+        let requirement = requirement
+            .map_err(|found| faults.extend(found))
+            .ok()
+            .flatten();
         match (space, rules) {
             (Some(space), Some(rules)) if !faults.has_errors() => {
                 let of_case = check_case(&campaign, &space);
@@ -165,13 +204,23 @@ impl Env {
                 }
                 let programs = programs(&campaign);
                 let text = campaign.source.text.to_string();
-                faults.or(Self { campaign, ontology, space, rules, rule_budget, text, requirement, programs })
+                faults.or(Self {
+                    campaign,
+                    ontology,
+                    space,
+                    rules,
+                    rule_budget,
+                    text,
+                    requirement,
+                    programs,
+                })
             }
             _ => Err(faults),
         }
     }
 
-    /// Warnings of the configuration, of the ontology and of the rules, such as rules without effect.
+    /// Warnings of the configuration, of the ontology and of the rules, such as rules without
+    /// effect.
     pub fn warnings(&self) -> Diagnostics {
         let mut warnings = self.campaign.warnings.clone();
         warnings.extend(self.findings());
@@ -196,22 +245,39 @@ impl Env {
             .ontology
             .properties
             .values()
-            .map(|p| (p.iri.clone(), p.rule.path.clone(), self.rules.digest(&p.iri).to_owned()))
+            .map(|p| {
+                (
+                    p.iri.clone(),
+                    p.rule.path.clone(),
+                    self.rules.digest(&p.iri).to_owned(),
+                )
+            })
             .collect();
-        let mut models: Vec<(String, String)> =
-            self.campaign.models.values().map(|model| (model.name.clone(), model.digest.clone())).collect();
-        models.push((self.campaign.robot.name.clone(), self.campaign.robot.digest.clone()));
+        let mut models: Vec<(String, String)> = self
+            .campaign
+            .models
+            .values()
+            .map(|model| (model.name.clone(), model.digest.clone()))
+            .collect();
+        models.push((
+            self.campaign.robot.name.clone(),
+            self.campaign.robot.digest.clone(),
+        ));
         let worlds = self.campaign.worlds.values();
         models.extend(worlds.map(|world| (format!("world {}", world.name), world.digest.clone())));
         models.sort();
-        let mut findings: Vec<FindingRecord> = self.findings().iter().map(FindingRecord::of).collect();
+        let mut findings: Vec<FindingRecord> =
+            self.findings().iter().map(FindingRecord::of).collect();
         findings.sort();
         CampaignRecord {
             id,
             name,
             config_text: self.text.clone(),
             config_digest: actcheck_base::digest_of(&self.text),
-            config_path: path_from(&self.campaign.history, Path::new(&*self.campaign.source.name)),
+            config_path: path_from(
+                &self.campaign.history,
+                Path::new(&*self.campaign.source.name),
+            ),
             ontology_digest: self.ontology.digest.clone(),
             rules,
             findings,
@@ -256,11 +322,13 @@ impl Env {
 
     /// Number of planned runs in this shard of the campaign.
     pub fn runs_to_make(&self) -> u64 {
-        self.campaign.shard.map_or(self.planned_runs(), |shard| shard.share(self.planned_runs()))
+        self.campaign.shard.map_or(self.planned_runs(), |shard| {
+            shard.share(self.planned_runs())
+        })
     }
 
-    /// Position of the test that a run performs. All runs of the first test come first; an index past the end gives the
-    /// last test.
+    /// Position of the test that a run performs. All runs of the first test come first; an index
+    /// past the end gives the last test.
     pub fn test_of(&self, index: u64) -> usize {
         let last = self.campaign.tests.len().saturating_sub(1);
         usize::try_from(index / self.runs_of_a_test().max(1)).map_or(last, |test| test.min(last))
@@ -272,7 +340,8 @@ impl Env {
     }
 }
 
-/// The configuration of a campaign as the history keeps it, and the folder to which its paths are relative.
+/// The configuration of a campaign as the history keeps it, and the folder to which its paths are
+/// relative.
 fn stored_configuration(history: &History, record: &CampaignRecord) -> (Source, PathBuf) {
     let path = config::resolve_path(history.dir(), &record.config_path);
     let source = Source::new(path.display().to_string(), record.config_text.as_str());
@@ -281,7 +350,8 @@ fn stored_configuration(history: &History, record: &CampaignRecord) -> (Source, 
 
 /// The command-line overrides with which a campaign of a history began, except the number of runs.
 pub(super) fn recorded_overrides(history: &History, record: &CampaignRecord) -> Overrides {
-    // A campaign merged from several shards is treated as a whole, so its missing shards belong to it too.
+    // A campaign merged from several shards is treated as a whole, so its missing shards belong to
+    // it too.
     let shard = match record.shards.as_slice() {
         [only] => Some(*only),
         _ => None,
@@ -303,16 +373,26 @@ pub(super) fn recorded_overrides(history: &History, record: &CampaignRecord) -> 
 /// Drops the warning O017 about the rule file that `[scene] require` names.
 fn forget_requirement(campaign: &Campaign, ontology: &mut Ontology) {
     let file = |source: &Source| std::fs::canonicalize(&*source.name).ok();
-    let Some(required) = campaign.scene_rule.as_ref().and_then(file) else { return };
+    let Some(required) = campaign.scene_rule.as_ref().and_then(file) else {
+        return;
+    };
     let is_required = |found: &Diagnostic| {
-        found.code == "O017" && found.source.as_ref().and_then(file).is_some_and(|path| path == required)
+        found.code == "O017"
+            && found
+                .source
+                .as_ref()
+                .and_then(file)
+                .is_some_and(|path| path == required)
     };
     let warnings = std::mem::take(&mut ontology.warnings);
-    ontology.warnings = warnings.into_iter().filter(|found| !is_required(found)).collect();
+    ontology.warnings = warnings
+        .into_iter()
+        .filter(|found| !is_required(found))
+        .collect();
 }
 
-/// Sets the category of models that come without one, and of all moving parts, from their name if the ontology has such a
-/// class; else they stay `act:Object`.
+/// Sets the category of models that come without one, and of all moving parts, from their name if
+/// the ontology has such a class; else they stay `act:Object`.
 fn categorise(campaign: &mut Campaign, ontology: &Ontology) {
     let used = campaign.used_models();
     for model in campaign.models.values_mut() {
@@ -324,21 +404,29 @@ fn categorise(campaign: &mut Campaign, ontology: &Ontology) {
         }
     }
     for name in &campaign.uncategorised {
-        let Some(model) = campaign.models.get_mut(name) else { continue };
+        let Some(model) = campaign.models.get_mut(name) else {
+            continue;
+        };
         // Models that only a world has are called WORLD/NAME. Configurations can't name them.
         let own_name = name.rsplit_once('/').map(|(_, own_name)| own_name);
         match ontology.class_called(own_name.unwrap_or(name)) {
             Some(class) => Arc::make_mut(model).category = class.to_owned(),
             None if own_name.is_none() && used.contains(name) => campaign.warnings.push(
-                Diagnostic::warning("W039", format!("the model `{name}` has no category: it counts as `act:Object`"))
-                    .help(format!("add it to `[categories]`, for example `{name} = \"act:Cup\"`")),
+                Diagnostic::warning(
+                    "W039",
+                    format!("the model `{name}` has no category: it counts as `act:Object`"),
+                )
+                .help(format!(
+                    "add it to `[categories]`, for example `{name} = \"act:Cup\"`"
+                )),
             ),
             None => {}
         }
     }
 }
 
-/// Returns a path relative to a folder, so that both can be moved together; unchanged if one of them does not exist.
+/// Returns a path relative to a folder, so that both can be moved together; unchanged if one of
+/// them does not exist.
 fn path_from(folder: &Path, path: &Path) -> String {
     let absolute = |path: &Path| std::fs::canonicalize(path).ok();
     let seen = match (absolute(folder), absolute(path)) {
@@ -348,8 +436,8 @@ fn path_from(folder: &Path, path: &Path) -> String {
     seen.display().to_string()
 }
 
-/// Checks that a search for failures is neither ended by an interval width (its raw counts are biased) nor split into
-/// shards (each scene depends on earlier results).
+/// Checks that a search for failures is neither ended by an interval width (its raw counts are
+/// biased) nor split into shards (each scene depends on earlier results).
 fn check_search(campaign: &Campaign, faults: &mut Diagnostics) {
     if !campaign.search.is_guided() {
         return;
@@ -357,13 +445,23 @@ fn check_search(campaign: &Campaign, faults: &mut Diagnostics) {
     let name = campaign.search.name();
     let help = "choose the strategy `random`, `halton` or `latin-hypercube`";
     let mut refuse = |why: &str| {
-        faults.push(campaign.fault("S024", "search", format!("a {name} search looks for failures: {why}")).help(help));
+        faults.push(
+            campaign
+                .fault(
+                    "S024",
+                    "search",
+                    format!("a {name} search looks for failures: {why}"),
+                )
+                .help(help),
+        );
     };
     if campaign.limits.until_width.is_some() {
         refuse("its share of failed runs is biased, so the width of an interval can't end it");
     }
     if campaign.shard.is_some() {
-        refuse("each scene depends on the results of earlier ones, so it can't be split into shards");
+        refuse(
+            "each scene depends on the results of earlier ones, so it can't be split into shards",
+        );
     }
 }
 
@@ -372,23 +470,35 @@ fn programs(campaign: &Campaign) -> Option<Programs> {
     match &campaign.launcher {
         Launcher::Reference => None,
         Launcher::Program(skill) => {
-            let tested = campaign.tests.iter().flatten().map(|step| step.action.clone()).collect();
+            let tested = campaign
+                .tests
+                .iter()
+                .flatten()
+                .map(|step| step.action.clone())
+                .collect();
             Some(Programs::new(skill.as_ref().clone(), tested))
         }
     }
 }
 
-/// Reports actions of the ontology that no reference skill performs. The scene space reports names that the ontology
-/// lacks, and a program names its skills only when it is started.
+/// Reports actions of the ontology that no reference skill performs. The scene space reports names
+/// that the ontology lacks, and a program names its skills only when it is started.
 fn check_skills(campaign: &Campaign, ontology: &Ontology, faults: &mut Diagnostics) {
     if campaign.launcher != Launcher::Reference {
         return;
     }
     for (test, listed) in campaign.tests.iter().enumerate() {
         for (step, action) in listed.iter().map(|step| &step.action).enumerate() {
-            if let (true, Err(unknown)) = (ontology.actions.contains_key(action), actions::known_skill(action)) {
+            if let (true, Err(unknown)) = (
+                ontology.actions.contains_key(action),
+                actions::known_skill(action),
+            ) {
                 let diagnostic = unknown.diagnostic();
-                let fault = campaign.fault(diagnostic.code, &format!("tests.{test}.{step}"), unknown.to_string());
+                let fault = campaign.fault(
+                    diagnostic.code,
+                    &format!("tests.{test}.{step}"),
+                    unknown.to_string(),
+                );
                 faults.push(match diagnostic.help {
                     Some(help) => fault.help(help),
                     None => fault,

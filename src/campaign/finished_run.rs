@@ -52,7 +52,8 @@ pub(super) struct RunPlace {
 }
 
 impl RunPlace {
-    /// The place of the only run of a campaign, or of a run that is not stored. It takes no time of a campaign.
+    /// The place of the only run of a campaign, or of a run that is not stored. It takes no time of
+    /// a campaign.
     pub(super) fn alone(campaign: &str) -> Self {
         Self {
             campaign: campaign.to_owned(),

@@ -1,6 +1,8 @@
-//! Warnings about objects and surfaces of the scene space that the robot can't handle, from its gripper, arm and camera.
+//! Warnings about objects and surfaces of the scene space that the robot can't handle, from its
+//! gripper, arm and camera.
 //!
-//! Only the reference skills are foreseen: a program that performs actions may grasp in other ways. Nothing is simulated.
+//! Only the reference skills are foreseen: a program that performs actions may grasp in other ways.
+//! Nothing is simulated.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -8,12 +10,14 @@ use crate::Env;
 use actcheck_actions as actions;
 use actcheck_base::{Diagnostic, Diagnostics};
 use actcheck_config::Launcher;
-use actcheck_data::{ChoiceName, ChoiceValue, Choices, ObjectAxis, ObjectModel, PlacedObject, Scene};
+use actcheck_data::{
+    ChoiceName, ChoiceValue, Choices, ObjectAxis, ObjectModel, PlacedObject, Scene,
+};
 use actcheck_scenario as scenario;
 use actcheck_world::{self as world, GRAVITY, World};
 
-/// Places of the target on the surface at which a pick is planned: the middle and two opposite corners. Values beyond
-/// the surface are limited to it. Unit: metres.
+/// Places of the target on the surface at which a pick is planned: the middle and two opposite
+/// corners. Values beyond the surface are limited to it. Unit: metres.
 const PLACES_M: [[f64; 2]; 3] = [[0.0, 0.0], [FAR_M, FAR_M], [-FAR_M, -FAR_M]];
 const FAR_M: f64 = 1e3;
 /// Height of the camera above a surface below which it sees the surface edge-on. Unit: metres.
@@ -22,30 +26,48 @@ const LEAST_ABOVE_M: f64 = 0.05;
 const IN_VIEW: f64 = 0.5;
 
 impl Env {
-    /// Predicts which objects and surfaces the robot can't handle, as warnings with numbers: the gripper is too narrow
-    /// or its cup does not seal (S070), objects are out of reach (S071) or too heavy (S072), the camera does not see a
-    /// surface (S073), the arm's motors can't hold its own weight (S074), efforts are unknown (S075), or a
-    /// shape is between the fingers (S076).
+    /// Predicts which objects and surfaces the robot can't handle, as warnings with numbers: the
+    /// gripper is too narrow or its cup does not seal (S070), objects are out of reach (S071) or
+    /// too heavy (S072), the camera does not see a surface (S073), the arm's motors can't hold its
+    /// own weight (S074), efforts are unknown (S075), or a shape is between the fingers (S076).
     pub fn forecast(&self) -> Diagnostics {
         let mut found = Diagnostics::new();
         let campaign = &self.campaign;
         if !matches!(campaign.launcher, Launcher::Reference) || campaign.case.is_some() {
             return found;
         }
-        found.extend(self.unknown_efforts().into_iter().chain(self.unknown_speeds()).chain(self.too_weak()).collect());
+        found.extend(
+            self.unknown_efforts()
+                .into_iter()
+                .chain(self.unknown_speeds())
+                .chain(self.too_weak())
+                .collect(),
+        );
         found.extend(self.obstructed().into_iter().collect());
         let scenes = self.nominal_scenes();
         if let Some(test) = self.test_with("PerceivePlane") {
             self.foresee_views(&scenes, test, &mut found);
         }
-        let Some(test) = self.test_with("Pick") else { return found };
-        for (idx, name) in campaign.candidates.get("pickObject").into_iter().flatten().enumerate() {
-            let Some(model) = campaign.models.get(name) else { continue };
+        let Some(test) = self.test_with("Pick") else {
+            return found;
+        };
+        for (idx, name) in campaign
+            .candidates
+            .get("pickObject")
+            .into_iter()
+            .flatten()
+            .enumerate()
+        {
+            let Some(model) = campaign.models.get(name) else {
+                continue;
+            };
             let key = format!("pickObject.{idx}");
             let unheld = match self.campaign.robot.suction {
                 Some(cup) => self.unsealed(&key, model, &cup),
                 None => {
-                    let narrow = self.too_wide(&key, model).or_else(|| self.too_slippery(&key, model));
+                    let narrow = self
+                        .too_wide(&key, model)
+                        .or_else(|| self.too_slippery(&key, model));
                     narrow.or_else(|| self.squeezed_out(&key, model))
                 }
             };
@@ -54,7 +76,11 @@ impl Env {
                 continue;
             }
             for scene in &scenes {
-                found.extend(self.foresee_picks(&key, model, scene, test).into_iter().collect());
+                found.extend(
+                    self.foresee_picks(&key, model, scene, test)
+                        .into_iter()
+                        .collect(),
+                );
             }
         }
         found
@@ -62,12 +88,21 @@ impl Env {
 
     /// Index of the first test with this action.
     fn test_with(&self, action: &str) -> Option<usize> {
-        self.campaign.tests.iter().position(|test| test.iter().any(|step| step.action == action))
+        self.campaign
+            .tests
+            .iter()
+            .position(|test| test.iter().any(|step| step.action == action))
     }
 
     /// Choices of a scene for each world and each surface in it.
     fn nominal_scenes(&self) -> Vec<(String, BTreeMap<ChoiceName, Vec<ChoiceValue>>)> {
-        let of = |designator: &str| self.campaign.candidates.get(designator).cloned().unwrap_or_default();
+        let of = |designator: &str| {
+            self.campaign
+                .candidates
+                .get(designator)
+                .cloned()
+                .unwrap_or_default()
+        };
         let worlds = of("world");
         let worlds: Vec<Option<&String>> = match worlds.is_empty() {
             true => vec![None],
@@ -82,7 +117,9 @@ impl Env {
                 values.insert(ChoiceName::SurfaceName, candidate(&surface));
                 values.insert(ChoiceName::SurfaceModel, candidate(&surface));
                 // A world without this surface has another one.
-                let drawn = self.draw(&values, 0).and_then(|scene| designated(&scene, "objectSurface"));
+                let drawn = self
+                    .draw(&values, 0)
+                    .and_then(|scene| designated(&scene, "objectSurface"));
                 if drawn.is_some_and(|surface| known.insert((world.cloned(), surface))) {
                     scenes.push((surface, values));
                 }
@@ -101,43 +138,66 @@ impl Env {
         if robot.suction.is_some() {
             return None;
         }
-        let links = world::shapes_between_fingers(robot).ok().filter(|links| !links.is_empty())?;
+        let links = world::shapes_between_fingers(robot)
+            .ok()
+            .filter(|links| !links.is_empty())?;
         let names = links.join("`, `");
         let message = format!(
             "the shape of `{names}` is between the fingers of {}: it keeps every object out of the hand",
             robot.name,
         );
-        let quoted = links.iter().map(|link| format!("\"{link}\"")).collect::<Vec<_>>().join(", ");
-        let help =
-            format!("if no real part is there, write `no_collision_links = [{quoted}]` into the robot's profile");
-        Some(self.campaign.warning("S076", "robot.profile", message).help(help))
+        let quoted = links
+            .iter()
+            .map(|link| format!("\"{link}\""))
+            .collect::<Vec<_>>()
+            .join(", ");
+        let help = format!(
+            "if no real part is there, write `no_collision_links = [{quoted}]` into the robot's profile"
+        );
+        Some(
+            self.campaign
+                .warning("S076", "robot.profile", message)
+                .help(help),
+        )
     }
 
     /// S075 if joints with a role have no known effort.
     fn unknown_efforts(&self) -> Option<Diagnostic> {
         let robot = &self.campaign.robot;
-        let (joints, effort) = world::assumed_efforts(robot).ok().filter(|(joints, _)| !joints.is_empty())?;
+        let (joints, effort) = world::assumed_efforts(robot)
+            .ok()
+            .filter(|(joints, _)| !joints.is_empty())?;
         let message = format!(
             "the `effort` of `{}` of {} is 0 or -1, and so unknown: {effort} N or N·m is used",
             joints.join("`, `"),
             robot.name,
         );
         let help = "write the largest force or torque of each joint into `<limit effort=\"…\">` of the URDF";
-        Some(self.campaign.warning("S075", "robot.profile", message).help(help))
+        Some(
+            self.campaign
+                .warning("S075", "robot.profile", message)
+                .help(help),
+        )
     }
 
     /// S075 if joints with a role have no known speed.
     fn unknown_speeds(&self) -> Option<Diagnostic> {
         let robot = &self.campaign.robot;
-        let (joints, [turning, sliding]) =
-            world::assumed_speeds(robot).ok().filter(|(joints, _)| !joints.is_empty())?;
+        let (joints, [turning, sliding]) = world::assumed_speeds(robot)
+            .ok()
+            .filter(|(joints, _)| !joints.is_empty())?;
         let message = format!(
             "the largest `velocity` of `{}` of {} is 0 or -1, and so unknown: {turning} rad/s or {sliding} m/s is used",
             joints.join("`, `"),
             robot.name,
         );
-        let help = "write the largest speed of each joint into `<limit velocity=\"…\">` of the URDF";
-        Some(self.campaign.warning("S075", "robot.profile", message).help(help))
+        let help =
+            "write the largest speed of each joint into `<limit velocity=\"…\">` of the URDF";
+        Some(
+            self.campaign
+                .warning("S075", "robot.profile", message)
+                .help(help),
+        )
     }
 
     /// S074 for each joint of the arm that can't hold the arm by its motor alone.
@@ -151,16 +211,24 @@ impl Env {
             );
             let help = "nothing, if the robot has springs or counterweights; otherwise correct the joint's `effort`, or \
                         the masses of the links, in the URDF";
-            self.campaign.warning("S074", "robot.profile", message).help(help)
+            self.campaign
+                .warning("S074", "robot.profile", message)
+                .help(help)
         };
-        world::balanced_joints(robot).unwrap_or_default().into_iter().map(warning).collect()
+        world::balanced_joints(robot)
+            .unwrap_or_default()
+            .into_iter()
+            .map(warning)
+            .collect()
     }
 
     /// S070 if the gripper opens too little for the narrower side.
     fn too_wide(&self, key: &str, model: &ObjectModel) -> Option<Diagnostic> {
         let (robot, [width, depth, _]) = (&self.campaign.robot, model.size_m);
         let needed_m = actions::needed_opening_m(width.min(depth));
-        let at_rim = model.rim().is_some_and(|rim| actions::takes_rim(&rim, robot.max_opening_m));
+        let at_rim = model
+            .rim()
+            .is_some_and(|rim| actions::takes_rim(&rim, robot.max_opening_m));
         if needed_m <= robot.max_opening_m || at_rim || self.campaign.lying.0 > 0.0 {
             return None;
         }
@@ -197,8 +265,8 @@ impl Env {
         Some(self.campaign.warning("S072", key, message).help(help))
     }
 
-    /// S072 if the fingers are so steep a wedge around the object that friction does not hold it: half of the angle between
-    /// them is above the friction angle.
+    /// S072 if the fingers are so steep a wedge around the object that friction does not hold it:
+    /// half of the angle between them is above the friction angle.
     fn squeezed_out(&self, key: &str, model: &ObjectModel) -> Option<Diagnostic> {
         let (robot, [width, depth, _]) = (&self.campaign.robot, model.size_m);
         let width_m = width.min(depth);
@@ -234,21 +302,36 @@ impl Env {
         let mut weakest: Option<actions::ForeseenPick> = None;
         for [x, y] in PLACES_M {
             let mut values = values.clone();
-            let mut set = |axis, value| values.insert(ChoiceName::Object(PlacedObject::Target, axis), vec![value]);
-            set(ObjectAxis::Model, ChoiceValue::Candidate(model.name.clone()));
+            let mut set = |axis, value| {
+                values.insert(ChoiceName::Object(PlacedObject::Target, axis), vec![value])
+            };
+            set(
+                ObjectAxis::Model,
+                ChoiceValue::Candidate(model.name.clone()),
+            );
             set(ObjectAxis::X, ChoiceValue::Number(x));
             set(ObjectAxis::Y, ChoiceValue::Number(y));
-            let Some(scene) = self.draw(&values, test) else { continue };
-            let (Some(target), Ok(mut world)) = (designated(&scene, "pickObject"), world::build(&scene)) else {
+            let Some(scene) = self.draw(&values, test) else {
+                continue;
+            };
+            let (Some(target), Ok(mut world)) =
+                (designated(&scene, "pickObject"), world::build(&scene))
+            else {
                 continue;
             };
             n_places += 1;
             match actions::foresee_pick(&target, &mut world, &mut Choices::named(&values)) {
-                Ok(pick) if weakest.as_ref().is_none_or(|least| pick.payload_kg < least.payload_kg) => {
+                Ok(pick)
+                    if weakest
+                        .as_ref()
+                        .is_none_or(|least| pick.payload_kg < least.payload_kg) =>
+                {
                     weakest = Some(pick);
                 }
                 Ok(_) => {}
-                Err(reason) => reasons.push(reason.trim_start_matches(&format!("{target}: ")).to_owned()),
+                Err(reason) => {
+                    reasons.push(reason.trim_start_matches(&format!("{target}: ")).to_owned())
+                }
             }
         }
         if let Some(reason) = reasons.first() {
@@ -258,8 +341,7 @@ impl Env {
                 reasons.len(),
                 n_places,
             );
-            let help =
-                "picks there will fail: name a lower or smaller surface, or add `postures` to the robot's profile";
+            let help = "picks there will fail: name a lower or smaller surface, or add `postures` to the robot's profile";
             return Some(self.campaign.warning("S071", key, message).help(help));
         }
         let pick = weakest?;
@@ -272,7 +354,8 @@ impl Env {
              `{surface}`",
             model.name, pick.weakest, pick.payload_kg,
         );
-        let help = "reduce the object's mass or `mass_scale`, or correct the joint's `effort` in the URDF";
+        let help =
+            "reduce the object's mass or `mass_scale`, or correct the joint's `effort` in the URDF";
         Some(self.campaign.warning("S072", key, message).help(help))
     }
 
@@ -283,39 +366,73 @@ impl Env {
         test: usize,
         found: &mut Diagnostics,
     ) {
-        let names = self.campaign.candidates.get("objectSurface").into_iter().flatten();
-        let keys: BTreeMap<&String, usize> = names.enumerate().map(|(idx, name)| (name, idx)).collect();
-        let is_in_front = self.campaign.tests[test].first().is_some_and(|first| first.action == "PerceivePlane");
+        let names = self
+            .campaign
+            .candidates
+            .get("objectSurface")
+            .into_iter()
+            .flatten();
+        let keys: BTreeMap<&String, usize> =
+            names.enumerate().map(|(idx, name)| (name, idx)).collect();
+        let is_in_front = self.campaign.tests[test]
+            .first()
+            .is_some_and(|first| first.action == "PerceivePlane");
         for (surface, values) in scenes {
-            let Some(scene) = self.draw(values, test) else { continue };
-            let (Some(top_m), Ok(world)) = (top_of(&scene), world::build(&scene)) else { continue };
-            let Some(why) = self.unseen(&world, top_m, is_in_front) else { continue };
-            let key = format!("objectSurface.{}", keys.get(surface).copied().unwrap_or_default());
-            let message =
-                format!("the camera of {} does not see the top of `{surface}`: {why}", self.campaign.robot.name);
-            let help = "change `camera_link` or `home` in the robot's profile, `[camera]`, or the surface";
+            let Some(scene) = self.draw(values, test) else {
+                continue;
+            };
+            let (Some(top_m), Ok(world)) = (top_of(&scene), world::build(&scene)) else {
+                continue;
+            };
+            let Some(why) = self.unseen(&world, top_m, is_in_front) else {
+                continue;
+            };
+            let key = format!(
+                "objectSurface.{}",
+                keys.get(surface).copied().unwrap_or_default()
+            );
+            let message = format!(
+                "the camera of {} does not see the top of `{surface}`: {why}",
+                self.campaign.robot.name
+            );
+            let help =
+                "change `camera_link` or `home` in the robot's profile, `[camera]`, or the surface";
             found.push(self.campaign.warning("S073", &key, message).help(help));
         }
     }
 
-    /// The reason why the camera does not see a point, with numbers. Its distance and direction only count if the robot
-    /// starts `in_front` of it.
+    /// The reason why the camera does not see a point, with numbers. Its distance and direction
+    /// only count if the robot starts `in_front` of it.
     fn unseen(&self, world: &World, point_m: [f64; 3], in_front: bool) -> Option<String> {
-        let (view, camera) = (actions::foresee_view(world, point_m), &self.campaign.sensing.camera);
+        let (view, camera) = (
+            actions::foresee_view(world, point_m),
+            &self.campaign.sensing.camera,
+        );
         if view.above_m < LEAST_ABOVE_M {
-            let (camera_m, top_m) = (centimetres(point_m[2] + view.above_m), centimetres(point_m[2]));
-            return Some(format!("it is at a height of {camera_m}, and the top at {top_m}"));
+            let (camera_m, top_m) = (
+                centimetres(point_m[2] + view.above_m),
+                centimetres(point_m[2]),
+            );
+            return Some(format!(
+                "it is at a height of {camera_m}, and the top at {top_m}"
+            ));
         }
         if !in_front {
             return None;
         }
         if !(camera.min_range_m..=camera.max_range_m).contains(&view.range_m) {
             let (near, far) = (camera.min_range_m, camera.max_range_m);
-            return Some(format!("its middle is {:.2} m away, and the range is {near} to {far} m", view.range_m));
+            return Some(format!(
+                "its middle is {:.2} m away, and the range is {near} to {far} m",
+                view.range_m
+            ));
         }
         let across = camera.field_of_view_rad;
         let up = across * f64::from(camera.height) / f64::from(camera.width.max(1));
-        let beyond = [across, up].iter().zip(view.off_rad).any(|(field, off)| off.abs() > field * IN_VIEW);
+        let beyond = [across, up]
+            .iter()
+            .zip(view.off_rad)
+            .any(|(field, off)| off.abs() > field * IN_VIEW);
         beyond.then(|| {
             let [off_across, off_up] = view.off_rad.map(|off| off.abs().to_degrees());
             format!(

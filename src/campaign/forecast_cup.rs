@@ -6,12 +6,18 @@ use actcheck_base::Diagnostic;
 use actcheck_data::{ObjectModel, Pose, Suction};
 use actcheck_world::{self as world, GRAVITY};
 
-/// Safety factor of a seal against the accelerations of the arm. Vendors of cups take 1.5 for level motions.
+/// Safety factor of a seal against the accelerations of the arm. Vendors of cups take 1.5 for level
+/// motions.
 const SAFETY: f64 = 1.5;
 
 impl Env {
     /// S070 or S072 for an object that the robot's suction cup can't hold.
-    pub(super) fn unsealed(&self, key: &str, model: &ObjectModel, cup: &Suction) -> Option<Diagnostic> {
+    pub(super) fn unsealed(
+        &self,
+        key: &str,
+        model: &ObjectModel,
+        cup: &Suction,
+    ) -> Option<Diagnostic> {
         let lips = actions::lips_on(model.size_m, cup);
         let flat = lips.iter().filter(|lip| world::would_seal(model, lip, cup));
         match flat.map(|lip| carried_n(lip, model, cup)).reduce(f64::max) {
@@ -31,7 +37,12 @@ impl Env {
         self.campaign.warning("S070", key, message).help(help)
     }
 
-    fn too_heavy_to_seal(&self, key: &str, model: &ObjectModel, force_n: f64) -> Option<Diagnostic> {
+    fn too_heavy_to_seal(
+        &self,
+        key: &str,
+        model: &ObjectModel,
+        force_n: f64,
+    ) -> Option<Diagnostic> {
         let [lightest_kg, heaviest_kg] =
             <[f64; 2]>::from(self.campaign.physics.mass_scale).map(|scale| model.mass_kg * scale);
         let carried_kg = force_n / GRAVITY;
@@ -53,8 +64,8 @@ impl Env {
     }
 }
 
-/// The weight that a seal at this place of an upright object carries. On a side, it shears the lip and peels it off. Unit:
-/// newtons.
+/// The weight that a seal at this place of an upright object carries. On a side, it shears the lip
+/// and peels it off. Unit: newtons.
 fn carried_n(lip: &Pose, model: &ObjectModel, cup: &Suction) -> f64 {
     let [x, y, z] = lip.position;
     if (z - model.size_m[2]).abs() < 1e-6 {
@@ -62,5 +73,6 @@ fn carried_n(lip: &Pose, model: &ObjectModel, cup: &Suction) -> f64 {
     }
     // The middle of the object is as far from the lip as the lip is from the object's axis.
     let lever_m = libm::hypot(x, y).max(1e-6);
-    cup.most_shear_n(cup.force_n).min(cup.most_peel_nm(cup.force_n) / lever_m)
+    cup.most_shear_n(cup.force_n)
+        .min(cup.most_peel_nm(cup.force_n) / lever_m)
 }

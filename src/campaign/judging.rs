@@ -9,8 +9,8 @@ use actcheck_ontology::{Action, Ontology};
 use actcheck_rules::{Budget, RuleBook};
 use actcheck_verdict::{Fate, judge};
 
-/// Returns the outcomes of an action's success properties. Rules are evaluated only for completed actions, those of
-/// preconditions for the state before the action alone.
+/// Returns the outcomes of an action's success properties. Rules are evaluated only for completed
+/// actions, those of preconditions for the state before the action alone.
 ///
 /// # Errors
 /// [`Failure::Interrupted`] if the budget's `stop` is set during a long evaluation.
@@ -32,12 +32,18 @@ pub(super) fn judge_action(
     let findings = match (&fate, facts) {
         (Fate::Completed, Some(facts)) => {
             let mut found = uninterrupted(rules.judge(&facts, &action.success_properties, budget))?;
-            found.extend(uninterrupted(rules.held_before(&facts, &action.preconditions, budget))?);
+            found.extend(uninterrupted(rules.held_before(
+                &facts,
+                &action.preconditions,
+                budget,
+            ))?);
             found
         }
         _ => BTreeMap::new(),
     };
-    let mut judgements = judge(ontology, action, &findings, &fate, |property| rules.digest(property).to_owned());
+    let mut judgements = judge(ontology, action, &findings, &fate, |property| {
+        rules.digest(property).to_owned()
+    });
     if let Some(facts) = facts {
         note_held_before(rules, &facts, &mut judgements, budget)?;
         note_vacuous(rules, &facts, &mut judgements, budget)?;
@@ -49,8 +55,14 @@ type Found = BTreeMap<String, Result<Findings, RuleFault>>;
 
 /// Returns the findings, or [`Failure::Interrupted`] if an evaluation was interrupted.
 fn uninterrupted(found: Found) -> Result<Found, Failure> {
-    let interrupted = found.values().any(|found| *found == Err(RuleFault::Interrupted));
-    if interrupted { Err(Failure::Interrupted) } else { Ok(found) }
+    let interrupted = found
+        .values()
+        .any(|found| *found == Err(RuleFault::Interrupted));
+    if interrupted {
+        Err(Failure::Interrupted)
+    } else {
+        Ok(found)
+    }
 }
 
 /// Sets `held_before` on the passed judgements whose property states success.
@@ -62,7 +74,9 @@ fn note_held_before(
 ) -> Result<(), Failure> {
     let asked: Vec<String> = judgements
         .iter()
-        .filter(|judgement| judgement.outcome == Outcome::Passed && rules.states_success(&judgement.property))
+        .filter(|judgement| {
+            judgement.outcome == Outcome::Passed && rules.states_success(&judgement.property)
+        })
         .map(|judgement| judgement.property.clone())
         .collect();
     if asked.is_empty() {
@@ -87,7 +101,9 @@ fn note_vacuous(
 ) -> Result<(), Failure> {
     let asked: Vec<String> = judgements
         .iter()
-        .filter(|judgement| judgement.outcome == Outcome::Passed && rules.can_pass_vacuously(&judgement.property))
+        .filter(|judgement| {
+            judgement.outcome == Outcome::Passed && rules.can_pass_vacuously(&judgement.property)
+        })
         .map(|judgement| judgement.property.clone())
         .collect();
     if asked.is_empty() {

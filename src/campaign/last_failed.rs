@@ -1,7 +1,8 @@
 //! Runs the failed runs of a configuration's last campaign again.
 //!
-//! Their choices are those of the history; configuration, ontology, rules, models and skills are the present ones. The
-//! new runs form a campaign of their own, which statistics leave out: its scenes were selected because they failed.
+//! Their choices are those of the history; configuration, ontology, rules, models and skills are
+//! the present ones. The new runs form a campaign of their own, which statistics leave out: its
+//! scenes were selected because they failed.
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -42,16 +43,24 @@ struct FailedRun {
 }
 
 impl LastFailed {
-    /// Finds the newest campaign of a configuration in a history, and its runs in which a property failed; prepares the
-    /// configuration to run them again. Campaigns that ran failed runs again count; shrunk runs don't.
+    /// Finds the newest campaign of a configuration in a history, and its runs in which a property
+    /// failed; prepares the configuration to run them again. Campaigns that ran failed runs again
+    /// count; shrunk runs don't.
     ///
     /// # Errors
-    /// `X038` if the history has no campaign of the configuration, `S040` if the configuration no longer has the test of
-    /// a failed run; else as [`Env::prepare`].
-    pub fn find(history: &History, config: &Path, rule_budget: Budget) -> Result<(Env, Self), Diagnostics> {
+    /// `X038` if the history has no campaign of the configuration, `S040` if the configuration no
+    /// longer has the test of a failed run; else as [`Env::prepare`].
+    pub fn find(
+        history: &History,
+        config: &Path,
+        rule_budget: Budget,
+    ) -> Result<(Env, Self), Diagnostics> {
         let record = last_campaign(history, config)?;
-        let overrides =
-            Overrides { seed: Some(record.seed), history: Some(history.dir().to_path_buf()), ..Overrides::default() };
+        let overrides = Overrides {
+            seed: Some(record.seed),
+            history: Some(history.dir().to_path_buf()),
+            ..Overrides::default()
+        };
         let mut campaign = config::load(config, &overrides)?;
         // The runs are given: neither a strategy nor a budget of the campaign chooses them.
         campaign.search = Strategy::Random;
@@ -60,7 +69,13 @@ impl LastFailed {
         (limits.time_secs, limits.until_width, limits.max_failures) = (None, None, None);
         let env = Env::of(campaign, rule_budget)?;
         let runs = failed_runs(history, &env, &record.id)?;
-        Ok((env, Self { campaign: record.id, runs }))
+        Ok((
+            env,
+            Self {
+                campaign: record.id,
+                runs,
+            },
+        ))
     }
 
     /// Number of failed runs.
@@ -80,8 +95,8 @@ impl LastFailed {
         record
     }
 
-    /// Makes the runs again on several workers, stores them in the campaign `id` in their old order, numbered from 1,
-    /// and then calls `on_run`. `stop` ends it after the runs in flight.
+    /// Makes the runs again on several workers, stores them in the campaign `id` in their old
+    /// order, numbered from 1, and then calls `on_run`. `stop` ends it after the runs in flight.
     ///
     /// Returns also the faults (`S041`) of runs whose scenes can no longer be built.
     pub fn run(
@@ -91,8 +106,12 @@ impl LastFailed {
         stop: &AtomicBool,
         mut on_run: impl FnMut(&RunRecord),
     ) -> (CampaignResult, Diagnostics) {
-        let mut end =
-            CampaignResult { ending: Ending::Finished, committed: 0, discards: Vec::new(), rates: Vec::new() };
+        let mut end = CampaignResult {
+            ending: Ending::Finished,
+            committed: 0,
+            discards: Vec::new(),
+            rates: Vec::new(),
+        };
         let mut faults = Diagnostics::new();
         let secs = options.context.clock.secs;
         let began_secs = secs();
@@ -107,7 +126,16 @@ impl LastFailed {
         let make = |run: &FailedRun| {
             let choices = || Choices::recorded(&run.choices);
             let cut = time_limit(env, &options.context);
-            rerun(env, &Attempt { campaign: id, index: run.index, choices: &choices, cut }, &options.context)
+            rerun(
+                env,
+                &Attempt {
+                    campaign: id,
+                    index: run.index,
+                    choices: &choices,
+                    cut,
+                },
+                &options.context,
+            )
         };
         let numbered: Vec<(u64, &FailedRun)> = (0..).zip(&self.runs).collect();
         // At most one trace for each worker is in memory.
@@ -141,37 +169,77 @@ impl LastFailed {
     }
 }
 
-fn renumbered(made: FinishedRun, id: &str, (number, run): (u64, &FailedRun), elapsed_secs: f64) -> RunRecord {
-    let place = RunPlace { repetition: run.repetition, elapsed_secs, ..RunPlace::alone(id) };
-    FinishedRun { index: number, ..made }.into_record(place)
+fn renumbered(
+    made: FinishedRun,
+    id: &str,
+    (number, run): (u64, &FailedRun),
+    elapsed_secs: f64,
+) -> RunRecord {
+    let place = RunPlace {
+        repetition: run.repetition,
+        elapsed_secs,
+        ..RunPlace::alone(id)
+    };
+    FinishedRun {
+        index: number,
+        ..made
+    }
+    .into_record(place)
 }
 
 fn last_campaign(history: &History, config: &Path) -> Result<CampaignRecord, Diagnostics> {
-    for row in history.campaigns()?.iter().rev().filter(|row| !row.name.starts_with(SHRUNK)) {
+    for row in history
+        .campaigns()?
+        .iter()
+        .rev()
+        .filter(|row| !row.name.starts_with(SHRUNK))
+    {
         let record = history.campaign(&row.id)?;
         if is_same_file(&config_of(history, &record), config) {
             return Ok(record);
         }
     }
-    let message = format!("the history `{}` has no campaign of {}", history.dir().display(), config.display());
+    let message = format!(
+        "the history `{}` has no campaign of {}",
+        history.dir().display(),
+        config.display()
+    );
     Err(Diagnostic::error("X038", message)
         .help("run it once without `--last-failed`; `--history DIR` selects another history")
         .into())
 }
 
 /// The runs of a campaign in which a property failed, in order.
-fn failed_runs(history: &History, env: &Env, campaign: &str) -> Result<Vec<FailedRun>, Diagnostics> {
-    let filter = RunFilter { campaign: Some(campaign.to_owned()), ..RunFilter::default() };
+fn failed_runs(
+    history: &History,
+    env: &Env,
+    campaign: &str,
+) -> Result<Vec<FailedRun>, Diagnostics> {
+    let filter = RunFilter {
+        campaign: Some(campaign.to_owned()),
+        ..RunFilter::default()
+    };
     let outcomes = history.outcomes(&filter)?;
-    let failed: BTreeSet<&str> =
-        outcomes.iter().filter(|row| row.outcome == Outcome::Failed).map(|row| row.run.as_str()).collect();
+    let failed: BTreeSet<&str> = outcomes
+        .iter()
+        .filter(|row| row.outcome == Outcome::Failed)
+        .map(|row| row.run.as_str())
+        .collect();
     let rows = history.runs(&filter)?;
     let failed_run = |row: &actcheck_history::RunRow| {
         let choices = history.choices(&row.run)?;
         let index = env.index_of(&row.test, &choices)?;
-        Ok(FailedRun { id: row.run.clone(), index, repetition: row.repetition, choices })
+        Ok(FailedRun {
+            id: row.run.clone(),
+            index,
+            repetition: row.repetition,
+            choices,
+        })
     };
-    rows.iter().filter(|row| failed.contains(row.run.as_str())).map(failed_run).collect()
+    rows.iter()
+        .filter(|row| failed.contains(row.run.as_str()))
+        .map(failed_run)
+        .collect()
 }
 
 fn unbuildable(run: &str, why: &str) -> Diagnostic {

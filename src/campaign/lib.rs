@@ -1,4 +1,5 @@
-//! Prepares a campaign, makes its runs and writes them to the history; replays, shrinks and rechecks stored runs.
+//! Prepares a campaign, makes its runs and writes them to the history; replays, shrinks and
+//! rechecks stored runs.
 //!
 //! Never: prints, reads the command line or a system clock, or depends on the internals of a stage.
 
@@ -49,7 +50,9 @@ pub use last_failed::LastFailed;
 pub use line::{Clock, Disturbance, RunContext, RunInput, run_line, run_sabotaged};
 pub use outcome::{CampaignResult, Ending, WeightedRate};
 pub use recheck::{RecheckEnd, RecheckOptions, judge_stored, recheck};
-pub use replay::{Fit, Misfit, MisfitKind, OutcomeChange, Replay, ReplayOptions, StoredCampaign, replay_all};
+pub use replay::{
+    Fit, Misfit, MisfitKind, OutcomeChange, Replay, ReplayOptions, StoredCampaign, replay_all,
+};
 pub use restore::{MayRun, restorer};
 pub use resume::{StoredRuns, unfinished};
 pub use rule_set::RuleSet;

@@ -43,7 +43,10 @@ pub struct RunContext {
 impl Clock {
     /// The present as the start of a run.
     pub(super) fn start(&self) -> Start {
-        Start { now: (self.now)(), secs: (self.secs)() }
+        Start {
+            now: (self.now)(),
+            secs: (self.secs)(),
+        }
     }
 }
 
@@ -72,9 +75,9 @@ pub struct RunInput<'a> {
 /// The same `choices` give the same record, except for its times. `campaign` is the campaign's id.
 ///
 /// # Errors
-/// [`Failure::Discard`] if the scene could not be generated or did not settle, [`Failure::Overlap`] if the robot overlaps
-/// something in it, [`Failure::Interrupted`] if
-/// [`Env::rule_budget`] was stopped during a long rule or an action of an external program. Simulation faults are not
+/// [`Failure::Discard`] if the scene could not be generated or did not settle, [`Failure::Overlap`]
+/// if the robot overlaps something in it, [`Failure::Interrupted`] if [`Env::rule_budget`] was
+/// stopped during a long rule or an action of an external program. Simulation faults are not
 /// errors: the record is `broken`.
 pub fn run_line(
     env: &Env,
@@ -83,8 +86,18 @@ pub fn run_line(
     choices: Choices,
     context: &RunContext,
 ) -> Result<RunRecord, Failure> {
-    let input = RunInput { campaign, index, choices };
-    let run = simulate(env, input, context, context.clock.start(), Interference::default())?;
+    let input = RunInput {
+        campaign,
+        index,
+        choices,
+    };
+    let run = simulate(
+        env,
+        input,
+        context,
+        context.clock.start(),
+        Interference::default(),
+    )?;
     Ok(run.into_record(RunPlace::alone(campaign)))
 }
 
@@ -101,11 +114,15 @@ pub fn run_sabotaged(
     saboteur: &mut Saboteur,
 ) -> Result<RunRecord, Failure> {
     let place = RunPlace::alone(input.campaign);
-    let interference = Interference { saboteur: Some(saboteur), ..Interference::default() };
+    let interference = Interference {
+        saboteur: Some(saboteur),
+        ..Interference::default()
+    };
     Ok(simulate(env, input, context, context.clock.start(), interference)?.into_record(place))
 }
 
-/// Makes one run as [`run_line`] does, with interference. `start` is its start on the context's clock.
+/// Makes one run as [`run_line`] does, with interference. `start` is its start on the context's
+/// clock.
 ///
 /// # Errors
 /// As [`run_line`].
@@ -116,7 +133,11 @@ pub(super) fn simulate(
     start: Start,
     interference: Interference<'_>,
 ) -> Result<FinishedRun, Failure> {
-    let RunInput { campaign, index, mut choices } = input;
+    let RunInput {
+        campaign,
+        index,
+        mut choices,
+    } = input;
     let scene = scenario::draw(&env.space, env.test_of(index), &mut choices)
         .map_err(|discard| Failure::Discard(discard.to_string()))?;
     let test = test_to_perform(env, index, &mut choices);
@@ -128,17 +149,49 @@ pub(super) fn simulate(
     choices.begin_noise();
     let mut program = env.programs.as_ref().map(|programs| {
         let seed = choices.index(ChoiceName::SkillSeed, SEEDS) as u64;
-        let run = RunName { run: format!("{campaign}-{}", index + 1), index, seed };
-        Performance::new(programs, run, context.clock.secs, Arc::clone(&env.rule_budget.stop))
+        let run = RunName {
+            run: format!("{campaign}-{}", index + 1),
+            index,
+            seed,
+        };
+        Performance::new(
+            programs,
+            run,
+            context.clock.secs,
+            Arc::clone(&env.rule_budget.stop),
+        )
     });
-    let external = program.as_mut().map(|program| program as &mut dyn ExternalSkill);
-    let interference = Interference { cut: interference.cut, saboteur: interference.saboteur, external, gate: None };
+    let external = program
+        .as_mut()
+        .map(|program| program as &mut dyn ExternalSkill);
+    let interference = Interference {
+        cut: interference.cut,
+        saboteur: interference.saboteur,
+        external,
+        gate: None,
+    };
     let (trace, quality) = perform(env, test, &scene, &mut choices, disturb, interference)?;
     if program.as_ref().is_some_and(Performance::was_stopped) {
         return Err(Failure::Interrupted);
     }
-    let program_output = program.as_ref().and_then(Performance::output).map(|lines| lines.join("\n"));
-    finish(env, Simulated { index, test, scene, trace, quality, choices, program_output }, context, start)
+    let program_output = program
+        .as_ref()
+        .and_then(Performance::output)
+        .map(|lines| lines.join("\n"));
+    finish(
+        env,
+        Simulated {
+            index,
+            test,
+            scene,
+            trace,
+            quality,
+            choices,
+            program_output,
+        },
+        context,
+        start,
+    )
 }
 
 /// Number of seeds of a program: every language can represent them.
@@ -161,11 +214,21 @@ pub(super) fn crashed(
     start: Start,
     reason: &str,
 ) -> Option<FinishedRun> {
-    let RunInput { index, mut choices, .. } = input;
+    let RunInput {
+        index, mut choices, ..
+    } = input;
     let scene = scenario::draw(&env.space, env.test_of(index), &mut choices).ok()?;
     let test = test_to_perform(env, index, &mut choices);
     let trace = never_performed(test, &scene, reason);
-    let simulated = Simulated { index, test, scene, trace, quality: None, choices, program_output: None };
+    let simulated = Simulated {
+        index,
+        test,
+        scene,
+        trace,
+        quality: None,
+        choices,
+        program_output: None,
+    };
     finish(env, simulated, context, start).ok()
 }
 
@@ -181,11 +244,27 @@ struct Simulated<'a> {
 }
 
 /// Computes facts, findings, verdicts and scores of a simulated run.
-fn finish(env: &Env, simulated: Simulated<'_>, context: &RunContext, start: Start) -> Result<FinishedRun, Failure> {
-    let Simulated { index, test, scene, trace, quality, choices, program_output } = simulated;
+fn finish(
+    env: &Env,
+    simulated: Simulated<'_>,
+    context: &RunContext,
+    start: Start,
+) -> Result<FinishedRun, Failure> {
+    let Simulated {
+        index,
+        test,
+        scene,
+        trace,
+        quality,
+        choices,
+        program_output,
+    } = simulated;
     let facts = facts::extract(&trace);
     let judgements = judge_all(env, &trace, &facts)?;
-    let action_scores: Vec<f64> = judgements.iter().map(|list| action_score(list.iter().map(|j| j.outcome))).collect();
+    let action_scores: Vec<f64> = judgements
+        .iter()
+        .map(|list| action_score(list.iter().map(|j| j.outcome)))
+        .collect();
     let (status, reason) = status_of(&trace);
     Ok(FinishedRun {
         index,
@@ -198,7 +277,11 @@ fn finish(env: &Env, simulated: Simulated<'_>, context: &RunContext, start: Star
         action_scores,
         choices: choices.into_made(),
         scene,
-        actions: trace.actions.iter().map(|action| env.ontology.actions[&action.action].iri.clone()).collect(),
+        actions: trace
+            .actions
+            .iter()
+            .map(|action| env.ontology.actions[&action.action].iri.clone())
+            .collect(),
         trace,
         facts,
         judgements,
@@ -208,8 +291,8 @@ fn finish(env: &Env, simulated: Simulated<'_>, context: &RunContext, start: Star
     })
 }
 
-/// Builds the scene, lets it settle and performs the test in it. Returns the trace, and the simulation's quality
-/// figures if a world could be built.
+/// Builds the scene, lets it settle and performs the test in it. Returns the trace, and the
+/// simulation's quality figures if a world could be built.
 fn perform(
     env: &Env,
     test: &[Step],
@@ -227,13 +310,19 @@ fn perform(
     }
     let settling = world.settle();
     if !settling.left.is_empty() {
-        return Err(Failure::Discard(format!("fell from its initial position: {}", settling.left.join(", "))));
+        return Err(Failure::Discard(format!(
+            "fell from its initial position: {}",
+            settling.left.join(", ")
+        )));
     }
     if let Some(fault) = world.fault() {
         return Err(Failure::Discard(fault.to_string()));
     }
     if !settling.settled {
-        return Err(Failure::Discard(format!("did not come to rest: {}", settling.unsettled.join(", "))));
+        return Err(Failure::Discard(format!(
+            "did not come to rest: {}",
+            settling.unsettled.join(", ")
+        )));
     }
     if let Some(requirement) = &env.requirement {
         requirement.check(scene, &world, &env.rule_budget)?;
@@ -241,21 +330,51 @@ fn perform(
     disturb(&mut world);
     let calls = calls(test, scene);
     let mut preconditions = Preconditions::new(env, scene);
-    let Interference { cut, saboteur, external, .. } = interference;
+    let Interference {
+        cut,
+        saboteur,
+        external,
+        ..
+    } = interference;
     let external = external.map(|skill| skill as &mut dyn ExternalSkill);
-    let interference = Interference { cut, saboteur, external, gate: Some(&mut preconditions) };
-    let trace = actions::perform_with(&calls, &mut world, choices, &env.campaign.budget, interference);
+    let interference = Interference {
+        cut,
+        saboteur,
+        external,
+        gate: Some(&mut preconditions),
+    };
+    let trace = actions::perform_with(
+        &calls,
+        &mut world,
+        choices,
+        &env.campaign.budget,
+        interference,
+    );
     if preconditions.interrupted {
         return Err(Failure::Interrupted);
     }
-    Ok((Trace { map: scene.map.clone(), ..trace }, Some(world.quality())))
+    Ok((
+        Trace {
+            map: scene.map.clone(),
+            ..trace
+        },
+        Some(world.quality()),
+    ))
 }
 
 /// The calls of a test's actions, each with the values that are in force for it.
 fn calls(test: &[Step], scene: &Scene) -> Vec<ActionCall> {
-    let parameters = |number: usize| scene.steps.get(number).unwrap_or(&scene.designators).clone();
-    let call =
-        |(number, step): (usize, &Step)| ActionCall { action: step.action.clone(), parameters: parameters(number) };
+    let parameters = |number: usize| {
+        scene
+            .steps
+            .get(number)
+            .unwrap_or(&scene.designators)
+            .clone()
+    };
+    let call = |(number, step): (usize, &Step)| ActionCall {
+        action: step.action.clone(),
+        parameters: parameters(number),
+    };
     test.iter().enumerate().map(call).collect()
 }
 
@@ -268,11 +387,19 @@ fn never_performed(test: &[Step], scene: &Scene, reason: &str) -> Trace {
             ..actcheck_data::ActionTrace::not_reached(&call.action, &call.parameters)
         })
         .collect();
-    Trace { actions, map: scene.map.clone(), ..Trace::default() }
+    Trace {
+        actions,
+        map: scene.map.clone(),
+        ..Trace::default()
+    }
 }
 
 /// Judges every action of a trace; one list for each.
-pub(super) fn judge_all(env: &Env, trace: &Trace, facts: &RunFacts) -> Result<Vec<Vec<Judgement>>, Failure> {
+pub(super) fn judge_all(
+    env: &Env,
+    trace: &Trace,
+    facts: &RunFacts,
+) -> Result<Vec<Vec<Judgement>>, Failure> {
     trace
         .actions
         .iter()
@@ -280,7 +407,14 @@ pub(super) fn judge_all(env: &Env, trace: &Trace, facts: &RunFacts) -> Result<Ve
         .map(|(step, performed)| {
             let action = &env.ontology.actions[&performed.action];
             let facts = facts.action(step);
-            judge_action(&env.ontology, &env.rules, action, &performed.end, facts, &env.rule_budget)
+            judge_action(
+                &env.ontology,
+                &env.rules,
+                action,
+                &performed.end,
+                facts,
+                &env.rule_budget,
+            )
         })
         .collect()
 }

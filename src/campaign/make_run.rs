@@ -32,23 +32,50 @@ pub(super) enum Making {
     Impossible(Diagnostics),
 }
 
-/// Makes a planned run of a campaign that began at a time of the context's clock (unit: seconds). Draws scenes until one
-/// can be built.
-pub(super) fn make_run(env: &Env, campaign: &str, began_secs: f64, planned: Planned, context: &RunContext) -> Making {
+/// Makes a planned run of a campaign that began at a time of the context's clock (unit: seconds).
+/// Draws scenes until one can be built.
+pub(super) fn make_run(
+    env: &Env,
+    campaign: &str,
+    began_secs: f64,
+    planned: Planned,
+    context: &RunContext,
+) -> Making {
     let (mut discards, mut n_overlaps) = (Vec::new(), 0);
-    let last_secs = env.campaign.limits.time_secs.map(|limit| began_secs + limit + overtime_secs(limit));
+    let last_secs = env
+        .campaign
+        .limits
+        .time_secs
+        .map(|limit| began_secs + limit + overtime_secs(limit));
     for number in 0..SCENES_PER_RUN {
         let choices = || planned.choices(env.campaign.seed, number);
         let own = time_limit(env, context);
         let (cut, ends_campaign) = match (own, last_secs) {
             (Cut::Clock { at_secs, .. }, Some(last_secs)) if at_secs <= last_secs => (own, false),
-            (_, Some(at_secs)) => (Cut::Clock { secs: context.clock.secs, at_secs }, true),
+            (_, Some(at_secs)) => (
+                Cut::Clock {
+                    secs: context.clock.secs,
+                    at_secs,
+                },
+                true,
+            ),
             (_, None) => (own, false),
         };
-        let attempt = Attempt { campaign, index: planned.index, choices: &choices, cut };
+        let attempt = Attempt {
+            campaign,
+            index: planned.index,
+            choices: &choices,
+            cut,
+        };
         match attempt.make(env, context) {
             Ok(run) => {
-                let record = record(run, campaign, &planned, discards, (context.clock.secs)() - began_secs);
+                let record = record(
+                    run,
+                    campaign,
+                    &planned,
+                    discards,
+                    (context.clock.secs)() - began_secs,
+                );
                 if ends_campaign && cut_secs(&record.trace).is_some() {
                     return Making::Interrupted;
                 }
@@ -75,20 +102,31 @@ pub(super) fn make_run(env: &Env, campaign: &str, began_secs: f64, planned: Plan
     })
 }
 
-/// Time for the runs in flight when the time of a campaign is up: usually they end by themselves, so that slow ones count as
-/// others do. After it they are given up: a skill may go on for hours. Unit: seconds.
+/// Time for the runs in flight when the time of a campaign is up: usually they end by themselves,
+/// so that slow ones count as others do. After it they are given up: a skill may go on for hours.
+/// Unit: seconds.
 fn overtime_secs(limit: f64) -> f64 {
     (limit / 2.0).clamp(10.0, 60.0)
 }
 
-/// The record of a run, with repetition and weight from its plan. Only the first run of a scene has the discards.
-fn record(run: FinishedRun, campaign: &str, planned: &Planned, discards: Vec<String>, elapsed_secs: f64) -> RunRecord {
+/// The record of a run, with repetition and weight from its plan. Only the first run of a scene has
+/// the discards.
+fn record(
+    run: FinishedRun,
+    campaign: &str,
+    planned: &Planned,
+    discards: Vec<String>,
+    elapsed_secs: f64,
+) -> RunRecord {
     let is_first = planned.repetition.is_none_or(|number| number == 0);
     run.into_record(RunPlace {
         campaign: campaign.to_owned(),
         shrunk_from: None,
         repetition: planned.repetition(),
-        weight: planned.steering.as_ref().and_then(|steering| steering.weight),
+        weight: planned
+            .steering
+            .as_ref()
+            .and_then(|steering| steering.weight),
         discards: if is_first { discards } else { Vec::new() },
         elapsed_secs,
     })
@@ -97,8 +135,16 @@ fn record(run: FinishedRun, campaign: &str, planned: &Planned, discards: Vec<Str
 /// Encodes a run: whole, or only its outline, as the campaign's configuration says.
 fn entry(env: &Env, record: &RunRecord) -> Result<Entry, Diagnostics> {
     let failed = record.status != RunStatus::Completed
-        || record.judgements.iter().flatten().any(|judgement| judgement.outcome == Outcome::Failed);
-    if env.campaign.keeping.keeps_whole(record.seed, record.index, failed) {
+        || record
+            .judgements
+            .iter()
+            .flatten()
+            .any(|judgement| judgement.outcome == Outcome::Failed);
+    if env
+        .campaign
+        .keeping
+        .keeps_whole(record.seed, record.index, failed)
+    {
         Entry::whole(record)
     } else {
         Entry::outline(record)

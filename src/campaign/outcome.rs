@@ -17,8 +17,8 @@ pub struct CampaignResult {
     pub rates: Vec<WeightedRate>,
 }
 
-/// Failure rate of a property over scenes as the configuration draws them, corrected for the scenes that the search
-/// chose.
+/// Failure rate of a property over scenes as the configuration draws them, corrected for the scenes
+/// that the search chose.
 #[derive(Debug, Clone, PartialEq)]
 pub struct WeightedRate {
     /// Names of the test's actions, joined by a space.
@@ -40,6 +40,7 @@ pub enum Ending {
     Budget(ExhaustedBudget),
     /// It was interrupted.
     Interrupted,
-    /// An error stopped it, for example a history that could not be written, or a scene that could not be built.
+    /// An error stopped it, for example a history that could not be written, or a scene that could
+    /// not be built.
     Stopped(Diagnostics),
 }

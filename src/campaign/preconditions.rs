@@ -18,23 +18,41 @@ pub(super) struct Preconditions<'a> {
 
 impl<'a> Preconditions<'a> {
     pub(super) fn new(env: &'a Env, scene: &'a Scene) -> Self {
-        Self { env, map: &scene.map, interrupted: false }
+        Self {
+            env,
+            map: &scene.map,
+            interrupted: false,
+        }
     }
 }
 
 impl Gate for Preconditions<'_> {
     fn reason_not_to_perform(&mut self, call: &ActionCall, state: &Snapshot) -> Option<String> {
-        let Env { ontology, rules, rule_budget, .. } = self.env;
-        let action = ontology.actions.get(&call.action).filter(|action| !action.preconditions.is_empty())?;
+        let Env {
+            ontology,
+            rules,
+            rule_budget,
+            ..
+        } = self.env;
+        let action = ontology
+            .actions
+            .get(&call.action)
+            .filter(|action| !action.preconditions.is_empty())?;
         let facts = facts_of_state(state, &call.parameters, self.map);
         let found = rules.held_before(&facts_before(&facts), &action.preconditions, rule_budget);
-        self.interrupted |= found.values().any(|found| *found == Err(RuleFault::Interrupted));
+        self.interrupted |= found
+            .values()
+            .any(|found| *found == Err(RuleFault::Interrupted));
         reason_not_to_perform(ontology, action, &found)
     }
 }
 
 /// The facts of one state, with the values of designators.
-pub(super) fn facts_of_state(state: &Snapshot, parameters: &BTreeMap<String, Vec<String>>, map: &SceneMap) -> RunFacts {
+pub(super) fn facts_of_state(
+    state: &Snapshot,
+    parameters: &BTreeMap<String, Vec<String>>,
+    map: &SceneMap,
+) -> RunFacts {
     facts::extract(&Trace {
         snapshots: vec![state.clone()],
         // Not performed: it only holds the values of the designators.
@@ -48,5 +66,12 @@ pub(super) fn facts_of_state(state: &Snapshot, parameters: &BTreeMap<String, Vec
 pub(super) fn facts_before(facts: &RunFacts) -> ActionFacts<'_> {
     let state = facts.snapshots.first().map_or(&[][..], Vec::as_slice);
     let parameters = facts.parameters.first().map_or(&[][..], Vec::as_slice);
-    ActionFacts { terms: &facts.terms, before: state, after: state, during: &[], parameters, course: None }
+    ActionFacts {
+        terms: &facts.terms,
+        before: state,
+        after: state,
+        during: &[],
+        parameters,
+        course: None,
+    }
 }

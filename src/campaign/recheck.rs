@@ -25,8 +25,8 @@ pub struct RecheckOptions {
 }
 
 impl RecheckOptions {
-    /// Default batch: a quarter of a second of work. This is short enough for a progress bar and Ctrl-C, and long
-    /// enough to make the cost of writing negligible.
+    /// Default batch: a quarter of a second of work. This is short enough for a progress bar and
+    /// Ctrl-C, and long enough to make the cost of writing negligible.
     pub const BATCH: usize = 256;
 }
 
@@ -41,18 +41,21 @@ pub struct RecheckEnd {
     pub faults: Diagnostics,
 }
 
-/// Number of runs that a worker takes at once: few, so that no worker waits long for the others at the end of a batch.
+/// Number of runs that a worker takes at once: few, so that no worker waits long for the others at
+/// the end of a batch.
 const SHARED: usize = 4;
 
 /// The results of one batch of runs.
 type Judged = Vec<Result<Vec<Recheck>, Diagnostics>>;
 
-/// Judges runs by the rules that `rules_of` returns for each, and stores changed judgements, those of a batch together.
+/// Judges runs by the rules that `rules_of` returns for each, and stores changed judgements, those
+/// of a batch together.
 ///
-/// `on_batch` is called once a batch is in the history, with all judgements (unchanged ones too) in the order of the
-/// runs. When `stop` is set, it ends after the runs in flight; their judgements are stored. A run that can't be judged
-/// (its trace is corrupt, or the rules' ontology lacks its action) is left unchanged and does not stop the others.
-/// Actions that did not complete, or were not performed, keep their outcomes.
+/// `on_batch` is called once a batch is in the history, with all judgements (unchanged ones too) in
+/// the order of the runs. When `stop` is set, it ends after the runs in flight; their judgements
+/// are stored. A run that can't be judged (its trace is corrupt, or the rules' ontology lacks its
+/// action) is left unchanged and does not stop the others. Actions that did not complete, or were
+/// not performed, keep their outcomes.
 pub fn recheck<'a>(
     history: &History,
     runs: &[RunRow],
@@ -61,14 +64,24 @@ pub fn recheck<'a>(
     stop: &AtomicBool,
     mut on_batch: impl FnMut(u64, &[Recheck]),
 ) -> RecheckEnd {
-    let mut end = RecheckEnd { ending: Ending::Finished, judged: 0, faults: Diagnostics::new() };
+    let mut end = RecheckEnd {
+        ending: Ending::Finished,
+        judged: 0,
+        faults: Diagnostics::new(),
+    };
     let pool = match workers(options.jobs) {
         Ok(pool) => pool,
-        Err(faults) => return RecheckEnd { ending: Ending::Stopped(faults), ..end },
+        Err(faults) => {
+            return RecheckEnd {
+                ending: Ending::Stopped(faults),
+                ..end
+            };
+        }
     };
     let stopped = || stop.load(Ordering::Relaxed);
     let newest = NewestJudgements::of(history);
-    let judge = |run: &RunRow| (!stopped()).then(|| judge_run(history, &newest, run, rules_of(run)));
+    let judge =
+        |run: &RunRow| (!stopped()).then(|| judge_run(history, &newest, run, rules_of(run)));
     let mut chunks = runs.chunks(options.batch.max(1));
     let mut taken = 0;
     let mut judged: Option<Vec<Recheck>> = None;
@@ -80,12 +93,26 @@ pub fn recheck<'a>(
         // One batch is written while the next is judged.
         let (written, fresh) = pool.install(|| {
             rayon::join(
-                || judged.as_ref().map_or(Ok(()), |batch| history.commit_rechecks(batch, &options.at)),
-                || next.map(|runs| runs.par_iter().with_max_len(SHARED).filter_map(judge).collect::<Judged>()),
+                || {
+                    judged
+                        .as_ref()
+                        .map_or(Ok(()), |batch| history.commit_rechecks(batch, &options.at))
+                },
+                || {
+                    next.map(|runs| {
+                        runs.par_iter()
+                            .with_max_len(SHARED)
+                            .filter_map(judge)
+                            .collect::<Judged>()
+                    })
+                },
             )
         });
         if let Err(faults) = written {
-            return RecheckEnd { ending: Ending::Stopped(faults), ..end };
+            return RecheckEnd {
+                ending: Ending::Stopped(faults),
+                ..end
+            };
         }
         if let Some(batch) = judged.take() {
             end.judged += taken;
@@ -106,8 +133,9 @@ pub fn recheck<'a>(
     end
 }
 
-/// Judges runs by other rules, and stores nothing. Returns the judgements in the order of the runs, and the faults of the
-/// runs that can't be judged. When `stop` is set, the remaining runs are left out.
+/// Judges runs by other rules, and stores nothing. Returns the judgements in the order of the runs,
+/// and the faults of the runs that can't be judged. When `stop` is set, the remaining runs are left
+/// out.
 ///
 /// # Errors
 /// `X010` if the workers can't be started.
@@ -119,7 +147,9 @@ pub fn judge_stored(
     stop: &AtomicBool,
 ) -> Result<(Vec<Recheck>, Diagnostics), Diagnostics> {
     let newest = NewestJudgements::of(history);
-    let judge = |run: &RunRow| (!stop.load(Ordering::Relaxed)).then(|| judge_run(history, &newest, run, rules));
+    let judge = |run: &RunRow| {
+        (!stop.load(Ordering::Relaxed)).then(|| judge_run(history, &newest, run, rules))
+    };
     let judged: Judged = workers(jobs)?.install(|| runs.par_iter().filter_map(judge).collect());
     let (rechecks, faults) = split_results(judged);
     Ok((rechecks.into_iter().flatten().collect(), faults))
@@ -162,7 +192,10 @@ fn judge_step(
     rules: &RuleSet,
 ) -> Result<Vec<Recheck>, Diagnostics> {
     let Some(action) = rules.actions.get(&performed.action) else {
-        let message = format!("run {} performed `{}`, which the ontology does not have", run.run, performed.action);
+        let message = format!(
+            "run {} performed `{}`, which the ontology does not have",
+            run.run, performed.action
+        );
         return Err(Diagnostic::error("X031", message)
             .help(
                 "name the ontology that has it with `--ontology FILE`, or select other campaigns with `--campaign ID`",
@@ -176,20 +209,35 @@ fn judge_step(
     let number = u32::try_from(step + 1).unwrap_or(u32::MAX);
     let mut stored = newest.read(&run.run, number, &action.success_properties)?;
     let (facts, budget) = (facts.action(step), Budget::default());
-    let judged = judge_action(&rules.ontology, &rules.rules, action, &performed.end, facts, &budget)
-        .map_err(|failure| Diagnostic::error("R091", failure.to_string()))?;
+    let judged = judge_action(
+        &rules.ontology,
+        &rules.rules,
+        action,
+        &performed.end,
+        facts,
+        &budget,
+    )
+    .map_err(|failure| Diagnostic::error("R091", failure.to_string()))?;
     let rechecks = judged.into_iter().map(|judgement| {
         let before = take(&mut stored, &judgement.property);
         let now = match &before {
             Some(before) if performed.end != ActionEnd::Completed => before.judgement.clone(),
             _ => judgement,
         };
-        Recheck { run: run.run.clone(), step: number, action: action.iri.clone(), before, now }
+        Recheck {
+            run: run.run.clone(),
+            step: number,
+            action: action.iri.clone(),
+            before,
+            now,
+        }
     });
     Ok(rechecks.collect())
 }
 
 fn take(stored: &mut Vec<StoredJudgement>, property: &str) -> Option<StoredJudgement> {
-    let place = stored.iter().position(|stored| stored.judgement.property == property)?;
+    let place = stored
+        .iter()
+        .position(|stored| stored.judgement.property == property)?;
     Some(stored.swap_remove(place))
 }

@@ -23,7 +23,8 @@ pub type StoredCampaign = (Env, CampaignRecord);
 /// How exactly the recorded choices must fit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Fit {
-    /// Every choice must be recorded and of the same kind, and none may be left over. Candidates may be added.
+    /// Every choice must be recorded and of the same kind, and none may be left over. Candidates
+    /// may be added.
     Exact,
     /// Values are clamped to their bounds, and missing choices are nominal.
     Nearest,
@@ -49,13 +50,15 @@ pub struct Replay {
     pub test: String,
     /// Whether all states are bitwise identical.
     pub same: bool,
-    /// Simulated time at which the wall-clock limit cut the run off; runs are compared up to then. Unit: seconds.
+    /// Simulated time at which the wall-clock limit cut the run off; runs are compared up to then.
+    /// Unit: seconds.
     pub cut_secs: Option<f64>,
     /// Digests of all states, then and now.
     pub hashes: [String; 2],
     /// Reasons why it did not complete, then and now.
     pub reasons: [Option<String>; 2],
-    /// The first difference of the traces; `None` if they are identical or differ by less than the stored precision.
+    /// The first difference of the traces; `None` if they are identical or differ by less than the
+    /// stored precision.
     pub difference: Option<TraceDifference>,
     /// Recorded choices that did not fit.
     pub misfits: Vec<Misfit>,
@@ -112,9 +115,11 @@ pub struct OutcomeChange {
     pub is: Option<String>,
 }
 
-/// Replays stored runs on several workers and calls `on_done` after each. `campaigns` has their campaigns by id.
+/// Replays stored runs on several workers and calls `on_done` after each. `campaigns` has their
+/// campaigns by id.
 ///
-/// The results are in the order of `runs`. They depend neither on the number of workers nor on the clock.
+/// The results are in the order of `runs`. They depend neither on the number of workers nor on the
+/// clock.
 ///
 /// # Errors
 /// `X010` if the workers can't be started. Each result has the faults of its own replay.
@@ -140,8 +145,8 @@ pub fn replay_all(
 /// Replays one stored run.
 ///
 /// # Errors
-/// `S040` if the configuration has no such test, `S041` if the scene can no longer be built, `S042` if the choices must
-/// fit exactly and do not; or the stored trace can't be read.
+/// `S040` if the configuration has no such test, `S041` if the scene can no longer be built, `S042`
+/// if the choices must fit exactly and do not; or the stored trace can't be read.
 fn replay(
     history: &History,
     (env, record): &StoredCampaign,
@@ -151,14 +156,26 @@ fn replay(
     let run = &detail.row.run;
     // An outline has no motion: its states and the digest over all states are compared.
     let is_outline = history.is_outline(run)?;
-    let (choices, was) = if is_outline { history.recorded(run)? } else { (history.choices(run)?, history.trace(run)?) };
+    let (choices, was) = if is_outline {
+        history.recorded(run)?
+    } else {
+        (history.choices(run)?, history.trace(run)?)
+    };
     let index = env.index_of(&detail.row.test, &choices)?;
-    // The wall clock is not part of a run's choices: the replay is cut off at the same simulated time.
+    // The wall clock is not part of a run's choices: the replay is cut off at the same simulated
+    // time.
     let cut_secs = cut_secs(&was);
     let cut = cut_secs.map_or(Cut::Never, |at_secs| Cut::Simulated { at_secs });
-    let attempt = Attempt { campaign: &record.id, index, choices: &|| Choices::recorded(&choices), cut };
+    let attempt = Attempt {
+        campaign: &record.id,
+        index,
+        choices: &|| Choices::recorded(&choices),
+        cut,
+    };
     let mut is = rerun(env, &attempt, &options.context).map_err(|why| {
-        refused(detail, &why).help("a model, the configuration or the program changed: see the digests in the history")
+        refused(detail, &why).help(
+            "a model, the configuration or the program changed: see the digests in the history",
+        )
     })?;
     let misfits = misfits(&choices, &is.choices);
     if options.fit == Fit::Exact && !misfits.is_empty() {
@@ -167,8 +184,10 @@ fn replay(
     if is_outline {
         is.trace.frames.rows.clear();
     }
-    let (now, difference) =
-        (env.record(String::new(), record.name.clone(), String::new()), first_difference(&was, &is.trace));
+    let (now, difference) = (
+        env.record(String::new(), record.name.clone(), String::new()),
+        first_difference(&was, &is.trace),
+    );
     Ok(Replay {
         run: run.clone(),
         test: detail.row.test.clone(),
@@ -185,19 +204,33 @@ fn replay(
 
 /// Simulated time at which the wall-clock limit cut a run off.
 pub(super) fn cut_secs(trace: &Trace) -> Option<f64> {
-    let cut = trace.actions.iter().any(|action| matches!(action.end, ActionEnd::Cut(_)));
-    trace.snapshots.last().filter(|_| cut).map(|last| last.time_secs)
+    let cut = trace
+        .actions
+        .iter()
+        .any(|action| matches!(action.end, ActionEnd::Cut(_)));
+    trace
+        .snapshots
+        .last()
+        .filter(|_| cut)
+        .map(|last| last.time_secs)
 }
 
 fn refused(detail: &RunDetail, why: &str) -> Diagnostic {
-    Diagnostic::error("S041", format!("run {} can't be run again: {why}", detail.row.run))
+    Diagnostic::error(
+        "S041",
+        format!("run {} can't be run again: {why}", detail.row.run),
+    )
 }
 
 /// Makes a run again. A simulation crash counts as a run too.
 ///
 /// # Errors
 /// The reason why there is no run, in words.
-pub(super) fn rerun(env: &Env, attempt: &Attempt<'_>, context: &RunContext) -> Result<FinishedRun, String> {
+pub(super) fn rerun(
+    env: &Env,
+    attempt: &Attempt<'_>,
+    context: &RunContext,
+) -> Result<FinishedRun, String> {
     attempt.make(env, context).map_err(|fault| match fault {
         AttemptFault::Failure(Failure::Interrupted) => Failure::Interrupted.to_string(),
         AttemptFault::Failure(Failure::Discard(reason) | Failure::Overlap(reason)) => {
@@ -223,7 +256,11 @@ fn misfits(recorded: &[Choice], made: &[Choice]) -> Vec<Misfit> {
                 (_, None) => Some(MisfitKind::LeftOver),
                 (Some(was), Some(is)) => misfit(was, is),
             };
-            let name = if number == 0 { name.clone() } else { format!("{name} ({})", number + 1) };
+            let name = if number == 0 {
+                name.clone()
+            } else {
+                format!("{name} ({})", number + 1)
+            };
             found.extend(kind.map(|kind| Misfit { name, kind }));
         }
     }
@@ -233,14 +270,21 @@ fn misfits(recorded: &[Choice], made: &[Choice]) -> Vec<Misfit> {
 /// Compares a recorded choice with the one made from it; `None` if they are the same.
 fn misfit(was: &Choice, is: &Choice) -> Option<MisfitKind> {
     match (was.candidate(), is.candidate()) {
-        (Some(was), Some(is)) => (was != is).then(|| MisfitKind::Replaced { was: was.to_owned(), is: is.to_owned() }),
-        _ if was.value.to_bits() != is.value.to_bits() => Some(MisfitKind::Moved { was: was.value, is: is.value }),
+        (Some(was), Some(is)) => (was != is).then(|| MisfitKind::Replaced {
+            was: was.to_owned(),
+            is: is.to_owned(),
+        }),
+        _ if was.value.to_bits() != is.value.to_bits() => Some(MisfitKind::Moved {
+            was: was.value,
+            is: is.value,
+        }),
         _ if is_same_kind(&was.kind, &is.kind) => None,
         _ => Some(MisfitKind::OtherKind),
     }
 }
 
-/// Whether two kinds have the same values. Old histories have the number of candidates, without their names.
+/// Whether two kinds have the same values. Old histories have the number of candidates, without
+/// their names.
 fn is_same_kind(was: &ChoiceKind, is: &ChoiceKind) -> bool {
     match (was, is) {
         (ChoiceKind::Index { of }, ChoiceKind::Candidate { names }) => names.len() == *of,
@@ -249,12 +293,24 @@ fn is_same_kind(was: &ChoiceKind, is: &ChoiceKind) -> bool {
 }
 
 fn unfit(detail: &RunDetail, misfits: &[Misfit]) -> Diagnostic {
-    let named: Vec<String> = misfits.iter().take(MOST_NAMED).map(Misfit::to_string).collect();
+    let named: Vec<String> = misfits
+        .iter()
+        .take(MOST_NAMED)
+        .map(Misfit::to_string)
+        .collect();
     let more = misfits.len().saturating_sub(MOST_NAMED);
-    let rest = if more > 0 { format!(", and {more} more") } else { String::new() };
+    let rest = if more > 0 {
+        format!(", and {more} more")
+    } else {
+        String::new()
+    };
     Diagnostic::error(
         "S042",
-        format!("the choices of run {} don't fit exactly: {}{rest}", detail.row.run, named.join(", ")),
+        format!(
+            "the choices of run {} don't fit exactly: {}{rest}",
+            detail.row.run,
+            named.join(", ")
+        ),
     )
     .help("`--nearest` clamps values to their bounds and uses nominal values for missing choices")
 }
@@ -266,7 +322,9 @@ impl std::fmt::Display for Misfit {
             MisfitKind::Missing => write!(f, "`{name}` is missing"),
             MisfitKind::LeftOver => write!(f, "`{name}` is no longer needed"),
             MisfitKind::OtherKind => write!(f, "`{name}` has another kind or range now"),
-            MisfitKind::Replaced { was, is } => write!(f, "`{name}` was `{was}`, which it can't be now, is `{is}`"),
+            MisfitKind::Replaced { was, is } => {
+                write!(f, "`{name}` was `{was}`, which it can't be now, is `{is}`")
+            }
             MisfitKind::Moved { was, is } => write!(f, "`{name}` was {was}, is {is}"),
         }
     }
@@ -277,12 +335,14 @@ fn outcome_changes(was: &RunDetail, is: &FinishedRun) -> Vec<OutcomeChange> {
     let mut both: BTreeMap<(usize, &str), [Option<&'static str>; 2]> = BTreeMap::new();
     for (idx, action) in was.actions.iter().enumerate() {
         for judgement in &action.judgements {
-            both.entry((idx + 1, &judgement.property)).or_default()[0] = Some(judgement.outcome.word());
+            both.entry((idx + 1, &judgement.property)).or_default()[0] =
+                Some(judgement.outcome.word());
         }
     }
     for (idx, judgements) in is.judgements.iter().enumerate() {
         for judgement in judgements {
-            both.entry((idx + 1, &judgement.property)).or_default()[1] = Some(judgement.outcome.word());
+            both.entry((idx + 1, &judgement.property)).or_default()[1] =
+                Some(judgement.outcome.word());
         }
     }
     both.into_iter()
@@ -302,14 +362,35 @@ mod tests {
     use actcheck_data::ChoiceName;
 
     fn real(name: &str, high: f64, value: f64) -> Choice {
-        Choice { name: name.into(), kind: ChoiceKind::Real { low: 0.0, high, nominal: 0.0 }, value }
+        Choice {
+            name: name.into(),
+            kind: ChoiceKind::Real {
+                low: 0.0,
+                high,
+                nominal: 0.0,
+            },
+            value,
+        }
     }
 
     #[test]
     fn every_kind_of_mismatch_is_named() {
-        let recorded = [real("a", 1.0, 0.5), real("b", 1.0, 0.9), real("b", 1.0, 0.1), real("c", 1.0, 0.2)];
-        let made = [real("a", 2.0, 0.5), real("b", 0.8, 0.8), real("d", 1.0, 0.0), real("c", 1.0, 0.2)];
-        let found: Vec<String> = misfits(&recorded, &made).iter().map(Misfit::to_string).collect();
+        let recorded = [
+            real("a", 1.0, 0.5),
+            real("b", 1.0, 0.9),
+            real("b", 1.0, 0.1),
+            real("c", 1.0, 0.2),
+        ];
+        let made = [
+            real("a", 2.0, 0.5),
+            real("b", 0.8, 0.8),
+            real("d", 1.0, 0.0),
+            real("c", 1.0, 0.2),
+        ];
+        let found: Vec<String> = misfits(&recorded, &made)
+            .iter()
+            .map(Misfit::to_string)
+            .collect();
         assert_eq!(
             found,
             [
@@ -324,18 +405,35 @@ mod tests {
 
     fn candidate(names: &[&str], value: f64) -> Choice {
         let names = names.iter().map(|name| (*name).to_owned()).collect();
-        Choice { name: ChoiceName::SurfaceName, kind: ChoiceKind::Candidate { names }, value }
+        Choice {
+            name: ChoiceName::SurfaceName,
+            kind: ChoiceKind::Candidate { names },
+            value,
+        }
     }
 
     #[test]
     fn candidates_may_be_added_but_not_removed() {
-        let misfit_text = |was: Choice, is: Choice| misfits(&[was], &[is]).first().map(Misfit::to_string);
-        assert_eq!(misfit_text(candidate(&["a"], 0.0), candidate(&["b", "a"], 1.0)), None);
+        let misfit_text =
+            |was: Choice, is: Choice| misfits(&[was], &[is]).first().map(Misfit::to_string);
+        assert_eq!(
+            misfit_text(candidate(&["a"], 0.0), candidate(&["b", "a"], 1.0)),
+            None
+        );
         let gone = misfit_text(candidate(&["a"], 0.0), candidate(&["b"], 0.0));
-        assert_eq!(gone.as_deref(), Some("`surface.name` was `a`, which it can't be now, is `b`"));
-        let old = |of| Choice { kind: ChoiceKind::Index { of }, ..candidate(&[], 0.0) };
+        assert_eq!(
+            gone.as_deref(),
+            Some("`surface.name` was `a`, which it can't be now, is `b`")
+        );
+        let old = |of| Choice {
+            kind: ChoiceKind::Index { of },
+            ..candidate(&[], 0.0)
+        };
         assert_eq!(misfit_text(old(1), candidate(&["a"], 0.0)), None);
         let grown = misfit_text(old(1), candidate(&["b", "a"], 0.0));
-        assert_eq!(grown.as_deref(), Some("`surface.name` has another kind or range now"));
+        assert_eq!(
+            grown.as_deref(),
+            Some("`surface.name` has another kind or range now")
+        );
     }
 }

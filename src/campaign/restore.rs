@@ -1,4 +1,5 @@
-//! Makes the motion of runs that have only an outline: simulates them again from their recorded choices.
+//! Makes the motion of runs that have only an outline: simulates them again from their recorded
+//! choices.
 
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -12,11 +13,12 @@ use actcheck_config::Starts;
 use actcheck_data::Choices;
 use actcheck_history::Restore;
 
-/// Decides whether runs of a campaign, by its id, may be simulated again with the programs that this starts.
+/// Decides whether runs of a campaign, by its id, may be simulated again with the programs that
+/// this starts.
 pub type MayRun = dyn Fn(&str, &Starts) -> bool + Send + Sync;
 
-/// Returns the function that simulates runs again for `History::restore_with`. `may_run` is asked once for each campaign;
-/// `on_start` is called with the id of each run before.
+/// Returns the function that simulates runs again for `History::restore_with`. `may_run` is asked
+/// once for each campaign; `on_start` is called with the id of each run before.
 pub fn restorer(
     context: RunContext,
     may_run: Box<MayRun>,
@@ -34,21 +36,34 @@ pub fn restorer(
                 None => {
                     let id = &detail.row.campaign;
                     let may = may_run(id, &Env::starts_from_history(history, id)?);
-                    let campaign = if may { Some(Arc::new(Env::from_history(history, id, None)?)) } else { None };
+                    let campaign = if may {
+                        Some(Arc::new(Env::from_history(history, id, None)?))
+                    } else {
+                        None
+                    };
                     known.insert(id.clone(), campaign.clone());
                     campaign
                 }
             }
         };
-        let Some(campaign) = campaign else { return Ok(None) };
+        let Some(campaign) = campaign else {
+            return Ok(None);
+        };
         on_start(run);
         let (env, record) = &*campaign;
         let index = env.index_of(&detail.row.test, &choices)?;
-        // The wall clock is not part of a run's choices: the run is cut off at the same simulated time.
+        // The wall clock is not part of a run's choices: the run is cut off at the same simulated
+        // time.
         let cut = cut_secs(&was).map_or(Cut::Never, |at_secs| Cut::Simulated { at_secs });
-        let attempt = Attempt { campaign: &record.id, index, choices: &|| Choices::recorded(&choices), cut };
-        let made = rerun(env, &attempt, &context)
-            .map_err(|why| Diagnostic::error("H031", format!("run {run} can't be simulated again: {why}")))?;
+        let attempt = Attempt {
+            campaign: &record.id,
+            index,
+            choices: &|| Choices::recorded(&choices),
+            cut,
+        };
+        let made = rerun(env, &attempt, &context).map_err(|why| {
+            Diagnostic::error("H031", format!("run {run} can't be simulated again: {why}"))
+        })?;
         Ok(Some((made.choices, made.trace)))
     })
 }

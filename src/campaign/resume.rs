@@ -1,7 +1,9 @@
-//! Resumes an interrupted campaign: finds it, checks that its inputs are unchanged, and reads its stored runs.
+//! Resumes an interrupted campaign: finds it, checks that its inputs are unchanged, and reads its
+//! stored runs.
 //!
-//! A resumed campaign follows the schedule from its beginning. Stored runs are read from the history instead of being
-//! made, so that budgets and guided schedules see the same runs in the same order as without the interruption.
+//! A resumed campaign follows the schedule from its beginning. Stored runs are read from the
+//! history instead of being made, so that budgets and guided schedules see the same runs in the
+//! same order as without the interruption.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -28,23 +30,38 @@ pub struct StoredRuns {
 impl StoredRuns {
     /// Creates it from the runs of the history.
     pub fn of(runs: &[RunDetail]) -> Self {
-        let discards = runs.iter().flat_map(|run| run.discards.iter().map(|reason| (run.row.index, reason.clone())));
+        let discards = runs.iter().flat_map(|run| {
+            run.discards
+                .iter()
+                .map(|reason| (run.row.index, reason.clone()))
+        });
         Self {
-            runs: runs.iter().map(|run| (run.row.index, RunResult::from_stored(run))).collect(),
+            runs: runs
+                .iter()
+                .map(|run| (run.row.index, RunResult::from_stored(run)))
+                .collect(),
             discards: discards.collect(),
             elapsed_secs: runs.iter().map(|run| run.elapsed_secs).fold(0.0, f64::max),
         }
     }
 }
 
-/// Returns the campaign to resume: the one with this id, or else the newest unfinished one, of `config` if given.
+/// Returns the campaign to resume: the one with this id, or else the newest unfinished one, of
+/// `config` if given.
 ///
 /// # Errors
 /// `H014` if there is no such campaign, `X050` if it is finished or none is unfinished.
-pub fn unfinished(history: &History, id: Option<&str>, config: Option<&Path>) -> Result<CampaignRecord, Diagnostics> {
+pub fn unfinished(
+    history: &History,
+    id: Option<&str>,
+    config: Option<&Path>,
+) -> Result<CampaignRecord, Diagnostics> {
     if let Some(id) = id {
         let record = history.campaign(id)?;
-        let finished = history.campaigns()?.iter().any(|row| row.id == id && is_finished(row));
+        let finished = history
+            .campaigns()?
+            .iter()
+            .any(|row| row.id == id && is_finished(row));
         return match finished {
             true => Err(finished_already(id)),
             false if record.name.starts_with(FAILED_AGAIN) => Err(not_resumable(id)),
@@ -61,9 +78,15 @@ pub fn unfinished(history: &History, id: Option<&str>, config: Option<&Path>) ->
         }
     }
     let of = config.map_or_else(String::new, |config| format!(" of {}", config.display()));
-    Err(Diagnostic::error("X050", format!("the history `{}` has no unfinished campaign{of}", history.dir().display()))
-        .help("`actcheck run CONFIG` begins one; `--history DIR` selects another history")
-        .into())
+    Err(Diagnostic::error(
+        "X050",
+        format!(
+            "the history `{}` has no unfinished campaign{of}",
+            history.dir().display()
+        ),
+    )
+    .help("`actcheck run CONFIG` begins one; `--history DIR` selects another history")
+    .into())
 }
 
 fn is_finished(row: &CampaignRow) -> bool {
@@ -71,16 +94,22 @@ fn is_finished(row: &CampaignRow) -> bool {
 }
 
 fn finished_already(id: &str) -> Diagnostics {
-    Diagnostic::error("X050", format!("campaign {id} is finished and can't be resumed"))
-        .help(format!("`actcheck list --campaign {id}` shows its runs"))
-        .into()
+    Diagnostic::error(
+        "X050",
+        format!("campaign {id} is finished and can't be resumed"),
+    )
+    .help(format!("`actcheck list --campaign {id}` shows its runs"))
+    .into()
 }
 
 /// X050: the campaign ran failed runs again, whose schedule is not in its record.
 fn not_resumable(id: &str) -> Diagnostics {
-    Diagnostic::error("X050", format!("campaign {id} ran failed runs again and can't be resumed"))
-        .help("run all failed runs again: `actcheck run CONFIG --last-failed`")
-        .into()
+    Diagnostic::error(
+        "X050",
+        format!("campaign {id} ran failed runs again and can't be resumed"),
+    )
+    .help("run all failed runs again: `actcheck run CONFIG --last-failed`")
+    .into()
 }
 
 /// The path of a campaign's configuration.
@@ -96,16 +125,27 @@ pub(super) fn is_same_file(one: &Path, other: &Path) -> bool {
 }
 
 impl Env {
-    /// Prepares a campaign for resumption: with the present configuration, ontology, rules and models, and the
-    /// command-line overrides with which it began.
+    /// Prepares a campaign for resumption: with the present configuration, ontology, rules and
+    /// models, and the command-line overrides with which it began.
     ///
     /// # Errors
     /// As [`Env::prepare`]; `X051` if an input has changed since the campaign began.
-    pub fn resume(history: &History, record: &CampaignRecord, rule_budget: Budget) -> Result<Self, Diagnostics> {
-        let mut campaign = config::load(&config_of(history, record), &recorded_overrides(history, record))?;
+    pub fn resume(
+        history: &History,
+        record: &CampaignRecord,
+        rule_budget: Budget,
+    ) -> Result<Self, Diagnostics> {
+        let mut campaign = config::load(
+            &config_of(history, record),
+            &recorded_overrides(history, record),
+        )?;
         campaign.test_count = Self::scenes_of_a_test(&campaign, record);
         let env = Self::of(campaign, rule_budget)?;
-        let now = env.record(record.id.clone(), record.name.clone(), record.started.clone());
+        let now = env.record(
+            record.id.clone(),
+            record.name.clone(),
+            record.started.clone(),
+        );
         match changes(record, &now).as_slice() {
             [] => Ok(env),
             changed => Err(changed_since(record, changed)),
@@ -117,7 +157,12 @@ fn changed_since(record: &CampaignRecord, changed: &[InputChange]) -> Diagnostic
     let mut faults = Diagnostics::new();
     let gone = |digest: &Option<String>| digest.clone().unwrap_or_else(|| "not there".to_owned());
     for change in changed {
-        let (kind, name, was, is) = (change.kind.word(), &change.name, gone(&change.was), gone(&change.is));
+        let (kind, name, was, is) = (
+            change.kind.word(),
+            &change.name,
+            gone(&change.was),
+            gone(&change.is),
+        );
         faults.push(
             Diagnostic::error(
                 "X051",

@@ -25,7 +25,11 @@ impl RuleSet {
         let ontology = ontology::load(files, path)?;
         let rules = RuleBook::prepare(&ontology)?;
         let actions = ontology.actions.clone();
-        Ok(Self { ontology, rules, actions })
+        Ok(Self {
+            ontology,
+            rules,
+            actions,
+        })
     }
 
     /// Warnings of the ontology and of the rules, such as rules without effect.
@@ -41,17 +45,29 @@ impl RuleSet {
     /// Restricts it to some properties, given by local name or IRI. An empty list means all.
     ///
     /// # Errors
-    /// `X037` for every name that is not a success property of any action. (The rules were checked before.)
+    /// `X037` for every name that is not a success property of any action. (The rules were checked
+    /// before.)
     pub fn only(mut self, properties: &[String]) -> Result<Self, Diagnostics> {
         if properties.is_empty() {
             return Ok(self);
         }
-        let named = |iri: &str| properties.iter().any(|name| name == iri || name == names::local(iri));
-        let all: BTreeSet<String> =
-            self.actions.values().flat_map(|action| &action.success_properties).cloned().collect();
+        let named = |iri: &str| {
+            properties
+                .iter()
+                .any(|name| name == iri || name == names::local(iri))
+        };
+        let all: BTreeSet<String> = self
+            .actions
+            .values()
+            .flat_map(|action| &action.success_properties)
+            .cloned()
+            .collect();
         let mut faults = Diagnostics::new();
         for name in properties {
-            if !all.iter().any(|iri| name == iri || name == names::local(iri)) {
+            if !all
+                .iter()
+                .any(|iri| name == iri || name == names::local(iri))
+            {
                 faults.push(
                     Diagnostic::error("X037", format!("no action has a success property `{name}`"))
                         .help(did_you_mean(name, all.iter().map(|iri| names::local(iri)))),
@@ -67,7 +83,12 @@ impl RuleSet {
         let asked: BTreeSet<&String> = only
             .actions
             .values()
-            .flat_map(|action| action.success_properties.iter().chain(&action.preconditions))
+            .flat_map(|action| {
+                action
+                    .success_properties
+                    .iter()
+                    .chain(&action.preconditions)
+            })
             .collect();
         ontology.properties.retain(|iri, _| asked.contains(iri));
         only.rules = only.rules.restricted(&ontology)?;

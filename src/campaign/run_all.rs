@@ -1,4 +1,5 @@
-//! Runs a campaign on several workers, which also encode their runs, and writes these in the order of the schedule.
+//! Runs a campaign on several workers, which also encode their runs, and writes these in the order
+//! of the schedule.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::ops::ControlFlow;
@@ -11,12 +12,14 @@ use crate::make_run::{MadeRun, Making, make_run};
 use crate::tally::Tally;
 use crate::workers::workers;
 use crate::{
-    CampaignResult, Ending, Env, ExhaustedBudget, Planned, RunContext, RunResult, Schedule, StoredRuns, schedule_of,
+    CampaignResult, Ending, Env, ExhaustedBudget, Planned, RunContext, RunResult, Schedule,
+    StoredRuns, schedule_of,
 };
 use actcheck_base::Diagnostics;
 use actcheck_history::{History, RunRecord};
 
-/// Maximum number of runs per worker that are made but not stored yet, because an earlier run is missing.
+/// Maximum number of runs per worker that are made but not stored yet, because an earlier run is
+/// missing.
 const AHEAD: usize = 4;
 
 /// Options of [`run_all`]. Neither the number of workers nor the clock changes the runs.
@@ -48,10 +51,12 @@ struct Made {
 
 /// Makes every run of the schedule, stores each completely or not at all, and then calls `on_run`.
 ///
-/// Runs are stored in the order of the schedule, whatever the number of workers: the history always has a prefix of the
-/// schedule. Budgets count the runs in the same order, and runs beyond a budget are discarded. `stop`, or the
-/// campaign's time limit, ends it after the runs in flight, which have at most a minute then. If `stop` is also the stop flag of the environment's rule
-/// budget, long rule evaluations are interrupted too. `on_run` is called only for runs that are in the history.
+/// Runs are stored in the order of the schedule, whatever the number of workers: the history always
+/// has a prefix of the schedule. Budgets count the runs in the same order, and runs beyond a budget
+/// are discarded. `stop`, or the campaign's time limit, ends it after the runs in flight, which
+/// have at most a minute then. If `stop` is also the stop flag of the environment's rule budget,
+/// long rule evaluations are interrupted too. `on_run` is called only for runs that are in the
+/// history.
 pub fn run_all(
     env: &Env,
     history: &History,
@@ -60,11 +65,19 @@ pub fn run_all(
     stop: &AtomicBool,
     on_run: impl FnMut(&RunRecord),
 ) -> CampaignResult {
-    resume_all(env, history, campaign, StoredRuns::default(), options, stop, on_run)
+    resume_all(
+        env,
+        history,
+        campaign,
+        StoredRuns::default(),
+        options,
+        stop,
+        on_run,
+    )
 }
 
-/// As [`run_all`], for a campaign with runs in the history: these count, but are neither made nor passed to `on_run`
-/// again.
+/// As [`run_all`], for a campaign with runs in the history: these count, but are neither made nor
+/// passed to `on_run` again.
 pub fn resume_all(
     env: &Env,
     history: &History,
@@ -82,7 +95,11 @@ pub fn resume_all(
     let began_secs = (clock.secs)() - stored.elapsed_secs;
     let mut writer = RunWriter::new(env, history, &mut on_run);
     writer.end.discards = stored.discards;
-    let time_up_at = env.campaign.limits.time_secs.map_or(f64::INFINITY, |limit| began_secs + limit);
+    let time_up_at = env
+        .campaign
+        .limits
+        .time_secs
+        .map_or(f64::INFINITY, |limit| began_secs + limit);
     let pool = match workers(jobs) {
         Ok(pool) => pool,
         Err(faults) => {
@@ -98,18 +115,35 @@ pub fn resume_all(
         for _ in 0..jobs {
             let (give, taken, halt) = (give.clone(), &taken, &halt);
             scope.spawn(move |_| {
-                work((env, campaign, began_secs), &options.context, taken, &give, &|| {
-                    stop.load(Ordering::Relaxed) || halt.load(Ordering::Relaxed) || (clock.secs)() >= time_up_at
-                });
+                work(
+                    (env, campaign, began_secs),
+                    &options.context,
+                    taken,
+                    &give,
+                    &|| {
+                        stop.load(Ordering::Relaxed)
+                            || halt.load(Ordering::Relaxed)
+                            || (clock.secs)() >= time_up_at
+                    },
+                );
             });
         }
-        conduct(&mut *schedule, stored.runs, &mut writer, &channels, jobs * AHEAD);
-        if let (Ending::Interrupted, Some(limit), false) =
-            (&writer.end.ending, env.campaign.limits.time_secs, stop.load(Ordering::Relaxed))
-        {
+        conduct(
+            &mut *schedule,
+            stored.runs,
+            &mut writer,
+            &channels,
+            jobs * AHEAD,
+        );
+        if let (Ending::Interrupted, Some(limit), false) = (
+            &writer.end.ending,
+            env.campaign.limits.time_secs,
+            stop.load(Ordering::Relaxed),
+        ) {
             writer.end.ending = Ending::Budget(ExhaustedBudget::Time(limit));
         }
-        // Runs still being made are no longer needed. Workers end when the channel of orders is closed.
+        // Runs still being made are no longer needed. Workers end when the channel of orders is
+        // closed.
         halt.store(true, Ordering::Relaxed);
         drop(channels);
     });
@@ -127,16 +161,22 @@ fn work(
 ) {
     loop {
         let order = orders.lock().unwrap_or_else(PoisonError::into_inner).recv();
-        let Ok(Order { position, planned }) = order else { return };
-        let making =
-            if stopped() { Making::Interrupted } else { make_run(env, campaign, began_secs, planned, context) };
+        let Ok(Order { position, planned }) = order else {
+            return;
+        };
+        let making = if stopped() {
+            Making::Interrupted
+        } else {
+            make_run(env, campaign, began_secs, planned, context)
+        };
         if give.send(Made { position, making }).is_err() {
             return;
         }
     }
 }
 
-/// Sends the planned runs to the workers and stores the results in order. `stored` are the runs in the history already.
+/// Sends the planned runs to the workers and stores the results in order. `stored` are the runs in
+/// the history already.
 fn conduct(
     schedule: &mut dyn Schedule,
     mut stored: BTreeMap<u64, RunResult>,
@@ -150,7 +190,9 @@ fn conduct(
     let (mut ordered, mut kept) = (0, 0);
     loop {
         if batch.is_empty() && ordered == kept {
-            batch = schedule.next_batch(&std::mem::take(&mut writer.results)).into();
+            batch = schedule
+                .next_batch(&std::mem::take(&mut writer.results))
+                .into();
             if batch.is_empty() {
                 return;
             }
@@ -160,7 +202,14 @@ fn conduct(
         {
             if let Some(result) = stored.remove(&planned.index) {
                 early.insert(ordered, Making::Stored(result));
-            } else if channels.orders.send(Order { position: ordered, planned }).is_err() {
+            } else if channels
+                .orders
+                .send(Order {
+                    position: ordered,
+                    planned,
+                })
+                .is_err()
+            {
                 return;
             }
             ordered += 1;
@@ -172,7 +221,9 @@ fn conduct(
             kept += 1;
             continue;
         }
-        let Ok(Made { position, making }) = channels.made.recv() else { return };
+        let Ok(Made { position, making }) = channels.made.recv() else {
+            return;
+        };
         early.insert(position, making);
     }
 }
@@ -190,9 +241,21 @@ struct RunWriter<'a> {
 
 impl<'a> RunWriter<'a> {
     fn new(env: &Env, history: &'a History, on_run: &'a mut dyn FnMut(&RunRecord)) -> Self {
-        let end = CampaignResult { ending: Ending::Finished, committed: 0, discards: Vec::new(), rates: Vec::new() };
+        let end = CampaignResult {
+            ending: Ending::Finished,
+            committed: 0,
+            discards: Vec::new(),
+            rates: Vec::new(),
+        };
         let tally = Tally::new(env);
-        Self { history, on_run, end, tally, broken: BrokenRuns::new(&env.campaign.launcher), results: Vec::new() }
+        Self {
+            history,
+            on_run,
+            end,
+            tally,
+            broken: BrokenRuns::new(&env.campaign.launcher),
+            results: Vec::new(),
+        }
     }
 
     /// Stores the next run of the schedule. Breaks if it is the last one.
@@ -204,7 +267,12 @@ impl<'a> RunWriter<'a> {
                     self.stop(faults);
                     return ControlFlow::Break(());
                 }
-                self.end.discards.extend(record.discards.iter().map(|reason| (record.index, reason.clone())));
+                self.end.discards.extend(
+                    record
+                        .discards
+                        .iter()
+                        .map(|reason| (record.index, reason.clone())),
+                );
                 (self.on_run)(&record);
                 self.count(RunResult::of(&record))?;
                 match self.broken.count(&record) {

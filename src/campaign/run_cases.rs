@@ -25,11 +25,12 @@ pub struct CaseRun {
     pub same_trace: Option<bool>,
 }
 
-/// Runs cases on several workers and stores each run as a campaign of its own with the case's name. Calls `on_case` for
-/// each in the order of `cases`, with its position.
+/// Runs cases on several workers and stores each run as a campaign of its own with the case's name.
+/// Calls `on_case` for each in the order of `cases`, with its position.
 ///
 /// # Errors
-/// `S064` if a scene can't be built or does not settle, `X010` if workers can't be started; or writing failed.
+/// `S064` if a scene can't be built or does not settle, `X010` if workers can't be started; or
+/// writing failed.
 pub fn run_cases(
     cases: &[(String, Env)],
     history: &History,
@@ -42,7 +43,8 @@ pub fn run_cases(
     let mut faults = Diagnostics::new();
     // At most one trace for each worker is in memory.
     for (number, some) in cases.chunks(jobs).enumerate() {
-        let made: Vec<_> = pool.install(|| some.par_iter().map(|(_, env)| make(env, context)).collect());
+        let made: Vec<_> =
+            pool.install(|| some.par_iter().map(|(_, env)| make(env, context)).collect());
         for (at, ((name, env), made)) in some.iter().zip(made).enumerate() {
             match made {
                 Ok(run) => on_case(number * jobs + at, store(env, history, name, run, context)?),
@@ -55,9 +57,18 @@ pub fn run_cases(
 
 fn make(env: &Env, context: &RunContext) -> Result<FinishedRun, Diagnostics> {
     let none = BTreeMap::new();
-    let choices = env.campaign.case.as_ref().map_or(&none, |case| &case.choices);
+    let choices = env
+        .campaign
+        .case
+        .as_ref()
+        .map_or(&none, |case| &case.choices);
     let choices = || Choices::named(choices);
-    let attempt = Attempt { campaign: "case", index: 0, choices: &choices, cut: time_limit(env, context) };
+    let attempt = Attempt {
+        campaign: "case",
+        index: 0,
+        choices: &choices,
+        cut: time_limit(env, context),
+    };
     rerun(env, &attempt, context).map_err(|why| {
         env.campaign
             .fault("S064", "case", format!("the scene of this case can't be built: {why}"))
@@ -81,19 +92,35 @@ fn store(
     history.commit(&record)?;
     history.finish_campaign(&id, &end_of(&record, (context.clock.now)()))?;
     let case = env.campaign.case.clone().unwrap_or_default();
-    let recurrence = Recurrence::of(&case.expect.into_iter().collect(), record.judgements.iter().flatten());
+    let recurrence = Recurrence::of(
+        &case.expect.into_iter().collect(),
+        record.judgements.iter().flatten(),
+    );
     let same_trace = case.trace.map(|trace| trace == record.trace.hash);
-    Ok(CaseRun { record, recurrence, same_trace })
+    Ok(CaseRun {
+        record,
+        recurrence,
+        same_trace,
+    })
 }
 
 /// The end of a campaign of one run.
 pub(super) fn end_of(record: &RunRecord, ended: String) -> CampaignEnd {
-    let counts = Counts::of(record.judgements.iter().flatten().map(|judgement| judgement.outcome));
+    let counts = Counts::of(
+        record
+            .judgements
+            .iter()
+            .flatten()
+            .map(|judgement| judgement.outcome),
+    );
     CampaignEnd {
         ended,
         score: Some(record.score),
         score_without_broken: (record.status != RunStatus::Broken).then_some(record.score),
-        outcomes: Outcome::ALL.into_iter().map(|outcome| (outcome, counts.get(outcome))).collect(),
+        outcomes: Outcome::ALL
+            .into_iter()
+            .map(|outcome| (outcome, counts.get(outcome)))
+            .collect(),
         discards: 0,
         ended_by: None,
         interrupted: false,

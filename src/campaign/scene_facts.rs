@@ -1,5 +1,5 @@
-//! Facts about a scene's objects and its sensor noise, only for the scene requirement. Actions don't have them, because
-//! no verdict may depend on the role of an object.
+//! Facts about a scene's objects and its sensor noise, only for the scene requirement. Actions
+//! don't have them, because no verdict may depend on the role of an object.
 
 use std::collections::BTreeMap;
 
@@ -14,15 +14,24 @@ const NAMED: [&str; 3] = ["role", "model", "worldName"];
 
 /// The terms of these facts for rules; all are in the namespace `act:`.
 pub(super) fn vocabulary() -> BTreeMap<String, VocabularyTerm> {
-    NAMED.into_iter().chain(history::NOISE_TERMS).map(|local| (names::act(local), VocabularyTerm::property())).collect()
+    NAMED
+        .into_iter()
+        .chain(history::NOISE_TERMS)
+        .map(|local| (names::act(local), VocabularyTerm::property()))
+        .collect()
 }
 
 /// Adds the facts to the first state: role and model of each object, world and noise of the robot.
 pub(super) fn add(scene: &Scene, facts: &mut RunFacts) {
-    let RunFacts { terms, snapshots, .. } = facts;
-    let Some(state) = snapshots.first_mut() else { return };
+    let RunFacts {
+        terms, snapshots, ..
+    } = facts;
+    let Some(state) = snapshots.first_mut() else {
+        return;
+    };
     let mut say = |subject: &str, local: &str, value: Term| {
-        let triple: Triple = [Term::iri(subject), Term::iri(names::act(local)), value].map(|term| terms.intern(term));
+        let triple: Triple = [Term::iri(subject), Term::iri(names::act(local)), value]
+            .map(|term| terms.intern(term));
         state.push(triple);
     };
     for object in &scene.objects {

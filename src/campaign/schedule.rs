@@ -1,7 +1,7 @@
 //! Schedules: the runs of a campaign, their order, and their choices.
 //!
-//! A schedule depends only on its configuration and on the results of earlier batches, neither on the number of workers
-//! nor on interruptions of the campaign.
+//! A schedule depends only on its configuration and on the results of earlier batches, neither on
+//! the number of workers nor on interruptions of the campaign.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -13,8 +13,9 @@ use actcheck_data::{ChoiceName, Choices};
 use actcheck_history::{Repetition, RunDetail, RunRecord};
 use actcheck_search::Strategy;
 
-/// Runs in a batch of a campaign without a search. Workers wait for each other only between batches, so a large number
-/// costs nothing; the limit bounds the memory of a campaign of millions of runs.
+/// Runs in a batch of a campaign without a search. Workers wait for each other only between
+/// batches, so a large number costs nothing; the limit bounds the memory of a campaign of millions
+/// of runs.
 const BATCH: usize = 10_000;
 
 /// Separates random streams of noise from those of scenes.
@@ -38,15 +39,18 @@ pub struct Planned {
 pub struct Steering {
     /// Quantiles of choices by name.
     pub quantiles: BTreeMap<ChoiceName, f64>,
-    /// Importance weight of the scene, if scenes are not drawn from the configuration's distribution.
+    /// Importance weight of the scene, if scenes are not drawn from the configuration's
+    /// distribution.
     pub weight: Option<f64>,
 }
 
 impl Planned {
-    /// Returns the choices of the run's `attempt`, from 0; the scenes of earlier attempts were discarded.
+    /// Returns the choices of the run's `attempt`, from 0; the scenes of earlier attempts were
+    /// discarded.
     ///
-    /// Each attempt has its own random stream, so that a discard does not change the choices of other runs. The noise
-    /// of each repetition has its own stream too, whatever the number of repetitions.
+    /// Each attempt has its own random stream, so that a discard does not change the choices of
+    /// other runs. The noise of each repetition has its own stream too, whatever the number of
+    /// repetitions.
     pub fn choices(&self, seed: u64, attempt: u64) -> Choices {
         let stream = self.scene | (attempt << 48);
         // If the steered scene can't be built, a random one replaces it.
@@ -62,7 +66,10 @@ impl Planned {
 
     /// The repetition for the run's record. Returns `None` if every scene is run once.
     pub fn repetition(&self) -> Option<Repetition> {
-        self.repetition.map(|number| Repetition { scene: self.scene, number })
+        self.repetition.map(|number| Repetition {
+            scene: self.scene,
+            number,
+        })
     }
 }
 
@@ -92,30 +99,49 @@ impl RunResult {
     /// Summarises a new run.
     pub fn of(record: &RunRecord) -> Self {
         let outcomes = record.judgements.iter().flatten().map(PropertyOutcome::of);
-        Self { index: record.index, discards: record.discards.len() as u64, outcomes: outcomes.collect() }
+        Self {
+            index: record.index,
+            discards: record.discards.len() as u64,
+            outcomes: outcomes.collect(),
+        }
     }
 
     /// Summarises a run of the history.
     pub fn from_stored(run: &RunDetail) -> Self {
-        let outcomes = run.actions.iter().flat_map(|action| &action.judgements).map(PropertyOutcome::of);
-        Self { index: run.row.index, discards: run.discards.len() as u64, outcomes: outcomes.collect() }
+        let outcomes = run
+            .actions
+            .iter()
+            .flat_map(|action| &action.judgements)
+            .map(PropertyOutcome::of);
+        Self {
+            index: run.row.index,
+            discards: run.discards.len() as u64,
+            outcomes: outcomes.collect(),
+        }
     }
 }
 
 impl PropertyOutcome {
     fn of(judgement: &Judgement) -> Self {
-        Self { property: judgement.property.clone(), outcome: judgement.outcome, margin: judgement.margin }
+        Self {
+            property: judgement.property.clone(),
+            outcome: judgement.outcome,
+            margin: judgement.margin,
+        }
     }
 }
 
 /// Plans the runs of a campaign in batches.
 pub trait Schedule {
-    /// Returns the next runs, in the order in which they are stored; empty if the schedule is finished.
+    /// Returns the next runs, in the order in which they are stored; empty if the schedule is
+    /// finished.
     ///
-    /// It is called when all runs of the previous batch are in the history; `results` has these runs, in the same order.
+    /// It is called when all runs of the previous batch are in the history; `results` has these
+    /// runs, in the same order.
     fn next_batch(&mut self, results: &[RunResult]) -> Vec<Planned>;
 
-    /// Failure rates of properties, if the raw counts of runs are biased. They cover the complete batches so far.
+    /// Failure rates of properties, if the raw counts of runs are biased. They cover the complete
+    /// batches so far.
     fn rates(&self) -> Vec<WeightedRate> {
         Vec::new()
     }
@@ -126,7 +152,12 @@ pub fn schedule_of(env: &Env) -> Box<dyn Schedule> {
     let all: Box<dyn Schedule> = if env.campaign.search == Strategy::Random {
         let tests = env.campaign.tests.len() as u64;
         let repeat = u64::from(env.campaign.repeat);
-        Box::new(InTurns { tests, scenes: u64::from(env.campaign.test_count), repeat, made: 0 })
+        Box::new(InTurns {
+            tests,
+            scenes: u64::from(env.campaign.test_count),
+            repeat,
+            made: 0,
+        })
     } else {
         Box::new(Searching::new(env))
     };
@@ -136,8 +167,8 @@ pub fn schedule_of(env: &Env) -> Box<dyn Schedule> {
     }
 }
 
-/// All repetitions of all scenes of all tests. Tests alternate, so that a campaign that ends early has about the same
-/// number of scenes of each.
+/// All repetitions of all scenes of all tests. Tests alternate, so that a campaign that ends early
+/// has about the same number of scenes of each.
 struct InTurns {
     tests: u64,
     /// Scenes of each test.
@@ -154,20 +185,29 @@ impl InTurns {
         let (turn, repetition) = (place / self.repeat, place % self.repeat);
         let scene = turn % self.tests * self.scenes + turn / self.tests;
         let repetition_of_several = (self.repeat > 1).then_some(repetition);
-        Planned { index: scene * self.repeat + repetition, scene, repetition: repetition_of_several, steering: None }
+        Planned {
+            index: scene * self.repeat + repetition,
+            scene,
+            repetition: repetition_of_several,
+            steering: None,
+        }
     }
 }
 
 impl Schedule for InTurns {
     fn next_batch(&mut self, _results: &[RunResult]) -> Vec<Planned> {
         let planned = self.tests * self.scenes * self.repeat;
-        let batch: Vec<Planned> = (self.made..planned).take(BATCH).map(|place| self.planned(place)).collect();
+        let batch: Vec<Planned> = (self.made..planned)
+            .take(BATCH)
+            .map(|place| self.planned(place))
+            .collect();
         self.made += batch.len() as u64;
         batch
     }
 }
 
-/// The runs of another schedule that belong to one shard. That schedule must not depend on the results of runs.
+/// The runs of another schedule that belong to one shard. That schedule must not depend on the
+/// results of runs.
 struct OneShard {
     all: Box<dyn Schedule>,
     shard: Shard,
@@ -194,7 +234,12 @@ mod tests {
 
     #[test]
     fn tests_alternate_and_every_run_is_planned_once() {
-        let mut schedule = InTurns { tests: 3, scenes: 5_000, repeat: 1, made: 0 };
+        let mut schedule = InTurns {
+            tests: 3,
+            scenes: 5_000,
+            repeat: 1,
+            made: 0,
+        };
         let mut indices = Vec::new();
         loop {
             let batch = schedule.next_batch(&[]);
@@ -210,17 +255,35 @@ mod tests {
 
     #[test]
     fn the_runs_of_a_scene_are_consecutive() {
-        let batch = InTurns { tests: 2, scenes: 2, repeat: 3, made: 0 }.next_batch(&[]);
+        let batch = InTurns {
+            tests: 2,
+            scenes: 2,
+            repeat: 3,
+            made: 0,
+        }
+        .next_batch(&[]);
         let indices: Vec<u64> = batch.iter().map(|planned| planned.index).collect();
         assert_eq!(indices, [0, 1, 2, 6, 7, 8, 3, 4, 5, 9, 10, 11]);
-        assert_eq!(batch[5].repetition(), Some(Repetition { scene: 2, number: 2 }));
+        assert_eq!(
+            batch[5].repetition(),
+            Some(Repetition {
+                scene: 2,
+                number: 2
+            })
+        );
     }
 
     /// Repetitions share the scene, and their noise does not depend on their number.
     #[test]
     fn repetitions_differ_only_in_noise() {
         let drawn = |scene, repetition| {
-            let mut choices = Planned { index: 0, scene, repetition, steering: None }.choices(7, 0);
+            let mut choices = Planned {
+                index: 0,
+                scene,
+                repetition,
+                steering: None,
+            }
+            .choices(7, 0);
             let yaw = choices.real("yaw".into(), 0.0, 1.0, 0.0).to_bits();
             choices.begin_noise();
             (yaw, choices.normal("sense.x".into(), 1.0).to_bits())
@@ -235,8 +298,16 @@ mod tests {
     fn every_run_is_in_one_shard() {
         let mut indices = Vec::new();
         for number in 1..=7 {
-            let all = Box::new(InTurns { tests: 2, scenes: 3_334, repeat: 3, made: 0 });
-            let mut schedule = OneShard { all, shard: Shard::new(number, 7).expect("a part") };
+            let all = Box::new(InTurns {
+                tests: 2,
+                scenes: 3_334,
+                repeat: 3,
+                made: 0,
+            });
+            let mut schedule = OneShard {
+                all,
+                shard: Shard::new(number, 7).expect("a part"),
+            };
             loop {
                 let batch = schedule.next_batch(&[]);
                 if batch.is_empty() {
@@ -252,10 +323,15 @@ mod tests {
     #[test]
     fn attempts_and_runs_have_independent_choices() {
         let first = |index, attempt| {
-            Planned { index, scene: index, repetition: None, steering: None }
-                .choices(7, attempt)
-                .real("x".into(), 0.0, 1.0, 0.0)
-                .to_bits()
+            Planned {
+                index,
+                scene: index,
+                repetition: None,
+                steering: None,
+            }
+            .choices(7, attempt)
+            .real("x".into(), 0.0, 1.0, 0.0)
+            .to_bits()
         };
         assert_eq!(first(1, 0), first(1, 0));
         assert_ne!(first(1, 0), first(2, 0));

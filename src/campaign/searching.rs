@@ -8,9 +8,11 @@ use actcheck_base::Outcome;
 use actcheck_config::Step;
 use actcheck_search::{Ask, PropertyResult, Search};
 
-/// Asks the searches of the tests in turn for a generation of scenes, and returns the results to them.
+/// Asks the searches of the tests in turn for a generation of scenes, and returns the results to
+/// them.
 ///
-/// The scenes depend on the seed and on the results of earlier generations, not on the number of workers.
+/// The scenes depend on the seed and on the results of earlier generations, not on the number of
+/// workers.
 pub(super) struct Searching {
     space: SearchSpace,
     tests: Vec<SearchedTest>,
@@ -44,15 +46,30 @@ impl Searching {
             Search::new(space.cube(), campaign.search, seed)
         };
         let tests = campaign.tests.iter().enumerate().map(|(number, test)| {
-            let actions = test.iter().filter_map(|step| env.ontology.actions.get(&step.action));
-            let mut properties: Vec<String> =
-                actions.flat_map(|action| action.success_properties.iter().cloned()).collect();
+            let actions = test
+                .iter()
+                .filter_map(|step| env.ontology.actions.get(&step.action));
+            let mut properties: Vec<String> = actions
+                .flat_map(|action| action.success_properties.iter().cloned())
+                .collect();
             properties.sort();
             properties.dedup();
-            SearchedTest { name: Step::test_name(test), search: search(number), properties, made: 0 }
+            SearchedTest {
+                name: Step::test_name(test),
+                search: search(number),
+                properties,
+                made: 0,
+            }
         });
         let (scenes, repeat) = (u64::from(campaign.test_count), u64::from(campaign.repeat));
-        Self { tests: tests.collect(), space, scenes, repeat, turn: 0, asked: false }
+        Self {
+            tests: tests.collect(),
+            space,
+            scenes,
+            repeat,
+            turn: 0,
+            asked: false,
+        }
     }
 
     /// All runs of a generation's scenes.
@@ -60,7 +77,10 @@ impl Searching {
         let guided = self.tests[self.turn].search.strategy().is_guided();
         let of_scene = |(ask, scene): (&Ask, u64)| {
             let quantiles = self.space.quantiles(&ask.point);
-            let steering = Arc::new(Steering { quantiles, weight: guided.then_some(ask.weight) });
+            let steering = Arc::new(Steering {
+                quantiles,
+                weight: guided.then_some(ask.weight),
+            });
             (0..self.repeat).map(move |repetition| Planned {
                 index: scene * self.repeat + repetition,
                 scene,
@@ -80,9 +100,13 @@ impl Schedule for Searching {
         }
         let (turn, scenes) = (self.turn, self.scenes);
         self.asked = true;
-        let Some(test) = self.tests.get_mut(turn) else { return Vec::new() };
+        let Some(test) = self.tests.get_mut(turn) else {
+            return Vec::new();
+        };
         // All tests have the same number of scenes, so they finish in the same turn.
-        let asked = test.search.ask(usize::try_from(scenes - test.made).unwrap_or(usize::MAX));
+        let asked = test
+            .search
+            .ask(usize::try_from(scenes - test.made).unwrap_or(usize::MAX));
         let first = turn as u64 * scenes + test.made;
         test.made += asked.len() as u64;
         self.planned(&asked, first)
@@ -90,16 +114,24 @@ impl Schedule for Searching {
 
     fn rates(&self) -> Vec<WeightedRate> {
         let guided = |test: &&SearchedTest| test.search.strategy().is_guided();
-        self.tests.iter().filter(guided).flat_map(SearchedTest::rates).collect()
+        self.tests
+            .iter()
+            .filter(guided)
+            .flat_map(SearchedTest::rates)
+            .collect()
     }
 }
 
 impl SearchedTest {
-    /// Passes the first run of each scene to the search: an estimate must count each scene once, not its repetitions.
+    /// Passes the first run of each scene to the search: an estimate must count each scene once,
+    /// not its repetitions.
     fn tell(&mut self, results: &[RunResult], repeat: u64) {
         for run in results.iter().filter(|run| run.index % repeat == 0) {
-            let results: Vec<PropertyResult> =
-                self.properties.iter().map(|property| worst_result(run, property)).collect();
+            let results: Vec<PropertyResult> = self
+                .properties
+                .iter()
+                .map(|property| worst_result(run, property))
+                .collect();
             if run.discards == 0 {
                 self.search.tell(results);
             } else {
@@ -125,8 +157,18 @@ impl SearchedTest {
 
 /// The worst result of a property over all actions of a run.
 fn worst_result(run: &RunResult, property: &str) -> PropertyResult {
-    let own = || run.outcomes.iter().filter(|outcome| outcome.property == property);
-    let decided = own().filter(|outcome| matches!(outcome.outcome, Outcome::Passed | Outcome::Failed));
-    let margin = decided.filter_map(|outcome| outcome.margin).reduce(f64::min);
-    PropertyResult { failed: own().any(|outcome| outcome.outcome == Outcome::Failed), margin }
+    let own = || {
+        run.outcomes
+            .iter()
+            .filter(|outcome| outcome.property == property)
+    };
+    let decided =
+        own().filter(|outcome| matches!(outcome.outcome, Outcome::Passed | Outcome::Failed));
+    let margin = decided
+        .filter_map(|outcome| outcome.margin)
+        .reduce(f64::min);
+    PropertyResult {
+        failed: own().any(|outcome| outcome.outcome == Outcome::Failed),
+        margin,
+    }
 }

@@ -1,4 +1,5 @@
-//! Decomposes the meshes of models and robot into convex hulls before the first run, with a cache beside the history.
+//! Decomposes the meshes of models and robot into convex hulls before the first run, with a cache
+//! beside the history.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -28,15 +29,38 @@ struct HullCache {
 ///
 /// Adds a fault (W037) for each mesh without a convex decomposition.
 pub(super) fn decompose_meshes(campaign: &mut Campaign, faults: &mut Diagnostics) {
-    let mut cache = HullCache { history: campaign.history.clone(), known: BTreeMap::new() };
+    let mut cache = HullCache {
+        history: campaign.history.clone(),
+        known: BTreeMap::new(),
+    };
     let used = campaign.used_models();
-    let models = campaign.models.iter().filter(|(name, _)| used.contains(*name)).map(|(_, model)| model.as_ref());
-    cache.fill(models.flat_map(shapes_of).chain(campaign.robot.meshes.values().flatten()));
-    for (name, model) in campaign.models.iter_mut().filter(|(name, _)| used.contains(*name)) {
+    let models = campaign
+        .models
+        .iter()
+        .filter(|(name, _)| used.contains(*name))
+        .map(|(_, model)| model.as_ref());
+    cache.fill(
+        models
+            .flat_map(shapes_of)
+            .chain(campaign.robot.meshes.values().flatten()),
+    );
+    for (name, model) in campaign
+        .models
+        .iter_mut()
+        .filter(|(name, _)| used.contains(*name))
+    {
         let moving = 0..model.moving.len();
         decompose_model(name, model, &mut cache, faults);
-        for idx in moving.filter(|idx| has_mesh(&model.moving[*idx].model)).collect::<Vec<_>>() {
-            decompose_model(name, &mut Arc::make_mut(model).moving[idx].model, &mut cache, faults);
+        for idx in moving
+            .filter(|idx| has_mesh(&model.moving[*idx].model))
+            .collect::<Vec<_>>()
+        {
+            decompose_model(
+                name,
+                &mut Arc::make_mut(model).moving[idx].model,
+                &mut cache,
+                faults,
+            );
         }
     }
     decompose_with(&mut cache, Arc::make_mut(&mut campaign.robot), faults);
@@ -49,10 +73,18 @@ fn shapes_of(model: &ObjectModel) -> impl Iterator<Item = &Shape> {
 }
 
 fn has_mesh(model: &ObjectModel) -> bool {
-    model.parts.iter().any(|part| matches!(part.shape, Shape::Mesh { .. }))
+    model
+        .parts
+        .iter()
+        .any(|part| matches!(part.shape, Shape::Mesh { .. }))
 }
 
-fn decompose_model(name: &str, model: &mut Arc<ObjectModel>, cache: &mut HullCache, faults: &mut Diagnostics) {
+fn decompose_model(
+    name: &str,
+    model: &mut Arc<ObjectModel>,
+    cache: &mut HullCache,
+    faults: &mut Diagnostics,
+) {
     if !has_mesh(model) {
         return;
     }
@@ -62,8 +94,8 @@ fn decompose_model(name: &str, model: &mut Arc<ObjectModel>, cache: &mut HullCac
     }
 }
 
-/// Proposes a profile for a robot without roles, and for that of its hands with `hand` in a name. Meshes are decomposed with
-/// the cache in the folder of a history.
+/// Proposes a profile for a robot without roles, and for that of its hands with `hand` in a name.
+/// Meshes are decomposed with the cache in the folder of a history.
 ///
 /// # Errors
 /// W037 for each mesh without a convex decomposition; W020 to W024 if no profile can be proposed.
@@ -72,7 +104,10 @@ pub fn proposed_robot(
     history: &Path,
     hand: Option<&str>,
 ) -> Result<world::Proposal, Diagnostics> {
-    let mut cache = HullCache { history: history.to_path_buf(), known: BTreeMap::new() };
+    let mut cache = HullCache {
+        history: history.to_path_buf(),
+        known: BTreeMap::new(),
+    };
     let mut faults = Diagnostics::new();
     cache.fill(robot.meshes.values().flatten());
     decompose_with(&mut cache, &mut robot, &mut faults);
@@ -80,7 +115,8 @@ pub fn proposed_robot(
     Ok(world::propose(&robot, hand).map_err(|error| error.diagnostic())?)
 }
 
-/// Finds the roles that the robot's profile leaves out, and limits the force of its grip to that of its motors.
+/// Finds the roles that the robot's profile leaves out, and limits the force of its grip to that of
+/// its motors.
 ///
 /// # Errors
 /// [`world::WorldError`] if they can't be found.
@@ -97,7 +133,10 @@ pub(super) fn complete_robot(campaign: &mut Campaign) -> Result<(), world::World
 
 fn decompose_with(cache: &mut HullCache, robot: &mut RobotProfile, faults: &mut Diagnostics) {
     for (file, shapes) in &mut robot.meshes {
-        let apart: Result<Vec<Vec<Shape>>, String> = shapes.iter().map(|shape| cache.solids_or_sheet(shape)).collect();
+        let apart: Result<Vec<Vec<Shape>>, String> = shapes
+            .iter()
+            .map(|shape| cache.solids_or_sheet(shape))
+            .collect();
         let meshes = shapes.iter().filter_map(|shape| match shape {
             Shape::Mesh { mesh } => Some(Arc::new(mesh.clone())),
             _ => None,
@@ -121,7 +160,15 @@ fn unusable(what: &str, reason: &str) -> Diagnostic {
 fn solid_parts(model: &ObjectModel, cache: &mut HullCache) -> Result<Vec<Part>, String> {
     let mut parts = Vec::new();
     for part in &model.parts {
-        parts.extend(cache.solids_or_sheet(&part.shape)?.into_iter().map(|shape| Part { pose: part.pose, shape }));
+        parts.extend(
+            cache
+                .solids_or_sheet(&part.shape)?
+                .into_iter()
+                .map(|shape| Part {
+                    pose: part.pose,
+                    shape,
+                }),
+        );
     }
     Ok(parts)
 }
@@ -134,13 +181,18 @@ impl HullCache {
             _ => None,
         });
         let meshes: BTreeMap<String, &Mesh> = meshes.collect();
-        let solids: Vec<_> = meshes.par_iter().map(|(key, mesh)| self.cached_or_new(key, mesh)).collect();
+        let solids: Vec<_> = meshes
+            .par_iter()
+            .map(|(key, mesh)| self.cached_or_new(key, mesh))
+            .collect();
         self.known.extend(meshes.into_keys().zip(solids));
     }
 
     /// Returns the convex hulls of a mesh, or any other shape unchanged.
     fn solids(&mut self, shape: &Shape) -> Result<Vec<Shape>, String> {
-        let Shape::Mesh { mesh } = shape else { return Ok(vec![shape.clone()]) };
+        let Shape::Mesh { mesh } = shape else {
+            return Ok(vec![shape.clone()]);
+        };
         let key = world::decomposition_key(mesh);
         if let Some(known) = self.known.get(&key) {
             return known.clone();
@@ -150,7 +202,8 @@ impl HullCache {
         solids
     }
 
-    /// As [`HullCache::solids`]; a flat mesh, such as a carpet or a marker on a robot, becomes a thin solid.
+    /// As [`HullCache::solids`]; a flat mesh, such as a carpet or a marker on a robot, becomes a
+    /// thin solid.
     fn solids_or_sheet(&mut self, shape: &Shape) -> Result<Vec<Shape>, String> {
         self.solids(shape).or_else(|reason| match shape {
             Shape::Mesh { mesh } => world::sheet(mesh).map(|sheet| vec![sheet]).ok_or(reason),
@@ -174,12 +227,18 @@ fn file_of(history: &Path, key: &str) -> PathBuf {
     history.join(FOLDER).join(format!("{key}.hulls"))
 }
 
-/// Reads the cache file of a mesh. Returns `None` if it is missing, corrupt, of another mesh, or in another format.
+/// Reads the cache file of a mesh. Returns `None` if it is missing, corrupt, of another mesh, or in
+/// another format.
 fn read(history: &Path, key: &str) -> Option<Vec<Shape>> {
-    let bytes = Below::new(history).read(&file_of(history, key), LONGEST).ok()?;
+    let bytes = Below::new(history)
+        .read(&file_of(history, key), LONGEST)
+        .ok()?;
     let (head, body) = bytes.split_at_checked(bytes.iter().position(|byte| *byte == b'\n')? + 1)?;
-    let solids: Vec<Shape> =
-        if head == head_of(key, body).as_bytes() { postcard::from_bytes(body).ok()? } else { return None };
+    let solids: Vec<Shape> = if head == head_of(key, body).as_bytes() {
+        postcard::from_bytes(body).ok()?
+    } else {
+        return None;
+    };
     let is_solid = |shape: &Shape| matches!(shape, Shape::Hull { points, .. } if points.len() >= 4);
     (!solids.is_empty() && solids.iter().all(is_solid)).then_some(solids)
 }
@@ -189,8 +248,15 @@ fn write(history: &Path, key: &str, solids: &[Shape]) -> Result<(), String> {
     let body = postcard::to_stdvec(solids).map_err(|error| error.to_string())?;
     let below = Below::new(history);
     let entries = below.entries(history).map_err(|error| error.to_string())?;
-    let has = |names: &[&str]| entries.iter().any(|(name, _)| name.to_str().is_some_and(|name| names.contains(&name)));
-    let is_ours = has(&["VERSION"]) || entries.iter().all(|(name, _)| name == FOLDER || name == "lock");
+    let has = |names: &[&str]| {
+        entries
+            .iter()
+            .any(|(name, _)| name.to_str().is_some_and(|name| names.contains(&name)))
+    };
+    let is_ours = has(&["VERSION"])
+        || entries
+            .iter()
+            .all(|(name, _)| name == FOLDER || name == "lock");
     if !is_ours {
         return Err("the folder is not that of a history".to_owned());
     }
@@ -222,17 +288,37 @@ mod tests {
         let path = file_of(&history, "key");
         let third = 1.0 / 3.0;
         let solids = vec![Shape::Hull {
-            points: vec![[third, -0.0, 1e-300], [1.0, 0.1, 0.2], [f64::MAX, 0.3, 5e-324], [0.7, third / 7.0, 9.9]],
+            points: vec![
+                [third, -0.0, 1e-300],
+                [1.0, 0.1, 0.2],
+                [f64::MAX, 0.3, 5e-324],
+                [0.7, third / 7.0, 9.9],
+            ],
             volume: third,
         }];
         write(&history, "key", &solids).expect("the cache can be written");
-        let Some([Shape::Hull { points, volume }]) = read(&history, "key").as_deref().map(|list| [list[0].clone()])
+        let Some([Shape::Hull { points, volume }]) = read(&history, "key")
+            .as_deref()
+            .map(|list| [list[0].clone()])
         else {
             panic!("one hull is read");
         };
-        let Shape::Hull { points: expected, .. } = &solids[0] else { unreachable!() };
-        let bits = |list: &[[f64; 3]]| list.iter().flatten().map(|x| x.to_bits()).collect::<Vec<_>>();
-        assert_eq!((bits(&points), volume.to_bits()), (bits(expected), third.to_bits()));
+        let Shape::Hull {
+            points: expected, ..
+        } = &solids[0]
+        else {
+            unreachable!()
+        };
+        let bits = |list: &[[f64; 3]]| {
+            list.iter()
+                .flatten()
+                .map(|x| x.to_bits())
+                .collect::<Vec<_>>()
+        };
+        assert_eq!(
+            (bits(&points), volume.to_bits()),
+            (bits(expected), third.to_bits())
+        );
         let bytes = fs::read(&path).expect("the cache can be read");
         for at in [0, bytes.len() / 2, bytes.len() - 1] {
             let mut other = bytes.clone();
@@ -243,6 +329,9 @@ mod tests {
         fs::write(&path, &bytes[..bytes.len() / 2]).expect("the cache can be written");
         assert!(read(&history, "key").is_none());
         fs::write(file_of(&history, "other"), &bytes).expect("the cache can be written");
-        assert!(read(&history, "other").is_none(), "the file of another mesh");
+        assert!(
+            read(&history, "other").is_none(),
+            "the file of another mesh"
+        );
     }
 }

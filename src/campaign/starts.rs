@@ -1,4 +1,5 @@
-//! Looks at some scenes of a campaign before its first run: whether the robot can start, and whether each test can begin.
+//! Looks at some scenes of a campaign before its first run: whether the robot can start, and
+//! whether each test can begin.
 //!
 //! Never: simulates a step.
 
@@ -15,14 +16,17 @@ use actcheck_world::World;
 const N_SCENES: u64 = 8;
 
 impl Env {
-    /// Draws some scenes of each test, as [`check_starts`](Self::check_starts) does. Returns an error if the robot overlaps something in all of them, and warnings if it
-    /// does in some (S025), or if the first action of a test can't be performed (S026).
+    /// Draws some scenes of each test, as [`check_starts`](Self::check_starts) does. Returns an
+    /// error if the robot overlaps something in all of them, and warnings if it does in some
+    /// (S025), or if the first action of a test can't be performed (S026).
     pub fn starts(&self) -> Diagnostics {
         let mut found = Diagnostics::new();
         for test in 0..self.space.tests() {
             let worlds: Vec<(Scene, World)> = self.some_scenes(test).filter_map(built).collect();
-            let overlaps: Vec<String> =
-                worlds.iter().filter_map(|(_, world)| world.overlaps().first().map(ToString::to_string)).collect();
+            let overlaps: Vec<String> = worlds
+                .iter()
+                .filter_map(|(_, world)| world.overlaps().first().map(ToString::to_string))
+                .collect();
             let n_scenes = worlds.len() as u64;
             match overlaps.first() {
                 Some(first) if overlaps.len() == worlds.len() => {
@@ -31,25 +35,39 @@ impl Env {
                     return found;
                 }
                 Some(first) => {
-                    let message =
-                        format!("{first} in {} of {n_scenes} scenes: such scenes are discarded", overlaps.len());
-                    found.push(self.campaign.warning("S025", START, message).help(MOVE_ROBOT));
+                    let message = format!(
+                        "{first} in {} of {n_scenes} scenes: such scenes are discarded",
+                        overlaps.len()
+                    );
+                    found.push(
+                        self.campaign
+                            .warning("S025", START, message)
+                            .help(MOVE_ROBOT),
+                    );
                 }
                 None => {}
             }
-            let unable = worlds.iter().find_map(|(scene, world)| self.reason_not_to_begin(test, scene, world));
+            let unable = worlds
+                .iter()
+                .find_map(|(scene, world)| self.reason_not_to_begin(test, scene, world));
             if let Some(reason) = unable {
                 let action = self.campaign.tests.get(test).and_then(|test| test.first());
                 let action = action.map_or(String::new(), |step| step.action.clone());
-                let message = format!("`{action}` is never performed as the first action: {reason}");
+                let message =
+                    format!("`{action}` is never performed as the first action: {reason}");
                 let help = "let another action come first that makes it hold";
-                found.push(self.campaign.warning("S026", &format!("tests.{test}.0"), message).help(help));
+                found.push(
+                    self.campaign
+                        .warning("S026", &format!("tests.{test}.0"), message)
+                        .help(help),
+                );
             }
         }
         found
     }
 
-    /// Returns an error (S025) if the robot overlaps something in all of some scenes of a test: its runs can't begin.
+    /// Returns an error (S025) if the robot overlaps something in all of some scenes of a test: its
+    /// runs can't begin.
     pub fn check_starts(&self) -> Result<(), Diagnostics> {
         for test in 0..self.space.tests() {
             let (mut first, mut n_scenes) = (None, 0);
@@ -75,24 +93,39 @@ impl Env {
             1 => String::new(),
             _ => format!(", in all of {n_scenes} scenes"),
         };
-        self.campaign.fault("S025", START, format!("{first}{scenes}")).help(MOVE_ROBOT)
+        self.campaign
+            .fault("S025", START, format!("{first}{scenes}"))
+            .help(MOVE_ROBOT)
     }
 
     fn some_scenes(&self, test: usize) -> impl Iterator<Item = Scene> {
         let choices: Vec<Choices> = match &self.campaign.case {
             Some(case) => vec![Choices::named(&case.choices)],
-            None => (0..N_SCENES).map(|index| Choices::random(self.campaign.seed, index)).collect(),
+            None => (0..N_SCENES)
+                .map(|index| Choices::random(self.campaign.seed, index))
+                .collect(),
         };
-        choices.into_iter().filter_map(move |mut choices| scenario::draw(&self.space, test, &mut choices).ok())
+        choices
+            .into_iter()
+            .filter_map(move |mut choices| scenario::draw(&self.space, test, &mut choices).ok())
     }
 
-    /// The reason why the first action of a test can't be performed. At the start, the robot touches nothing.
+    /// The reason why the first action of a test can't be performed. At the start, the robot
+    /// touches nothing.
     fn reason_not_to_begin(&self, test: usize, scene: &Scene, world: &World) -> Option<String> {
         let step = self.campaign.tests.get(test)?.first()?;
-        let action = self.ontology.actions.get(&step.action).filter(|action| !action.preconditions.is_empty())?;
+        let action = self
+            .ontology
+            .actions
+            .get(&step.action)
+            .filter(|action| !action.preconditions.is_empty())?;
         let values = scene.steps.first().unwrap_or(&scene.designators);
         let facts = facts_of_state(&world.snapshot(), values, &scene.map);
-        let found = self.rules.held_before(&facts_before(&facts), &action.preconditions, &self.rule_budget);
+        let found = self.rules.held_before(
+            &facts_before(&facts),
+            &action.preconditions,
+            &self.rule_budget,
+        );
         reason_not_to_perform(&self.ontology, action, &found)
     }
 }

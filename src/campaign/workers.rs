@@ -10,7 +10,9 @@ use actcheck_base::{Diagnostic, Diagnostics};
 /// `X010` if they can't be started.
 pub(super) fn workers(jobs: usize) -> Result<ThreadPool, Diagnostics> {
     let pool = ThreadPoolBuilder::new().num_threads(jobs.max(1)).build();
-    pool.map_err(|error| Diagnostic::error("X010", format!("workers can't be started: {error}")).into())
+    pool.map_err(|error| {
+        Diagnostic::error("X010", format!("workers can't be started: {error}")).into()
+    })
 }
 
 /// Does two things side by side with two workers or more, otherwise one after the other.

@@ -10,20 +10,25 @@ use crate::output;
 use crate::picture::Picture;
 use crate::work::{all_cores, both};
 use actcheck_analysis::{
-    Column, Hierarchy, JudgedProperty, Mirror, OutcomeTable, PatternOptions, RATE_COLUMNS, TableFilter, cascades,
-    collisions, columns, finding_columns, flaky_scenes, judged, property_findings, table_failure_modes, trend, two_way,
+    Column, Hierarchy, JudgedProperty, Mirror, OutcomeTable, PatternOptions, RATE_COLUMNS,
+    TableFilter, cascades, collisions, columns, finding_columns, flaky_scenes, judged,
+    property_findings, table_failure_modes, trend, two_way,
 };
 use actcheck_base::{Diagnostic, Diagnostics, ShellLine, did_you_mean};
 use actcheck_history::History;
 use actcheck_ontology::Ontology;
 use actcheck_report::{
-    FindingsSummary, PropertyReport, collisions_picture, findings_json, findings_table, findings_text, maps_table,
-    patterns_picture, scene_rule,
+    FindingsSummary, PropertyReport, collisions_picture, findings_json, findings_table,
+    findings_text, maps_table, patterns_picture, scene_rule,
 };
 use actcheck_verdict::Counts;
 
-/// Default heat maps of a requested property: the target's position on its surface, and its category and orientation.
-const USUAL_MAPS: [[&str; 2]; 2] = [["surface_y_m", "surface_x_m"], ["target_category", "target_turned_rad"]];
+/// Default heat maps of a requested property: the target's position on its surface, and its
+/// category and orientation.
+const USUAL_MAPS: [[&str; 2]; 2] = [
+    ["surface_y_m", "surface_x_m"],
+    ["target_category", "target_turned_rad"],
+];
 
 /// Maximum number of conditions of a pattern, also the default.
 const MOST_CONDITIONS: u8 = 3;
@@ -31,20 +36,23 @@ const MOST_CONDITIONS: u8 = 3;
 /// `actcheck analyse`
 #[derive(Debug, Args)]
 pub struct AnalyseArgs {
-    /// Only this property, by its name in the ontology (may be given several times); also prints heat maps
+    /// Only this property, by its name in the ontology (may be given several times); also prints
+    /// heat maps
     #[arg(long, value_name = "P")]
     pub property: Vec<String>,
-    /// Failures by one or two parameters, such as `target_category,target_turned_rad`, instead of the usual heat maps
+    /// Failures by one or two parameters, such as `target_category,target_turned_rad`, instead of
+    /// the usual heat maps
     #[arg(long, value_name = "DOWN[,ACROSS]", value_delimiter = ',', num_args = 1..=2)]
     pub by: Vec<String>,
     /// Draw the patterns into this file, as a raster (.png) or vector image (.svg)
     #[arg(long, value_name = "FILE.png", conflicts_with = "by")]
     pub picture: Option<PathBuf>,
-    /// Draw collisions from above into this file: the things that were hit, around the target or goal
+    /// Draw collisions from above into this file: the things that were hit, around the target or
+    /// goal
     #[arg(long, value_name = "FILE.png", conflicts_with = "by")]
     pub collisions: Option<PathBuf>,
-    /// Print the N-th pattern of the requested property as a rule: if `[scene] require` in a configuration names the
-    /// file, every scene matches the pattern
+    /// Print the N-th pattern of the requested property as a rule: if `[scene] require` in a
+    /// configuration names the file, every scene matches the pattern
     #[arg(long, value_name = "N", requires = "property", conflicts_with = "by")]
     pub scene_rule: Option<usize>,
     /// Maximum number of conditions of a pattern
@@ -61,7 +69,8 @@ pub struct AnalyseArgs {
     pub format: Format,
 }
 
-/// Number of rows from which conditions are sought in a sample: a million runs would take minutes, and find the same.
+/// Number of rows from which conditions are sought in a sample: a million runs would take minutes,
+/// and find the same.
 const MOST_ROWS: usize = 400_000;
 /// Number of rows of the sample.
 const SAMPLED_ROWS: usize = 100_000;
@@ -104,8 +113,11 @@ pub fn analyse(args: &AnalyseArgs) -> Result<(), Diagnostics> {
     }
     if let Some(top_view) = top_view {
         top_view.write(&collisions_picture(&summary).ok_or_else(|| {
-            Diagnostic::error("X013", "no collisions were found, so nothing was drawn".to_owned())
-                .help("the robot touched nothing that it was not to touch, or the runs have no traces")
+            Diagnostic::error(
+                "X013",
+                "no collisions were found, so nothing was drawn".to_owned(),
+            )
+            .help("the robot touched nothing that it was not to touch, or the runs have no traces")
         })?)?;
     }
     if let Some(number) = args.scene_rule {
@@ -114,7 +126,9 @@ pub fn analyse(args: &AnalyseArgs) -> Result<(), Diagnostics> {
     }
     output::print(&match args.format {
         Format::Text => findings_text(&summary, output::page()),
-        Format::Csv if !args.by.is_empty() => maps_table(&summary).render(args.format.into(), output::page()),
+        Format::Csv if !args.by.is_empty() => {
+            maps_table(&summary).render(args.format.into(), output::page())
+        }
         Format::Csv => findings_table(&summary).render(args.format.into(), output::page()),
         Format::Json => format!("{:#}\n", findings_json(&summary)),
     });
@@ -141,12 +155,16 @@ impl Question<'_> {
     /// The options that choose runs and the depth of patterns, as they were typed.
     fn typed(&self) -> ShellLine {
         let typed = self.chosen.typed();
-        if self.depth < MOST_CONDITIONS { typed.option("--depth", self.depth.to_string()) } else { typed }
+        if self.depth < MOST_CONDITIONS {
+            typed.option("--depth", self.depth.to_string())
+        } else {
+            typed
+        }
     }
 }
 
-/// Updates the tables beside a history and finds conditions that go with failures; reads the `further` columns into the
-/// table too.
+/// Updates the tables beside a history and finds conditions that go with failures; reads the
+/// `further` columns into the table too.
 pub(super) fn analysed(
     asked: &Question<'_>,
     history: &History,
@@ -157,9 +175,13 @@ pub(super) fn analysed(
     let hierarchy = chosen::hierarchy(&ontology);
     let (mirror, _) = Mirror::update(history)?;
     let (mut table, mut sample) = read(&mirror, &filter, further)?;
-    let sampling = chosen::sampling(history, |id| table.text("campaign").texts.iter().any(|known| known == id))?;
+    let sampling = chosen::sampling(history, |id| {
+        table.text("campaign").texts.iter().any(|known| known == id)
+    })?;
     table.sampling = sampling;
-    sample.iter_mut().for_each(|sample| sample.sampling = sampling);
+    sample
+        .iter_mut()
+        .for_each(|sample| sample.sampling = sampling);
     if table.is_empty() {
         return Err(chosen::none_of(history).into());
     }
@@ -173,19 +195,35 @@ pub(super) fn analysed(
     let ((modes, cascades, collisions), properties) = both(
         || {
             let collisions = collisions(sample.as_ref().unwrap_or(&table));
-            (table_failure_modes(&table), cascades(&table, asked.level), collisions)
+            (
+                table_failure_modes(&table),
+                cascades(&table, asked.level),
+                collisions,
+            )
         },
-        || reports(&wanted, |of| report(asked, &table, of, sampled.as_ref(), &hierarchy, &ontology)),
+        || {
+            reports(&wanted, |of| {
+                report(asked, &table, of, sampled.as_ref(), &hierarchy, &ontology)
+            })
+        },
     );
     let summary = FindingsSummary {
         history: history.dir().display().to_string(),
-        program: std::env::args().next().unwrap_or_else(|| "actcheck".to_owned()),
+        program: std::env::args()
+            .next()
+            .unwrap_or_else(|| "actcheck".to_owned()),
         options: asked.typed().to_string(),
         campaigns: table.text("campaign").texts.clone(),
         runs: table.text("run").texts.len() as u64,
         sampling,
-        twins: table.counted_runs().iter().filter(|counts| !**counts).count() as u64,
-        sampled_runs: sample.as_ref().map(|sample| sample.text("run").texts.len() as u64),
+        twins: table
+            .counted_runs()
+            .iter()
+            .filter(|counts| !**counts)
+            .count() as u64,
+        sampled_runs: sample
+            .as_ref()
+            .map(|sample| sample.text("run").texts.len() as u64),
         counts,
         modes,
         cascades,
@@ -193,19 +231,30 @@ pub(super) fn analysed(
         properties,
         level: asked.level,
     };
-    Ok(Analysed { table, sample, summary, ontology })
+    Ok(Analysed {
+        table,
+        sample,
+        summary,
+        ontology,
+    })
 }
 
-/// A report of each property, in order. Computes as many at once as there are cores, which limits the memory in use.
+/// A report of each property, in order. Computes as many at once as there are cores, which limits
+/// the memory in use.
 fn reports(
     properties: &[JudgedProperty],
     report: impl Fn(&JudgedProperty) -> PropertyReport + Sync,
 ) -> Vec<PropertyReport> {
     let at_once = |properties: &[JudgedProperty]| -> Vec<PropertyReport> {
         std::thread::scope(|scope| {
-            let started: Vec<_> = properties.iter().map(|of| scope.spawn(|| report(of))).collect();
+            let started: Vec<_> = properties
+                .iter()
+                .map(|of| scope.spawn(|| report(of)))
+                .collect();
             let joined = started.into_iter().map(std::thread::ScopedJoinHandle::join);
-            joined.map(|found| found.unwrap_or_else(|panic| std::panic::resume_unwind(panic))).collect()
+            joined
+                .map(|found| found.unwrap_or_else(|panic| std::panic::resume_unwind(panic)))
+                .collect()
         })
     };
     properties.chunks(all_cores()).flat_map(at_once).collect()
@@ -217,11 +266,17 @@ fn read(
     filter: &TableFilter,
     further: &[&'static str],
 ) -> Result<(OutcomeTable, Option<OutcomeTable>), Diagnostics> {
-    let names: Vec<&str> = finding_columns().into_iter().chain(further.iter().copied()).collect();
+    let names: Vec<&str> = finding_columns()
+        .into_iter()
+        .chain(further.iter().copied())
+        .collect();
     if mirror.rows(filter) <= MOST_ROWS {
         return Ok((OutcomeTable::read(mirror, filter, &names)?, None));
     }
-    let of_runs = further.iter().copied().filter(|name| RUN_COLUMNS.contains(name));
+    let of_runs = further
+        .iter()
+        .copied()
+        .filter(|name| RUN_COLUMNS.contains(name));
     let rates: Vec<&str> = RATE_COLUMNS.into_iter().chain(of_runs).collect();
     let (sample, table) = both(
         || OutcomeTable::read_sample(mirror, filter, &names, SAMPLED_ROWS),
@@ -230,7 +285,8 @@ fn read(
     Ok((table?, Some(sample?)))
 }
 
-/// The report of a property. `sampled`: a sample of the rows with its properties, in which patterns are sought.
+/// The report of a property. `sampled`: a sample of the rows with its properties, in which patterns
+/// are sought.
 fn report(
     asked: &Question<'_>,
     table: &OutcomeTable,
@@ -239,13 +295,22 @@ fn report(
     hierarchy: &Hierarchy,
     ontology: &Ontology,
 ) -> PropertyReport {
-    let options =
-        PatternOptions { most_conditions: usize::from(asked.depth), level: asked.level, ..PatternOptions::default() };
+    let options = PatternOptions {
+        most_conditions: usize::from(asked.depth),
+        level: asked.level,
+        ..PatternOptions::default()
+    };
     let findings = match sampled {
         None => property_findings(table, of, hierarchy, &options),
         Some((sample, judged)) => {
-            let is_same = |other: &&JudgedProperty| other.action == of.action && other.property == of.property;
-            let none = JudgedProperty { rows: Vec::new(), every_row: Vec::new(), ..of.clone() };
+            let is_same = |other: &&JudgedProperty| {
+                other.action == of.action && other.property == of.property
+            };
+            let none = JudgedProperty {
+                rows: Vec::new(),
+                every_row: Vec::new(),
+                ..of.clone()
+            };
             let of_sample = judged.iter().find(is_same).unwrap_or(&none);
             property_findings(sample, of_sample, hierarchy, &options).with_rates_of(table, of)
         }
@@ -261,12 +326,18 @@ fn report(
         true => Vec::new(),
         false => {
             let all = findings.everything();
-            wanted.into_iter().filter_map(|by| two_way(&all, by)).collect()
+            wanted
+                .into_iter()
+                .filter_map(|by| two_way(&all, by))
+                .collect()
         }
     };
     PropertyReport {
         maps,
-        unit: ontology.properties.get(&of.property).and_then(|property| property.unit.clone()),
+        unit: ontology
+            .properties
+            .get(&of.property)
+            .and_then(|property| property.unit.clone()),
         trend: trend(table, of, asked.level),
         flaky,
         repeated_scenes,
@@ -277,32 +348,55 @@ fn report(
 /// The requested properties, or all if none is named.
 fn wanted(all: Vec<JudgedProperty>, names: &[String]) -> Result<Vec<JudgedProperty>, Diagnostics> {
     chosen::all_judged(names, all.iter().map(|of| of.property.as_str()))?;
-    let is_wanted = |of: &JudgedProperty| names.is_empty() || names.iter().any(|name| is_meant(&of.property, name));
+    let is_wanted = |of: &JudgedProperty| {
+        names.is_empty() || names.iter().any(|name| is_meant(&of.property, name))
+    };
     Ok(all.into_iter().filter(is_wanted).collect())
 }
 
-/// A pattern as a rule about scenes. Patterns are numbered over all requested properties, as in the text.
+/// A pattern as a rule about scenes. Patterns are numbered over all requested properties, as in the
+/// text.
 fn rule(summary: &FindingsSummary, number: usize) -> Result<String, Diagnostics> {
     let told = |report: &PropertyReport| report.findings.patterns.confirmed().count();
     let known: usize = summary.properties.iter().map(told).sum();
-    let mut patterns = summary
-        .properties
-        .iter()
-        .flat_map(|report| report.findings.patterns.confirmed().map(move |pattern| (report, pattern)));
-    let Some((report, pattern)) = number.checked_sub(1).and_then(|before| patterns.nth(before)) else {
-        return Err(Diagnostic::error("X049", format!("there is no pattern {number}: the analysis found {known}"))
-            .help("`actcheck analyse` with the same options lists them with their numbers")
-            .into());
+    let mut patterns = summary.properties.iter().flat_map(|report| {
+        report
+            .findings
+            .patterns
+            .confirmed()
+            .map(move |pattern| (report, pattern))
+    });
+    let Some((report, pattern)) = number
+        .checked_sub(1)
+        .and_then(|before| patterns.nth(before))
+    else {
+        return Err(Diagnostic::error(
+            "X049",
+            format!("there is no pattern {number}: the analysis found {known}"),
+        )
+        .help("`actcheck analyse` with the same options lists them with their numbers")
+        .into());
     };
-    scene_rule(&pattern.conditions, &report.findings.input.parameters, &report.sentence(pattern)).map_err(|unknown| {
+    scene_rule(
+        &pattern.conditions,
+        &report.findings.input.parameters,
+        &report.sentence(pattern),
+    )
+    .map_err(|unknown| {
         let message = format!("a scene rule can't constrain {}", unknown.join(", "));
-        Diagnostic::error("X049", message).help("narrow the configuration's own ranges and lists instead").into()
+        Diagnostic::error("X049", message)
+            .help("narrow the configuration's own ranges and lists instead")
+            .into()
     })
 }
 
 fn check_parameters(by: &[String]) -> Result<(), Diagnostics> {
     let mined = |column: &&Column| column.is_condition() || column.is_effect();
-    let known: Vec<&str> = columns().iter().filter(mined).map(|column| column.name).collect();
+    let known: Vec<&str> = columns()
+        .iter()
+        .filter(mined)
+        .map(|column| column.name)
+        .collect();
     let mut faults = Diagnostics::new();
     for name in by.iter().filter(|name| !known.contains(&name.as_str())) {
         faults.push(

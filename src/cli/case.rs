@@ -22,7 +22,10 @@ pub fn run(args: &RunArgs, env: Env) -> Result<u8, Diagnostics> {
     let stem = Path::new(&file).file_stem();
     let name = stem.map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
     let cases = [(name, env)];
-    let context = RunContext { clock: clock::system(), disturb: None };
+    let context = RunContext {
+        clock: clock::system(),
+        disturb: None,
+    };
     let mut summary = None;
     quietly(|| {
         run_cases(&cases, &history, 1, &context, &mut |_, made| {
@@ -54,7 +57,11 @@ pub(super) fn summarise(file: &str, env: &Env, made: CaseRun) -> CaseSummary {
     CaseSummary {
         file: file.to_owned(),
         run: made.record.id,
-        expected: env.campaign.case.as_ref().map_or_else(Vec::new, |case| case.expect.clone()),
+        expected: env
+            .campaign
+            .case
+            .as_ref()
+            .map_or_else(Vec::new, |case| case.expect.clone()),
         recurrence: made.recurrence,
         same_trace: made.same_trace,
         reason: made.record.reason,
@@ -91,7 +98,8 @@ fn refuse_campaign_options(args: &RunArgs, file: &str) -> Result<(), Diagnostics
     ];
     let mut found = Diagnostics::new();
     for (option, _) in given.into_iter().filter(|(_, given)| *given) {
-        let message = format!("`{option}` can't be used with {file}: it is a case, which has one scene");
+        let message =
+            format!("`{option}` can't be used with {file}: it is a case, which has one scene");
         found.push(Diagnostic::error("X040", message).help(
             "remove the option; `actcheck shrink` and `actcheck replay` accept the id of the run that the case makes",
         ));

@@ -22,13 +22,13 @@ pub struct CheckArgs {
     /// The campaign's configuration (TOML) [default: configs/pick.toml]
     pub config: Option<PathBuf>,
 
-    /// Write a copy of the robot's URDF beside it, in which impossible moments of inertia (W034, W036) are those of a box
-    /// around the link
+    /// Write a copy of the robot's URDF beside it, in which impossible moments of inertia (W034,
+    /// W036) are those of a box around the link
     #[arg(long)]
     pub mend: bool,
 
-    /// Draw the robot in its postures into this file, with the frames of base, grasp and camera, as a raster (.png) or
-    /// vector image (.svg)
+    /// Draw the robot in its postures into this file, with the frames of base, grasp and camera, as
+    /// a raster (.png) or vector image (.svg)
     #[arg(long, value_name = "FILE.png")]
     pub picture: Option<PathBuf>,
 }
@@ -42,13 +42,24 @@ pub fn check(args: &CheckArgs, stop: &Arc<AtomicBool>) -> Result<(), Diagnostics
         None => return Err(configurations::none_given("check").into()),
     };
     let picture = args.picture.as_deref().map(Picture::new).transpose()?;
-    let mended = if args.mend { mended_robot(config) } else { None };
+    let mended = if args.mend {
+        mended_robot(config)
+    } else {
+        None
+    };
     if let Some(mended) = mended {
         return write_mended(mended);
     }
-    let budget = Budget { stop: Arc::clone(stop), ..Budget::default() };
+    let budget = Budget {
+        stop: Arc::clone(stop),
+        ..Budget::default()
+    };
     let env = Env::prepare_within(config, &Overrides::default(), budget.clone())?;
-    let cases = if env.campaign.case.is_some() { Vec::new() } else { regressions::prepare(&env, &budget)? };
+    let cases = if env.campaign.case.is_some() {
+        Vec::new()
+    } else {
+        regressions::prepare(&env, &budget)?
+    };
     let starts = env.starts();
     if starts.has_errors() {
         return Err(starts);
@@ -67,14 +78,22 @@ pub fn check(args: &CheckArgs, stop: &Arc<AtomicBool>) -> Result<(), Diagnostics
             1 => "1 property".to_owned(),
             count => format!("{count} properties"),
         },
-        env.ontology.sources.first().map_or("", |source| &source.name),
+        env.ontology
+            .sources
+            .first()
+            .map_or("", |source| &source.name),
         counted(env.campaign.models.len() as u64, "model"),
         env.campaign.robot.name,
     ));
     if args.mend {
-        output::print_prose("nothing to mend: all moments of inertia of the robot's moving links are possible\n");
+        output::print_prose(
+            "nothing to mend: all moments of inertia of the robot's moving links are possible\n",
+        );
     }
-    if let (Some(picture), Some(drawing)) = (picture, robot_picture(&env.campaign.robot.name, &env.robot_views())) {
+    if let (Some(picture), Some(drawing)) = (
+        picture,
+        robot_picture(&env.campaign.robot.name, &env.robot_views()),
+    ) {
         picture.write(&drawing)?;
     }
     Ok(())
@@ -85,17 +104,35 @@ pub fn check(args: &CheckArgs, stop: &Arc<AtomicBool>) -> Result<(), Diagnostics
 /// # Errors
 /// As [`NewFiles::write`].
 fn write_mended(mended: MendedUrdf) -> Result<(), Diagnostics> {
-    let name = mended.original.file_name().unwrap_or_default().to_string_lossy();
+    let name = mended
+        .original
+        .file_name()
+        .unwrap_or_default()
+        .to_string_lossy();
     let stem = name.trim_end_matches(".xacro").trim_end_matches(".urdf");
-    let copy = mended.original.with_file_name(format!("{stem}.mended.urdf"));
+    let copy = mended
+        .original
+        .with_file_name(format!("{stem}.mended.urdf"));
     let mut files = NewFiles::default();
     files.add(&copy, mended.text);
-    files.write("it may have been written before: name it as `urdf` in the profile, or delete it")?;
-    let changes: String = mended.changes.iter().map(|change| format!("- {change}\n")).collect();
-    output::print_prose(&format!("{changes}wrote {}: name it as `urdf` in the profile of the robot\n", copy.display()));
+    files
+        .write("it may have been written before: name it as `urdf` in the profile, or delete it")?;
+    let changes: String = mended
+        .changes
+        .iter()
+        .map(|change| format!("- {change}\n"))
+        .collect();
+    output::print_prose(&format!(
+        "{changes}wrote {}: name it as `urdf` in the profile of the robot\n",
+        copy.display()
+    ));
     Ok(())
 }
 
 fn counted(count: u64, noun: &str) -> String {
-    if count == 1 { format!("1 {noun}") } else { format!("{count} {noun}s") }
+    if count == 1 {
+        format!("1 {noun}")
+    } else {
+        format!("{count} {noun}s")
+    }
 }

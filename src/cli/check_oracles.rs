@@ -23,8 +23,8 @@ use actcheck_rules::Budget;
 pub struct CheckOraclesArgs {
     /// The campaign's configuration (TOML)
     pub config: PathBuf,
-    /// Scenes for each test, instead of the configuration's `test_count`; each runs once without a fault and once with
-    /// each fault
+    /// Scenes for each test, instead of the configuration's `test_count`; each runs once without a
+    /// fault and once with each fault
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     pub runs: Option<u32>,
     /// Seed of all randomness, instead of the configuration's `seed`
@@ -40,27 +40,48 @@ pub struct CheckOraclesArgs {
 
 /// Runs every scene with every fault and prints which properties detect it. Returns the exit code.
 pub fn check_oracles(args: &CheckOraclesArgs) -> Result<u8, Diagnostics> {
-    let overrides = Overrides { runs: args.runs, seed: args.seed, ..Overrides::default() };
+    let overrides = Overrides {
+        runs: args.runs,
+        seed: args.seed,
+        ..Overrides::default()
+    };
     // No runs are stored, so an interrupt needs no cleanup.
     let stop = stop::on_interrupt(|| {});
-    let budget = Budget { stop: Arc::clone(&stop), ..Budget::default() };
+    let budget = Budget {
+        stop: Arc::clone(&stop),
+        ..Budget::default()
+    };
     let env = Env::prepare_within(&args.config, &overrides, budget)?;
     env.check_starts()?;
-    let concerns = |fault: &Fault| env.campaign.tests.iter().any(|test| fault.concerns(test, &env.campaign.robot));
+    let concerns = |fault: &Fault| {
+        env.campaign
+            .tests
+            .iter()
+            .any(|test| fault.concerns(test, &env.campaign.robot))
+    };
     let faults: Vec<Fault> = FAULTS.into_iter().filter(concerns).collect();
     let steps = env.planned_runs() * (faults.len() as u64 + 1);
     let bar = ProgressBar::with_draw_target(Some(steps), ProgressDrawTarget::stderr());
-    let context = RunContext { clock: clock::system(), disturb: None };
-    let options = TrialOptions { jobs: args.jobs.map_or_else(all_cores, usize::from), context };
+    let context = RunContext {
+        clock: clock::system(),
+        disturb: None,
+    };
+    let options = TrialOptions {
+        jobs: args.jobs.map_or_else(all_cores, usize::from),
+        context,
+    };
     let trials = quietly(|| try_faults(&env, &faults, &options, &stop, || bar.inc(1)))?;
     bar.finish_and_clear();
     if stop.load(Ordering::Relaxed) {
         return Ok(stop::INTERRUPTED);
     }
     if trials.iter().all(|trial| trial.outcomes.is_empty()) {
-        return Err(Diagnostic::error("V010", "no scene could be judged, so the properties could not be tested")
-            .help("`actcheck run` with the same configuration shows why")
-            .into());
+        return Err(Diagnostic::error(
+            "V010",
+            "no scene could be judged, so the properties could not be tested",
+        )
+        .help("`actcheck run` with the same configuration shows why")
+        .into());
     }
     let summary = summarise(args, &env, &faults, &trials);
     output::print(&match args.format {
@@ -72,9 +93,20 @@ pub fn check_oracles(args: &CheckOraclesArgs) -> Result<u8, Diagnostics> {
     Ok(summary.exit_code())
 }
 
-fn summarise(args: &CheckOraclesArgs, env: &Env, faults: &[Fault], trials: &[Trial]) -> OracleSummary {
+fn summarise(
+    args: &CheckOraclesArgs,
+    env: &Env,
+    faults: &[Fault],
+    trials: &[Trial],
+) -> OracleSummary {
     let mut properties: Vec<String> = Vec::new();
-    for action in env.campaign.tests.iter().flatten().filter_map(|step| env.ontology.actions.get(&step.action)) {
+    for action in env
+        .campaign
+        .tests
+        .iter()
+        .flatten()
+        .filter_map(|step| env.ontology.actions.get(&step.action))
+    {
         for iri in &action.success_properties {
             if !properties.contains(iri) {
                 properties.push(iri.clone());
@@ -83,7 +115,9 @@ fn summarise(args: &CheckOraclesArgs, env: &Env, faults: &[Fault], trials: &[Tri
     }
     let plain: Vec<OracleTrial> = trials.iter().map(plain).collect();
     let tests = &env.campaign.tests;
-    let of_course = COURSE_FAULTS.iter().filter(|fault| tests.iter().any(|test| fault.concerns(test, env)));
+    let of_course = COURSE_FAULTS
+        .iter()
+        .filter(|fault| tests.iter().any(|test| fault.concerns(test, env)));
     let tried: Vec<(&str, &str)> = faults
         .iter()
         .map(|fault| (fault.name, fault.description))
@@ -91,12 +125,20 @@ fn summarise(args: &CheckOraclesArgs, env: &Env, faults: &[Fault], trials: &[Tri
         .collect();
     let names: Vec<&str> = tried.iter().map(|(name, _)| *name).collect();
     let matrix = oracle_matrix(&names, &properties, &plain);
-    let name = |iri: &String| env.ontology.properties.get(iri).map_or_else(|| iri.clone(), |p| p.name.clone());
+    let name = |iri: &String| {
+        env.ontology
+            .properties
+            .get(iri)
+            .map_or_else(|| iri.clone(), |p| p.name.clone())
+    };
     OracleSummary {
         config: args.config.display().to_string(),
         seed: env.campaign.seed,
         planned: env.planned_runs(),
-        faults: tried.iter().map(|(name, what)| ((*name).to_owned(), (*what).to_owned())).collect(),
+        faults: tried
+            .iter()
+            .map(|(name, what)| ((*name).to_owned(), (*what).to_owned()))
+            .collect(),
         names: properties.iter().map(name).collect(),
         // The first fault is a robot that does nothing.
         gaps: matrix.gaps(FAULTS[0].name),

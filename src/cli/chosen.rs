@@ -17,15 +17,15 @@ use actcheck_ontology::Ontology;
 /// Runs of a history, and the ontology that explains them.
 #[derive(Debug, Args)]
 pub struct ChosenRuns {
-    /// Only runs of this campaign (may be given several times) [default: all but shrunk runs, repeated failed
-    /// runs and cases]
+    /// Only runs of this campaign (may be given several times) [default: all but shrunk runs,
+    /// repeated failed runs and cases]
     #[arg(long, value_name = "ID")]
     pub campaign: Vec<String>,
     /// Only runs since this time, such as 2026-11-21, 2026-11-21T18:00:00Z, or 12h for 12 hours ago
     #[arg(long, value_name = "WHEN", value_parser = when::parse)]
     pub since: Option<String>,
-    /// The ontology with the rules and the hierarchy of object categories [default: ontology/actions.ttl here, or the
-    /// shipped one]
+    /// The ontology with the rules and the hierarchy of object categories [default:
+    /// ontology/actions.ttl here, or the shipped one]
     #[arg(long, value_name = "FILE")]
     pub ontology: Option<PathBuf>,
     /// The folder of the history.
@@ -33,9 +33,16 @@ pub struct ChosenRuns {
     pub history: HistoryArgs,
 }
 
-/// Returns how the number of runs of some campaigns was decided: outcomes, if they did so in one of them.
-pub(super) fn sampling(history: &History, is_meant: impl Fn(&str) -> bool) -> Result<Sampling, Diagnostics> {
-    let rows = history.campaigns()?.into_iter().filter(|row| is_meant(&row.id));
+/// Returns how the number of runs of some campaigns was decided: outcomes, if they did so in one of
+/// them.
+pub(super) fn sampling(
+    history: &History,
+    is_meant: impl Fn(&str) -> bool,
+) -> Result<Sampling, Diagnostics> {
+    let rows = history
+        .campaigns()?
+        .into_iter()
+        .filter(|row| is_meant(&row.id));
     let of = rows.map(|row| Sampling::of(row.ended_by.as_deref(), row.interrupted));
     Ok(of.fold(Sampling::Fixed, Sampling::and))
 }
@@ -55,7 +62,10 @@ impl ChosenRuns {
             history.campaign(campaign)?;
         }
         let campaigns = (!self.campaign.is_empty()).then(|| self.campaign.clone());
-        Ok(TableFilter { campaigns, since: self.since.clone() })
+        Ok(TableFilter {
+            campaigns,
+            since: self.since.clone(),
+        })
     }
 
     /// Loads the ontology.
@@ -69,24 +79,44 @@ impl ChosenRuns {
 
     /// The options that choose the runs, as they were typed.
     pub(super) fn typed(&self) -> ShellLine {
-        let Self { campaign, since, ontology, history: HistoryArgs { history } } = self;
-        let typed = campaign.iter().fold(ShellLine::default(), |typed, id| typed.option("--campaign", id));
-        let typed = since.iter().fold(typed, |typed, since| typed.option("--since", since));
-        let typed = ontology.iter().fold(typed, |typed, file| typed.option("--ontology", file));
-        history.iter().fold(typed, |typed, folder| typed.option("--history", folder))
+        let Self {
+            campaign,
+            since,
+            ontology,
+            history: HistoryArgs { history },
+        } = self;
+        let typed = campaign.iter().fold(ShellLine::default(), |typed, id| {
+            typed.option("--campaign", id)
+        });
+        let typed = since
+            .iter()
+            .fold(typed, |typed, since| typed.option("--since", since));
+        let typed = ontology
+            .iter()
+            .fold(typed, |typed, file| typed.option("--ontology", file));
+        history
+            .iter()
+            .fold(typed, |typed, folder| typed.option("--history", folder))
     }
 }
 
-/// The superclasses of each class of an ontology, nearest first: a class with more superclasses is nearer.
+/// The superclasses of each class of an ontology, nearest first: a class with more superclasses is
+/// nearer.
 pub(super) fn hierarchy(ontology: &Ontology) -> Hierarchy {
     let classes = &ontology.superclasses;
     let depth = |class: &String| classes.get(class).map_or(0, BTreeSet::len);
     let nearest_first = |above: &BTreeSet<String>| {
         let mut above: Vec<&String> = above.iter().collect();
         above.sort_by_key(|class| (Reverse(depth(class)), *class));
-        above.into_iter().map(|class| names::local(class).to_owned()).collect()
+        above
+            .into_iter()
+            .map(|class| names::local(class).to_owned())
+            .collect()
     };
-    classes.iter().map(|(class, above)| (class.clone(), nearest_first(above))).collect()
+    classes
+        .iter()
+        .map(|(class, above)| (class.clone(), nearest_first(above)))
+        .collect()
 }
 
 /// X044: the chosen campaigns and times have no runs.
@@ -99,7 +129,14 @@ pub(super) fn none_of(history: &History) -> Diagnostic {
         ),
         None => "`actcheck list` shows its runs; `actcheck run CONFIG` creates some".to_owned(),
     };
-    Diagnostic::error("X044", format!("the history `{}` has no matching runs", history.dir().display())).help(help)
+    Diagnostic::error(
+        "X044",
+        format!(
+            "the history `{}` has no matching runs",
+            history.dir().display()
+        ),
+    )
+    .help(help)
 }
 
 /// Whether a name or IRI denotes the property with an IRI.
@@ -107,15 +144,28 @@ pub(super) fn is_meant(property: &str, name: &str) -> bool {
     name == property || name == names::local(property)
 }
 
-/// Checks that every named property was judged (X045): a property that was never judged is probably misspelt.
+/// Checks that every named property was judged (X045): a property that was never judged is probably
+/// misspelt.
 pub(super) fn all_judged<'a>(
     names: &[String],
     judged: impl Iterator<Item = &'a str> + Clone,
 ) -> Result<(), Diagnostics> {
     let mut faults = Diagnostics::new();
-    for name in names.iter().filter(|name| !judged.clone().any(|property| is_meant(property, name))) {
-        let help = did_you_mean(name, judged.clone().map(names::local).collect::<BTreeSet<_>>());
-        faults.push(Diagnostic::error("X045", format!("no property `{name}` was judged in these runs")).help(help));
+    for name in names
+        .iter()
+        .filter(|name| !judged.clone().any(|property| is_meant(property, name)))
+    {
+        let help = did_you_mean(
+            name,
+            judged.clone().map(names::local).collect::<BTreeSet<_>>(),
+        );
+        faults.push(
+            Diagnostic::error(
+                "X045",
+                format!("no property `{name}` was judged in these runs"),
+            )
+            .help(help),
+        );
     }
     faults.or(())
 }

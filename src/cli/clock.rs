@@ -11,14 +11,19 @@ pub fn system() -> Clock {
 }
 
 fn now() -> String {
-    // Campaigns are sorted by start time, and a campaign can begin in the same second as its regressions.
+    // Campaigns are sorted by start time, and a campaign can begin in the same second as its
+    // regressions.
     format!("{:.3}", timestamp())
 }
 
 /// The time of the machine's clock, or the nearest one of the years −9999 to 9999.
 pub(super) fn timestamp() -> jiff::Timestamp {
     let now = SystemTime::now();
-    let nearest = if now < SystemTime::UNIX_EPOCH { jiff::Timestamp::MIN } else { jiff::Timestamp::MAX };
+    let nearest = if now < SystemTime::UNIX_EPOCH {
+        jiff::Timestamp::MIN
+    } else {
+        jiff::Timestamp::MAX
+    };
     jiff::Timestamp::try_from(now).unwrap_or(nearest)
 }
 

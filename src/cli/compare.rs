@@ -12,7 +12,9 @@ use actcheck_analysis::{ComparedRun, ComparedRuns, Comparison, Sampling, compare
 use actcheck_base::{Diagnostic, Diagnostics};
 use actcheck_campaign::changes;
 use actcheck_history::{CampaignRecord, History, Judgements, RunFilter, Wish};
-use actcheck_report::{CompareSummary, ComparedSide, SideChange, compare_json, compare_table, compare_text};
+use actcheck_report::{
+    CompareSummary, ComparedSide, SideChange, compare_json, compare_table, compare_text,
+};
 
 /// Suffix of a campaign: use its newest judgements.
 const RECHECKED: &str = "@rechecked";
@@ -20,23 +22,24 @@ const RECHECKED: &str = "@rechecked";
 /// `actcheck compare`
 #[derive(Debug, Args)]
 pub struct CompareArgs {
-    /// The baseline campaign: ID, DIR#ID for one of another history, or DIR for the newest there; the suffix @rechecked
-    /// selects its newest judgements (see `actcheck recheck`)
+    /// The baseline campaign: ID, DIR#ID for one of another history, or DIR for the newest there;
+    /// the suffix @rechecked selects its newest judgements (see `actcheck recheck`)
     #[arg(value_name = "A")]
     pub first: String,
     /// The campaign to compare with it, named the same way
     #[arg(value_name = "B")]
     pub second: String,
-    /// Exit with 1 if B is worse than A: if, in any line, so many scenes that only A passes would occur with at most
-    /// this probability if B were not worse. Broken runs and timeouts are a line, too. The probability of a false alarm is at
-    /// most LEVEL (usually 0.05), over all lines together
+    /// Exit with 1 if B is worse than A: if, in any line, so many scenes that only A passes would
+    /// occur with at most this probability if B were not worse. Broken runs and timeouts are a
+    /// line, too. The probability of a false alarm is at most LEVEL (usually 0.05), over all lines
+    /// together
     #[arg(long, value_name = "LEVEL", value_parser = level)]
     pub fail_if_worse: Option<f64>,
     /// Rates that differ by less count as equal, as a share
     #[arg(long, value_name = "SHARE", value_parser = level, default_value = "0.05")]
     pub margin: f64,
-    /// Exit with the answer: 0 no difference, 1 worse, 3 better, 4 underpowered (too few scenes to decide); at the level of
-    /// --fail-if-worse, or 0.05
+    /// Exit with the answer: 0 no difference, 1 worse, 3 better, 4 underpowered (too few scenes to
+    /// decide); at the level of --fail-if-worse, or 0.05
     #[arg(long)]
     pub decide: bool,
     /// The folder of the history for an ID without DIR.
@@ -52,7 +55,11 @@ pub fn compare(args: &CompareArgs) -> Result<u8, Diagnostics> {
     let mut histories = Histories::default();
     let first = Side::read(&args.first, &args.history, &mut histories)?;
     let second = Side::read(&args.second, &args.history, &mut histories)?;
-    let comparison = compare_runs(&first.runs, &second.runs, first.sampling.and(second.sampling));
+    let comparison = compare_runs(
+        &first.runs,
+        &second.runs,
+        first.sampling.and(second.sampling),
+    );
     if comparison.pairs == 0 {
         return Err(nothing_shared(&first, &second, &comparison).into());
     }
@@ -122,7 +129,11 @@ impl<'a> Name<'a> {
             None if Path::new(place).is_dir() => (Some(Path::new(place)), None),
             None => (None, Some(place)),
         };
-        Self { dir, campaign, rechecked }
+        Self {
+            dir,
+            campaign,
+            rechecked,
+        }
     }
 }
 
@@ -138,7 +149,11 @@ struct Side {
 }
 
 impl Side {
-    fn read(text: &str, default: &HistoryArgs, histories: &mut Histories) -> Result<Self, Diagnostics> {
+    fn read(
+        text: &str,
+        default: &HistoryArgs,
+        histories: &mut Histories,
+    ) -> Result<Self, Diagnostics> {
         let name = Name::read(text);
         let history = histories.get(name.dir, default)?;
         let id = match name.campaign {
@@ -147,15 +162,35 @@ impl Side {
         };
         let mut record = history.campaign(&id)?;
         let sampling = sampling(history, |campaign| campaign == id)?;
-        let filter = RunFilter { campaign: Some(id), ..RunFilter::default() };
-        let judgements = if name.rechecked { Judgements::Newest } else { Judgements::Campaign };
+        let filter = RunFilter {
+            campaign: Some(id),
+            ..RunFilter::default()
+        };
+        let judgements = if name.rechecked {
+            Judgements::Newest
+        } else {
+            Judgements::Campaign
+        };
         let mut collected = ComparedRuns::default();
-        let later = history.each_judged(&filter, Wish { judgements, scenes: true }, &mut |run| collected.add(run))?;
+        let later = history.each_judged(
+            &filter,
+            Wish {
+                judgements,
+                scenes: true,
+            },
+            &mut |run| collected.add(run),
+        )?;
         if name.rechecked {
             judged_by(&mut record, &later);
         }
         let count = collected.len() as u64;
-        Ok(Self { name: text.to_owned(), record, runs: collected.sorted(), count, sampling })
+        Ok(Self {
+            name: text.to_owned(),
+            record,
+            runs: collected.sorted(),
+            count,
+            sampling,
+        })
     }
 
     fn summary(&self) -> ComparedSide {
@@ -171,7 +206,8 @@ impl Side {
     }
 }
 
-/// Returns the newest campaign of a history, except those that hold a shrunk run, ran failed runs again, or ran a case.
+/// Returns the newest campaign of a history, except those that hold a shrunk run, ran failed runs
+/// again, or ran a case.
 ///
 /// # Errors
 /// `X070` there is no such campaign.
@@ -179,25 +215,40 @@ pub(super) fn newest(history: &History) -> Result<String, Diagnostics> {
     let shrunk = history.selected_campaigns()?;
     let mut ids = history.campaigns()?.into_iter().map(|row| row.id).rev();
     ids.find(|id| !shrunk.contains(id)).ok_or_else(|| {
-        Diagnostic::error("X070", format!("the history `{}` has no campaign", history.dir().display()))
-            .help("`actcheck run CONFIG` creates one")
-            .into()
+        Diagnostic::error(
+            "X070",
+            format!("the history `{}` has no campaign", history.dir().display()),
+        )
+        .help("`actcheck run CONFIG` creates one")
+        .into()
     })
 }
 
 /// Replaces the campaign's own rules by those of later judgements.
-fn judged_by(record: &mut CampaignRecord, rules: &BTreeMap<String, std::collections::BTreeSet<String>>) {
+fn judged_by(
+    record: &mut CampaignRecord,
+    rules: &BTreeMap<String, std::collections::BTreeSet<String>>,
+) {
     for (property, digests) in rules {
         let digest = digests.iter().cloned().collect::<Vec<_>>().join(" and ");
-        match record.rules.iter_mut().find(|(known, ..)| known == property) {
+        match record
+            .rules
+            .iter_mut()
+            .find(|(known, ..)| known == property)
+        {
             Some((_, _, known)) => *known = digest,
-            None => record.rules.push((property.clone(), property.clone(), digest)),
+            None => record
+                .rules
+                .push((property.clone(), property.clone(), digest)),
         }
     }
 }
 
 fn nothing_shared(first: &Side, second: &Side, comparison: &Comparison) -> Diagnostic {
-    let message = format!("`{}` and `{}` have no scene in common", first.name, second.name);
+    let message = format!(
+        "`{}` and `{}` have no scene in common",
+        first.name, second.name
+    );
     let fault = Diagnostic::error("X071", message);
     let [a, b] = [&first.record, &second.record];
     fault.help(if first.count == 0 || second.count == 0 {
@@ -219,13 +270,29 @@ mod tests {
 
     #[test]
     fn a_side_is_named_by_history_campaign_and_judgements() {
-        let name = |dir, campaign, rechecked| Name { dir, campaign, rechecked };
+        let name = |dir, campaign, rechecked| Name {
+            dir,
+            campaign,
+            rechecked,
+        };
         assert_eq!(Name::read("k7f3"), name(None, Some("k7f3"), false));
         assert_eq!(Name::read("k7f3@rechecked"), name(None, Some("k7f3"), true));
-        assert_eq!(Name::read("old/.actcheck#k7f3"), name(Some(Path::new("old/.actcheck")), Some("k7f3"), false));
-        assert_eq!(Name::read("a#b#k7f3"), name(Some(Path::new("a#b")), Some("k7f3"), false));
+        assert_eq!(
+            Name::read("old/.actcheck#k7f3"),
+            name(Some(Path::new("old/.actcheck")), Some("k7f3"), false)
+        );
+        assert_eq!(
+            Name::read("a#b#k7f3"),
+            name(Some(Path::new("a#b")), Some("k7f3"), false)
+        );
         // The tests run in the folder of the crate, which has a folder of this name.
-        assert_eq!(Name::read("shipped@rechecked"), name(Some(Path::new("shipped")), None, true));
-        assert_eq!(Name::read("nowhere#"), name(Some(Path::new("nowhere")), None, false));
+        assert_eq!(
+            Name::read("shipped@rechecked"),
+            name(Some(Path::new("shipped")), None, true)
+        );
+        assert_eq!(
+            Name::read("nowhere#"),
+            name(Some(Path::new("nowhere")), None, false)
+        );
     }
 }

@@ -20,13 +20,19 @@ pub struct DatalogArgs {
     /// The program (.rls)
     pub file: PathBuf,
     /// Folder for the exported files
-    #[arg(short = 'D', long = "export-dir", value_name = "DIR", default_value = "results")]
+    #[arg(
+        short = 'D',
+        long = "export-dir",
+        value_name = "DIR",
+        default_value = "results"
+    )]
     pub output: PathBuf,
-    /// Explain why this fact holds or does not, such as 'p(1, _)', instead of exporting. Exit code: 0 it holds, 1 it does
-    /// not
+    /// Explain why this fact holds or does not, such as 'p(1, _)', instead of exporting. Exit code:
+    /// 0 it holds, 1 it does not
     #[arg(long, value_name = "FACT")]
     pub trace: Option<String>,
-    /// How the number of tuples of each predicate is printed, or with --trace the explanation (dot: only explanations)
+    /// How the number of tuples of each predicate is printed, or with --trace the explanation (dot:
+    /// only explanations)
     #[arg(long, value_name = "FORMAT", value_enum, default_value_t)]
     pub format: ProofFormat,
     /// Stop after this many derived tuples
@@ -44,34 +50,52 @@ pub struct DatalogArgs {
     /// Leave out rows and statements of imported files that can't be read, with a warning
     #[arg(long)]
     pub lenient: bool,
-    /// Value of a parameter instead of that in the program, such as limit=1 or 'name="cup"'; may be repeated
+    /// Value of a parameter instead of that in the program, such as limit=1 or 'name="cup"'; may be
+    /// repeated
     #[arg(long = "param", value_name = "NAME=VALUE", value_parser = parameter)]
     pub parameters: Vec<(String, String)>,
 }
 
 /// Parses the name and value of a parameter.
 fn parameter(text: &str) -> Result<(String, String), String> {
-    let (name, value) = text.split_once('=').ok_or("write the name, `=` and the value, such as `limit=1`")?;
-    Ok((name.trim().trim_start_matches('$').to_owned(), value.trim().to_owned()))
+    let (name, value) = text
+        .split_once('=')
+        .ok_or("write the name, `=` and the value, such as `limit=1`")?;
+    Ok((
+        name.trim().trim_start_matches('$').to_owned(),
+        value.trim().to_owned(),
+    ))
 }
 
-/// Runs a standalone program, or explains why one of its facts holds or does not. Returns the exit code: 1 if the fact
-/// to explain does not hold.
+/// Runs a standalone program, or explains why one of its facts holds or does not. Returns the exit
+/// code: 1 if the fact to explain does not hold.
 pub fn datalog(args: &DatalogArgs, stop: &Arc<AtomicBool>) -> Result<u8, Diagnostics> {
     let (tuples, bytes, secs) = (args.max_tuples, args.max_memory, args.max_time);
-    let budget = Budget { tuples, bytes, secs, new_things: args.max_new, stop: Arc::clone(stop) };
+    let budget = Budget {
+        tuples,
+        bytes,
+        secs,
+        new_things: args.max_new,
+        stop: Arc::clone(stop),
+    };
     let parameters = args.parameters.iter().cloned().collect();
-    let loading = Loading { budget: budget.clone(), lenient: args.lenient, parameters };
+    let loading = Loading {
+        budget: budget.clone(),
+        lenient: args.lenient,
+        parameters,
+    };
     if let Some(statement) = &args.trace {
         let source = Files::Disk.read_program(&args.file).map_err(|why| {
-            Diagnostic::error("X005", format!("{}: {why}", args.file.display())).help("name a file with rules (.rls)")
+            Diagnostic::error("X005", format!("{}: {why}", args.file.display()))
+                .help("name a file with rules (.rls)")
         })?;
         let folder = args.file.parent().unwrap_or(Path::new("."));
         let program = Program::load_as(&source, folder, &loading)?;
         output::print_diagnostics(&program.warnings);
         program.check_goal(statement)?;
         let explained = program.explain(statement, &budget);
-        let explained = explained.map_err(|fault| Diagnostic::error("X008", fault.to_string()).in_source(&source))?;
+        let explained = explained
+            .map_err(|fault| Diagnostic::error("X008", fault.to_string()).in_source(&source))?;
         output::print_diagnostics(&unknown_terms(statement, &explained));
         output::print(&match args.format {
             ProofFormat::Text => output::page().set(&explained.to_text()),
@@ -102,8 +126,11 @@ pub fn datalog(args: &DatalogArgs, stop: &Arc<AtomicBool>) -> Result<u8, Diagnos
         table.rows.push(vec![predicate.into(), tuples.into()]);
     }
     output::print(&table.render(format, output::page()));
-    let written: Vec<String> =
-        summary.written.iter().map(|(file, lines)| format!("{}: {lines} lines", file.display())).collect();
+    let written: Vec<String> = summary
+        .written
+        .iter()
+        .map(|(file, lines)| format!("{}: {lines} lines", file.display()))
+        .collect();
     // CSV and JSON are one document.
     output::tell(&written, format != TableFormat::Table);
     Ok(0)
@@ -114,10 +141,22 @@ fn unknown_terms(statement: &str, explained: &Explanation) -> Diagnostics {
     let source = Source::new("goal", statement.trim());
     let mut warnings = Diagnostics::new();
     for term in &explained.unknown {
-        let help = term.similar.as_ref().map(|similar| format!("did you mean `{similar}`?"));
-        let help = help.unwrap_or_else(|| "a constant of the goal is usually a constant of some fact".to_owned());
-        let message = format!("`{}` occurs neither in the rules nor in any tuple", term.text);
-        warnings.push(Diagnostic::warning("R093", message).at(&source, term.span.clone()).help(help));
+        let help = term
+            .similar
+            .as_ref()
+            .map(|similar| format!("did you mean `{similar}`?"));
+        let help = help.unwrap_or_else(|| {
+            "a constant of the goal is usually a constant of some fact".to_owned()
+        });
+        let message = format!(
+            "`{}` occurs neither in the rules nor in any tuple",
+            term.text
+        );
+        warnings.push(
+            Diagnostic::warning("R093", message)
+                .at(&source, term.span.clone())
+                .help(help),
+        );
     }
     warnings
 }

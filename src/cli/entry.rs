@@ -6,19 +6,21 @@ use clap::FromArgMatches as _;
 
 use crate::args::{Arguments, Command};
 use crate::{
-    check, check_oracles, completions, datalog, explain, export, groups, list, man, new, output, query, recheck, rules,
-    show, shrink, stop, why,
+    check, check_oracles, completions, datalog, explain, export, groups, list, man, new, output,
+    query, recheck, rules, show, shrink, stop, why,
 };
 use actcheck_base::set_program_digest;
 
 /// Parses the process's arguments and runs the command.
 ///
-/// Exit codes: 0 done (for `run` and `recheck`: nothing failed), 1 a property failed or a traced fact does not hold, 2 the command failed, 130
-/// interrupted.
+/// Exit codes: 0 done (for `run` and `recheck`: nothing failed), 1 a property failed or a traced
+/// fact does not hold, 2 the command failed, 130 interrupted.
 pub fn run(sources_digest: &'static str) -> ExitCode {
     set_program_digest(sources_digest);
     // clap prints help, version and usage errors itself; after a usage error it exits with 2.
-    let matches = groups::program().try_get_matches().unwrap_or_else(|error| groups::with_suggestion(error).exit());
+    let matches = groups::program()
+        .try_get_matches()
+        .unwrap_or_else(|error| groups::with_suggestion(error).exit());
     let arguments = Arguments::from_arg_matches(&matches).unwrap_or_else(|error| error.exit());
     let done = match arguments.command {
         Command::Analyse(args) => crate::analyse::analyse(&args).map(|()| 0),

@@ -17,14 +17,21 @@ const RECORDS: &str = "sent";
 /// The store to which a history is sent.
 #[derive(Debug, Args)]
 pub struct SparqlArgs {
-    /// Send the whole history to a SPARQL 1.1 store, runs that are kept as outlines too. If it ends early, the same command
-    /// continues where it was; later it sends only new runs and judgements. The store then has the statements of
-    /// `--nquads`, with IRIs in place of blank nodes. Credentials: ACTCHECK_SPARQL_USER and ACTCHECK_SPARQL_PASSWORD, or
-    /// ACTCHECK_SPARQL_TOKEN, or `--netrc`
+    /// Send the whole history to a SPARQL 1.1 store, runs that are kept as outlines too. If it ends
+    /// early, the same command continues where it was; later it sends only new runs and judgements.
+    /// The store then has the statements of `--nquads`, with IRIs in place of blank nodes.
+    /// Credentials: ACTCHECK_SPARQL_USER and ACTCHECK_SPARQL_PASSWORD, or ACTCHECK_SPARQL_TOKEN, or
+    /// `--netrc`
     #[arg(long, value_name = "URL")]
     pub sparql: Option<String>,
     /// How statements are sent
-    #[arg(long, value_name = "PROTOCOL", value_enum, default_value_t, requires = "sparql")]
+    #[arg(
+        long,
+        value_name = "PROTOCOL",
+        value_enum,
+        default_value_t,
+        requires = "sparql"
+    )]
     pub protocol: ProtocolName,
     /// Number of statements in a request; runs are not divided unless the server asks for it
     #[arg(long, value_name = "N", default_value_t = 5_000, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
@@ -44,18 +51,25 @@ pub enum ProtocolName {
     /// SPARQL 1.1 Update: INSERT DATA, sent to the address for updates
     #[default]
     Update,
-    /// SPARQL 1.1 Graph Store HTTP Protocol: N-Triples, a request for each graph; only adds statements
+    /// SPARQL 1.1 Graph Store HTTP Protocol: N-Triples, a request for each graph; only adds
+    /// statements
     GraphStore,
     /// N-Quads, which many stores accept at the address for graphs; only adds statements
     Quads,
 }
 
 /// Sends the history. `complete`: with all facts from the traces. Returns the exit code.
-pub fn send(args: &SparqlArgs, url: &str, complete: bool, history: &History) -> Result<u8, Diagnostics> {
+pub fn send(
+    args: &SparqlArgs,
+    url: &str,
+    complete: bool,
+    history: &History,
+) -> Result<u8, Diagnostics> {
     let address = Address::parse(url)?;
     stop::interruptible(|flag| {
         let client = args.remote.client(&address, flag)?;
-        let (upload, warning) = Upload::new(&client, &address, options(args), &record(history, &address));
+        let (upload, warning) =
+            Upload::new(&client, &address, options(args), &record(history, &address));
         if let Some(warning) = warning {
             output::print_diagnostics(&warning.into());
         }
@@ -67,11 +81,20 @@ pub fn send(args: &SparqlArgs, url: &str, complete: bool, history: &History) -> 
     })
 }
 
-fn all(mut upload: Upload<'_>, complete: bool, history: &History, bar: &ProgressBar) -> Result<Sent, Diagnostics> {
+fn all(
+    mut upload: Upload<'_>,
+    complete: bool,
+    history: &History,
+    bar: &ProgressBar,
+) -> Result<Sent, Diagnostics> {
     history.each_part(complete, &mut |part| {
         let replaced = part.is_replaced.then(|| part.node.clone());
         bar.inc(1);
-        upload.add(Part { name: part.node, replaced, statements: part.statements })
+        upload.add(Part {
+            name: part.node,
+            replaced,
+            statements: part.statements,
+        })
     })?;
     upload.finish()
 }
@@ -82,12 +105,19 @@ fn options(args: &SparqlArgs) -> UploadOptions {
         ProtocolName::GraphStore => Protocol::GraphStore,
         ProtocolName::Quads => Protocol::Quads,
     };
-    UploadOptions { protocol, batch: args.batch as usize, from_start: args.from_start }
+    UploadOptions {
+        protocol,
+        batch: args.batch as usize,
+        from_start: args.from_start,
+    }
 }
 
 /// The file with the parts that the store at an address has accepted.
 fn record(history: &History, address: &Address) -> PathBuf {
-    history.dir().join(RECORDS).join(digest_of(&address.to_string()))
+    history
+        .dir()
+        .join(RECORDS)
+        .join(digest_of(&address.to_string()))
 }
 
 fn bar(parts: u64) -> ProgressBar {
@@ -98,7 +128,11 @@ fn bar(parts: u64) -> ProgressBar {
 }
 
 fn summary(sent: &Sent, address: &Address) -> String {
-    let Sent { statements, known, requests } = sent;
+    let Sent {
+        statements,
+        known,
+        requests,
+    } = sent;
     match (statements, known) {
         (0, 0) => format!("the history is empty: {address} received no statements\n"),
         (0, known) => format!("{address} has all {known} statements since earlier uploads\n"),

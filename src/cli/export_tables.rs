@@ -28,7 +28,10 @@ pub fn copy(name: &str, args: &RemoteArgs, history: &History) -> Result<u8, Diag
         let around = Place::parse(&around, &settings, client())?;
         let (mirror, _) = Mirror::update(history)?;
         let there = place.list()?;
-        let before = around.get(&list)?.map(|text| sizes(&text)).unwrap_or_default();
+        let before = around
+            .get(&list)?
+            .map(|text| sizes(&text))
+            .unwrap_or_default();
         let (mut files, mut copied, mut bytes) = (Vec::new(), 0, 0);
         for (campaign, path) in mirror.paths() {
             // Its name has the digest of the content with all columns.
@@ -49,8 +52,10 @@ pub fn copy(name: &str, args: &RemoteArgs, history: &History) -> Result<u8, Diag
         // Readers that go by the list have all of its files at any moment.
         around.put(&list, index.as_bytes())?;
         let now = sizes(index.as_bytes());
-        let outdated: Vec<&String> =
-            before.keys().filter(|name| !now.contains_key(*name) && there.contains_key(*name)).collect();
+        let outdated: Vec<&String> = before
+            .keys()
+            .filter(|name| !now.contains_key(*name) && there.contains_key(*name))
+            .collect();
         outdated.iter().try_for_each(|name| place.remove(name))?;
         output::print_prose(&summary(name, files.len(), copied, bytes, outdated.len()));
         Ok(0)
@@ -58,55 +63,87 @@ pub fn copy(name: &str, args: &RemoteArgs, history: &History) -> Result<u8, Diag
 }
 
 fn index(files: &[Value]) -> String {
-    format!("{:#}\n", json!({ "format": 1, "files": files, "columns": columns() }))
+    format!(
+        "{:#}\n",
+        json!({ "format": 1, "files": files, "columns": columns() })
+    )
 }
 
-/// The names of the files in a list with their sizes: only of those that this command can have written.
+/// The names of the files in a list with their sizes: only of those that this command can have
+/// written.
 fn sizes(index: &[u8]) -> BTreeMap<String, u64> {
     let index: Value = serde_json::from_slice(index).unwrap_or_default();
     let files = index["files"].as_array().into_iter().flatten();
-    let files = files.filter_map(|file| Some((file["name"].as_str()?.to_owned(), file["bytes"].as_u64()?)));
+    let files =
+        files.filter_map(|file| Some((file["name"].as_str()?.to_owned(), file["bytes"].as_u64()?)));
     files
-        .filter(|(name, _)| name.starts_with("campaign=") && name.ends_with(".parquet") && !name.contains(".."))
+        .filter(|(name, _)| {
+            name.starts_with("campaign=") && name.ends_with(".parquet") && !name.contains("..")
+        })
         .collect()
 }
 
-/// The place and name of the list of a place's files. It is beside the place: many readers take each file of a folder for a
-/// table.
+/// The place and name of the list of a place's files. It is beside the place: many readers take
+/// each file of a folder for a table.
 fn list_of(place: &str) -> (String, String) {
     if place.contains("://") {
         let place = place.trim_end_matches('/');
         return match place.rsplit_once('/') {
-            Some((around, name)) if !around.ends_with('/') => (around.to_owned(), format!("{name}.{INDEX}")),
+            Some((around, name)) if !around.ends_with('/') => {
+                (around.to_owned(), format!("{name}.{INDEX}"))
+            }
             // A whole bucket has no place beside it.
             _ => (place.to_owned(), INDEX.to_owned()),
         };
     }
     let written = PathBuf::from(place);
     // `.` and `..` have names, too.
-    let named = if written.file_name().is_some() { Some(written) } else { std::fs::canonicalize(written).ok() };
-    match named.as_deref().and_then(|path| Some((path.parent()?, path.file_name()?))) {
-        Some((around, name)) => (around.display().to_string(), format!("{}.{INDEX}", name.to_string_lossy())),
+    let named = if written.file_name().is_some() {
+        Some(written)
+    } else {
+        std::fs::canonicalize(written).ok()
+    };
+    match named
+        .as_deref()
+        .and_then(|path| Some((path.parent()?, path.file_name()?)))
+    {
+        Some((around, name)) => (
+            around.display().to_string(),
+            format!("{}.{INDEX}", name.to_string_lossy()),
+        ),
         None => (place.to_owned(), INDEX.to_owned()),
     }
 }
 
 fn summary(place: &str, files: usize, copied: usize, bytes: u64, removed: usize) -> String {
     let megabytes = bytes as f64 / 1e6;
-    let removed = if removed == 0 { String::new() } else { format!(", {removed} outdated ones were removed") };
+    let removed = if removed == 0 {
+        String::new()
+    } else {
+        format!(", {removed} outdated ones were removed")
+    };
     format!("{place} holds {files} tables: {copied} were copied ({megabytes:.1} MB){removed}\n")
 }
 
 fn settings(variable: &dyn Fn(&str) -> Option<OsString>) -> Result<BucketSettings, Diagnostics> {
-    let text =
-        |name: &str| variable(name).and_then(|value| value.into_string().ok()).filter(|value| !value.trim().is_empty());
+    let text = |name: &str| {
+        variable(name)
+            .and_then(|value| value.into_string().ok())
+            .filter(|value| !value.trim().is_empty())
+    };
     let keys = match (text("AWS_ACCESS_KEY_ID"), text("AWS_SECRET_ACCESS_KEY")) {
         (Some(key), Some(secret)) => Some((key, secret)),
         (None, None) => None,
         (found, _) => {
-            let missing = if found.is_some() { "AWS_SECRET_ACCESS_KEY" } else { "AWS_ACCESS_KEY_ID" };
+            let missing = if found.is_some() {
+                "AWS_SECRET_ACCESS_KEY"
+            } else {
+                "AWS_ACCESS_KEY_ID"
+            };
             let fault = Diagnostic::error("X096", format!("{missing} is not set"));
-            return Err(fault.help("set both AWS_ACCESS_KEY_ID and AWS_SECRET_ACCESS_KEY").into());
+            return Err(fault
+                .help("set both AWS_ACCESS_KEY_ID and AWS_SECRET_ACCESS_KEY")
+                .into());
         }
     };
     Ok(BucketSettings {

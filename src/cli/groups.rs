@@ -1,4 +1,5 @@
-//! The commands in groups, as the program's help lists them, and the command tree for completions and the manual.
+//! The commands in groups, as the program's help lists them, and the command tree for completions
+//! and the manual.
 
 use clap::builder::styling::{Effects, Style};
 use clap::error::{ContextKind, ContextValue};
@@ -15,15 +16,28 @@ struct Group {
     commands: &'static [&'static str],
 }
 
-/// All commands except hidden ones. They are declared in the same order, which completions and the manual use.
+/// All commands except hidden ones. They are declared in the same order, which completions and the
+/// manual use.
 const GROUPS: [Group; 4] = [
-    Group { title: "Run", commands: &["run", "launch", "new", "check", "replay", "shrink"] },
+    Group {
+        title: "Run",
+        commands: &["run", "launch", "new", "check", "replay", "shrink"],
+    },
     Group {
         title: "Look",
-        commands: &["list", "show", "report", "analyse", "compare", "bisect", "health", "query", "serve", "explain"],
+        commands: &[
+            "list", "show", "report", "analyse", "compare", "bisect", "health", "query", "serve",
+            "explain",
+        ],
     },
-    Group { title: "Judge", commands: &["why", "recheck", "rules", "check-oracles", "datalog"] },
-    Group { title: "Exchange", commands: &["export", "merge", "schema", "completions", "man"] },
+    Group {
+        title: "Judge",
+        commands: &["why", "recheck", "rules", "check-oracles", "datalog"],
+    },
+    Group {
+        title: "Exchange",
+        commands: &["export", "merge", "schema", "completions", "man"],
+    },
 ];
 
 /// The program, whose help lists the commands in groups.
@@ -33,7 +47,9 @@ pub(super) fn program() -> Command {
         "{{about-with-newline}}\n{{usage-heading}} {{usage}}\n\n{}{heading}Options:{heading:#}\n{{options}}{{after-help}}",
         listed(heading)
     );
-    let program = Arguments::command().disable_help_subcommand(false).help_template(help);
+    let program = Arguments::command()
+        .disable_help_subcommand(false)
+        .help_template(help);
     match terminal::demanded_width() {
         Some(width) => program.term_width(width),
         None => program,
@@ -55,33 +71,55 @@ pub(super) fn command_tree() -> Command {
 /// Adds a similar command to the error about an unknown one, if clap found none.
 pub(super) fn with_suggestion(mut error: clap::Error) -> clap::Error {
     let unknown = match error.get(ContextKind::InvalidSubcommand) {
-        Some(ContextValue::String(name)) if error.get(ContextKind::SuggestedSubcommand).is_none() => name.clone(),
+        Some(ContextValue::String(name))
+            if error.get(ContextKind::SuggestedSubcommand).is_none() =>
+        {
+            name.clone()
+        }
         _ => return error,
     };
-    if let Some(known) = nearest(&unknown, GROUPS.iter().flat_map(|group| group.commands).copied()) {
-        error.insert(ContextKind::SuggestedSubcommand, ContextValue::Strings(vec![known.to_owned()]));
+    if let Some(known) = nearest(
+        &unknown,
+        GROUPS.iter().flat_map(|group| group.commands).copied(),
+    ) {
+        error.insert(
+            ContextKind::SuggestedSubcommand,
+            ContextValue::Strings(vec![known.to_owned()]),
+        );
     }
     error
 }
 
 fn shown(all: &Command) -> impl Iterator<Item = &Command> {
-    all.get_subcommands().filter(|command| !command.is_hide_set())
+    all.get_subcommands()
+        .filter(|command| !command.is_hide_set())
 }
 
-/// The list of commands as clap renders it, in the width of the terminal, with a heading before each group.
+/// The list of commands as clap renders it, in the width of the terminal, with a heading before
+/// each group.
 fn listed(heading: Style) -> String {
     let all = Arguments::command();
     let mut list = Command::new("actcheck")
         .disable_help_subcommand(true)
         .max_term_width(100)
         .help_template("{subcommands}")
-        .subcommands(shown(&all).enumerate().map(|(place, command)| command.clone().display_order(place)));
+        .subcommands(
+            shown(&all)
+                .enumerate()
+                .map(|(place, command)| command.clone().display_order(place)),
+        );
     let list = list.render_help();
     let (plain, styled) = (list.to_string(), list.ansi().to_string());
     let mut text = String::new();
     for (plain, styled) in plain.lines().zip(styled.lines()) {
-        let name = plain.split_whitespace().next().filter(|_| !plain.starts_with("   "));
-        if let Some(group) = GROUPS.iter().find(|group| group.commands.first().copied() == name) {
+        let name = plain
+            .split_whitespace()
+            .next()
+            .filter(|_| !plain.starts_with("   "));
+        if let Some(group) = GROUPS
+            .iter()
+            .find(|group| group.commands.first().copied() == name)
+        {
             let before = if text.is_empty() { "" } else { "\n" };
             text.push_str(&format!("{before}{heading}{}:{heading:#}\n", group.title));
         }
@@ -99,7 +137,11 @@ mod tests {
     fn every_command_is_in_one_group_and_declared_in_the_same_order() {
         let all = Arguments::command();
         let declared: Vec<&str> = shown(&all).map(Command::get_name).collect();
-        let grouped: Vec<&str> = GROUPS.iter().flat_map(|group| group.commands).copied().collect();
+        let grouped: Vec<&str> = GROUPS
+            .iter()
+            .flat_map(|group| group.commands)
+            .copied()
+            .collect();
         assert_eq!(declared, grouped);
     }
 
@@ -108,12 +150,21 @@ mod tests {
         let help = program().render_help().to_string();
         let mut rest = help.as_str();
         for group in GROUPS {
-            rest = rest.split_once(&format!("\n{}:\n", group.title)).expect("a heading").1;
+            rest = rest
+                .split_once(&format!("\n{}:\n", group.title))
+                .expect("a heading")
+                .1;
             for name in group.commands {
-                rest = rest.split_once(&format!("  {name} ")).unwrap_or_else(|| panic!("{name}:\n{help}")).1;
+                rest = rest
+                    .split_once(&format!("  {name} "))
+                    .unwrap_or_else(|| panic!("{name}:\n{help}"))
+                    .1;
             }
         }
-        assert!(rest.contains("\nOptions:\n") && rest.contains("Example:"), "{help}");
+        assert!(
+            rest.contains("\nOptions:\n") && rest.contains("Example:"),
+            "{help}"
+        );
     }
 
     /// The page has a row for each command, hidden ones included, and for no others.
@@ -121,10 +172,14 @@ mod tests {
     fn the_page_about_strangers_lists_every_command_once() {
         let file = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/strangers.md");
         let page = std::fs::read_to_string(&file).expect("the page can be read");
-        let rows = page.lines().filter_map(|line| line.strip_prefix("| `")?.split_once("` |"));
+        let rows = page
+            .lines()
+            .filter_map(|line| line.strip_prefix("| `")?.split_once("` |"));
         let mut listed: Vec<String> = rows.map(|(name, _)| name.to_owned()).collect();
-        let mut all: Vec<String> =
-            Arguments::command().get_subcommands().map(|command| command.get_name().to_owned()).collect();
+        let mut all: Vec<String> = Arguments::command()
+            .get_subcommands()
+            .map(|command| command.get_name().to_owned())
+            .collect();
         listed.sort();
         all.sort();
         assert_eq!(listed, all);
@@ -136,9 +191,14 @@ mod tests {
         let file = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/strangers.md");
         let page = std::fs::read_to_string(&file).expect("the page can be read");
         for command in Arguments::command().get_subcommands() {
-            let row = page.lines().find(|line| line.starts_with(&format!("| `{}` |", command.get_name())));
-            let has_option = command.get_arguments().any(|argument| argument.get_long() == Some("trust"));
-            let is_named = row.is_some_and(|row| row.contains("`--trust`") || row.contains("| as `"));
+            let row = page
+                .lines()
+                .find(|line| line.starts_with(&format!("| `{}` |", command.get_name())));
+            let has_option = command
+                .get_arguments()
+                .any(|argument| argument.get_long() == Some("trust"));
+            let is_named =
+                row.is_some_and(|row| row.contains("`--trust`") || row.contains("| as `"));
             assert!(!has_option || is_named, "{}", command.get_name());
         }
     }

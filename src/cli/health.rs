@@ -18,8 +18,8 @@ use actcheck_report::{HealthSummary, health_json, health_table, health_text};
 pub struct HealthArgs {
     /// Id of the campaign [default: the newest]
     pub campaign: Option<String>,
-    /// Compare the files of the whole history with their checksums and with each other, and name the damaged ones; a
-    /// damaged mirror (the folder `tables`) is written anew
+    /// Compare the files of the whole history with their checksums and with each other, and name
+    /// the damaged ones; a damaged mirror (the folder `tables`) is written anew
     #[arg(long, conflicts_with = "campaign")]
     pub integrity: bool,
     /// The folder of the history.
@@ -42,9 +42,12 @@ pub fn health(args: &HealthArgs) -> Result<u8, Diagnostics> {
     };
     let summary = examine(&history, &campaign)?;
     if summary.health.runs == 0 {
-        return Err(Diagnostic::error("X057", format!("campaign {campaign} has no runs to examine"))
-            .help("`actcheck list` shows the runs of all campaigns")
-            .into());
+        return Err(Diagnostic::error(
+            "X057",
+            format!("campaign {campaign} has no runs to examine"),
+        )
+        .help("`actcheck list` shows the runs of all campaigns")
+        .into());
     }
     output::print(&match args.format {
         Format::Text => health_text(&summary, output::page()),
@@ -64,17 +67,24 @@ pub(super) fn examine(history: &History, campaign: &str) -> Result<HealthSummary
     let (vitals, outcomes) = both(
         || {
             let mut meter = HealthMeter::default();
-            history.each_vitals(campaign, |run| meter.add(run)).map(|_| meter)
+            history
+                .each_vitals(campaign, |run| meter.add(run))
+                .map(|_| meter)
         },
         || {
             let mut outcomes: BTreeMap<(Arc<str>, Outcome), u64> = BTreeMap::new();
-            let filter = RunFilter { campaign: Some(campaign.to_owned()), ..RunFilter::default() };
+            let filter = RunFilter {
+                campaign: Some(campaign.to_owned()),
+                ..RunFilter::default()
+            };
             let add = &mut |run: JudgedRun| {
                 for own in run.outcomes {
                     *outcomes.entry((own.property, own.outcome)).or_default() += 1;
                 }
             };
-            history.each_judged(&filter, Wish::default(), add).map(|_| outcomes)
+            history
+                .each_judged(&filter, Wish::default(), add)
+                .map(|_| outcomes)
         },
     );
     let mut meter = vitals?;
@@ -84,7 +94,9 @@ pub(super) fn examine(history: &History, campaign: &str) -> Result<HealthSummary
     Ok(HealthSummary {
         campaign: campaign.to_owned(),
         history: history.dir().display().to_string(),
-        program: std::env::args().next().unwrap_or_else(|| "actcheck".to_owned()),
+        program: std::env::args()
+            .next()
+            .unwrap_or_else(|| "actcheck".to_owned()),
         health: meter.finish(),
     })
 }

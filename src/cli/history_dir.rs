@@ -28,7 +28,8 @@ pub fn open_with(args: &HistoryArgs, threads: usize) -> Result<History, Diagnost
     warned(History::open_existing_with(&folder(args)?, threads)?)
 }
 
-/// Like [`open`], but the state of this moment for reading: other processes may read and write the history.
+/// Like [`open`], but the state of this moment for reading: other processes may read and write the
+/// history.
 ///
 /// # Errors
 /// As [`open`].
@@ -59,7 +60,8 @@ pub fn folder(args: &HistoryArgs) -> Result<PathBuf, Diagnostics> {
     }
 }
 
-/// A trace, or a part of one, if it can be read. `None` if it is missing, or can't be simulated again.
+/// A trace, or a part of one, if it can be read. `None` if it is missing, or can't be simulated
+/// again.
 ///
 /// # Errors
 /// `H007` it is damaged: an answer without it would be another than before.
@@ -70,7 +72,8 @@ pub fn unless_damaged<T>(read: Result<T, Diagnostics>) -> Result<Option<T>, Diag
     }
 }
 
-/// Opens the named history, or the one that is found. Returns `None` if none is named and none is found.
+/// Opens the named history, or the one that is found. Returns `None` if none is named and none is
+/// found.
 ///
 /// # Errors
 /// Several histories are found, or the history can't be opened.

@@ -29,7 +29,8 @@ pub(super) fn examine(args: &HistoryArgs, format: Format) -> Result<u8, Diagnost
     });
     // A mirror is not written from a damaged store.
     if !damaged.is_empty() && found.damage.len() == damaged.len() {
-        let told = Mirror::rebuild(&history).map_or_else(|faults| faults, |_| mended(damaged.len()).into());
+        let told = Mirror::rebuild(&history)
+            .map_or_else(|faults| faults, |_| mended(damaged.len()).into());
         output::print_diagnostics(&told);
     }
     if found.damage.is_empty() {
@@ -42,32 +43,61 @@ pub(super) fn examine(args: &HistoryArgs, format: Format) -> Result<u8, Diagnost
 }
 
 fn mended(files: usize) -> Diagnostic {
-    let files =
-        if files == 1 { "a file of the mirror was".to_owned() } else { format!("{files} files of the mirror were") };
-    Diagnostic::warning("A002", format!("{files} damaged, and the mirror was written anew from the store"))
-        .help("tables and reports made before may be wrong: make them again")
+    let files = if files == 1 {
+        "a file of the mirror was".to_owned()
+    } else {
+        format!("{files} files of the mirror were")
+    };
+    Diagnostic::warning(
+        "A002",
+        format!("{files} damaged, and the mirror was written anew from the store"),
+    )
+    .help("tables and reports made before may be wrong: make them again")
 }
 
 fn fault(found: &Integrity, mirror: usize, dir: &Path) -> Diagnostic {
     let parts = found.damage.len() - mirror;
-    let parts = if parts == 1 { "a part is".to_owned() } else { format!("{parts} parts are") };
-    Diagnostic::error("H007", format!("the history `{}` is damaged: {parts} not as written", dir.display())).help(
+    let parts = if parts == 1 {
+        "a part is".to_owned()
+    } else {
+        format!("{parts} parts are")
+    };
+    Diagnostic::error(
+        "H007",
         format!(
-            "restore the files from a backup; or `{}` copies all readable data, and \
-             `actcheck run --resume ID --history NEW` makes the lost runs again",
-            ShellLine::default().fixed("actcheck merge --salvage").file(dir).fixed("--into NEW")
+            "the history `{}` is damaged: {parts} not as written",
+            dir.display()
         ),
     )
+    .help(format!(
+        "restore the files from a backup; or `{}` copies all readable data, and \
+             `actcheck run --resume ID --history NEW` makes the lost runs again",
+        ShellLine::default()
+            .fixed("actcheck merge --salvage")
+            .file(dir)
+            .fixed("--into NEW")
+    ))
 }
 
 fn text(found: &Integrity, dir: &Path) -> String {
     let mut text = String::new();
     for damage in &found.damage {
-        let run = damage.run.as_ref().map_or_else(String::new, |run| format!(" (run {run})"));
-        text.push_str(&format!("{}{run}: {}\n", dir.join(&damage.file).display(), damage.reason));
+        let run = damage
+            .run
+            .as_ref()
+            .map_or_else(String::new, |run| format!(" (run {run})"));
+        text.push_str(&format!(
+            "{}{run}: {}\n",
+            dir.join(&damage.file).display(),
+            damage.reason
+        ));
     }
     if found.damage.is_empty() {
-        text = format!("{}: store, {} traces and mirror are intact\n", dir.display(), found.runs);
+        text = format!(
+            "{}: store, {} traces and mirror are intact\n",
+            dir.display(),
+            found.runs
+        );
     }
     if found.unlisted > 0 {
         text.push_str(&format!(
@@ -87,7 +117,11 @@ fn text(found: &Integrity, dir: &Path) -> String {
 fn table(found: &Integrity) -> Table {
     let mut table = Table::new(["file", "run", "damage"]);
     let row = |damage: &Damage| {
-        vec![damage.file.display().to_string().into(), damage.run.clone().into(), damage.reason.clone().into()]
+        vec![
+            damage.file.display().to_string().into(),
+            damage.run.clone().into(),
+            damage.reason.clone().into(),
+        ]
     };
     table.rows = found.damage.iter().map(row).collect();
     table

@@ -29,17 +29,20 @@ pub struct ListArgs {
     /// Only runs in which a property failed
     #[arg(long)]
     pub failed: bool,
-    /// Only runs in which this property was judged, by its name in the ontology, and a column with its outcomes; with
-    /// `--failed` or `--outcome`, only those in which it has that outcome (may be given several times)
+    /// Only runs in which this property was judged, by its name in the ontology, and a column with
+    /// its outcomes; with `--failed` or `--outcome`, only those in which it has that outcome (may
+    /// be given several times)
     #[arg(long, value_name = "P")]
     pub property: Vec<String>,
-    /// Only runs in which a property has this outcome: passed, failed, inapplicable, broken, timeout or untested
+    /// Only runs in which a property has this outcome: passed, failed, inapplicable, broken,
+    /// timeout or untested
     #[arg(long, value_name = "OUTCOME", value_parser = outcome, conflicts_with = "failed")]
     pub outcome: Option<Outcome>,
-    /// Only runs with an outcome that satisfies this condition on a column of the table of outcomes, such as
-    /// `target_mass_kg > 0.3` or `target_category = Glass` (may be given several times; `actcheck export --csv` writes
-    /// the table and describes its columns). With `--property`, `--failed` or `--outcome`, one of these outcomes must
-    /// satisfy it. Shrunk runs, cases and failed runs that ran again are not in the table
+    /// Only runs with an outcome that satisfies this condition on a column of the table of
+    /// outcomes, such as `target_mass_kg > 0.3` or `target_category = Glass` (may be given several
+    /// times; `actcheck export --csv` writes the table and describes its columns). With
+    /// `--property`, `--failed` or `--outcome`, one of these outcomes must satisfy it. Shrunk runs,
+    /// cases and failed runs that ran again are not in the table
     #[arg(long = "where", value_name = "COLUMN<VALUE", value_parser = Condition::parse)]
     pub conditions: Vec<Condition>,
     /// How the table is printed
@@ -50,7 +53,11 @@ pub struct ListArgs {
 impl ListArgs {
     /// The outcome that a run must have.
     fn wanted(&self) -> Option<Outcome> {
-        if self.failed { Some(Outcome::Failed) } else { self.outcome }
+        if self.failed {
+            Some(Outcome::Failed)
+        } else {
+            self.outcome
+        }
     }
 }
 
@@ -63,11 +70,20 @@ pub fn list(args: &ListArgs) -> Result<(), Diagnostics> {
     if let Some(campaign) = &args.campaign {
         history.campaign(campaign)?;
     }
-    let filter = RunFilter { campaign: args.campaign.clone(), ..RunFilter::default() };
+    let filter = RunFilter {
+        campaign: args.campaign.clone(),
+        ..RunFilter::default()
+    };
     let (mut runs, words) = chosen_runs(args, &history, &filter)?;
     if !args.conditions.is_empty() {
         let campaign = args.campaign.as_ref();
-        let found = matching_runs(&history, campaign, &args.property, args.wanted(), &args.conditions)?;
+        let found = matching_runs(
+            &history,
+            campaign,
+            &args.property,
+            args.wanted(),
+            &args.conditions,
+        )?;
         runs.retain(|row| found.contains(&row.run));
     }
     // Most campaigns have neither, so empty columns are hidden.
@@ -76,8 +92,12 @@ pub fn list(args: &ListArgs) -> Result<(), Diagnostics> {
     let columns: [(&str, bool, Cell); 9] = [
         ("run", true, |row| row.run.as_str().into()),
         ("index", true, |row| row.index.into()),
-        ("scene", repeated, |row| row.repetition.map(|repetition| repetition.scene).into()),
-        ("repetition", repeated, |row| row.repetition.map(|repetition| repetition.number).into()),
+        ("scene", repeated, |row| {
+            row.repetition.map(|repetition| repetition.scene).into()
+        }),
+        ("repetition", repeated, |row| {
+            row.repetition.map(|repetition| repetition.number).into()
+        }),
         ("test", true, |row| row.test.as_str().into()),
         ("status", true, |row| row.status.word().into()),
         ("score", true, |row| row.score.into()),
@@ -85,12 +105,28 @@ pub fn list(args: &ListArgs) -> Result<(), Diagnostics> {
         ("trace_hash", true, |row| row.trace_hash.as_str().into()),
     ];
     let shown: Vec<_> = columns.into_iter().filter(|(_, shown, _)| *shown).collect();
-    let mut table =
-        Table::new(shown.iter().map(|(name, ..)| *name)).with_expendable(["trace_hash", "index", "weight", "test"]);
-    table.columns.extend(args.property.iter().map(|name| names::local(name).to_owned()));
+    let mut table = Table::new(shown.iter().map(|(name, ..)| *name)).with_expendable([
+        "trace_hash",
+        "index",
+        "weight",
+        "test",
+    ]);
+    table.columns.extend(
+        args.property
+            .iter()
+            .map(|name| names::local(name).to_owned()),
+    );
     let row = |row: &RunRow| -> Vec<Value> {
-        let words = words.get(&row.run).into_iter().flatten().map(|words| words.as_str().into());
-        shown.iter().map(|(.., cell)| cell(row)).chain(words).collect()
+        let words = words
+            .get(&row.run)
+            .into_iter()
+            .flatten()
+            .map(|words| words.as_str().into());
+        shown
+            .iter()
+            .map(|(.., cell)| cell(row))
+            .chain(words)
+            .collect()
     };
     // The rows of all runs together would take a gigabyte for each million.
     let chunks = runs.chunks(ROWS_AT_A_TIME);
@@ -117,7 +153,11 @@ pub fn list(args: &ListArgs) -> Result<(), Diagnostics> {
                 table.rows = runs.iter().map(row).collect();
                 // The array of each part without its brackets.
                 let part = table.render(args.format.into(), output::page());
-                let items = part.trim_end().trim_start_matches('[').trim_end_matches(']').trim_end();
+                let items = part
+                    .trim_end()
+                    .trim_start_matches('[')
+                    .trim_end_matches(']')
+                    .trim_end();
                 output::print(&format!("{}{items}", if place == 0 { "[" } else { "," }));
             }
             output::print("\n]\n");
@@ -136,8 +176,8 @@ fn outcome(word: &str) -> Result<Outcome, String> {
 /// The outcomes of the named properties by run: one text for each property.
 type OutcomeWords = BTreeMap<String, Vec<String>>;
 
-/// The runs that the options choose, and the outcomes of the named properties in each: one text for each property, with the
-/// outcomes of all actions that have it.
+/// The runs that the options choose, and the outcomes of the named properties in each: one text for
+/// each property, with the outcomes of all actions that have it.
 fn chosen_runs(
     args: &ListArgs,
     history: &History,
@@ -145,29 +185,55 @@ fn chosen_runs(
 ) -> Result<(Vec<RunRow>, OutcomeWords), Diagnostics> {
     let wanted = args.wanted();
     let by_outcome = wanted.is_some() || !args.property.is_empty();
-    let judgements = if by_outcome { Judgements::Newest } else { Judgements::None };
+    let judgements = if by_outcome {
+        Judgements::Newest
+    } else {
+        Judgements::None
+    };
     let (mut runs, mut words) = (Vec::new(), BTreeMap::new());
     let mut judged: BTreeSet<Arc<str>> = BTreeSet::new();
-    history.each_judged(filter, Wish { judgements, ..Wish::default() }, &mut |run| {
-        for own in &run.outcomes {
-            if !judged.contains(&own.property) {
-                judged.insert(Arc::clone(&own.property));
+    history.each_judged(
+        filter,
+        Wish {
+            judgements,
+            ..Wish::default()
+        },
+        &mut |run| {
+            for own in &run.outcomes {
+                if !judged.contains(&own.property) {
+                    judged.insert(Arc::clone(&own.property));
+                }
             }
-        }
-        let is_named = |own: &&JudgedOutcome| args.property.iter().any(|name| is_meant(&own.property, name));
-        let mut named = run.outcomes.iter().filter(|own| args.property.is_empty() || is_named(own));
-        if by_outcome && !named.any(|own| wanted.is_none_or(|wanted| own.outcome == wanted)) {
-            return;
-        }
-        let outcomes = |name: &String| -> String {
-            let own = run.outcomes.iter().filter(|own| is_meant(&own.property, name));
-            own.map(|own| own.outcome.word()).collect::<Vec<_>>().join(", ")
-        };
-        if !args.property.is_empty() {
-            words.insert(run.row.run.clone(), args.property.iter().map(outcomes).collect());
-        }
-        runs.push(run.row);
-    })?;
+            let is_named = |own: &&JudgedOutcome| {
+                args.property
+                    .iter()
+                    .any(|name| is_meant(&own.property, name))
+            };
+            let mut named = run
+                .outcomes
+                .iter()
+                .filter(|own| args.property.is_empty() || is_named(own));
+            if by_outcome && !named.any(|own| wanted.is_none_or(|wanted| own.outcome == wanted)) {
+                return;
+            }
+            let outcomes = |name: &String| -> String {
+                let own = run
+                    .outcomes
+                    .iter()
+                    .filter(|own| is_meant(&own.property, name));
+                own.map(|own| own.outcome.word())
+                    .collect::<Vec<_>>()
+                    .join(", ")
+            };
+            if !args.property.is_empty() {
+                words.insert(
+                    run.row.run.clone(),
+                    args.property.iter().map(outcomes).collect(),
+                );
+            }
+            runs.push(run.row);
+        },
+    )?;
     if by_outcome {
         chosen::all_judged(&args.property, judged.iter().map(|property| &**property))?;
     }

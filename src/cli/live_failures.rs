@@ -9,8 +9,8 @@ use actcheck_report::{FailureLines, Page, RunSummary};
 /// Number of failures that are printed, unless all are requested.
 const MOST_SHOWN: u64 = 10;
 
-/// Writes the text about each failed run, in the order in which runs are stored: that of their ids, whatever the number of
-/// workers.
+/// Writes the text about each failed run, in the order in which runs are stored: that of their ids,
+/// whatever the number of workers.
 pub(super) struct LiveFailures<'a> {
     env: &'a Env,
     /// Id of the campaign.
@@ -52,17 +52,45 @@ impl<'a> LiveFailures<'a> {
         self.failures += 1;
         self.all_failed &= run.failed();
         let all = self.verbosity == Verbosity::Verbose;
-        let Self { program, history, campaign, .. } = &*self;
+        let Self {
+            program,
+            history,
+            campaign,
+            ..
+        } = &*self;
         if self.failures == MOST_SHOWN + 1 && !all {
-            let list = ShellLine::new(program).fixed(if self.all_failed { "list --failed" } else { "list" });
-            let list = list.option("--campaign", campaign).option("--history", history);
+            let list = ShellLine::new(program).fixed(if self.all_failed {
+                "list --failed"
+            } else {
+                "list"
+            });
+            let list = list
+                .option("--campaign", campaign)
+                .option("--history", history);
             return Some(FailureLines::further(&list, self.page));
         }
         if self.failures > MOST_SHOWN && !all {
             return None;
         }
-        let name = |iri: &str| self.env.ontology.properties.get(iri).map_or_else(|| iri.to_owned(), |p| p.name.clone());
-        let show = ShellLine::new(program).fixed("show").word(&run.id).option("--history", history);
-        Some(FailureLines { run, show: &show, all, name: &name }.text(self.page))
+        let name = |iri: &str| {
+            self.env
+                .ontology
+                .properties
+                .get(iri)
+                .map_or_else(|| iri.to_owned(), |p| p.name.clone())
+        };
+        let show = ShellLine::new(program)
+            .fixed("show")
+            .word(&run.id)
+            .option("--history", history);
+        Some(
+            FailureLines {
+                run,
+                show: &show,
+                all,
+                name: &name,
+            }
+            .text(self.page),
+        )
     }
 }

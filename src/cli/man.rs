@@ -12,8 +12,8 @@ use actcheck_base::{Diagnostic, Diagnostics};
 /// `actcheck man`
 #[derive(Debug, Args)]
 pub struct ManArgs {
-    /// Write a page for each command into this folder, such as `actcheck-run.1`, instead of printing one with all of
-    /// them
+    /// Write a page for each command into this folder, such as `actcheck-run.1`, instead of
+    /// printing one with all of them
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
 }
@@ -39,7 +39,10 @@ fn page_of_all(root: &Command) -> io::Result<Vec<u8>> {
     man.render_name_section(&mut page)?;
     man.render_synopsis_section(&mut page)?;
     man.render_description_section(&mut page)?;
-    for command in below(root).into_iter().filter(|command| !command.has_subcommands()) {
+    for command in below(root)
+        .into_iter()
+        .filter(|command| !command.has_subcommands())
+    {
         let name = command.get_bin_name().unwrap_or(command.get_name());
         writeln!(page, ".SH \"{}\"", name.replace('-', "\\-"))?;
         page.extend(section_of(command)?);
@@ -56,13 +59,16 @@ fn section_of(command: &Command) -> io::Result<Vec<u8>> {
     man.render_options_section(&mut page)?;
     man.render_extra_section(&mut page)?;
     // A line of text never begins with a dot.
-    Ok(format!("\n{}", with_examples(&page)).replace("\n.SH ", "\n.SS ").into_bytes())
+    Ok(format!("\n{}", with_examples(&page))
+        .replace("\n.SH ", "\n.SS ")
+        .into_bytes())
 }
 
 /// Renames the section after the options to EXAMPLES.
 fn with_examples(page: &[u8]) -> String {
     let page = String::from_utf8_lossy(page);
-    page.replace(".SH EXTRA\nExamples:\n", ".SH EXAMPLES\n").replace(".SH EXTRA\nExample:\n", ".SH EXAMPLES\n")
+    page.replace(".SH EXTRA\nExamples:\n", ".SH EXAMPLES\n")
+        .replace(".SH EXTRA\nExample:\n", ".SH EXAMPLES\n")
 }
 
 fn write_pages(root: &Command, folder: &Path) -> Result<(), Diagnostics> {
@@ -77,17 +83,25 @@ fn write_pages(root: &Command, folder: &Path) -> Result<(), Diagnostics> {
         written.map_err(|error| output_file::cannot_write(&file, error))?;
     }
     let first = folder.join("actcheck.1");
-    output::print_prose(&format!("wrote {} pages: man -l {}\n", commands.len(), first.display()));
+    output::print_prose(&format!(
+        "wrote {} pages: man -l {}\n",
+        commands.len(),
+        first.display()
+    ));
     Ok(())
 }
 
 fn manual(command: &Command) -> Man {
-    Man::new(command.clone()).manual("actcheck").source(concat!("actcheck ", env!("CARGO_PKG_VERSION")))
+    Man::new(command.clone())
+        .manual("actcheck")
+        .source(concat!("actcheck ", env!("CARGO_PKG_VERSION")))
 }
 
 /// All subcommands of a command, each before its own subcommands.
 fn below(command: &Command) -> Vec<&Command> {
-    let each = command.get_subcommands().map(|command| std::iter::once(command).chain(below(command)));
+    let each = command
+        .get_subcommands()
+        .map(|command| std::iter::once(command).chain(below(command)));
     each.flatten().collect()
 }
 

@@ -26,14 +26,15 @@ pub struct MergeArgs {
     /// The destination: a new folder, or an existing history to add to
     #[arg(long, value_name = "DIR")]
     pub into: PathBuf,
-    /// Give a campaign a new id if another campaign has the same one (not needed for parts of one campaign)
+    /// Give a campaign a new id if another campaign has the same one (not needed for parts of one
+    /// campaign)
     #[arg(long)]
     pub rename: bool,
     /// Leave this campaign out: ID, or DIR#ID as messages name it; may be given several times
     #[arg(long, value_name = "CAMPAIGN")]
     pub leave_out: Vec<String>,
-    /// Copy all readable data of damaged histories; lost runs are listed, and resuming their campaigns makes
-    /// them again
+    /// Copy all readable data of damaged histories; lost runs are listed, and resuming their
+    /// campaigns makes them again
     #[arg(long)]
     pub salvage: bool,
     /// How the resulting campaigns are printed
@@ -44,22 +45,34 @@ pub struct MergeArgs {
 /// Merges histories and prints the resulting campaigns. Returns the exit code.
 pub fn merge(args: &MergeArgs) -> Result<u8, Diagnostics> {
     let (sources, mut warnings) = open_all(args)?;
-    let known = is_there(&args.into).then(|| History::open_existing(&args.into)).transpose()?;
-    let options = MergeOptions { rename: args.rename, leave_out: args.leave_out.clone() };
+    let known = is_there(&args.into)
+        .then(|| History::open_existing(&args.into))
+        .transpose()?;
+    let options = MergeOptions {
+        rename: args.rename,
+        leave_out: args.leave_out.clone(),
+    };
     let plan = plan(&sources, known.as_ref(), &options)?;
     let into = match known {
         Some(history) => history,
         None => History::open(&args.into)?,
     };
-    let progress = Progress::new(plan.campaigns.iter().map(|campaign| campaign.added).sum(), None);
+    let progress = Progress::new(
+        plan.campaigns.iter().map(|campaign| campaign.added).sum(),
+        None,
+    );
     let bar = progress.bar();
-    let stop = stop::on_interrupt(move || bar.println("stopping after this run; merge again to continue"));
+    let stop =
+        stop::on_interrupt(move || bar.println("stopping after this run; merge again to continue"));
     let merged = carry_out(&plan, &sources, &into, &stop, || progress.judged(1, 0));
     progress.finish();
     let merged = merged?;
     if merged.interrupted {
         let fault = Diagnostic::error("X030", "interrupted");
-        return Err(fault.help("written runs are complete; merge again to add the rest").into()).or_else(|faults| {
+        return Err(fault
+            .help("written runs are complete; merge again to add the rest")
+            .into())
+        .or_else(|faults| {
             output::print_diagnostics(&faults);
             Ok(stop::INTERRUPTED)
         });
@@ -69,16 +82,26 @@ pub fn merge(args: &MergeArgs) -> Result<u8, Diagnostics> {
         output::print_diagnostics(&faults);
     }
     output::print(&printed(&plan, args.format));
-    merged.warning().into_iter().for_each(|warning| warnings.push(warning));
-    plan.campaigns.iter().filter_map(lacking).for_each(|warning| warnings.push(warning));
+    merged
+        .warning()
+        .into_iter()
+        .for_each(|warning| warnings.push(warning));
+    plan.campaigns
+        .iter()
+        .filter_map(lacking)
+        .for_each(|warning| warnings.push(warning));
     if !warnings.is_empty() {
         output::print_diagnostics(&warnings);
     }
-    Ok(u8::from(plan.campaigns.iter().any(|campaign| !campaign.missing.is_empty())))
+    Ok(u8::from(
+        plan.campaigns
+            .iter()
+            .any(|campaign| !campaign.missing.is_empty()),
+    ))
 }
 
-/// Opens each history once for reading, except the destination: its runs need no copying. Returns them with warnings
-/// about damage.
+/// Opens each history once for reading, except the destination: its runs need no copying. Returns
+/// them with warnings about damage.
 fn open_all(args: &MergeArgs) -> Result<(Vec<History>, Diagnostics), Diagnostics> {
     let same = |dir: &Path| std::fs::canonicalize(dir).unwrap_or_else(|_| dir.to_path_buf());
     let (mut seen, mut sources) = (vec![same(&args.into)], Vec::new());
@@ -96,7 +119,9 @@ fn open_all(args: &MergeArgs) -> Result<(Vec<History>, Diagnostics), Diagnostics
         match opened {
             Ok((history, lost)) => {
                 history.rest();
-                lost_runs(dir, &lost).into_iter().for_each(|warning| warnings.push(warning));
+                lost_runs(dir, &lost)
+                    .into_iter()
+                    .for_each(|warning| warnings.push(warning));
                 sources.push(history);
             }
             Err(found) => faults.extend(found),
@@ -111,7 +136,12 @@ fn lost_runs(dir: &Path, lost: &[String]) -> Option<Diagnostic> {
     if lost.len() > MAX_LISTED {
         named.push("…");
     }
-    let message = format!("{} runs of `{}` can't be read any more: {}", lost.len(), dir.display(), named.join(", "));
+    let message = format!(
+        "{} runs of `{}` can't be read any more: {}",
+        lost.len(),
+        dir.display(),
+        named.join(", ")
+    );
     (!lost.is_empty()).then(|| {
         Diagnostic::warning("H007", message).help(
             "`actcheck run --resume ID --history DIR` in the merged history makes them again, with the same results",
@@ -126,9 +156,14 @@ fn is_there(dir: &Path) -> bool {
 
 fn printed(plan: &MergePlan, format: Format) -> String {
     if format == Format::Json {
-        return format!("{:#}\n", Value::Array(plan.campaigns.iter().map(campaign_json).collect()));
+        return format!(
+            "{:#}\n",
+            Value::Array(plan.campaigns.iter().map(campaign_json).collect())
+        );
     }
-    let mut table = Table::new(["campaign", "name", "from", "runs", "added", "planned", "missing"]);
+    let mut table = Table::new([
+        "campaign", "name", "from", "runs", "added", "planned", "missing",
+    ]);
     for campaign in &plan.campaigns {
         table.rows.push(vec![
             campaign.id.clone().into(),
@@ -159,7 +194,11 @@ fn campaign_json(campaign: &PlannedMerge) -> Value {
 /// Returns a warning if no part of a campaign has some of its runs.
 fn lacking(campaign: &PlannedMerge) -> Option<Diagnostic> {
     let missing = &campaign.missing;
-    let mut numbers: Vec<String> = missing.iter().take(MAX_LISTED).map(|index| (index + 1).to_string()).collect();
+    let mut numbers: Vec<String> = missing
+        .iter()
+        .take(MAX_LISTED)
+        .map(|index| (index + 1).to_string())
+        .collect();
     if missing.len() > MAX_LISTED {
         numbers.push("…".to_owned());
     }
@@ -170,6 +209,7 @@ fn lacking(campaign: &PlannedMerge) -> Option<Diagnostic> {
         campaign.planned,
         numbers.join(", ")
     );
-    (!missing.is_empty())
-        .then(|| Diagnostic::warning("X080", message).help("merge the missing parts into the same folder"))
+    (!missing.is_empty()).then(|| {
+        Diagnostic::warning("X080", message).help("merge the missing parts into the same folder")
+    })
 }

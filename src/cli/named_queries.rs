@@ -26,7 +26,10 @@ pub struct NamedQuery {
 /// # Errors
 /// `X047` a file of the project can't be read.
 pub fn all() -> Result<Vec<NamedQuery>, Diagnostics> {
-    sources()?.into_iter().map(|(name, source)| Ok(described(name, &source.text))).collect()
+    sources()?
+        .into_iter()
+        .map(|(name, source)| Ok(described(name, &source.text)))
+        .collect()
 }
 
 /// Returns the query with a name.
@@ -40,8 +43,16 @@ pub fn named(name: &str) -> Result<Source, Diagnostics> {
         None => {
             let fault = Diagnostic::error("X048", format!("there is no query `{name}`"));
             let help = did_you_mean(name, known.keys().map(String::as_str));
-            let help = if help.ends_with('?') { help } else { help + ";" };
-            Err(fault.help(format!("{help} `actcheck query --list-named` describes all of them")).into())
+            let help = if help.ends_with('?') {
+                help
+            } else {
+                help + ";"
+            };
+            Err(fault
+                .help(format!(
+                    "{help} `actcheck query --list-named` describes all of them"
+                ))
+                .into())
         }
     }
 }
@@ -55,12 +66,15 @@ fn sources() -> Result<BTreeMap<String, Source>, Diagnostics> {
     let mut found = BTreeMap::new();
     for files in [Files::Shipped, Files::Disk] {
         for path in files.list(Path::new(FOLDER)) {
-            let (Some(stem), Some("rq")) = (path.file_stem(), path.extension().and_then(|ending| ending.to_str()))
-            else {
+            let (Some(stem), Some("rq")) = (
+                path.file_stem(),
+                path.extension().and_then(|ending| ending.to_str()),
+            ) else {
                 continue;
             };
             let source = files.read(&path).map_err(|why| {
-                Diagnostic::error("X047", format!("{}: {why}", path.display())).help("repair or remove the file")
+                Diagnostic::error("X047", format!("{}: {why}", path.display()))
+                    .help("repair or remove the file")
             })?;
             found.insert(stem.to_string_lossy().into_owned(), source);
         }
@@ -69,7 +83,10 @@ fn sources() -> Result<BTreeMap<String, Source>, Diagnostics> {
 }
 
 fn described(name: String, text: &str) -> NamedQuery {
-    let mut lines = text.lines().map_while(|line| line.strip_prefix('#')).map(str::trim);
+    let mut lines = text
+        .lines()
+        .map_while(|line| line.strip_prefix('#'))
+        .map(str::trim);
     let title = lines.next().unwrap_or_default().to_owned();
     NamedQuery {
         name,
@@ -85,10 +102,21 @@ mod tests {
 
     #[test]
     fn title_and_description_come_from_the_first_comment() {
-        let query = described("q".into(), "# Title\n# One line\n#  and another.\n\n# no more\nSELECT * {}");
-        assert_eq!((query.title.as_str(), query.description.as_str()), ("Title", "One line and another."));
+        let query = described(
+            "q".into(),
+            "# Title\n# One line\n#  and another.\n\n# no more\nSELECT * {}",
+        );
+        assert_eq!(
+            (query.title.as_str(), query.description.as_str()),
+            ("Title", "One line and another.")
+        );
         assert_eq!(described("q".into(), "ASK {}").title, "");
         let all = all().expect("the embedded queries can be read");
-        assert!(all.len() >= 12 && all.iter().all(|query| !query.title.is_empty() && !query.description.is_empty()));
+        assert!(
+            all.len() >= 12
+                && all
+                    .iter()
+                    .all(|query| !query.title.is_empty() && !query.description.is_empty())
+        );
     }
 }

@@ -20,7 +20,8 @@ const ONTOLOGY: &str = "ontology/actions.ttl";
 /// `actcheck new campaign`
 #[derive(Debug, Args)]
 pub struct NewCampaignArgs {
-    /// Name of the configuration: letters, digits, `_` and `-`. The file is NAME.toml in this folder
+    /// Name of the configuration: letters, digits, `_` and `-`. The file is NAME.toml in this
+    /// folder
     #[arg(default_value = "pick")]
     pub name: String,
     /// Also write these, and make the configuration use them
@@ -70,12 +71,17 @@ pub fn campaign(args: &NewCampaignArgs) -> Result<(), Diagnostics> {
 
     let mut text = format!("wrote {}\n", files.in_words());
     if finds_ontology {
-        text.push_str(&format!("{config} uses {ONTOLOGY}, which already existed\n"));
+        text.push_str(&format!(
+            "{config} uses {ONTOLOGY}, which already existed\n"
+        ));
     }
     if has(Part::Skill) {
         text.push_str(&format!("{SKILL_FILE} needs Python with the package `actcheck` (in actcheck's wheel, and in its sources in clients/python)\n"));
     }
-    text.push_str(&format!("next: {}\n", ShellLine::default().fixed("actcheck run").file(&config)));
+    text.push_str(&format!(
+        "next: {}\n",
+        ShellLine::default().fixed("actcheck run").file(&config)
+    ));
     output::print_prose(&text);
     Ok(())
 }
@@ -91,7 +97,8 @@ fn check_name(name: &str) -> Result<(), Diagnostics> {
         .into())
 }
 
-/// Whether the template can use an ontology: it exists, is well-formed, and has the template's action.
+/// Whether the template can use an ontology: it exists, is well-formed, and has the template's
+/// action.
 fn is_usable(ontology: &Path) -> bool {
     ontology::load(&Files::Disk, ontology).is_ok_and(|known| known.actions.contains_key("Pick"))
 }

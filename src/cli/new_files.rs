@@ -34,18 +34,28 @@ impl NewFiles {
         Ok(())
     }
 
-    /// Writes all files and the folders that they need. If one fails, removes those that it has written.
+    /// Writes all files and the folders that they need. If one fails, removes those that it has
+    /// written.
     ///
     /// # Errors
     /// X015: one of the files exists. X007: one can't be written.
     pub(super) fn write(&self, help: &str) -> Result<(), Diagnostics> {
         // A dangling symbolic link counts as existing.
-        if let Some(file) = self.files.keys().find(|file| fs::symlink_metadata(file).is_ok()) {
-            return Err(Diagnostic::error("X015", format!("{} already exists", file.display())).help(help).into());
+        if let Some(file) = self
+            .files
+            .keys()
+            .find(|file| fs::symlink_metadata(file).is_ok())
+        {
+            return Err(
+                Diagnostic::error("X015", format!("{} already exists", file.display()))
+                    .help(help)
+                    .into(),
+            );
         }
         let mut made = Vec::new();
         for (file, bytes) in &self.files {
-            if let Err(faults) = make_folders(file, &mut made).and_then(|()| output_file::write_in_project(file, bytes))
+            if let Err(faults) = make_folders(file, &mut made)
+                .and_then(|()| output_file::write_in_project(file, bytes))
             {
                 take_back(&made);
                 return Err(faults);
@@ -59,21 +69,29 @@ impl NewFiles {
     pub(super) fn in_words(&self) -> String {
         let mut folders: BTreeMap<&Path, Vec<&Path>> = BTreeMap::new();
         for file in self.files.keys() {
-            let first = file.components().next().map_or(Path::new(""), |first| Path::new(first.as_os_str()));
+            let first = file
+                .components()
+                .next()
+                .map_or(Path::new(""), |first| Path::new(first.as_os_str()));
             folders.entry(first).or_default().push(file);
         }
-        let words = folders.into_iter().map(|(folder, files)| match files.as_slice() {
-            [only] => only.display().to_string(),
-            several => format!("{}/ ({} files)", folder.display(), several.len()),
-        });
+        let words = folders
+            .into_iter()
+            .map(|(folder, files)| match files.as_slice() {
+                [only] => only.display().to_string(),
+                several => format!("{}/ ({} files)", folder.display(), several.len()),
+            });
         words.collect::<Vec<_>>().join(", ")
     }
 }
 
 /// Creates the folders that a file needs, outermost first.
 fn make_folders(file: &Path, made: &mut Vec<PathBuf>) -> Result<(), Diagnostics> {
-    let mut missing: Vec<&Path> =
-        file.ancestors().skip(1).take_while(|folder| !folder.as_os_str().is_empty() && !folder.exists()).collect();
+    let mut missing: Vec<&Path> = file
+        .ancestors()
+        .skip(1)
+        .take_while(|folder| !folder.as_os_str().is_empty() && !folder.exists())
+        .collect();
     missing.reverse();
     for folder in missing {
         let created = output_file::project(folder).create_folder(folder);
@@ -83,11 +101,16 @@ fn make_folders(file: &Path, made: &mut Vec<PathBuf>) -> Result<(), Diagnostics>
     Ok(())
 }
 
-/// Removes files and folders, the last one first. Ignores errors: the caller reports the fault that came before.
+/// Removes files and folders, the last one first. Ignores errors: the caller reports the fault that
+/// came before.
 fn take_back(made: &[PathBuf]) {
     for path in made.iter().rev() {
         let below = output_file::project(path);
-        let _ = if path.is_dir() { below.remove_folder(path) } else { below.remove(path) };
+        let _ = if path.is_dir() {
+            below.remove_folder(path)
+        } else {
+            below.remove(path)
+        };
     }
 }
 
@@ -109,7 +132,10 @@ mod tests {
         assert!(!at("a").exists(), "written files are removed");
         fs::remove_file(at("taken")).expect("it can be removed");
         files.write("").expect("all can be written");
-        assert_eq!(fs::read_to_string(at("a/b/one.txt")).expect("the file exists"), "1");
+        assert_eq!(
+            fs::read_to_string(at("a/b/one.txt")).expect("the file exists"),
+            "1"
+        );
         let faults = files.write("move it").expect_err("they exist");
         assert!(faults.iter().all(|fault| fault.code == "X015"), "{faults}");
     }
@@ -117,7 +143,17 @@ mod tests {
     #[test]
     fn many_files_of_a_folder_are_counted() {
         let mut files = NewFiles::default();
-        ["rules/a.rls", "rules/lib/b.rls", "pick.toml", "skills/pick.py"].iter().for_each(|file| files.add(*file, ""));
-        assert_eq!(files.in_words(), "pick.toml, rules/ (2 files), skills/pick.py");
+        [
+            "rules/a.rls",
+            "rules/lib/b.rls",
+            "pick.toml",
+            "skills/pick.py",
+        ]
+        .iter()
+        .for_each(|file| files.add(*file, ""));
+        assert_eq!(
+            files.in_words(),
+            "pick.toml, rules/ (2 files), skills/pick.py"
+        );
     }
 }

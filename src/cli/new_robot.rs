@@ -21,13 +21,15 @@ pub struct NewRobotArgs {
     /// The robot's model: URDF, xacro (FILE.xacro), MJCF or SDF
     #[arg(value_name = "FILE")]
     pub model: PathBuf,
-    /// Folders in which `package://NAME` and `$(find NAME)` look for packages, besides those around the model
+    /// Folders in which `package://NAME` and `$(find NAME)` look for packages, besides those around
+    /// the model
     #[arg(long = "packages", value_name = "DIR")]
     pub package_dirs: Vec<PathBuf>,
     /// An argument of the xacro file, such as `gripper:=robotiq_2f_85`
     #[arg(long = "xacro-arg", value_name = "NAME:=VALUE")]
     pub xacro_args: Vec<String>,
-    /// Of several hands, the one with TEXT in the name of a link or joint of its arm: `left`, for example
+    /// Of several hands, the one with TEXT in the name of a link or joint of its arm: `left`, for
+    /// example
     #[arg(long, value_name = "TEXT")]
     pub hand: Option<String>,
     /// The profile to write [default: the model's name with the extension .toml, in this folder]
@@ -37,9 +39,17 @@ pub struct NewRobotArgs {
 
 /// Writes a profile proposed for a robot's model.
 pub fn robot(args: &NewRobotArgs) -> Result<(), Diagnostics> {
-    let bare = robot::bare(&Files::Disk, &args.model, &args.package_dirs, &args.xacro_args)?;
+    let bare = robot::bare(
+        &Files::Disk,
+        &args.model,
+        &args.package_dirs,
+        &args.xacro_args,
+    )?;
     let name = bare.name.clone();
-    let out = args.out.clone().unwrap_or_else(|| PathBuf::from(format!("{name}.toml")));
+    let out = args
+        .out
+        .clone()
+        .unwrap_or_else(|| PathBuf::from(format!("{name}.toml")));
     let folder = out.parent().unwrap_or(Path::new(""));
     let proposal = proposed_robot(bare, &folder.join(HISTORY), args.hand.as_deref())?;
     let (profile, notes, other_hands) = (proposal.profile, proposal.notes, proposal.other_hands);
@@ -47,17 +57,28 @@ pub fn robot(args: &NewRobotArgs) -> Result<(), Diagnostics> {
     files.add(&out, text(&profile, &notes, args, folder));
     files.write("name another file with `--out PROFILE`, or delete it")?;
     let gripper = match &profile.suction {
-        Some(cup) => format!("a suction cup of {:.0} mm at {}", cup.radius_m * 2e3, profile.grasp_link),
+        Some(cup) => format!(
+            "a suction cup of {:.0} mm at {}",
+            cup.radius_m * 2e3,
+            profile.grasp_link
+        ),
         None => {
             let [left, right] = &profile.finger_links;
-            format!("fingers {left} and {right} that open {:.0} mm", profile.max_opening_m * 1e3)
+            format!(
+                "fingers {left} and {right} that open {:.0} mm",
+                profile.max_opening_m * 1e3
+            )
         }
     };
     output::print_prose(&format!(
         "wrote {}: {} with an arm of {} joints, {gripper}, camera {}\n\
          next: name it as `profile` in `[robot]` of a configuration, then `actcheck check CONFIG`\n",
         out.display(),
-        if profile.base_joints.is_some() { "a mobile robot" } else { "a fixed robot" },
+        if profile.base_joints.is_some() {
+            "a mobile robot"
+        } else {
+            "a fixed robot"
+        },
         profile.arm_joints.len(),
         profile.camera_link,
     ));
@@ -70,13 +91,23 @@ pub fn robot(args: &NewRobotArgs) -> Result<(), Diagnostics> {
     Ok(())
 }
 
-/// The profile as TOML, with a comment for each guess. The keys that the program finds on the model whenever it reads the
-/// profile are comments too.
-fn text(profile: &RobotProfile, notes: &BTreeMap<&'static str, String>, args: &NewRobotArgs, folder: &Path) -> String {
-    let command = ShellLine::default().fixed("actcheck new robot").file(&args.model);
+/// The profile as TOML, with a comment for each guess. The keys that the program finds on the model
+/// whenever it reads the profile are comments too.
+fn text(
+    profile: &RobotProfile,
+    notes: &BTreeMap<&'static str, String>,
+    args: &NewRobotArgs,
+    folder: &Path,
+) -> String {
+    let command = ShellLine::default()
+        .fixed("actcheck new robot")
+        .file(&args.model);
     let title = format!("# Proposed by `{command}`: check each guess.\n");
     let stated = lines(&stated(profile, args, folder), notes);
-    let found = lines(&found(profile), notes).lines().map(commented).collect::<String>();
+    let found = lines(&found(profile), notes)
+        .lines()
+        .map(commented)
+        .collect::<String>();
     format!(
         "{title}\n{stated}\n# Found on the model whenever this profile is read. To change a line, remove its `# `, and those of \
          all lines\n# about the same link.\n{found}"
@@ -93,17 +124,28 @@ fn commented(line: &str) -> String {
 /// Keys with their values, each after the basis of its guess.
 fn lines(keys: &[(&'static str, String)], notes: &BTreeMap<&'static str, String>) -> String {
     let of = |(key, value): &(&'static str, String)| {
-        let note = notes.get(key).map(|note| format!("# Guessed: {note}.\n")).unwrap_or_default();
+        let note = notes
+            .get(key)
+            .map(|note| format!("# Guessed: {note}.\n"))
+            .unwrap_or_default();
         format!("{note}{key} = {value}\n")
     };
     keys.iter().map(of).collect()
 }
 
 /// The keys that a profile needs, or that decide about the others.
-fn stated(profile: &RobotProfile, args: &NewRobotArgs, folder: &Path) -> Vec<(&'static str, String)> {
+fn stated(
+    profile: &RobotProfile,
+    args: &NewRobotArgs,
+    folder: &Path,
+) -> Vec<(&'static str, String)> {
     let mut keys = vec![("urdf", quoted(&seen_from(folder, &args.model)))];
     if !args.package_dirs.is_empty() {
-        let folders: Vec<String> = args.package_dirs.iter().map(|packages| seen_from(folder, packages)).collect();
+        let folders: Vec<String> = args
+            .package_dirs
+            .iter()
+            .map(|packages| seen_from(folder, packages))
+            .collect();
         keys.push(("package_dirs", list(&folders)));
     }
     if !args.xacro_args.is_empty() {
@@ -157,7 +199,11 @@ fn found(profile: &RobotProfile) -> Vec<(&'static str, String)> {
         keys.push(("max_opening_m", profile.max_opening_m.to_string()));
     }
     keys.push(("camera_link", quoted(&profile.camera_link)));
-    let usual = if profile.camera_link.contains("optical") { robot::OPTICAL_TURNED_RAD } else { [0.0; 3] };
+    let usual = if profile.camera_link.contains("optical") {
+        robot::OPTICAL_TURNED_RAD
+    } else {
+        [0.0; 3]
+    };
     if profile.camera_turned_rad != usual {
         keys.push(("camera_turned_rad", numbers(&profile.camera_turned_rad)));
     }
@@ -175,7 +221,10 @@ fn grasp_frame(profile: &RobotProfile) -> [(&'static str, String); 3] {
 }
 
 fn postures(profile: &RobotProfile) -> String {
-    let each = profile.postures.iter().map(|arm| format!("    {{ arm = {} }},\n", numbers(arm)));
+    let each = profile
+        .postures
+        .iter()
+        .map(|arm| format!("    {{ arm = {} }},\n", numbers(arm)));
     format!("[\n{}]", each.collect::<String>())
 }
 
@@ -183,7 +232,10 @@ fn postures(profile: &RobotProfile) -> String {
 fn seen_from(folder: &Path, path: &Path) -> String {
     match folder.as_os_str().is_empty() {
         true => path.display().to_string(),
-        false => std::path::absolute(path).unwrap_or_else(|_| path.to_owned()).display().to_string(),
+        false => std::path::absolute(path)
+            .unwrap_or_else(|_| path.to_owned())
+            .display()
+            .to_string(),
     }
 }
 
@@ -193,9 +245,23 @@ fn quoted(text: &str) -> String {
 }
 
 fn list(names: &[String]) -> String {
-    format!("[{}]", names.iter().map(|name| quoted(name)).collect::<Vec<_>>().join(", "))
+    format!(
+        "[{}]",
+        names
+            .iter()
+            .map(|name| quoted(name))
+            .collect::<Vec<_>>()
+            .join(", ")
+    )
 }
 
 fn numbers(values: &[f64]) -> String {
-    format!("[{}]", values.iter().map(f64::to_string).collect::<Vec<_>>().join(", "))
+    format!(
+        "[{}]",
+        values
+            .iter()
+            .map(f64::to_string)
+            .collect::<Vec<_>>()
+            .join(", ")
+    )
 }

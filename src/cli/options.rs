@@ -1,4 +1,5 @@
-//! Options that several commands have: the history's folder, output formats, durations, significance levels.
+//! Options that several commands have: the history's folder, output formats, durations,
+//! significance levels.
 
 use std::path::PathBuf;
 
@@ -67,20 +68,23 @@ pub enum ProofFormat {
     Dot,
 }
 
-/// Parses a duration such as `90s`, `10m` or `1h30m` into seconds. A plain number, which earlier versions required, is a
-/// number of seconds.
+/// Parses a duration such as `90s`, `10m` or `1h30m` into seconds. A plain number, which earlier
+/// versions required, is a number of seconds.
 ///
 /// # Errors
 /// A message if the text is neither, or not above zero.
 pub fn duration(text: &str) -> Result<f64, String> {
     match text.trim().parse::<f64>() {
         Ok(secs) if secs > 0.0 && secs.is_finite() => Ok(secs),
-        Ok(_) => Err(format!("`{text}` must be a duration above zero, such as 90s, 10m or 2h")),
+        Ok(_) => Err(format!(
+            "`{text}` must be a duration above zero, such as 90s, 10m or 2h"
+        )),
         Err(_) => duration_secs(text),
     }
 }
 
-/// Parses an amount of memory such as `512MiB`, `4GiB` or `2GB` into bytes. A plain number is a number of bytes.
+/// Parses an amount of memory such as `512MiB`, `4GiB` or `2GB` into bytes. A plain number is a
+/// number of bytes.
 ///
 /// # Errors
 /// A message if the text is none of these, or not above zero.
@@ -95,11 +99,15 @@ pub fn memory(text: &str) -> Result<usize, String> {
         ("B", 1.0),
     ];
     let text = text.trim();
-    let (number, unit) =
-        UNITS.iter().find_map(|(unit, bytes)| Some((text.strip_suffix(unit)?, *bytes))).unwrap_or((text, 1.0));
+    let (number, unit) = UNITS
+        .iter()
+        .find_map(|(unit, bytes)| Some((text.strip_suffix(unit)?, *bytes)))
+        .unwrap_or((text, 1.0));
     match number.trim().parse::<f64>() {
         Ok(amount) if amount * unit >= 1.0 && amount.is_finite() => Ok((amount * unit) as usize),
-        _ => Err(format!("`{text}` must be an amount of memory above zero, such as 512MiB or 4GiB")),
+        _ => Err(format!(
+            "`{text}` must be an amount of memory above zero, such as 512MiB or 4GiB"
+        )),
     }
 }
 
@@ -128,23 +136,49 @@ mod tests {
 
     #[test]
     fn amounts_of_memory_have_units_and_plain_numbers_are_bytes() {
-        for (text, bytes) in [("512MiB", 512 << 20), ("4 GiB", 4 << 30), ("1.5kB", 1500), ("7", 7), ("7B", 7)] {
+        for (text, bytes) in [
+            ("512MiB", 512 << 20),
+            ("4 GiB", 4 << 30),
+            ("1.5kB", 1500),
+            ("7", 7),
+            ("7B", 7),
+        ] {
             assert_eq!(memory(text), Ok(bytes), "{text}");
         }
         for wrong in ["", "0", "-1MB", "inf", "NaN", "much", "10 apples"] {
-            assert!(memory(wrong).is_err_and(|message| message.contains("GiB")), "{wrong}");
+            assert!(
+                memory(wrong).is_err_and(|message| message.contains("GiB")),
+                "{wrong}"
+            );
         }
     }
 
     #[test]
     fn durations_have_units_and_plain_numbers_are_seconds() {
-        for (text, secs) in [("10m", 600.0), ("1.5s", 1.5), ("200ms", 0.2), ("1h30m", 5400.0), ("7", 7.0), ("0.5", 0.5)]
-        {
+        for (text, secs) in [
+            ("10m", 600.0),
+            ("1.5s", 1.5),
+            ("200ms", 0.2),
+            ("1h30m", 5400.0),
+            ("7", 7.0),
+            ("0.5", 0.5),
+        ] {
             assert_eq!(duration(text), Ok(secs), "{text}");
         }
-        for wrong in ["", "0", "0s", "-5", "-5s", "inf", "NaN", "soon", "10 apples"] {
+        for wrong in [
+            "",
+            "0",
+            "0s",
+            "-5",
+            "-5s",
+            "inf",
+            "NaN",
+            "soon",
+            "10 apples",
+        ] {
             assert!(
-                duration(wrong).is_err_and(|message| message.contains("10m") || message.contains("zero")),
+                duration(wrong)
+                    .is_err_and(|message| message.contains("10m") || message.contains("zero")),
                 "{wrong}"
             );
         }

@@ -11,7 +11,8 @@ use actcheck_report::Page;
 
 /// Writes results. A reader that has gone away (`| head`) ends the process quietly.
 ///
-/// On a terminal, control characters of names and messages from files and skills are shown as escapes.
+/// On a terminal, control characters of names and messages from files and skills are shown as
+/// escapes.
 pub fn print(text: &str) {
     if std::io::stdout().is_terminal() {
         print_bytes(printable_in_colour(text).as_bytes());
@@ -37,7 +38,9 @@ pub fn print_bytes(results: &[u8]) {
         if error.kind() == std::io::ErrorKind::BrokenPipe {
             std::process::exit(0);
         }
-        print_diagnostics(&Diagnostic::error("X001", format!("results could not be written: {error}")).into());
+        print_diagnostics(
+            &Diagnostic::error("X001", format!("results could not be written: {error}")).into(),
+        );
         std::process::exit(2);
     }
 }
@@ -60,10 +63,13 @@ pub fn print_none(sentence: &str) {
 /// Writes a text to the error stream.
 pub fn print_error_text(text: &str) {
     // If the error stream itself fails, there is nowhere left to report it.
-    let _ = std::io::stderr().lock().write_all(printable_in_colour(text).as_bytes());
+    let _ = std::io::stderr()
+        .lock()
+        .write_all(printable_in_colour(text).as_bytes());
 }
 
-/// Most diagnostics that are printed at once: the excerpt of each takes time in proportion to its file.
+/// Most diagnostics that are printed at once: the excerpt of each takes time in proportion to its
+/// file.
 const MOST_PRINTED: usize = 200;
 
 /// Writes faults with their places, the first 200 if there are more, and the number of errors.
@@ -82,13 +88,19 @@ pub fn print_diagnostics(faults: &Diagnostics) {
     if let Some(more @ 1..) = told.len().checked_sub(MOST_PRINTED) {
         text.push_str(&format!("{more} more are not printed\n"));
     }
-    let errors = faults.iter().filter(|fault| fault.severity == Severity::Error).count();
+    let errors = faults
+        .iter()
+        .filter(|fault| fault.severity == Severity::Error)
+        .count();
     if errors > 1 {
         text.push_str(&format!("{errors} errors\n"));
     }
     // For people only; programs read the codes.
     if let (true, Some(first)) = (std::io::stderr().is_terminal(), faults.iter().next()) {
-        text.push_str(&page.set(&format!("`actcheck explain {}` prints usual causes and the way out\n", first.code)));
+        text.push_str(&page.set(&format!(
+            "`actcheck explain {}` prints usual causes and the way out\n",
+            first.code
+        )));
     }
     print_error_text(&text);
 }
@@ -96,8 +108,8 @@ pub fn print_diagnostics(faults: &Diagnostics) {
 /// Number of places that are named for a warning with many.
 const PLACES_NAMED: usize = 3;
 
-/// The diagnostics with each warning once, since all files of a collection often have the same one. Its help names other
-/// places.
+/// The diagnostics with each warning once, since all files of a collection often have the same one.
+/// Its help names other places.
 fn once(faults: &Diagnostics) -> Vec<Diagnostic> {
     let mut told: Vec<Diagnostic> = Vec::new();
     let mut first: HashMap<(&str, &str, Option<&str>), usize> = HashMap::new();
@@ -109,7 +121,11 @@ fn once(faults: &Diagnostics) -> Vec<Diagnostic> {
                 let (count, named) = others.entry(*first).or_default();
                 *count += 1;
                 // Finding a place takes time in proportion to its file.
-                named.extend(if named.len() < PLACES_NAMED { fault.place() } else { None });
+                named.extend(if named.len() < PLACES_NAMED {
+                    fault.place()
+                } else {
+                    None
+                });
             }
             _ => {
                 first.entry(same).or_insert(told.len());
@@ -118,10 +134,16 @@ fn once(faults: &Diagnostics) -> Vec<Diagnostic> {
         }
     }
     for (idx, (count, named)) in others {
-        let help = told[idx].help.take().map_or_else(String::new, |help| help + "\n");
+        let help = told[idx]
+            .help
+            .take()
+            .map_or_else(String::new, |help| help + "\n");
         let places = if count == 1 { "place" } else { "places" };
         let more = if count > named.len() { ", …" } else { "" };
-        told[idx].help = Some(format!("{help}the same in {count} more {places}: {}{more}", named.join(", ")));
+        told[idx].help = Some(format!(
+            "{help}the same in {count} more {places}: {}{more}",
+            named.join(", ")
+        ));
     }
     told
 }
@@ -129,9 +151,19 @@ fn once(faults: &Diagnostics) -> Vec<Diagnostic> {
 /// Breaks message and help between words, but not within code.
 fn broken_into_lines(fault: Diagnostic, page: Page) -> Diagnostic {
     let width = page.width.map_or(WIDEST, |width| width.min(WIDEST));
-    let fill = |text: &str, before: usize| Page { width: width.checked_sub(before), ..page }.fill(text);
+    let fill = |text: &str, before: usize| {
+        Page {
+            width: width.checked_sub(before),
+            ..page
+        }
+        .fill(text)
+    };
     // In front of a message are four columns, such as `  × `, and in front of a help `  help: `.
-    Diagnostic { message: fill(&fault.message, 4), help: fault.help.as_deref().map(|help| fill(help, 8)), ..fault }
+    Diagnostic {
+        message: fill(&fault.message, 4),
+        help: fault.help.as_deref().map(|help| fill(help, 8)),
+        ..fault
+    }
 }
 
 /// Only the first error of each file outside of the project: messages may quote its words.
@@ -148,15 +180,26 @@ fn first_of_foreign(faults: Vec<Diagnostic>) -> Vec<Diagnostic> {
 
 /// A fault in a file outside of the project has its place, but no excerpt.
 fn without_foreign_text(fault: &Diagnostic) -> Diagnostic {
-    let is_foreign = fault.source.as_ref().is_some_and(|source| !own_files::is_own(&source.name));
+    let is_foreign = fault
+        .source
+        .as_ref()
+        .is_some_and(|source| !own_files::is_own(&source.name));
     match fault.place() {
         Some(place) if is_foreign && fault.span.is_some() => {
             // Parsers quote a part of a text that they can't parse.
             let is_syntax = fault.message.starts_with("this is not ");
-            let problem =
-                fault.message.split_once(": ").filter(|_| is_syntax).map_or(&*fault.message, |(what, _)| what);
+            let problem = fault
+                .message
+                .split_once(": ")
+                .filter(|_| is_syntax)
+                .map_or(&*fault.message, |(what, _)| what);
             let message = format!("{place}: {problem}");
-            Diagnostic { source: None, span: None, message, ..fault.clone() }
+            Diagnostic {
+                source: None,
+                span: None,
+                message,
+                ..fault.clone()
+            }
         }
         _ => fault.clone(),
     }
@@ -165,7 +208,10 @@ fn without_foreign_text(fault: &Diagnostic) -> Diagnostic {
 /// A fault of a whole file has no excerpt with the file's name, so the message names the file.
 fn with_file_in_message(fault: &Diagnostic) -> Diagnostic {
     match (&fault.source, &fault.span) {
-        (Some(source), None) => Diagnostic { message: format!("{}: {}", source.name, fault.message), ..fault.clone() },
+        (Some(source), None) => Diagnostic {
+            message: format!("{}: {}", source.name, fault.message),
+            ..fault.clone()
+        },
         _ => fault.clone(),
     }
 }
@@ -175,7 +221,17 @@ const WIDEST: usize = 100;
 
 /// Colours are those of the terminal's own palette, which fit a light and a dark background.
 fn handler(page: Page) -> GraphicalReportHandler {
-    let styles = if page.colour { ThemeStyles::ansi() } else { ThemeStyles::none() };
-    let theme = GraphicalTheme { characters: ThemeCharacters::unicode(), styles };
-    GraphicalReportHandler::new_themed(theme).with_width(WIDEST).with_wrap_lines(false).with_links(false)
+    let styles = if page.colour {
+        ThemeStyles::ansi()
+    } else {
+        ThemeStyles::none()
+    };
+    let theme = GraphicalTheme {
+        characters: ThemeCharacters::unicode(),
+        styles,
+    };
+    GraphicalReportHandler::new_themed(theme)
+        .with_width(WIDEST)
+        .with_wrap_lines(false)
+        .with_links(false)
 }

@@ -24,32 +24,58 @@ impl<'a> Picture<'a> {
     /// # Errors
     /// X012: the extension is neither `.png` nor `.svg`.
     pub(super) fn new(file: &'a Path) -> Result<Self, Diagnostics> {
-        let ending = file.extension().unwrap_or_default().to_string_lossy().to_lowercase();
+        let ending = file
+            .extension()
+            .unwrap_or_default()
+            .to_string_lossy()
+            .to_lowercase();
         match ending.as_str() {
-            "png" => Ok(Self { file, render: Drawing::to_png }),
-            "svg" => Ok(Self { file, render: |drawing| Ok(drawing.to_svg().into_bytes()) }),
+            "png" => Ok(Self {
+                file,
+                render: Drawing::to_png,
+            }),
+            "svg" => Ok(Self {
+                file,
+                render: |drawing| Ok(drawing.to_svg().into_bytes()),
+            }),
             _ => {
                 let message = format!("no picture format is known for {}", file.display());
-                let help = format!("use the extension .png or .svg, such as {}", file.with_extension("png").display());
+                let help = format!(
+                    "use the extension .png or .svg, such as {}",
+                    file.with_extension("png").display()
+                );
                 Err(Diagnostic::error("X012", message).help(help).into())
             }
         }
     }
 
-    /// Draws a run, with the signals that decided its failed properties about time by the rules of an ontology, or of the
-    /// usual one.
+    /// Draws a run, with the signals that decided its failed properties about time by the rules of
+    /// an ontology, or of the usual one.
     ///
     /// # Errors
     /// X006: the run has no state to draw; X007: the file can't be written.
-    pub(super) fn draw(&self, history: &History, run: &RunDetail, ontology: Option<&Path>) -> Result<(), Diagnostics> {
+    pub(super) fn draw(
+        &self,
+        history: &History,
+        run: &RunDetail,
+        ontology: Option<&Path>,
+    ) -> Result<(), Diagnostics> {
         // Without its motion, the states before and after are drawn.
         let id = &run.row.run;
-        let trace = history.trace_if_allowed(id)?.map_or_else(|| history.states(id), Ok)?;
-        let drawing = run_picture(&Caption { charts: charts(&trace, run, ontology), ..Caption::of(run) }, &trace)
-            .ok_or_else(|| {
-                Diagnostic::error("X006", format!("run {} has no state to draw", run.row.run))
-                    .help("it broke before its first action; `actcheck show` shows the reason")
-            })?;
+        let trace = history
+            .trace_if_allowed(id)?
+            .map_or_else(|| history.states(id), Ok)?;
+        let drawing = run_picture(
+            &Caption {
+                charts: charts(&trace, run, ontology),
+                ..Caption::of(run)
+            },
+            &trace,
+        )
+        .ok_or_else(|| {
+            Diagnostic::error("X006", format!("run {} has no state to draw", run.row.run))
+                .help("it broke before its first action; `actcheck show` shows the reason")
+        })?;
         self.write(&drawing)
     }
 
@@ -58,7 +84,8 @@ impl<'a> Picture<'a> {
     /// # Errors
     /// X007: the file can't be written.
     pub(super) fn write(&self, drawing: &Drawing) -> Result<(), Diagnostics> {
-        let bytes = (self.render)(drawing).map_err(|error| output_file::cannot_write(self.file, error))?;
+        let bytes =
+            (self.render)(drawing).map_err(|error| output_file::cannot_write(self.file, error))?;
         output_file::write(self.file, bytes)
     }
 }
@@ -67,6 +94,10 @@ impl<'a> Picture<'a> {
 fn charts(trace: &Trace, run: &RunDetail, ontology: Option<&Path>) -> Vec<Chart> {
     let budget = Budget::default();
     let (files, path) = ontology_file(ontology);
-    let rules = ontology::load(&files, &path).and_then(|ontology| RuleBook::prepare_within(&ontology, &budget));
-    rules.map_or_else(|_| Vec::new(), |rules| Chart::all_of(&explained(trace, &rules, run, &budget)))
+    let rules = ontology::load(&files, &path)
+        .and_then(|ontology| RuleBook::prepare_within(&ontology, &budget));
+    rules.map_or_else(
+        |_| Vec::new(),
+        |rules| Chart::all_of(&explained(trace, &rules, run, &budget)),
+    )
 }

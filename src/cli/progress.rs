@@ -16,10 +16,13 @@ pub struct Progress {
 }
 
 impl Progress {
-    /// Creates a bar for a number of runs. With a time budget, it shows the elapsed time instead of the remaining runs.
+    /// Creates a bar for a number of runs. With a time budget, it shows the elapsed time instead of
+    /// the remaining runs.
     pub fn new(runs: u64, time_secs: Option<f64>) -> Self {
         let bar = ProgressBar::with_draw_target(Some(runs), ProgressDrawTarget::stderr());
-        let drawn = terminal::of_errors().width.is_none_or(|width| width >= WIDTH_OF_BAR);
+        let drawn = terminal::of_errors()
+            .width
+            .is_none_or(|width| width >= WIDTH_OF_BAR);
         let template = match time_secs {
             None if drawn => "{bar:24} {pos}/{len} runs  {rate}  {eta} left  {msg}".to_owned(),
             None => "{pos}/{len} runs  {rate}  {eta} left  {msg}".to_owned(),
@@ -29,16 +32,25 @@ impl Progress {
             // A line that can't be formatted is drawn without its rate.
             let _ = write!(out, "{:.1} runs/s", state.per_sec());
         };
-        let style = ProgressStyle::with_template(&template).unwrap_or_else(|_| ProgressStyle::default_bar());
+        let style = ProgressStyle::with_template(&template)
+            .unwrap_or_else(|_| ProgressStyle::default_bar());
         bar.set_style(style.with_key("rate", rate));
         bar.set_message("0 failed");
         bar.enable_steady_tick(std::time::Duration::from_millis(200));
-        Self { bar, failed: 0, spoilt: 0 }
+        Self {
+            bar,
+            failed: 0,
+            spoilt: 0,
+        }
     }
 
     /// A bar that is never drawn.
     pub fn hidden() -> Self {
-        Self { bar: ProgressBar::hidden(), failed: 0, spoilt: 0 }
+        Self {
+            bar: ProgressBar::hidden(),
+            failed: 0,
+            spoilt: 0,
+        }
     }
 
     /// Returns a handle for printing above the bar.
@@ -55,8 +67,13 @@ impl Progress {
     pub fn run(&mut self, run: &RunSummary) {
         self.failed += u64::from(run.failed());
         self.spoilt += u64::from(run.reason.is_some());
-        let spoilt = if self.spoilt > 0 { format!(", {} did not complete", self.spoilt) } else { String::new() };
-        self.bar.set_message(format!("{} failed{spoilt}", self.failed));
+        let spoilt = if self.spoilt > 0 {
+            format!(", {} did not complete", self.spoilt)
+        } else {
+            String::new()
+        };
+        self.bar
+            .set_message(format!("{} failed{spoilt}", self.failed));
         self.bar.inc(1);
     }
 

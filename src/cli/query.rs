@@ -34,8 +34,8 @@ pub struct QueryArgs {
     /// The folder of the history.
     #[command(flatten)]
     pub history: HistoryArgs,
-    /// Ask a SPARQL 1.1 endpoint, to which the history was sent with `actcheck export --sparql`, instead of the history here.
-    /// Credentials: as for `export --sparql`
+    /// Ask a SPARQL 1.1 endpoint, to which the history was sent with `actcheck export --sparql`,
+    /// instead of the history here. Credentials: as for `export --sparql`
     #[arg(long, value_name = "URL", conflicts_with = "history")]
     pub endpoint: Option<String>,
     /// Time limit and credentials of the endpoint.
@@ -70,9 +70,12 @@ fn ask_history(args: &QueryArgs, text: &Source) -> Result<(), Diagnostics> {
             return Ok(());
         }
         (QueryFormat::Turtle, _) => {
-            return Err(Diagnostic::error("X004", "this query's answer is a table, but Turtle is for graphs")
-                .help("use CONSTRUCT or DESCRIBE, or `--format text`, `csv` or `json`")
-                .into());
+            return Err(Diagnostic::error(
+                "X004",
+                "this query's answer is a table, but Turtle is for graphs",
+            )
+            .help("use CONSTRUCT or DESCRIBE, or `--format text`, `csv` or `json`")
+            .into());
         }
         (QueryFormat::Text, _) => TableFormat::Table,
         (QueryFormat::Csv, _) => TableFormat::Csv,
@@ -99,15 +102,24 @@ fn is_empty(answer: &QueryAnswer) -> bool {
     }
 }
 
-/// The terms of histories, of the world, and of the ontology in this folder. Files that can't be read are left out: the
-/// query has been answered without them.
+/// The terms of histories, of the world, and of the ontology in this folder. Files that can't be
+/// read are left out: the query has been answered without them.
 fn vocabulary() -> Vocabulary {
-    let shipped = ["ontology/history.ttl", "ontology/world.ttl", "ontology/actions.ttl"];
-    let mut files: Vec<(Files, PathBuf)> = shipped.map(|file| (Files::Shipped, PathBuf::from(file))).into();
+    let shipped = [
+        "ontology/history.ttl",
+        "ontology/world.ttl",
+        "ontology/actions.ttl",
+    ];
+    let mut files: Vec<(Files, PathBuf)> = shipped
+        .map(|file| (Files::Shipped, PathBuf::from(file)))
+        .into();
     files.push(ontology_file(None));
-    let read = files.iter().filter_map(|(files, path)| load_vocabulary(files, path).ok());
+    let read = files
+        .iter()
+        .filter_map(|(files, path)| load_vocabulary(files, path).ok());
     let mut all = Vocabulary::default();
-    all.terms.extend(read.flat_map(|vocabulary| vocabulary.terms));
+    all.terms
+        .extend(read.flat_map(|vocabulary| vocabulary.terms));
     all
 }
 
@@ -118,14 +130,21 @@ fn list_named(format: QueryFormat) -> Result<(), Diagnostics> {
         QueryFormat::Csv => TableFormat::Csv,
         QueryFormat::Json => TableFormat::Json,
         QueryFormat::Turtle => {
-            return Err(Diagnostic::error("X004", "the list of queries is a table, but Turtle is for graphs")
-                .help("use `--format text`, `csv` or `json`")
-                .into());
+            return Err(Diagnostic::error(
+                "X004",
+                "the list of queries is a table, but Turtle is for graphs",
+            )
+            .help("use `--format text`, `csv` or `json`")
+            .into());
         }
     };
     let mut table = Table::new(["name", "title", "description"]);
     for query in named_queries::all()? {
-        table.rows.push(vec![query.name.into(), query.title.into(), query.description.into()]);
+        table.rows.push(vec![
+            query.name.into(),
+            query.title.into(),
+            query.description.into(),
+        ]);
     }
     output::print(&table.render(format, output::page()));
     Ok(())
@@ -139,13 +158,20 @@ fn text(args: &QueryArgs) -> Result<Source, Diagnostics> {
     match (&args.text, &args.file) {
         (Some(text), _) if named_queries::is_named(text) => {
             let help = format!("write `actcheck query --named {text}`");
-            Err(Diagnostic::error("X005", format!("`{text}` is the name of a query, not its text")).help(help).into())
+            Err(Diagnostic::error(
+                "X005",
+                format!("`{text}` is the name of a query, not its text"),
+            )
+            .help(help)
+            .into())
         }
         (Some(text), _) => Ok(Source::new("query", text.as_str())),
         (None, Some(file)) if file.as_os_str() == "-" => {
             let mut text = String::new();
             let read = std::io::stdin().read_to_string(&mut text);
-            read.map_err(|error| Diagnostic::error("X005", format!("standard input can't be read: {error}")))?;
+            read.map_err(|error| {
+                Diagnostic::error("X005", format!("standard input can't be read: {error}"))
+            })?;
             Ok(Source::new("standard input", text))
         }
         (None, Some(file)) => Files::Disk.read(file).map_err(|why| {
@@ -153,9 +179,9 @@ fn text(args: &QueryArgs) -> Result<Source, Diagnostics> {
                 .help("name a file with a SPARQL query")
                 .into()
         }),
-        (None, None) => {
-            Err(Diagnostic::error("X005", "no query was given").help("give its text, or a file with -f").into())
-        }
+        (None, None) => Err(Diagnostic::error("X005", "no query was given")
+            .help("give its text, or a file with -f")
+            .into()),
     }
 }
 
@@ -166,18 +192,30 @@ fn turtle(triples: &[[Term; 3]]) -> String {
 
 /// The beginning of a graph in Turtle.
 pub(super) fn turtle_prefixes() -> String {
-    names::PREFIXES.iter().map(|(prefix, namespace)| format!("@prefix {prefix}: <{namespace}> .\n")).collect()
+    names::PREFIXES
+        .iter()
+        .map(|(prefix, namespace)| format!("@prefix {prefix}: <{namespace}> .\n"))
+        .collect()
 }
 
 /// A triple in Turtle.
 pub(super) fn turtle_line([s, p, o]: &[Term; 3]) -> String {
-    format!("{} {} {} .\n", turtle_term(s), turtle_term(p), turtle_term(o))
+    format!(
+        "{} {} {} .\n",
+        turtle_term(s),
+        turtle_term(p),
+        turtle_term(o)
+    )
 }
 
 /// A term in Turtle. Literals whose shorthand would have another type carry their datatype.
 fn turtle_term(term: &Term) -> String {
     let quoted = |text: &str| {
-        let text = text.replace('\\', "\\\\").replace('"', "\\\"").replace('\n', "\\n").replace('\r', "\\r");
+        let text = text
+            .replace('\\', "\\\\")
+            .replace('"', "\\\"")
+            .replace('\n', "\\n")
+            .replace('\r', "\\r");
         format!("\"{text}\"")
     };
     match term {

@@ -27,8 +27,8 @@ pub struct RecheckArgs {
     /// Only the runs of this campaign; may be given several times [default: all]
     #[arg(long = "campaign", value_name = "ID")]
     pub campaigns: Vec<String>,
-    /// Judge by the rules of another version: a folder with `ontology/actions.ttl` (or `actions.ttl`) and the files
-    /// that it links
+    /// Judge by the rules of another version: a folder with `ontology/actions.ttl` (or
+    /// `actions.ttl`) and the files that it links
     #[arg(long, value_name = "DIR", conflicts_with = "ontology")]
     pub as_of_rules: Option<PathBuf>,
     /// The ontology with the rules [default: ontology/actions.ttl here, or the shipped one]
@@ -48,7 +48,8 @@ pub struct RecheckArgs {
     pub format: Format,
 }
 
-/// Judges stored runs by the current rules, stores new and changed outcomes, and prints them. Returns the exit code.
+/// Judges stored runs by the current rules, stores new and changed outcomes, and prints them.
+/// Returns the exit code.
 pub fn recheck(args: &RecheckArgs) -> Result<u8, Diagnostics> {
     let (files, path) = ontology(args)?;
     let jobs = args.jobs.map_or_else(all_cores, usize::from);
@@ -66,8 +67,14 @@ pub fn recheck(args: &RecheckArgs) -> Result<u8, Diagnostics> {
     output::print_diagnostics(rules.warnings());
     let progress = Progress::new(runs.len() as u64, None);
     let bar = progress.bar();
-    let stop = stop::on_interrupt(move || bar.println("stopping after the runs in flight; judgements so far are kept"));
-    let options = RecheckOptions { jobs, batch: RecheckOptions::BATCH, at: (clock::system().now)() };
+    let stop = stop::on_interrupt(move || {
+        bar.println("stopping after the runs in flight; judgements so far are kept")
+    });
+    let options = RecheckOptions {
+        jobs,
+        batch: RecheckOptions::BATCH,
+        at: (clock::system().now)(),
+    };
     if rules.reads_course() {
         restore::announce(&history, &runs, options.jobs)?;
     }
@@ -99,7 +106,10 @@ pub fn recheck(args: &RecheckArgs) -> Result<u8, Diagnostics> {
 }
 
 /// Both results, or the faults of both.
-fn both<A, B>(first: Result<A, Diagnostics>, second: Result<B, Diagnostics>) -> Result<(A, B), Diagnostics> {
+fn both<A, B>(
+    first: Result<A, Diagnostics>,
+    second: Result<B, Diagnostics>,
+) -> Result<(A, B), Diagnostics> {
     match (first, second) {
         (Ok(first), Ok(second)) => Ok((first, second)),
         (Err(mut faults), Err(others)) => {
@@ -112,17 +122,29 @@ fn both<A, B>(first: Result<A, Diagnostics>, second: Result<B, Diagnostics>) -> 
 
 /// The named ontology, the one of another version, or the default one.
 fn ontology(args: &RecheckArgs) -> Result<(Files, PathBuf), Diagnostics> {
-    let Some(folder) = &args.as_of_rules else { return Ok(ontology_file(args.ontology.as_deref())) };
+    let Some(folder) = &args.as_of_rules else {
+        return Ok(ontology_file(args.ontology.as_deref()));
+    };
     let places = ["ontology/actions.ttl", "actions.ttl"];
-    match places.map(|place| folder.join(place)).into_iter().find(|path| path.is_file()) {
+    match places
+        .map(|place| folder.join(place))
+        .into_iter()
+        .find(|path| path.is_file())
+    {
         Some(path) => Ok((Files::Disk, path)),
         None => Err(no_rules(folder).into()),
     }
 }
 
 fn no_rules(folder: &Path) -> Diagnostic {
-    Diagnostic::error("X032", format!("{} has neither `ontology/actions.ttl` nor `actions.ttl`", folder.display()))
-        .help("name a folder such as an older checkout of the project, with its ontology and rules")
+    Diagnostic::error(
+        "X032",
+        format!(
+            "{} has neither `ontology/actions.ttl` nor `actions.ttl`",
+            folder.display()
+        ),
+    )
+    .help("name a folder such as an older checkout of the project, with its ontology and rules")
 }
 
 /// The runs of the named campaigns, or all runs if none is named.
@@ -130,8 +152,14 @@ fn runs(history: &History, campaigns: &[String]) -> Result<Vec<RunRow>, Diagnost
     let known: Vec<String> = history.campaigns()?.into_iter().map(|row| row.id).collect();
     let mut faults = Diagnostics::new();
     for id in campaigns.iter().filter(|id| !known.contains(id)) {
-        let fault = format!("the history `{}` has no campaign `{id}`", history.dir().display());
-        faults.push(Diagnostic::error("X033", fault).help(did_you_mean(id, known.iter().map(String::as_str))));
+        let fault = format!(
+            "the history `{}` has no campaign `{id}`",
+            history.dir().display()
+        );
+        faults.push(
+            Diagnostic::error("X033", fault)
+                .help(did_you_mean(id, known.iter().map(String::as_str))),
+        );
     }
     let mut runs = faults.or(history.runs(&RunFilter::default())?)?;
     runs.retain(|run| campaigns.is_empty() || campaigns.contains(&run.campaign));
@@ -139,7 +167,10 @@ fn runs(history: &History, campaigns: &[String]) -> Result<Vec<RunRow>, Diagnost
     if runs.is_empty() {
         return Err(Diagnostic::error(
             "X034",
-            format!("the history `{}` has no runs to judge", history.dir().display()),
+            format!(
+                "the history `{}` has no runs to judge",
+                history.dir().display()
+            ),
         )
         .help("`actcheck run CONFIG` creates some")
         .into());
@@ -150,9 +181,15 @@ fn runs(history: &History, campaigns: &[String]) -> Result<Vec<RunRow>, Diagnost
 fn first_of(faults: Diagnostics) -> Diagnostics {
     let left_out = faults.len().saturating_sub(MAX_LISTED);
     let mut told = Diagnostics::new();
-    faults.into_iter().take(MAX_LISTED).for_each(|fault| told.push(fault));
+    faults
+        .into_iter()
+        .take(MAX_LISTED)
+        .for_each(|fault| told.push(fault));
     if left_out > 0 {
-        told.push(Diagnostic::error("X035", format!("{left_out} more runs could not be judged")));
+        told.push(Diagnostic::error(
+            "X035",
+            format!("{left_out} more runs could not be judged"),
+        ));
     }
     told
 }

@@ -11,9 +11,9 @@ use actcheck_history::{CampaignRecord, CampaignRow, History, RunDetail, RunFilte
 use actcheck_report::CaseSummary;
 use actcheck_rules::Budget;
 
-/// Prepares the cases of a campaign, sorted by file name. The campaign's own skills perform them, so no program that a
-/// case names is started. Of a campaign in parts, only the first part gets them. Their runs go into the campaign's
-/// history.
+/// Prepares the cases of a campaign, sorted by file name. The campaign's own skills perform them,
+/// so no program that a case names is started. Of a campaign in parts, only the first part gets
+/// them. Their runs go into the campaign's history.
 ///
 /// # Errors
 /// All faults of all cases at once: those of any configuration, or `S065` if a file is not a case.
@@ -41,10 +41,17 @@ fn files(folder: &Path) -> Result<Vec<PathBuf>, Diagnostics> {
     if !folder.is_dir() {
         return Ok(Vec::new());
     }
-    let entries = std::fs::read_dir(folder).and_then(|entries| entries.collect::<Result<Vec<_>, _>>());
+    let entries =
+        std::fs::read_dir(folder).and_then(|entries| entries.collect::<Result<Vec<_>, _>>());
     let entries = entries.map_err(|error| {
-        Diagnostic::error("X041", format!("the regressions in {} can't be listed: {error}", folder.display()))
-            .help("make the folder readable, or move it away")
+        Diagnostic::error(
+            "X041",
+            format!(
+                "the regressions in {} can't be listed: {error}",
+                folder.display()
+            ),
+        )
+        .help("make the folder readable, or move it away")
     })?;
     let mut files: Vec<PathBuf> = entries.into_iter().map(|entry| entry.path()).collect();
     files.retain(|file| file.extension().is_some_and(|ending| ending == "toml"));
@@ -53,10 +60,12 @@ fn files(folder: &Path) -> Result<Vec<PathBuf>, Diagnostics> {
 }
 
 fn name_of(file: &Path) -> String {
-    file.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned())
+    file.file_name()
+        .map_or_else(String::new, |name| name.to_string_lossy().into_owned())
 }
 
-/// Runs each case as its own campaign. Before a campaign that is resumed, only those that did not run before it began.
+/// Runs each case as its own campaign. Before a campaign that is resumed, only those that did not
+/// run before it began.
 ///
 /// # Errors
 /// A scene can no longer be generated, or writing failed.
@@ -69,12 +78,19 @@ pub fn run(
     let mut done = Vec::new();
     let mut new = Vec::new();
     for (file, env) in cases {
-        match resumed.map(|campaign| made_before(&file, &env, history, campaign)).transpose()?.flatten() {
+        match resumed
+            .map(|campaign| made_before(&file, &env, history, campaign))
+            .transpose()?
+            .flatten()
+        {
             Some(run) => done.push(case::summarise_stored(&file, &env, &run)),
             None => new.push((file, env)),
         }
     }
-    let context = RunContext { clock: clock::system(), disturb: None };
+    let context = RunContext {
+        clock: clock::system(),
+        disturb: None,
+    };
     quietly(|| {
         run_cases(&new, history, jobs, &context, &mut |at, made| {
             let (file, env) = &new[at];
@@ -92,11 +108,21 @@ fn made_before(
     history: &History,
     campaign: &CampaignRecord,
 ) -> Result<Option<RunDetail>, Diagnostics> {
-    let digest = env.record(String::new(), file.to_owned(), String::new()).config_digest;
+    let digest = env
+        .record(String::new(), file.to_owned(), String::new())
+        .config_digest;
     let is_of_case = |row: &CampaignRow| {
-        row.name == file && row.config_digest == digest && row.started <= campaign.started && row.ended.is_some()
+        row.name == file
+            && row.config_digest == digest
+            && row.started <= campaign.started
+            && row.ended.is_some()
     };
-    let Some(found) = history.campaigns()?.into_iter().rfind(is_of_case) else { return Ok(None) };
-    let rows = history.runs(&RunFilter { campaign: Some(found.id), ..RunFilter::default() })?;
+    let Some(found) = history.campaigns()?.into_iter().rfind(is_of_case) else {
+        return Ok(None);
+    };
+    let rows = history.runs(&RunFilter {
+        campaign: Some(found.id),
+        ..RunFilter::default()
+    })?;
     rows.first().map(|row| history.run(&row.run)).transpose()
 }

@@ -39,7 +39,8 @@ pub struct ReplayArgs {
     /// Run with this configuration instead of the one in the history
     #[arg(long, value_name = "FILE")]
     pub config: Option<PathBuf>,
-    /// Start the program that the history names, even if its configuration is not there or names another one
+    /// Start the program that the history names, even if its configuration is not there or names
+    /// another one
     #[arg(long)]
     pub trust: bool,
     /// Number of workers, each with one simulation; does not affect results [default: all cores]
@@ -61,7 +62,14 @@ pub fn replay(args: &ReplayArgs) -> Result<u8, Diagnostics> {
     let bar = ProgressBar::with_draw_target(Some(runs.len() as u64), ProgressDrawTarget::stderr());
     let fit = if args.exact { Fit::Exact } else { Fit::Nearest };
     let jobs = args.jobs.map_or_else(all_cores, usize::from);
-    let options = ReplayOptions { fit, jobs, context: RunContext { clock: clock::system(), disturb: None } };
+    let options = ReplayOptions {
+        fit,
+        jobs,
+        context: RunContext {
+            clock: clock::system(),
+            disturb: None,
+        },
+    };
     let replayed = quietly(|| replay_all(&history, &campaigns, &runs, &options, || bar.inc(1)));
     bar.finish_and_clear();
     let (mut done, mut faults) = (Vec::new(), Diagnostics::new());
@@ -76,7 +84,11 @@ pub fn replay(args: &ReplayArgs) -> Result<u8, Diagnostics> {
         Format::Json => format!("{:#}\n", replay_json(&done)),
         Format::Csv => replay_table(&done).render(Format::Csv.into(), output::page()),
     });
-    if faults.has_errors() { Err(faults) } else { Ok(u8::from(done.iter().any(|replay: &Replay| !replay.same))) }
+    if faults.has_errors() {
+        Err(faults)
+    } else {
+        Ok(u8::from(done.iter().any(|replay: &Replay| !replay.same)))
+    }
 }
 
 /// The requested runs, without duplicates, in the order in which they are named.
@@ -89,8 +101,15 @@ fn runs(history: &History, args: &ReplayArgs) -> Result<Vec<RunDetail>, Diagnost
         history.campaign(campaign)?;
     }
     if args.campaign.is_some() || args.sample.is_some() {
-        let filter = RunFilter { campaign: args.campaign.clone(), ..RunFilter::default() };
-        let all = history.runs(&filter)?.into_iter().map(|row| row.run).collect();
+        let filter = RunFilter {
+            campaign: args.campaign.clone(),
+            ..RunFilter::default()
+        };
+        let all = history
+            .runs(&filter)?
+            .into_iter()
+            .map(|row| row.run)
+            .collect();
         ids.extend(match args.sample {
             Some(size) => sample(all, size as usize, args.seed),
             None => all,

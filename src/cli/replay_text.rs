@@ -22,7 +22,11 @@ pub fn replay_text(replays: &[Replay], refused: usize) -> String {
         let expected = |replay: &&Replay| !replay.same && other_physics(&replay.changes).is_some();
         let other = replays.iter().filter(expected).count();
         let differ = replays.len() - same - other;
-        let _ = write!(out, "{same} of {} runs are the same, {differ} differ", replays.len() + refused);
+        let _ = write!(
+            out,
+            "{same} of {} runs are the same, {differ} differ",
+            replays.len() + refused
+        );
         let _ = match other {
             0 => writeln!(out),
             _ => writeln!(out, ", {other} were made by other physics"),
@@ -49,16 +53,31 @@ fn one_text(out: &mut String, replay: &Replay) {
             "  only up to {secs:.3} s, where the wall-clock limit had ended the run (`[budget] run_secs`)"
         );
     }
-    lines(out, "choice", replay.misfits.iter().map(ToString::to_string));
+    lines(
+        out,
+        "choice",
+        replay.misfits.iter().map(ToString::to_string),
+    );
     let or_none = |word: &Option<String>| word.clone().unwrap_or_else(|| "not judged".to_owned());
     let outcomes = replay.outcomes.iter().map(|change| {
         let property = names::local(&change.property);
-        format!("{property} of action {} was {}, is {}", change.step, or_none(&change.was), or_none(&change.is))
+        format!(
+            "{property} of action {} was {}, is {}",
+            change.step,
+            or_none(&change.was),
+            or_none(&change.is)
+        )
     });
     lines(out, "outcome", outcomes);
     let or_gone = |digest: &Option<String>| digest.clone().unwrap_or_else(|| "missing".to_owned());
     let changes = replay.changes.iter().map(|change| {
-        format!("{} `{}` was {}, is {}", change.kind.word(), change.name, or_gone(&change.was), or_gone(&change.is))
+        format!(
+            "{} `{}` was {}, is {}",
+            change.kind.word(),
+            change.name,
+            or_gone(&change.was),
+            or_gone(&change.is)
+        )
     });
     lines(out, "changed since", changes);
 }
@@ -75,7 +94,10 @@ fn lines(out: &mut String, what: &str, lines: impl ExactSizeIterator<Item = Stri
 
 fn difference_text(replay: &Replay) -> String {
     let Some(found) = &replay.difference else {
-        let [was, is] = replay.reasons.each_ref().map(|reason| reason.as_deref().unwrap_or("completed"));
+        let [was, is] = replay
+            .reasons
+            .each_ref()
+            .map(|reason| reason.as_deref().unwrap_or("completed"));
         return match was == is {
             true => {
                 "by less than the resolution of the stored states: 0.1 mm between the starts and ends of actions".into()
@@ -83,22 +105,63 @@ fn difference_text(replay: &Replay) -> String {
             false => format!("it ended differently: was {was}, is {is}"),
         };
     };
-    let TraceDifference { time_secs, step, body, quantity, unit, was, is, by, others } = found;
-    let place = if *step == 0 { "before the first action".to_owned() } else { format!("in action {step}") };
-    let unit = if unit.is_empty() { String::new() } else { format!(" {unit}") };
+    let TraceDifference {
+        time_secs,
+        step,
+        body,
+        quantity,
+        unit,
+        was,
+        is,
+        by,
+        others,
+    } = found;
+    let place = if *step == 0 {
+        "before the first action".to_owned()
+    } else {
+        format!("in action {step}")
+    };
+    let unit = if unit.is_empty() {
+        String::new()
+    } else {
+        format!(" {unit}")
+    };
     let by = by.map_or_else(String::new, |by| format!(", by {by:.3e}{unit}"));
-    let rest = if *others > 0 { format!("; {others} more quantities differ then") } else { String::new() };
-    format!("first at {time_secs:.3} s, {place}: {quantity} of {body} was {was}{unit}, is {is}{unit}{by}{rest}")
+    let rest = if *others > 0 {
+        format!("; {others} more quantities differ then")
+    } else {
+        String::new()
+    };
+    format!(
+        "first at {time_secs:.3} s, {place}: {quantity} of {body} was {was}{unit}, is {is}{unit}{by}{rest}"
+    )
 }
 
 /// One row for each run.
 pub fn replay_table(replays: &[Replay]) -> Table {
-    let columns = ["run", "same", "time_secs", "step", "body", "quantity", "unit", "was", "is", "by", "changed"];
+    let columns = [
+        "run",
+        "same",
+        "time_secs",
+        "step",
+        "body",
+        "quantity",
+        "unit",
+        "was",
+        "is",
+        "by",
+        "changed",
+    ];
     let mut table = Table::new(columns);
     for replay in replays {
-        let of = |value: fn(&TraceDifference) -> Value| replay.difference.as_ref().map_or(Value::Null, value);
-        let changed: Vec<String> =
-            replay.changes.iter().map(|change| format!("{} {}", change.kind.word(), change.name)).collect();
+        let of = |value: fn(&TraceDifference) -> Value| {
+            replay.difference.as_ref().map_or(Value::Null, value)
+        };
+        let changed: Vec<String> = replay
+            .changes
+            .iter()
+            .map(|change| format!("{} {}", change.kind.word(), change.name))
+            .collect();
         table.rows.push(vec![
             replay.run.clone().into(),
             replay.same.into(),

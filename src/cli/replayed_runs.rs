@@ -1,5 +1,5 @@
-//! Runs to be replayed in a report, read in order, a batch at a time. Reading and explaining them takes most of a report's
-//! time, so all cores share the work.
+//! Runs to be replayed in a report, read in order, a batch at a time. Reading and explaining them
+//! takes most of a report's time, so all cores share the work.
 
 use std::ops::ControlFlow;
 
@@ -17,8 +17,9 @@ pub(super) const MOST_RESTORED: usize = 10;
 /// Number of runs that a worker reads ahead.
 const RUNS_OF_A_WORKER: usize = 8;
 
-/// Reads runs in the given order and passes those that were read at once to `take`, until `take` returns
-/// [`ControlFlow::Break`]. Leaves out those whose motion a program would have to simulate again without consent.
+/// Reads runs in the given order and passes those that were read at once to `take`, until `take`
+/// returns [`ControlFlow::Break`]. Leaves out those whose motion a program would have to simulate
+/// again without consent.
 ///
 /// # Errors
 /// A run can't be read, or `take` fails.
@@ -29,30 +30,47 @@ pub(super) fn for_each_batch(
     mut take: impl FnMut(Vec<ReplayedRun>) -> Result<ControlFlow<()>, Diagnostics>,
 ) -> Result<(), Diagnostics> {
     let budget = Budget::default();
-    // If the current rules can't be read, there are no explanations; the outcomes come from the history.
+    // If the current rules can't be read, there are no explanations; the outcomes come from the
+    // history.
     let rules = RuleBook::prepare_within(ontology, &budget).ok();
     let read = |id: &String| -> Result<Option<ReplayedRun>, Diagnostics> {
         let run = history.newest_run(id)?;
-        // A run that broke before its first state has no trace; everything else about it is reported.
+        // A run that broke before its first state has no trace; everything else about it is
+        // reported.
         let trace = match unless_damaged(history.trace_if_allowed(id))? {
             Some(None) => return Ok(None),
             trace => trace.flatten(),
         };
-        let explained = rules.as_ref().zip(trace.as_ref()).map(|(rules, trace)| explained(trace, rules, &run, &budget));
+        let explained = rules
+            .as_ref()
+            .zip(trace.as_ref())
+            .map(|(rules, trace)| explained(trace, rules, &run, &budget));
         Ok(Some((run, trace, explained.unwrap_or_default())))
     };
     let order = affordable(history, order)?;
     for runs in order.chunks(all_cores() * RUNS_OF_A_WORKER) {
-        let shares: Vec<Vec<Result<Option<ReplayedRun>, Diagnostics>>> = std::thread::scope(|scope| {
-            let share = |runs: &'_ [String]| runs.iter().map(read).collect();
-            let of_each = runs.len().div_ceil(all_cores()).max(1);
-            let started: Vec<_> = runs.chunks(of_each).map(|runs| scope.spawn(move || share(runs))).collect();
-            started
-                .into_iter()
-                .map(|share| share.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)))
-                .collect()
-        });
-        let runs = shares.into_iter().flatten().filter_map(Result::transpose).collect::<Result<_, _>>()?;
+        let shares: Vec<Vec<Result<Option<ReplayedRun>, Diagnostics>>> =
+            std::thread::scope(|scope| {
+                let share = |runs: &'_ [String]| runs.iter().map(read).collect();
+                let of_each = runs.len().div_ceil(all_cores()).max(1);
+                let started: Vec<_> = runs
+                    .chunks(of_each)
+                    .map(|runs| scope.spawn(move || share(runs)))
+                    .collect();
+                started
+                    .into_iter()
+                    .map(|share| {
+                        share
+                            .join()
+                            .unwrap_or_else(|panic| std::panic::resume_unwind(panic))
+                    })
+                    .collect()
+            });
+        let runs = shares
+            .into_iter()
+            .flatten()
+            .filter_map(Result::transpose)
+            .collect::<Result<_, _>>()?;
         if take(runs)?.is_break() {
             return Ok(());
         }
@@ -74,22 +92,46 @@ fn affordable(history: &History, order: &[String]) -> Result<Vec<String>, Diagno
     Ok(affordable)
 }
 
-/// Explains the failed properties of a run, given its trace. Omits those that the current rules can't explain.
-pub(super) fn explained(trace: &Trace, rules: &RuleBook, run: &RunDetail, budget: &Budget) -> Vec<Explained> {
-    if run.actions.iter().flat_map(|action| &action.judgements).all(|judgement| judgement.outcome != Outcome::Failed) {
+/// Explains the failed properties of a run, given its trace. Omits those that the current rules
+/// can't explain.
+pub(super) fn explained(
+    trace: &Trace,
+    rules: &RuleBook,
+    run: &RunDetail,
+    budget: &Budget,
+) -> Vec<Explained> {
+    if run
+        .actions
+        .iter()
+        .flat_map(|action| &action.judgements)
+        .all(|judgement| judgement.outcome != Outcome::Failed)
+    {
         return Vec::new();
     }
     let facts = History::facts_of(trace);
     let mut found = Vec::new();
     for (idx, action) in run.actions.iter().enumerate() {
-        let Some(seen) = facts.action(idx) else { continue };
-        let failed = action.judgements.iter().filter(|judgement| judgement.outcome == Outcome::Failed);
-        let failed: Vec<&str> = failed.map(|judgement| judgement.property.as_str()).collect();
-        for (property, explanation) in failed.iter().zip(rules.explain_all(&seen, &failed, budget)) {
+        let Some(seen) = facts.action(idx) else {
+            continue;
+        };
+        let failed = action
+            .judgements
+            .iter()
+            .filter(|judgement| judgement.outcome == Outcome::Failed);
+        let failed: Vec<&str> = failed
+            .map(|judgement| judgement.property.as_str())
+            .collect();
+        for (property, explanation) in failed.iter().zip(rules.explain_all(&seen, &failed, budget))
+        {
             if let Ok(explanation) = explanation {
                 let (step, property) = (action.step, (*property).to_owned());
                 let text = explanation.to_text();
-                found.push(Explained { step, property, text, deciding: explanation.deciding });
+                found.push(Explained {
+                    step,
+                    property,
+                    text,
+                    deciding: explanation.deciding,
+                });
             }
         }
     }

@@ -13,7 +13,8 @@ use actcheck_base::{Diagnostic, Diagnostics};
 use actcheck_history::{History, RunDetail};
 use actcheck_report::HTML_COLUMNS;
 
-/// Maximum number of conditions of a pattern, and the false discovery rate: the defaults of `actcheck analyse`.
+/// Maximum number of conditions of a pattern, and the false discovery rate: the defaults of
+/// `actcheck analyse`.
 const DEPTH: u8 = 3;
 const LEVEL: f64 = 0.05;
 /// Millions, not 2^20, as browsers and file listings count them.
@@ -26,7 +27,8 @@ pub struct ReportArgs {
     /// Write the report as one page (HTML); `-` prints it
     #[arg(long, value_name = "FILE.html")]
     pub html: Option<PathBuf>,
-    /// Write runs in 3D over simulated time, with contacts and outcomes, for the Rerun viewer; `-` prints them
+    /// Write runs in 3D over simulated time, with contacts and outcomes, for the Rerun viewer; `-`
+    /// prints them
     #[cfg_attr(
         not(feature = "rerun"),
         doc = "",
@@ -40,8 +42,8 @@ pub struct ReportArgs {
     /// Only this property, by its name in the ontology (may be given several times)
     #[arg(long, value_name = "P")]
     pub property: Vec<String>,
-    /// Maximum size of the replays of failed runs in the page, and of recordings; larger files take longer to make and
-    /// to send
+    /// Maximum size of the replays of failed runs in the page, and of recordings; larger files take
+    /// longer to make and to send
     #[arg(long, value_name = "MB", default_value_t = 5.0, value_parser = megabytes)]
     pub replay_mb: f64,
     /// The runs to report, and their history.
@@ -68,18 +70,25 @@ impl ReportArgs {
     /// Removes the outcomes that were not requested from a run.
     pub(super) fn keep_wanted(&self, run: &mut RunDetail) {
         for action in &mut run.actions {
-            action.judgements.retain(|judgement| self.property.is_empty() || self.wants(&judgement.property));
+            action
+                .judgements
+                .retain(|judgement| self.property.is_empty() || self.wants(&judgement.property));
         }
     }
 
     /// Whether a report goes to standard output.
     ///
     /// # Errors
-    /// X058: several reports would go there. X055: a report needs a feature that this program was built without.
+    /// X058: several reports would go there. X055: a report needs a feature that this program was
+    /// built without.
     fn prints(&self) -> Result<bool, Diagnostics> {
         let mut faults = Diagnostics::new();
-        let printed = |file: &Option<PathBuf>| file.as_deref().is_some_and(|file| file.as_os_str() == "-");
-        let files = [&self.html, &self.rrd].into_iter().filter(|file| printed(file)).count();
+        let printed =
+            |file: &Option<PathBuf>| file.as_deref().is_some_and(|file| file.as_os_str() == "-");
+        let files = [&self.html, &self.rrd]
+            .into_iter()
+            .filter(|file| printed(file))
+            .count();
         let streams = self.formats.printed() + files;
         if streams > 1 {
             faults.push(
@@ -112,7 +121,10 @@ pub fn report(args: &ReportArgs) -> Result<(), Diagnostics> {
 }
 
 /// Writes the reports with replays, which are based on the analysis. Returns the messages to print.
-fn write_reports_with_replays(args: &ReportArgs, history: &History) -> Result<Vec<String>, Diagnostics> {
+fn write_reports_with_replays(
+    args: &ReportArgs,
+    history: &History,
+) -> Result<Vec<String>, Diagnostics> {
     let found = found(args, history)?;
     let room = args.replay_mb * BYTES_IN_A_MB;
     let mut told = Vec::new();
@@ -122,7 +134,11 @@ fn write_reports_with_replays(args: &ReportArgs, history: &History) -> Result<Ve
             output::print(&page);
         } else {
             output_file::write(file, &page)?;
-            told.push(format!("{} holds the report ({:.1} MB)", file.display(), page.len() as f64 / 1e6));
+            told.push(format!(
+                "{} holds the report ({:.1} MB)",
+                file.display(),
+                page.len() as f64 / 1e6
+            ));
         }
     }
     #[cfg(feature = "rerun")]

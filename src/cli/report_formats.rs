@@ -1,5 +1,5 @@
-//! `actcheck report` in the formats of other tools: reads one run after another and passes each to the requested
-//! formats.
+//! `actcheck report` in the formats of other tools: reads one run after another and passes each to
+//! the requested formats.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -13,16 +13,17 @@ use crate::{chosen, output, output_file, replayed_runs, show};
 use actcheck_base::{Below, Diagnostics, Outcome, ShellLine};
 use actcheck_history::{CampaignRow, History, RunDetail, RunFilter, RunRow, newest_of_alike};
 use actcheck_report::{
-    Attachment, Caption, Chart, EarlReport, JunitReport, MarkdownReport, Repetitions, allure_common, allure_results,
-    markdown, observation, run_picture,
+    Attachment, Caption, Chart, EarlReport, JunitReport, MarkdownReport, Repetitions,
+    allure_common, allure_results, markdown, observation, run_picture,
 };
 use actcheck_rules::{Budget, RuleBook};
 
 /// Formats of other tools.
 #[derive(Debug, Args)]
 pub struct FormatArgs {
-    /// Write results for Allure 2 and 3 into this folder, beside any others: one for each run, action and property,
-    /// with steps, parameters, explanations, and pictures of runs in which not everything passed
+    /// Write results for Allure 2 and 3 into this folder, beside any others: one for each run,
+    /// action and property, with steps, parameters, explanations, and pictures of runs in which not
+    /// everything passed
     #[arg(long, value_name = "DIR")]
     pub allure: Option<PathBuf>,
     /// Write JUnit XML; `-` prints it
@@ -31,7 +32,8 @@ pub struct FormatArgs {
     /// Write outcomes in EARL and their provenance in PROV (Turtle); `-` prints them
     #[arg(long, value_name = "FILE.ttl")]
     pub earl: Option<PathBuf>,
-    /// Write one observation for each run, in the schema of Hypothesis's observability (JSON Lines); `-` prints them
+    /// Write one observation for each run, in the schema of Hypothesis's observability (JSON
+    /// Lines); `-` prints them
     #[arg(long, value_name = "FILE.jsonl")]
     pub jsonl: Option<PathBuf>,
     /// Print a summary for a pull request (Markdown)
@@ -41,13 +43,20 @@ pub struct FormatArgs {
 
 impl FormatArgs {
     fn any(&self) -> bool {
-        self.markdown || [&self.allure, &self.junit, &self.earl, &self.jsonl].iter().any(|file| file.is_some())
+        self.markdown
+            || [&self.allure, &self.junit, &self.earl, &self.jsonl]
+                .iter()
+                .any(|file| file.is_some())
     }
 
     /// Number of formats that go to standard output.
     pub(super) fn printed(&self) -> usize {
         let files = [&self.junit, &self.earl, &self.jsonl];
-        files.iter().filter(|file| file.as_deref() == Some(Path::new("-"))).count() + usize::from(self.markdown)
+        files
+            .iter()
+            .filter(|file| file.as_deref() == Some(Path::new("-")))
+            .count()
+            + usize::from(self.markdown)
     }
 }
 
@@ -71,9 +80,12 @@ pub(super) fn write(args: &ReportArgs, history: &History) -> Result<Vec<String>,
     sinks.finish(&args.formats, &campaigns)
 }
 
-/// The requested campaigns and runs, in order; shrunk runs, failed runs that ran again, and cases only if their
-/// campaign is named.
-fn asked_for(args: &ReportArgs, history: &History) -> Result<(Vec<CampaignRow>, Vec<RunRow>), Diagnostics> {
+/// The requested campaigns and runs, in order; shrunk runs, failed runs that ran again, and cases
+/// only if their campaign is named.
+fn asked_for(
+    args: &ReportArgs,
+    history: &History,
+) -> Result<(Vec<CampaignRow>, Vec<RunRow>), Diagnostics> {
     let filter = args.chosen.filter(history)?;
     let selected = history.selected_campaigns()?;
     let wanted = |id: &String| match &filter.campaigns {
@@ -87,7 +99,11 @@ fn asked_for(args: &ReportArgs, history: &History) -> Result<(Vec<CampaignRow>, 
         return Err(chosen::none_of(history).into());
     }
     let met: BTreeSet<&String> = rows.iter().map(|row| &row.campaign).collect();
-    let campaigns = history.campaigns()?.into_iter().filter(|row| met.contains(&row.id)).collect();
+    let campaigns = history
+        .campaigns()?
+        .into_iter()
+        .filter(|row| met.contains(&row.id))
+        .collect();
     Ok((campaigns, rows))
 }
 
@@ -103,11 +119,17 @@ struct Sinks<'a> {
 }
 
 impl<'a> Sinks<'a> {
-    fn open(args: &'a ReportArgs, history: &'a History, campaigns: &[CampaignRow]) -> Result<Self, Diagnostics> {
+    fn open(
+        args: &'a ReportArgs,
+        history: &'a History,
+        campaigns: &[CampaignRow],
+    ) -> Result<Self, Diagnostics> {
         let asked = &args.formats;
         let allure = asked.allure.as_deref();
         Ok(Self {
-            allure: allure.map(|folder| AllureFolder::open(folder, args, history, campaigns)).transpose()?,
+            allure: allure
+                .map(|folder| AllureFolder::open(folder, args, history, campaigns))
+                .transpose()?,
             junit: asked.junit.as_ref().map(|_| JunitReport::new()),
             earl: asked.earl.as_ref().map(|_| EarlReport::new()),
             jsonl: asked.jsonl.as_ref().map(|_| String::new()),
@@ -138,18 +160,34 @@ impl<'a> Sinks<'a> {
             let started = campaign.map_or("", |row| row.started.as_str());
             lines.push_str(&format!("{}\n", observation(run, started)));
         }
-        self.allure.as_mut().map_or(Ok(()), |folder| folder.take(run))
+        self.allure
+            .as_mut()
+            .map_or(Ok(()), |folder| folder.take(run))
     }
 
-    fn finish(self, asked: &FormatArgs, campaigns: &[CampaignRow]) -> Result<Vec<String>, Diagnostics> {
+    fn finish(
+        self,
+        asked: &FormatArgs,
+        campaigns: &[CampaignRow],
+    ) -> Result<Vec<String>, Diagnostics> {
         let texts = [
-            (&asked.junit, self.junit.map(|report| report.text()), "JUnit XML"),
-            (&asked.earl, self.earl.map(|report| report.text(campaigns)), "outcomes in EARL"),
+            (
+                &asked.junit,
+                self.junit.map(|report| report.text()),
+                "JUnit XML",
+            ),
+            (
+                &asked.earl,
+                self.earl.map(|report| report.text(campaigns)),
+                "outcomes in EARL",
+            ),
             (&asked.jsonl, self.jsonl, "observations"),
         ];
         let mut told = Vec::new();
         for (file, text, what) in texts {
-            let (Some(file), Some(text)) = (file, text) else { continue };
+            let (Some(file), Some(text)) = (file, text) else {
+                continue;
+            };
             if file.as_os_str() == "-" {
                 output::print(&text);
             } else {
@@ -189,7 +227,8 @@ impl<'a> AllureFolder<'a> {
         campaigns: &[CampaignRow],
     ) -> Result<Self, Diagnostics> {
         let budget = Budget::default();
-        // If the current rules can't be read, there are no explanations; the outcomes come from the history.
+        // If the current rules can't be read, there are no explanations; the outcomes come from the
+        // history.
         let rules = RuleBook::prepare_within(&args.chosen.ontology()?, &budget).ok();
         output_file::folder(folder)?;
         let ids: Vec<String> = campaigns.iter().map(|row| row.id.clone()).collect();
@@ -210,9 +249,18 @@ impl<'a> AllureFolder<'a> {
 
     fn take(&mut self, run: &RunDetail) -> Result<(), Diagnostics> {
         let number = self.repetitions.number(run);
-        self.results += run.actions.iter().map(|action| action.judgements.len()).sum::<usize>();
+        self.results += run
+            .actions
+            .iter()
+            .map(|action| action.judgements.len())
+            .sum::<usize>();
         let attachments = self.attachments(run)?;
-        self.write(&allure_results(run, number, &attachments, &show::perceived(self.history, run)?))
+        self.write(&allure_results(
+            run,
+            number,
+            &attachments,
+            &show::perceived(self.history, run)?,
+        ))
     }
 
     /// Explanations of failures, and a picture unless everything passed.
@@ -238,7 +286,8 @@ impl<'a> AllureFolder<'a> {
             }
         };
         let rules = self.rules.as_ref();
-        let explained = rules.map(|rules| replayed_runs::explained(&trace, rules, run, &self.budget));
+        let explained =
+            rules.map(|rules| replayed_runs::explained(&trace, rules, run, &self.budget));
         let explained = explained.unwrap_or_default();
         let charts = Chart::all_of(&explained);
         let mut attachments: Vec<Attachment> = explained
@@ -252,7 +301,13 @@ impl<'a> AllureFolder<'a> {
             })
             .collect();
         // A run that broke before its first state has nothing to draw.
-        let picture = run_picture(&Caption { charts, ..Caption::of(run) }, &trace);
+        let picture = run_picture(
+            &Caption {
+                charts,
+                ..Caption::of(run)
+            },
+            &trace,
+        );
         attachments.extend(picture.map(|drawing| Attachment {
             about: None,
             name: "before and after".to_owned(),
@@ -273,14 +328,25 @@ impl<'a> AllureFolder<'a> {
     }
 
     fn told(&self) -> Vec<String> {
-        let generate = ShellLine::default().fixed("npx allure generate").file(self.folder);
-        let mut told = vec![format!("{} holds {} results: {generate}", self.folder.display(), self.results)];
+        let generate = ShellLine::default()
+            .fixed("npx allure generate")
+            .file(self.folder);
+        let mut told = vec![format!(
+            "{} holds {} results: {generate}",
+            self.folder.display(),
+            self.results
+        )];
         let others = self.restored.saturating_sub(MOST_RESTORED) + self.withheld;
         if others > 0 {
-            told.push(format!("{others} runs have no pictures and explanations: they are kept as outlines"));
+            told.push(format!(
+                "{others} runs have no pictures and explanations: they are kept as outlines"
+            ));
         }
         if self.untraced > 0 {
-            told.push(format!("{} runs have no pictures and explanations: their traces can't be read", self.untraced));
+            told.push(format!(
+                "{} runs have no pictures and explanations: their traces can't be read",
+                self.untraced
+            ));
         }
         told
     }

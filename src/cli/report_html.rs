@@ -16,11 +16,18 @@ use actcheck_report::{HtmlReport, PackedRuns, PropertyWords, Replays, html, repl
 /// # Errors
 /// The history can't be read.
 pub(super) fn page(found: &Analysed, history: &History, room: f64) -> Result<String, Diagnostics> {
-    let Analysed { table, sample, summary, ontology } = found;
+    let Analysed {
+        table,
+        sample,
+        summary,
+        ontology,
+    } = found;
     let order = replay_order(summary, sample.as_ref().unwrap_or(table));
     // Of a million runs, each takes seconds.
-    let (runs, replays) =
-        work::both(|| PackedRuns::of(summary, table, sample.as_ref()), || replays(history, ontology, &order, room));
+    let (runs, replays) = work::both(
+        || PackedRuns::of(summary, table, sample.as_ref()),
+        || replays(history, ontology, &order, room),
+    );
     let replays = replays?;
     Ok(html(&HtmlReport {
         version: env!("CARGO_PKG_VERSION"),
@@ -44,18 +51,31 @@ fn words(ontology: &Ontology) -> BTreeMap<String, PropertyWords> {
             _ => Vec::new(),
         },
     };
-    ontology.properties.iter().map(|(iri, property)| (iri.clone(), told(property))).collect()
+    ontology
+        .properties
+        .iter()
+        .map(|(iri, property)| (iri.clone(), told(property)))
+        .collect()
 }
 
 /// Replays of as many runs as fit into `room` bytes.
-fn replays(history: &History, ontology: &Ontology, order: &[String], room: f64) -> Result<Replays, Diagnostics> {
+fn replays(
+    history: &History,
+    ontology: &Ontology,
+    order: &[String],
+    room: f64,
+) -> Result<Replays, Diagnostics> {
     let mut replays = Replays::default();
     if room <= 0.0 {
         return Ok(replays);
     }
     replayed_runs::for_each_batch(history, ontology, order, |batch| {
         replays.add_all(&batch, room);
-        Ok(if replays.bytes() as f64 >= room { ControlFlow::Break(()) } else { ControlFlow::Continue(()) })
+        Ok(if replays.bytes() as f64 >= room {
+            ControlFlow::Break(())
+        } else {
+            ControlFlow::Continue(())
+        })
     })?;
     Ok(replays)
 }

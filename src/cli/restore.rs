@@ -10,14 +10,20 @@ use actcheck_history::{History, RunRow};
 /// Whether a note has said that runs are simulated again.
 static IS_NOTED: AtomicBool = AtomicBool::new(false);
 
-/// Lets a history simulate runs again. The first time, a note says so. Programs that this starts need consent
-/// (`is_trusted`): without it, a warning names them, and the motion is missing.
+/// Lets a history simulate runs again. The first time, a note says so. Programs that this starts
+/// need consent (`is_trusted`): without it, a warning names them, and the motion is missing.
 pub fn allow(history: &History, is_trusted: bool) {
-    let context = RunContext { clock: clock::system(), disturb: None };
-    let may_run = move |campaign: &str, starts: &_| is_trusted || trust::starts_none(campaign, starts);
+    let context = RunContext {
+        clock: clock::system(),
+        disturb: None,
+    };
+    let may_run =
+        move |campaign: &str, starts: &_| is_trusted || trust::starts_none(campaign, starts);
     history.restore_with(restorer(context, Box::new(may_run), move |run| {
         if !IS_NOTED.swap(true, Ordering::Relaxed) {
-            note(format!("run {run} is kept as an outline: its motion is simulated again"));
+            note(format!(
+                "run {run} is kept as an outline: its motion is simulated again"
+            ));
         }
     }));
 }
@@ -31,8 +37,14 @@ pub fn announce(history: &History, runs: &[RunRow], jobs: usize) -> Result<(), D
     if runs > 1 {
         IS_NOTED.store(true, Ordering::Relaxed);
         let secs = secs / jobs.max(1) as f64;
-        let time = if secs < 100.0 { format!("{secs:.0} s") } else { format!("{:.0} min", secs / 60.0) };
-        note(format!("{runs} runs are kept as outlines: their motion is simulated again, which takes about {time}"));
+        let time = if secs < 100.0 {
+            format!("{secs:.0} s")
+        } else {
+            format!("{:.0} min", secs / 60.0)
+        };
+        note(format!(
+            "{runs} runs are kept as outlines: their motion is simulated again, which takes about {time}"
+        ));
     }
     Ok(())
 }

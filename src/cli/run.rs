@@ -17,14 +17,15 @@ use actcheck_analysis as analysis;
 use actcheck_analysis::{Interval, Mirror, Sampling};
 use actcheck_base::{Diagnostic, Diagnostics, Outcome};
 use actcheck_campaign::{
-    CampaignOptions, CampaignResult, Ending, Env, ExhaustedBudget, RunContext, StoredRuns, WeightedRate, resume_all,
+    CampaignOptions, CampaignResult, Ending, Env, ExhaustedBudget, RunContext, StoredRuns,
+    WeightedRate, resume_all,
 };
 use actcheck_history as history;
 use actcheck_history::{History, RunFilter, RunRecord, RunRow, newest_of_alike};
 use actcheck_report::{
     CampaignSummary, EndedBy, GuidedSearch, HealthSummary, RunSummary, WeightedLine, campaign_json,
-    campaign_result_text, campaign_table, campaign_text, health_json, health_lines, shrunk_json, shrunk_text,
-    with_shrunk,
+    campaign_result_text, campaign_table, campaign_text, health_json, health_lines, shrunk_json,
+    shrunk_text, with_shrunk,
 };
 use actcheck_rules::Budget;
 use actcheck_verdict::{Counts, mean};
@@ -35,7 +36,10 @@ const MIRROR_EVERY: usize = 1_000;
 /// Runs a campaign and prints its results. Returns the exit code.
 pub fn run(args: &RunArgs) -> Result<u8, Diagnostics> {
     let (stop, shown) = interrupt();
-    let budget = Budget { stop: Arc::clone(&stop), ..Budget::default() };
+    let budget = Budget {
+        stop: Arc::clone(&stop),
+        ..Budget::default()
+    };
     let jobs = args.jobs.map_or_else(all_cores, usize::from);
     let session = match session::open(args, &budget, jobs)? {
         Opened::Case(env) => {
@@ -55,8 +59,8 @@ pub fn run(args: &RunArgs) -> Result<u8, Diagnostics> {
     })
 }
 
-/// Makes the runs that a campaign lacks, and prints its results. `on_bar` gets the bar before the first run. Returns the
-/// exit code.
+/// Makes the runs that a campaign lacks, and prints its results. `on_bar` gets the bar before the
+/// first run. Returns the exit code.
 pub(super) fn campaign(
     args: &RunArgs,
     session: Session,
@@ -73,7 +77,13 @@ pub(super) fn campaign(
     };
     on_bar(progress.bar());
     session.begin((clock.now)())?;
-    let options = CampaignOptions { jobs, context: RunContext { clock, disturb: None } };
+    let options = CampaignOptions {
+        jobs,
+        context: RunContext {
+            clock,
+            disturb: None,
+        },
+    };
     let mut runs: Vec<RunSummary> = session.kept.iter().map(RunSummary::from_history).collect();
     runs.iter().for_each(|run| progress.run(run));
     let mut failures = LiveFailures::new(&session.env, &session.id, verbosity);
@@ -94,8 +104,16 @@ pub(super) fn campaign(
     if failures.any() && args.format == Format::Text {
         output::print_error_text("\n");
     }
-    let Session { env, history, id, failed, regressions, .. } = session;
-    // Sums are taken in the order of indices, so that a campaign merged from parts gets bit-identical results.
+    let Session {
+        env,
+        history,
+        id,
+        failed,
+        regressions,
+        ..
+    } = session;
+    // Sums are taken in the order of indices, so that a campaign merged from parts gets
+    // bit-identical results.
     runs.sort_by_key(|run| run.index);
     let finished = finish(&history, &id, &runs, &end, (clock.now)());
     let mut summary = summarise(&env, id.clone(), runs, &end);
@@ -104,13 +122,24 @@ pub(super) fn campaign(
         mirror(&history);
         summary.failure_modes = failure_modes(&history, id, summary.sampling())?;
     }
-    // If the history failed, only that fault is reported. Failed runs are a biased sample, so their health means little.
-    let health =
-        if finished.is_ok() && failed.is_none() { Some(health::examine(&history, &summary.campaign)?) } else { None };
-    let results = Results { summary: &summary, health: health.as_ref(), format: args.format, verbosity };
+    // If the history failed, only that fault is reported. Failed runs are a biased sample, so their
+    // health means little.
+    let health = if finished.is_ok() && failed.is_none() {
+        Some(health::examine(&history, &summary.campaign)?)
+    } else {
+        None
+    };
+    let results = Results {
+        summary: &summary,
+        health: health.as_ref(),
+        format: args.format,
+        verbosity,
+    };
     let shrinks = args.shrink && finished.is_ok() && is_whole(&end);
     if shrinks {
-        results.print_with(|| shrink::shrink_modes(&env, &history, &examples(&summary), options.jobs, stop))?;
+        results.print_with(|| {
+            shrink::shrink_modes(&env, &history, &examples(&summary), options.jobs, stop)
+        })?;
     } else {
         results.print();
     }
@@ -119,25 +148,40 @@ pub(super) fn campaign(
     finished.map(|()| if interrupted { stop::INTERRUPTED } else { code })
 }
 
-/// Makes the runs of a campaign, or those of `--last-failed`. Returns also the faults of runs that can't be made again.
+/// Makes the runs of a campaign, or those of `--last-failed`. Returns also the faults of runs that
+/// can't be made again.
 fn make_runs(
     session: &Session,
     options: &CampaignOptions,
     stop: &AtomicBool,
     mut on_run: impl FnMut(&RunRecord),
 ) -> (CampaignResult, Diagnostics) {
-    let Session { env, history, id, failed, kept, .. } = session;
+    let Session {
+        env,
+        history,
+        id,
+        failed,
+        kept,
+        ..
+    } = session;
     quietly(|| match failed {
         Some(failed) => failed.run((env, history, id), options, stop, &mut on_run),
         None => {
             let stored = StoredRuns::of(kept);
-            (resume_all(env, history, id, stored, options, stop, &mut on_run), Diagnostics::new())
+            (
+                resume_all(env, history, id, stored, options, stop, &mut on_run),
+                Diagnostics::new(),
+            )
         }
     })
 }
 
 /// The exit code of a campaign, unless an error ended it or runs could not be made again.
-fn exit_code(ending: Ending, faults: Diagnostics, summary: &CampaignSummary) -> Result<u8, Diagnostics> {
+fn exit_code(
+    ending: Ending,
+    faults: Diagnostics,
+    summary: &CampaignSummary,
+) -> Result<u8, Diagnostics> {
     match ending {
         Ending::Stopped(faults) => Err(faults),
         Ending::Interrupted => Ok(stop::INTERRUPTED),
@@ -148,19 +192,23 @@ fn exit_code(ending: Ending, faults: Diagnostics, summary: &CampaignSummary) -> 
 
 /// X039: `--last-failed` has nothing to run.
 fn none_failed(campaign: &str) -> Diagnostic {
-    Diagnostic::warning("X039", format!("no run failed in campaign {campaign}, the last one of this configuration"))
-        .help("run the configuration without `--last-failed` to try all its scenes")
+    Diagnostic::warning(
+        "X039",
+        format!("no run failed in campaign {campaign}, the last one of this configuration"),
+    )
+    .help("run the configuration without `--last-failed` to try all its scenes")
 }
 
-/// Updates the tables beside the history. They can be rebuilt at any time, so a fault is only reported.
+/// Updates the tables beside the history. They can be rebuilt at any time, so a fault is only
+/// reported.
 fn mirror(history: &History) {
     if let Err(faults) = Mirror::update(history) {
         output::print_diagnostics(&faults);
     }
 }
 
-/// The flag that Ctrl-C sets, and a cell for the bar that then shows it; while the cell is empty, Ctrl-C ends the
-/// process.
+/// The flag that Ctrl-C sets, and a cell for the bar that then shows it; while the cell is empty,
+/// Ctrl-C ends the process.
 fn interrupt() -> (Arc<AtomicBool>, Arc<OnceLock<ProgressBar>>) {
     let shown = Arc::new(OnceLock::<ProgressBar>::new());
     let bar = Arc::clone(&shown);
@@ -186,8 +234,15 @@ impl Results<'_> {
             Format::Text => {
                 let page = output::page();
                 let quiet = self.verbosity == Verbosity::Quiet;
-                let text = if quiet { campaign_result_text } else { campaign_text }(self.summary, page);
-                text + &self.health.map(|health| health_lines(health, page)).unwrap_or_default()
+                let text = if quiet {
+                    campaign_result_text
+                } else {
+                    campaign_text
+                }(self.summary, page);
+                text + &self
+                    .health
+                    .map(|health| health_lines(health, page))
+                    .unwrap_or_default()
             }
             Format::Csv => campaign_table(self.summary).render(self.format.into(), output::page()),
             Format::Json => format!("{:#}\n", self.json()),
@@ -203,22 +258,27 @@ impl Results<'_> {
 
     fn warn(&self) {
         if self.format == Format::Csv {
-            output::print_diagnostics(&self.health.map(HealthSummary::warnings).unwrap_or_default());
+            output::print_diagnostics(
+                &self.health.map(HealthSummary::warnings).unwrap_or_default(),
+            );
         }
     }
 
-    /// Prints the results with the shrunk runs. The table is printed before shrinking, so that users need not wait for
-    /// it; CSV and JSON are one document.
+    /// Prints the results with the shrunk runs. The table is printed before shrinking, so that
+    /// users need not wait for it; CSV and JSON are one document.
     fn print_with(&self, shrink: impl FnOnce() -> shrink::ShrunkModes) -> Result<(), Diagnostics> {
         if self.format == Format::Text {
             self.print();
         }
         let shrunk = shrink();
         output::print(&match self.format {
-            Format::Text => shrunk.done.iter().map(|one| format!("\n{}", shrunk_text(one, output::page()))).collect(),
-            Format::Csv => {
-                with_shrunk(campaign_table(self.summary), &shrunk.done).render(self.format.into(), output::page())
-            }
+            Format::Text => shrunk
+                .done
+                .iter()
+                .map(|one| format!("\n{}", shrunk_text(one, output::page())))
+                .collect(),
+            Format::Csv => with_shrunk(campaign_table(self.summary), &shrunk.done)
+                .render(self.format.into(), output::page()),
             Format::Json => {
                 let mut json = self.json();
                 json["shrunk"] = shrunk.done.iter().map(shrunk_json).collect();
@@ -232,7 +292,10 @@ impl Results<'_> {
 
 /// The first run of each failure mode, with its index in the campaign.
 fn examples(summary: &CampaignSummary) -> Vec<(String, u64)> {
-    let failing = summary.failure_modes.iter().filter(|mode| !mode.failed.is_empty());
+    let failing = summary
+        .failure_modes
+        .iter()
+        .filter(|mode| !mode.failed.is_empty());
     let first = failing.filter_map(|mode| mode.runs.first());
     first
         .filter_map(|id| summary.runs.iter().find(|run| run.id == *id))
@@ -242,7 +305,9 @@ fn examples(summary: &CampaignSummary) -> Vec<(String, u64)> {
 
 /// How the user invoked this program.
 pub(super) fn program() -> String {
-    std::env::args().next().unwrap_or_else(|| "actcheck".to_owned())
+    std::env::args()
+        .next()
+        .unwrap_or_else(|| "actcheck".to_owned())
 }
 
 /// The budget that ended a campaign.
@@ -266,13 +331,18 @@ fn finish(
     end: &CampaignResult,
     ended: String,
 ) -> Result<(), Diagnostics> {
-    let whole = runs.iter().filter(|run| run.status != history::RunStatus::Broken);
+    let whole = runs
+        .iter()
+        .filter(|run| run.status != history::RunStatus::Broken);
     let counts = Counts::of(runs.iter().flat_map(RunSummary::outcomes));
     let record = history::CampaignEnd {
         ended,
         score: mean(runs.iter().map(|run| run.score)),
         score_without_broken: mean(whole.map(|run| run.score)),
-        outcomes: Outcome::ALL.into_iter().map(|outcome| (outcome, counts.get(outcome))).collect(),
+        outcomes: Outcome::ALL
+            .into_iter()
+            .map(|outcome| (outcome, counts.get(outcome)))
+            .collect(),
         discards: end.discards.len() as u64,
         ended_by: spent(end).map(|spent| spent.word().to_owned()),
         interrupted: !is_whole(end),
@@ -280,33 +350,57 @@ fn finish(
     history.finish_campaign(id, &record)
 }
 
-fn failure_modes(history: &History, id: String, sampling: Sampling) -> Result<Vec<analysis::FailureMode>, Diagnostics> {
-    let filter = RunFilter { campaign: Some(id), ..RunFilter::default() };
+fn failure_modes(
+    history: &History,
+    id: String,
+    sampling: Sampling,
+) -> Result<Vec<analysis::FailureMode>, Diagnostics> {
+    let filter = RunFilter {
+        campaign: Some(id),
+        ..RunFilter::default()
+    };
     let rows = history.outcomes(&filter)?;
     let runs = history.runs(&filter)?;
     Ok(analysis::failure_modes(&rows, &scenes(runs), sampling))
 }
 
-/// The scene of each run: its number if scenes are repeated, or the position of the first run with the same trace. Empty if
-/// all scenes were run once.
+/// The scene of each run: its number if scenes are repeated, or the position of the first run with
+/// the same trace. Empty if all scenes were run once.
 fn scenes(runs: Vec<RunRow>) -> BTreeMap<String, u64> {
     if runs.iter().any(|run| run.repetition.is_some()) {
-        return runs.into_iter().filter_map(|run| Some((run.run, run.repetition?.scene))).collect();
+        return runs
+            .into_iter()
+            .filter_map(|run| Some((run.run, run.repetition?.scene)))
+            .collect();
     }
     let alike = newest_of_alike(&runs).len() < runs.len();
     let mut first: BTreeMap<String, u64> = BTreeMap::new();
     let mut scenes = BTreeMap::new();
     for run in runs.into_iter().filter(|_| alike) {
-        let scene =
-            if run.trace_hash.is_empty() { run.index } else { *first.entry(run.trace_hash).or_insert(run.index) };
+        let scene = if run.trace_hash.is_empty() {
+            run.index
+        } else {
+            *first.entry(run.trace_hash).or_insert(run.index)
+        };
         scenes.insert(run.run, scene);
     }
     scenes
 }
 
-fn summarise(env: &Env, campaign: String, runs: Vec<RunSummary>, end: &CampaignResult) -> CampaignSummary {
+fn summarise(
+    env: &Env,
+    campaign: String,
+    runs: Vec<RunSummary>,
+    end: &CampaignResult,
+) -> CampaignSummary {
     let mut properties: Vec<(String, String, Option<String>)> = Vec::new();
-    for action in env.campaign.tests.iter().flatten().filter_map(|step| env.ontology.actions.get(&step.action)) {
+    for action in env
+        .campaign
+        .tests
+        .iter()
+        .flatten()
+        .filter_map(|step| env.ontology.actions.get(&step.action))
+    {
         for iri in &action.success_properties {
             if let Some(property) = env.ontology.properties.get(iri)
                 && !properties.iter().any(|(known, ..)| known == iri)
@@ -328,7 +422,10 @@ fn summarise(env: &Env, campaign: String, runs: Vec<RunSummary>, end: &CampaignR
         privileged: env.is_privileged(),
         planned: env.runs_to_make(),
         discards: end.discards.len() as u64,
-        ended_by: spent(end).map(|spent| EndedBy { budget: spent.word(), description: spent.to_string() }),
+        ended_by: spent(end).map(|spent| EndedBy {
+            budget: spent.word(),
+            description: spent.to_string(),
+        }),
         interrupted: !is_whole(end),
     };
     summary.search = guided_search(env, &summary, end);
@@ -336,17 +433,30 @@ fn summarise(env: &Env, campaign: String, runs: Vec<RunSummary>, end: &CampaignR
 }
 
 /// The failure rates of a guided search. Returns `None` if another strategy chose the scenes.
-fn guided_search(env: &Env, summary: &CampaignSummary, end: &CampaignResult) -> Option<GuidedSearch> {
+fn guided_search(
+    env: &Env,
+    summary: &CampaignSummary,
+    end: &CampaignResult,
+) -> Option<GuidedSearch> {
     let line = |found: &WeightedRate| WeightedLine {
         test: found.test.clone(),
         property: found.property.clone(),
-        label: env.ontology.properties.get(&found.property).map_or_else(String::new, |known| known.name.clone()),
-        failing: Interval { rate: found.failing.rate, low: found.failing.low, high: found.failing.high },
+        label: env
+            .ontology
+            .properties
+            .get(&found.property)
+            .map_or_else(String::new, |known| known.name.clone()),
+        failing: Interval {
+            rate: found.failing.rate,
+            low: found.failing.low,
+            high: found.failing.high,
+        },
         scenes: found.scenes,
         raw: summary.raw_failures(&found.test, &found.property),
     };
     let strategy = env.campaign.search;
-    strategy
-        .is_guided()
-        .then(|| GuidedSearch { strategy: strategy.name().to_owned(), lines: end.rates.iter().map(line).collect() })
+    strategy.is_guided().then(|| GuidedSearch {
+        strategy: strategy.name().to_owned(),
+        lines: end.rates.iter().map(line).collect(),
+    })
 }

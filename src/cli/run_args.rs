@@ -14,26 +14,29 @@ use actcheck_search::Strategy;
 pub struct RunArgs {
     /// The campaign's configuration (TOML)
     pub config: Option<PathBuf>,
-    /// Resume the newest killed or interrupted campaign (of CONFIG, if given), or the campaign with this id, with its
-    /// original options: the results are the same as without the interruption
+    /// Resume the newest killed or interrupted campaign (of CONFIG, if given), or the campaign with
+    /// this id, with its original options: the results are the same as without the interruption
     #[arg(long, value_name = "ID", num_args = 0..=1, require_equals = true, default_missing_value = "")]
     #[arg(conflicts_with_all = ["runs", "time", "until_width", "max_failures", "seed", "repeat", "strategy", "shard"])]
     pub resume: Option<String>,
-    /// Run the failed runs of CONFIG's last campaign again, and nothing else: those in which a property failed, with their
-    /// recorded choices, and the present configuration, rules, models and skills. They form a campaign of their own,
-    /// which statistics leave out; the next `--last-failed` runs those of them that still fail
+    /// Run the failed runs of CONFIG's last campaign again, and nothing else: those in which a
+    /// property failed, with their recorded choices, and the present configuration, rules, models
+    /// and skills. They form a campaign of their own, which statistics leave out; the next
+    /// `--last-failed` runs those of them that still fail
     #[arg(long)]
     #[arg(conflicts_with_all = ["resume", "runs", "time", "until_width", "max_failures", "seed", "repeat", "strategy", "shard", "shrink"])]
     pub last_failed: bool,
-    /// Scenes for each test, instead of the configuration's `test_count`; an upper limit if a budget ends the campaign
+    /// Scenes for each test, instead of the configuration's `test_count`; an upper limit if a
+    /// budget ends the campaign
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..), allow_negative_numbers = true)]
     pub runs: Option<u32>,
-    /// End after this time, such as 90s, 10m or 2h; runs in flight are completed and kept. Without `--runs`, as many
-    /// runs as fit
+    /// End after this time, such as 90s, 10m or 2h; runs in flight are completed and kept. Without
+    /// `--runs`, as many runs as fit
     #[arg(long, value_name = "DURATION", value_parser = duration_secs)]
     pub time: Option<f64>,
-    /// End when the 95 % confidence interval of every property's pass rate is at most this wide, such as 0.05. Without
-    /// `--runs`, the limit is four times the number of runs that suffices for any rate: 6132 of each test for 0.05
+    /// End when the 95 % confidence interval of every property's pass rate is at most this wide,
+    /// such as 0.05. Without `--runs`, the limit is four times the number of runs that suffices for
+    /// any rate: 6132 of each test for 0.05
     #[arg(long, value_name = "WIDTH", value_parser = width)]
     pub until_width: Option<f64>,
     /// End at the N-th failed run, which is the same for any number of workers
@@ -42,25 +45,28 @@ pub struct RunArgs {
     /// Seed of all randomness, instead of the configuration's `seed`
     #[arg(long, value_name = "S")]
     pub seed: Option<u64>,
-    /// How scenes are chosen: random, halton, latin-hypercube, cross-entropy, bandit or boundary, instead of the
-    /// configuration's `[search] strategy`; the last three search for failures, guided by the properties' margins
+    /// How scenes are chosen: random, halton, latin-hypercube, cross-entropy, bandit or boundary,
+    /// instead of the configuration's `[search] strategy`; the last three search for failures,
+    /// guided by the properties' margins
     #[arg(long, value_name = "NAME", value_parser = strategy)]
     pub strategy: Option<Strategy>,
     /// Runs of each scene, each with different noise, instead of the configuration's `repeat`
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1000))]
     pub repeat: Option<u32>,
-    /// Number of workers, each with one simulation; does not affect the results [default: all cores]
+    /// Number of workers, each with one simulation; does not affect the results [default: all
+    /// cores]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub jobs: Option<u16>,
-    /// Run only part I of N: every N-th run, starting with the I-th; `actcheck merge` joins the parts. Budgets apply to
-    /// each part
+    /// Run only part I of N: every N-th run, starting with the I-th; `actcheck merge` joins the
+    /// parts. Budgets apply to each part
     #[arg(long, value_name = "I/N")]
     pub shard: Option<Shard>,
     /// Shrink one run of each failure mode afterwards, as `actcheck shrink` does
     #[arg(long)]
     pub shrink: bool,
-    /// Start the program that CONFIG names if it is a case; without it, a case runs only with the reference skills. Files
-    /// of the folder `regressions` need no consent: the campaign's own skills perform them
+    /// Start the program that CONFIG names if it is a case; without it, a case runs only with the
+    /// reference skills. Files of the folder `regressions` need no consent: the campaign's own
+    /// skills perform them
     #[arg(long)]
     pub trust: bool,
     /// Folder of the history [default: `.actcheck` beside the configuration]
@@ -72,7 +78,8 @@ pub struct RunArgs {
     /// Print only the result: scores and failures, without progress, tables and notes
     #[arg(long, short, conflicts_with = "verbose")]
     pub quiet: bool,
-    /// Print every failure when it happens, each with all its failed properties; otherwise the first ten, each with one
+    /// Print every failure when it happens, each with all its failed properties; otherwise the
+    /// first ten, each with one
     #[arg(long, short)]
     pub verbose: bool,
 }

@@ -12,14 +12,19 @@ use crate::output;
 /// `actcheck schema`
 #[derive(Debug, Args)]
 pub struct SchemaArgs {
-    /// Print a reference page (Markdown) instead: all tables and keys with types, bounds, defaults and meanings
+    /// Print a reference page (Markdown) instead: all tables and keys with types, bounds, defaults
+    /// and meanings
     #[arg(long)]
     pub markdown: bool,
 }
 
 /// Prints the schema, or the page made from it.
 pub fn schema(args: &SchemaArgs) {
-    if args.markdown { output::print(&page()) } else { output::print(SCHEMA) }
+    if args.markdown {
+        output::print(&page())
+    } else {
+        output::print(SCHEMA)
+    }
 }
 
 const INTRODUCTION: &str = "\
@@ -40,27 +45,45 @@ in a file of this name beside them.
 fn page() -> String {
     let schema: Value = serde_json::from_str(SCHEMA).expect("the embedded schema is JSON");
     let mut page = INTRODUCTION.to_owned();
-    let (tables, keys): (Vec<_>, Vec<_>) = entries(&schema).into_iter().partition(|(_, part)| is_table(part));
+    let (tables, keys): (Vec<_>, Vec<_>) = entries(&schema)
+        .into_iter()
+        .partition(|(_, part)| is_table(part));
     page.push_str("\n## Top level\n\n");
     page.push_str(&rows(&schema, &schema, &keys));
     for (name, table) in tables {
-        let _ = write!(page, "\n## `[{name}]`\n\n{}\n\n", text(table, "description"));
-        match table.get("additionalProperties").filter(|rest| rest.is_object()) {
+        let _ = write!(
+            page,
+            "\n## `[{name}]`\n\n{}\n\n",
+            text(table, "description")
+        );
+        match table
+            .get("additionalProperties")
+            .filter(|rest| rest.is_object())
+        {
             Some(value) => page.push_str(&rows(&schema, table, &[("NAME", value)])),
             None => page.push_str(&rows(&schema, table, &entries(table))),
         }
     }
     let own = &schema["additionalProperties"];
-    let _ = write!(page, "\n## `[DESIGNATOR]`\n\n{}\n", text(own, "description"));
+    let _ = write!(
+        page,
+        "\n## `[DESIGNATOR]`\n\n{}\n",
+        text(own, "description")
+    );
     page
 }
 
 fn entries(table: &Value) -> Vec<(&str, &Value)> {
     let properties = table.get("properties").and_then(Value::as_object);
-    properties.into_iter().flatten().map(|(key, part)| (key.as_str(), part)).collect()
+    properties
+        .into_iter()
+        .flatten()
+        .map(|(key, part)| (key.as_str(), part))
+        .collect()
 }
 
-/// Whether a part is written as a table with a header; a table of free names below another one is a value.
+/// Whether a part is written as a table with a header; a table of free names below another one is a
+/// value.
 fn is_table(part: &Value) -> bool {
     part["type"] == "object"
 }
@@ -71,8 +94,13 @@ fn text<'a>(part: &'a Value, key: &str) -> &'a str {
 
 /// A Markdown table of keys.
 fn rows(schema: &Value, table: &Value, keys: &[(&str, &Value)]) -> String {
-    let required: Vec<&str> =
-        table.get("required").and_then(Value::as_array).into_iter().flatten().filter_map(Value::as_str).collect();
+    let required: Vec<&str> = table
+        .get("required")
+        .and_then(Value::as_array)
+        .into_iter()
+        .flatten()
+        .filter_map(Value::as_str)
+        .collect();
     let mut rows = "| key | value | default | meaning |\n| --- | --- | --- | --- |\n".to_owned();
     for (key, part) in keys {
         let default = match part.get("default") {
@@ -81,13 +109,26 @@ fn rows(schema: &Value, table: &Value, keys: &[(&str, &Value)]) -> String {
             None => "–".to_owned(),
         };
         let mut meaning = text(part, "description").to_owned();
-        let examples: Vec<String> =
-            part.get("examples").and_then(Value::as_array).into_iter().flatten().map(written).collect();
+        let examples: Vec<String> = part
+            .get("examples")
+            .and_then(Value::as_array)
+            .into_iter()
+            .flatten()
+            .map(written)
+            .collect();
         if !examples.is_empty() {
-            let noun = if examples.len() == 1 { "Example" } else { "Examples" };
+            let noun = if examples.len() == 1 {
+                "Example"
+            } else {
+                "Examples"
+            };
             let _ = write!(meaning, " {noun}: `{}`", examples.join("`, `"));
         }
-        let _ = writeln!(rows, "| `{key}` | {} | {default} | {meaning} |", kind(schema, part));
+        let _ = writeln!(
+            rows,
+            "| `{key}` | {} | {default} | {meaning} |",
+            kind(schema, part)
+        );
     }
     rows
 }
@@ -95,21 +136,37 @@ fn rows(schema: &Value, table: &Value, keys: &[(&str, &Value)]) -> String {
 /// The type of a value with its bounds, in words.
 fn kind(schema: &Value, part: &Value) -> String {
     if let Some(target) = part.get("$ref").and_then(Value::as_str) {
-        return kind(schema, schema.pointer(target.trim_start_matches('#')).unwrap_or(&Value::Null));
+        return kind(
+            schema,
+            schema
+                .pointer(target.trim_start_matches('#'))
+                .unwrap_or(&Value::Null),
+        );
     }
     if let Some(forms) = part.get("anyOf").and_then(Value::as_array) {
-        return forms.iter().map(|form| kind(schema, form)).collect::<Vec<_>>().join(", or ");
+        return forms
+            .iter()
+            .map(|form| kind(schema, form))
+            .collect::<Vec<_>>()
+            .join(", or ");
     }
     if let Some(names) = part.get("enum").and_then(Value::as_array) {
-        let names: Vec<String> = names.iter().map(|name| format!("`{}`", written(name))).collect();
+        let names: Vec<String> = names
+            .iter()
+            .map(|name| format!("`{}`", written(name)))
+            .collect();
         return format!("one of {}", names.join(", "));
     }
     match text(part, "type") {
-        "array" if part.get("minItems") == part.get("maxItems") && part.get("minItems").is_some() => {
+        "array"
+            if part.get("minItems") == part.get("maxItems") && part.get("minItems").is_some() =>
+        {
             format!("`[least, most]`, each {}", kind(schema, &part["items"]))
         }
         "array" => match kind(schema, &part["items"]) {
-            inner if inner.starts_with("list ") => format!("list of lists{}", inner.trim_start_matches("list")),
+            inner if inner.starts_with("list ") => {
+                format!("list of lists{}", inner.trim_start_matches("list"))
+            }
             inner => format!("list of {inner}"),
         },
         "string" => "text".to_owned(),
@@ -128,9 +185,14 @@ fn bounds(part: &Value) -> String {
         (least, most) => {
             let above = bound("exclusiveMinimum").map(|value| format!("> {value}"));
             let below = bound("exclusiveMaximum").map(|value| format!("< {value}"));
-            let [least, most] = [(least, "≥"), (most, "≤")].map(|(value, sign)| value.map(|v| format!("{sign} {v}")));
+            let [least, most] = [(least, "≥"), (most, "≤")]
+                .map(|(value, sign)| value.map(|v| format!("{sign} {v}")));
             let all: Vec<String> = [above, least, most, below].into_iter().flatten().collect();
-            if all.is_empty() { String::new() } else { format!(" {}", all.join(", ")) }
+            if all.is_empty() {
+                String::new()
+            } else {
+                format!(" {}", all.join(", "))
+            }
         }
     };
     if let Some(step) = bound("multipleOf") {
@@ -145,7 +207,9 @@ fn limit(value: &Value) -> String {
         (Some(whole), _) if whole > u64::from(u16::MAX) && (whole + 1).is_power_of_two() => {
             format!("2^{} − 1", (whole + 1).trailing_zeros())
         }
-        (None, Some(angle)) if angle.abs() == TAU => format!("{}2π", if angle < 0.0 { "−" } else { "" }),
+        (None, Some(angle)) if angle.abs() == TAU => {
+            format!("{}2π", if angle < 0.0 { "−" } else { "" })
+        }
         _ => value.to_string().replace('-', "−"),
     }
 }
@@ -153,7 +217,10 @@ fn limit(value: &Value) -> String {
 /// A value in TOML.
 fn written(value: &Value) -> String {
     match value {
-        Value::Array(items) => format!("[{}]", items.iter().map(written).collect::<Vec<_>>().join(", ")),
+        Value::Array(items) => format!(
+            "[{}]",
+            items.iter().map(written).collect::<Vec<_>>().join(", ")
+        ),
         other => other.to_string(),
     }
 }
@@ -168,10 +235,22 @@ mod tests {
         let page = page();
         for (name, part) in entries(&schema) {
             let header = format!("\n## `[{name}]`\n");
-            assert!(page.contains(&header) || page.contains(&format!("\n| `{name}` | ")), "{name}");
-            let section = page.split(&header).nth(1).unwrap_or(&page).split("\n## ").next().unwrap_or_default();
+            assert!(
+                page.contains(&header) || page.contains(&format!("\n| `{name}` | ")),
+                "{name}"
+            );
+            let section = page
+                .split(&header)
+                .nth(1)
+                .unwrap_or(&page)
+                .split("\n## ")
+                .next()
+                .unwrap_or_default();
             for (key, _) in entries(part) {
-                assert!(section.contains(&format!("\n| `{key}` | ")), "[{name}] {key}");
+                assert!(
+                    section.contains(&format!("\n| `{key}` | ")),
+                    "[{name}] {key}"
+                );
             }
         }
     }
@@ -179,10 +258,22 @@ mod tests {
     #[test]
     fn bounds_are_written_for_people() {
         let bounds = |json: &str| bounds(&serde_json::from_str(json).expect("it is JSON"));
-        assert_eq!(bounds(r#"{"minimum": 0, "maximum": 9223372036854775807}"#), " 0 … 2^63 − 1");
-        assert_eq!(bounds(r#"{"minimum": -6.283185307179586, "maximum": 6.283185307179586}"#), " −2π … 2π");
-        assert_eq!(bounds(r#"{"exclusiveMinimum": 0, "maximum": 100}"#), " > 0, ≤ 100");
-        assert_eq!(bounds(r#"{"minimum": 60, "maximum": 10000, "multipleOf": 60}"#), " 60 … 10000, a multiple of 60");
+        assert_eq!(
+            bounds(r#"{"minimum": 0, "maximum": 9223372036854775807}"#),
+            " 0 … 2^63 − 1"
+        );
+        assert_eq!(
+            bounds(r#"{"minimum": -6.283185307179586, "maximum": 6.283185307179586}"#),
+            " −2π … 2π"
+        );
+        assert_eq!(
+            bounds(r#"{"exclusiveMinimum": 0, "maximum": 100}"#),
+            " > 0, ≤ 100"
+        );
+        assert_eq!(
+            bounds(r#"{"minimum": 60, "maximum": 10000, "multipleOf": 60}"#),
+            " 60 … 10000, a multiple of 60"
+        );
         assert_eq!(bounds("{}"), "");
     }
 }

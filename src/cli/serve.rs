@@ -22,7 +22,8 @@ pub struct ServeArgs {
     /// Port to listen on; 0 takes a free one, which is printed
     #[arg(long, value_name = "PORT", default_value_t = 7878)]
     pub port: u16,
-    /// A host name by which clients reach this server, besides addresses and localhost (may be given several times)
+    /// A host name by which clients reach this server, besides addresses and localhost (may be
+    /// given several times)
     #[arg(long, value_name = "NAME")]
     pub allow_host: Vec<String>,
     /// Time limit for a query, such as 500ms, 10s or 1m
@@ -54,14 +55,20 @@ pub struct ServeQueryArgs {
 }
 
 fn at_most_a_day(text: &str) -> Result<f64, String> {
-    duration(text)
-        .and_then(|secs| if secs <= 86_400.0 { Ok(secs) } else { Err(format!("`{text}` must be at most a day (24h)")) })
+    duration(text).and_then(|secs| {
+        if secs <= 86_400.0 {
+            Ok(secs)
+        } else {
+            Err(format!("`{text}` must be at most a day (24h)"))
+        }
+    })
 }
 
 /// Serves until Ctrl-C.
 pub fn serve(args: &ServeArgs) -> Result<(), Diagnostics> {
     let folder = history_dir::folder(&args.history)?;
-    // A wrong folder is reported now; a history that a campaign is just creating is served once it exists.
+    // A wrong folder is reported now; a history that a campaign is just creating is served once it
+    // exists.
     if let Err(faults) = History::open_to_read(&folder)
         && faults.iter().any(|fault| fault.code != "H002")
     {
@@ -87,17 +94,31 @@ pub fn serve(args: &ServeArgs) -> Result<(), Diagnostics> {
 /// Answers the queries from standard input.
 pub fn serve_query(args: &ServeQueryArgs) -> Result<(), Diagnostics> {
     let folder = history_dir::folder(&args.history)?;
-    serve::answer(&folder, std::io::stdin().lock(), std::io::stdout().lock())
-        .map_err(|error| Diagnostic::error("X005", format!("the query can't be read or answered: {error}")).into())
+    serve::answer(&folder, std::io::stdin().lock(), std::io::stdout().lock()).map_err(|error| {
+        Diagnostic::error(
+            "X005",
+            format!("the query can't be read or answered: {error}"),
+        )
+        .into()
+    })
 }
 
 fn options(args: &ServeArgs, folder: &Path) -> Result<ServeOptions, Diagnostics> {
     let program = std::env::current_exe().map_err(|error| {
-        Diagnostic::error("X052", format!("the path of this program can't be found: {error}"))
-            .help("start actcheck by its full path")
+        Diagnostic::error(
+            "X052",
+            format!("the path of this program can't be found: {error}"),
+        )
+        .help("start actcheck by its full path")
     })?;
     let history = folder.display().to_string();
-    let with_history = |words: &[&str]| words.iter().map(|word| (*word).to_owned()).chain([history.clone()]).collect();
+    let with_history = |words: &[&str]| {
+        words
+            .iter()
+            .map(|word| (*word).to_owned())
+            .chain([history.clone()])
+            .collect()
+    };
     let named = named_queries::all()?;
     let example = |query: named_queries::NamedQuery| ExampleQuery {
         name: query.name,
@@ -123,7 +144,10 @@ fn options(args: &ServeArgs, folder: &Path) -> Result<ServeOptions, Diagnostics>
 }
 
 fn unheard(args: &ServeArgs, error: &std::io::Error) -> Diagnostics {
-    Diagnostic::error("X053", format!("can't listen on {} port {}: {error}", args.bind, args.port))
-        .help("name another port with `--port`, or 0 for any; another address with `--bind`")
-        .into()
+    Diagnostic::error(
+        "X053",
+        format!("can't listen on {} port {}: {error}", args.bind, args.port),
+    )
+    .help("name another port with `--port`, or 0 for any; another address with `--bind`")
+    .into()
 }

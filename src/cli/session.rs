@@ -44,25 +44,38 @@ pub struct Session {
 /// Prints the warnings about a history that a campaign is added to.
 fn notices(history: &History) -> Result<(), Diagnostics> {
     let mut warnings = Diagnostics::new();
-    history.journal_warning()?.into_iter().for_each(|warning| warnings.push(warning));
-    history.clock_warning(&(clock::system().now)())?.into_iter().for_each(|warning| warnings.push(warning));
+    history
+        .journal_warning()?
+        .into_iter()
+        .for_each(|warning| warnings.push(warning));
+    history
+        .clock_warning(&(clock::system().now)())?
+        .into_iter()
+        .for_each(|warning| warnings.push(warning));
     if !warnings.is_empty() {
         output::print_diagnostics(&warnings);
     }
     Ok(())
 }
 
-/// Prepares the campaign or case of the arguments, and runs the project's cases. The results of a resumed campaign include
-/// those of the cases that ran before it.
+/// Prepares the campaign or case of the arguments, and runs the project's cases. The results of a
+/// resumed campaign include those of the cases that ran before it.
 pub fn open(args: &RunArgs, budget: &Budget, jobs: usize) -> Result<Opened, Diagnostics> {
     if args.last_failed {
         return open_failed(args, budget);
     }
-    let going_on = args.resume.as_deref().map(|id| find(args, id)).transpose()?;
+    let going_on = args
+        .resume
+        .as_deref()
+        .map(|id| find(args, id))
+        .transpose()?;
     let env = match &going_on {
         Some((history, record)) => Env::resume(history, record, budget.clone())?,
         None => {
-            let config = args.config.as_deref().ok_or_else(|| configurations::none_given("run"))?;
+            let config = args
+                .config
+                .as_deref()
+                .ok_or_else(|| configurations::none_given("run"))?;
             Env::prepare_within(config, &overrides(args), budget.clone())?
         }
     };
@@ -86,28 +99,56 @@ pub fn open(args: &RunArgs, budget: &Budget, jobs: usize) -> Result<Opened, Diag
         history.sync_each_run();
     }
     let regressions = regressions::run(cases, &history, resumed.as_ref(), jobs)?;
-    let kept = resumed.as_ref().map_or_else(|| Ok(Vec::new()), |campaign| stored(&history, &env, &campaign.id))?;
+    let kept = resumed.as_ref().map_or_else(
+        || Ok(Vec::new()),
+        |campaign| stored(&history, &env, &campaign.id),
+    )?;
     let (id, goes_on) = match resumed {
         Some(campaign) => (campaign.id, true),
-        None => (history.next_campaign_id(&digest_of(&env.campaign.source.text), env.campaign.seed)?, false),
+        None => (
+            history.next_campaign_id(&digest_of(&env.campaign.source.text), env.campaign.seed)?,
+            false,
+        ),
     };
-    Ok(Opened::Campaign(Box::new(Session { env, history, id, goes_on, failed: None, kept, regressions })))
+    Ok(Opened::Campaign(Box::new(Session {
+        env,
+        history,
+        id,
+        goes_on,
+        failed: None,
+        kept,
+        regressions,
+    })))
 }
 
 /// X083: a shard has none of the campaign's runs.
 fn check_shard(env: &Env) -> Result<(), Diagnostics> {
-    let Some(shard) = env.campaign.shard.filter(|_| env.runs_to_make() == 0) else { return Ok(()) };
-    let message = format!("shard {shard} has no runs: the campaign has only {}", env.planned_runs());
-    Err(Diagnostic::error("X083", message).help("divide it into fewer shards, or let it have more runs").into())
+    let Some(shard) = env.campaign.shard.filter(|_| env.runs_to_make() == 0) else {
+        return Ok(());
+    };
+    let message = format!(
+        "shard {shard} has no runs: the campaign has only {}",
+        env.planned_runs()
+    );
+    Err(Diagnostic::error("X083", message)
+        .help("divide it into fewer shards, or let it have more runs")
+        .into())
 }
 
 /// Prepares the failed runs of a configuration's last campaign.
 fn open_failed(args: &RunArgs, budget: &Budget) -> Result<Opened, Diagnostics> {
-    let config = args.config.as_deref().ok_or_else(|| configurations::none_given("run"))?;
+    let config = args
+        .config
+        .as_deref()
+        .ok_or_else(|| configurations::none_given("run"))?;
     let loaded = config::load(config, &overrides(args))?;
     if loaded.case.is_some() {
         // A case refuses the option together with all others that don't fit.
-        return Ok(Opened::Case(Box::new(Env::prepare_within(config, &overrides(args), budget.clone())?)));
+        return Ok(Opened::Case(Box::new(Env::prepare_within(
+            config,
+            &overrides(args),
+            budget.clone(),
+        )?)));
     }
     let history = History::open_existing(&loaded.history)?;
     if loaded.sync_each_run {
@@ -133,7 +174,9 @@ fn open_failed(args: &RunArgs, budget: &Budget) -> Result<Opened, Diagnostics> {
 impl Session {
     /// Number of runs to make.
     pub fn runs_to_make(&self) -> u64 {
-        self.failed.as_ref().map_or_else(|| self.env.runs_to_make(), LastFailed::len)
+        self.failed
+            .as_ref()
+            .map_or_else(|| self.env.runs_to_make(), LastFailed::len)
     }
 
     /// Writes the beginning of a new campaign, or removes the end of a resumed one.
@@ -142,11 +185,14 @@ impl Session {
             return self.history.reopen_campaign(&self.id);
         }
         if let Some(failed) = &self.failed {
-            return self.history.begin_campaign(&failed.record(&self.env, self.id.clone(), now));
+            return self
+                .history
+                .begin_campaign(&failed.record(&self.env, self.id.clone(), now));
         }
         let stem = Path::new(&*self.env.campaign.source.name).file_stem();
         let name = stem.map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
-        self.history.begin_campaign(&self.env.record(self.id.clone(), name, now))
+        self.history
+            .begin_campaign(&self.env.record(self.id.clone(), name, now))
     }
 }
 
@@ -158,26 +204,50 @@ fn find(args: &RunArgs, id: &str) -> Result<(History, CampaignRecord), Diagnosti
         (None, None) => None,
     };
     let history = history_dir::open(&HistoryArgs { history: folder })?;
-    let record = unfinished(&history, (!id.is_empty()).then_some(id), args.config.as_deref())?;
+    let record = unfinished(
+        &history,
+        (!id.is_empty()).then_some(id),
+        args.config.as_deref(),
+    )?;
     Ok((history, record))
 }
 
 /// Runs of a campaign that are in the history.
 pub fn stored(history: &History, env: &Env, id: &str) -> Result<Vec<RunDetail>, Diagnostics> {
-    let rows = history.runs(&RunFilter { campaign: Some(id.to_owned()), ..RunFilter::default() })?;
+    let rows = history.runs(&RunFilter {
+        campaign: Some(id.to_owned()),
+        ..RunFilter::default()
+    })?;
     let mut ids: Vec<String> = rows.into_iter().map(|row| row.run).collect();
     history.sort_as_stored(id, &mut ids)?;
-    let mut kept: Vec<RunDetail> = ids.iter().map(|run| history.run(run)).collect::<Result<_, _>>()?;
+    let mut kept: Vec<RunDetail> = ids
+        .iter()
+        .map(|run| history.run(run))
+        .collect::<Result<_, _>>()?;
     kept.sort_by_key(|run| run.row.index);
-    kept.iter_mut().flat_map(|run| &mut run.actions).for_each(|action| order(action, env));
+    kept.iter_mut()
+        .flat_map(|run| &mut run.actions)
+        .for_each(|action| order(action, env));
     Ok(kept)
 }
 
 /// Sorts the outcomes of an action as in a new run: in the order of its success properties.
 fn order(action: &mut ActionDetail, env: &Env) {
-    if let Some(known) = env.ontology.actions.values().find(|known| known.iri == action.action) {
-        let place = |property: &str| known.success_properties.iter().position(|iri| iri == property);
-        action.judgements.sort_by_key(|judgement| place(&judgement.property));
+    if let Some(known) = env
+        .ontology
+        .actions
+        .values()
+        .find(|known| known.iri == action.action)
+    {
+        let place = |property: &str| {
+            known
+                .success_properties
+                .iter()
+                .position(|iri| iri == property)
+        };
+        action
+            .judgements
+            .sort_by_key(|judgement| place(&judgement.property));
     }
 }
 

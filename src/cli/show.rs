@@ -26,10 +26,12 @@ pub struct ShowArgs {
     /// The consent to start programs.
     #[command(flatten)]
     pub trust: TrustArgs,
-    /// Draw the scene before and after the run into this file, as a raster (.png) or vector image (.svg)
+    /// Draw the scene before and after the run into this file, as a raster (.png) or vector image
+    /// (.svg)
     #[arg(long, value_name = "FILE.png")]
     pub picture: Option<PathBuf>,
-    /// The ontology whose rules explain failures in the picture [default: ontology/actions.ttl here, or the shipped one]
+    /// The ontology whose rules explain failures in the picture [default: ontology/actions.ttl
+    /// here, or the shipped one]
     #[arg(long, value_name = "FILE")]
     pub ontology: Option<PathBuf>,
     /// How it is printed
@@ -70,25 +72,40 @@ pub fn show(args: &ShowArgs) -> Result<(), Diagnostics> {
 
 /// Says that the run was made by other physics than this program's. Empty if it was not.
 fn made_by(campaign: &CampaignRecord) -> String {
-    made_by_other_physics(campaign).map(|made| format!("{made}: a replay has other states\n")).unwrap_or_default()
+    made_by_other_physics(campaign)
+        .map(|made| format!("{made}: a replay has other states\n"))
+        .unwrap_or_default()
 }
 
 /// Names the warnings about the rules that its campaign keeps.
 fn findings(campaign: &CampaignRecord) -> String {
     let line = |found: &FindingRecord| {
-        let place = found.place.as_ref().map(|place| format!(" {place}")).unwrap_or_default();
-        format!("finding about the rules of its campaign: {}{place}: {}\n", found.code, found.message)
+        let place = found
+            .place
+            .as_ref()
+            .map(|place| format!(" {place}"))
+            .unwrap_or_default();
+        format!(
+            "finding about the rules of its campaign: {}{place}: {}\n",
+            found.code, found.message
+        )
     };
     campaign.findings.iter().map(line).collect()
 }
 
-/// Sentences about the perceived targets of a run's actions that failed, by their positions. Empty if its trace is missing.
+/// Sentences about the perceived targets of a run's actions that failed, by their positions. Empty
+/// if its trace is missing.
 ///
 /// # Errors
 /// `H007` its trace is damaged.
-pub(super) fn perceived(history: &History, run: &RunDetail) -> Result<BTreeMap<u32, String>, Diagnostics> {
+pub(super) fn perceived(
+    history: &History,
+    run: &RunDetail,
+) -> Result<BTreeMap<u32, String>, Diagnostics> {
     let trace = history_dir::unless_damaged(history.states(&run.row.run))?;
-    Ok(trace.map(|trace| perceived_sentences(run, &trace)).unwrap_or_default())
+    Ok(trace
+        .map(|trace| perceived_sentences(run, &trace))
+        .unwrap_or_default())
 }
 
 /// Names the outcomes that differ from those of the campaign. Empty if all are the same.
@@ -97,19 +114,31 @@ fn judged_again(own: &RunDetail, newest: &RunDetail) -> String {
     for (own, newest) in own.actions.iter().zip(&newest.actions) {
         for judgement in &newest.judgements {
             let name = names::local(&judgement.property);
-            match own.judgements.iter().find(|own| own.property == judgement.property) {
+            match own
+                .judgements
+                .iter()
+                .find(|own| own.property == judgement.property)
+            {
                 None => notes.push(format!("{name} is new")),
-                Some(own) if own.outcome != judgement.outcome => notes.push(format!("{name} was {}", own.outcome)),
+                Some(own) if own.outcome != judgement.outcome => {
+                    notes.push(format!("{name} was {}", own.outcome))
+                }
                 Some(_) => {}
             }
         }
     }
-    if notes.is_empty() { String::new() } else { format!("judged again by `actcheck recheck`: {}\n", notes.join(", ")) }
+    if notes.is_empty() {
+        String::new()
+    } else {
+        format!("judged again by `actcheck recheck`: {}\n", notes.join(", "))
+    }
 }
 
 /// One row for each property of each action of a run.
 pub(super) fn outcomes(run: &RunDetail) -> Table {
-    let mut table = Table::new(["run", "step", "action", "property", "outcome", "margin", "witness"]);
+    let mut table = Table::new([
+        "run", "step", "action", "property", "outcome", "margin", "witness",
+    ]);
     for action in &run.actions {
         for judgement in &action.judgements {
             table.rows.push(vec![

@@ -23,7 +23,8 @@ use serde_json::Value;
 pub struct ShrinkArgs {
     /// Id of the run, or a unique prefix
     pub run: String,
-    /// The property that must still fail, by its name in the ontology [default: exactly those that failed]
+    /// The property that must still fail, by its name in the ontology [default: exactly those that
+    /// failed]
     #[arg(long, value_name = "PROPERTY")]
     pub property: Option<String>,
     /// Maximum number of simulations, including those for the explanation
@@ -32,7 +33,8 @@ pub struct ShrinkArgs {
     /// Time limit, such as 90s, 10m or 2h [default: no limit]
     #[arg(long, value_name = "DURATION", value_parser = duration)]
     pub time: Option<f64>,
-    /// A scene must fail in K of N repetitions with fresh noise [default: once, with the recorded noise]
+    /// A scene must fail in K of N repetitions with fresh noise [default: once, with the recorded
+    /// noise]
     #[arg(long, alias = "repeat", value_name = "K/N", value_parser = must_fail)]
     pub must_fail: Option<Repeat>,
     /// Number of workers, each with one simulation; does not affect results [default: all cores]
@@ -41,13 +43,15 @@ pub struct ShrinkArgs {
     /// The configuration to run with [default: the campaign's own, from the history]
     #[arg(long, value_name = "FILE")]
     pub config: Option<PathBuf>,
-    /// Start the program that the history names, even if its configuration is not there or names another one
+    /// Start the program that the history names, even if its configuration is not there or names
+    /// another one
     #[arg(long)]
     pub trust: bool,
     /// The folder of the history.
     #[command(flatten)]
     pub history: HistoryArgs,
-    /// Draw the shrunk scene before and after the run into this file, as a raster (.png) or vector image (.svg)
+    /// Draw the shrunk scene before and after the run into this file, as a raster (.png) or vector
+    /// image (.svg)
     #[arg(long, value_name = "FILE.png")]
     pub picture: Option<PathBuf>,
     /// How it is printed (csv: one line for each choice that remains special)
@@ -58,7 +62,8 @@ pub struct ShrinkArgs {
 /// Default limit of simulations for one run: three times the number that most runs need.
 pub const TRIALS: u64 = 200;
 
-/// Finds the smallest scene that fails in the same way as a run, stores it and prints it. Returns the exit code.
+/// Finds the smallest scene that fails in the same way as a run, stores it and prints it. Returns
+/// the exit code.
 pub fn shrink(args: &ShrinkArgs) -> Result<u8, Diagnostics> {
     let picture = args.picture.as_deref().map(Picture::new).transpose()?;
     let history = history_dir::open(&args.history)?;
@@ -68,10 +73,15 @@ pub fn shrink(args: &ShrinkArgs) -> Result<u8, Diagnostics> {
         trust::check_stored(&env, &history, &record)?;
     }
     restore::allow(&history, true);
-    let context = RunContext { clock: clock::system(), disturb: None };
+    let context = RunContext {
+        clock: clock::system(),
+        disturb: None,
+    };
     let until = args.time.map(|secs| (context.clock.secs)() + secs);
     let asked = stop::on_interrupt(|| eprintln!("stopping; the smallest scene so far follows"));
-    let stop = || asked.load(Ordering::Relaxed) || until.is_some_and(|until| (context.clock.secs)() >= until);
+    let stop = || {
+        asked.load(Ordering::Relaxed) || until.is_some_and(|until| (context.clock.secs)() >= until)
+    };
     let options = ShrinkOptions {
         property: args.property.as_deref(),
         trials: args.trials,
@@ -91,7 +101,11 @@ pub fn shrink(args: &ShrinkArgs) -> Result<u8, Diagnostics> {
     if let Some(picture) = picture {
         picture.draw(&history, &shrunk.run, None)?;
     }
-    Ok(if asked.load(Ordering::Relaxed) { stop::INTERRUPTED } else { 0 })
+    Ok(if asked.load(Ordering::Relaxed) {
+        stop::INTERRUPTED
+    } else {
+        0
+    })
 }
 
 /// Shrunk runs of a campaign, and the faults of those that could not be shrunk.
@@ -110,14 +124,28 @@ pub fn shrink_modes(
     jobs: usize,
     asked: &AtomicBool,
 ) -> ShrunkModes {
-    let context = RunContext { clock: clock::system(), disturb: None };
+    let context = RunContext {
+        clock: clock::system(),
+        disturb: None,
+    };
     let stop = || asked.load(Ordering::Relaxed);
-    let options = ShrinkOptions { property: None, trials: TRIALS, jobs, repeat: None, context, stop: &stop };
-    let mut shrunk = ShrunkModes { done: Vec::new(), faults: Diagnostics::new() };
+    let options = ShrinkOptions {
+        property: None,
+        trials: TRIALS,
+        jobs,
+        repeat: None,
+        context,
+        stop: &stop,
+    };
+    let mut shrunk = ShrunkModes {
+        done: Vec::new(),
+        faults: Diagnostics::new(),
+    };
     for (run, index) in examples.iter().take_while(|_| !stop()) {
         match shrink_one(env, history, (run, *index), &options) {
             Ok(one) => shrunk.done.push(one),
-            // If a rule was interrupted, the properties don't fail as expected: that is not a fault.
+            // If a rule was interrupted, the properties don't fail as expected: that is not a
+            // fault.
             Err(_) if stop() => {}
             Err(found) => shrunk.faults.extend(found),
         }
@@ -145,17 +173,27 @@ fn summary(
     record: &RunRecord,
 ) -> Result<ShrunkSummary, Diagnostics> {
     let influences = shrunk.explained.influences.iter();
-    let shown = |id: &Id| match influences.clone().filter(|other| other.id.name == id.name).count() {
+    let shown = |id: &Id| match influences
+        .clone()
+        .filter(|other| other.id.name == id.name)
+        .count()
+    {
         0 | 1 => id.name.to_string(),
         _ => format!("{} ({})", id.name, id.nth + 1),
     };
-    let choices = influences.clone().map(|influence| shrunk_choice(shown(&influence.id), influence));
+    let choices = influences
+        .clone()
+        .map(|influence| shrunk_choice(shown(&influence.id), influence));
     Ok(ShrunkSummary {
         original: original.to_owned(),
         run: history.run(&record.id)?,
         choices: choices.collect(),
         property: property.map(str::to_owned),
-        neighbour: shrunk.explained.neighbour.as_ref().map(|near| (shown(&near.id), passing_value(&near.passing))),
+        neighbour: shrunk
+            .explained
+            .neighbour
+            .as_ref()
+            .map(|near| (shown(&near.id), passing_value(&near.passing))),
         why: why(env, record, &shrunk)?,
         failed: shrunk.failed.into_iter().collect(),
         others_before: shrunk.others_before,
@@ -170,7 +208,17 @@ fn summary(
 
 /// One row for each choice that remains special.
 fn choices_table(shrunk: &ShrunkSummary) -> Table {
-    let columns = ["run", "name", "value", "nominal", "unit", "needed", "fails_from", "fails_to", "passes_below"];
+    let columns = [
+        "run",
+        "name",
+        "value",
+        "nominal",
+        "unit",
+        "needed",
+        "fails_from",
+        "fails_to",
+        "passes_below",
+    ];
     let mut table = Table::new(columns.into_iter().chain(["passes_above"]));
     let row = |choice: &ShrunkChoice| {
         let fails = choice.fails;
@@ -193,7 +241,11 @@ fn choices_table(shrunk: &ShrunkSummary) -> Table {
 }
 
 fn shrunk_choice(name: String, influence: &shrink::Influence) -> ShrunkChoice {
-    let Choice { name: full, kind, value } = &influence.choice;
+    let Choice {
+        name: full,
+        kind,
+        value,
+    } = &influence.choice;
     ShrunkChoice {
         name,
         value: *value,
@@ -201,24 +253,37 @@ fn shrunk_choice(name: String, influence: &shrink::Influence) -> ShrunkChoice {
         unit: full.unit(),
         matters: influence.matters,
         fails: influence.fails,
-        passes: (influence.passes.0.as_ref().map(passing_value), influence.passes.1.as_ref().map(passing_value)),
+        passes: (
+            influence.passes.0.as_ref().map(passing_value),
+            influence.passes.1.as_ref().map(passing_value),
+        ),
     }
 }
 
 fn passing_value(passing: &shrink::Passing) -> PassingValue {
-    PassingValue { value: passing.value, others: passing.others.clone() }
+    PassingValue {
+        value: passing.value,
+        others: passing.others.clone(),
+    }
 }
 
 /// The explanation of each property that fails.
 fn why(env: &Env, record: &RunRecord, shrunk: &Shrunk) -> Result<Vec<String>, Diagnostics> {
     let mut texts = Vec::new();
     for (step, judgements) in record.judgements.iter().enumerate() {
-        let Some(facts) = record.facts.action(step) else { continue };
+        let Some(facts) = record.facts.action(step) else {
+            continue;
+        };
         for judgement in judgements {
-            if judgement.outcome == actcheck_base::Outcome::Failed && shrunk.failed.contains(&judgement.property) {
-                let explained = env.rules.explain(&facts, &judgement.property, &Budget::default());
-                let explained =
-                    explained.map_err(|fault| Diagnostic::error("X008", format!("{}: {fault}", judgement.property)))?;
+            if judgement.outcome == actcheck_base::Outcome::Failed
+                && shrunk.failed.contains(&judgement.property)
+            {
+                let explained = env
+                    .rules
+                    .explain(&facts, &judgement.property, &Budget::default());
+                let explained = explained.map_err(|fault| {
+                    Diagnostic::error("X008", format!("{}: {fault}", judgement.property))
+                })?;
                 texts.push(explained.to_text());
             }
         }
@@ -227,7 +292,9 @@ fn why(env: &Env, record: &RunRecord, shrunk: &Shrunk) -> Result<Vec<String>, Di
 }
 
 fn must_fail(text: &str) -> Result<Repeat, String> {
-    let parts = text.split_once('/').and_then(|(least, of)| Some((least.parse().ok()?, of.parse().ok()?)));
+    let parts = text
+        .split_once('/')
+        .and_then(|(least, of)| Some((least.parse().ok()?, of.parse().ok()?)));
     match parts {
         Some((least, of)) if 1 <= least && least <= of && of <= 1000 => Ok(Repeat { least, of }),
         _ => Err("must be K/N, such as 3/5: at least 3 failures in 5 repetitions".to_owned()),

@@ -10,11 +10,12 @@ use actcheck_base::{Diagnostic, Diagnostics};
 /// Exit code of a command that was interrupted.
 pub const INTERRUPTED: u8 = 130;
 
-/// Work that does not check the flag (sorting millions of rows, opening a store) is ended after this time.
+/// Work that does not check the flag (sorting millions of rows, opening a store) is ended after
+/// this time.
 const GRACE: Duration = Duration::from_secs(1);
 
-/// Returns a flag that Ctrl-C (or a termination signal) sets; then `asked` is called once. A second signal ends the
-/// process at once; committed data is kept.
+/// Returns a flag that Ctrl-C (or a termination signal) sets; then `asked` is called once. A second
+/// signal ends the process at once; committed data is kept.
 pub fn on_interrupt(asked: impl Fn() + Send + 'static) -> Arc<AtomicBool> {
     let flag = Arc::new(AtomicBool::new(false));
     let seen = Arc::clone(&flag);
@@ -34,9 +35,11 @@ pub fn end_now() -> ! {
     std::process::exit(i32::from(INTERRUPTED));
 }
 
-/// Does a command's work so that Ctrl-C can end it at any moment: through the flag if the work checks it, else after
-/// one second. Returns the exit code.
-pub fn interruptible(work: impl FnOnce(&Arc<AtomicBool>) -> Result<u8, Diagnostics>) -> Result<u8, Diagnostics> {
+/// Does a command's work so that Ctrl-C can end it at any moment: through the flag if the work
+/// checks it, else after one second. Returns the exit code.
+pub fn interruptible(
+    work: impl FnOnce(&Arc<AtomicBool>) -> Result<u8, Diagnostics>,
+) -> Result<u8, Diagnostics> {
     let flag = on_interrupt(|| {
         std::thread::sleep(GRACE);
         end_now();

@@ -24,18 +24,28 @@ pub(super) fn demanded_width() -> Option<usize> {
 
 fn page_of(stream: impl IsTerminal + AsFd) -> Page {
     let is_terminal = stream.is_terminal();
-    let own =
-        if is_terminal { terminal_size_of(&stream).map(|(Width(columns), _)| usize::from(columns)) } else { None };
-    Page { width: demanded_width().or(own), colour: has_colours(is_terminal, &|name| std::env::var_os(name)) }
+    let own = if is_terminal {
+        terminal_size_of(&stream).map(|(Width(columns), _)| usize::from(columns))
+    } else {
+        None
+    };
+    Page {
+        width: demanded_width().or(own),
+        colour: has_colours(is_terminal, &|name| std::env::var_os(name)),
+    }
 }
 
 /// `COLUMNS`, if it is a number above zero.
 fn width(variable: &dyn Fn(&str) -> Option<OsString>) -> Option<usize> {
-    variable("COLUMNS")?.to_str()?.parse().ok().filter(|columns| *columns > 0)
+    variable("COLUMNS")?
+        .to_str()?
+        .parse()
+        .ok()
+        .filter(|columns| *columns > 0)
 }
 
-/// Whether a stream has colours. `NO_COLOR` forbids them and `CLICOLOR_FORCE` demands them; otherwise terminals have them,
-/// except with `CLICOLOR=0` or `TERM=dumb`.
+/// Whether a stream has colours. `NO_COLOR` forbids them and `CLICOLOR_FORCE` demands them;
+/// otherwise terminals have them, except with `CLICOLOR=0` or `TERM=dumb`.
 fn has_colours(is_terminal: bool, variable: &dyn Fn(&str) -> Option<OsString>) -> bool {
     let is = |name: &str, value: &str| variable(name).is_some_and(|found| found == value);
     let is_set = |name: &str| variable(name).is_some_and(|found| !found.is_empty());
@@ -54,7 +64,9 @@ mod tests {
 
     fn colours(is_terminal: bool, set: &[(&str, &str)]) -> bool {
         has_colours(is_terminal, &|name| {
-            set.iter().find(|(known, _)| *known == name).map(|(_, value)| OsString::from(value))
+            set.iter()
+                .find(|(known, _)| *known == name)
+                .map(|(_, value)| OsString::from(value))
         })
     }
 
@@ -83,7 +95,10 @@ mod tests {
     #[test]
     fn columns_is_a_width_if_it_is_a_number_above_zero() {
         let with = |value: &str| width(&|name| (name == "COLUMNS").then(|| OsString::from(value)));
-        assert_eq!(["50", "0", "", "wide", "-3"].map(with), [Some(50), None, None, None, None]);
+        assert_eq!(
+            ["50", "0", "", "wide", "-3"].map(with),
+            [Some(50), None, None, None, None]
+        );
         assert_eq!(width(&|_| None), None);
     }
 }

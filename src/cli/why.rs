@@ -9,7 +9,9 @@ use clap::Args;
 use crate::options::{HistoryArgs, ProofFormat};
 use crate::trust::TrustArgs;
 use crate::{explanations, history_dir, output, restore, show};
-use actcheck_base::{Diagnostic, Diagnostics, Files, Findings, Judgement, Outcome, did_you_mean, names};
+use actcheck_base::{
+    Diagnostic, Diagnostics, Files, Findings, Judgement, Outcome, did_you_mean, names,
+};
 use actcheck_history::{ActionDetail, RunDetail};
 use actcheck_ontology as ontology;
 use actcheck_report::{Table, TableFormat};
@@ -36,9 +38,13 @@ pub struct WhyArgs {
     pub format: ProofFormat,
 }
 
-/// Prints, for each requested outcome of a run, the proof that the property holds or how close it came.
+/// Prints, for each requested outcome of a run, the proof that the property holds or how close it
+/// came.
 pub fn why(args: &WhyArgs, stop: &Arc<AtomicBool>) -> Result<(), Diagnostics> {
-    let budget = Budget { stop: Arc::clone(stop), ..Budget::default() };
+    let budget = Budget {
+        stop: Arc::clone(stop),
+        ..Budget::default()
+    };
     let history = history_dir::open_to_read(&args.history)?;
     restore::allow(&history, args.trust.trust);
     let run = history.newest_run(&args.run)?;
@@ -48,35 +54,70 @@ pub fn why(args: &WhyArgs, stop: &Arc<AtomicBool>) -> Result<(), Diagnostics> {
     let facts = history.allowed_facts(&run.row.run, rules.reads_course())?;
     let perceived = show::perceived(&history, &run)?;
     let mut told = 0;
-    let mut table = Table::new(["run", "step", "action", "property", "holds", "margin", "explanation"]);
+    let mut table = Table::new([
+        "run",
+        "step",
+        "action",
+        "property",
+        "holds",
+        "margin",
+        "explanation",
+    ]);
     for (step, action) in run.actions.iter().enumerate() {
-        let Some(seen) = facts.action(step) else { continue };
+        let Some(seen) = facts.action(step) else {
+            continue;
+        };
         for property in asked(action, args) {
-            let title = format!("{} {}, {}", run.row.run, names::local(&action.action), names::local(&property));
+            let title = format!(
+                "{} {}, {}",
+                run.row.run,
+                names::local(&action.action),
+                names::local(&property)
+            );
             let explained = rules.explain(&seen, &property, &budget);
-            let mut explained = explained.map_err(|fault| Diagnostic::error("X008", format!("{title}: {fault}")))?;
-            explained.notes.extend(differs(action, &property, explained.findings.as_ref()));
-            let columns = [run.row.run.as_str(), &(step + 1).to_string(), &action.action, &property];
+            let mut explained = explained
+                .map_err(|fault| Diagnostic::error("X008", format!("{title}: {fault}")))?;
+            explained
+                .notes
+                .extend(differs(action, &property, explained.findings.as_ref()));
+            let columns = [
+                run.row.run.as_str(),
+                &(step + 1).to_string(),
+                &action.action,
+                &property,
+            ];
             match args.format {
                 ProofFormat::Csv => table.rows.push(explanations::row(&columns, &explained)),
-                ProofFormat::Text => output::print_prose(&format!("{title}\n{}\n", explained.to_text())),
+                ProofFormat::Text => {
+                    output::print_prose(&format!("{title}\n{}\n", explained.to_text()))
+                }
                 ProofFormat::Json => output::print(&format!("{:#}\n\n", explained.to_json())),
                 ProofFormat::Dot => output::print(&format!("{}\n", explained.to_dot())),
             }
             told += 1;
         }
-        let failed = |judgement: &Judgement| judgement.outcome == Outcome::Failed && is_asked(judgement, args);
+        let failed = |judgement: &Judgement| {
+            judgement.outcome == Outcome::Failed && is_asked(judgement, args)
+        };
         if let Some(sentence) = perceived.get(&action.step)
             && args.format == ProofFormat::Text
             && action.judgements.iter().any(failed)
         {
-            output::print_prose(&format!("{} {}: {sentence}\n", run.row.run, names::local(&action.action)));
+            output::print_prose(&format!(
+                "{} {}: {sentence}\n",
+                run.row.run,
+                names::local(&action.action)
+            ));
         }
     }
     if args.format == ProofFormat::Csv && told > 0 {
         output::print(&table.render(TableFormat::Csv, output::page()));
     }
-    if told == 0 { Err(nothing_to_tell(&run, args.property.as_deref()).into()) } else { Ok(()) }
+    if told == 0 {
+        Err(nothing_to_tell(&run, args.property.as_deref()).into())
+    } else {
+        Ok(())
+    }
 }
 
 /// The named ontology, else the one in this folder, else the shipped one.
@@ -91,13 +132,20 @@ pub(super) fn ontology_file(named: Option<&Path>) -> (Files, PathBuf) {
 
 /// The requested properties of an action: the named one, or all that were judged.
 fn asked(action: &ActionDetail, args: &WhyArgs) -> Vec<String> {
-    let all = action.judgements.iter().filter(|judgement| is_asked(judgement, args));
+    let all = action
+        .judgements
+        .iter()
+        .filter(|judgement| is_asked(judgement, args));
     all.map(|judgement| judgement.property.clone()).collect()
 }
 
 /// Returns a remark if the run was judged otherwise than the current rules judge it.
 fn differs(action: &ActionDetail, property: &str, found: Option<&Findings>) -> Option<String> {
-    let recorded = action.judgements.iter().find(|judgement| judgement.property == property)?.outcome;
+    let recorded = action
+        .judgements
+        .iter()
+        .find(|judgement| judgement.property == property)?
+        .outcome;
     let current = found?.outcome();
     let decided = matches!(recorded, Outcome::Passed | Outcome::Failed) && recorded != current;
     decided.then(|| {
@@ -108,7 +156,9 @@ fn differs(action: &ActionDetail, property: &str, found: Option<&Findings>) -> O
 
 fn is_asked(judgement: &Judgement, args: &WhyArgs) -> bool {
     let iri = &judgement.property;
-    args.property.as_ref().is_none_or(|named| names::local(iri) == named || iri == named)
+    args.property
+        .as_ref()
+        .is_none_or(|named| names::local(iri) == named || iri == named)
 }
 
 fn nothing_to_tell(run: &RunDetail, named: Option<&str>) -> Diagnostic {
@@ -119,11 +169,15 @@ fn nothing_to_tell(run: &RunDetail, named: Option<&str>) -> Diagnostic {
         .map(|judgement| names::local(&judgement.property))
         .collect();
     match named {
-        Some(named) if !judged.contains(&named) => {
-            Diagnostic::error("X009", format!("no property `{named}` was judged in run {}", run.row.run))
-                .help(did_you_mean(named, judged))
-        }
-        _ => Diagnostic::error("X009", format!("run {} has no facts to explain", run.row.run))
-            .help("it broke before its first action; `actcheck show` shows the reason"),
+        Some(named) if !judged.contains(&named) => Diagnostic::error(
+            "X009",
+            format!("no property `{named}` was judged in run {}", run.row.run),
+        )
+        .help(did_you_mean(named, judged)),
+        _ => Diagnostic::error(
+            "X009",
+            format!("run {} has no facts to explain", run.row.run),
+        )
+        .help("it broke before its first action; `actcheck show` shows the reason"),
     }
 }

@@ -32,7 +32,8 @@ pub struct Campaign {
     pub models: BTreeMap<String, Arc<ObjectModel>>,
     /// Names of models without a category, neither in their own files nor in `[categories]`.
     pub uncategorised: BTreeSet<String>,
-    /// The worlds that contain the scenes (`[world] worlds`), by name; if empty, scenes have only a floor.
+    /// The worlds that contain the scenes (`[world] worlds`), by name; if empty, scenes have only a
+    /// floor.
     pub worlds: BTreeMap<String, Arc<WorldMap>>,
     /// The robot (`[robot]`).
     pub robot: Arc<RobotProfile>,
@@ -42,7 +43,8 @@ pub struct Campaign {
     pub nav_obstacle_count: u32,
     /// Whether obstacles may be on locations and close paths (`[nav] may_block`; default `false`).
     pub nav_may_block: bool,
-    /// Candidate values by designator table: `world` → `worlds`, `pickObject` → `model_list`, and so on.
+    /// Candidate values by designator table: `world` → `worlds`, `pickObject` → `model_list`, and
+    /// so on.
     ///
     /// The table of any other designator keeps its own name.
     pub candidates: BTreeMap<String, Vec<String>>,
@@ -50,10 +52,12 @@ pub struct Campaign {
     pub other_counts: OtherCounts,
     /// Rules that every scene must satisfy (`[scene] require`).
     pub scene_rule: Option<Source>,
-    /// Shares of targets and of other objects that lie on their side (`[pickObject] lying`, `[surfaceObjects] lying`).
+    /// Shares of targets and of other objects that lie on their side (`[pickObject] lying`,
+    /// `[surfaceObjects] lying`).
     pub lying: (f64, f64),
-    /// Ranges of the base's initial x, y and heading (`[robot] start_x_m`, `start_y_m`, `start_heading_rad`).
-    /// If `None`, it starts in front of the surface. Units: metres and radians.
+    /// Ranges of the base's initial x, y and heading (`[robot] start_x_m`, `start_y_m`,
+    /// `start_heading_rad`). If `None`, it starts in front of the surface. Units: metres and
+    /// radians.
     pub start: Option<[Range; 3]>,
     /// Ranges of physical parameters, and time stepping (`[physics]`).
     pub physics: Physics,
@@ -73,8 +77,9 @@ pub struct Campaign {
     pub sync_each_run: bool,
     /// Which runs the history keeps whole (`[history] keep` and `keep_whole`; by default all).
     pub keeping: Keeping,
-    /// Spans of keys and values, for faults that only a later stage can find: `tests.0.1` is the second action of
-    /// the first test, `tests.0.1.pickObject` the value that it gives to this designator, `pickObject` the table's header, `pickObject.2` its third candidate.
+    /// Spans of keys and values, for faults that only a later stage can find: `tests.0.1` is the
+    /// second action of the first test, `tests.0.1.pickObject` the value that it gives to this
+    /// designator, `pickObject` the table's header, `pickObject.2` its third candidate.
     pub places: BTreeMap<String, Span>,
     /// Warnings about ignored parts of used models, and about unused models with errors.
     pub warnings: Diagnostics,
@@ -84,8 +89,16 @@ impl Campaign {
     /// Returns the names of the models that its scenes can contain.
     pub fn used_models(&self) -> BTreeSet<String> {
         let named = designators::named_models(&self.candidates, &self.nav_obstacles);
-        let standing = self.worlds.values().flat_map(|world| &world.furniture).map(|piece| piece.model.as_str());
-        named.into_iter().chain(standing).map(str::to_owned).collect()
+        let standing = self
+            .worlds
+            .values()
+            .flat_map(|world| &world.furniture)
+            .map(|piece| piece.model.as_str());
+        named
+            .into_iter()
+            .chain(standing)
+            .map(str::to_owned)
+            .collect()
     }
 
     /// Returns an error that a later stage found, at the span of `key` (see [`Campaign::places`]).
@@ -138,7 +151,8 @@ pub struct Limits {
     pub run_secs: Option<f64>,
     /// Wall-clock time of the campaign. Unit: seconds.
     pub time_secs: Option<f64>,
-    /// The campaign ends when the 95 % confidence interval of every property is at most this wide. In (0, 1).
+    /// The campaign ends when the 95 % confidence interval of every property is at most this wide.
+    /// In (0, 1).
     pub until_width: Option<f64>,
     /// The campaign ends after this many runs with a failed property; at least 1.
     pub max_failures: Option<u64>,

@@ -1,4 +1,5 @@
-//! `[case]`: one scene as a list of its choices, written by `actcheck export` and read by `actcheck run`.
+//! `[case]`: one scene as a list of its choices, written by `actcheck export` and read by
+//! `actcheck run`.
 
 use std::collections::BTreeMap;
 
@@ -16,7 +17,8 @@ pub struct Case {
     pub expect: Vec<String>,
     /// Digest over all states of that run.
     pub trace: Option<String>,
-    /// Values by name of the choice, in order if a name repeats. Missing choices take their nominal value.
+    /// Values by name of the choice, in order if a name repeats. Missing choices take their nominal
+    /// value.
     pub choices: BTreeMap<ChoiceName, Vec<ChoiceValue>>,
 }
 
@@ -46,14 +48,20 @@ impl<'a> Form<'a> {
     /// Returns the form of a choice's values, given its name.
     fn of(choice: &ChoiceName, designators: &'a Designators) -> Self {
         match choice {
-            ChoiceName::Designator(name) => {
-                designators.candidates.get(name).map_or(Self::Number, |names| Self::Candidate(names))
-            }
+            ChoiceName::Designator(name) => designators
+                .candidates
+                .get(name)
+                .map_or(Self::Number, |names| Self::Candidate(names)),
             ChoiceName::Object(_, ObjectAxis::LeftOut) => Self::YesNo,
             ChoiceName::Step { .. } => Self::OfScene,
-            _ => match (choice.candidates(), designators.other_counts.of_choice(choice)) {
+            _ => match (
+                choice.candidates(),
+                designators.other_counts.of_choice(choice),
+            ) {
                 (Some(OBSTACLE_LIST), _) => Self::Candidate(&designators.nav_obstacles),
-                (Some(table), _) => Self::Candidate(designators.candidates.get(table).map_or(&[], Vec::as_slice)),
+                (Some(table), _) => {
+                    Self::Candidate(designators.candidates.get(table).map_or(&[], Vec::as_slice))
+                }
                 (None, Some((least, _))) => Self::Count(least),
                 (None, None) => Self::Number,
             },
@@ -75,7 +83,12 @@ pub(super) fn read(
         trace: table.string("trace").map(|trace| trace.value),
         ..Case::default()
     };
-    for (idx, name) in table.strings("expect").unwrap_or_default().into_iter().enumerate() {
+    for (idx, name) in table
+        .strings("expect")
+        .unwrap_or_default()
+        .into_iter()
+        .enumerate()
+    {
         places.insert(format!("case.expect.{idx}"), name.span);
         case.expect.push(name.value);
     }
@@ -91,12 +104,21 @@ fn read_choices(
     mut table: Table,
     prefix: &str,
     designators: &Designators,
-    (choices, places): (&mut BTreeMap<ChoiceName, Vec<ChoiceValue>>, &mut BTreeMap<String, Span>),
+    (choices, places): (
+        &mut BTreeMap<ChoiceName, Vec<ChoiceValue>>,
+        &mut BTreeMap<String, Span>,
+    ),
     found: &mut Diagnostics,
 ) {
     for key in table.untaken_tables() {
         if let Some(inner) = table.table(&key) {
-            read_choices(inner, &format!("{prefix}{key}."), designators, (&mut *choices, &mut *places), found);
+            read_choices(
+                inner,
+                &format!("{prefix}{key}."),
+                designators,
+                (&mut *choices, &mut *places),
+                found,
+            );
         }
     }
     for key in table.untaken_keys() {
@@ -106,7 +128,8 @@ fn read_choices(
         let values = read_values(&mut table, &key, form);
         places.insert(Case::place_of(&name), span.clone());
         if choices.insert(name.clone(), values).is_some() {
-            let message = format!("the choice `{name}` is written twice, with and without quotation marks");
+            let message =
+                format!("the choice `{name}` is written twice, with and without quotation marks");
             table.fault("C015", span, message, "leave one of them out");
         }
     }
@@ -119,7 +142,9 @@ fn read_values(table: &mut Table, key: &str, form: Form<'_>) -> Vec<ChoiceValue>
         Form::Candidate(_) if table.is_number(key) => table.number(key, ..).into_iter().collect(),
         Form::OfScene => {
             let written = table.string(key).into_iter();
-            return written.map(|text| ChoiceValue::Candidate(text.value)).collect();
+            return written
+                .map(|text| ChoiceValue::Candidate(text.value))
+                .collect();
         }
         Form::Candidate(names) => return read_candidates(table, key, names),
         Form::Count(least) => table
@@ -139,11 +164,19 @@ fn read_candidates(table: &mut Table, key: &str, names: &[String]) -> Vec<Choice
         true => table.strings(key).unwrap_or_default(),
         false => table.string(key).into_iter().collect(),
     };
-    written.into_iter().filter_map(|text| candidate(table, key, text, names)).collect()
+    written
+        .into_iter()
+        .filter_map(|text| candidate(table, key, text, names))
+        .collect()
 }
 
 /// Returns a candidate, or reports that it is not in the list (C015).
-fn candidate(table: &mut Table, key: &str, text: Located<String>, names: &[String]) -> Option<ChoiceValue> {
+fn candidate(
+    table: &mut Table,
+    key: &str,
+    text: Located<String>,
+    names: &[String],
+) -> Option<ChoiceValue> {
     if !names.contains(&text.value) {
         let message = format!("`{}` is not a candidate for `{key}`", text.value);
         let help = did_you_mean(&text.value, names.iter().map(String::as_str));

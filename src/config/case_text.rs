@@ -30,7 +30,8 @@ pub struct CaseText<'a> {
     pub choices: &'a [Choice],
     /// Paths to write; missing ones omit their key.
     pub paths: WrittenPaths,
-    /// Values to write for `test_launcher` and `[skill] dir`, if an external program performs actions.
+    /// Values to write for `test_launcher` and `[skill] dir`, if an external program performs
+    /// actions.
     pub skill: Option<(Option<String>, String)>,
 }
 
@@ -48,7 +49,11 @@ pub struct WrittenPaths {
 impl WrittenPaths {
     /// Returns all paths.
     pub fn all(&self) -> impl Iterator<Item = &str> {
-        self.ontology.iter().chain(&self.models).chain(&self.profile).map(String::as_str)
+        self.ontology
+            .iter()
+            .chain(&self.models)
+            .chain(&self.profile)
+            .map(String::as_str)
     }
 
     /// Changes each path.
@@ -72,15 +77,24 @@ pub fn written_paths(source: &Source) -> Result<WrittenPaths, Diagnostics> {
     let profile = text(table.get("robot").and_then(|robot| robot.get("profile")));
     let profile = profile.filter(|profile| profile.ends_with(".toml"));
     let models = match table.get("model_dir") {
-        Some(Value::Array(folders)) => folders.iter().filter_map(|folder| text(Some(folder))).collect(),
+        Some(Value::Array(folders)) => folders
+            .iter()
+            .filter_map(|folder| text(Some(folder)))
+            .collect(),
         folder => text(folder).into_iter().collect(),
     };
-    Ok(WrittenPaths { ontology: text(table.get("ontology")), models, profile })
+    Ok(WrittenPaths {
+        ontology: text(table.get("ontology")),
+        models,
+        profile,
+    })
 }
 
 fn parse(source: &Source) -> Result<toml::Table, Diagnostics> {
     source.text.parse().map_err(|error: toml::de::Error| {
-        Diagnostic::error("C002", format!("this is not TOML: {}", error.message())).in_source(source).into()
+        Diagnostic::error("C002", format!("this is not TOML: {}", error.message()))
+            .in_source(source)
+            .into()
     })
 }
 
@@ -92,14 +106,30 @@ pub fn case_text(campaign: &Campaign, case: &CaseText<'_>) -> Result<String, Dia
     let mut table = parse(&campaign.source)?;
     OF_CAMPAIGNS.iter().for_each(|key| drop(table.remove(*key)));
     if let Some(Value::Table(budget)) = table.get_mut("budget") {
-        BUDGETS_OF_CAMPAIGNS.iter().for_each(|key| drop(budget.remove(*key)));
+        BUDGETS_OF_CAMPAIGNS
+            .iter()
+            .for_each(|key| drop(budget.remove(*key)));
     }
-    table.insert("tests".to_owned(), Value::Array(vec![Value::Array(case.test.iter().map(step).collect())]));
+    table.insert(
+        "tests".to_owned(),
+        Value::Array(vec![Value::Array(case.test.iter().map(step).collect())]),
+    );
     table.insert("test_count".to_owned(), Value::Integer(1));
-    let WrittenPaths { ontology, models, profile } = case.paths.clone();
+    let WrittenPaths {
+        ontology,
+        models,
+        profile,
+    } = case.paths.clone();
     let mut models: Vec<Value> = models.into_iter().map(Value::String).collect();
-    let model_dir = if models.len() > 1 { Some(Value::Array(models)) } else { models.pop() };
-    for (key, value) in [("ontology", ontology.map(Value::String)), ("model_dir", model_dir)] {
+    let model_dir = if models.len() > 1 {
+        Some(Value::Array(models))
+    } else {
+        models.pop()
+    };
+    for (key, value) in [
+        ("ontology", ontology.map(Value::String)),
+        ("model_dir", model_dir),
+    ] {
         match value {
             Some(value) => table.insert(key.to_owned(), value),
             None => table.remove(key),
@@ -109,9 +139,13 @@ pub fn case_text(campaign: &Campaign, case: &CaseText<'_>) -> Result<String, Dia
         robot.insert("profile".to_owned(), Value::String(profile));
     }
     if let Some((launcher, dir)) = &case.skill {
-        let launcher = launcher.iter().map(|text| ("test_launcher".to_owned(), Value::String(text.clone())));
+        let launcher = launcher
+            .iter()
+            .map(|text| ("test_launcher".to_owned(), Value::String(text.clone())));
         table.extend(launcher);
-        let skill = table.entry("skill").or_insert_with(|| Value::Table(toml::Table::new()));
+        let skill = table
+            .entry("skill")
+            .or_insert_with(|| Value::Table(toml::Table::new()));
         if let Value::Table(skill) = skill {
             skill.insert("dir".to_owned(), Value::String(dir.clone()));
         }
@@ -122,8 +156,16 @@ pub fn case_text(campaign: &Campaign, case: &CaseText<'_>) -> Result<String, Dia
         case.run
     );
     let _ = writeln!(out, "[case]\nfrom = {}", Value::String(case.run.to_owned()));
-    let _ = writeln!(out, "# Properties that failed in that run.\nexpect = {}", names(case.failed));
-    let _ = writeln!(out, "# Digest over all states of that run.\ntrace = {}", Value::String(case.trace.to_owned()));
+    let _ = writeln!(
+        out,
+        "# Properties that failed in that run.\nexpect = {}",
+        names(case.failed)
+    );
+    let _ = writeln!(
+        out,
+        "# Digest over all states of that run.\ntrace = {}",
+        Value::String(case.trace.to_owned())
+    );
     let _ = writeln!(
         out,
         "\n# Every choice of the run, to edit as needed. Choices left out take their nominal value. Poses are in the\n\
@@ -133,8 +175,8 @@ pub fn case_text(campaign: &Campaign, case: &CaseText<'_>) -> Result<String, Dia
     Ok(out)
 }
 
-/// Returns a case's text with the skills of a campaign instead of its own. `skill`: as in [`CaseText`]. The text is
-/// unchanged if it names the same skills.
+/// Returns a case's text with the skills of a campaign instead of its own. `skill`: as in
+/// [`CaseText`]. The text is unchanged if it names the same skills.
 ///
 /// # Errors
 /// C002 if one of the texts is not TOML.
@@ -148,17 +190,33 @@ pub fn with_skills(
     let is = match skill {
         None => [None, None],
         Some((launcher, dir)) => {
-            let mut options = own.get("skill").and_then(Value::as_table).cloned().unwrap_or_default();
+            let mut options = own
+                .get("skill")
+                .and_then(Value::as_table)
+                .cloned()
+                .unwrap_or_default();
             options.insert("dir".to_owned(), Value::String(dir));
-            [launcher.map(Value::String).or_else(|| own.get("test_launcher").cloned()), Some(Value::Table(options))]
+            [
+                launcher
+                    .map(Value::String)
+                    .or_else(|| own.get("test_launcher").cloned()),
+                Some(Value::Table(options)),
+            ]
         }
     };
-    let names_none = was[1].is_none() && was[0].as_ref().is_none_or(|name| name.as_str() == Some("reference"));
+    let names_none = was[1].is_none()
+        && was[0]
+            .as_ref()
+            .is_none_or(|name| name.as_str() == Some("reference"));
     if was == is || (is == [None, None] && names_none) {
         return Ok(case.text.to_string());
     }
     let keys = ["test_launcher", "skill"].map(str::to_owned);
-    table.extend(keys.into_iter().zip(is).filter_map(|(key, value)| Some((key, value?))));
+    table.extend(
+        keys.into_iter()
+            .zip(is)
+            .filter_map(|(key, value)| Some((key, value?))),
+    );
     Ok(table.to_string())
 }
 
@@ -167,8 +225,16 @@ fn step(step: &Step) -> Value {
     if step.values.is_empty() {
         return Value::String(step.action.clone());
     }
-    let values = step.values.iter().map(|(name, value)| (name.clone(), Value::String(value.clone())));
-    Value::Table([("action".to_owned(), Value::String(step.action.clone()))].into_iter().chain(values).collect())
+    let values = step
+        .values
+        .iter()
+        .map(|(name, value)| (name.clone(), Value::String(value.clone())));
+    Value::Table(
+        [("action".to_owned(), Value::String(step.action.clone()))]
+            .into_iter()
+            .chain(values)
+            .collect(),
+    )
 }
 
 fn names(names: &[String]) -> Value {
@@ -195,28 +261,49 @@ fn choice_lines(campaign: &Campaign, case: &CaseText<'_>) -> String {
         }
         thing = Some(of);
         let same = &values[&ChoiceName::from(name.as_str())];
-        let written: Vec<String> = same.iter().map(|choice| written(choice, &campaign.other_counts)).collect();
+        let written: Vec<String> = same
+            .iter()
+            .map(|choice| written(choice, &campaign.other_counts))
+            .collect();
         let value = match written.as_slice() {
             [only] => only.clone(),
             several => format!("[{}]", several.join(", ")),
         };
         let remark = same.first().and_then(|choice| remark(choice));
-        let _ = writeln!(out, "{} = {value}{}", key(name, &order), remark.unwrap_or_default());
+        let _ = writeln!(
+            out,
+            "{} = {value}{}",
+            key(name, &order),
+            remark.unwrap_or_default()
+        );
     }
     out
 }
 
-/// Formats a name as dotted keys, or in quotation marks if a prefix of it is a choice too, which TOML forbids.
+/// Formats a name as dotted keys, or in quotation marks if a prefix of it is a choice too, which
+/// TOML forbids.
 fn key(name: &str, all: &[String]) -> String {
     let quoted = |text: &str| Value::String(text.to_owned()).to_string();
-    let within = |other: &String| name.strip_prefix(other.as_str()).is_some_and(|rest| rest.starts_with('.'));
+    let within = |other: &String| {
+        name.strip_prefix(other.as_str())
+            .is_some_and(|rest| rest.starts_with('.'))
+    };
     if all.iter().any(within) {
         return quoted(name);
     }
     let is_bare = |part: &str| {
-        !part.is_empty() && part.bytes().all(|byte| byte.is_ascii_alphanumeric() || matches!(byte, b'_' | b'-'))
+        !part.is_empty()
+            && part
+                .bytes()
+                .all(|byte| byte.is_ascii_alphanumeric() || matches!(byte, b'_' | b'-'))
     };
-    let parts = name.split('.').map(|part| if is_bare(part) { part.to_owned() } else { quoted(part) });
+    let parts = name.split('.').map(|part| {
+        if is_bare(part) {
+            part.to_owned()
+        } else {
+            quoted(part)
+        }
+    });
     parts.collect::<Vec<_>>().join(".")
 }
 
@@ -240,7 +327,11 @@ fn remark(choice: &Choice) -> Option<String> {
         ChoiceKind::Index { .. } | ChoiceKind::Candidate { .. } => return None,
     };
     let unit = choice.name.unit();
-    let unit = if unit.is_empty() { String::new() } else { format!("{unit}, ") };
+    let unit = if unit.is_empty() {
+        String::new()
+    } else {
+        format!("{unit}, ")
+    };
     Some(format!("  # {unit}{bounds}"))
 }
 

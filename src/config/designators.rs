@@ -15,7 +15,8 @@ enum Kind {
     Model,
 }
 
-/// The paper's tables with the key of their candidates. Worlds come first because locations and surfaces refer to them.
+/// The paper's tables with the key of their candidates. Worlds come first because locations and
+/// surfaces refer to them.
 const PAPER_TABLES: [(&str, &str, Kind); 6] = [
     ("world", "worlds", Kind::World),
     ("objectLocation", "location_list", Kind::Location),
@@ -40,8 +41,9 @@ pub(crate) struct Designators {
     pub(crate) nav_may_block: bool,
 }
 
-/// Reads the tables of designators: those of the paper, and any other with a single list of strings. Only the ontology
-/// defines which designators exist, so `places` keeps the span for a later check.
+/// Reads the tables of designators: those of the paper, and any other with a single list of
+/// strings. Only the ontology defines which designators exist, so `places` keeps the span for a
+/// later check.
 pub(crate) fn read(
     root: &mut Table,
     library: &mut ModelLibrary,
@@ -55,7 +57,9 @@ pub(crate) fn read(
     let has_others = root.key_span("surfaceObjects").is_some();
     let has_surface = root.key_span("objectSurface").is_some();
     for (name, key, kind) in PAPER_TABLES {
-        let Some(mut table) = root.table(name) else { continue };
+        let Some(mut table) = root.table(name) else {
+            continue;
+        };
         table.require(&[key]);
         let values = table.non_empty_strings(key).unwrap_or_default();
         for value in &values {
@@ -83,7 +87,14 @@ pub(crate) fn read(
         read_own_table(root, &name, &mut candidates, places, found);
     }
     let (nav_obstacles, nav_obstacle_count) = read_obstacles(root, library);
-    Designators { candidates, other_counts, lying, nav_obstacles, nav_obstacle_count, nav_may_block }
+    Designators {
+        candidates,
+        other_counts,
+        lying,
+        nav_obstacles,
+        nav_obstacle_count,
+        nav_may_block,
+    }
 }
 
 /// Returns the names of the models that a configuration may put into scenes.
@@ -91,8 +102,12 @@ pub(crate) fn named_models<'a>(
     candidates: &'a BTreeMap<String, Vec<String>>,
     nav_obstacles: &'a [String],
 ) -> BTreeSet<&'a str> {
-    let tables = PAPER_TABLES.iter().filter(|(.., kind)| matches!(kind, Kind::Surface | Kind::Model));
-    let listed = tables.filter_map(|(name, ..)| candidates.get(*name)).flatten();
+    let tables = PAPER_TABLES
+        .iter()
+        .filter(|(.., kind)| matches!(kind, Kind::Surface | Kind::Model));
+    let listed = tables
+        .filter_map(|(name, ..)| candidates.get(*name))
+        .flatten();
     listed.chain(nav_obstacles).map(String::as_str).collect()
 }
 
@@ -107,11 +122,14 @@ fn keep(
     for (idx, value) in values.iter().enumerate() {
         places.insert(format!("{name}.{idx}"), value.span.clone());
     }
-    candidates.insert(name.to_owned(), values.into_iter().map(|value| value.value).collect());
+    candidates.insert(
+        name.to_owned(),
+        values.into_iter().map(|value| value.value).collect(),
+    );
 }
 
-/// Reads a table with a single list, which may be named after a designator of the user's ontology. Any other table is
-/// left for [`Table::finish`] to report as unknown.
+/// Reads a table with a single list, which may be named after a designator of the user's ontology.
+/// Any other table is left for [`Table::finish`] to report as unknown.
 fn read_own_table(
     root: &mut Table,
     name: &str,
@@ -119,8 +137,12 @@ fn read_own_table(
     places: &mut BTreeMap<String, Span>,
     found: &mut Diagnostics,
 ) {
-    let Some(key) = root.only_list_of(name) else { return };
-    let Some(mut table) = root.table(name) else { return };
+    let Some(key) = root.only_list_of(name) else {
+        return;
+    };
+    let Some(mut table) = root.table(name) else {
+        return;
+    };
     let values = table.non_empty_strings(&key).unwrap_or_default();
     keep(name, table.span(), values, candidates, places);
     table.finish(found);
@@ -143,8 +165,10 @@ fn read_place_count(table: &mut Table, has_others: bool) -> (u32, u32) {
     let place = table.key_span("count");
     let count = read_count(table).unwrap_or_default();
     if count.1 > 0 && !has_others {
-        let message =
-            format!("`placeSurface.count` allows up to {} objects, but there are no models to choose from", count.1);
+        let message = format!(
+            "`placeSurface.count` allows up to {} objects, but there are no models to choose from",
+            count.1
+        );
         table.fault(
             "C007",
             place.unwrap_or(0..0),
@@ -157,7 +181,9 @@ fn read_place_count(table: &mut Table, has_others: bool) -> (u32, u32) {
 
 /// Reads `[nav] may_block`.
 fn read_nav(root: &mut Table, found: &mut Diagnostics) -> bool {
-    let Some(mut nav) = root.table("nav") else { return false };
+    let Some(mut nav) = root.table("nav") else {
+        return false;
+    };
     let may_block = nav.boolean("may_block").unwrap_or(false);
     nav.finish(found);
     may_block
@@ -167,10 +193,21 @@ fn read_obstacles(root: &mut Table, library: &mut ModelLibrary) -> (Vec<String>,
     let names = root.strings("nav_obstacle_list").unwrap_or_default();
     names.iter().for_each(|name| library.check_name(root, name));
     let place = root.key_span("nav_obstacle_count");
-    let count = root.integer("nav_obstacle_count", 0..=MOST_OBJECTS).unwrap_or(0);
+    let count = root
+        .integer("nav_obstacle_count", 0..=MOST_OBJECTS)
+        .unwrap_or(0);
     if count > 0 && names.is_empty() {
-        let message = format!("`nav_obstacle_count` is {count}, but there is no obstacle to choose");
-        root.fault("C007", place.unwrap_or(0..0), message, "name models in `nav_obstacle_list`, or set the count to 0");
+        let message =
+            format!("`nav_obstacle_count` is {count}, but there is no obstacle to choose");
+        root.fault(
+            "C007",
+            place.unwrap_or(0..0),
+            message,
+            "name models in `nav_obstacle_list`, or set the count to 0",
+        );
     }
-    (names.into_iter().map(|name| name.value).collect(), u32::try_from(count).unwrap_or(0))
+    (
+        names.into_iter().map(|name| name.value).collect(),
+        u32::try_from(count).unwrap_or(0),
+    )
 }

@@ -10,8 +10,10 @@ const LONGEST_SECS: f64 = 366.0 * 86_400.0;
 /// # Errors
 /// A message if the text is not a duration, or not above zero and at most a year.
 pub fn duration_secs(text: &str) -> Result<f64, String> {
-    let duration: SignedDuration =
-        text.trim().parse().map_err(|_| format!("`{text}` is not a duration such as 90s, 10m or 2h"))?;
+    let duration: SignedDuration = text
+        .trim()
+        .parse()
+        .map_err(|_| format!("`{text}` is not a duration such as 90s, 10m or 2h"))?;
     let secs = duration.as_secs_f64();
     if secs > 0.0 && secs <= LONGEST_SECS {
         Ok(secs)
@@ -26,9 +28,14 @@ mod tests {
 
     #[test]
     fn durations_have_several_spellings() {
-        for (text, secs) in
-            [("90s", 90.0), ("10m", 600.0), ("2h", 7200.0), ("1h30m", 5400.0), ("1.5s", 1.5), (" 1 h ", 3600.0)]
-        {
+        for (text, secs) in [
+            ("90s", 90.0),
+            ("10m", 600.0),
+            ("2h", 7200.0),
+            ("1h30m", 5400.0),
+            ("1.5s", 1.5),
+            (" 1 h ", 3600.0),
+        ] {
             assert_eq!(duration_secs(text), Ok(secs), "{text}");
         }
         for text in ["", "10", "0s", "-5s", "ten minutes", "1e9h", "500000h"] {

@@ -1,4 +1,5 @@
-//! Parses and validates a TOML configuration into a [`Campaign`], including its models, worlds and robot.
+//! Parses and validates a TOML configuration into a [`Campaign`], including its models, worlds and
+//! robot.
 //!
 //! Never: samples a choice, interprets actions, or reads the ontology.
 

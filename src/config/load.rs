@@ -9,7 +9,9 @@ use crate::paths::{check_unnamed, resolve_path};
 use crate::robot::{MendedUrdf, mended};
 use crate::table::WrittenStep;
 use crate::{Campaign, Overrides, Step, Table, case, model_library, ranges, skill};
-use actcheck_base::{Diagnostic, Diagnostics, Files, Keep, Keeping, Severity, Source, Span, did_you_mean};
+use actcheck_base::{
+    Diagnostic, Diagnostics, Files, Keep, Keeping, Severity, Source, Span, did_you_mean,
+};
 use actcheck_search::Strategy;
 
 /// The ontology embedded in the program.
@@ -24,12 +26,16 @@ const MOST_REPETITIONS: i64 = 1000;
 /// Reads a configuration with its models and robot. Its paths are relative to its folder.
 ///
 /// # Errors
-/// All faults at once: the file can't be read (C001), is not TOML (C002), has unknown, missing or invalid keys
-/// (C003 to C009), names missing models, robots or files (C010 to C014), or a model or robot has errors (W…).
+/// All faults at once: the file can't be read (C001), is not TOML (C002), has unknown, missing or
+/// invalid keys (C003 to C009), names missing models, robots or files (C010 to C014), or a model or
+/// robot has errors (W…).
 pub fn load(path: &Path, overrides: &Overrides) -> Result<Campaign, Diagnostics> {
     let source = Files::Disk.read(path).map_err(|reason| {
-        Diagnostic::error("C001", format!("cannot read the configuration {}: {reason}", path.display()))
-            .help("name a TOML file, such as configs/pick.toml")
+        Diagnostic::error(
+            "C001",
+            format!("cannot read the configuration {}: {reason}", path.display()),
+        )
+        .help("name a TOML file, such as configs/pick.toml")
     })?;
     load_text(source, path.parent().unwrap_or(Path::new("")), overrides)
 }
@@ -38,15 +44,27 @@ pub fn load(path: &Path, overrides: &Overrides) -> Result<Campaign, Diagnostics>
 ///
 /// # Errors
 /// As [`load`], except C001.
-pub fn load_text(source: Source, folder: &Path, overrides: &Overrides) -> Result<Campaign, Diagnostics> {
+pub fn load_text(
+    source: Source,
+    folder: &Path,
+    overrides: &Overrides,
+) -> Result<Campaign, Diagnostics> {
     let mut table = Table::parse(&source)?;
     let mut found = Diagnostics::new();
 
     table.require(&["tests", "test_count"]);
     let (tests, mut places) = read_tests(&mut table);
-    let test_count = table.integer("test_count", 1..=MOST_RUNS).and_then(|count| u32::try_from(count).ok());
-    let repeat = table.integer("repeat", 1..=MOST_REPETITIONS).and_then(|count| u32::try_from(count).ok());
-    places.extend(table.key_span("test_launcher").map(|span| ("test_launcher".to_owned(), span)));
+    let test_count = table
+        .integer("test_count", 1..=MOST_RUNS)
+        .and_then(|count| u32::try_from(count).ok());
+    let repeat = table
+        .integer("repeat", 1..=MOST_REPETITIONS)
+        .and_then(|count| u32::try_from(count).ok());
+    places.extend(
+        table
+            .key_span("test_launcher")
+            .map(|span| ("test_launcher".to_owned(), span)),
+    );
     let launcher = match &overrides.launcher {
         Some(launcher) => {
             skill::pass_over(&mut table);
@@ -54,7 +72,9 @@ pub fn load_text(source: Source, folder: &Path, overrides: &Overrides) -> Result
         }
         None => skill::read(&mut table, folder, &mut found),
     };
-    let seed = table.integer("seed", 0..=i64::MAX).map_or(0, i64::unsigned_abs);
+    let seed = table
+        .integer("seed", 0..=i64::MAX)
+        .map_or(0, i64::unsigned_abs);
     let ontology = read_ontology_path(&mut table, folder);
     let scene_rule = read_scene_rule(&mut table, folder, &mut found);
     let mut library = model_library::read(&mut table, folder, &mut found);
@@ -71,8 +91,7 @@ pub fn load_text(source: Source, folder: &Path, overrides: &Overrides) -> Result
     }
     if keeping.keep != Keep::All && launcher != Launcher::Reference {
         let span = places.get("test_launcher").cloned().unwrap_or(0..0);
-        let message =
-            "runs of a program may not be the same a second time: motion that the history does not keep may be lost";
+        let message = "runs of a program may not be the same a second time: motion that the history does not keep may be lost";
         found.push(
             Diagnostic::warning("C018", message)
                 .at(&source, span)
@@ -81,15 +100,31 @@ pub fn load_text(source: Source, folder: &Path, overrides: &Overrides) -> Result
     }
     // Taken before the tables of designators, which may have any name.
     let case = table.table("case");
-    places.extend(library.profile_at.clone().map(|span| ("robot.profile".to_owned(), span)));
+    places.extend(
+        library
+            .profile_at
+            .clone()
+            .map(|span| ("robot.profile".to_owned(), span)),
+    );
     let designators = designators::read(&mut table, &mut library, &mut places, &mut found);
     let case = case.map(|table| case::read(table, &designators, &mut places, &mut found));
-    let Designators { candidates, other_counts, lying, nav_obstacles, nav_obstacle_count, nav_may_block } = designators;
+    let Designators {
+        candidates,
+        other_counts,
+        lying,
+        nav_obstacles,
+        nav_obstacle_count,
+        nav_may_block,
+    } = designators;
     table.finish(&mut found);
     let named = designators::named_models(&candidates, &nav_obstacles);
     let report = library.report(&named);
     found.extend(report);
-    let warnings: Diagnostics = found.iter().filter(|fault| fault.severity == Severity::Warning).cloned().collect();
+    let warnings: Diagnostics = found
+        .iter()
+        .filter(|fault| fault.severity == Severity::Warning)
+        .cloned()
+        .collect();
 
     let robot = match robot {
         Some(robot) if !found.has_errors() => robot,
@@ -130,8 +165,8 @@ pub fn load_text(source: Source, folder: &Path, overrides: &Overrides) -> Result
     })
 }
 
-/// Mends the URDF of a configuration's robot: see [`crate::robot::mended`]. Returns `None` if there is nothing to mend, or one of the
-/// files can't be read: [`load`] reports the reason.
+/// Mends the URDF of a configuration's robot: see [`crate::robot::mended`]. Returns `None` if there
+/// is nothing to mend, or one of the files can't be read: [`load`] reports the reason.
 pub fn mended_robot(path: &Path) -> Option<MendedUrdf> {
     let source = Files::Disk.read(path).ok()?;
     let folder = path.parent().unwrap_or(Path::new(""));
@@ -147,30 +182,57 @@ pub fn in_order_of_place(found: Diagnostics) -> Diagnostics {
     let mut names: Vec<String> = Vec::new();
     let mut faults: Vec<(usize, usize, Diagnostic)> = Vec::new();
     for fault in found {
-        let name = fault.source.as_ref().map_or(String::new(), |source| source.name.to_string());
-        let rank = names.iter().position(|known| *known == name).unwrap_or_else(|| {
-            names.push(name);
-            names.len() - 1
-        });
-        faults.push((rank, fault.span.as_ref().map_or(0, |span| span.start), fault));
+        let name = fault
+            .source
+            .as_ref()
+            .map_or(String::new(), |source| source.name.to_string());
+        let rank = names
+            .iter()
+            .position(|known| *known == name)
+            .unwrap_or_else(|| {
+                names.push(name);
+                names.len() - 1
+            });
+        faults.push((
+            rank,
+            fault.span.as_ref().map_or(0, |span| span.start),
+            fault,
+        ));
     }
     faults.sort_by_key(|(rank, start, _)| (*rank, *start));
     let mut sorted = Diagnostics::new();
-    faults.into_iter().for_each(|(.., fault)| sorted.push(fault));
+    faults
+        .into_iter()
+        .for_each(|(.., fault)| sorted.push(fault));
     sorted
 }
 
 fn read_tests(table: &mut Table) -> (Vec<Vec<Step>>, BTreeMap<String, Span>) {
     let mut places = BTreeMap::new();
     let mut tests = Vec::new();
-    for (idx, list) in table.lists_of_steps("tests").unwrap_or_default().into_iter().enumerate() {
+    for (idx, list) in table
+        .lists_of_steps("tests")
+        .unwrap_or_default()
+        .into_iter()
+        .enumerate()
+    {
         let mut test = Vec::new();
         for (number, WrittenStep { action, values }) in list.into_iter().enumerate() {
             let place = format!("tests.{idx}.{number}");
-            places.extend(values.iter().map(|(name, value)| (format!("{place}.{name}"), value.span.clone())));
+            places.extend(
+                values
+                    .iter()
+                    .map(|(name, value)| (format!("{place}.{name}"), value.span.clone())),
+            );
             places.insert(place, action.span);
-            let values = values.into_iter().map(|(name, value)| (name, value.value)).collect();
-            test.push(Step { action: action.value, values });
+            let values = values
+                .into_iter()
+                .map(|(name, value)| (name, value.value))
+                .collect();
+            test.push(Step {
+                action: action.value,
+                values,
+            });
         }
         tests.push(test);
     }
@@ -178,7 +240,9 @@ fn read_tests(table: &mut Table) -> (Vec<Vec<Step>>, BTreeMap<String, Span>) {
 }
 
 fn read_ontology_path(table: &mut Table, folder: &Path) -> (Files, PathBuf) {
-    let Some(written) = table.string("ontology") else { return (Files::Shipped, PathBuf::from(SHIPPED_ONTOLOGY)) };
+    let Some(written) = table.string("ontology") else {
+        return (Files::Shipped, PathBuf::from(SHIPPED_ONTOLOGY));
+    };
     let path = resolve_path(folder, &written.value);
     if let Err(reason) = Files::Disk.read(&path) {
         let message = format!("cannot read the ontology {}: {reason}", path.display());
@@ -195,10 +259,17 @@ fn read_ontology_path(table: &mut Table, folder: &Path) -> (Files, PathBuf) {
 fn read_search(table: &mut Table, found: &mut Diagnostics) -> Option<Strategy> {
     let mut search = table.table("search")?;
     let written = search.string("strategy");
-    let strategy = written.as_ref().and_then(|written| Strategy::by_name(&written.value));
+    let strategy = written
+        .as_ref()
+        .and_then(|written| Strategy::by_name(&written.value));
     if let (Some(written), None) = (written, strategy) {
         let help = did_you_mean(&written.value, Strategy::ALL.map(Strategy::name));
-        search.fault("C016", written.span, format!("there is no search strategy `{}`", written.value), help);
+        search.fault(
+            "C016",
+            written.span,
+            format!("there is no search strategy `{}`", written.value),
+            help,
+        );
     }
     search.finish(found);
     strategy
@@ -210,12 +281,22 @@ fn read_scene_rule(table: &mut Table, folder: &Path, found: &mut Diagnostics) ->
     scene.require(&["require"]);
     let read = scene.string("require").and_then(|written| {
         let path = resolve_path(folder, &written.value);
-        let is_rules = path.extension().is_some_and(|ending| ending == "rls" || ending == "rq");
-        let read =
-            if is_rules { Files::Disk.read(&path) } else { Err("it ends neither in `.rls` nor in `.rq`".to_owned()) };
+        let is_rules = path
+            .extension()
+            .is_some_and(|ending| ending == "rls" || ending == "rq");
+        let read = if is_rules {
+            Files::Disk.read(&path)
+        } else {
+            Err("it ends neither in `.rls` nor in `.rq`".to_owned())
+        };
         read.map_err(|reason| {
             let message = format!("cannot read the scene's rules {}: {reason}", path.display());
-            scene.fault("C022", written.span, message, "the path is relative to the configuration");
+            scene.fault(
+                "C022",
+                written.span,
+                message,
+                "the path is relative to the configuration",
+            );
         })
         .ok()
     });
@@ -223,8 +304,13 @@ fn read_scene_rule(table: &mut Table, folder: &Path, found: &mut Diagnostics) ->
     read
 }
 
-/// Reads the history's folder, whether each run is written to the disk at once, and which runs are kept whole.
-fn read_history(table: &mut Table, folder: &Path, found: &mut Diagnostics) -> (PathBuf, bool, Keeping) {
+/// Reads the history's folder, whether each run is written to the disk at once, and which runs are
+/// kept whole.
+fn read_history(
+    table: &mut Table,
+    folder: &Path,
+    found: &mut Diagnostics,
+) -> (PathBuf, bool, Keeping) {
     let (mut dir, mut sync, mut keeping) = (folder.join(HISTORY_DIR), false, Keeping::default());
     if let Some(mut history) = table.table("history") {
         if let Some(written) = history.string("dir") {
@@ -232,11 +318,19 @@ fn read_history(table: &mut Table, folder: &Path, found: &mut Diagnostics) -> (P
         }
         sync = history.boolean("sync").unwrap_or(false);
         if let Some(written) = history.string("keep") {
-            match Keep::ALL.into_iter().find(|keep| keep.word() == written.value) {
+            match Keep::ALL
+                .into_iter()
+                .find(|keep| keep.word() == written.value)
+            {
                 Some(keep) => keeping.keep = keep,
                 None => {
                     let help = did_you_mean(&written.value, Keep::ALL.map(Keep::word));
-                    history.fault("C017", written.span, format!("`keep` can't be `{}`", written.value), help);
+                    history.fault(
+                        "C017",
+                        written.span,
+                        format!("`keep` can't be `{}`", written.value),
+                        help,
+                    );
                 }
             }
         }

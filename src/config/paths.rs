@@ -4,7 +4,8 @@ use std::path::{Path, PathBuf};
 
 use actcheck_base::{Diagnostic, Diagnostics, ShellLine};
 
-/// Resolves a path of a configuration relative to `folder`, without `..` where removing it does not change the target.
+/// Resolves a path of a configuration relative to `folder`, without `..` where removing it does not
+/// change the target.
 pub fn resolve_path(folder: &Path, written: &str) -> PathBuf {
     let (mut base, mut rest) = (folder.to_path_buf(), Path::new(written));
     while let Ok(shorter) = rest.strip_prefix("..") {
@@ -15,16 +16,24 @@ pub fn resolve_path(folder: &Path, written: &str) -> PathBuf {
     }
     let path = base.join(rest);
     // An empty path is the current directory.
-    if path.as_os_str().is_empty() { PathBuf::from(".") } else { path }
+    if path.as_os_str().is_empty() {
+        PathBuf::from(".")
+    } else {
+        path
+    }
 }
 
-/// Checks the folder of a history that the user did not name: a link would lead its writers to any folder. `from`: the folder
-/// of the configuration, which the user did name.
+/// Checks the folder of a history that the user did not name: a link would lead its writers to any
+/// folder. `from`: the folder of the configuration, which the user did name.
 ///
 /// # Errors
 /// `H028` it is a link, or in a folder that is one.
 pub fn check_unnamed(from: &Path, history: &Path) -> Result<(), Diagnostics> {
-    let shared = from.components().zip(history.components()).take_while(|(one, other)| one == other).count();
+    let shared = from
+        .components()
+        .zip(history.components())
+        .take_while(|(one, other)| one == other)
+        .count();
     let is_elsewhere = history.is_absolute() != from.is_absolute();
     let mut path = PathBuf::new();
     let steps = history.components().enumerate().map(|(place, part)| {
@@ -32,12 +41,17 @@ pub fn check_unnamed(from: &Path, history: &Path) -> Result<(), Diagnostics> {
         (place, path.clone())
     });
     let last = history.components().count().saturating_sub(1);
-    let links =
-        steps.filter(|(place, path)| (*place >= shared && !is_elsewhere || *place == last) && path.is_symlink());
+    let links = steps.filter(|(place, path)| {
+        (*place >= shared && !is_elsewhere || *place == last) && path.is_symlink()
+    });
     match links.map(|(_, path)| path).next() {
         None => Ok(()),
         Some(link) => {
-            let message = format!("the history `{}` isn't used: `{}` is a link", history.display(), link.display());
+            let message = format!(
+                "the history `{}` isn't used: `{}` is a link",
+                history.display(),
+                link.display()
+            );
             let option = ShellLine::default().option("--history", history);
             let help = format!(
                 "if you know where it leads, name the folder on the command line: `{option}`; otherwise remove the link"
@@ -53,9 +67,18 @@ mod tests {
 
     #[test]
     fn paths_are_relative_to_the_configuration() {
-        assert_eq!(resolve_path(Path::new("no-such"), "../models"), Path::new("models"));
-        assert_eq!(resolve_path(Path::new(""), "../models"), Path::new("../models"));
-        assert_eq!(resolve_path(Path::new("a/b"), "../../../m"), Path::new("../m"));
+        assert_eq!(
+            resolve_path(Path::new("no-such"), "../models"),
+            Path::new("models")
+        );
+        assert_eq!(
+            resolve_path(Path::new(""), "../models"),
+            Path::new("../models")
+        );
+        assert_eq!(
+            resolve_path(Path::new("a/b"), "../../../m"),
+            Path::new("../m")
+        );
         assert_eq!(resolve_path(Path::new("a"), "/m"), Path::new("/m"));
         assert_eq!(resolve_path(Path::new("a"), ".."), Path::new("."));
     }

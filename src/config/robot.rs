@@ -15,15 +15,23 @@ use crate::robot_roles::Roles;
 use crate::xacro::{self, Inputs, Unexpanded};
 use crate::{Located, Table};
 
-/// Number of folders above the URDF that are searched for `package://`. `PACKAGE/robots/FILE.urdf` needs two.
+/// Number of folders above the URDF that are searched for `package://`. `PACKAGE/robots/FILE.urdf`
+/// needs two.
 const PACKAGE_LEVELS: usize = 4;
 
 /// Required keys of a profile. The others are found on the model, when its meshes are known.
 const REQUIRED: [&str; 1] = ["urdf"];
 
 /// Keys that most profiles have.
-const USUAL: [&str; 7] =
-    ["arm_joints", "finger_joints", "finger_links", "grasp_link", "camera_link", "max_opening_m", "home"];
+const USUAL: [&str; 7] = [
+    "arm_joints",
+    "finger_joints",
+    "finger_links",
+    "grasp_link",
+    "camera_link",
+    "max_opening_m",
+    "home",
+];
 
 /// Most joints whose motors move the fingers.
 const MOST_FINGER_JOINTS: usize = 8;
@@ -45,12 +53,18 @@ const DEPENDENT: [(&str, &str); 10] = [
 /// Friction of the fingertips if the profile has none: that of rubber pads.
 const FINGER_FRICTION: f64 = 0.8;
 
-/// Rotation of the camera's frame relative to a link whose name contains `optical`, if the profile has none: by ROS's
-/// convention, z points forwards and y down in the frame of such a link. Unit: radians.
-pub const OPTICAL_TURNED_RAD: [f64; 3] = [std::f64::consts::FRAC_PI_2, -std::f64::consts::FRAC_PI_2, 0.0];
+/// Rotation of the camera's frame relative to a link whose name contains `optical`, if the profile
+/// has none: by ROS's convention, z points forwards and y down in the frame of such a link. Unit:
+/// radians.
+pub const OPTICAL_TURNED_RAD: [f64; 3] = [
+    std::f64::consts::FRAC_PI_2,
+    -std::f64::consts::FRAC_PI_2,
+    0.0,
+];
 
-/// Force of a finger if the profile has none and its motors can give it: a usual setting of grippers that can give 40 N
-/// (HSR) to 235 N (Robotiq 2F-85). It holds a can while the arm stops from its full speed. Unit: newtons.
+/// Force of a finger if the profile has none and its motors can give it: a usual setting of
+/// grippers that can give 40 N (HSR) to 235 N (Robotiq 2F-85). It holds a can while the arm stops
+/// from its full speed. Unit: newtons.
 const GRIP_FORCE_N: f64 = 30.0;
 
 /// Reads a profile with the meshes around its URDF: [`read_with`] without further folders.
@@ -61,15 +75,20 @@ pub fn read(files: &Files, path: &Path) -> Result<RobotProfile, Diagnostics> {
     read_with(files, path, &[])
 }
 
-/// Reads a profile, its URDF (relative to the profile) and the URDF's meshes. `package://NAME/…` is looked up in the
-/// profile's `package_dirs`, in `packages`, and around the URDF. xacro is expanded.
+/// Reads a profile, its URDF (relative to the profile) and the URDF's meshes. `package://NAME/…` is
+/// looked up in the profile's `package_dirs`, in `packages`, and around the URDF. xacro is
+/// expanded.
 ///
 /// # Errors
-/// All faults of both texts: those of the table reader (`C…`), an unreadable file (W010), a list of the wrong length
-/// (W011), a failed xacro expansion (W012), an argument for xacro that is not a
-/// value (W013), faults of the URDF and its meshes (W031 to W037, W051), and roles that the
-/// URDF's joints and links can't fill (W050 to W054).
-pub fn read_with(files: &Files, path: &Path, packages: &[PathBuf]) -> Result<RobotProfile, Diagnostics> {
+/// All faults of both texts: those of the table reader (`C…`), an unreadable file (W010), a list of
+/// the wrong length (W011), a failed xacro expansion (W012), an argument for xacro that is not a
+/// value (W013), faults of the URDF and its meshes (W031 to W037, W051), and roles that the URDF's
+/// joints and links can't fill (W050 to W054).
+pub fn read_with(
+    files: &Files,
+    path: &Path,
+    packages: &[PathBuf],
+) -> Result<RobotProfile, Diagnostics> {
     read_telling(files, path, packages).map(|(profile, _)| profile)
 }
 
@@ -83,8 +102,11 @@ pub(crate) fn read_telling(
     packages: &[PathBuf],
 ) -> Result<(RobotProfile, Diagnostics), Diagnostics> {
     let source = files.read(path).map_err(|reason| {
-        Diagnostic::error("W010", format!("cannot read the robot profile {}: {reason}", path.display()))
-            .help("a profile is a TOML file that names a URDF and its joints")
+        Diagnostic::error(
+            "W010",
+            format!("cannot read the robot profile {}: {reason}", path.display()),
+        )
+        .help("a profile is a TOML file that names a URDF and its joints")
     })?;
     let mut table = Table::parse(&source)?;
     table.require(&REQUIRED);
@@ -92,7 +114,10 @@ pub(crate) fn read_telling(
     if has_cup {
         exclude_fingers(&mut table);
     }
-    let usual: Vec<&str> = USUAL.into_iter().filter(|key| !(has_cup && OF_FINGERS.contains(key))).collect();
+    let usual: Vec<&str> = USUAL
+        .into_iter()
+        .filter(|key| !(has_cup && OF_FINGERS.contains(key)))
+        .collect();
     table.expect(&usual);
     let mut found = Diagnostics::new();
     let (urdf, lookup) = find_urdf(files, path, packages, &mut table, &mut found);
@@ -103,11 +128,21 @@ pub(crate) fn read_telling(
             } else {
                 format!("write `{of}` too, or leave out both: then they are found on the model")
             };
-            table.fault("W011", span, format!("`{key}` depends on `{of}`, which is missing"), help);
+            table.fault(
+                "W011",
+                span,
+                format!("`{key}` depends on `{of}`, which is missing"),
+                help,
+            );
         }
     }
     let mut roles = Roles::default();
-    let profile = read_table(&mut table, urdf.as_ref().map(|(urdf, _)| urdf), &mut roles, &mut found);
+    let profile = read_table(
+        &mut table,
+        urdf.as_ref().map(|(urdf, _)| urdf),
+        &mut roles,
+        &mut found,
+    );
     let mut read = None;
     if let Some((text, path)) = &urdf {
         let text = foreign::robot::read(text, path, &lookup, &mut found);
@@ -119,9 +154,17 @@ pub(crate) fn read_telling(
     table.finish(&mut found);
     let warnings = found.clone();
     found.or(())?;
-    // Every missing or wrong key was reported above, so this error only occurs together with another.
-    let incomplete = || Diagnostic::error("W010", "the robot profile is incomplete").in_source(&source).into();
-    profile.zip(read).map(|(profile, read)| (with_meshes(profile, read), warnings)).ok_or_else(incomplete)
+    // Every missing or wrong key was reported above, so this error only occurs together with
+    // another.
+    let incomplete = || {
+        Diagnostic::error("W010", "the robot profile is incomplete")
+            .in_source(&source)
+            .into()
+    };
+    profile
+        .zip(read)
+        .map(|(profile, read)| (with_meshes(profile, read), warnings))
+        .ok_or_else(incomplete)
 }
 
 /// A URDF with moments of inertia that a body can have, where its own are impossible (W034, W036).
@@ -135,8 +178,8 @@ pub struct MendedUrdf {
     pub changes: Vec<String>,
 }
 
-/// Mends the URDF of a profile. Returns `None` if it has no moments of inertia to mend, or can't be read: [`read_with`]
-/// reports the reason.
+/// Mends the URDF of a profile. Returns `None` if it has no moments of inertia to mend, or can't be
+/// read: [`read_with`] reports the reason.
 pub fn mended(files: &Files, path: &Path, packages: &[PathBuf]) -> Option<MendedUrdf> {
     let source = files.read(path).ok()?;
     let mut table = Table::parse(&source).ok()?;
@@ -152,7 +195,11 @@ pub fn mended(files: &Files, path: &Path, packages: &[PathBuf]) -> Option<Mended
     for mend in &mends {
         text.replace_range(mend.span.clone(), &mend.text);
     }
-    Some(MendedUrdf { original, text, changes: mends.into_iter().rev().map(|mend| mend.change).collect() })
+    Some(MendedUrdf {
+        original,
+        text,
+        changes: mends.into_iter().rev().map(|mend| mend.change).collect(),
+    })
 }
 
 /// Finds the URDF of a profile, with its path, and the folders of its meshes.
@@ -166,12 +213,19 @@ fn find_urdf<'a>(
     let folder = profile.parent().unwrap_or(Path::new(""));
     let own = values(table.strings("package_dirs").unwrap_or_default());
     let arguments = table.strings("xacro_args").unwrap_or_default();
-    let mut folders: Vec<PathBuf> = own.into_iter().map(|written| resolve_path(folder, &written)).collect();
-    let Some(written) = table.string("urdf") else { return (None, Lookup { files, folders }) };
+    let mut folders: Vec<PathBuf> = own
+        .into_iter()
+        .map(|written| resolve_path(folder, &written))
+        .collect();
+    let Some(written) = table.string("urdf") else {
+        return (None, Lookup { files, folders });
+    };
     let path = resolve_path(folder, &written.value);
     folders.extend(around(&path, packages));
-    let refused: Vec<_> =
-        arguments.iter().filter_map(|written| Some((written.span.clone(), xacro::refusal(&written.value)?))).collect();
+    let refused: Vec<_> = arguments
+        .iter()
+        .filter_map(|written| Some((written.span.clone(), xacro::refusal(&written.value)?)))
+        .collect();
     if !refused.is_empty() {
         for (span, Unexpanded { message, help }) in refused {
             table.fault("W013", span, message, help);
@@ -179,7 +233,14 @@ fn find_urdf<'a>(
         return (None, Lookup { files, folders });
     }
     let arguments = values(arguments);
-    let urdf = match text_of(files, &path, Inputs { arguments: &arguments, folders: &folders }) {
+    let urdf = match text_of(
+        files,
+        &path,
+        Inputs {
+            arguments: &arguments,
+            folders: &folders,
+        },
+    ) {
         Ok(urdf) => Some((urdf, path)),
         Err(Unread::File(code, fault)) => {
             table.fault(code, written.span, fault.message, fault.help);
@@ -193,18 +254,27 @@ fn find_urdf<'a>(
     (urdf, Lookup { files, folders })
 }
 
-/// The words of the command that reading a profile starts: of `xacro`, if its URDF is to be expanded.
+/// The words of the command that reading a profile starts: of `xacro`, if its URDF is to be
+/// expanded.
 pub(crate) fn expansion(files: &Files, profile: &Path) -> Option<Vec<OsString>> {
     let source = files.read(profile).ok()?;
     let mut table = Table::parse(&source).ok()?;
     let arguments = values(table.strings("xacro_args").unwrap_or_default());
-    let path = resolve_path(profile.parent().unwrap_or(Path::new("")), &table.string("urdf")?.value);
+    let path = resolve_path(
+        profile.parent().unwrap_or(Path::new("")),
+        &table.string("urdf")?.value,
+    );
     xacro::is_xacro(&path).then(|| xacro::words(&path, &arguments))
 }
 
-/// Folders in which the packages of a robot's file are looked up: those given, then those around the file.
+/// Folders in which the packages of a robot's file are looked up: those given, then those around
+/// the file.
 fn around(path: &Path, packages: &[PathBuf]) -> Vec<PathBuf> {
-    let above = path.ancestors().skip(1).take(PACKAGE_LEVELS).map(Path::to_path_buf);
+    let above = path
+        .ancestors()
+        .skip(1)
+        .take(PACKAGE_LEVELS)
+        .map(Path::to_path_buf);
     packages.iter().cloned().chain(above).collect()
 }
 
@@ -219,10 +289,21 @@ pub fn bare(
     arguments: &[String],
 ) -> Result<RobotProfile, Diagnostics> {
     let folders = around(path, packages);
-    if let Some(refused) = arguments.iter().find_map(|argument| xacro::refusal(argument)) {
+    if let Some(refused) = arguments
+        .iter()
+        .find_map(|argument| xacro::refusal(argument))
+    {
         return Err(Unread::File("W013", refused).faults());
     }
-    let urdf = text_of(files, path, Inputs { arguments, folders: &folders }).map_err(Unread::faults)?;
+    let urdf = text_of(
+        files,
+        path,
+        Inputs {
+            arguments,
+            folders: &folders,
+        },
+    )
+    .map_err(Unread::faults)?;
     let mut found = Diagnostics::new();
     let read = foreign::robot::read(&urdf, path, &Lookup { files, folders }, &mut found);
     found.or(())?;
@@ -274,7 +355,9 @@ enum Unread {
 impl Unread {
     fn faults(self) -> Diagnostics {
         match self {
-            Self::File(code, fault) => Diagnostic::error(code, fault.message).help(fault.help).into(),
+            Self::File(code, fault) => Diagnostic::error(code, fault.message)
+                .help(fault.help)
+                .into(),
             Self::Inside(faults) => faults,
         }
     }
@@ -284,7 +367,13 @@ impl Unread {
 fn text_of(files: &Files, path: &Path, inputs: Inputs<'_>) -> Result<Source, Unread> {
     let text = files.read(path).map_err(|reason| {
         let message = format!("cannot read the URDF {}: {reason}", path.display());
-        Unread::File("W010", Unexpanded { message, help: "the path is relative to the profile".to_owned() })
+        Unread::File(
+            "W010",
+            Unexpanded {
+                message,
+                help: "the path is relative to the profile".to_owned(),
+            },
+        )
     })?;
     if xacro::is_xacro(path) {
         return xacro::expand(path, inputs).map_err(|fault| Unread::File("W012", fault));
@@ -314,11 +403,19 @@ fn read_table(
     roles: &mut Roles,
     found: &mut Diagnostics,
 ) -> Option<RobotProfile> {
-    let file_stem = Path::new(&*table.source().name).file_stem().map(|stem| stem.to_string_lossy().into_owned());
-    let name = table.string("name").map(|name| name.value).or(file_stem).unwrap_or_default();
+    let file_stem = Path::new(&*table.source().name)
+        .file_stem()
+        .map(|stem| stem.to_string_lossy().into_owned());
+    let name = table
+        .string("name")
+        .map(|name| name.value)
+        .or(file_stem)
+        .unwrap_or_default();
     let base = read_base(table, roles);
     let arm_joints = table.non_empty_strings("arm_joints");
-    roles.joints.push(("arm_joints", arm_joints.clone().unwrap_or_default()));
+    roles
+        .joints
+        .push(("arm_joints", arm_joints.clone().unwrap_or_default()));
     let finger_joints = finger_joints(table, roles);
     let finger_links = names(table, "finger_links", roles);
     let head_joints = table.strings("head_joints").unwrap_or_default();
@@ -328,43 +425,87 @@ fn read_table(
     let (parked_span, has_parked) = (table.key_span("parked_joints"), table.has("parked"));
     let parked_joints = table.strings("parked_joints").unwrap_or_default();
     roles.joints.push(("parked_joints", parked_joints.clone()));
-    let parked = posture(table, "parked", ("parked_joints", parked_joints.len()), roles).unwrap_or_default();
+    let parked = posture(
+        table,
+        "parked",
+        ("parked_joints", parked_joints.len()),
+        roles,
+    )
+    .unwrap_or_default();
     if let (Some(span), false) = (parked_span, has_parked) {
         let message = "`parked_joints` needs `parked`: the position of each of them".to_owned();
-        table.fault("W011", span, message, "give one position for each joint, in metres or radians");
+        table.fault(
+            "W011",
+            span,
+            message,
+            "give one position for each joint, in metres or radians",
+        );
     }
     let no_collision_links = table.strings("no_collision_links").unwrap_or_default();
     roles.links.push(no_collision_links.clone());
     let (grasp_link, camera_link) = (table.string("grasp_link"), table.string("camera_link"));
     // A camera that is fixed in the world is on no link.
-    let in_world = camera_link.as_ref().is_some_and(|link| link.value == RobotProfile::MAP);
+    let in_world = camera_link
+        .as_ref()
+        .is_some_and(|link| link.value == RobotProfile::MAP);
     let of_robot = camera_link.iter().filter(|_| !in_world);
-    roles.links.push(grasp_link.iter().chain(of_robot).cloned().collect());
+    roles
+        .links
+        .push(grasp_link.iter().chain(of_robot).cloned().collect());
     let grasp_turned_rad = table.numbers("grasp_turned_rad", ..).unwrap_or([0.0; 3]);
-    let grasp_offset_m = table.numbers("grasp_offset_m", -1.0..=1.0).unwrap_or([0.0; 3]);
+    let grasp_offset_m = table
+        .numbers("grasp_offset_m", -1.0..=1.0)
+        .unwrap_or([0.0; 3]);
     let camera_turned_rad = table.numbers("camera_turned_rad", ..).unwrap_or_else(|| {
-        let is_optical = camera_link.as_ref().is_some_and(|link| link.value.contains("optical"));
-        if is_optical { OPTICAL_TURNED_RAD } else { [0.0; 3] }
+        let is_optical = camera_link
+            .as_ref()
+            .is_some_and(|link| link.value.contains("optical"));
+        if is_optical {
+            OPTICAL_TURNED_RAD
+        } else {
+            [0.0; 3]
+        }
     });
     let farthest_m = if in_world { 100.0 } else { 1.0 };
-    let camera_offset_m = table.numbers("camera_offset_m", -farthest_m..=farthest_m).unwrap_or([0.0; 3]);
+    let camera_offset_m = table
+        .numbers("camera_offset_m", -farthest_m..=farthest_m)
+        .unwrap_or([0.0; 3]);
     let mount_height_m = table.number("mount_height_m", 0.0..=3.0).unwrap_or(0.0);
-    let (on_surface, reach_m) = read_place(table, base.as_ref().is_some_and(|(joints, _)| joints.is_some()));
-    let mount_turned_rad =
-        table.number("mount_turned_rad", -std::f64::consts::TAU..=std::f64::consts::TAU).unwrap_or(0.0);
+    let (on_surface, reach_m) = read_place(
+        table,
+        base.as_ref().is_some_and(|(joints, _)| joints.is_some()),
+    );
+    let mount_turned_rad = table
+        .number(
+            "mount_turned_rad",
+            -std::f64::consts::TAU..=std::f64::consts::TAU,
+        )
+        .unwrap_or(0.0);
     let opening_span = table.key_span("max_opening_m");
     let max_opening_m = table.number("max_opening_m", 0.001..=1.0);
     roles.opening = opening_span.zip(max_opening_m);
-    let finger_friction = table.number("finger_friction", 0.0..=2.0).unwrap_or(FINGER_FRICTION);
-    let grip_force_n = table.number("grip_force_n", 0.1..=1000.0).unwrap_or(GRIP_FORCE_N);
+    let finger_friction = table
+        .number("finger_friction", 0.0..=2.0)
+        .unwrap_or(FINGER_FRICTION);
+    let grip_force_n = table
+        .number("grip_force_n", 0.1..=1000.0)
+        .unwrap_or(GRIP_FORCE_N);
     let suction = read_suction(table);
     let n_arm_joints = arm_joints.as_ref().map_or(0, Vec::len);
     let home = posture(table, "home", ("arm_joints", n_arm_joints), roles);
-    let postures = table.tables("postures").into_iter().filter_map(|mut posture_table| {
-        let arm = posture(&mut posture_table, "arm", ("arm_joints", n_arm_joints), roles);
-        posture_table.finish(found);
-        arm
-    });
+    let postures = table
+        .tables("postures")
+        .into_iter()
+        .filter_map(|mut posture_table| {
+            let arm = posture(
+                &mut posture_table,
+                "arm",
+                ("arm_joints", n_arm_joints),
+                roles,
+            );
+            posture_table.finish(found);
+            arm
+        });
     let postures: Vec<Vec<f64>> = postures.collect();
     let (base_joints, planar_base) = base?;
     let urdf = urdf?.clone();
@@ -419,8 +560,10 @@ fn finger_joints(table: &mut Table, roles: &mut Roles) -> Option<Vec<String>> {
     let list = table.strings("finger_joints")?;
     roles.joints.push(("finger_joints", list.clone()));
     if !(1..=MOST_FINGER_JOINTS).contains(&list.len()) {
-        let message =
-            format!("`finger_joints` must list 1 to {MOST_FINGER_JOINTS} names, but this list has {}", list.len());
+        let message = format!(
+            "`finger_joints` must list 1 to {MOST_FINGER_JOINTS} names, but this list has {}",
+            list.len()
+        );
         let help = "name the joints with motors; joints that mimic them follow without being named";
         table.fault("W011", span, message, help);
         return None;
@@ -429,7 +572,11 @@ fn finger_joints(table: &mut Table, roles: &mut Roles) -> Option<Vec<String>> {
 }
 
 /// Reads a list of exactly `N` names: of links if the key ends in `_links`, else of joints.
-pub(super) fn names<const N: usize>(table: &mut Table, key: &'static str, roles: &mut Roles) -> Option<[String; N]> {
+pub(super) fn names<const N: usize>(
+    table: &mut Table,
+    key: &'static str,
+    roles: &mut Roles,
+) -> Option<[String; N]> {
     let span = table.key_span(key)?;
     let list = table.strings(key)?;
     let length = list.len();
@@ -461,9 +608,21 @@ fn posture(
     let span = table.key_span(key);
     let (positions, span) = (table.number_list(key, ..)?, span?);
     if positions.len() != n_joints && (n_joints > 0 || joints != "arm_joints") {
-        let what = if joints == "arm_joints" { "arm joints" } else { "parked joints" };
-        let message = format!("`{key}` has {} positions for {n_joints} {what}", positions.len());
-        table.fault("W011", span, message, format!("give one position for each joint of `{joints}`"));
+        let what = if joints == "arm_joints" {
+            "arm joints"
+        } else {
+            "parked joints"
+        };
+        let message = format!(
+            "`{key}` has {} positions for {n_joints} {what}",
+            positions.len()
+        );
+        table.fault(
+            "W011",
+            span,
+            message,
+            format!("give one position for each joint of `{joints}`"),
+        );
         return None;
     }
     roles.postures.push((span, joints, positions.clone()));
@@ -476,7 +635,8 @@ mod tests {
 
     #[test]
     fn a_missing_or_incomplete_profile_is_refused() {
-        let found = read(&Files::Disk, Path::new("no/such/robot.toml")).expect_err("the file is missing");
+        let found =
+            read(&Files::Disk, Path::new("no/such/robot.toml")).expect_err("the file is missing");
         assert_eq!(found.iter().map(|d| d.code).collect::<Vec<_>>(), ["W010"]);
         let source = Source::new(
             "r.toml",
@@ -485,12 +645,30 @@ mod tests {
         );
         let mut table = Table::parse(&source).expect("it is TOML");
         let mut found = Diagnostics::new();
-        assert!(find_urdf(&Files::Disk, Path::new("no/such/r.toml"), &[], &mut table, &mut found).0.is_none());
+        assert!(
+            find_urdf(
+                &Files::Disk,
+                Path::new("no/such/r.toml"),
+                &[],
+                &mut table,
+                &mut found
+            )
+            .0
+            .is_none()
+        );
         assert!(read_table(&mut table, None, &mut Roles::default(), &mut found).is_none());
         table.finish(&mut found);
         let codes: Vec<&str> = found.iter().map(|d| d.code).collect();
-        assert_eq!(codes.iter().filter(|code| **code == "W011").count(), 2, "{found}");
-        assert_eq!(codes.iter().filter(|code| **code == "W010").count(), 1, "{found}");
+        assert_eq!(
+            codes.iter().filter(|code| **code == "W011").count(),
+            2,
+            "{found}"
+        );
+        assert_eq!(
+            codes.iter().filter(|code| **code == "W010").count(),
+            1,
+            "{found}"
+        );
         assert_eq!(codes.len(), 3, "{found}");
     }
 
@@ -503,7 +681,10 @@ mod tests {
         std::fs::write(&path, text).expect("the file is new");
         let found = read(&Files::Disk, &path).expect_err("three keys are missing");
         std::fs::remove_dir_all(&folder).expect("the folder exists");
-        let said: Vec<String> = found.iter().map(|d| format!("{} {}", d.code, d.message)).collect();
+        let said: Vec<String> = found
+            .iter()
+            .map(|d| format!("{} {}", d.code, d.message))
+            .collect();
         let expected = [
             "C005 `urdf` is missing",
             "W011 `grasp_offset_m` depends on `grasp_link`, which is missing",

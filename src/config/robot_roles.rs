@@ -23,13 +23,19 @@ pub(super) struct Roles {
 }
 
 impl Roles {
-    /// Reports every role that its joint or link can't fill: an unknown name (W050), a joint with two roles (W052), a
-    /// joint of the wrong type (W053), a position beyond the joint limits (W054).
+    /// Reports every role that its joint or link can't fill: an unknown name (W050), a joint with
+    /// two roles (W052), a joint of the wrong type (W053), a position beyond the joint limits
+    /// (W054).
     pub(super) fn check(&self, tree: &Tree, table: &mut Table) {
         for link in self.links.iter().flatten() {
             if !tree.links.contains(&link.value) {
                 let help = did_you_mean(&link.value, tree.links.iter().map(String::as_str));
-                table.fault("W050", link.span.clone(), format!("the URDF has no link `{}`", link.value), help);
+                table.fault(
+                    "W050",
+                    link.span.clone(),
+                    format!("the URDF has no link `{}`", link.value),
+                    help,
+                );
             }
         }
         let mut taken: BTreeMap<&str, &str> = BTreeMap::new();
@@ -39,9 +45,17 @@ impl Roles {
                     let message = if other == *key {
                         format!("the joint `{}` is named twice in `{key}`", joint.value)
                     } else {
-                        format!("the joint `{}` is both in `{other}` and in `{key}`", joint.value)
+                        format!(
+                            "the joint `{}` is both in `{other}` and in `{key}`",
+                            joint.value
+                        )
                     };
-                    table.fault("W052", joint.span.clone(), message, "each joint has one role");
+                    table.fault(
+                        "W052",
+                        joint.span.clone(),
+                        message,
+                        "each joint has one role",
+                    );
                 }
                 check_joint(key, place, joint, tree, table);
             }
@@ -51,38 +65,51 @@ impl Roles {
     }
 
     fn of(&self, key: &str) -> &[Located<String>] {
-        self.joints.iter().find(|(known, _)| *known == key).map_or(&[], |(_, joints)| joints)
+        self.joints
+            .iter()
+            .find(|(known, _)| *known == key)
+            .map_or(&[], |(_, joints)| joints)
     }
 
     fn check_postures(&self, tree: &Tree, table: &mut Table) {
         for (span, key, positions) in &self.postures {
             for (joint, position) in self.of(key).iter().zip(positions) {
-                let Some(limits) = tree.joints.get(&joint.value) else { continue };
+                let Some(limits) = tree.joints.get(&joint.value) else {
+                    continue;
+                };
                 if *position < limits.lower - SLACK || *position > limits.upper + SLACK {
                     let message = format!("{position} is beyond the limits of `{}`", joint.value);
                     let radians = position.to_radians();
-                    let is_large = limits.motion == Motion::Turns && position.abs() > std::f64::consts::TAU;
+                    let is_large =
+                        limits.motion == Motion::Turns && position.abs() > std::f64::consts::TAU;
                     let meant = is_large && (limits.lower..=limits.upper).contains(&radians);
                     let degrees = match meant {
                         true => format!(" rad; {position} degrees are {radians:.4} rad"),
                         false => String::new(),
                     };
-                    let help = format!("its limits are {} and {}{degrees}", limits.lower, limits.upper);
+                    let help = format!(
+                        "its limits are {} and {}{degrees}",
+                        limits.lower, limits.upper
+                    );
                     table.fault("W054", span.clone(), message, help);
                 }
             }
         }
     }
 
-    /// Checks that two fingers that slide apart from 0 can open to `max_opening_m`. The opening of other grippers is
-    /// measured by the simulation.
+    /// Checks that two fingers that slide apart from 0 can open to `max_opening_m`. The opening of
+    /// other grippers is measured by the simulation.
     fn check_opening(&self, tree: &Tree, table: &mut Table) {
-        let Some((span, opening)) = &self.opening else { return };
+        let Some((span, opening)) = &self.opening else {
+            return;
+        };
         let fingers: Vec<f64> = self
             .of("finger_joints")
             .iter()
             .filter_map(|joint| tree.joints.get(&joint.value))
-            .filter(|joint| joint.motion == Motion::Slides && joint.lower >= -SLACK && joint.upper > SLACK)
+            .filter(|joint| {
+                joint.motion == Motion::Slides && joint.lower >= -SLACK && joint.upper > SLACK
+            })
             .map(|joint| joint.upper)
             .collect();
         let widest = 2.0 * fingers.iter().copied().fold(f64::INFINITY, f64::min);
@@ -98,9 +125,17 @@ impl Roles {
 fn check_joint(key: &str, place: usize, joint: &Located<String>, tree: &Tree, table: &mut Table) {
     let name = &joint.value;
     let Some(found) = tree.joints.get(name) else {
-        let movable = tree.joints.iter().filter(|(_, joint)| joint.motion != Motion::Fixed);
+        let movable = tree
+            .joints
+            .iter()
+            .filter(|(_, joint)| joint.motion != Motion::Fixed);
         let help = did_you_mean(name, movable.map(|(name, _)| name.as_str()));
-        table.fault("W050", joint.span.clone(), format!("the URDF has no joint `{name}`"), help);
+        table.fault(
+            "W050",
+            joint.span.clone(),
+            format!("the URDF has no joint `{name}`"),
+            help,
+        );
         return;
     };
     let wanted = match (key, place) {
@@ -109,14 +144,24 @@ fn check_joint(key: &str, place: usize, joint: &Located<String>, tree: &Tree, ta
         _ => None,
     };
     let (fault, help) = match (found.motion, wanted) {
-        (Motion::Fixed, _) => ("does not move", "name a joint of the type prismatic, revolute or continuous"),
-        (Motion::Turns, Some(Motion::Slides)) => {
-            ("rotates, but must be prismatic", "`base_joints` are x, y and heading")
-        }
-        (Motion::Slides, Some(Motion::Turns)) => {
-            ("is prismatic, but must be revolute or continuous", "`base_joints` are x, y and heading")
-        }
+        (Motion::Fixed, _) => (
+            "does not move",
+            "name a joint of the type prismatic, revolute or continuous",
+        ),
+        (Motion::Turns, Some(Motion::Slides)) => (
+            "rotates, but must be prismatic",
+            "`base_joints` are x, y and heading",
+        ),
+        (Motion::Slides, Some(Motion::Turns)) => (
+            "is prismatic, but must be revolute or continuous",
+            "`base_joints` are x, y and heading",
+        ),
         _ => return,
     };
-    table.fault("W053", joint.span.clone(), format!("the joint `{name}` {fault}"), help);
+    table.fault(
+        "W053",
+        joint.span.clone(),
+        format!("the joint `{name}` {fault}"),
+        help,
+    );
 }

@@ -1,4 +1,5 @@
-//! The skills that perform the actions: the reference skills or an external program (`test_launcher`, `[skill]`).
+//! The skills that perform the actions: the reference skills or an external program
+//! (`test_launcher`, `[skill]`).
 
 use std::collections::BTreeMap;
 use std::ffi::{OsStr, OsString};
@@ -28,8 +29,8 @@ pub struct Skill {
     pub program: PathBuf,
     /// Its arguments.
     pub args: Vec<String>,
-    /// The file that `test_launcher` begins with, relative to the current directory, and the words after it; `None` if
-    /// it begins with an installed program.
+    /// The file that `test_launcher` begins with, relative to the current directory, and the words
+    /// after it; `None` if it begins with an installed program.
     pub launched: Option<(PathBuf, Vec<String>)>,
     /// Digest of the command and of the files among its words.
     pub digest: String,
@@ -54,14 +55,25 @@ pub struct Skill {
 impl Skill {
     /// The words of its command.
     pub fn words(&self) -> Vec<OsString> {
-        [self.program.clone().into()].into_iter().chain(self.args.iter().map(OsString::from)).collect()
+        [self.program.clone().into()]
+            .into_iter()
+            .chain(self.args.iter().map(OsString::from))
+            .collect()
     }
 
-    /// Returns `true` if both start the same program: with the same arguments and environment, in the same folder.
+    /// Returns `true` if both start the same program: with the same arguments and environment, in
+    /// the same folder.
     pub fn starts_as(&self, other: &Self) -> bool {
         let words = |skill: &Self| -> Vec<PathBuf> {
             let args = skill.args.iter().map(Path::new);
-            args.map(|word| if word.is_absolute() { canonical(word) } else { word.to_path_buf() }).collect()
+            args.map(|word| {
+                if word.is_absolute() {
+                    canonical(word)
+                } else {
+                    word.to_path_buf()
+                }
+            })
+            .collect()
         };
         canonical(&self.program) == canonical(&other.program)
             && words(self) == words(other)
@@ -69,12 +81,14 @@ impl Skill {
             && canonical(&self.dir) == canonical(&other.dir)
     }
 
-    /// Returns the value of `test_launcher` for a configuration in another folder; `seen` converts the file's path.
-    /// Returns `None` if the value does not depend on the folder.
+    /// Returns the value of `test_launcher` for a configuration in another folder; `seen` converts
+    /// the file's path. Returns `None` if the value does not depend on the folder.
     pub fn launcher(&self, seen: impl Fn(&Path) -> String) -> Option<String> {
         let (file, behind) = self.launched.as_ref()?;
         let file = seen(file);
-        let words = [file.as_str()].into_iter().chain(behind.iter().map(String::as_str));
+        let words = [file.as_str()]
+            .into_iter()
+            .chain(behind.iter().map(String::as_str));
         shlex::try_join(words).ok()
     }
 }
@@ -90,14 +104,20 @@ const LONGEST_SECS: f64 = 3600.0;
 const A_WHILE: (Bound<f64>, Bound<f64>) = (Bound::Excluded(0.0), Bound::Included(LONGEST_SECS));
 
 /// Commands that start ROS launch files, by the file's extension.
-const ROS: [(&str, &[&str]); 2] = [(".launch.py", &["ros2", "launch"]), (".launch", &["roslaunch"])];
+const ROS: [(&str, &[&str]); 2] = [
+    (".launch.py", &["ros2", "launch"]),
+    (".launch", &["roslaunch"]),
+];
 
 /// Reads `test_launcher` and `[skill]`. Paths are relative to `folder`, the configuration's.
 ///
-/// Reports an invalid command (C030), a program that is missing (C031) or can't be started (C032), a launch file
-/// without ROS (C033), a missing working directory (C034), and a `[skill]` without a program (C035, a warning).
+/// Reports an invalid command (C030), a program that is missing (C031) or can't be started (C032),
+/// a launch file without ROS (C033), a missing working directory (C034), and a `[skill]` without a
+/// program (C035, a warning).
 pub(super) fn read(table: &mut Table, folder: &Path, found: &mut Diagnostics) -> Launcher {
-    let written = table.string("test_launcher").filter(|written| written.value != "reference");
+    let written = table
+        .string("test_launcher")
+        .filter(|written| written.value != "reference");
     let span = table.key_span("skill");
     let options = table.table("skill");
     let Some(written) = written else {
@@ -112,8 +132,17 @@ pub(super) fn read(table: &mut Table, folder: &Path, found: &mut Diagnostics) ->
         options.finish(found);
     }
     match find(&written, folder) {
-        Ok(Command { program, mut args, launched }) => {
-            skill.text = [&written.value].into_iter().chain(&skill.args).cloned().collect::<Vec<_>>().join(" ");
+        Ok(Command {
+            program,
+            mut args,
+            launched,
+        }) => {
+            skill.text = [&written.value]
+                .into_iter()
+                .chain(&skill.args)
+                .cloned()
+                .collect::<Vec<_>>()
+                .join(" ");
             args.append(&mut skill.args);
             Launcher::Program(Box::new(Skill {
                 digest: digest(&program, &args, &skill.dir),
@@ -123,7 +152,11 @@ pub(super) fn read(table: &mut Table, folder: &Path, found: &mut Diagnostics) ->
                 ..skill
             }))
         }
-        Err(Missing { code, message, help }) => {
+        Err(Missing {
+            code,
+            message,
+            help,
+        }) => {
             table.fault(code, written.span, message, help);
             Launcher::Reference
         }
@@ -137,7 +170,11 @@ pub(super) fn pass_over(table: &mut Table) {
 }
 
 fn blank(folder: &Path) -> Skill {
-    let dir = if folder.as_os_str().is_empty() { PathBuf::from(".") } else { folder.to_path_buf() };
+    let dir = if folder.as_os_str().is_empty() {
+        PathBuf::from(".")
+    } else {
+        folder.to_path_buf()
+    };
     Skill {
         text: String::new(),
         program: PathBuf::new(),
@@ -147,7 +184,8 @@ fn blank(folder: &Path) -> Skill {
         env: BTreeMap::new(),
         dir,
         privileged: false,
-        // A Python program that imports machine-learning libraries takes about ten seconds on a busy machine.
+        // A Python program that imports machine-learning libraries takes about ten seconds on a
+        // busy machine.
         startup_secs: 30.0,
         timeout_secs: 10.0,
         memory_mb: None,
@@ -171,11 +209,16 @@ fn unused(mut options: Table, folder: &Path, span: Span, found: &mut Diagnostics
 
 fn fill(skill: &mut Skill, options: &mut Table, folder: &Path) {
     let args = options.strings("args").unwrap_or_default();
-    skill.args = args.into_iter().filter_map(|arg| whole(options, "args", arg)).collect();
+    skill.args = args
+        .into_iter()
+        .filter_map(|arg| whole(options, "args", arg))
+        .collect();
     if let Some(mut env) = options.table("env") {
         let mut faults = Diagnostics::new();
         for name in env.keys() {
-            let value = env.string(&name).and_then(|value| whole(&mut env, "env", value));
+            let value = env
+                .string(&name)
+                .and_then(|value| whole(&mut env, "env", value));
             skill.env.extend(value.map(|value| (name, value)));
         }
         env.finish(&mut faults);
@@ -185,22 +228,48 @@ fn fill(skill: &mut Skill, options: &mut Table, folder: &Path) {
         skill.dir = resolve_path(folder, &written.value);
         if !skill.dir.is_dir() {
             let message = format!("there is no folder {}", skill.dir.display());
-            options.fault("C034", written.span, message, "`dir` is relative to the configuration");
+            options.fault(
+                "C034",
+                written.span,
+                message,
+                "`dir` is relative to the configuration",
+            );
         }
     }
     set(&mut skill.privileged, options.boolean("privileged"));
-    set(&mut skill.startup_secs, options.number("startup_s", A_WHILE));
-    set(&mut skill.timeout_secs, options.number("timeout_s", A_WHILE));
+    set(
+        &mut skill.startup_secs,
+        options.number("startup_s", A_WHILE),
+    );
+    set(
+        &mut skill.timeout_secs,
+        options.number("timeout_s", A_WHILE),
+    );
     // Interpreters need at least 16 MB to start.
-    skill.memory_mb = options.integer("memory_mb", 16..=1 << 30).map(i64::unsigned_abs);
-    skill.cpu_secs = options.integer("cpu_s", 1..=i64::from(u32::MAX)).map(i64::unsigned_abs);
-    set(&mut skill.max_broken, options.integer("max_broken", 1..=i64::from(u32::MAX)).map(i64::unsigned_abs));
+    skill.memory_mb = options
+        .integer("memory_mb", 16..=1 << 30)
+        .map(i64::unsigned_abs);
+    skill.cpu_secs = options
+        .integer("cpu_s", 1..=i64::from(u32::MAX))
+        .map(i64::unsigned_abs);
+    set(
+        &mut skill.max_broken,
+        options
+            .integer("max_broken", 1..=i64::from(u32::MAX))
+            .map(i64::unsigned_abs),
+    );
 }
 
-/// Returns the text, or reports an error if it contains a NUL character, which would end the argument.
+/// Returns the text, or reports an error if it contains a NUL character, which would end the
+/// argument.
 fn whole(table: &mut Table, key: &str, text: Located<String>) -> Option<String> {
     if text.value.contains('\0') {
-        table.fault("C006", text.span, format!("`{key}` contains a NUL character"), "remove it");
+        table.fault(
+            "C006",
+            text.span,
+            format!("`{key}` contains a NUL character"),
+            "remove it",
+        );
         return None;
     }
     Some(text.value)
@@ -231,12 +300,20 @@ struct Command {
 fn find(written: &Located<String>, folder: &Path) -> Result<Command, Missing> {
     let text = written.value.as_str();
     // A path may contain spaces.
-    let words = if resolve_path(folder, text).is_file() { Some(vec![text.to_owned()]) } else { shlex::split(text) };
-    let split = words.filter(|words| !text.contains('\0') && !words.is_empty()).ok_or_else(|| Missing {
-        code: "C030",
-        message: format!("`{text}` is not a command: it is empty or a quotation mark is not closed"),
-        help: "write it as in a shell, such as `python3 my_pick.py --speed 0.5`".to_owned(),
-    })?;
+    let words = if resolve_path(folder, text).is_file() {
+        Some(vec![text.to_owned()])
+    } else {
+        shlex::split(text)
+    };
+    let split = words
+        .filter(|words| !text.contains('\0') && !words.is_empty())
+        .ok_or_else(|| Missing {
+            code: "C030",
+            message: format!(
+                "`{text}` is not a command: it is empty or a quotation mark is not closed"
+            ),
+            help: "write it as in a shell, such as `python3 my_pick.py --speed 0.5`".to_owned(),
+        })?;
     let mut words = split.into_iter();
     let (name, args) = (words.next().unwrap_or_default(), words.collect::<Vec<_>>());
     let path = resolve_path(folder, &name);
@@ -245,13 +322,21 @@ fn find(written: &Located<String>, folder: &Path) -> Result<Command, Missing> {
     }
     let program = on_path(&name).ok_or_else(|| Missing {
         code: "C031",
-        message: format!("there is no program `{name}`, neither next to the configuration nor in `PATH`"),
-        help: "name a file relative to the configuration, an installed program, or `reference`".to_owned(),
+        message: format!(
+            "there is no program `{name}`, neither next to the configuration nor in `PATH`"
+        ),
+        help: "name a file relative to the configuration, an installed program, or `reference`"
+            .to_owned(),
     })?;
-    Ok(Command { program, args, launched: None })
+    Ok(Command {
+        program,
+        args,
+        launched: None,
+    })
 }
 
-/// Resolves a command that begins with a file: `name` as written, `path` relative to the current directory.
+/// Resolves a command that begins with a file: `name` as written, `path` relative to the current
+/// directory.
 fn find_file(name: &str, path: PathBuf, args: Vec<String>) -> Result<Command, Missing> {
     if !path.is_file() {
         return Err(Missing {
@@ -261,7 +346,10 @@ fn find_file(name: &str, path: PathBuf, args: Vec<String>) -> Result<Command, Mi
         });
     }
     let launched = Some((path.clone(), args.clone()));
-    let (program, args) = match (ROS.iter().find(|(ending, _)| name.ends_with(ending)), name.ends_with(".py")) {
+    let (program, args) = match (
+        ROS.iter().find(|(ending, _)| name.ends_with(ending)),
+        name.ends_with(".py"),
+    ) {
         (Some((_, starter)), _) => through(starter, &path, args, "C033")?,
         (None, true) => through(&["python3"], &path, args, "C032")?,
         (None, false) if is_executable(&path) => (std::path::absolute(&path).unwrap_or(path), args),
@@ -277,7 +365,11 @@ fn find_file(name: &str, path: PathBuf, args: Vec<String>) -> Result<Command, Mi
             });
         }
     };
-    Ok(Command { program, args, launched })
+    Ok(Command {
+        program,
+        args,
+        launched,
+    })
 }
 
 /// Resolves a file that `starter` runs.
@@ -299,28 +391,46 @@ fn through(
     })?;
     let mut all: Vec<String> = before.iter().map(|word| (*word).to_owned()).collect();
     // The program may have another working directory.
-    all.push(std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf()).display().to_string());
+    all.push(
+        std::path::absolute(path)
+            .unwrap_or_else(|_| path.to_path_buf())
+            .display()
+            .to_string(),
+    );
     all.extend(args);
     Ok((found, all))
 }
 
-/// Finds a program in `PATH`. Like the disk, `PATH` is part of the machine that the configuration refers to.
+/// Finds a program in `PATH`. Like the disk, `PATH` is part of the machine that the configuration
+/// refers to.
 pub(super) fn on_path(name: &str) -> Option<PathBuf> {
     let folders = std::env::var_os("PATH")?;
-    std::env::split_paths(&folders).map(|folder| folder.join(name)).find(|path| is_executable(path))
+    std::env::split_paths(&folders)
+        .map(|folder| folder.join(name))
+        .find(|path| is_executable(path))
 }
 
 fn is_executable(path: &Path) -> bool {
-    std::fs::metadata(path).is_ok_and(|data| data.is_file() && data.permissions().mode() & 0o111 != 0)
+    std::fs::metadata(path)
+        .is_ok_and(|data| data.is_file() && data.permissions().mode() & 0o111 != 0)
 }
 
-/// Digest of a command: its words without their folders, and the contents of those that are files. Only the name of an
-/// installed program, such as an interpreter, is included, so that the digest is the same on all machines.
+/// Digest of a command: its words without their folders, and the contents of those that are files.
+/// Only the name of an installed program, such as an interpreter, is included, so that the digest
+/// is the same on all machines.
 fn digest(program: &Path, args: &[String], dir: &Path) -> String {
     let mut digest = Digest::new();
-    let installed = program.file_name().and_then(OsStr::to_str).and_then(on_path).is_some_and(|found| found == program);
+    let installed = program
+        .file_name()
+        .and_then(OsStr::to_str)
+        .and_then(on_path)
+        .is_some_and(|found| found == program);
     digest.update(last(program).as_bytes());
-    digest.update(&if installed { Vec::new() } else { bytes(program) });
+    digest.update(&if installed {
+        Vec::new()
+    } else {
+        bytes(program)
+    });
     for word in args.iter().map(Path::new) {
         digest.update(last(word).as_bytes());
         digest.update(&bytes(&dir.join(word)));
@@ -329,7 +439,9 @@ fn digest(program: &Path, args: &[String], dir: &Path) -> String {
 }
 
 fn last(path: &Path) -> std::borrow::Cow<'_, str> {
-    path.file_name().unwrap_or(path.as_os_str()).to_string_lossy()
+    path.file_name()
+        .unwrap_or(path.as_os_str())
+        .to_string_lossy()
 }
 
 /// Returns the contents of a file, or nothing if it can't be read.

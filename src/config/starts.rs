@@ -15,16 +15,21 @@ pub struct Starts {
     pub skill: Option<Vec<OsString>>,
 }
 
-/// Finds the programs that a configuration starts, without starting any. Paths in the text are relative to `folder`.
-/// Faults are left to [`crate::load_text`], which finds the same programs.
+/// Finds the programs that a configuration starts, without starting any. Paths in the text are
+/// relative to `folder`. Faults are left to [`crate::load_text`], which finds the same programs.
 pub fn starts(source: &Source, folder: &Path) -> Starts {
     let mut found = Diagnostics::new();
-    let Ok(mut table) = Table::parse(source) else { return Starts::default() };
+    let Ok(mut table) = Table::parse(source) else {
+        return Starts::default();
+    };
     let skill = match skill::read(&mut table, folder, &mut found) {
         Launcher::Reference => None,
         Launcher::Program(skill) => Some(skill.words()),
     };
     let mut library = model_library::read(&mut table, folder, &mut found);
     let profile = library.locate_robot(&mut table, folder, &mut found);
-    Starts { expansion: profile.and_then(|(files, path, _)| robot::expansion(&files, &path)), skill }
+    Starts {
+        expansion: profile.and_then(|(files, path, _)| robot::expansion(&files, &path)),
+        skill,
+    }
 }

@@ -8,20 +8,28 @@ use std::fmt;
 pub struct Step {
     /// Name of the action.
     pub action: String,
-    /// Values by designator: the role, model or id of an object, or the name of a place. They hold for this action and
-    /// for later ones, until one of these gives another value. Designators without a value have that of the scene.
+    /// Values by designator: the role, model or id of an object, or the name of a place. They hold
+    /// for this action and for later ones, until one of these gives another value. Designators
+    /// without a value have that of the scene.
     pub values: BTreeMap<String, String>,
 }
 
 impl Step {
     /// An action with the values of the scene.
     pub fn plain(action: impl Into<String>) -> Self {
-        Self { action: action.into(), values: BTreeMap::new() }
+        Self {
+            action: action.into(),
+            values: BTreeMap::new(),
+        }
     }
 
-    /// Returns the name of a test, by which its runs are found again: its actions, joined by a space.
+    /// Returns the name of a test, by which its runs are found again: its actions, joined by a
+    /// space.
     pub fn test_name(test: &[Self]) -> String {
-        test.iter().map(ToString::to_string).collect::<Vec<_>>().join(" ")
+        test.iter()
+            .map(ToString::to_string)
+            .collect::<Vec<_>>()
+            .join(" ")
     }
 }
 
@@ -32,7 +40,11 @@ impl fmt::Display for Step {
         if self.values.is_empty() {
             return Ok(());
         }
-        let values: Vec<String> = self.values.iter().map(|(name, value)| format!("{name}={value}")).collect();
+        let values: Vec<String> = self
+            .values
+            .iter()
+            .map(|(name, value)| format!("{name}={value}"))
+            .collect();
         write!(f, "({})", values.join(","))
     }
 }
@@ -43,8 +55,18 @@ mod tests {
 
     #[test]
     fn plain_actions_are_written_as_their_names() {
-        let values = [("placeSurface", "shelf"), ("pickObject", "other")].map(|(a, b)| (a.to_owned(), b.to_owned()));
-        let test = [Step::plain("Pick"), Step { action: "Place".to_owned(), values: values.into() }];
-        assert_eq!(Step::test_name(&test), "Pick Place(pickObject=other,placeSurface=shelf)");
+        let values = [("placeSurface", "shelf"), ("pickObject", "other")]
+            .map(|(a, b)| (a.to_owned(), b.to_owned()));
+        let test = [
+            Step::plain("Pick"),
+            Step {
+                action: "Place".to_owned(),
+                values: values.into(),
+            },
+        ];
+        assert_eq!(
+            Step::test_name(&test),
+            "Pick Place(pickObject=other,placeSurface=shelf)"
+        );
     }
 }

@@ -10,8 +10,8 @@ use actcheck_base::{Diagnostic, Diagnostics, Source, Span, did_you_mean, nearest
 
 /// A table that is being read.
 ///
-/// Getters remove a key and return its value. They return `None` if the key is missing, and also record a fault if its
-/// value is invalid. [`Table::finish`] reports the keys that remain.
+/// Getters remove a key and return its value. They return `None` if the key is missing, and also
+/// record a fault if its value is invalid. [`Table::finish`] reports the keys that remain.
 #[derive(Debug)]
 pub struct Table {
     source: Source,
@@ -45,7 +45,12 @@ impl Table {
     /// # Errors
     /// C002 for each syntax error.
     pub fn parse(source: &Source) -> Result<Self, Diagnostics> {
-        Ok(Self::new(source, String::new(), 0..0, value::parse(source)?))
+        Ok(Self::new(
+            source,
+            String::new(),
+            0..0,
+            value::parse(source)?,
+        ))
     }
 
     fn new(source: &Source, path: String, span: Span, entries: BTreeMap<String, Entry>) -> Self {
@@ -88,12 +93,16 @@ impl Table {
 
     /// Whether a key that was not taken yet holds a list.
     pub fn is_list(&self, key: &str) -> bool {
-        self.entries.get(key).is_some_and(|entry| matches!(entry.value.value, Value::Array(_)))
+        self.entries
+            .get(key)
+            .is_some_and(|entry| matches!(entry.value.value, Value::Array(_)))
     }
 
     /// Whether a key that was not taken yet holds a number.
     pub fn is_number(&self, key: &str) -> bool {
-        self.entries.get(key).is_some_and(|entry| matches!(entry.value.value, Value::Integer(_) | Value::Float(_)))
+        self.entries
+            .get(key)
+            .is_some_and(|entry| matches!(entry.value.value, Value::Integer(_) | Value::Float(_)))
     }
 
     /// Returns the keys that were not taken yet, sorted.
@@ -101,14 +110,31 @@ impl Table {
         self.entries.keys().cloned().collect()
     }
 
-    /// Returns the only key of an untaken sub-table; `None` unless it has one key, with a list of strings.
+    /// Returns the only key of an untaken sub-table; `None` unless it has one key, with a list of
+    /// strings.
     pub fn only_list_of(&self, table: &str) -> Option<String> {
-        let Value::Table(entries) = &self.entries.get(table)?.value.value else { return None };
+        let Value::Table(entries) = &self.entries.get(table)?.value.value else {
+            return None;
+        };
         let mut entries = entries.iter();
         match (entries.next(), entries.next()) {
-            (Some((key, Entry { value: Located { value: Value::Array(list), .. }, .. })), None) => {
-                list.iter().all(|element| matches!(element.value, Value::String(_))).then(|| key.clone())
-            }
+            (
+                Some((
+                    key,
+                    Entry {
+                        value:
+                            Located {
+                                value: Value::Array(list),
+                                ..
+                            },
+                        ..
+                    },
+                )),
+                None,
+            ) => list
+                .iter()
+                .all(|element| matches!(element.value, Value::String(_)))
+                .then(|| key.clone()),
             _ => None,
         }
     }
@@ -116,7 +142,11 @@ impl Table {
     /// Returns the keys of tables that were not taken yet, sorted.
     pub fn untaken_tables(&self) -> Vec<String> {
         let is_table = |entry: &Entry| matches!(entry.value.value, Value::Table(_));
-        self.entries.iter().filter(|(_, entry)| is_table(entry)).map(|(key, _)| key.clone()).collect()
+        self.entries
+            .iter()
+            .filter(|(_, entry)| is_table(entry))
+            .map(|(key, _)| key.clone())
+            .collect()
     }
 
     /// Reports every missing key of the list (C005).
@@ -126,13 +156,16 @@ impl Table {
             if !self.entries.contains_key(*key) {
                 let message = format!("{} is missing", self.name(key));
                 let help = format!("add `{key} = …`{}", self.place_in_words());
-                let fault = Diagnostic::error("C005", message).at(&self.source, self.span.clone()).help(help);
+                let fault = Diagnostic::error("C005", message)
+                    .at(&self.source, self.span.clone())
+                    .help(help);
                 self.missing.push(((*key).to_owned(), fault));
             }
         }
     }
 
-    /// Names keys that most tables of this kind have: an unknown key resembles one of these rather than a rare one.
+    /// Names keys that most tables of this kind have: an unknown key resembles one of these rather
+    /// than a rare one.
     pub fn expect(&mut self, keys: &[&str]) {
         let missing = keys.iter().filter(|key| !self.entries.contains_key(**key));
         self.unused.extend(missing.map(|key| (*key).to_owned()));
@@ -144,8 +177,18 @@ impl Table {
     }
 
     /// Records a fault of this table's text.
-    pub fn fault(&mut self, code: &'static str, span: Span, message: impl Into<String>, help: impl Into<String>) {
-        self.found.push(Diagnostic::error(code, message).at(&self.source, span).help(help));
+    pub fn fault(
+        &mut self,
+        code: &'static str,
+        span: Span,
+        message: impl Into<String>,
+        help: impl Into<String>,
+    ) {
+        self.found.push(
+            Diagnostic::error(code, message)
+                .at(&self.source, span)
+                .help(help),
+        );
     }
 
     /// Records the faults of a table within this one.
@@ -153,13 +196,18 @@ impl Table {
         self.found.extend(faults);
     }
 
-    /// Moves the faults to `diagnostics`, with a C003 for each unknown key. A required key that is missing because it is
-    /// misspelt is one fault.
+    /// Moves the faults to `diagnostics`, with a C003 for each unknown key. A required key that is
+    /// missing because it is misspelt is one fault.
     pub fn finish(mut self, diagnostics: &mut Diagnostics) {
         for (key, entry) in std::mem::take(&mut self.entries) {
-            let kind = if matches!(entry.value.value, Value::Table(_)) { "table" } else { "key" };
+            let kind = if matches!(entry.value.value, Value::Table(_)) {
+                "table"
+            } else {
+                "key"
+            };
             let mut message = format!("unknown {kind} {}", self.name(&key));
-            let missing = nearest(&key, self.missing.iter().map(|(key, _)| key.as_str())).map(str::to_owned);
+            let missing =
+                nearest(&key, self.missing.iter().map(|(key, _)| key.as_str())).map(str::to_owned);
             let help = match missing {
                 Some(missing) => {
                     message.push_str(&format!(", and {} is missing", self.name(&missing)));
@@ -173,7 +221,9 @@ impl Table {
             };
             self.fault("C003", entry.key_span, message, help);
         }
-        self.missing.into_iter().for_each(|(_, fault)| diagnostics.push(fault));
+        self.missing
+            .into_iter()
+            .for_each(|(_, fault)| diagnostics.push(fault));
         diagnostics.extend(self.found);
     }
 
@@ -186,7 +236,11 @@ impl Table {
     /// Takes a list of non-empty strings. The list may be empty: see [`Table::non_empty_strings`].
     pub fn strings(&mut self, key: &str) -> Option<Vec<Located<String>>> {
         let list = self.list(key, "a list of strings")?;
-        Some(list.into_iter().filter_map(|value| self.text_of(key, "a list of strings", value)).collect())
+        Some(
+            list.into_iter()
+                .filter_map(|value| self.text_of(key, "a list of strings", value))
+                .collect(),
+        )
     }
 
     /// Takes a string, or a list of at least one string. Empty if the key is missing or wrong.
@@ -203,7 +257,12 @@ impl Table {
         let before = self.found.len();
         let list = self.strings(key)?;
         if list.is_empty() && self.found.len() == before {
-            self.fault("C007", span?, format!("{} is an empty list", self.name(key)), "name at least one");
+            self.fault(
+                "C007",
+                span?,
+                format!("{} is an empty list", self.name(key)),
+                "name at least one",
+            );
         }
         (!list.is_empty()).then_some(list)
     }
@@ -214,16 +273,31 @@ impl Table {
         let place = self.entries.get(key).map(|entry| entry.value.span.clone());
         let outer = self.list(key, expected)?;
         if outer.is_empty() {
-            self.fault("C007", place?, format!("{} is an empty list", self.name(key)), example(key, expected));
+            self.fault(
+                "C007",
+                place?,
+                format!("{} is an empty list", self.name(key)),
+                example(key, expected),
+            );
         }
         let mut lists = Vec::new();
         for Located { value, span } in outer {
             match value {
                 Value::Array(inner) if inner.is_empty() => {
-                    self.fault("C007", span, format!("an empty list in {}", self.name(key)), "name at least one");
+                    self.fault(
+                        "C007",
+                        span,
+                        format!("an empty list in {}", self.name(key)),
+                        "name at least one",
+                    );
                 }
                 Value::Array(inner) => {
-                    lists.push(inner.into_iter().filter_map(|value| self.step_of(key, expected, value)).collect());
+                    lists.push(
+                        inner
+                            .into_iter()
+                            .filter_map(|value| self.step_of(key, expected, value))
+                            .collect(),
+                    );
                 }
                 other => self.wrong(key, expected, &Located { value: other, span }),
             }
@@ -231,15 +305,29 @@ impl Table {
         Some(lists)
     }
 
-    /// Returns an action of a test: its name, or a table with its name as `action` and with values of designators.
-    fn step_of(&mut self, key: &str, expected: &str, Located { value, span }: Located<Value>) -> Option<WrittenStep> {
+    /// Returns an action of a test: its name, or a table with its name as `action` and with values
+    /// of designators.
+    fn step_of(
+        &mut self,
+        key: &str,
+        expected: &str,
+        Located { value, span }: Located<Value>,
+    ) -> Option<WrittenStep> {
         let Value::Table(mut entries) = value else {
             let action = self.text_of(key, expected, Located { value, span })?;
-            return Some(WrittenStep { action, values: BTreeMap::new() });
+            return Some(WrittenStep {
+                action,
+                values: BTreeMap::new(),
+            });
         };
         let Some(action) = entries.remove(ACTION) else {
             let message = format!("`{ACTION}` is missing in a table of {}", self.name(key));
-            self.fault("C005", span, message, "name the action: `{ action = \"Pick\", pickObject = \"other\" }`");
+            self.fault(
+                "C005",
+                span,
+                message,
+                "name the action: `{ action = \"Pick\", pickObject = \"other\" }`",
+            );
             return None;
         };
         let action = self.text_of(key, expected, action.value)?;
@@ -265,7 +353,10 @@ impl Table {
             self.wrong_length(key, span?, expected, list.len());
             return None;
         };
-        let (least, most) = (self.integer_of(key, least, &bounds), self.integer_of(key, most, &bounds));
+        let (least, most) = (
+            self.integer_of(key, least, &bounds),
+            self.integer_of(key, most, &bounds),
+        );
         self.in_order(key, span?, least?, most?)
     }
 
@@ -276,7 +367,11 @@ impl Table {
     }
 
     /// Takes exactly `N` finite numbers, each within bounds.
-    pub fn numbers<const N: usize>(&mut self, key: &str, bounds: impl RangeBounds<f64>) -> Option<[f64; N]> {
+    pub fn numbers<const N: usize>(
+        &mut self,
+        key: &str,
+        bounds: impl RangeBounds<f64>,
+    ) -> Option<[f64; N]> {
         let span = self.entries.get(key).map(|entry| entry.value.span.clone());
         let list = self.number_list(key, bounds)?;
         let length = list.len();
@@ -292,7 +387,10 @@ impl Table {
     /// Takes a list of finite numbers, each within bounds.
     pub fn number_list(&mut self, key: &str, bounds: impl RangeBounds<f64>) -> Option<Vec<f64>> {
         let list = self.list(key, "a list of numbers")?;
-        let numbers: Vec<Option<f64>> = list.iter().map(|value| self.number_of(key, value, &bounds)).collect();
+        let numbers: Vec<Option<f64>> = list
+            .iter()
+            .map(|value| self.number_of(key, value, &bounds))
+            .collect();
         numbers.into_iter().collect()
     }
 
@@ -305,7 +403,10 @@ impl Table {
             self.wrong_length(key, span?, expected, list.len());
             return None;
         };
-        let (low, high) = (self.number_of(key, low, &bounds), self.number_of(key, high, &bounds));
+        let (low, high) = (
+            self.number_of(key, low, &bounds),
+            self.number_of(key, high, &bounds),
+        );
         self.in_order(key, span?, low?, high?)
     }
 
@@ -324,16 +425,28 @@ impl Table {
         let key_span = self.key_span(key);
         let value = self.take(key)?;
         match value.value {
-            Value::Table(entries) => Some(Self::new(&self.source, self.path_of(key), key_span?, entries)),
+            Value::Table(entries) => Some(Self::new(
+                &self.source,
+                self.path_of(key),
+                key_span?,
+                entries,
+            )),
             other => {
-                self.wrong(key, "a table", &Located { value: other, span: value.span });
+                self.wrong(
+                    key,
+                    "a table",
+                    &Located {
+                        value: other,
+                        span: value.span,
+                    },
+                );
                 None
             }
         }
     }
 
-    /// Takes a list of tables (`[[key]]`), on each of which the caller must call [`Table::finish`]; empty if the key is
-    /// missing.
+    /// Takes a list of tables (`[[key]]`), on each of which the caller must call [`Table::finish`];
+    /// empty if the key is missing.
     pub fn tables(&mut self, key: &str) -> Vec<Table> {
         let expected = "a list of tables";
         let mut tables = Vec::new();
@@ -359,35 +472,75 @@ impl Table {
         match value.value {
             Value::Array(list) => Some(list),
             other => {
-                self.wrong(key, expected, &Located { value: other, span: value.span });
+                self.wrong(
+                    key,
+                    expected,
+                    &Located {
+                        value: other,
+                        span: value.span,
+                    },
+                );
                 None
             }
         }
     }
 
     /// Returns the text of a value. `expected` describes the value or the list that contains it.
-    fn text_of(&mut self, key: &str, expected: &str, value: Located<Value>) -> Option<Located<String>> {
+    fn text_of(
+        &mut self,
+        key: &str,
+        expected: &str,
+        value: Located<Value>,
+    ) -> Option<Located<String>> {
         match value.value {
             Value::String(text) if text.trim().is_empty() => {
-                self.fault("C006", value.span, format!("an empty string in {}", self.name(key)), "write a name");
+                self.fault(
+                    "C006",
+                    value.span,
+                    format!("an empty string in {}", self.name(key)),
+                    "write a name",
+                );
                 None
             }
-            Value::String(text) => Some(Located { value: text, span: value.span }),
+            Value::String(text) => Some(Located {
+                value: text,
+                span: value.span,
+            }),
             other => {
-                self.wrong(key, expected, &Located { value: other, span: value.span });
+                self.wrong(
+                    key,
+                    expected,
+                    &Located {
+                        value: other,
+                        span: value.span,
+                    },
+                );
                 None
             }
         }
     }
 
-    fn integer_of(&mut self, key: &str, value: &Located<Value>, bounds: &RangeInclusive<i64>) -> Option<i64> {
+    fn integer_of(
+        &mut self,
+        key: &str,
+        value: &Located<Value>,
+        bounds: &RangeInclusive<i64>,
+    ) -> Option<i64> {
         let expected = in_words("a whole number", bounds, &i64::MAX);
         match &value.value {
             Value::Integer(Some(number)) if bounds.contains(number) => Some(*number),
             Value::Integer(number) => {
-                let found = number.map_or_else(|| "is too large".to_owned(), |number| format!("is {number}"));
+                let found = number.map_or_else(
+                    || "is too large".to_owned(),
+                    |number| format!("is {number}"),
+                );
                 let message = format!("{} {found}", self.name(key));
-                self.fault("C006", value.span.clone(), message, format!("it must be {expected}"));
+                self.fault(
+                    "C006",
+                    value.span.clone(),
+                    message,
+                    format!("it must be {expected}"),
+                );
                 None
             }
             _ => {
@@ -397,7 +550,12 @@ impl Table {
         }
     }
 
-    fn number_of(&mut self, key: &str, value: &Located<Value>, bounds: &impl RangeBounds<f64>) -> Option<f64> {
+    fn number_of(
+        &mut self,
+        key: &str,
+        value: &Located<Value>,
+        bounds: &impl RangeBounds<f64>,
+    ) -> Option<f64> {
         let expected = in_words("a number", bounds, &f64::INFINITY);
         let number = match &value.value {
             Value::Float(number) => *number,
@@ -410,30 +568,58 @@ impl Table {
         match number.filter(|number| number.is_finite() && bounds.contains(number)) {
             Some(number) => Some(number),
             None => {
-                let found = self.source.text.get(value.span.clone()).unwrap_or("out of range").to_owned();
+                let found = self
+                    .source
+                    .text
+                    .get(value.span.clone())
+                    .unwrap_or("out of range")
+                    .to_owned();
                 let message = format!("{} is {found}", self.name(key));
-                self.fault("C006", value.span.clone(), message, format!("it must be {expected}"));
+                self.fault(
+                    "C006",
+                    value.span.clone(),
+                    message,
+                    format!("it must be {expected}"),
+                );
                 None
             }
         }
     }
 
-    fn in_order<T: PartialOrd + Display>(&mut self, key: &str, span: Span, low: T, high: T) -> Option<(T, T)> {
+    fn in_order<T: PartialOrd + Display>(
+        &mut self,
+        key: &str,
+        span: Span,
+        low: T,
+        high: T,
+    ) -> Option<(T, T)> {
         if low <= high {
             return Some((low, high));
         }
         let message = format!("the range {} begins above its end", self.name(key));
-        self.fault("C009", span, message, format!("write the smaller number first: `[{high}, {low}]`"));
+        self.fault(
+            "C009",
+            span,
+            message,
+            format!("write the smaller number first: `[{high}, {low}]`"),
+        );
         None
     }
 
     fn wrong(&mut self, key: &str, expected: &str, value: &Located<Value>) {
-        let message = format!("{} must be {expected}, but this is {}", self.name(key), value.value.kind());
+        let message = format!(
+            "{} must be {expected}, but this is {}",
+            self.name(key),
+            value.value.kind()
+        );
         self.fault("C004", value.span.clone(), message, example(key, expected));
     }
 
     fn wrong_length(&mut self, key: &str, span: Span, expected: &str, length: usize) {
-        let message = format!("{} must be {expected}, but this list has {length}", self.name(key));
+        let message = format!(
+            "{} must be {expected}, but this list has {length}",
+            self.name(key)
+        );
         self.fault("C004", span, message, example(key, expected));
     }
 
@@ -443,11 +629,19 @@ impl Table {
     }
 
     fn path_of(&self, key: &str) -> String {
-        if self.path.is_empty() { key.to_owned() } else { format!("{}.{key}", self.path) }
+        if self.path.is_empty() {
+            key.to_owned()
+        } else {
+            format!("{}.{key}", self.path)
+        }
     }
 
     fn place_in_words(&self) -> String {
-        if self.path.is_empty() { " at the top of the file".to_owned() } else { format!(" to [{}]", self.path) }
+        if self.path.is_empty() {
+            " at the top of the file".to_owned()
+        } else {
+            format!(" to [{}]", self.path)
+        }
     }
 }
 
@@ -467,7 +661,10 @@ mod tests {
             }
             Err(diagnostics) => found = diagnostics,
         }
-        found.iter().map(|d| format!("{} {}: {d}", d.code, d.place().unwrap_or_default())).collect()
+        found
+            .iter()
+            .map(|d| format!("{} {}: {d}", d.code, d.place().unwrap_or_default()))
+            .collect()
     }
 
     #[test]
@@ -475,7 +672,10 @@ mod tests {
         let text = "name = \"glass\"\nsize = [1, 2.5, 3]\n[part]\nround = true\n";
         let found = faults(text, |table| {
             table.require(&["name", "size"]);
-            assert_eq!(table.string("name").map(|name| (name.value, name.span)), Some(("glass".to_owned(), 7..14)));
+            assert_eq!(
+                table.string("name").map(|name| (name.value, name.span)),
+                Some(("glass".to_owned(), 7..14))
+            );
             assert_eq!(table.numbers("size", 0.0..), Some([1.0, 2.5, 3.0]));
             let mut part = table.table("part").expect("the table exists");
             assert_eq!(part.boolean("round"), Some(true));
@@ -514,6 +714,9 @@ mod tests {
     fn syntax_errors_have_their_places() {
         let found = faults("a = \nb = [1,\n", |_| {});
         assert!(found.len() >= 2, "{found:?}");
-        assert!(found.iter().all(|fault| fault.starts_with("C002 t.toml:")), "{found:?}");
+        assert!(
+            found.iter().all(|fault| fault.starts_with("C002 t.toml:")),
+            "{found:?}"
+        );
     }
 }

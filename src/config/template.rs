@@ -32,22 +32,36 @@ pub struct CampaignTemplate<'a> {
     pub ontology: bool,
     /// Uses the folder `models` next to the configuration instead of the shipped models.
     pub models: bool,
-    /// The program that performs the actions, as a path from the configuration; the reference skill if `None`.
+    /// The program that performs the actions, as a path from the configuration; the reference skill
+    /// if `None`.
     pub skill: Option<&'a str>,
 }
 
 /// Returns the text of a new configuration. It runs unchanged if the files that it names exist.
 pub fn campaign_template(new: &CampaignTemplate<'_>) -> String {
-    replacements(new).into_iter().fold(PICK.to_owned(), |text, (from, to)| text.replacen(from, &to, 1))
+    replacements(new)
+        .into_iter()
+        .fold(PICK.to_owned(), |text, (from, to)| {
+            text.replacen(from, &to, 1)
+        })
 }
 
 /// Returns the pieces of `configs/pick.toml` to replace, each with its replacement.
 fn replacements(new: &CampaignTemplate<'_>) -> Vec<(&'static str, String)> {
     let name = new.name;
     let mut pieces = vec![
-        ("The first use case of the paper: a robot", "A robot".to_owned()),
-        ("actcheck run configs/pick.toml", format!("actcheck run {name}.toml")),
-        ("`actcheck check` finds", format!("`actcheck check {name}.toml` finds")),
+        (
+            "The first use case of the paper: a robot",
+            "A robot".to_owned(),
+        ),
+        (
+            "actcheck run configs/pick.toml",
+            format!("actcheck run {name}.toml"),
+        ),
+        (
+            "`actcheck check` finds",
+            format!("`actcheck check {name}.toml` finds"),
+        ),
         (PATHS, paths(new)),
     ];
     if let Some(skill) = new.skill {
@@ -63,9 +77,11 @@ fn replacements(new: &CampaignTemplate<'_>) -> Vec<(&'static str, String)> {
 /// Returns the lines of `ontology` and `model_dir`, commented out unless their files are used.
 fn paths(new: &CampaignTemplate<'_>) -> String {
     let [ontology, models] =
-        [(new.ontology, ONTOLOGY_LINE), (new.models, MODELS_LINE)].map(|(is_used, line)| match is_used {
-            true => line.to_owned(),
-            false => commented(line),
+        [(new.ontology, ONTOLOGY_LINE), (new.models, MODELS_LINE)].map(|(is_used, line)| {
+            match is_used {
+                true => line.to_owned(),
+                false => commented(line),
+            }
         });
     format!(
         "# Actions, properties and the rule files that decide them. Without this line: those that come with actcheck.\n\
@@ -94,26 +110,44 @@ pub enum LinksOntology {
 
 /// Uncomments the `ontology` line of [`campaign_template`].
 pub fn link_ontology(config: &str) -> LinksOntology {
-    let names_one = |text: &str| Table::parse(&Source::new("", text)).is_ok_and(|table| table.has("ontology"));
+    let names_one =
+        |text: &str| Table::parse(&Source::new("", text)).is_ok_and(|table| table.has("ontology"));
     if names_one(config) {
         return LinksOntology::Already;
     }
     let text = config.replacen(&commented(ONTOLOGY_LINE), ONTOLOGY_LINE, 1);
-    // Below a table header the line would be a key of that table; within a comment it would remain a comment.
-    if names_one(&text) { LinksOntology::Now(text) } else { LinksOntology::No }
+    // Below a table header the line would be a key of that table; within a comment it would remain
+    // a comment.
+    if names_one(&text) {
+        LinksOntology::Now(text)
+    } else {
+        LinksOntology::No
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    const PLAIN: CampaignTemplate<'_> = CampaignTemplate { name: "mine", ontology: false, models: false, skill: None };
+    const PLAIN: CampaignTemplate<'_> = CampaignTemplate {
+        name: "mine",
+        ontology: false,
+        models: false,
+        skill: None,
+    };
 
     #[test]
     fn every_replaced_text_occurs_once_in_the_shipped_configuration() {
-        let all = CampaignTemplate { skill: Some("skills/pick.py"), ..PLAIN };
+        let all = CampaignTemplate {
+            skill: Some("skills/pick.py"),
+            ..PLAIN
+        };
         for (from, to) in replacements(&all) {
-            assert_eq!(PICK.matches(from).count(), 1, "configs/pick.toml no longer has `{from}`");
+            assert_eq!(
+                PICK.matches(from).count(),
+                1,
+                "configs/pick.toml no longer has `{from}`"
+            );
             assert!(campaign_template(&all).contains(&to), "{to}");
         }
     }
@@ -125,8 +159,17 @@ mod tests {
         shipped.remove("ontology");
         shipped.remove("model_dir");
         assert_eq!(parsed(&campaign_template(&PLAIN)), shipped);
-        let all = CampaignTemplate { ontology: true, models: true, skill: Some("s.py"), ..PLAIN };
-        for (key, value) in [("ontology", "ontology/actions.ttl"), ("model_dir", "models"), ("test_launcher", "s.py")] {
+        let all = CampaignTemplate {
+            ontology: true,
+            models: true,
+            skill: Some("s.py"),
+            ..PLAIN
+        };
+        for (key, value) in [
+            ("ontology", "ontology/actions.ttl"),
+            ("model_dir", "models"),
+            ("test_launcher", "s.py"),
+        ] {
             shipped.insert(key.to_owned(), value.into());
         }
         assert_eq!(parsed(&campaign_template(&all)), shipped);
@@ -135,11 +178,20 @@ mod tests {
     #[test]
     fn a_template_can_be_linked_to_an_ontology_later() {
         let plain = campaign_template(&PLAIN);
-        let with_ontology = campaign_template(&CampaignTemplate { ontology: true, ..PLAIN });
-        assert_eq!(link_ontology(&plain), LinksOntology::Now(with_ontology.clone()));
+        let with_ontology = campaign_template(&CampaignTemplate {
+            ontology: true,
+            ..PLAIN
+        });
+        assert_eq!(
+            link_ontology(&plain),
+            LinksOntology::Now(with_ontology.clone())
+        );
         assert_eq!(link_ontology(&with_ontology), LinksOntology::Already);
         assert_eq!(link_ontology("tests = [[\"Pick\"]]\n"), LinksOntology::No);
-        assert_eq!(link_ontology("[robot]\n# ontology = \"ontology/actions.ttl\"\n"), LinksOntology::No);
+        assert_eq!(
+            link_ontology("[robot]\n# ontology = \"ontology/actions.ttl\"\n"),
+            LinksOntology::No
+        );
         let crlf = "# ontology = \"ontology/actions.ttl\"\r\nseed = 1\r\n";
         assert_eq!(
             link_ontology(crlf),

@@ -71,12 +71,20 @@ fn syntax_fault(source: &Source, span: Span, message: &str) -> Diagnostic {
 
 /// The remedy for a syntax error, by its message and by common habits from other languages.
 fn syntax_help(text: &str, span: &Span, message: &str) -> String {
-    let start = text.get(..span.start).unwrap_or(text).rfind('\n').map_or(0, |at| at + 1);
+    let start = text
+        .get(..span.start)
+        .unwrap_or(text)
+        .rfind('\n')
+        .map_or(0, |at| at + 1);
     let line = text[start..].lines().next().unwrap_or_default();
     // A quote or a bracket without its end is noticed further down.
     let is_open = |(_, line): &(usize, &str)| bare(line).matches('"').count() % 2 == 1;
     let open = text[..start].lines().enumerate().filter(is_open).last();
-    let key = line.split(':').next().map(str::trim).filter(|_| line.contains(':') && !line.contains('='));
+    let key = line
+        .split(':')
+        .next()
+        .map(str::trim)
+        .filter(|_| line.contains(':') && !line.contains('='));
     match (open, key) {
         _ if message == "duplicate key" => "keep one of them; a table is written once".to_owned(),
         _ if text.trim_start().starts_with('{') => {
@@ -95,7 +103,9 @@ fn syntax_help(text: &str, span: &Span, message: &str) -> String {
 
 /// A line without its comment, unless the comment sign is in a string.
 fn bare(line: &str) -> &str {
-    let comment = line.match_indices('#').find(|(at, _)| line[..*at].matches('"').count().is_multiple_of(2));
+    let comment = line
+        .match_indices('#')
+        .find(|(at, _)| line[..*at].matches('"').count().is_multiple_of(2));
     comment.map_or(line, |(at, _)| &line[..at])
 }
 
@@ -117,7 +127,15 @@ impl Value {
 fn entries_of(table: &DeTable<'_>) -> BTreeMap<String, Entry> {
     table
         .iter()
-        .map(|(key, value)| (key.get_ref().to_string(), Entry { key_span: key.span(), value: located(value) }))
+        .map(|(key, value)| {
+            (
+                key.get_ref().to_string(),
+                Entry {
+                    key_span: key.span(),
+                    value: located(value),
+                },
+            )
+        })
         .collect()
 }
 
@@ -125,7 +143,9 @@ fn located(value: &Spanned<DeValue<'_>>) -> Located<Value> {
     let span = value.span();
     let value = match value.get_ref() {
         DeValue::String(text) => Value::String(text.to_string()),
-        DeValue::Integer(number) => Value::Integer(i64::from_str_radix(number.as_str(), number.radix()).ok()),
+        DeValue::Integer(number) => {
+            Value::Integer(i64::from_str_radix(number.as_str(), number.radix()).ok())
+        }
         DeValue::Float(number) => Value::Float(number.as_str().parse().ok()),
         DeValue::Boolean(boolean) => Value::Boolean(*boolean),
         DeValue::Datetime(_) => Value::Datetime,

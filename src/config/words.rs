@@ -3,8 +3,13 @@
 use std::fmt::Display;
 use std::ops::{Bound, RangeBounds};
 
-/// Describes bounds, as in "a number of at least 0 and at most 1". Bounds at or beyond `unlimited` are omitted.
-pub(super) fn in_words<T: PartialOrd + Display>(what: &str, bounds: &impl RangeBounds<T>, unlimited: &T) -> String {
+/// Describes bounds, as in "a number of at least 0 and at most 1". Bounds at or beyond `unlimited`
+/// are omitted.
+pub(super) fn in_words<T: PartialOrd + Display>(
+    what: &str,
+    bounds: &impl RangeBounds<T>,
+    unlimited: &T,
+) -> String {
     let low = match bounds.start_bound() {
         Bound::Included(low) => Some(format!("of at least {low}")),
         Bound::Excluded(low) => Some(format!("above {low}")),
@@ -28,7 +33,9 @@ pub(super) fn example(key: &str, expected: &str) -> String {
     let value = match expected {
         text if text.contains("list of lists") => "[[\"…\"], [\"…\", \"…\"]]",
         text if text.contains("list of strings") => "[\"…\", \"…\"]",
-        text if text.contains("list of tables") => return format!("write one `[[{key}]]` header for each"),
+        text if text.contains("list of tables") => {
+            return format!("write one `[[{key}]]` header for each");
+        }
         text if text.contains("range of whole") => "[1, 4]",
         text if text.contains("range of") => "[0.8, 1.2]",
         text if text.contains("list of 2") => "[0.1, 0.2]",

@@ -1,4 +1,5 @@
-//! Worlds: the walls and furniture that all their scenes share, and their named locations and rooms.
+//! Worlds: the walls and furniture that all their scenes share, and their named locations and
+//! rooms.
 
 use actcheck_base::{Diagnostics, Source, Span, did_you_mean, digest_of, names};
 use actcheck_data::{Location, ObjectModel, Part, Pose, Room, Shape};
@@ -67,9 +68,9 @@ impl WorldMap {
 /// Reads a TOML world. `model` looks models up by name; `known` lists the names for suggestions.
 ///
 /// # Errors
-/// All faults of the text: those of the table reader (`C…`), an unknown model (W040), a duplicate name (W041), a
-/// location in front of an unknown surface (W042), a location inside furniture (W043), a wall or room without extent
-/// (W044).
+/// All faults of the text: those of the table reader (`C…`), an unknown model (W040), a duplicate
+/// name (W041), a location in front of an unknown surface (W042), a location inside furniture
+/// (W043), a wall or room without extent (W044).
 pub(crate) fn read<'a>(
     name: &str,
     source: &Source,
@@ -78,8 +79,16 @@ pub(crate) fn read<'a>(
 ) -> Result<WorldMap, Diagnostics> {
     let mut table = Table::parse(source)?;
     let mut found = Diagnostics::new();
-    let rooms = table.tables("rooms").into_iter().filter_map(|room| read_room(room, &mut found)).collect();
-    let walls: Vec<Wall> = table.tables("walls").into_iter().filter_map(|wall| read_wall(wall, &mut found)).collect();
+    let rooms = table
+        .tables("rooms")
+        .into_iter()
+        .filter_map(|room| read_room(room, &mut found))
+        .collect();
+    let walls: Vec<Wall> = table
+        .tables("walls")
+        .into_iter()
+        .filter_map(|wall| read_wall(wall, &mut found))
+        .collect();
     let mut taken = BTreeSet::new();
     let mut furniture = Vec::new();
     for piece in table.tables("furniture") {
@@ -88,10 +97,19 @@ pub(crate) fn read<'a>(
     let mut taken = BTreeSet::new();
     let mut locations = Vec::new();
     for location in table.tables("locations") {
-        locations.extend(read_location(location, &furniture, &model, &mut taken, &mut found));
+        locations.extend(read_location(
+            location, &furniture, &model, &mut taken, &mut found,
+        ));
     }
     table.finish(&mut found);
-    found.or(WorldMap { name: name.to_owned(), walls, furniture, locations, rooms, digest: digest_of(&source.text) })
+    found.or(WorldMap {
+        name: name.to_owned(),
+        walls,
+        furniture,
+        locations,
+        rooms,
+        digest: digest_of(&source.text),
+    })
 }
 
 /// Reads a name and reports duplicates (W041).
@@ -100,7 +118,12 @@ fn new_name(table: &mut Table, taken: &mut BTreeSet<String>) -> Option<String> {
     if taken.insert(value.clone()) {
         return Some(value);
     }
-    table.fault("W041", span, format!("there are two `{value}`"), "give one of them another name");
+    table.fault(
+        "W041",
+        span,
+        format!("there are two `{value}`"),
+        "give one of them another name",
+    );
     None
 }
 
@@ -120,7 +143,11 @@ fn read_room(mut table: Table, found: &mut Diagnostics) -> Option<Room> {
         );
     }
     table.finish(found);
-    Some(Room { name: name?, low_m: low_m?, high_m: high_m? })
+    Some(Room {
+        name: name?,
+        low_m: low_m?,
+        high_m: high_m?,
+    })
 }
 
 fn corner(table: &mut Table, key: &str) -> Option<[f64; 2]> {
@@ -131,13 +158,22 @@ fn read_wall(mut table: Table, found: &mut Diagnostics) -> Option<Wall> {
     table.require(&["from_m", "to_m"]);
     let span = table.span();
     let (from, to) = (corner(&mut table, "from_m"), corner(&mut table, "to_m"));
-    let height = table.number("height_m", 0.05..=10.0).unwrap_or(WALL_HEIGHT_M);
-    let thickness = table.number("thickness_m", 0.01..=2.0).unwrap_or(WALL_THICKNESS_M);
+    let height = table
+        .number("height_m", 0.05..=10.0)
+        .unwrap_or(WALL_HEIGHT_M);
+    let thickness = table
+        .number("thickness_m", 0.01..=2.0)
+        .unwrap_or(WALL_THICKNESS_M);
     let length = |from: [f64; 2], to: [f64; 2]| libm::hypot(to[0] - from[0], to[1] - from[1]);
     if let (Some(from), Some(to)) = (from, to)
         && length(from, to) < thickness
     {
-        table.fault("W044", span, "the wall has no length", "`from_m` and `to_m` are its two ends, x and y");
+        table.fault(
+            "W044",
+            span,
+            "the wall has no length",
+            "`from_m` and `to_m` are its two ends, x and y",
+        );
     }
     table.finish(found);
     let (from, to) = (from?, to?);
@@ -145,12 +181,18 @@ fn read_wall(mut table: Table, found: &mut Diagnostics) -> Option<Wall> {
     let middle = [(from[0] + to[0]) / 2.0, (from[1] + to[1]) / 2.0, 0.0];
     // Extend the wall so that adjacent walls overlap at the corner.
     let model = wall_model([length(from, to) + thickness, thickness, height]);
-    Some(Wall { model, pose: Pose::upright(middle, heading) })
+    Some(Wall {
+        model,
+        pose: Pose::upright(middle, heading),
+    })
 }
 
 /// A wall of painted plaster.
 fn wall_model(size_m: [f64; 3]) -> ObjectModel {
-    let part = Part { pose: Pose::upright([0.0, 0.0, size_m[2] / 2.0], 0.0), shape: Shape::Box { size: size_m } };
+    let part = Part {
+        pose: Pose::upright([0.0, 0.0, size_m[2] / 2.0], 0.0),
+        shape: Shape::Box { size: size_m },
+    };
     ObjectModel {
         name: "wall".to_owned(),
         category: names::act("Wall"),
@@ -183,13 +225,22 @@ fn read_furniture<'a>(
         && model(&named.value).is_none()
     {
         let message = format!("there is no usable model `{}`", named.value);
-        table.fault("W040", named.span.clone(), message, did_you_mean(&named.value, known.iter().map(String::as_str)));
+        table.fault(
+            "W040",
+            named.span.clone(),
+            message,
+            did_you_mean(&named.value, known.iter().map(String::as_str)),
+        );
     }
     let at = corner(&mut table, "at_m");
     let heading = table.number("heading_rad", ..).unwrap_or(0.0);
     table.finish(found);
     let [x, y] = at?;
-    Some(Furniture { name: name?, model: named?.value, pose: Pose::upright([x, y, 0.0], heading) })
+    Some(Furniture {
+        name: name?,
+        model: named?.value,
+        pose: Pose::upright([x, y, 0.0], heading),
+    })
 }
 
 fn read_location<'a>(
@@ -205,25 +256,48 @@ fn read_location<'a>(
     let at = corner(&mut table, "at_m");
     let heading = table.number("heading_rad", ..).unwrap_or(0.0);
     let surface = table.string("surface");
-    let carries = |piece: &&Furniture| model(&piece.model).is_some_and(|model| model.surface.is_some());
+    let carries =
+        |piece: &&Furniture| model(&piece.model).is_some_and(|model| model.surface.is_some());
     if let Some(surface) = &surface
-        && !furniture.iter().filter(carries).any(|piece| piece.name == surface.value)
+        && !furniture
+            .iter()
+            .filter(carries)
+            .any(|piece| piece.name == surface.value)
     {
         let message = format!("the world has no surface `{}`", surface.value);
-        let surfaces: Vec<&str> = furniture.iter().filter(carries).map(|piece| piece.name.as_str()).collect();
-        table.fault("W042", surface.span.clone(), message, did_you_mean(&surface.value, surfaces));
+        let surfaces: Vec<&str> = furniture
+            .iter()
+            .filter(carries)
+            .map(|piece| piece.name.as_str())
+            .collect();
+        table.fault(
+            "W042",
+            surface.span.clone(),
+            message,
+            did_you_mean(&surface.value, surfaces),
+        );
     }
     if let Some(at) = at {
-        let inside =
-            furniture.iter().find(|piece| model(&piece.model).is_some_and(|model| is_inside(at, piece, model)));
+        let inside = furniture
+            .iter()
+            .find(|piece| model(&piece.model).is_some_and(|model| is_inside(at, piece, model)));
         if let Some(piece) = inside {
             let message = format!("the location is inside `{}`", piece.name);
-            table.fault("W043", span, message, "move it away: the robot drives to this location");
+            table.fault(
+                "W043",
+                span,
+                message,
+                "move it away: the robot drives to this location",
+            );
         }
     }
     table.finish(found);
     let [x, y] = at?;
-    Some(Location { name: name?, at: [x, y, heading], surface: surface.map(|surface| surface.value) })
+    Some(Location {
+        name: name?,
+        at: [x, y, heading],
+        surface: surface.map(|surface| surface.value),
+    })
 }
 
 fn is_inside([x, y]: [f64; 2], piece: &Furniture, model: &ObjectModel) -> bool {

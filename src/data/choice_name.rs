@@ -8,7 +8,9 @@ use std::str::FromStr;
 
 use serde::{Deserialize, Serialize};
 
-use crate::choice_parts::{ObjectAxis, PlacedObject, PlanarAxis, SightingAxis, StartAxis, WheelAxis};
+use crate::choice_parts::{
+    ObjectAxis, PlacedObject, PlanarAxis, SightingAxis, StartAxis, WheelAxis,
+};
 
 /// The name of a choice.
 ///
@@ -48,7 +50,8 @@ pub enum ChoiceName {
     Robot(StartAxis),
     /// Number of the test's last actions that a shrunk run leaves out.
     ActionsLeftOut,
-    /// The value of a designator in one action of the test, a candidate: the id of an object of the scene.
+    /// The value of a designator in one action of the test, a candidate: the id of an object of the
+    /// scene.
     Step {
         /// Position of the action in the test, from 1.
         number: u32,
@@ -76,7 +79,8 @@ pub enum ChoiceName {
         /// The coordinate.
         axis: SightingAxis,
     },
-    /// The value of a designator of the configuration that is not an object, a candidate. Any other name is one too.
+    /// The value of a designator of the configuration that is not an object, a candidate. Any other
+    /// name is one too.
     Designator(String),
 }
 
@@ -131,15 +135,25 @@ impl ChoiceName {
         match id {
             // Furniture may have any name. As text, this one is the name of another choice.
             LOCALISATION | LANDMARK | ODOMETRY => format!("{SENSE}{id}.{}", axis.word()).into(),
-            _ => Self::Sighting { id: id.to_owned(), axis },
+            _ => Self::Sighting {
+                id: id.to_owned(),
+                axis,
+            },
         }
     }
 
     /// All names of choices that are made only during a run and belong to no object.
     pub fn of_runs() -> Vec<Self> {
-        let planar = PlanarAxis::ALL.into_iter().flat_map(|axis| [Self::Localisation(axis), Self::Landmark(axis)]);
+        let planar = PlanarAxis::ALL
+            .into_iter()
+            .flat_map(|axis| [Self::Localisation(axis), Self::Landmark(axis)]);
         let wheels = WheelAxis::ALL.into_iter().map(Self::Odometry);
-        let single = [Self::SkillSeed, Self::MotionSamples, Self::Gripper, Self::CameraFrame];
+        let single = [
+            Self::SkillSeed,
+            Self::MotionSamples,
+            Self::Gripper,
+            Self::CameraFrame,
+        ];
         planar.chain(wheels).chain(single).collect()
     }
 
@@ -162,7 +176,8 @@ impl ChoiceName {
         }
     }
 
-    /// Returns the unit of the values; empty for candidates, counts, seeds, factors and errors of the wheel odometry.
+    /// Returns the unit of the values; empty for candidates, counts, seeds, factors and errors of
+    /// the wheel odometry.
     pub fn unit(&self) -> &'static str {
         match self {
             Self::Object(_, ObjectAxis::X | ObjectAxis::Y)
@@ -183,29 +198,35 @@ impl ChoiceName {
     /// Returns the group, or `None` if the choice only sets how much there is: objects and actions.
     pub fn group(&self) -> Option<ChoiceGroup> {
         match self {
-            Self::OtherCount | Self::PlaceOtherCount | Self::ActionsLeftOut | Self::Object(_, ObjectAxis::LeftOut) => {
-                None
-            }
-            Self::Object(_, ObjectAxis::MassScale | ObjectAxis::FrictionScale | ObjectAxis::Restitution) => {
-                Some(ChoiceGroup::Physics)
-            }
+            Self::OtherCount
+            | Self::PlaceOtherCount
+            | Self::ActionsLeftOut
+            | Self::Object(_, ObjectAxis::LeftOut) => None,
+            Self::Object(
+                _,
+                ObjectAxis::MassScale | ObjectAxis::FrictionScale | ObjectAxis::Restitution,
+            ) => Some(ChoiceGroup::Physics),
             Self::Object(PlacedObject::Target, ObjectAxis::X | ObjectAxis::Y | ObjectAxis::Yaw) => {
                 Some(ChoiceGroup::TargetPose)
             }
-            Self::Object(_, ObjectAxis::X | ObjectAxis::Y | ObjectAxis::Yaw) => Some(ChoiceGroup::OtherPoses),
+            Self::Object(_, ObjectAxis::X | ObjectAxis::Y | ObjectAxis::Yaw) => {
+                Some(ChoiceGroup::OtherPoses)
+            }
             Self::Robot(_) => Some(ChoiceGroup::Start),
             _ if self.is_noise() => Some(ChoiceGroup::Noise),
             _ => Some(ChoiceGroup::Rest),
         }
     }
 
-    /// Returns the simplest value, or `None` if it depends on the scene, such as the middle of the surface.
+    /// Returns the simplest value, or `None` if it depends on the scene, such as the middle of the
+    /// surface.
     pub fn simplest(&self) -> Option<f64> {
         match self {
             Self::Object(_, axis) => match axis {
-                ObjectAxis::SizeScale | ObjectAxis::MassScale | ObjectAxis::FrictionScale | ObjectAxis::Stands => {
-                    Some(1.0)
-                }
+                ObjectAxis::SizeScale
+                | ObjectAxis::MassScale
+                | ObjectAxis::FrictionScale
+                | ObjectAxis::Stands => Some(1.0),
                 ObjectAxis::Model | ObjectAxis::LeftOut | ObjectAxis::Yaw => Some(0.0),
                 ObjectAxis::Restitution | ObjectAxis::X | ObjectAxis::Y => None,
             },
@@ -216,8 +237,8 @@ impl ChoiceName {
         }
     }
 
-    /// Returns the configuration's table with the candidates: a designator, or [`OBSTACLE_LIST`]. Returns `None` if the
-    /// choice is not one of candidates.
+    /// Returns the configuration's table with the candidates: a designator, or [`OBSTACLE_LIST`].
+    /// Returns `None` if the choice is not one of candidates.
     pub fn candidates(&self) -> Option<&str> {
         match self {
             Self::World => Some("world"),
@@ -242,13 +263,18 @@ impl ChoiceName {
         }
     }
 
-    /// Returns the object, if there are several of its kind, and the name with `*` in place of its number or id.
+    /// Returns the object, if there are several of its kind, and the name with `*` in place of its
+    /// number or id.
     pub fn pooled(&self) -> (Option<String>, String) {
         match self {
-            Self::Object(object, axis) if object.is_numbered() => {
-                (Some(object.to_string()), format!("{}.*.{}", object.word(), axis.word()))
-            }
-            Self::Sighting { id, axis } => (Some(format!("{SENSE}{id}")), format!("{SENSE}*.{}", axis.word())),
+            Self::Object(object, axis) if object.is_numbered() => (
+                Some(object.to_string()),
+                format!("{}.*.{}", object.word(), axis.word()),
+            ),
+            Self::Sighting { id, axis } => (
+                Some(format!("{SENSE}{id}")),
+                format!("{SENSE}*.{}", axis.word()),
+            ),
             _ => (None, self.to_string()),
         }
     }
@@ -260,7 +286,10 @@ impl ChoiceName {
             LOCALISATION => PlanarAxis::read(axis).map(Self::Localisation),
             LANDMARK => PlanarAxis::read(axis).map(Self::Landmark),
             ODOMETRY => WheelAxis::read(axis).map(Self::Odometry),
-            _ => SightingAxis::read(axis).map(|axis| Self::Sighting { id: id.to_owned(), axis }),
+            _ => SightingAxis::read(axis).map(|axis| Self::Sighting {
+                id: id.to_owned(),
+                axis,
+            }),
         }
     }
 
@@ -269,7 +298,10 @@ impl ChoiceName {
         let (written, designator) = rest.split_once('.')?;
         let number: u32 = written.parse().ok()?;
         let is_canonical = number > 0 && number.to_string() == written && !designator.is_empty();
-        is_canonical.then(|| Self::Step { number, designator: designator.to_owned() })
+        is_canonical.then(|| Self::Step {
+            number,
+            designator: designator.to_owned(),
+        })
     }
 
     fn read(text: &str) -> Option<Self> {
@@ -285,7 +317,10 @@ impl ChoiceName {
         let (of, axis) = text.rsplit_once('.')?;
         match of {
             "robot" => StartAxis::read(axis).map(Self::Robot),
-            _ => Some(Self::Object(PlacedObject::read(of)?, ObjectAxis::read(axis)?)),
+            _ => Some(Self::Object(
+                PlacedObject::read(of)?,
+                ObjectAxis::read(axis)?,
+            )),
         }
     }
 }
@@ -301,7 +336,10 @@ impl fmt::Display for ChoiceName {
             Self::Landmark(axis) => write!(f, "{SENSE}{LANDMARK}.{}", axis.word()),
             Self::Sighting { id, axis } => write!(f, "{SENSE}{id}.{}", axis.word()),
             Self::Designator(name) => f.write_str(name),
-            _ => FIXED.iter().find(|(name, _)| name == self).map_or(Ok(()), |(_, written)| f.write_str(written)),
+            _ => FIXED
+                .iter()
+                .find(|(name, _)| name == self)
+                .map_or(Ok(()), |(_, written)| f.write_str(written)),
         }
     }
 }
@@ -408,14 +446,23 @@ mod tests {
             "",
             ".",
         ] {
-            assert_eq!(ChoiceName::from(written), ChoiceName::Designator(written.to_owned()));
+            assert_eq!(
+                ChoiceName::from(written),
+                ChoiceName::Designator(written.to_owned())
+            );
             assert_eq!(ChoiceName::from(written).to_string(), written);
         }
     }
 
     #[test]
     fn furniture_of_any_name_can_be_seen() {
-        for id in ["localisation", "odometry", "odometry.landmark", "camera", "mug_1"] {
+        for id in [
+            "localisation",
+            "odometry",
+            "odometry.landmark",
+            "camera",
+            "mug_1",
+        ] {
             for axis in SightingAxis::ALL {
                 let name = ChoiceName::sighting(id, axis);
                 assert_eq!(name.to_string(), format!("sense.{id}.{}", axis.word()));
@@ -427,7 +474,12 @@ mod tests {
 
     #[test]
     fn names_have_units_and_groups() {
-        let of = |text: &str| (ChoiceName::from(text).unit(), ChoiceName::from(text).group());
+        let of = |text: &str| {
+            (
+                ChoiceName::from(text).unit(),
+                ChoiceName::from(text).group(),
+            )
+        };
         for (text, unit, group) in [
             ("target.x", "m", Some(ChoiceGroup::TargetPose)),
             ("obstacle.2.yaw", "rad", Some(ChoiceGroup::OtherPoses)),
@@ -448,10 +500,14 @@ mod tests {
 
     #[test]
     fn choices_of_runs_are_not_of_scenes() {
-        let of_runs: Vec<String> = ChoiceName::of_runs().iter().map(ToString::to_string).collect();
+        let of_runs: Vec<String> = ChoiceName::of_runs()
+            .iter()
+            .map(ToString::to_string)
+            .collect();
         for written in WRITTEN {
             let name = ChoiceName::from(written);
-            let listed = of_runs.iter().any(|other| other == written) || matches!(name, ChoiceName::Sighting { .. });
+            let listed = of_runs.iter().any(|other| other == written)
+                || matches!(name, ChoiceName::Sighting { .. });
             assert_eq!(name.is_of_run(), listed, "{written}");
         }
     }

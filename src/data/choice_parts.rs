@@ -158,9 +158,15 @@ impl PlacedObject {
             return (text == Self::Target.word()).then_some(Self::Target);
         };
         let number = number.parse().ok()?;
-        let kinds = [Self::Other(number), Self::PlaceOther(number), Self::Obstacle(number)];
+        let kinds = [
+            Self::Other(number),
+            Self::PlaceOther(number),
+            Self::Obstacle(number),
+        ];
         // `other.01` would be written as `other.1`.
-        kinds.into_iter().find(|object| object.word() == word && object.to_string() == text)
+        kinds
+            .into_iter()
+            .find(|object| object.word() == word && object.to_string() == text)
     }
 }
 

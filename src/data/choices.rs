@@ -64,7 +64,8 @@ pub enum ChoiceValue {
 #[derive(Debug, Clone)]
 pub struct Choices {
     origin: Origin,
-    /// Generator that takes over at [`Choices::begin_noise`]. If `None`, the scene's generator continues.
+    /// Generator that takes over at [`Choices::begin_noise`]. If `None`, the scene's generator
+    /// continues.
     noise: Option<Box<ChaCha8Rng>>,
     made: Vec<Choice>,
 }
@@ -110,9 +111,13 @@ impl Choice {
         }
     }
 
-    /// Returns the value with which the choice is made again: a candidate by name, so that it is found among others.
+    /// Returns the value with which the choice is made again: a candidate by name, so that it is
+    /// found among others.
     fn to_value(&self) -> ChoiceValue {
-        self.candidate().map_or(ChoiceValue::Number(self.value), |name| ChoiceValue::Candidate(name.to_owned()))
+        self.candidate()
+            .map_or(ChoiceValue::Number(self.value), |name| {
+                ChoiceValue::Candidate(name.to_owned())
+            })
     }
 }
 
@@ -124,45 +129,76 @@ impl Choices {
 
     /// Replays a record by name. Choices that the record lacks get their nominal value.
     pub fn recorded(record: &[Choice]) -> Self {
-        Self::of(Origin::Recorded { values: by_name(record), rest: Rest::Nominal })
+        Self::of(Origin::Recorded {
+            values: by_name(record),
+            rest: Rest::Nominal,
+        })
     }
 
     /// Replays values by name, in order if a name repeats. Missing choices get their nominal value.
     pub fn named(values: &BTreeMap<ChoiceName, Vec<ChoiceValue>>) -> Self {
-        let values = values.iter().map(|(name, values)| (name.clone(), values.iter().cloned().collect())).collect();
-        Self::of(Origin::Recorded { values, rest: Rest::Nominal })
+        let values = values
+            .iter()
+            .map(|(name, values)| (name.clone(), values.iter().cloned().collect()))
+            .collect();
+        Self::of(Origin::Recorded {
+            values,
+            rest: Rest::Nominal,
+        })
     }
 
     /// Replays a record by name. Choices that it lacks are drawn as by [`Choices::random`].
     pub fn partly_recorded(record: &[Choice], seed: u64, index: u64) -> Self {
         let rest = Rest::Random(generator(seed, index));
-        Self::of(Origin::Recorded { values: by_name(record), rest })
+        Self::of(Origin::Recorded {
+            values: by_name(record),
+            rest,
+        })
     }
 
-    /// Draws every choice, except that the first choice of each name in `quantiles` is that quantile of its
-    /// distribution. Quantiles range from 0 to 1; uniform quantiles give the nominal distribution.
+    /// Draws every choice, except that the first choice of each name in `quantiles` is that
+    /// quantile of its distribution. Quantiles range from 0 to 1; uniform quantiles give the
+    /// nominal distribution.
     pub fn steered(quantiles: &BTreeMap<ChoiceName, f64>, seed: u64, index: u64) -> Self {
-        Self::of(Origin::Steered { quantiles: quantiles.clone(), generator: generator(seed, index) })
+        Self::of(Origin::Steered {
+            quantiles: quantiles.clone(),
+            generator: generator(seed, index),
+        })
     }
 
     fn of(origin: Origin) -> Self {
-        Self { origin, noise: None, made: Vec::new() }
+        Self {
+            origin,
+            noise: None,
+            made: Vec::new(),
+        }
     }
 
-    /// Draws the choices after [`Choices::begin_noise`] from a separate stream, so that the same scene can be run with
-    /// different noise.
+    /// Draws the choices after [`Choices::begin_noise`] from a separate stream, so that the same
+    /// scene can be run with different noise.
     pub fn with_noise(self, seed: u64, index: u64) -> Self {
-        Self { noise: Some(generator(seed, index)), ..self }
+        Self {
+            noise: Some(generator(seed, index)),
+            ..self
+        }
     }
 
     /// Marks the scene as complete. All further choices are noise.
     pub fn begin_noise(&mut self) {
-        let Some(noise) = self.noise.take() else { return };
+        let Some(noise) = self.noise.take() else {
+            return;
+        };
         match &mut self.origin {
             Origin::Random(generator)
             | Origin::Steered { generator, .. }
-            | Origin::Recorded { rest: Rest::Random(generator), .. } => *generator = noise,
-            Origin::Recorded { rest: Rest::Nominal, .. } => {}
+            | Origin::Recorded {
+                rest: Rest::Random(generator),
+                ..
+            } => *generator = noise,
+            Origin::Recorded {
+                rest: Rest::Nominal,
+                ..
+            } => {}
         }
     }
 
@@ -175,20 +211,30 @@ impl Choices {
 
     /// Chooses a candidate and returns its index. `names` must not be empty.
     ///
-    /// A recorded candidate is found by name. If it is not among the candidates, the nominal one is chosen.
+    /// A recorded candidate is found by name. If it is not among the candidates, the nominal one is
+    /// chosen.
     pub fn candidate(&mut self, name: ChoiceName, names: Vec<String>) -> usize {
         let recorded = self.take_recorded(&name).map(|value| match value {
             ChoiceValue::Number(idx) => idx,
-            ChoiceValue::Candidate(wanted) => names.iter().position(|name| *name == wanted).unwrap_or(0) as f64,
+            ChoiceValue::Candidate(wanted) => {
+                names.iter().position(|name| *name == wanted).unwrap_or(0) as f64
+            }
         });
         self.option(name, names.len(), recorded, ChoiceKind::Candidate { names })
     }
 
-    fn option(&mut self, name: ChoiceName, of: usize, recorded: Option<f64>, kind: ChoiceKind) -> usize {
+    fn option(
+        &mut self,
+        name: ChoiceName,
+        of: usize,
+        recorded: Option<f64>,
+        kind: ChoiceKind,
+    ) -> usize {
         let last = of.saturating_sub(1);
         // 53 random bits over a handful of options: the bias is under 1e-13.
         let at = |share: f64| ((share * of as f64) as usize).min(last) as f64;
-        let value = recorded.unwrap_or_else(|| self.decide(&name, 0.0, at, |generator| at(unit(generator))));
+        let value = recorded
+            .unwrap_or_else(|| self.decide(&name, 0.0, at, |generator| at(unit(generator))));
         let value = (value.max(0.0) as usize).min(last);
         self.record(name, kind, value as f64);
         value
@@ -199,20 +245,22 @@ impl Choices {
         let nominal = nominal.clamp(low, high);
         let at = |share: f64| low + (high - low) * share;
         let recorded = self.recorded_number(&name);
-        let value = recorded.unwrap_or_else(|| self.decide(&name, nominal, at, |generator| at(unit(generator))));
+        let value = recorded
+            .unwrap_or_else(|| self.decide(&name, nominal, at, |generator| at(unit(generator))));
         let value = value.clamp(low, high);
         self.record(name, ChoiceKind::Real { low, high, nominal }, value);
         value
     }
 
-    /// Chooses as [`Choices::real`]. The nominal value is the name's simplest one, or else the middle of the bounds.
+    /// Chooses as [`Choices::real`]. The nominal value is the name's simplest one, or else the
+    /// middle of the bounds.
     pub fn simple(&mut self, name: ChoiceName, low: f64, high: f64) -> f64 {
         let nominal = name.simplest().unwrap_or((low + high) / 2.0);
         self.real(name, low, high, nominal)
     }
 
-    /// Chooses normally distributed noise with mean 0 and the given standard deviation, clamped to 4 standard
-    /// deviations.
+    /// Chooses normally distributed noise with mean 0 and the given standard deviation, clamped to
+    /// 4 standard deviations.
     pub fn normal(&mut self, name: ChoiceName, sigma: f64) -> f64 {
         let at = |share: f64| normal_quantile(share) * sigma;
         let recorded = self.recorded_number(&name);
@@ -228,8 +276,8 @@ impl Choices {
         value
     }
 
-    /// Makes a choice that is never random: an index below `of`, taken from the record, or 0 if the record lacks it.
-    /// Only a nonzero value is recorded.
+    /// Makes a choice that is never random: an index below `of`, taken from the record, or 0 if the
+    /// record lacks it. Only a nonzero value is recorded.
     ///
     /// This lets a record ask for less than its configuration does.
     pub fn exception(&mut self, name: ChoiceName, of: usize) -> usize {
@@ -244,7 +292,9 @@ impl Choices {
     /// Whether the next choice of this name has a value in the record.
     pub fn is_recorded(&self, name: &ChoiceName) -> bool {
         match &self.origin {
-            Origin::Recorded { values, .. } => values.get(name).is_some_and(|values| !values.is_empty()),
+            Origin::Recorded { values, .. } => {
+                values.get(name).is_some_and(|values| !values.is_empty())
+            }
             Origin::Random(_) | Origin::Steered { .. } => false,
         }
     }
@@ -288,9 +338,19 @@ impl Choices {
         draw: impl FnOnce(&mut ChaCha8Rng) -> f64,
     ) -> f64 {
         match &mut self.origin {
-            Origin::Recorded { rest: Rest::Nominal, .. } => nominal,
-            Origin::Random(generator) | Origin::Recorded { rest: Rest::Random(generator), .. } => draw(generator),
-            Origin::Steered { quantiles, generator } => match quantiles.remove(name) {
+            Origin::Recorded {
+                rest: Rest::Nominal,
+                ..
+            } => nominal,
+            Origin::Random(generator)
+            | Origin::Recorded {
+                rest: Rest::Random(generator),
+                ..
+            } => draw(generator),
+            Origin::Steered {
+                quantiles,
+                generator,
+            } => match quantiles.remove(name) {
                 Some(share) => at(share.clamp(0.0, 1.0)),
                 None => draw(generator),
             },
@@ -311,7 +371,10 @@ fn generator(seed: u64, index: u64) -> Box<ChaCha8Rng> {
 fn by_name(record: &[Choice]) -> BTreeMap<ChoiceName, VecDeque<ChoiceValue>> {
     let mut by_name: BTreeMap<ChoiceName, VecDeque<ChoiceValue>> = BTreeMap::new();
     for choice in record {
-        by_name.entry(choice.name.clone()).or_default().push_back(choice.to_value());
+        by_name
+            .entry(choice.name.clone())
+            .or_default()
+            .push_back(choice.to_value());
     }
     by_name
 }
@@ -323,7 +386,11 @@ fn normal_quantile(share: f64) -> f64 {
     // Bisection: 60 halvings of an interval of width 8 leave less than the last bit.
     for _ in 0..60 {
         let middle = 0.5 * (low + high);
-        if below(middle) < share { low = middle } else { high = middle }
+        if below(middle) < share {
+            low = middle
+        } else {
+            high = middle
+        }
     }
     0.5 * (low + high)
 }
@@ -365,7 +432,11 @@ mod tests {
     fn only_a_record_can_choose_an_exception() {
         assert_eq!(Choices::random(7, 3).exception("left_out".into(), 2), 0);
         assert_eq!(Choices::recorded(&[]).exception("left_out".into(), 2), 0);
-        let said = Choice { name: "left_out".into(), kind: ChoiceKind::Index { of: 2 }, value: 1.0 };
+        let said = Choice {
+            name: "left_out".into(),
+            kind: ChoiceKind::Index { of: 2 },
+            value: 1.0,
+        };
         let mut again = Choices::recorded(std::slice::from_ref(&said));
         assert_eq!(again.exception("left_out".into(), 2), 1);
         assert_eq!(again.made(), [said]);
@@ -373,18 +444,42 @@ mod tests {
 
     #[test]
     fn a_recorded_candidate_is_found_by_name() {
-        let names = |names: &[&str]| names.iter().map(|name| (*name).to_owned()).collect::<Vec<_>>();
+        let names = |names: &[&str]| {
+            names
+                .iter()
+                .map(|name| (*name).to_owned())
+                .collect::<Vec<_>>()
+        };
         let made = |record: &[Choice], among: &[&str]| {
             let mut choices = Choices::recorded(record);
             choices.candidate(ChoiceName::SurfaceName, names(among));
             choices.into_made().remove(0)
         };
         let value = 1.0;
-        let first = Choice { name: ChoiceName::SurfaceName, kind: ChoiceKind::Index { of: 2 }, value };
-        assert_eq!(made(std::slice::from_ref(&first), &["a", "b"]).candidate(), Some("b"));
-        let named = Choice { kind: ChoiceKind::Candidate { names: names(&["a", "b"]) }, ..first };
-        assert_eq!(made(std::slice::from_ref(&named), &["b", "a"]).candidate(), Some("b"));
-        assert_eq!(made(&[named], &["c", "a"]).candidate(), Some("c"), "the nominal one");
+        let first = Choice {
+            name: ChoiceName::SurfaceName,
+            kind: ChoiceKind::Index { of: 2 },
+            value,
+        };
+        assert_eq!(
+            made(std::slice::from_ref(&first), &["a", "b"]).candidate(),
+            Some("b")
+        );
+        let named = Choice {
+            kind: ChoiceKind::Candidate {
+                names: names(&["a", "b"]),
+            },
+            ..first
+        };
+        assert_eq!(
+            made(std::slice::from_ref(&named), &["b", "a"]).candidate(),
+            Some("b")
+        );
+        assert_eq!(
+            made(&[named], &["c", "a"]).candidate(),
+            Some("c"),
+            "the nominal one"
+        );
     }
 
     #[test]
@@ -392,14 +487,19 @@ mod tests {
         for index in 0..20 {
             let names = (0..5).map(|number| number.to_string()).collect();
             let candidate = Choices::random(7, index).candidate("model".into(), names);
-            assert_eq!(candidate, Choices::random(7, index).index("model".into(), 5));
+            assert_eq!(
+                candidate,
+                Choices::random(7, index).index("model".into(), 5)
+            );
         }
     }
 
     #[test]
     fn noise_has_the_given_standard_deviation() {
         let mut choices = Choices::random(1, 0);
-        let values: Vec<f64> = (0..20_000).map(|_| choices.normal("n".into(), 2.0)).collect();
+        let values: Vec<f64> = (0..20_000)
+            .map(|_| choices.normal("n".into(), 2.0))
+            .collect();
         let mean = values.iter().sum::<f64>() / values.len() as f64;
         let variance = values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / values.len() as f64;
         assert!(mean.abs() < 0.06, "{mean}");
@@ -436,7 +536,11 @@ mod tests {
 
     #[test]
     fn steered_choices_take_their_quantiles_once() {
-        let quantiles = BTreeMap::from([("model".into(), 0.5), ("yaw".into(), 0.75), ("noise".into(), 0.975)]);
+        let quantiles = BTreeMap::from([
+            ("model".into(), 0.5),
+            ("yaw".into(), 0.75),
+            ("noise".into(), 0.975),
+        ]);
         let mut choices = Choices::steered(&quantiles, 7, 3);
         let (model, yaw, noise) = draw(&mut choices);
         assert_eq!((model, yaw), (2, 0.5));

@@ -27,20 +27,35 @@ pub struct Face {
 impl Face {
     /// Area. Unit: square metres.
     pub fn area(&self) -> f64 {
-        let Some(first) = self.corners.first() else { return 0.0 };
-        let doubled: Vector3<f64> =
-            self.corners.windows(2).map(|pair| (pair[0] - first).cross(&(pair[1] - first))).sum();
+        let Some(first) = self.corners.first() else {
+            return 0.0;
+        };
+        let doubled: Vector3<f64> = self
+            .corners
+            .windows(2)
+            .map(|pair| (pair[0] - first).cross(&(pair[1] - first)))
+            .sum();
         doubled.norm() / 2.0
     }
 
     /// Area divided by the longest side: about the width of a sliver. Unit: metres.
     pub fn width(&self) -> f64 {
         let next = self.corners.iter().cycle().skip(1);
-        let longest = self.corners.iter().zip(next).map(|(a, b)| (b - a).norm()).fold(0.0, f64::max);
-        if longest > 0.0 { self.area() / longest } else { 0.0 }
+        let longest = self
+            .corners
+            .iter()
+            .zip(next)
+            .map(|(a, b)| (b - a).norm())
+            .fold(0.0, f64::max);
+        if longest > 0.0 {
+            self.area() / longest
+        } else {
+            0.0
+        }
     }
 
-    /// Cuts the polygon by a level plane. Returns the part below and the part above; one is `None` if all is on the other side.
+    /// Cuts the polygon by a level plane. Returns the part below and the part above; one is `None`
+    /// if all is on the other side.
     pub fn cut(&self, height_m: f64) -> [Option<Self>; 2] {
         [-1.0, 1.0].map(|side| {
             let above = |corner: &Vector3<f64>| side * (corner.z - height_m);
@@ -54,7 +69,10 @@ impl Face {
                 }
             }
             let rises = kept.iter().any(|corner| above(corner) > ON_PLANE_M);
-            (rises && kept.len() > 2).then_some(Self { corners: kept, normal: self.normal })
+            (rises && kept.len() > 2).then_some(Self {
+                corners: kept,
+                normal: self.normal,
+            })
         })
     }
 }
@@ -77,34 +95,61 @@ impl Mesh {
             }
             triangles.entry(group).or_default().push(*corners);
         }
-        let of =
-            |group| Self { vertices: welded.vertices.clone(), triangles: triangles.remove(&group).unwrap_or_default() };
-        order.into_iter().map(of).map(|mesh| mesh.without_loose_vertices()).collect()
+        let of = |group| Self {
+            vertices: welded.vertices.clone(),
+            triangles: triangles.remove(&group).unwrap_or_default(),
+        };
+        order
+            .into_iter()
+            .map(of)
+            .map(|mesh| mesh.without_loose_vertices())
+            .collect()
     }
 
     /// Whether no point is in front of any face: a convex solid, or a flat one.
     pub fn is_convex(&self) -> bool {
-        let points: Vec<Vector3<f64>> = self.vertices.iter().map(|vertex| Vector3::from(*vertex)).collect();
+        let points: Vec<Vector3<f64>> = self
+            .vertices
+            .iter()
+            .map(|vertex| Vector3::from(*vertex))
+            .collect();
         let outwards = self.outwards();
         self.triangles
             .iter()
             .filter_map(|corners| plane(&points, corners))
-            .all(|(normal, at)| points.iter().all(|point| outwards * normal.dot(&(point - points[at])) <= ON_PLANE_M))
+            .all(|(normal, at)| {
+                points
+                    .iter()
+                    .all(|point| outwards * normal.dot(&(point - points[at])) <= ON_PLANE_M)
+            })
     }
 
-    /// Returns the surface as convex polygons: triangles in one plane are joined while the result is convex.
+    /// Returns the surface as convex polygons: triangles in one plane are joined while the result
+    /// is convex.
     ///
-    /// Source: S. Hertel, K. Mehlhorn, Fast triangulation of simple polygons (1983), by length of the removed side.
+    /// Source: S. Hertel, K. Mehlhorn, Fast triangulation of simple polygons (1983), by length of
+    /// the removed side.
     pub fn faces(&self) -> Vec<Face> {
         let mesh = self.one_sided();
-        let points: Vec<Vector3<f64>> = mesh.vertices.iter().map(|vertex| Vector3::from(*vertex)).collect();
+        let points: Vec<Vector3<f64>> = mesh
+            .vertices
+            .iter()
+            .map(|vertex| Vector3::from(*vertex))
+            .collect();
         let outwards = mesh.outwards();
         let mut polygons: Vec<Polygon> = Vec::new();
         for corners in &mesh.triangles {
             let [a, b, c] = corners.map(|idx| idx as usize);
             if let Some((normal, _)) = plane(&points, corners) {
-                let corners = if outwards < 0.0 { vec![c, b, a] } else { vec![a, b, c] };
-                polygons.push(Polygon { corners, normal: normal * outwards });
+                let corners = if outwards < 0.0 {
+                    vec![c, b, a]
+                } else {
+                    vec![a, b, c]
+                };
+                polygons.push(Polygon {
+                    corners,
+                    normal: normal * outwards,
+                });
             }
         }
         let mut side_of: BTreeMap<[usize; 2], usize> = BTreeMap::new();
@@ -114,8 +159,11 @@ impl Mesh {
             }
         }
         let length = |[a, b]: &[usize; 2]| (points[*b] - points[*a]).norm();
-        let mut shared: Vec<[usize; 2]> =
-            side_of.keys().filter(|[a, b]| a < b && side_of.contains_key(&[*b, *a])).copied().collect();
+        let mut shared: Vec<[usize; 2]> = side_of
+            .keys()
+            .filter(|[a, b]| a < b && side_of.contains_key(&[*b, *a]))
+            .copied()
+            .collect();
         shared.sort_by(|one, other| length(other).total_cmp(&length(one)).then(one.cmp(other)));
         let mut groups = Groups::new(polygons.len());
         for [a, b] in shared {
@@ -128,15 +176,23 @@ impl Mesh {
                 polygons[kept] = joined;
             }
         }
-        let kept = (0..polygons.len()).filter(|idx| groups.first(*idx) == *idx).collect::<Vec<_>>();
-        kept.into_iter().map(|idx| polygons[idx].face(&points)).collect()
+        let kept = (0..polygons.len())
+            .filter(|idx| groups.first(*idx) == *idx)
+            .collect::<Vec<_>>();
+        kept.into_iter()
+            .map(|idx| polygons[idx].face(&points))
+            .collect()
     }
 
     /// 1, or -1 if the triangles of a closed mesh face inwards.
     fn outwards(&self) -> f64 {
         let corner = |idx: u32| Vector3::from(self.vertices[idx as usize]);
         let sixfold = |[a, b, c]: &[u32; 3]| corner(*a).dot(&corner(*b).cross(&corner(*c)));
-        if self.triangles.iter().map(sixfold).sum::<f64>() < 0.0 { -1.0 } else { 1.0 }
+        if self.triangles.iter().map(sixfold).sum::<f64>() < 0.0 {
+            -1.0
+        } else {
+            1.0
+        }
     }
 
     fn without_loose_vertices(&self) -> Self {
@@ -148,8 +204,15 @@ impl Mesh {
                 u32::try_from(vertices.len() - 1).unwrap_or(u32::MAX)
             })
         };
-        let triangles = self.triangles.iter().map(|corners| corners.map(&mut number)).collect();
-        Self { vertices, triangles }
+        let triangles = self
+            .triangles
+            .iter()
+            .map(|corners| corners.map(&mut number))
+            .collect();
+        Self {
+            vertices,
+            triangles,
+        }
     }
 }
 
@@ -169,18 +232,24 @@ struct Polygon {
 
 impl Polygon {
     fn sides(&self) -> impl Iterator<Item = [usize; 2]> + '_ {
-        self.corners.iter().zip(self.corners.iter().cycle().skip(1)).map(|(a, b)| [*a, *b])
+        self.corners
+            .iter()
+            .zip(self.corners.iter().cycle().skip(1))
+            .map(|(a, b)| [*a, *b])
     }
 
-    /// Joins two polygons at the side from `a` to `b` of the first one, if they are in one plane and the result is convex.
+    /// Joins two polygons at the side from `a` to `b` of the first one, if they are in one plane
+    /// and the result is convex.
     fn joined(&self, other: &Self, [a, b]: [usize; 2], points: &[Vector3<f64>]) -> Option<Self> {
-        let on_plane = |corner: &usize| self.normal.dot(&(points[*corner] - points[a])).abs() <= ON_PLANE_M;
+        let on_plane =
+            |corner: &usize| self.normal.dot(&(points[*corner] - points[a])).abs() <= ON_PLANE_M;
         if self.normal.dot(&other.normal) < SAME_COSINE || !other.corners.iter().all(on_plane) {
             return None;
         }
         let mut corners = from(&self.corners, b)?;
         corners.extend(from(&other.corners, a)?);
-        // Both ends of the side are there twice; where the polygons share more sides, the path goes there and back.
+        // Both ends of the side are there twice; where the polygons share more sides, the path goes
+        // there and back.
         loop {
             let n = corners.len();
             let at = |idx: usize| corners[idx % n];
@@ -192,7 +261,10 @@ impl Polygon {
                 break;
             }
         }
-        let joined = Self { corners, normal: self.normal };
+        let joined = Self {
+            corners,
+            normal: self.normal,
+        };
         joined.is_convex(points).then_some(joined)
     }
 
@@ -215,7 +287,10 @@ impl Polygon {
             let (before, after) = (at(*idx) - at(idx + n - 1), at(idx + 1) - at(*idx));
             before.cross(&after).dot(&self.normal) > STRAIGHT * before.norm() * after.norm()
         };
-        Face { corners: (0..n).filter(turns).map(at).collect(), normal: self.normal }
+        Face {
+            corners: (0..n).filter(turns).map(at).collect(),
+            normal: self.normal,
+        }
     }
 }
 
@@ -232,7 +307,9 @@ struct Groups {
 
 impl Groups {
     fn new(count: usize) -> Self {
-        Self { parent: (0..count).collect() }
+        Self {
+            parent: (0..count).collect(),
+        }
     }
 
     fn first(&mut self, mut idx: usize) -> usize {
@@ -256,12 +333,31 @@ impl Groups {
 mod tests {
     use super::*;
 
-    /// A wall 4 m long, 3 m high and 0.2 m thick along x, with a door 1 m wide and 2.1 m high in its middle.
+    /// A wall 4 m long, 3 m high and 0.2 m thick along x, with a door 1 m wide and 2.1 m high in
+    /// its middle.
     fn wall_with_door() -> Mesh {
-        let outline = [[0.0, 0.0], [1.5, 0.0], [1.5, 2.1], [2.5, 2.1], [2.5, 0.0], [4.0, 0.0], [4.0, 3.0], [0.0, 3.0]];
-        let front = [[0, 1, 2], [0, 2, 7], [7, 2, 6], [2, 3, 6], [3, 4, 5], [3, 5, 6]];
-        let vertices =
-            [0.0, 0.2].iter().flat_map(|y| outline.iter().map(|[x, z]| [*x, *y, *z])).collect::<Vec<[f64; 3]>>();
+        let outline = [
+            [0.0, 0.0],
+            [1.5, 0.0],
+            [1.5, 2.1],
+            [2.5, 2.1],
+            [2.5, 0.0],
+            [4.0, 0.0],
+            [4.0, 3.0],
+            [0.0, 3.0],
+        ];
+        let front = [
+            [0, 1, 2],
+            [0, 2, 7],
+            [7, 2, 6],
+            [2, 3, 6],
+            [3, 4, 5],
+            [3, 5, 6],
+        ];
+        let vertices = [0.0, 0.2]
+            .iter()
+            .flat_map(|y| outline.iter().map(|[x, z]| [*x, *y, *z]))
+            .collect::<Vec<[f64; 3]>>();
         let mut triangles: Vec<[u32; 3]> = front.to_vec();
         triangles.extend(front.iter().map(|[a, b, c]| [c + 8, b + 8, a + 8]));
         for a in 0..8 {
@@ -283,7 +379,10 @@ mod tests {
         // Three for each side of the wall, and eight around it.
         assert_eq!(faces.len(), 14, "{faces:?}");
         let inside = Vector3::new(0.7, 0.1, 1.0);
-        for face in faces.iter().filter(|face| face.corners[0].x < 1.0 || face.normal.y != 0.0) {
+        for face in faces
+            .iter()
+            .filter(|face| face.corners[0].x < 1.0 || face.normal.y != 0.0)
+        {
             let towards = face.normal.dot(&(face.corners[0] - inside));
             assert!(towards > 0.0, "{face:?}");
         }
@@ -292,16 +391,35 @@ mod tests {
     #[test]
     fn triangles_that_face_inwards_are_turned() {
         let wall = wall_with_door();
-        let inwards = Mesh { triangles: wall.triangles.iter().map(|[a, b, c]| [*c, *b, *a]).collect(), ..wall.clone() };
+        let inwards = Mesh {
+            triangles: wall
+                .triangles
+                .iter()
+                .map(|[a, b, c]| [*c, *b, *a])
+                .collect(),
+            ..wall.clone()
+        };
         assert_eq!(wall.faces().len(), inwards.faces().len());
-        assert!(inwards.faces().iter().any(|face| face.normal.y < -0.9 && face.corners[0].y == 0.0));
+        assert!(
+            inwards
+                .faces()
+                .iter()
+                .any(|face| face.normal.y < -0.9 && face.corners[0].y == 0.0)
+        );
     }
 
     #[test]
     fn faces_are_cut_at_a_height() {
-        let corners = [[0.0, 0.0], [2.0, 0.0], [2.0, 3.0], [0.0, 3.0]].map(|[x, z]| Vector3::new(x, 0.0, z)).to_vec();
-        let wall = Face { corners, normal: -Vector3::y() };
-        let [below, above] = wall.cut(2.0).map(|face| face.expect("the plane cuts the wall"));
+        let corners = [[0.0, 0.0], [2.0, 0.0], [2.0, 3.0], [0.0, 3.0]]
+            .map(|[x, z]| Vector3::new(x, 0.0, z))
+            .to_vec();
+        let wall = Face {
+            corners,
+            normal: -Vector3::y(),
+        };
+        let [below, above] = wall
+            .cut(2.0)
+            .map(|face| face.expect("the plane cuts the wall"));
         assert!((below.area() - 4.0).abs() < 1e-12 && (above.area() - 2.0).abs() < 1e-12);
         assert!(below.corners.iter().all(|corner| corner.z <= 2.0));
         let [below, above] = wall.cut(3.0);
@@ -314,15 +432,32 @@ mod tests {
         let wall = wall_with_door();
         let further = wall.vertices.iter().map(|[x, y, z]| [x + 9.0, *y, *z]);
         let vertices: Vec<[f64; 3]> = wall.vertices.iter().copied().chain(further).collect();
-        let more = wall.triangles.iter().map(|corners| corners.map(|idx| idx + 16));
-        let both = Mesh { vertices, triangles: wall.triangles.iter().copied().chain(more).collect() };
+        let more = wall
+            .triangles
+            .iter()
+            .map(|corners| corners.map(|idx| idx + 16));
+        let both = Mesh {
+            vertices,
+            triangles: wall.triangles.iter().copied().chain(more).collect(),
+        };
         let parts = both.components();
         assert_eq!(parts.len(), 2);
         for part in &parts {
-            assert!((part.volume() - wall.volume()).abs() < 1e-9 && part.vertices.len() == 16, "{part:?}");
+            assert!(
+                (part.volume() - wall.volume()).abs() < 1e-9 && part.vertices.len() == 16,
+                "{part:?}"
+            );
         }
-        let tetrahedron = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
-        let mesh = Mesh::new(tetrahedron.to_vec(), vec![[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]);
+        let tetrahedron = [
+            [0.0, 0.0, 0.0],
+            [1.0, 0.0, 0.0],
+            [0.0, 1.0, 0.0],
+            [0.0, 0.0, 1.0],
+        ];
+        let mesh = Mesh::new(
+            tetrahedron.to_vec(),
+            vec![[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]],
+        );
         assert!(mesh.expect("the mesh is valid").is_convex());
     }
 }

@@ -1,11 +1,13 @@
 //! The convex hull of points in a plane.
 
-/// Returns the corners of the convex hull, counter-clockwise if y is to the left of x. Points that are not finite are
-/// ignored; points on a side are not corners.
+/// Returns the corners of the convex hull, counter-clockwise if y is to the left of x. Points that
+/// are not finite are ignored; points on a side are not corners.
 ///
 /// Source: Andrew's monotone chain algorithm (1979).
 pub fn convex_hull(points: impl IntoIterator<Item = [f64; 2]>) -> Vec<[f64; 2]> {
-    let finite = points.into_iter().filter(|point| point.iter().all(|value| value.is_finite()));
+    let finite = points
+        .into_iter()
+        .filter(|point| point.iter().all(|value| value.is_finite()));
     let mut points: Vec<[f64; 2]> = finite.collect();
     points.sort_by(|a, b| a[0].total_cmp(&b[0]).then(a[1].total_cmp(&b[1])));
     points.dedup();
@@ -53,7 +55,13 @@ mod tests {
     #[test]
     fn few_points_are_their_own_hull() {
         assert_eq!(convex_hull([]), Vec::<[f64; 2]>::new());
-        assert_eq!(convex_hull([[f64::NAN, 0.0], [1.0, 1.0], [1.0, 1.0]]), [[1.0, 1.0]]);
-        assert_eq!(convex_hull([[2.0, 2.0], [0.0, 0.0], [1.0, 1.0]]), [[0.0, 0.0], [2.0, 2.0]]);
+        assert_eq!(
+            convex_hull([[f64::NAN, 0.0], [1.0, 1.0], [1.0, 1.0]]),
+            [[1.0, 1.0]]
+        );
+        assert_eq!(
+            convex_hull([[2.0, 2.0], [0.0, 0.0], [1.0, 1.0]]),
+            [[0.0, 0.0], [2.0, 2.0]]
+        );
     }
 }

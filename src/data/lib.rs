@@ -49,6 +49,6 @@ pub use shape::{Part, Shape, bounds};
 pub use snapshot::{BodyState, CupState, JointState, LinkState, RobotState, Snapshot};
 pub use stream::Stream;
 pub use trace::{
-    ActionEnd, ActionReport, ActionTrace, ContactEpisode, Extremes, Form, Frames, Look, Perceived, PerceivedPlane,
-    PerceivedThing, Percept, Phase, Trace,
+    ActionEnd, ActionReport, ActionTrace, ContactEpisode, Extremes, Form, Frames, Look, Perceived,
+    PerceivedPlane, PerceivedThing, Percept, Phase, Trace,
 };

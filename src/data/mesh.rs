@@ -16,29 +16,44 @@ pub struct Mesh {
     pub triangles: Vec<[u32; 3]>,
 }
 
-/// Triangles whose normal is tilted by less than this count as level. Unit: cosine (about 2.5 degrees).
+/// Triangles whose normal is tilted by less than this count as level. Unit: cosine (about 2.5
+/// degrees).
 const LEVEL_COSINE: f64 = 0.999;
 
 impl Mesh {
     /// Creates a mesh with finite coordinates and valid vertex indices.
     ///
     /// # Errors
-    /// A lower-case message if a coordinate is not finite, an index is out of bounds, or there are no triangles.
+    /// A lower-case message if a coordinate is not finite, an index is out of bounds, or there are
+    /// no triangles.
     pub fn new(vertices: Vec<[f64; 3]>, triangles: Vec<[u32; 3]>) -> Result<Self, String> {
-        if let Some(vertex) = vertices.iter().position(|vertex| !vertex.iter().all(|x| x.is_finite())) {
+        if let Some(vertex) = vertices
+            .iter()
+            .position(|vertex| !vertex.iter().all(|x| x.is_finite()))
+        {
             return Err(format!("its vertex {} is not finite", vertex + 1));
         }
         let beyond = |idx: &u32| *idx as usize >= vertices.len();
-        if let Some(triangle) = triangles.iter().position(|corners| corners.iter().any(beyond)) {
-            return Err(format!("its triangle {} refers to a missing vertex", triangle + 1));
+        if let Some(triangle) = triangles
+            .iter()
+            .position(|corners| corners.iter().any(beyond))
+        {
+            return Err(format!(
+                "its triangle {} refers to a missing vertex",
+                triangle + 1
+            ));
         }
         if triangles.is_empty() {
             return Err("it has no triangles".to_owned());
         }
-        Ok(Self { vertices, triangles })
+        Ok(Self {
+            vertices,
+            triangles,
+        })
     }
 
-    /// Merges equal vertices, so that neighbouring triangles share them, and drops degenerate triangles.
+    /// Merges equal vertices, so that neighbouring triangles share them, and drops degenerate
+    /// triangles.
     #[must_use]
     pub fn welded(&self) -> Self {
         let mut known: BTreeMap<[u64; 3], u32> = BTreeMap::new();
@@ -46,21 +61,34 @@ impl Mesh {
         let mut place = |idx: u32| {
             let vertex = self.vertices[idx as usize];
             // Adding 0 turns -0 into +0.
-            *known.entry(vertex.map(|x| (x + 0.0).to_bits())).or_insert_with(|| {
-                vertices.push(vertex);
-                u32::try_from(vertices.len() - 1).unwrap_or(u32::MAX)
-            })
+            *known
+                .entry(vertex.map(|x| (x + 0.0).to_bits()))
+                .or_insert_with(|| {
+                    vertices.push(vertex);
+                    u32::try_from(vertices.len() - 1).unwrap_or(u32::MAX)
+                })
         };
         let has_extent = |[a, b, c]: &[u32; 3]| a != b && b != c && a != c;
-        let triangles: Vec<[u32; 3]> =
-            self.triangles.iter().map(|corners| corners.map(&mut place)).filter(has_extent).collect();
-        Self { vertices, triangles }
+        let triangles: Vec<[u32; 3]> = self
+            .triangles
+            .iter()
+            .map(|corners| corners.map(&mut place))
+            .filter(has_extent)
+            .collect();
+        Self {
+            vertices,
+            triangles,
+        }
     }
 
-    /// Keeps the first of all triangles with the same corners: some programs write the back of each face, too.
+    /// Keeps the first of all triangles with the same corners: some programs write the back of each
+    /// face, too.
     #[must_use]
     pub fn one_sided(&self) -> Self {
-        let Self { vertices, triangles } = self.welded();
+        let Self {
+            vertices,
+            triangles,
+        } = self.welded();
         let mut known = BTreeSet::new();
         let is_first = |corners: &[u32; 3]| {
             let mut corners = *corners;
@@ -68,27 +96,48 @@ impl Mesh {
             known.insert(corners)
         };
         let triangles = triangles.into_iter().filter(is_first).collect();
-        Self { vertices, triangles }
+        Self {
+            vertices,
+            triangles,
+        }
     }
 
-    /// Scales each axis. Reverses the triangles of a mirrored mesh, so that they still face outwards.
+    /// Scales each axis. Reverses the triangles of a mirrored mesh, so that they still face
+    /// outwards.
     #[must_use]
     pub fn scaled(&self, [x, y, z]: [f64; 3]) -> Self {
-        let vertices = self.vertices.iter().map(|vertex| [vertex[0] * x, vertex[1] * y, vertex[2] * z]).collect();
+        let vertices = self
+            .vertices
+            .iter()
+            .map(|vertex| [vertex[0] * x, vertex[1] * y, vertex[2] * z])
+            .collect();
         let mirrored = x * y * z < 0.0;
-        let triangles = self.triangles.iter().map(|[a, b, c]| if mirrored { [*a, *c, *b] } else { [*a, *b, *c] });
-        Self { vertices, triangles: triangles.collect() }
+        let triangles = self
+            .triangles
+            .iter()
+            .map(|[a, b, c]| if mirrored { [*a, *c, *b] } else { [*a, *b, *c] });
+        Self {
+            vertices,
+            triangles: triangles.collect(),
+        }
     }
 
-    /// Enclosed volume, by the divergence theorem; approximate if the mesh has small holes. Unit: cubic metres.
+    /// Enclosed volume, by the divergence theorem; approximate if the mesh has small holes. Unit:
+    /// cubic metres.
     pub fn volume(&self) -> f64 {
         let sixfold: f64 = self.corners().map(|[a, b, c]| a.dot(&b.cross(&c))).sum();
         (sixfold / 6.0).abs()
     }
 
-    /// Finds the triangles that, transformed by `placed`, are level, face up, and are at most `depth_m` below `top_m`.
-    /// Returns their area and bounding rectangle. Units: metres, square metres.
-    pub fn top(&self, top_m: f64, depth_m: f64, placed: impl Fn(&Vector3<f64>) -> Vector3<f64>) -> Top {
+    /// Finds the triangles that, transformed by `placed`, are level, face up, and are at most
+    /// `depth_m` below `top_m`. Returns their area and bounding rectangle. Units: metres, square
+    /// metres.
+    pub fn top(
+        &self,
+        top_m: f64,
+        depth_m: f64,
+        placed: impl Fn(&Vector3<f64>) -> Vector3<f64>,
+    ) -> Top {
         let mut found = Top::default();
         for corners in self.corners() {
             let [a, b, c] = corners.map(|corner| placed(&corner));
@@ -109,20 +158,27 @@ impl Mesh {
     pub fn digest(&self) -> String {
         let mut digest = Digest::new();
         for vertex in &self.vertices {
-            vertex.iter().for_each(|x| digest.update(&x.to_bits().to_le_bytes()));
+            vertex
+                .iter()
+                .for_each(|x| digest.update(&x.to_bits().to_le_bytes()));
         }
         for corners in &self.triangles {
-            corners.iter().for_each(|idx| digest.update(&idx.to_le_bytes()));
+            corners
+                .iter()
+                .for_each(|idx| digest.update(&idx.to_le_bytes()));
         }
         digest.finish()
     }
 
     fn corners(&self) -> impl Iterator<Item = [Vector3<f64>; 3]> + '_ {
-        self.triangles.iter().map(|corners| corners.map(|idx| Vector3::from(self.vertices[idx as usize])))
+        self.triangles
+            .iter()
+            .map(|corners| corners.map(|idx| Vector3::from(self.vertices[idx as usize])))
     }
 }
 
-/// The level part of a mesh near its top, facing up: area and bounding rectangle (lowest and highest x and y).
+/// The level part of a mesh near its top, facing up: area and bounding rectangle (lowest and
+/// highest x and y).
 pub struct Top {
     pub area: f64,
     pub low: [f64; 2],
@@ -131,7 +187,11 @@ pub struct Top {
 
 impl Default for Top {
     fn default() -> Self {
-        Self { area: 0.0, low: [f64::INFINITY; 2], high: [f64::NEG_INFINITY; 2] }
+        Self {
+            area: 0.0,
+            low: [f64::INFINITY; 2],
+            high: [f64::NEG_INFINITY; 2],
+        }
     }
 }
 
@@ -141,19 +201,34 @@ mod tests {
 
     #[test]
     fn volumes_scale_and_vertices_are_welded() {
-        let corner = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+        let corner = [
+            [0.0, 0.0, 0.0],
+            [1.0, 0.0, 0.0],
+            [0.0, 1.0, 0.0],
+            [0.0, 0.0, 1.0],
+        ];
         let faces = [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]];
         let soup: Vec<[f64; 3]> = faces.iter().flatten().map(|idx| corner[*idx]).collect();
-        let mesh = Mesh::new(soup, (0..4).map(|face| [3 * face, 3 * face + 1, 3 * face + 2]).collect())
-            .expect("the mesh is valid");
+        let mesh = Mesh::new(
+            soup,
+            (0..4)
+                .map(|face| [3 * face, 3 * face + 1, 3 * face + 2])
+                .collect(),
+        )
+        .expect("the mesh is valid");
         assert_eq!(mesh.welded().vertices.len(), 4);
         assert!((mesh.volume() - 1.0 / 6.0).abs() < 1e-12);
         assert!((mesh.scaled([2.0, -1.0, 3.0]).volume() - 1.0).abs() < 1e-12);
         let backs = mesh.triangles.iter().map(|[a, b, c]| [*c, *b, *a]);
-        let both = Mesh { triangles: mesh.triangles.iter().copied().chain(backs).collect(), ..mesh.clone() };
+        let both = Mesh {
+            triangles: mesh.triangles.iter().copied().chain(backs).collect(),
+            ..mesh.clone()
+        };
         assert!(both.volume() < 1e-12 && (both.one_sided().volume() - mesh.volume()).abs() < 1e-12);
         assert!(
-            Mesh::new(corner.to_vec(), vec![[0, 1, 4]]).expect_err("the index is out of range").contains("triangle 1")
+            Mesh::new(corner.to_vec(), vec![[0, 1, 4]])
+                .expect_err("the index is out of range")
+                .contains("triangle 1")
         );
     }
 }

@@ -6,7 +6,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::{Part, PartJoint, Pose, Shape};
 
-/// Smallest difference of positions and angles that counts for the form of a vessel. Units: metres and radians.
+/// Smallest difference of positions and angles that counts for the form of a vessel. Units: metres
+/// and radians.
 const ROUGHLY: f64 = 2e-3;
 
 /// A rigid object or piece of furniture, made of shapes. Joints may move further parts of it.
@@ -24,7 +25,8 @@ pub struct ObjectModel {
     pub friction: f64,
     /// Coefficient of restitution in [0, 1].
     pub restitution: f64,
-    /// Position of the file's origin in the model's frame; nonzero only for SDF and URDF models. Unit: metres.
+    /// Position of the file's origin in the model's frame; nonzero only for SDF and URDF models.
+    /// Unit: metres.
     pub origin_m: [f64; 3],
     /// Outer dimensions in the upright pose. Unit: metres. Shape: x, y, z.
     pub size_m: [f64; 3],
@@ -32,12 +34,13 @@ pub struct ObjectModel {
     pub parts: Vec<Part>,
     /// Whether it is static.
     pub fixed: bool,
-    /// Centre of mass and moments of inertia from its file; if `None`, the parts have a uniform density.
+    /// Centre of mass and moments of inertia from its file; if `None`, the parts have a uniform
+    /// density.
     pub inertia: Option<Inertia>,
     /// For furniture: the flat rectangle on top that can hold objects.
     pub surface: Option<Surface>,
-    /// Parts that joints move, such as drawers and doors. Their shapes and masses are not among those above; the outer
-    /// dimensions contain them.
+    /// Parts that joints move, such as drawers and doors. Their shapes and masses are not among
+    /// those above; the outer dimensions contain them.
     pub moving: Vec<MovingPart>,
     /// Digest of the model's files.
     pub digest: String,
@@ -92,12 +95,22 @@ pub struct Surface {
 }
 
 impl Part {
-    /// Returns the convex solids of the part: the boxes of a tube, or the part itself. Frame: the model's.
+    /// Returns the convex solids of the part: the boxes of a tube, or the part itself. Frame: the
+    /// model's.
     pub fn solids(&self) -> Vec<Self> {
-        let Shape::Tube { .. } = self.shape else { return vec![self.clone()] };
+        let Shape::Tube { .. } = self.shape else {
+            return vec![self.clone()];
+        };
         let outer = self.pose.to_isometry();
         let placed = |pose: &Pose| Pose::from_isometry(&(outer * pose.to_isometry()));
-        self.shape.staves().into_iter().map(|stave| Self { pose: placed(&stave.pose), shape: stave.shape }).collect()
+        self.shape
+            .staves()
+            .into_iter()
+            .map(|stave| Self {
+                pose: placed(&stave.pose),
+                shape: stave.shape,
+            })
+            .collect()
     }
 }
 
@@ -107,31 +120,63 @@ impl ObjectModel {
         self.parts.iter().flat_map(Part::solids).collect()
     }
 
-    /// Returns the convex solids of the model and of its moving parts, with all joints at 0. Frame: the model's.
+    /// Returns the convex solids of the model and of its moving parts, with all joints at 0. Frame:
+    /// the model's.
     pub fn all_solids(&self) -> Vec<Part> {
         let of_part = |part: &MovingPart| -> Vec<Part> {
             let at = part.pose.to_isometry();
             let placed = |pose: &Pose| Pose::from_isometry(&(at * pose.to_isometry()));
-            part.model.solids().into_iter().map(|solid| Part { pose: placed(&solid.pose), ..solid }).collect()
+            part.model
+                .solids()
+                .into_iter()
+                .map(|solid| Part {
+                    pose: placed(&solid.pose),
+                    ..solid
+                })
+                .collect()
         };
-        self.solids().into_iter().chain(self.moving.iter().flat_map(of_part)).collect()
+        self.solids()
+            .into_iter()
+            .chain(self.moving.iter().flat_map(of_part))
+            .collect()
     }
 
-    /// Returns the rim of an open vessel: an upright wall around the middle that reaches up to the top, with nothing above its
-    /// floor.
+    /// Returns the rim of an open vessel: an upright wall around the middle that reaches up to the
+    /// top, with nothing above its floor.
     pub fn rim(&self) -> Option<Rim> {
         let is_central = |part: &Part| {
             let at = part.pose.to_isometry();
             at.rotation.angle() < ROUGHLY && at.translation.vector.xy().norm() < ROUGHLY
         };
         let of = |(idx, part): (usize, &Part)| {
-            let Shape::Tube { radius_low, radius_high, wall, height, .. } = part.shape else { return None };
+            let Shape::Tube {
+                radius_low,
+                radius_high,
+                wall,
+                height,
+                ..
+            } = part.shape
+            else {
+                return None;
+            };
             let top_m = part.bounds().1[2];
-            let others = self.parts.iter().enumerate().filter(|(other, _)| *other != idx);
-            let floor_m = others.map(|(_, other)| other.bounds().1[2]).fold(0.0, f64::max);
+            let others = self
+                .parts
+                .iter()
+                .enumerate()
+                .filter(|(other, _)| *other != idx);
+            let floor_m = others
+                .map(|(_, other)| other.bounds().1[2])
+                .fold(0.0, f64::max);
             let is_open = top_m > self.size_m[2] - ROUGHLY && floor_m < top_m / 2.0;
             let slope = (radius_high - radius_low) / height;
-            (is_central(part) && is_open).then_some(Rim { radius_m: radius_high, top_m, slope, wall_m: wall, floor_m })
+            (is_central(part) && is_open).then_some(Rim {
+                radius_m: radius_high,
+                top_m,
+                slope,
+                wall_m: wall,
+                floor_m,
+            })
         };
         self.parts.iter().enumerate().find_map(of)
     }
@@ -139,14 +184,19 @@ impl ObjectModel {
     /// Scales the model uniformly; the mass stays the same.
     #[must_use]
     pub fn scaled(&self, by: f64) -> Self {
-        let placed = |pose: &Pose| Pose { position: pose.position.map(|x| x * by), rotation: pose.rotation };
+        let placed = |pose: &Pose| Pose {
+            position: pose.position.map(|x| x * by),
+            rotation: pose.rotation,
+        };
         let surface = |surface: Surface| Surface {
             height_m: surface.height_m * by,
             size_m: surface.size_m.map(|extent| extent * by),
         };
         let inertia = |inertia: Inertia| Inertia {
             com_m: inertia.com_m.map(|x| x * by),
-            about_com: inertia.about_com.map(|row| row.map(|moment| moment * by * by)),
+            about_com: inertia
+                .about_com
+                .map(|row| row.map(|moment| moment * by * by)),
         };
         Self {
             size_m: self.size_m.map(|extent| extent * by),
@@ -154,7 +204,10 @@ impl ObjectModel {
             parts: self
                 .parts
                 .iter()
-                .map(|part| Part { pose: placed(&part.pose), shape: part.shape.sized(by) })
+                .map(|part| Part {
+                    pose: placed(&part.pose),
+                    shape: part.shape.sized(by),
+                })
                 .collect(),
             surface: self.surface.map(surface),
             inertia: self.inertia.map(inertia),

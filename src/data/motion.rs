@@ -2,7 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-/// The robot's motion during one action, sampled as often as the bodies' poses; the first row is the initial state.
+/// The robot's motion during one action, sampled as often as the bodies' poses; the first row is
+/// the initial state.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Motion {
     /// Names of the joints, in the robot's order.
@@ -49,7 +50,15 @@ impl Motion {
     pub fn moments(&self) -> impl Iterator<Item = MotionRow<'_>> {
         self.rows.iter().filter_map(|row| {
             let (head, joints) = row.split_first_chunk::<12>()?;
-            let [time_secs, opening_m, left, right, commanded_opening_m, commanded_force_n, base @ ..] = *head;
+            let [
+                time_secs,
+                opening_m,
+                left,
+                right,
+                commanded_opening_m,
+                commanded_force_n,
+                base @ ..,
+            ] = *head;
             let [true_x, true_y, true_heading, x, y, heading] = base;
             (joints.len() == 4 * self.joints.len()).then_some(MotionRow {
                 time_secs,

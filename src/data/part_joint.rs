@@ -21,7 +21,15 @@ impl PartJoint {
     /// Returns the joint of a part that is scaled uniformly.
     #[must_use]
     pub fn scaled(self, by: f64) -> Self {
-        let range = if self.slides { self.range.map(|end| end * by) } else { self.range };
-        Self { anchor_m: self.anchor_m.map(|x| x * by), range, ..self }
+        let range = if self.slides {
+            self.range.map(|end| end * by)
+        } else {
+            self.range
+        };
+        Self {
+            anchor_m: self.anchor_m.map(|x| x * by),
+            range,
+            ..self
+        }
     }
 }

@@ -2,11 +2,12 @@
 
 use serde::{Deserialize, Serialize};
 
-/// Radius of the floor on which a base can be. Unit: metres. Frame: world. A body that is a metre farther out has left the world.
+/// Radius of the floor on which a base can be. Unit: metres. Frame: world. A body that is a metre
+/// farther out has left the world.
 pub const FLOOR_M: f64 = 13.0;
 
-/// Robots drive below furniture that begins higher above the floor, such as lintels, lamps and ceilings. Unit: metres. The height
-/// of a door, less rounding.
+/// Robots drive below furniture that begins higher above the floor, such as lintels, lamps and
+/// ceilings. Unit: metres. The height of a door, less rounding.
 pub const OVERHEAD_M: f64 = 1.99;
 
 /// A named pose on the floor.

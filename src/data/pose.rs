@@ -16,15 +16,22 @@ pub struct Pose {
 
 impl Pose {
     /// The origin without rotation.
-    pub const IDENTITY: Self = Self { position: [0.0; 3], rotation: [0.0, 0.0, 0.0, 1.0] };
+    pub const IDENTITY: Self = Self {
+        position: [0.0; 3],
+        rotation: [0.0, 0.0, 0.0, 1.0],
+    };
 
     /// Returns an upright pose. Units: metres, radians about the vertical.
     pub fn upright(position: [f64; 3], yaw: f64) -> Self {
         let (sin, cos) = (libm::sin(yaw / 2.0), libm::cos(yaw / 2.0));
-        Self { position, rotation: [0.0, 0.0, sin, cos] }
+        Self {
+            position,
+            rotation: [0.0, 0.0, sin, cos],
+        }
     }
 
-    /// Returns the heading: the angle of the pose's x axis about the vertical. Unit: radians in (−π, π].
+    /// Returns the heading: the angle of the pose's x axis about the vertical. Unit: radians in
+    /// (−π, π].
     pub fn yaw(&self) -> f64 {
         yaw_of(self.rotation)
     }
@@ -46,7 +53,10 @@ impl Pose {
     /// Converts a nalgebra transform to a pose.
     pub fn from_isometry(isometry: &Isometry3<f64>) -> Self {
         let q = isometry.rotation.quaternion();
-        Self { position: isometry.translation.vector.into(), rotation: [q.i, q.j, q.k, q.w] }
+        Self {
+            position: isometry.translation.vector.into(),
+            rotation: [q.i, q.j, q.k, q.w],
+        }
     }
 }
 
@@ -59,8 +69,14 @@ mod tests {
         let pose = Pose::upright([1.0, 2.0, 3.0], 0.7);
         assert!((pose.yaw() - 0.7).abs() < 1e-12);
         assert!(pose.tilt() < 1e-7);
-        assert_eq!(Pose::from_isometry(&pose.to_isometry()).position, pose.position);
-        let lying = Pose { position: [0.0; 3], rotation: [(0.5f64).sqrt(), 0.0, 0.0, (0.5f64).sqrt()] };
+        assert_eq!(
+            Pose::from_isometry(&pose.to_isometry()).position,
+            pose.position
+        );
+        let lying = Pose {
+            position: [0.0; 3],
+            rotation: [(0.5f64).sqrt(), 0.0, 0.0, (0.5f64).sqrt()],
+        };
         assert!((lying.tilt() - std::f64::consts::FRAC_PI_2).abs() < 1e-12);
     }
 }

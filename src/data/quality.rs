@@ -7,7 +7,8 @@ use serde::{Deserialize, Serialize};
 pub struct Quality {
     /// Deepest penetration of two bodies in contact. Unit: metres.
     pub deepest_penetration_m: f64,
-    /// Largest rise of the kinetic and potential energy of the objects that the robot could not have pushed: it touched
-    /// neither them nor their neighbours. Unit: joules. Real objects only lose energy.
+    /// Largest rise of the kinetic and potential energy of the objects that the robot could not
+    /// have pushed: it touched neither them nor their neighbours. Unit: joules. Real objects only
+    /// lose energy.
     pub energy_gain_j: f64,
 }

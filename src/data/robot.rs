@@ -6,8 +6,8 @@ use std::sync::Arc;
 use crate::{Mesh, Part, Pose, Shape};
 use actcheck_base::Source;
 
-/// Mass of links without a mass in the URDF, such as the stages of a base, and of lighter ones. Unit: kilograms. Small
-/// compared to any real link, large enough for 32-bit arithmetic.
+/// Mass of links without a mass in the URDF, such as the stages of a base, and of lighter ones.
+/// Unit: kilograms. Small compared to any real link, large enough for 32-bit arithmetic.
 pub const LEAST_LINK_KG: f64 = 0.01;
 
 /// A robot: its URDF and the roles of its joints and links. Read from a profile next to the URDF.
@@ -19,37 +19,41 @@ pub struct RobotProfile {
     pub urdf: Source,
     /// Joints of an omnidirectional base in the order x, y, heading; `None` if the base is fixed.
     pub base_joints: Option<[String; 3]>,
-    /// Whether those joints are added below the URDF's root instead of being part of it: `base = "planar"`.
+    /// Whether those joints are added below the URDF's root instead of being part of it:
+    /// `base = "planar"`.
     pub planar_base: bool,
-    /// Height of the root above the floor or the surface that the robot is mounted on: of a mount, which is not simulated, or wheels.
-    /// Unit: metres.
+    /// Height of the root above the floor or the surface that the robot is mounted on: of a mount,
+    /// which is not simulated, or wheels. Unit: metres.
     pub mount_height_m: f64,
-    /// Rotation of the root of a fixed robot about the vertical, if its arm does not work along the root's x axis. Unit:
-    /// radians.
+    /// Rotation of the root of a fixed robot about the vertical, if its arm does not work along the
+    /// root's x axis. Unit: radians.
     pub mount_turned_rad: f64,
-    /// Whether it is mounted on the surface that holds the objects, beside its edge, instead of on the floor.
+    /// Whether it is mounted on the surface that holds the objects, beside its edge, instead of on
+    /// the floor.
     pub on_surface: bool,
-    /// Distances from the root, nearest and farthest, at which a fixed arm takes objects: targets are placed between them.
-    /// `None`: anywhere on the half of the surface towards the robot. Unit: metres.
+    /// Distances from the root, nearest and farthest, at which a fixed arm takes objects: targets
+    /// are placed between them. `None`: anywhere on the half of the surface towards the robot.
+    /// Unit: metres.
     pub reach_m: Option<[f64; 2]>,
     /// Joints that position the hand (lift and arm), from the base outwards.
     pub arm_joints: Vec<String>,
-    /// Joints with motors that move the fingers: left then right, or one for both or for the only finger that moves.
-    /// Further ones close further fingers with these. Joints that mimic them follow.
+    /// Joints with motors that move the fingers: left then right, or one for both or for the only
+    /// finger that moves. Further ones close further fingers with these. Joints that mimic them
+    /// follow.
     pub finger_joints: Vec<String>,
     /// Head joints, pan then tilt; empty if the head does not move.
     pub head_joints: Vec<String>,
     /// Joints without another role that programs may move. All joints without a role are rigid.
     pub other_joints: Vec<String>,
-    /// Positions of rigid joints, such as those of a second arm; all others are at 0 or at the limit nearest to it. Units:
-    /// metres or radians.
+    /// Positions of rigid joints, such as those of a second arm; all others are at 0 or at the
+    /// limit nearest to it. Units: metres or radians.
     pub parked: Vec<(String, f64)>,
     /// Links whose collision shapes are left out, such as markers between the fingers.
     pub no_collision_links: Vec<String>,
     /// Link between the fingertips; its x axis points along the fingers, its y axis across them.
     pub grasp_link: String,
-    /// Rotation of the grasp frame relative to that link, if the link's axes differ: about its fixed x, y and z axes,
-    /// in this order. Unit: radians.
+    /// Rotation of the grasp frame relative to that link, if the link's axes differ: about its
+    /// fixed x, y and z axes, in this order. Unit: radians.
     pub grasp_turned_rad: [f64; 3],
     /// Origin of the grasp frame in that link's frame, if it differs from the link's. Unit: metres.
     pub grasp_offset_m: [f64; 3],
@@ -58,11 +62,11 @@ pub struct RobotProfile {
     /// Link of the depth camera, whose x axis points forwards and whose z axis up in the image; or
     /// [`RobotProfile::MAP`], if the camera is fixed beside the robot.
     pub camera_link: String,
-    /// Rotation of the camera's frame relative to that link, if the link's axes differ: about its fixed x, y and z axes,
-    /// in this order. Unit: radians.
+    /// Rotation of the camera's frame relative to that link, if the link's axes differ: about its
+    /// fixed x, y and z axes, in this order. Unit: radians.
     pub camera_turned_rad: [f64; 3],
-    /// Position of the lens in that link's frame, if it differs from the link's origin; in the world's, if the camera
-    /// is fixed there. Unit: metres.
+    /// Position of the lens in that link's frame, if it differs from the link's origin; in the
+    /// world's, if the camera is fixed there. Unit: metres.
     pub camera_offset_m: [f64; 3],
     /// Widest gap between the fingers. Unit: metres.
     pub max_opening_m: f64,
@@ -74,12 +78,14 @@ pub struct RobotProfile {
     pub finger_friction: f64,
     /// Closing force of one finger; of a suction cup, its greatest pull. Unit: newtons.
     pub grip_force_n: f64,
-    /// The suction cup of a gripper without fingers: both `finger_links` are then the `grasp_link`, whose grasp frame is at
-    /// the cup's lip with its x axis along the axis of the cup; `max_opening_m` is the cup's diameter.
+    /// The suction cup of a gripper without fingers: both `finger_links` are then the `grasp_link`,
+    /// whose grasp frame is at the cup's lip with its x axis along the axis of the cup;
+    /// `max_opening_m` is the cup's diameter.
     pub suction: Option<Suction>,
     /// Collision meshes by the file name in the URDF, in the file's own scale.
     pub meshes: BTreeMap<String, Vec<Shape>>,
-    /// The same meshes before they were divided into convex pieces, which fill hollows; empty if they were not divided.
+    /// The same meshes before they were divided into convex pieces, which fill hollows; empty if
+    /// they were not divided.
     pub surfaces: BTreeMap<String, Vec<Arc<Mesh>>>,
     /// Digest of profile, URDF and meshes.
     pub digest: String,
@@ -87,8 +93,8 @@ pub struct RobotProfile {
 
 /// A suction cup, which holds a surface by a seal.
 ///
-/// The seal breaks if the pull along the cup's axis exceeds `force_n`, the shear force across it `friction · force_n`, or
-/// the peel moment about the middle of the lip `force_n · radius_m`.
+/// The seal breaks if the pull along the cup's axis exceeds `force_n`, the shear force across it
+/// `friction · force_n`, or the peel moment about the middle of the lip `force_n · radius_m`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Suction {
     /// Greatest pull along the cup's axis. Unit: newtons.
@@ -100,11 +106,12 @@ pub struct Suction {
 }
 
 impl RobotProfile {
-    /// The `camera_link` of a camera that is fixed beside the robot: its pose is in the frame of the map, whose z axis
-    /// points up from the floor.
+    /// The `camera_link` of a camera that is fixed beside the robot: its pose is in the frame of
+    /// the map, whose z axis points up from the floor.
     pub const MAP: &'static str = "map";
     /// Joints of a planar base that is added below the URDF's root: x, y, heading.
-    pub const PLANAR_JOINTS: [&'static str; 3] = ["planar_x_joint", "planar_y_joint", "planar_heading_joint"];
+    pub const PLANAR_JOINTS: [&'static str; 3] =
+        ["planar_x_joint", "planar_y_joint", "planar_heading_joint"];
 
     /// Returns the profile with a suction cup instead of fingers. The `grasp_link` must be known.
     pub fn with_cup(self, cup: Suction) -> Self {
@@ -121,7 +128,8 @@ impl RobotProfile {
 }
 
 impl Suction {
-    /// Returns the greatest shear force across the axis at a pull limit of `force_n`. Unit: newtons.
+    /// Returns the greatest shear force across the axis at a pull limit of `force_n`. Unit:
+    /// newtons.
     pub fn most_shear_n(&self, force_n: f64) -> f64 {
         self.friction * force_n
     }

@@ -1,4 +1,5 @@
-//! Events of the robot itself during one action: joints at their limits, colliding links, held objects.
+//! Events of the robot itself during one action: joints at their limits, colliding links, held
+//! objects.
 
 use serde::{Deserialize, Serialize};
 
@@ -19,11 +20,12 @@ pub struct RobotCourse {
     /// Its measurements and commands. Stored with the bodies' tracks, which not every reader needs.
     #[serde(skip)]
     pub motion: Motion,
-    /// Quantities of all bodies at the control rate, for rules about time. Stored with the bodies' tracks. Empty in
-    /// traces of earlier versions.
+    /// Quantities of all bodies at the control rate, for rules about time. Stored with the bodies'
+    /// tracks. Empty in traces of earlier versions.
     #[serde(skip)]
     pub samples: Samples,
-    /// When objects were held and when they moved, by [`Samples::intervals`]. `None` in traces of earlier versions.
+    /// When objects were held and when they moved, by [`Samples::intervals`]. `None` in traces of
+    /// earlier versions.
     #[serde(skip)]
     pub intervals: Option<Vec<Interval>>,
 }
@@ -37,19 +39,21 @@ pub struct JointCourse {
     pub max_excess: f64,
     /// Largest speed as a share of the joint's limit.
     pub max_speed_share: f64,
-    /// Longest uninterrupted time at the motor's effort limit; 0 for fingers, which hold by force. Unit: seconds.
+    /// Longest uninterrupted time at the motor's effort limit; 0 for fingers, which hold by force.
+    /// Unit: seconds.
     pub overload_secs: f64,
 }
 
-/// Two links of the robot that pressed or penetrated each other, and did neither when the run began.
+/// Two links of the robot that pressed or penetrated each other, and did neither when the run
+/// began.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SelfCollision {
     /// `robot/LINK`, sorted.
     pub pair: [String; 2],
     /// Time of its first detection since the action began. Unit: seconds.
     pub start_secs: f64,
-    /// Largest penetration depth, of solid material only: hulls that fill the hollows of a mesh do not count. In traces of
-    /// earlier versions, they do. Unit: metres.
+    /// Largest penetration depth, of solid material only: hulls that fill the hollows of a mesh do
+    /// not count. In traces of earlier versions, they do. Unit: metres.
     pub max_depth_m: f64,
     /// How hard they pressed each other. `None` in traces of earlier versions.
     #[serde(skip)]

@@ -13,8 +13,8 @@ pub struct Samples {
     pub series: Vec<Series>,
 }
 
-/// One quantity over time, in steps of its resolution: rules that judge a new run and rules that judge a stored one
-/// read the same numbers.
+/// One quantity over time, in steps of its resolution: rules that judge a new run and rules that
+/// judge a stored one read the same numbers.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Series {
     /// Id of the object, `robot/LINK`, `robot`, `gripper`, `floor`, or `joint/NAME`.
@@ -33,12 +33,22 @@ impl Series {
     /// Creates an empty series.
     pub fn new(thing: &str, other: &str, quantity: &str, steps_per_unit: u32) -> Self {
         let (thing, other, quantity) = (thing.to_owned(), other.to_owned(), quantity.to_owned());
-        Self { thing, other, quantity, steps_per_unit, steps: Steps::default() }
+        Self {
+            thing,
+            other,
+            quantity,
+            steps_per_unit,
+            steps: Steps::default(),
+        }
     }
 
-    /// Returns a value as a number of steps; values beyond the range become its ends, and NaN becomes 0.
+    /// Returns a value as a number of steps; values beyond the range become its ends, and NaN
+    /// becomes 0.
     pub fn steps_of(value: f64, steps_per_unit: u32) -> i32 {
-        #[expect(clippy::cast_possible_truncation, reason = "the cast saturates, as the documentation says")]
+        #[expect(
+            clippy::cast_possible_truncation,
+            reason = "the cast saturates, as the documentation says"
+        )]
         let steps = (value * f64::from(steps_per_unit)).round() as i32;
         steps
     }
@@ -46,7 +56,9 @@ impl Series {
     /// Returns the samples in the quantity's unit.
     pub fn values(&self) -> impl ExactSizeIterator<Item = f64> + '_ {
         let per_unit = f64::from(self.steps_per_unit.max(1));
-        self.steps.iter().map(move |steps| f64::from(*steps) / per_unit)
+        self.steps
+            .iter()
+            .map(move |steps| f64::from(*steps) / per_unit)
     }
 }
 
@@ -57,8 +69,10 @@ mod tests {
     #[test]
     fn samples_are_the_nearest_decimals() {
         let mut series = Series::new("cup", "", "z", 10_000);
-        series.steps =
-            [0.3, -0.12345, f64::INFINITY, f64::NAN].map(|value| Series::steps_of(value, 10_000)).into_iter().collect();
+        series.steps = [0.3, -0.12345, f64::INFINITY, f64::NAN]
+            .map(|value| Series::steps_of(value, 10_000))
+            .into_iter()
+            .collect();
         let values: Vec<f64> = series.values().collect();
         assert_eq!(values[..2], [0.3, -0.1235]);
         assert_eq!(values[2], f64::from(i32::MAX) / 1e4);

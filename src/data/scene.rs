@@ -3,7 +3,10 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use crate::{MovingPart, ObjectModel, Part, PartJoint, Physics, Pose, Rim, RobotProfile, SceneMap, Sensing, Shape};
+use crate::{
+    MovingPart, ObjectModel, Part, PartJoint, Physics, Pose, Rim, RobotProfile, SceneMap, Sensing,
+    Shape,
+};
 
 /// A sampled scene. Frame of all poses: world; z up; the floor at 0.
 #[derive(Debug, Clone)]
@@ -18,7 +21,8 @@ pub struct Scene {
     pub robot: RobotStart,
     /// Values of the designators: ids of objects, or names of locations.
     pub designators: BTreeMap<String, Vec<String>>,
-    /// The same for each action of the test, with the values that the test gives. Actions beyond have those of the scene.
+    /// The same for each action of the test, with the values that the test gives. Actions beyond
+    /// have those of the scene.
     pub steps: Vec<BTreeMap<String, Vec<String>>>,
     /// Sensor noise of the run.
     pub sensing: Sensing,
@@ -56,8 +60,10 @@ impl SceneObject {
     /// Returns the parts of the object that joints move, as objects of their own.
     pub fn moving_parts(&self) -> Vec<Self> {
         let id_of = |part: &MovingPart| format!("{}_{}", self.id, part.name);
-        let (mass_scale, friction_scale) =
-            (self.mass_kg / self.model.mass_kg, self.friction / self.model.friction.max(f64::MIN_POSITIVE));
+        let (mass_scale, friction_scale) = (
+            self.mass_kg / self.model.mass_kg,
+            self.friction / self.model.friction.max(f64::MIN_POSITIVE),
+        );
         let place = self.pose.to_isometry();
         let part = |part: &MovingPart| {
             let carrier = part.on.and_then(|on| self.model.moving.get(on));
@@ -95,7 +101,9 @@ pub struct Attached {
 }
 
 /// The role of an object in a scene.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, serde::Serialize, serde::Deserialize)]
+#[derive(
+    Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, serde::Serialize, serde::Deserialize,
+)]
 pub enum Role {
     /// Carries other objects and never moves.
     Platform,
@@ -112,7 +120,14 @@ pub enum Role {
 }
 
 impl Role {
-    const ALL: [Self; 6] = [Self::Platform, Self::Target, Self::Other, Self::PlaceOther, Self::Obstacle, Self::Part];
+    const ALL: [Self; 6] = [
+        Self::Platform,
+        Self::Target,
+        Self::Other,
+        Self::PlaceOther,
+        Self::Obstacle,
+        Self::Part,
+    ];
 
     /// Its name in messages and histories.
     pub fn word(self) -> &'static str {
@@ -146,7 +161,8 @@ pub struct RobotStart {
     pub base: [f64; 3],
     /// Height of its root above the floor. Unit: metres.
     pub root_height_m: f64,
-    /// The kinds of objects that it can recognise: all models of the campaign, in this scene or not.
+    /// The kinds of objects that it can recognise: all models of the campaign, in this scene or
+    /// not.
     pub knows: Arc<[KnownKind]>,
 }
 
@@ -173,7 +189,13 @@ impl KnownKind {
             category: model.category.clone(),
             size_m: model.size_m,
             rim: model.rim(),
-            is_box: matches!(model.parts.as_slice(), [Part { shape: Shape::Box { .. }, .. }]),
+            is_box: matches!(
+                model.parts.as_slice(),
+                [Part {
+                    shape: Shape::Box { .. },
+                    ..
+                }]
+            ),
         }
     }
 }

@@ -34,8 +34,9 @@ impl SceneMap {
 
     /// Returns the first room that contains a point of the floor, or `None`.
     pub fn room_of(&self, x: f64, y: f64) -> Option<&Room> {
-        self.rooms
-            .iter()
-            .find(|room| (room.low_m[0]..=room.high_m[0]).contains(&x) && (room.low_m[1]..=room.high_m[1]).contains(&y))
+        self.rooms.iter().find(|room| {
+            (room.low_m[0]..=room.high_m[0]).contains(&x)
+                && (room.low_m[1]..=room.high_m[1]).contains(&y)
+        })
     }
 }

@@ -43,15 +43,16 @@ pub struct Sensing {
     pub camera: Camera,
 }
 
-/// Localisation while the base drives: keys of `[sensing]`. Standard deviations unless noted otherwise.
+/// Localisation while the base drives: keys of `[sensing]`. Standard deviations unless noted
+/// otherwise.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Odometry {
     /// Position error per distance driven, along and across the path (`odometry_drift`).
     pub drift: f64,
     /// Heading error per radian turned and per metre driven (`heading_drift`). Unit: radians.
     pub heading_drift: f64,
-    /// Distance driven between two landmark sightings, which correct the estimate (`landmark_every_m`); 0 means no
-    /// landmarks. Unit: metres.
+    /// Distance driven between two landmark sightings, which correct the estimate
+    /// (`landmark_every_m`); 0 means no landmarks. Unit: metres.
     pub landmark_every_m: f64,
     /// Error of a position measured by landmarks (`landmark_noise_m`). Unit: metres.
     pub landmark_noise_m: f64,
@@ -61,8 +62,13 @@ pub struct Odometry {
 
 impl Odometry {
     /// Odometry without errors or landmarks: the initial localisation error stays constant.
-    pub const IDEAL: Self =
-        Self { drift: 0.0, heading_drift: 0.0, landmark_every_m: 0.0, landmark_noise_m: 0.0, landmark_noise_rad: 0.0 };
+    pub const IDEAL: Self = Self {
+        drift: 0.0,
+        heading_drift: 0.0,
+        landmark_every_m: 0.0,
+        landmark_noise_m: 0.0,
+        landmark_noise_rad: 0.0,
+    };
 }
 
 /// The depth camera on the robot's camera link: its intrinsics and noise.
@@ -72,22 +78,26 @@ pub struct Camera {
     pub width: u32,
     /// Image height. Unit: pixels.
     pub height: u32,
-    /// Angle between the outermost columns. Unit: radians. The vertical angle follows, as pixels are square.
+    /// Angle between the outermost columns. Unit: radians. The vertical angle follows, as pixels
+    /// are square.
     pub field_of_view_rad: f64,
     /// Nearest visible distance from the camera. Unit: metres.
     pub min_range_m: f64,
     /// Farthest visible distance from the camera. Unit: metres.
     pub max_range_m: f64,
-    /// Standard deviation of the range at a distance of 1 m; it grows with the square of the distance. Unit: metres.
+    /// Standard deviation of the range at a distance of 1 m; it grows with the square of the
+    /// distance. Unit: metres.
     pub range_noise_m: f64,
     /// Share of pixels that are dropped at random.
     pub dropout: f64,
-    /// Angle between ray and surface below which pixels are dropped: all at 0, none at this angle. Unit: radians.
+    /// Angle between ray and surface below which pixels are dropped: all at 0, none at this angle.
+    /// Unit: radians.
     pub grazing_rad: f64,
 }
 
 impl Camera {
-    /// 320 × 240 pixels, 57 degrees wide, from 0.3 to 5 m like the depth cameras of service robots, and without noise.
+    /// 320 × 240 pixels, 57 degrees wide, from 0.3 to 5 m like the depth cameras of service robots,
+    /// and without noise.
     pub const IDEAL: Self = Self {
         width: 320,
         height: 240,
@@ -107,6 +117,6 @@ pub struct Budget {
     pub action_secs: f64,
 }
 
-/// Control commands and contact records per second of simulated time. Every physics rate is a multiple of it, so that
-/// a control period is a whole number of physics steps.
+/// Control commands and contact records per second of simulated time. Every physics rate is a
+/// multiple of it, so that a control period is a whole number of physics steps.
 pub const CONTROL_HZ: u32 = 60;

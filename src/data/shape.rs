@@ -54,7 +54,8 @@ pub enum Shape {
         /// Height of the cylinder, without the hemispheres.
         height: f64,
     },
-    /// A closed mesh, not yet decomposed into convex solids. Code that needs a solid uses its convex hull.
+    /// A closed mesh, not yet decomposed into convex solids. Code that needs a solid uses its
+    /// convex hull.
     Mesh {
         /// The mesh.
         mesh: Mesh,
@@ -76,7 +77,9 @@ impl Shape {
             Self::Box { size: [x, y, z] } => x * y * z,
             Self::Cylinder { radius, height } => PI * radius * radius * height,
             Self::Sphere { radius } => 4.0 / 3.0 * PI * radius * radius * radius,
-            Self::Capsule { radius, height } => PI * radius * radius * (height + 4.0 / 3.0 * radius),
+            Self::Capsule { radius, height } => {
+                PI * radius * radius * (height + 4.0 / 3.0 * radius)
+            }
             Self::Mesh { mesh } => mesh.volume(),
             Self::Hull { volume, .. } => *volume,
             Self::Tube { .. } => self.staves().iter().map(|stave| stave.shape.volume()).sum(),
@@ -87,7 +90,16 @@ impl Shape {
     ///
     /// The outer edges of the boxes lie on the tube's outer radius, so the boxes never exceed it.
     pub(crate) fn staves(&self) -> Vec<Part> {
-        let Self::Tube { radius_low, radius_high, wall, height, staves } = *self else { return Vec::new() };
+        let Self::Tube {
+            radius_low,
+            radius_high,
+            wall,
+            height,
+            staves,
+        } = *self
+        else {
+            return Vec::new();
+        };
         let half_angle = std::f64::consts::PI / f64::from(staves);
         let slant = libm::atan2(radius_high - radius_low, height);
         let middle = (radius_low + radius_high) / 2.0;
@@ -97,10 +109,18 @@ impl Shape {
         let leaning = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), slant);
         (0..staves)
             .map(|idx| {
-                let turned = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), 2.0 * half_angle * f64::from(idx));
-                let at =
-                    Isometry3::from_parts(Translation3::from(turned * Vector3::new(reach, 0.0, 0.0)), turned * leaning);
-                Part { pose: Pose::from_isometry(&at), shape: Self::Box { size } }
+                let turned = UnitQuaternion::from_axis_angle(
+                    &Vector3::z_axis(),
+                    2.0 * half_angle * f64::from(idx),
+                );
+                let at = Isometry3::from_parts(
+                    Translation3::from(turned * Vector3::new(reach, 0.0, 0.0)),
+                    turned * leaning,
+                );
+                Part {
+                    pose: Pose::from_isometry(&at),
+                    shape: Self::Box { size },
+                }
             })
             .collect()
     }
@@ -111,11 +131,27 @@ impl Shape {
     #[must_use]
     pub fn sized(&self, by: f64) -> Self {
         match self {
-            Self::Box { size } => Self::Box { size: size.map(|extent| extent * by) },
-            Self::Cylinder { radius, height } => Self::Cylinder { radius: radius * by, height: height * by },
-            Self::Sphere { radius } => Self::Sphere { radius: radius * by },
-            Self::Capsule { radius, height } => Self::Capsule { radius: radius * by, height: height * by },
-            Self::Tube { radius_low, radius_high, wall, height, staves } => Self::Tube {
+            Self::Box { size } => Self::Box {
+                size: size.map(|extent| extent * by),
+            },
+            Self::Cylinder { radius, height } => Self::Cylinder {
+                radius: radius * by,
+                height: height * by,
+            },
+            Self::Sphere { radius } => Self::Sphere {
+                radius: radius * by,
+            },
+            Self::Capsule { radius, height } => Self::Capsule {
+                radius: radius * by,
+                height: height * by,
+            },
+            Self::Tube {
+                radius_low,
+                radius_high,
+                wall,
+                height,
+                staves,
+            } => Self::Tube {
                 radius_low: radius_low * by,
                 radius_high: radius_high * by,
                 wall: wall * by,
@@ -130,11 +166,19 @@ impl Shape {
     #[must_use]
     pub fn scaled(&self, scale: [f64; 3]) -> Self {
         match self {
-            Self::Mesh { mesh } => Self::Mesh { mesh: mesh.scaled(scale) },
+            Self::Mesh { mesh } => Self::Mesh {
+                mesh: mesh.scaled(scale),
+            },
             Self::Hull { points, volume } => {
                 let [x, y, z] = scale;
-                let points = points.iter().map(|point| [point[0] * x, point[1] * y, point[2] * z]).collect();
-                Self::Hull { points, volume: volume * (x * y * z).abs() }
+                let points = points
+                    .iter()
+                    .map(|point| [point[0] * x, point[1] * y, point[2] * z])
+                    .collect();
+                Self::Hull {
+                    points,
+                    volume: volume * (x * y * z).abs(),
+                }
             }
             other => other.clone(),
         }
@@ -146,17 +190,23 @@ impl Part {
     pub fn bounds(&self) -> ([f64; 3], [f64; 3]) {
         let at = self.pose.to_isometry();
         let centre = at.translation.vector;
-        // Extents along the frame's axes of a unit segment along the shape's z axis, and of a unit disc across it.
+        // Extents along the frame's axes of a unit segment along the shape's z axis, and of a unit
+        // disc across it.
         let along = (at.rotation * Vector3::z()).abs();
         let across = along.map(|cosine| (1.0 - cosine * cosine).max(0.0).sqrt());
         let reach = match &self.shape {
-            Shape::Box { size } => at.rotation.to_rotation_matrix().matrix().abs() * (Vector3::from(*size) / 2.0),
+            Shape::Box { size } => {
+                at.rotation.to_rotation_matrix().matrix().abs() * (Vector3::from(*size) / 2.0)
+            }
             Shape::Cylinder { radius, height } => along * (height / 2.0) + across * *radius,
             Shape::Sphere { radius } => Vector3::repeat(*radius),
             Shape::Capsule { radius, height } => along * (height / 2.0) + Vector3::repeat(*radius),
-            Shape::Tube { radius_low, radius_high, height, .. } => {
-                along * (height / 2.0) + across * radius_low.max(*radius_high)
-            }
+            Shape::Tube {
+                radius_low,
+                radius_high,
+                height,
+                ..
+            } => along * (height / 2.0) + across * radius_low.max(*radius_high),
             Shape::Mesh { mesh } => return around(&at, &mesh.vertices),
             Shape::Hull { points, .. } => return around(&at, points),
         };
@@ -165,7 +215,10 @@ impl Part {
 }
 
 fn around(at: &Isometry3<f64>, points: &[[f64; 3]]) -> ([f64; 3], [f64; 3]) {
-    let (mut low, mut high) = (Vector3::repeat(f64::INFINITY), Vector3::repeat(f64::NEG_INFINITY));
+    let (mut low, mut high) = (
+        Vector3::repeat(f64::INFINITY),
+        Vector3::repeat(f64::NEG_INFINITY),
+    );
     for point in points {
         let point = (at * Point3::from(*point)).coords;
         (low, high) = (low.inf(&point), high.sup(&point));
@@ -173,12 +226,19 @@ fn around(at: &Isometry3<f64>, points: &[[f64; 3]]) -> ([f64; 3], [f64; 3]) {
     (low.into(), high.into())
 }
 
-/// Returns the bounding box of several parts; inverted (infinite lows, negative infinite highs) if there are none.
+/// Returns the bounding box of several parts; inverted (infinite lows, negative infinite highs) if
+/// there are none.
 pub fn bounds(parts: &[Part]) -> (Vector3<f64>, Vector3<f64>) {
-    let nothing = (Vector3::repeat(f64::INFINITY), Vector3::repeat(f64::NEG_INFINITY));
+    let nothing = (
+        Vector3::repeat(f64::INFINITY),
+        Vector3::repeat(f64::NEG_INFINITY),
+    );
     parts.iter().fold(nothing, |(low, high), part| {
         let (lowest, highest) = part.bounds();
-        (low.inf(&Vector3::from(lowest)), high.sup(&Vector3::from(highest)))
+        (
+            low.inf(&Vector3::from(lowest)),
+            high.sup(&Vector3::from(highest)),
+        )
     })
 }
 
@@ -192,9 +252,19 @@ mod tests {
             Translation3::new(1.0, 0.0, 0.0),
             UnitQuaternion::from_euler_angles(std::f64::consts::FRAC_PI_2, 0.0, 0.0),
         );
-        let part = Part { pose: Pose::from_isometry(&lying), shape: Shape::Cylinder { radius: 0.1, height: 1.0 } };
+        let part = Part {
+            pose: Pose::from_isometry(&lying),
+            shape: Shape::Cylinder {
+                radius: 0.1,
+                height: 1.0,
+            },
+        };
         let (low, high) = part.bounds();
-        for (found, expected) in low.into_iter().chain(high).zip([0.9, -0.5, -0.1, 1.1, 0.5, 0.1]) {
+        for (found, expected) in low
+            .into_iter()
+            .chain(high)
+            .zip([0.9, -0.5, -0.1, 1.1, 0.5, 0.1])
+        {
             assert!((found - expected).abs() < 1e-9, "{low:?} {high:?}");
         }
     }

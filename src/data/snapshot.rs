@@ -42,24 +42,27 @@ pub struct BodyState {
     pub friction: f64,
     /// Coefficient of restitution.
     pub restitution: f64,
-    /// Bodies in contact with it, above the minimum contact force, sorted: ids of objects, `robot` or `floor`.
+    /// Bodies in contact with it, above the minimum contact force, sorted: ids of objects, `robot`
+    /// or `floor`.
     pub touches: Vec<String>,
     /// Bodies that support it against gravity, sorted: ids of objects, `robot` or `floor`.
     pub rests_on: Vec<String>,
     /// Whether physics has put it to sleep.
     pub asleep: bool,
-    /// Dimensions along its own axes, in its scaled size. Unit: metres. `None` in traces of earlier versions.
+    /// Dimensions along its own axes, in its scaled size. Unit: metres. `None` in traces of earlier
+    /// versions.
     #[serde(skip)]
     pub size_m: Option<[f64; 3]>,
-    /// Distance from the grasp point to the surface of its shapes; negative inside. Unit: metres. `None` for static
-    /// bodies and in traces of earlier versions.
+    /// Distance from the grasp point to the surface of its shapes; negative inside. Unit: metres.
+    /// `None` for static bodies and in traces of earlier versions.
     #[serde(skip)]
     pub grasp_distance_m: Option<f64>,
-    /// If it is a part that a joint moves: the id of the whole, and the joint's position in metres or radians. `None` in
-    /// traces read from a history.
+    /// If it is a part that a joint moves: the id of the whole, and the joint's position in metres
+    /// or radians. `None` in traces read from a history.
     #[serde(skip)]
     pub part: Option<(String, f64)>,
-    /// Whether the robot flung, pushed or dropped it out of the world, where it stays. False in traces of earlier versions.
+    /// Whether the robot flung, pushed or dropped it out of the world, where it stays. False in
+    /// traces of earlier versions.
     #[serde(skip)]
     pub left_world: bool,
 }
@@ -94,7 +97,8 @@ pub struct RobotState {
 pub struct CupState {
     /// Greatest pull that its seal holds, at the commanded vacuum. Unit: newtons.
     pub force_n: f64,
-    /// Mean pull on its seal along its axis in the last control tick; negative if it is pushed, 0 without a seal. Unit: newtons.
+    /// Mean pull on its seal along its axis in the last control tick; negative if it is pushed, 0
+    /// without a seal. Unit: newtons.
     pub pull_n: f64,
 }
 

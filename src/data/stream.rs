@@ -1,8 +1,10 @@
-//! Counter-based random numbers: each value is a function of a seed and an index, independent of the order of calls.
+//! Counter-based random numbers: each value is a function of a seed and an index, independent of
+//! the order of calls.
 
 /// A stateless sequence of random numbers with random access.
 ///
-/// Source: SplitMix64 (Steele, Lea and Flood, "Fast splittable pseudorandom number generators", 2014).
+/// Source: SplitMix64 (Steele, Lea and Flood, "Fast splittable pseudorandom number generators",
+/// 2014).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Stream(u64);
 
@@ -27,11 +29,14 @@ impl Stream {
         (self.bits(number) >> 11) as f64 / (1u64 << 53) as f64
     }
 
-    /// Returns approximately normal noise with mean 0 and standard deviation 1, within ±3.47: the scaled sum of four
-    /// uniform numbers. This needs no logarithm or root, so that noise for a whole image takes a millisecond.
+    /// Returns approximately normal noise with mean 0 and standard deviation 1, within ±3.47: the
+    /// scaled sum of four uniform numbers. This needs no logarithm or root, so that noise for a
+    /// whole image takes a millisecond.
     pub fn bell(self, number: u64) -> f64 {
         let bits = self.bits(number);
-        let sum = (0..4).map(|part| (bits >> (16 * part)) & 0xffff).sum::<u64>();
+        let sum = (0..4)
+            .map(|part| (bits >> (16 * part)) & 0xffff)
+            .sum::<u64>();
         (sum as f64 / 65_536.0 - (2.0 - 2.0 / 65_536.0)) * TO_UNIT_DEVIATION
     }
 }
@@ -62,7 +67,8 @@ mod tests {
         let values: Vec<f64> = (0..100_000).map(|number| stream.bell(number)).collect();
         let mean = values.iter().sum::<f64>() / values.len() as f64;
         let variance = values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / values.len() as f64;
-        let together = values.windows(2).map(|pair| pair[0] * pair[1]).sum::<f64>() / values.len() as f64;
+        let together =
+            values.windows(2).map(|pair| pair[0] * pair[1]).sum::<f64>() / values.len() as f64;
         assert!(mean.abs() < 0.01, "{mean}");
         assert!((variance - 1.0).abs() < 0.02, "{variance}");
         assert!(together.abs() < 0.01, "{together}");

@@ -8,8 +8,9 @@ use crate::{Part, Pose, RobotCourse, SceneMap, Snapshot};
 
 /// A whole run as recorded by the simulation.
 ///
-/// `snapshots` has one more element than there are reached actions: the state after one action is the state before
-/// the next and is stored once. An action that was not performed has the same state before and after it.
+/// `snapshots` has one more element than there are reached actions: the state after one action is
+/// the state before the next and is stored once. An action that was not performed has the same
+/// state before and after it.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Trace {
     /// States before, between and after the actions.
@@ -28,7 +29,8 @@ pub struct Trace {
     pub robot_courses: Vec<RobotCourse>,
 }
 
-/// The shape of a body, detailed enough for an outline. Mesh pieces are reduced to their outermost points.
+/// The shape of a body, detailed enough for an outline. Mesh pieces are reduced to their outermost
+/// points.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Form {
     /// Id of the object, or `robot/LINK`.
@@ -58,7 +60,8 @@ pub struct ActionTrace {
     pub perceived: Option<Perceived>,
     /// Extremes during the action, one for each body of the scene, in scene order.
     pub extremes: Vec<Extremes>,
-    /// Smallest and largest true x and y of the base during the action; `None` for a fixed base. Unit: metres.
+    /// Smallest and largest true x and y of the base during the action; `None` for a fixed base.
+    /// Unit: metres.
     pub base: Option<[[f64; 2]; 2]>,
     /// Phases of the action with their start times, for the timeline.
     pub phases: Vec<Phase>,
@@ -96,7 +99,8 @@ pub enum ActionEnd {
     NotReached,
     /// The run exceeded its wall-clock limit: a timeout that says nothing about the robot.
     Cut(String),
-    /// A precondition of the action did not hold, as the text says: the action was not performed, and the run went on.
+    /// A precondition of the action did not hold, as the text says: the action was not performed,
+    /// and the run went on.
     NotPerformed(String),
 }
 
@@ -132,7 +136,8 @@ pub struct ContactEpisode {
     pub end_secs: f64,
     /// Largest normal force. Unit: newtons.
     pub max_force_n: f64,
-    /// Position of the contact at its largest force. Unit: metres. Frame: world. `None` in traces of earlier versions.
+    /// Position of the contact at its largest force. Unit: metres. Frame: world. `None` in traces
+    /// of earlier versions.
     #[serde(skip)]
     pub point_m: Option<[f64; 3]>,
 }
@@ -192,7 +197,8 @@ pub struct PerceivedThing {
     pub category: Option<String>,
     /// Upright pose of the centre of its foot.
     pub pose: Pose,
-    /// Dimensions along the axes of that pose; hidden sides get the length known for its kind. Unit: metres.
+    /// Dimensions along the axes of that pose; hidden sides get the length known for its kind.
+    /// Unit: metres.
     pub size_m: [f64; 3],
 }
 
@@ -227,6 +233,7 @@ pub struct Frames {
     pub period_secs: f64,
     /// Bodies with a track: ids of movable objects, then `robot/LINK`.
     pub names: Vec<String>,
-    /// One row per frame: for each name x, y, z (metres) and qx, qy, qz, qw. Shape: frames × (7 · names).
+    /// One row per frame: for each name x, y, z (metres) and qx, qy, qz, qw. Shape: frames × (7 ·
+    /// names).
     pub rows: Vec<Vec<f32>>,
 }

@@ -9,19 +9,35 @@ use actcheck_data::Trace;
 /// Quantities of bodies that don't move.
 const AT_REST: [&str; 6] = ["vx", "vy", "vz", "wx", "wy", "wz"];
 
-/// Returns the course of an action, counted from 0. Returns `None` if its samples were not recorded or not read.
+/// Returns the course of an action, counted from 0. Returns `None` if its samples were not recorded
+/// or not read.
 pub(super) fn of_action(trace: &Trace, step: usize) -> Option<Course> {
     let samples = &trace.robot_courses.get(step)?.samples;
     if samples.count == 0 {
         return None;
     }
     let mut course = Course::new(samples.period_secs, samples.count);
-    for body in trace.snapshots.get(step)?.bodies.iter().filter(|body| body.fixed) {
+    for body in trace
+        .snapshots
+        .get(step)?
+        .bodies
+        .iter()
+        .filter(|body| body.fixed)
+    {
         let mut set = |quantity: &str, value: f64| {
-            course.set([names::w(quantity), thing_iri(&body.id), String::new()], Signal::Constant(value));
+            course.set(
+                [names::w(quantity), thing_iri(&body.id), String::new()],
+                Signal::Constant(value),
+            );
         };
-        POSITION.into_iter().zip(body.pose.position).for_each(|(quantity, value)| set(quantity, value));
-        ROTATION.into_iter().zip(body.pose.rotation).for_each(|(quantity, value)| set(quantity, value));
+        POSITION
+            .into_iter()
+            .zip(body.pose.position)
+            .for_each(|(quantity, value)| set(quantity, value));
+        ROTATION
+            .into_iter()
+            .zip(body.pose.rotation)
+            .for_each(|(quantity, value)| set(quantity, value));
         AT_REST.into_iter().for_each(|quantity| set(quantity, 0.0));
     }
     for body in &trace.snapshots.get(step)?.bodies {
@@ -35,12 +51,25 @@ pub(super) fn of_action(trace: &Trace, step: usize) -> Option<Course> {
     }
     // Furniture that can slide has samples, too: they replace its constants.
     for series in &samples.series {
-        let other = if series.other.is_empty() { String::new() } else { iri(&series.other) };
-        let signal = Signal::Steps { per_unit: series.steps_per_unit, steps: series.steps.clone() };
-        course.set([names::w(&series.quantity), iri(&series.thing), other], signal);
+        let other = if series.other.is_empty() {
+            String::new()
+        } else {
+            iri(&series.other)
+        };
+        let signal = Signal::Steps {
+            per_unit: series.steps_per_unit,
+            steps: series.steps.clone(),
+        };
+        course.set(
+            [names::w(&series.quantity), iri(&series.thing), other],
+            signal,
+        );
     }
     let phases = &trace.actions.get(step)?.phases;
-    course.phases = phases.iter().map(|phase| (phase.name.clone(), phase.start_secs)).collect();
+    course.phases = phases
+        .iter()
+        .map(|phase| (phase.name.clone(), phase.start_secs))
+        .collect();
     Some(course)
 }
 

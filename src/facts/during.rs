@@ -9,16 +9,24 @@ use actcheck_data::{ActionTrace, ContactEpisode, Extremes, Look, Perceived, Perc
 
 /// Number of contact episodes that become facts for rules for each pair: the strongest ones.
 ///
-/// A body that chatters on a surface makes and breaks contact many times a second. Rules use the pair, the first
-/// contact above some force, and the largest force. The trace keeps all episodes.
+/// A body that chatters on a surface makes and breaks contact many times a second. Rules use the
+/// pair, the first contact above some force, and the largest force. The trace keeps all episodes.
 const EPISODES_OF_A_PAIR: usize = 3;
 
-/// Writes the report, contacts, extremes and percepts of one action that began at this time, and the plane and objects
-/// that the action itself perceived. Unit: seconds since the scene was built.
+/// Writes the report, contacts, extremes and percepts of one action that began at this time, and
+/// the plane and objects that the action itself perceived. Unit: seconds since the scene was built.
 pub(super) fn write(action: &ActionTrace, began_secs: f64, extent: Extent, writer: &mut Writer) {
     let subject = writer.w("action");
     if let Some(report) = &action.report {
-        writer.text(subject, "reported", if report.succeeded { "succeeded" } else { "failed" });
+        writer.text(
+            subject,
+            "reported",
+            if report.succeeded {
+                "succeeded"
+            } else {
+                "failed"
+            },
+        );
         writer.text(subject, "message", &report.message);
     }
     writer.number(subject, "duration", action.duration_secs);
@@ -43,7 +51,8 @@ pub(super) fn write_base([low, high]: &[[f64; 2]; 2], writer: &mut Writer) {
     writer.numbers(subject, ["baseMaxX", "baseMaxY"], *high);
 }
 
-/// Returns all episodes, or the strongest ones of each pair for rules, sorted by start, then by pair.
+/// Returns all episodes, or the strongest ones of each pair for rules, sorted by start, then by
+/// pair.
 fn kept(contacts: &[ContactEpisode], extent: Extent) -> Vec<&ContactEpisode> {
     let mut by_pair: BTreeMap<&[String; 2], Vec<&ContactEpisode>> = BTreeMap::new();
     for contact in contacts {
@@ -51,13 +60,21 @@ fn kept(contacts: &[ContactEpisode], extent: Extent) -> Vec<&ContactEpisode> {
     }
     let mut kept = Vec::new();
     for mut episodes in by_pair.into_values() {
-        episodes.sort_by(|a, b| b.max_force_n.total_cmp(&a.max_force_n).then(a.start_secs.total_cmp(&b.start_secs)));
+        episodes.sort_by(|a, b| {
+            b.max_force_n
+                .total_cmp(&a.max_force_n)
+                .then(a.start_secs.total_cmp(&b.start_secs))
+        });
         if extent == Extent::Rules {
             episodes.truncate(EPISODES_OF_A_PAIR);
         }
         kept.extend(episodes);
     }
-    kept.sort_by(|a, b| a.start_secs.total_cmp(&b.start_secs).then_with(|| a.pair.cmp(&b.pair)));
+    kept.sort_by(|a, b| {
+        a.start_secs
+            .total_cmp(&b.start_secs)
+            .then_with(|| a.pair.cmp(&b.pair))
+    });
     kept
 }
 
@@ -68,7 +85,11 @@ fn write_contact(number: usize, contact: &ContactEpisode, writer: &mut Writer) {
         let thing = writer.thing(id);
         writer.state(subject, property, thing);
     }
-    writer.numbers(subject, ["start", "end", "maxForce"], [contact.start_secs, contact.end_secs, contact.max_force_n]);
+    writer.numbers(
+        subject,
+        ["start", "end", "maxForce"],
+        [contact.start_secs, contact.end_secs, contact.max_force_n],
+    );
     if let Some(point) = contact.point_m {
         writer.numbers(subject, ["x", "y", "z"], point);
     }
@@ -79,7 +100,12 @@ fn write_extremes(extremes: &Extremes, writer: &mut Writer) {
     writer.numbers(
         subject,
         ["maxTilt", "maxSpeed", "maxRise", "maxDisplacement"],
-        [extremes.max_tilt_rad, extremes.max_speed, extremes.max_rise_m, extremes.max_displacement_m],
+        [
+            extremes.max_tilt_rad,
+            extremes.max_speed,
+            extremes.max_rise_m,
+            extremes.max_displacement_m,
+        ],
     );
 }
 
@@ -94,18 +120,35 @@ fn write_percept(number: usize, percept: &Percept, began_secs: f64, writer: &mut
     write_look(subject, percept.look.as_ref(), began_secs, writer);
 }
 
-/// Writes the moment of perception: the time, the base's true and believed pose, the camera's position.
+/// Writes the moment of perception: the time, the base's true and believed pose, the camera's
+/// position.
 fn write_look(subject: TermId, look: Option<&Look>, began_secs: f64, writer: &mut Writer) {
     let Some(look) = look else { return };
     writer.number(subject, "takenAt", look.time_secs - began_secs);
-    writer.numbers(subject, ["takenBaseX", "takenBaseY", "takenBaseYaw"], look.base_true);
-    writer.numbers(subject, ["takenBelievedX", "takenBelievedY", "takenBelievedYaw"], look.base_believed);
-    writer.numbers(subject, ["cameraX", "cameraY", "cameraZ"], look.camera.position);
+    writer.numbers(
+        subject,
+        ["takenBaseX", "takenBaseY", "takenBaseYaw"],
+        look.base_true,
+    );
+    writer.numbers(
+        subject,
+        ["takenBelievedX", "takenBelievedY", "takenBelievedYaw"],
+        look.base_believed,
+    );
+    writer.numbers(
+        subject,
+        ["cameraX", "cameraY", "cameraZ"],
+        look.camera.position,
+    );
 }
 
 /// Writes the rotations of the camera when it took the pictures of each percept.
 pub(super) fn write_cameras(action: &ActionTrace, writer: &mut Writer) {
-    let percepts = action.percepts.iter().enumerate().map(|(idx, seen)| (format!("percept/{}", idx + 1), &seen.look));
+    let percepts = action
+        .percepts
+        .iter()
+        .enumerate()
+        .map(|(idx, seen)| (format!("percept/{}", idx + 1), &seen.look));
     let perceived = action.perceived.iter().flat_map(|perceived| {
         let plane = perceived.plane.iter().map(|_| "perceivedPlane".to_owned());
         let things = (1..=perceived.things.len()).map(|number| format!("perceivedObject/{number}"));
@@ -114,7 +157,11 @@ pub(super) fn write_cameras(action: &ActionTrace, writer: &mut Writer) {
     for (name, look) in percepts.chain(perceived) {
         if let Some(look) = look {
             let subject = writer.w(&name);
-            writer.numbers(subject, ["cameraQx", "cameraQy", "cameraQz", "cameraQw"], look.camera.rotation);
+            writer.numbers(
+                subject,
+                ["cameraQx", "cameraQy", "cameraQz", "cameraQw"],
+                look.camera.rotation,
+            );
         }
     }
 }
@@ -124,7 +171,11 @@ fn write_perceived(perceived: &Perceived, began_secs: f64, writer: &mut Writer) 
         let subject = writer.w("perceivedPlane");
         writer.world_class(subject, "PerceivedPlane");
         writer.numbers(subject, ["x", "y", "z"], plane.pose.position);
-        writer.numbers(subject, ["yaw", "tilt"], [plane.pose.yaw(), plane.pose.tilt()]);
+        writer.numbers(
+            subject,
+            ["yaw", "tilt"],
+            [plane.pose.yaw(), plane.pose.tilt()],
+        );
         writer.numbers(subject, ["extentX", "extentY"], plane.size_m);
         write_look(subject, perceived.look.as_ref(), began_secs, writer);
     }
@@ -132,7 +183,11 @@ fn write_perceived(perceived: &Perceived, began_secs: f64, writer: &mut Writer) 
         let subject = writer.named("perceivedObject", &(idx + 1).to_string());
         writer.world_class(subject, "PerceivedObject");
         writer.numbers(subject, ["x", "y", "z"], thing.pose.position);
-        writer.numbers(subject, ["yaw", "tilt"], [thing.pose.yaw(), thing.pose.tilt()]);
+        writer.numbers(
+            subject,
+            ["yaw", "tilt"],
+            [thing.pose.yaw(), thing.pose.tilt()],
+        );
         writer.numbers(subject, ["sizeX", "sizeY", "sizeZ"], thing.size_m);
         write_look(subject, perceived.look.as_ref(), began_secs, writer);
         if let Some(category) = &thing.category {

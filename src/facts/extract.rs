@@ -7,17 +7,18 @@ use crate::{course, during, intervals, places, robot_course, snapshot};
 use actcheck_base::{RunFacts, Term, TermId, names};
 use actcheck_data::{SceneMap, Trace};
 
-/// Extracts the facts of a run: one list for each snapshot, and for each action one list of events and one of
-/// designators.
+/// Extracts the facts of a run: one list for each snapshot, and for each action one list of events
+/// and one of designators.
 ///
-/// The same trace gives the same facts with the same term IDs. An action that was never reached or not performed has
-/// designators but no events. Every number is the shortest decimal of its f32.
+/// The same trace gives the same facts with the same term IDs. An action that was never reached or
+/// not performed has designators but no events. Every number is the shortest decimal of its f32.
 pub fn extract(trace: &Trace) -> RunFacts {
     extract_to(trace, Extent::Rules)
 }
 
-/// Extracts the facts of a run like [`extract`], with those that rules don't use: the poses of links, the rotations
-/// of the camera, the base's path also without rooms, and all contacts instead of the strongest ones of each pair.
+/// Extracts the facts of a run like [`extract`], with those that rules don't use: the poses of
+/// links, the rotations of the camera, the base's path also without rooms, and all contacts instead
+/// of the strongest ones of each pair.
 pub fn extract_complete(trace: &Trace) -> RunFacts {
     extract_to(trace, Extent::Complete)
 }
@@ -42,10 +43,17 @@ fn extract_to(trace: &Trace, extent: Extent) -> RunFacts {
         places::write(&trace.map, &mut writer);
         facts.snapshots.push(writer.take());
     }
-    let bodies: BTreeSet<&str> = trace.snapshots.iter().flat_map(|s| s.bodies.iter().map(|b| b.id.as_str())).collect();
+    let bodies: BTreeSet<&str> = trace
+        .snapshots
+        .iter()
+        .flat_map(|s| s.bodies.iter().map(|b| b.id.as_str()))
+        .collect();
     for (idx, action) in trace.actions.iter().enumerate() {
         if action.end.was_begun() {
-            let began_secs = trace.snapshots.get(idx).map_or(0.0, |before| before.time_secs);
+            let began_secs = trace
+                .snapshots
+                .get(idx)
+                .map_or(0.0, |before| before.time_secs);
             during::write(action, began_secs, extent, &mut writer);
             if extent == Extent::Complete {
                 during::write_cameras(action, &mut writer);
@@ -63,14 +71,19 @@ fn extract_to(trace: &Trace, extent: Extent) -> RunFacts {
         }
         facts.during.push(writer.take());
         facts.courses.push(course::of_action(trace, idx));
-        facts.parameters.push(parameters(&action.parameters, &bodies, &trace.map, &mut writer));
+        facts.parameters.push(parameters(
+            &action.parameters,
+            &bodies,
+            &trace.map,
+            &mut writer,
+        ));
     }
     facts.terms = writer.terms;
     facts
 }
 
-/// Returns designators, as IRIs, with their values. A value is an object if the scene has one of that name, else a
-/// location if the map has one, else a string.
+/// Returns designators, as IRIs, with their values. A value is an object if the scene has one of
+/// that name, else a location if the map has one, else a string.
 fn parameters(
     values: &BTreeMap<String, Vec<String>>,
     bodies: &BTreeSet<&str>,

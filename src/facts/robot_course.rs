@@ -3,11 +3,12 @@
 use crate::writer::Writer;
 use actcheck_data::RobotCourse;
 
-/// A joint that used less than this share of its maximum speed counts as unmoved: its speed is not written.
+/// A joint that used less than this share of its maximum speed counts as unmoved: its speed is not
+/// written.
 const MIN_SPEED_SHARE: f64 = 0.01;
 
-/// Writes how close joints came to their limits, self-contacts, clearances and held objects. Marks the robot as
-/// measured, so that rules don't take missing facts for a pass.
+/// Writes how close joints came to their limits, self-contacts, clearances and held objects. Marks
+/// the robot as measured, so that rules don't take missing facts for a pass.
 pub(super) fn write(course: &RobotCourse, writer: &mut Writer) {
     let action = writer.w("action");
     writer.boolean(action, "robotMeasured", true);
@@ -31,7 +32,11 @@ pub(super) fn write(course: &RobotCourse, writer: &mut Writer) {
             let link = writer.thing(link);
             writer.state(subject, property, link);
         }
-        writer.numbers(subject, ["seenAt", "maxDepth"], [contact.start_secs, contact.max_depth_m]);
+        writer.numbers(
+            subject,
+            ["seenAt", "maxDepth"],
+            [contact.start_secs, contact.max_depth_m],
+        );
         if let Some(press) = contact.press {
             writer.number(subject, "maxForce", press.max_force_n);
             writer.boolean(subject, "fingersMeet", press.of_hand);
@@ -43,6 +48,10 @@ pub(super) fn write(course: &RobotCourse, writer: &mut Writer) {
     }
     for held in &course.held {
         let subject = writer.thing(&held.id);
-        writer.numbers(subject, ["heldTime", "heldTilt"], [held.held_secs, held.max_tilt_rad]);
+        writer.numbers(
+            subject,
+            ["heldTime", "heldTilt"],
+            [held.held_secs, held.max_tilt_rad],
+        );
     }
 }

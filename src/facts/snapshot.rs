@@ -28,7 +28,11 @@ fn write_body(body: &BodyState, writer: &mut Writer) {
     }
     writer.numbers(subject, ["minX", "minY", "minZ"], body.aabb_min);
     writer.numbers(subject, ["maxX", "maxY", "maxZ"], body.aabb_max);
-    writer.numbers(subject, ["mass", "friction", "restitution"], [body.mass_kg, body.friction, body.restitution]);
+    writer.numbers(
+        subject,
+        ["mass", "friction", "restitution"],
+        [body.mass_kg, body.friction, body.restitution],
+    );
     if let Some(size_m) = body.size_m {
         writer.numbers(subject, ["sizeX", "sizeY", "sizeZ"], size_m);
     }
@@ -51,7 +55,11 @@ fn write_body(body: &BodyState, writer: &mut Writer) {
 fn write_robot(robot: &RobotState, writer: &mut Writer) {
     let subject = writer.w("robot");
     writer.numbers(subject, ["baseX", "baseY", "baseYaw"], robot.base_true);
-    writer.numbers(subject, ["believedX", "believedY", "believedYaw"], robot.base_believed);
+    writer.numbers(
+        subject,
+        ["believedX", "believedY", "believedYaw"],
+        robot.base_believed,
+    );
     let gripper = writer.w("gripper");
     write_pose(gripper, &robot.gripper, writer);
     writer.number(gripper, "opening", robot.gripper_opening_m);
@@ -78,8 +86,22 @@ fn write_joint(joint: &JointState, writer: &mut Writer) {
     writer.world_class(subject, "Joint");
     writer.numbers(
         subject,
-        ["position", "velocity", "lower", "upper", "maxVelocity", "maxEffort"],
-        [joint.position, joint.velocity, joint.lower, joint.upper, joint.max_velocity, joint.max_effort],
+        [
+            "position",
+            "velocity",
+            "lower",
+            "upper",
+            "maxVelocity",
+            "maxEffort",
+        ],
+        [
+            joint.position,
+            joint.velocity,
+            joint.lower,
+            joint.upper,
+            joint.max_velocity,
+            joint.max_effort,
+        ],
     );
 }
 

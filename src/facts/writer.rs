@@ -6,8 +6,8 @@ use actcheck_base::names::escaped;
 use actcheck_base::{Term, TermId, Terms, Triple, names};
 use foldhash::fast::RandomState;
 
-/// Returns the IRI of an object with this ID in the simulation: `w:robot`, `w:floor`, `w:link/NAME` for `robot/NAME`,
-/// and `obj:ID` for the rest.
+/// Returns the IRI of an object with this ID in the simulation: `w:robot`, `w:floor`, `w:link/NAME`
+/// for `robot/NAME`, and `obj:ID` for the rest.
 ///
 /// Characters not allowed in an IRI are percent-encoded.
 pub fn thing_iri(id: &str) -> String {
@@ -20,11 +20,15 @@ pub fn thing_iri(id: &str) -> String {
     }
 }
 
-/// Returns the number with the fewest digits that rounds to the same f32. Physics has f32 precision, and 0.3 stays 0.3.
+/// Returns the number with the fewest digits that rounds to the same f32. Physics has f32
+/// precision, and 0.3 stays 0.3.
 ///
 /// Both zeros become `0.0`, so that they are one term. NaN and infinities are unchanged.
 pub(super) fn shortest(value: f64) -> f64 {
-    #[expect(clippy::cast_possible_truncation, reason = "rounding to the precision of physics is intended")]
+    #[expect(
+        clippy::cast_possible_truncation,
+        reason = "rounding to the precision of physics is intended"
+    )]
     let single = value as f32;
     if single == 0.0 {
         return 0.0;
@@ -32,8 +36,9 @@ pub(super) fn shortest(value: f64) -> f64 {
     if !single.is_finite() {
         return f64::from(single);
     }
-    // Halfway between two numbers of the fewest digits, as 30.8515625 is, the standard library takes the larger one, and the
-    // faster library the even one. Such a number has at most 14 binary digits after the point.
+    // Halfway between two numbers of the fewest digits, as 30.8515625 is, the standard library
+    // takes the larger one, and the faster library the even one. Such a number has at most 14
+    // binary digits after the point.
     let parsed = match (single * HALFWAY).fract() == 0.0 {
         true => format!("{single:e}").parse(),
         false => zmij::Buffer::new().format_finite(single).parse(),
@@ -69,7 +74,11 @@ impl Writer {
     pub(super) fn new() -> Self {
         let terms = Terms::with_capacity(TERMS);
         let numbers = HashMap::with_capacity_and_hasher(TERMS, RandomState::default());
-        Self { terms, numbers, ..Self::default() }
+        Self {
+            terms,
+            numbers,
+            ..Self::default()
+        }
     }
 
     /// Returns the collected triples, sorted and deduplicated, and starts an empty list.
@@ -133,13 +142,24 @@ impl Writer {
     }
 
     fn number_term(&mut self, value: f64) -> TermId {
-        #[expect(clippy::cast_possible_truncation, reason = "rounding to the precision of physics is intended")]
+        #[expect(
+            clippy::cast_possible_truncation,
+            reason = "rounding to the precision of physics is intended"
+        )]
         let bits = (value as f32).to_bits();
-        *self.numbers.entry(bits).or_insert_with(|| self.terms.intern(Term::Double(shortest(value))))
+        *self
+            .numbers
+            .entry(bits)
+            .or_insert_with(|| self.terms.intern(Term::Double(shortest(value))))
     }
 
     /// Adds several numbers, one for each property.
-    pub(super) fn numbers<const N: usize>(&mut self, subject: TermId, properties: [&'static str; N], values: [f64; N]) {
+    pub(super) fn numbers<const N: usize>(
+        &mut self,
+        subject: TermId,
+        properties: [&'static str; N],
+        values: [f64; N],
+    ) {
         for (property, value) in properties.into_iter().zip(values) {
             self.number(subject, property, value);
         }
@@ -186,7 +206,9 @@ impl Writer {
     }
 
     fn rdf_type(&mut self) -> TermId {
-        *self.rdf_type.get_or_insert_with(|| self.terms.intern(Term::iri(format!("{}type", names::RDF))))
+        *self
+            .rdf_type
+            .get_or_insert_with(|| self.terms.intern(Term::iri(format!("{}type", names::RDF))))
     }
 }
 
@@ -196,9 +218,12 @@ mod tests {
 
     #[test]
     fn a_number_has_the_fewest_digits_that_identify_its_f32() {
-        for (value, expected) in
-            [(f64::from(0.3f32), 0.3), (-0.0, 0.0), (1e-40, 1e-40), (f64::from(f32::MAX), 3.402_823_5e38)]
-        {
+        for (value, expected) in [
+            (f64::from(0.3f32), 0.3),
+            (-0.0, 0.0),
+            (1e-40, 1e-40),
+            (f64::from(f32::MAX), 3.402_823_5e38),
+        ] {
             assert_eq!(shortest(value).to_bits(), f64::to_bits(expected), "{value}");
         }
         assert!(shortest(f64::NAN).is_nan());
@@ -211,14 +236,21 @@ mod tests {
         for bits in (0..f32::INFINITY.to_bits()).step_by(10_007) {
             let single = f32::from_bits(bits);
             let expected: f64 = format!("{single:e}").parse().unwrap_or(f64::NAN);
-            assert_eq!(shortest(single.into()).to_bits(), (expected + 0.0).to_bits(), "{single:e}");
+            assert_eq!(
+                shortest(single.into()).to_bits(),
+                (expected + 0.0).to_bits(),
+                "{single:e}"
+            );
             assert_eq!(shortest((-single).into()), -expected, "{single:e}");
         }
     }
 
     #[test]
     fn a_name_with_spaces_is_an_iri() {
-        assert_eq!(thing_iri("robot/left finger"), names::w("link/left%20finger"));
+        assert_eq!(
+            thing_iri("robot/left finger"),
+            names::w("link/left%20finger")
+        );
         assert_eq!(thing_iri("glass_1"), names::obj("glass_1"));
         assert_eq!(thing_iri("floor"), names::w("floor"));
     }

@@ -28,15 +28,19 @@ impl Chosen {
     pub(super) fn of(wanted: &Wanted, terms: &[Written<'_>]) -> Self {
         let is_named = |run: &String| {
             terms.iter().any(|term| match term {
-                Written::Iri(iri) => {
-                    iri.strip_prefix(run.as_str()).is_some_and(|rest| rest.is_empty() || rest.starts_with('/'))
-                }
+                Written::Iri(iri) => iri
+                    .strip_prefix(run.as_str())
+                    .is_some_and(|rest| rest.is_empty() || rest.starts_with('/')),
                 _ => false,
             })
         };
         Self {
             all: wanted.runs.iter().any(is_named),
-            patterns: wanted.patterns.iter().filter_map(|pattern| numbered(pattern, terms)).collect(),
+            patterns: wanted
+                .patterns
+                .iter()
+                .filter_map(|pattern| numbered(pattern, terms))
+                .collect(),
         }
     }
 
@@ -48,7 +52,12 @@ impl Chosen {
                 Graph::Named => row[3] > 0,
                 Graph::Is(graph) => row[3] == graph,
             };
-            is_in && pattern.terms.iter().zip(row).all(|(fit, term)| fit.as_ref().is_none_or(|fit| fit.contains(term)))
+            is_in
+                && pattern
+                    .terms
+                    .iter()
+                    .zip(row)
+                    .all(|(fit, term)| fit.as_ref().is_none_or(|fit| fit.contains(term)))
         };
         self.all || self.patterns.iter().any(fits)
     }
@@ -59,7 +68,11 @@ fn numbered(pattern: &Pattern, terms: &[Written<'_>]) -> Option<Numbered> {
     let fitting = |fixed: &Option<Fixed>| match fixed {
         None => Some(None),
         Some(fixed) => {
-            let found: Vec<u32> = (0u32..).zip(terms).filter(|(_, term)| fits(fixed, term)).map(|(at, _)| at).collect();
+            let found: Vec<u32> = (0u32..)
+                .zip(terms)
+                .filter(|(_, term)| fits(fixed, term))
+                .map(|(at, _)| at)
+                .collect();
             (!found.is_empty()).then_some(Some(found))
         }
     };
@@ -68,11 +81,20 @@ fn numbered(pattern: &Pattern, terms: &[Written<'_>]) -> Option<Numbered> {
         InGraph::Named => Graph::Named,
         InGraph::Default => Graph::Is(0),
         InGraph::Is(iri) => {
-            let at = (0u32..).zip(terms).find(|(_, term)| **term == Written::Iri(iri));
+            let at = (0u32..)
+                .zip(terms)
+                .find(|(_, term)| **term == Written::Iri(iri));
             Graph::Is(at?.0 + 1)
         }
     };
-    Some(Numbered { terms: [fitting(&pattern.subject)?, fitting(&pattern.property)?, fitting(&pattern.value)?], graph })
+    Some(Numbered {
+        terms: [
+            fitting(&pattern.subject)?,
+            fitting(&pattern.property)?,
+            fitting(&pattern.value)?,
+        ],
+        graph,
+    })
 }
 
 fn fits(fixed: &Fixed, term: &Written<'_>) -> bool {

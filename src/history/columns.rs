@@ -1,9 +1,10 @@
 //! Queries that read most values of some properties, as joins of columns.
 //!
-//! The evaluator looks up the next pattern for each row so far, and a look-up in the store's tables takes as long as
-//! reading three rows that follow each other there. A query without a fixed subject or value reads nearly all values of
-//! its properties, so that reading each property once and joining the rows in memory takes a sixth of the time. The
-//! evaluator joins subqueries in this way.
+//! The evaluator looks up the next pattern for each row so far, and a look-up in the store's tables
+//! takes as long as reading three rows that follow each other there. A query without a fixed
+//! subject or value reads nearly all values of its properties, so that reading each property once
+//! and joining the rows in memory takes a sixth of the time. The evaluator joins subqueries in this
+//! way.
 
 use spargebra::Query;
 use spargebra::algebra::GraphPattern;
@@ -11,25 +12,36 @@ use spargebra::term::{NamedNodePattern, TermPattern, TriplePattern, Variable};
 
 use oxigraph::model::vocab::rdf;
 
-/// Rewrites a query so that its patterns are joined as columns, if that takes less time. Its answer remains the same,
-/// except for the order of unsorted rows.
+/// Rewrites a query so that its patterns are joined as columns, if that takes less time. Its answer
+/// remains the same, except for the order of unsorted rows.
 pub(super) fn by_columns(query: Query) -> Query {
     match query {
-        Query::Select { dataset: None, pattern, base_iri } if is_wide(&pattern) => {
-            Query::Select { dataset: None, pattern: joined(pattern), base_iri }
-        }
+        Query::Select {
+            dataset: None,
+            pattern,
+            base_iri,
+        } if is_wide(&pattern) => Query::Select {
+            dataset: None,
+            pattern: joined(pattern),
+            base_iri,
+        },
         other => other,
     }
 }
 
-/// Whether all patterns have a fixed property and nothing else that is fixed, and whether all rows are needed.
+/// Whether all patterns have a fixed property and nothing else that is fixed, and whether all rows
+/// are needed.
 fn is_wide(pattern: &GraphPattern) -> bool {
     use GraphPattern as G;
     match pattern {
         G::Bgp { patterns } => patterns.iter().all(is_column),
-        G::Join { left, right } | G::Union { left, right } | G::LeftJoin { left, right, expression: None } => {
-            is_wide(left) && is_wide(right)
-        }
+        G::Join { left, right }
+        | G::Union { left, right }
+        | G::LeftJoin {
+            left,
+            right,
+            expression: None,
+        } => is_wide(left) && is_wide(right),
         G::Slice { inner, .. } => is_wide(inner) && needs_all_rows(inner),
         G::Filter { inner, .. }
         | G::Extend { inner, .. }
@@ -57,7 +69,8 @@ fn needs_all_rows(pattern: &GraphPattern) -> bool {
 }
 
 fn is_column(triple: &TriplePattern) -> bool {
-    let is_open = |term: &TermPattern| matches!(term, TermPattern::Variable(_) | TermPattern::BlankNode(_));
+    let is_open =
+        |term: &TermPattern| matches!(term, TermPattern::Variable(_) | TermPattern::BlankNode(_));
     match &triple.predicate {
         NamedNodePattern::Variable(_) => false,
         NamedNodePattern::NamedNode(node) => {
@@ -71,17 +84,68 @@ fn joined(pattern: GraphPattern) -> GraphPattern {
     let boxed = |inner: Box<G>| Box::new(joined(*inner));
     match pattern {
         G::Bgp { patterns } => join_of(patterns),
-        G::Join { left, right } => G::Join { left: boxed(left), right: boxed(right) },
-        G::Union { left, right } => G::Union { left: boxed(left), right: boxed(right) },
-        G::LeftJoin { left, right, expression } => G::LeftJoin { left: boxed(left), right: boxed(right), expression },
-        G::Slice { inner, start, length } => G::Slice { inner: boxed(inner), start, length },
-        G::Filter { expr, inner } => G::Filter { expr, inner: boxed(inner) },
-        G::Extend { inner, variable, expression } => G::Extend { inner: boxed(inner), variable, expression },
-        G::OrderBy { inner, expression } => G::OrderBy { inner: boxed(inner), expression },
-        G::Project { inner, variables } => G::Project { inner: boxed(inner), variables },
-        G::Distinct { inner } => G::Distinct { inner: boxed(inner) },
-        G::Reduced { inner } => G::Reduced { inner: boxed(inner) },
-        G::Group { inner, variables, aggregates } => G::Group { inner: boxed(inner), variables, aggregates },
+        G::Join { left, right } => G::Join {
+            left: boxed(left),
+            right: boxed(right),
+        },
+        G::Union { left, right } => G::Union {
+            left: boxed(left),
+            right: boxed(right),
+        },
+        G::LeftJoin {
+            left,
+            right,
+            expression,
+        } => G::LeftJoin {
+            left: boxed(left),
+            right: boxed(right),
+            expression,
+        },
+        G::Slice {
+            inner,
+            start,
+            length,
+        } => G::Slice {
+            inner: boxed(inner),
+            start,
+            length,
+        },
+        G::Filter { expr, inner } => G::Filter {
+            expr,
+            inner: boxed(inner),
+        },
+        G::Extend {
+            inner,
+            variable,
+            expression,
+        } => G::Extend {
+            inner: boxed(inner),
+            variable,
+            expression,
+        },
+        G::OrderBy { inner, expression } => G::OrderBy {
+            inner: boxed(inner),
+            expression,
+        },
+        G::Project { inner, variables } => G::Project {
+            inner: boxed(inner),
+            variables,
+        },
+        G::Distinct { inner } => G::Distinct {
+            inner: boxed(inner),
+        },
+        G::Reduced { inner } => G::Reduced {
+            inner: boxed(inner),
+        },
+        G::Group {
+            inner,
+            variables,
+            aggregates,
+        } => G::Group {
+            inner: boxed(inner),
+            variables,
+            aggregates,
+        },
         other => other,
     }
 }
@@ -91,13 +155,17 @@ fn join_of(mut patterns: Vec<TriplePattern>) -> GraphPattern {
     let mut known: Vec<Variable> = Vec::new();
     let mut join: Option<GraphPattern> = None;
     while !patterns.is_empty() {
-        let is_next = |triple: &TriplePattern| variables(triple).any(|variable| known.contains(&variable));
+        let is_next =
+            |triple: &TriplePattern| variables(triple).any(|variable| known.contains(&variable));
         let triple = patterns.remove(patterns.iter().position(is_next).unwrap_or(0));
         known.extend(variables(&triple));
         let column = column(triple);
         join = Some(match join {
             None => column,
-            Some(join) => GraphPattern::Join { left: Box::new(join), right: Box::new(column) },
+            Some(join) => GraphPattern::Join {
+                left: Box::new(join),
+                right: Box::new(column),
+            },
         });
     }
     join.unwrap_or_default()
@@ -107,8 +175,17 @@ fn join_of(mut patterns: Vec<TriplePattern>) -> GraphPattern {
 fn column(triple: TriplePattern) -> GraphPattern {
     let variables: Vec<Variable> = variables(&triple).collect();
     let named = |term: TermPattern| variable(&term).map_or(term, TermPattern::Variable);
-    let triple = TriplePattern { subject: named(triple.subject), object: named(triple.object), ..triple };
-    GraphPattern::Project { inner: Box::new(GraphPattern::Bgp { patterns: vec![triple] }), variables }
+    let triple = TriplePattern {
+        subject: named(triple.subject),
+        object: named(triple.object),
+        ..triple
+    };
+    GraphPattern::Project {
+        inner: Box::new(GraphPattern::Bgp {
+            patterns: vec![triple],
+        }),
+        variables,
+    }
 }
 
 fn variables(triple: &TriplePattern) -> impl Iterator<Item = Variable> + use<> {
@@ -117,11 +194,14 @@ fn variables(triple: &TriplePattern) -> impl Iterator<Item = Variable> + use<> {
     subject.into_iter().chain(object)
 }
 
-/// The variable of a term. A blank node is one, too, but a subquery has no place for its value without a name.
+/// The variable of a term. A blank node is one, too, but a subquery has no place for its value
+/// without a name.
 fn variable(term: &TermPattern) -> Option<Variable> {
     match term {
         TermPattern::Variable(variable) => Some(variable.clone()),
-        TermPattern::BlankNode(node) => Some(Variable::new_unchecked(format!("blank_{}", node.as_str()))),
+        TermPattern::BlankNode(node) => {
+            Some(Variable::new_unchecked(format!("blank_{}", node.as_str())))
+        }
         _ => None,
     }
 }
@@ -138,12 +218,17 @@ mod tests {
     /// The rows of a query over a small store, sorted.
     fn rows(store: &Store, query: Query) -> Vec<String> {
         let prepared = SparqlEvaluator::new().for_query(query);
-        let QueryResults::Solutions(solutions) = prepared.on_store(store).execute().expect("it can be evaluated")
+        let QueryResults::Solutions(solutions) = prepared
+            .on_store(store)
+            .execute()
+            .expect("it can be evaluated")
         else {
             panic!("it is no `SELECT`");
         };
         let row = |row: QuerySolution| format!("{:?}", row.values());
-        let mut rows: Vec<String> = solutions.map(|solution| row(solution.expect("it can be evaluated"))).collect();
+        let mut rows: Vec<String> = solutions
+            .map(|solution| row(solution.expect("it can be evaluated")))
+            .collect();
         rows.sort();
         rows
     }
@@ -153,17 +238,29 @@ mod tests {
         let store = Store::new().expect("memory");
         let node = |name: String| NamedNode::new_unchecked(format!("http://x/{name}"));
         let insert = |subject: &NamedNode, property: &str, value: Term| {
-            let quad = Quad::new(subject.clone(), iri(property), value, GraphName::DefaultGraph);
+            let quad = Quad::new(
+                subject.clone(),
+                iri(property),
+                value,
+                GraphName::DefaultGraph,
+            );
             store.insert(&quad).expect("memory");
         };
         for run in 0..6 {
-            let (of, test) = (node(format!("run{run}")), Literal::from(format!("test {}", run % 2)));
+            let (of, test) = (
+                node(format!("run{run}")),
+                Literal::from(format!("test {}", run % 2)),
+            );
             insert(&of, "rdf:type", iri("act:Run").into());
             insert(&of, "act:test", test.into());
             for outcome in 0..run {
                 let result = node(format!("result{run}/{outcome}"));
                 insert(&result, "act:ofRun", of.clone().into());
-                insert(&result, "act:outcome", Literal::from(["passed", "failed"][outcome % 2]).into());
+                insert(
+                    &result,
+                    "act:outcome",
+                    Literal::from(["passed", "failed"][outcome % 2]).into(),
+                );
                 if outcome % 3 == 0 {
                     insert(&result, "act:margin", Literal::from(outcome as u64).into());
                 }
@@ -186,8 +283,14 @@ mod tests {
             "SELECT * { ?a act:margin ?m . ?b act:test ?t }",
         ] {
             let query = parser().parse_query(text).expect("it is valid");
-            let (joined, plain) = (rows(&store, by_columns(query.clone())), rows(&store, query.clone()));
-            assert!(!plain.is_empty() && by_columns(query.clone()) != query, "{text}");
+            let (joined, plain) = (
+                rows(&store, by_columns(query.clone())),
+                rows(&store, query.clone()),
+            );
+            assert!(
+                !plain.is_empty() && by_columns(query.clone()) != query,
+                "{text}"
+            );
             assert_eq!(joined, plain, "{text}");
         }
     }

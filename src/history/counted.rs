@@ -1,4 +1,5 @@
-//! The runs that count in rates: each trace once, and no run whose scene was selected because it failed.
+//! The runs that count in rates: each trace once, and no run whose scene was selected because it
+//! failed.
 
 use std::collections::BTreeSet;
 
@@ -9,12 +10,15 @@ use crate::threads::cores;
 use crate::{History, RunFilter, RunRow, lists};
 use actcheck_base::Diagnostics;
 
-/// Returns the ids of the runs that count in rates over `runs`, which are sorted by time: of runs with bit-identical
-/// traces only the newest counts, because the others add no evidence.
+/// Returns the ids of the runs that count in rates over `runs`, which are sorted by time: of runs
+/// with bit-identical traces only the newest counts, because the others add no evidence.
 pub fn newest_of_alike(runs: &[RunRow]) -> BTreeSet<String> {
     let mut seen = BTreeSet::new();
     // A run without a hash (broken before its first state) is never a duplicate.
-    let newest = runs.iter().rev().filter(|run| run.trace_hash.is_empty() || seen.insert(&run.trace_hash));
+    let newest = runs
+        .iter()
+        .rev()
+        .filter(|run| run.trace_hash.is_empty() || seen.insert(&run.trace_hash));
     newest.map(|run| run.run.clone()).collect()
 }
 
@@ -29,15 +33,18 @@ pub(super) fn counted_runs(store: &Store) -> Result<BTreeSet<String>, QueryEvalu
 /// The function of our own in queries.
 const COUNTS: &str = "act:counts(";
 
-/// A query for other stores: calls of the function `act:counts` are replaced by expressions of SPARQL 1.1 with the same meaning.
-/// Lines keep their numbers. Calls whose argument is not a variable are kept.
+/// A query for other stores: calls of the function `act:counts` are replaced by expressions of
+/// SPARQL 1.1 with the same meaning. Lines keep their numbers. Calls whose argument is not a
+/// variable are kept.
 pub fn without_counts(query: &str) -> String {
     let (mut written, mut rest) = (String::new(), query);
     while let Some(at) = rest.find(COUNTS) {
         let (before, call) = rest.split_at(at);
         written.push_str(before);
         let argument = call[COUNTS.len()..].split_once(')');
-        let variable = argument.map(|(text, after)| (text.trim(), after)).filter(|(text, _)| is_variable(text));
+        let variable = argument
+            .map(|(text, after)| (text.trim(), after))
+            .filter(|(text, _)| is_variable(text));
         match variable {
             Some((variable, after)) => {
                 written.push_str(&counts(variable));
@@ -53,8 +60,12 @@ pub fn without_counts(query: &str) -> String {
 }
 
 fn is_variable(text: &str) -> bool {
-    text.strip_prefix(['?', '$'])
-        .is_some_and(|name| !name.is_empty() && name.chars().all(|letter| letter.is_alphanumeric() || letter == '_'))
+    text.strip_prefix(['?', '$']).is_some_and(|name| {
+        !name.is_empty()
+            && name
+                .chars()
+                .all(|letter| letter.is_alphanumeric() || letter == '_')
+    })
 }
 
 /// The definition of [`History::counted_runs`] as an expression.
@@ -94,12 +105,21 @@ mod tests {
     fn only_calls_with_a_variable_are_replaced() {
         let query = "SELECT * {\n FILTER(?a || act:counts( ?run ) && act:counts(<http://x>))\n}";
         let standard = without_counts(query);
-        assert!(!standard.contains("counts(") || standard.matches("act:counts(").count() == 1, "{standard}");
-        assert!(standard.contains("act:counts(<http://x>)") && standard.contains("?run act:traceHash"), "{standard}");
+        assert!(
+            !standard.contains("counts(") || standard.matches("act:counts(").count() == 1,
+            "{standard}"
+        );
+        assert!(
+            standard.contains("act:counts(<http://x>)") && standard.contains("?run act:traceHash"),
+            "{standard}"
+        );
         assert_eq!(standard.lines().count(), query.lines().count());
         let checked = crate::check_query(&actcheck_base::Source::new("query", standard.as_str()));
         assert!(checked.is_ok(), "{checked:?}");
-        assert_eq!(without_counts("SELECT * { ?s ?p ?o }"), "SELECT * { ?s ?p ?o }");
+        assert_eq!(
+            without_counts("SELECT * { ?s ?p ?o }"),
+            "SELECT * { ?s ?p ?o }"
+        );
         assert_eq!(without_counts("act:counts("), "act:counts(");
     }
 }

@@ -13,7 +13,8 @@ use crate::{ActionDetail, ObjectDetail, Repetition, RunDetail, RunRow, RunStatus
 use actcheck_base::{Judgement, Outcome, names};
 use actcheck_data::Role;
 
-/// The objects of a run's scene and its actions with their outcomes. None of these depends on the time that the run took.
+/// The objects of a run's scene and its actions with their outcomes. None of these depends on the
+/// time that the run took.
 pub(super) type Parts = (Vec<ObjectDetail>, Vec<ActionDetail>);
 
 /// Reads an existing run.
@@ -43,7 +44,8 @@ pub(super) fn read_with(
         elapsed_secs: node.number("act:elapsedSeconds").unwrap_or_default(),
         world: node.text("act:worldName").unwrap_or_default(),
         program_version: version(&node),
-        robot_base: ["w:baseX", "w:baseY", "w:baseYaw"].map(|property| node.number(property).unwrap_or_default()),
+        robot_base: ["w:baseX", "w:baseY", "w:baseYaw"]
+            .map(|property| node.number(property).unwrap_or_default()),
         noise: noise(&node),
         designators: designators(&node),
         objects,
@@ -54,7 +56,11 @@ pub(super) fn read_with(
 fn row(run: &NamedNode, node: &Node) -> RunRow {
     RunRow {
         run: id_of(&run.clone().into()),
-        campaign: node.all("act:campaign").first().map(id_of).unwrap_or_default(),
+        campaign: node
+            .all("act:campaign")
+            .first()
+            .map(id_of)
+            .unwrap_or_default(),
         index: node.count("act:index").unwrap_or_default(),
         repetition: node
             .count("act:sceneNumber")
@@ -70,13 +76,22 @@ fn row(run: &NamedNode, node: &Node) -> RunRow {
 }
 
 /// Reasons of the discards before a run, in order.
-pub(super) fn discards(store: &impl QuadSource, run: &NamedNode, node: &Node) -> Result<Vec<String>, StorageError> {
+pub(super) fn discards(
+    store: &impl QuadSource,
+    run: &NamedNode,
+    node: &Node,
+) -> Result<Vec<String>, StorageError> {
     if node.count("act:discards").unwrap_or_default() == 0 {
         return Ok(Vec::new());
     }
     let mut found: Vec<(u64, String)> = of_run(store, run, "act:Discard")?
         .iter()
-        .map(|(_, node)| (node.count("act:attempt").unwrap_or_default(), node.text("act:reason").unwrap_or_default()))
+        .map(|(_, node)| {
+            (
+                node.count("act:attempt").unwrap_or_default(),
+                node.text("act:reason").unwrap_or_default(),
+            )
+        })
         .collect();
     found.sort();
     Ok(found.into_iter().map(|(_, reason)| reason).collect())
@@ -84,7 +99,8 @@ pub(super) fn discards(store: &impl QuadSource, run: &NamedNode, node: &Node) ->
 
 /// Parses a status. Any other word is `Broken`, so that it never counts as a success.
 pub(super) fn status(word: Option<&str>) -> RunStatus {
-    word.and_then(RunStatus::from_word).unwrap_or(RunStatus::Broken)
+    word.and_then(RunStatus::from_word)
+        .unwrap_or(RunStatus::Broken)
 }
 
 /// Parses an outcome. Any other word is `Broken`, so that it never counts as a success.
@@ -99,7 +115,10 @@ pub(super) fn version(node: &Node) -> String {
 }
 
 fn noise(node: &Node) -> BTreeMap<String, f64> {
-    NOISE_TERMS.into_iter().filter_map(|name| Some((name.to_owned(), node.number(&names::act(name))?))).collect()
+    NOISE_TERMS
+        .into_iter()
+        .filter_map(|name| Some((name.to_owned(), node.number(&names::act(name))?)))
+        .collect()
 }
 
 /// Values of the designators of a run or an execution.
@@ -113,12 +132,20 @@ pub(super) fn designators(node: &Node) -> BTreeMap<String, Vec<String>> {
     found
 }
 
-fn of_run(store: &impl QuadSource, run: &NamedNode, class: &str) -> Result<Vec<(Term, Node)>, StorageError> {
+fn of_run(
+    store: &impl QuadSource,
+    run: &NamedNode,
+    class: &str,
+) -> Result<Vec<(Term, Node)>, StorageError> {
     let class = iri(class);
     let mut found = Vec::new();
     for subject in subjects(store, "act:ofRun", run.as_ref())? {
         let node = Node::read(store, &subject)?;
-        if node.all("rdf:type").iter().any(|kind| *kind == Term::from(class.clone())) {
+        if node
+            .all("rdf:type")
+            .iter()
+            .any(|kind| *kind == Term::from(class.clone()))
+        {
             found.push((subject.into(), node));
         }
     }
@@ -126,9 +153,14 @@ fn of_run(store: &impl QuadSource, run: &NamedNode, class: &str) -> Result<Vec<(
 }
 
 /// The objects of a run's scene, sorted by role, then by id.
-pub(super) fn objects(store: &impl QuadSource, run: &NamedNode) -> Result<Vec<ObjectDetail>, StorageError> {
-    let mut objects: Vec<ObjectDetail> =
-        of_run(store, run, "act:SceneObject")?.iter().map(|(_, node)| object(node)).collect();
+pub(super) fn objects(
+    store: &impl QuadSource,
+    run: &NamedNode,
+) -> Result<Vec<ObjectDetail>, StorageError> {
+    let mut objects: Vec<ObjectDetail> = of_run(store, run, "act:SceneObject")?
+        .iter()
+        .map(|(_, node)| object(node))
+        .collect();
     objects.sort_by(|a, b| (a.role, &a.id).cmp(&(b.role, &b.id)));
     Ok(objects)
 }
@@ -136,10 +168,17 @@ pub(super) fn objects(store: &impl QuadSource, run: &NamedNode) -> Result<Vec<Ob
 fn object(node: &Node) -> ObjectDetail {
     let number = |property| node.number(property).unwrap_or_default();
     ObjectDetail {
-        id: node.all("act:object").first().map(id_of).unwrap_or_default(),
+        id: node
+            .all("act:object")
+            .first()
+            .map(id_of)
+            .unwrap_or_default(),
         model: node.text("act:model").unwrap_or_default(),
         category: node.text("act:category").unwrap_or_default(),
-        role: node.text("act:role").and_then(|word| Role::from_word(&word)).unwrap_or(Role::Other),
+        role: node
+            .text("act:role")
+            .and_then(|word| Role::from_word(&word))
+            .unwrap_or(Role::Other),
         x: number("w:x"),
         y: number("w:y"),
         z: number("w:z"),
@@ -159,7 +198,10 @@ fn actions(store: &impl QuadSource, run: &NamedNode) -> Result<Vec<ActionDetail>
     let mut actions = Vec::new();
     for (execution, node) in of_run(store, run, "act:ActionExecution")? {
         actions.push(ActionDetail {
-            step: node.count("act:step").and_then(|step| u32::try_from(step).ok()).unwrap_or_default(),
+            step: node
+                .count("act:step")
+                .and_then(|step| u32::try_from(step).ok())
+                .unwrap_or_default(),
             action: node.text("act:action").unwrap_or_default(),
             score: node.number("act:score").unwrap_or_default(),
             reported: node.boolean("act:reported"),

@@ -1,4 +1,5 @@
-//! A run as its history stores it. The worker that made the run encodes it; one thread writes the entries of all workers.
+//! A run as its history stores it. The worker that made the run encodes it; one thread writes the
+//! entries of all workers.
 
 use crate::journal::Record;
 use crate::outlines::Outline;
@@ -36,8 +37,8 @@ impl Entry {
         Ok(Self::of(record, content))
     }
 
-    /// Encodes the outline of a run: everything except its motion over time, which comes back when the run is simulated
-    /// again.
+    /// Encodes the outline of a run: everything except its motion over time, which comes back when
+    /// the run is simulated again.
     ///
     /// # Errors
     /// `H006` it can't be encoded.
@@ -47,12 +48,20 @@ impl Entry {
     }
 
     fn of(record: &RunRecord, content: Content) -> Self {
-        Self { campaign: record.campaign.clone(), run: record.id.clone(), index: record.index, content }
+        Self {
+            campaign: record.campaign.clone(),
+            run: record.id.clone(),
+            index: record.index,
+            content,
+        }
     }
 }
 
 fn whole(record: &RunRecord) -> Result<Content, String> {
-    let (run, in_memory) = (run_node(&record.id), RunQuads::new(write_run::quads_without_facts(record)));
+    let (run, in_memory) = (
+        run_node(&record.id),
+        RunQuads::new(write_run::quads_without_facts(record)),
+    );
     let parts = detail::parts(&in_memory, &run).map_err(|error| error.to_string())?;
     let trace = trace_file::encode(&record.choices, &record.trace)?;
     let trace = trace_parts::appended(trace, &record.trace.hash, &parts)?;
@@ -75,13 +84,19 @@ impl History {
         self.check_ids("run", [&entry.run])?;
         let (trace, statements) = match &entry.content {
             Content::Whole { trace, statements } => (trace, statements),
-            Content::Outline(outline) => return self.enter_outline(&entry.campaign, entry.index, outline),
+            Content::Outline(outline) => {
+                return self.enter_outline(&entry.campaign, entry.index, outline);
+            }
         };
         let doing = format!("writing run {}", entry.run);
         let file = self.folder.trace(&entry.run);
-        self.folder.below().write_atomic(&file, trace).map_err(|error| fault::io(self.dir(), &doing, &error))?;
+        self.folder
+            .below()
+            .write_atomic(&file, trace)
+            .map_err(|error| fault::io(self.dir(), &doing, &error))?;
         self.enter(statements, &doing).inspect_err(|_| {
-            // A trace without a run is harmless; if it can't be removed now, the next campaign removes it.
+            // A trace without a run is harmless; if it can't be removed now, the next campaign
+            // removes it.
             let _ = self.folder.below().remove(&file);
         })?;
         self.load_long_journal()

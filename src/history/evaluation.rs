@@ -24,10 +24,10 @@ pub(super) enum Unfinished {
 
 /// Evaluates a query in its own thread.
 ///
-/// The evaluation checks its token only when it reads the store, which a join of large results may not do for minutes.
-/// Over a damaged part of the store it may never end, because the store repeats the error for ever and the evaluator
-/// collects errors. So a second thread reads the store for damage if a query takes long. In either case the thread is
-/// abandoned.
+/// The evaluation checks its token only when it reads the store, which a join of large results may
+/// not do for minutes. Over a damaged part of the store it may never end, because the store repeats
+/// the error for ever and the evaluator collects errors. So a second thread reads the store for
+/// damage if a query takes long. In either case the thread is abandoned.
 pub(super) fn evaluate<T: Send + 'static>(
     store: &Store,
     cancel: &Cancel,
@@ -46,7 +46,9 @@ pub(super) fn evaluate<T: Send + 'static>(
     loop {
         match receiver.recv_timeout(LOOK_EVERY) {
             Ok(answer) => return answer.map_err(Unfinished::Failed),
-            Err(RecvTimeoutError::Timeout) if cancel.is_cancelled() => return Err(Unfinished::Stopped),
+            Err(RecvTimeoutError::Timeout) if cancel.is_cancelled() => {
+                return Err(Unfinished::Stopped);
+            }
             Err(RecvTimeoutError::Timeout) => {}
             Err(RecvTimeoutError::Disconnected) => return Err(Unfinished::Crashed),
         }

@@ -1,9 +1,9 @@
 //! The folder of a history: its layout, its version, and its lock.
 //!
-//! `VERSION` names the format; `lock` is held while a process writes; `store/` is the RDF store, and `seal/` has the
-//! checksums of its files; `journal` has the statements that are not in its tables yet; `traces/` has one file for each
-//! run that is kept whole, `outlines/` the others; `hulls/` caches the convex solids of meshes, which can be recomputed at
-//! any time.
+//! `VERSION` names the format; `lock` is held while a process writes; `store/` is the RDF store,
+//! and `seal/` has the checksums of its files; `journal` has the statements that are not in its
+//! tables yet; `traces/` has one file for each run that is kept whole, `outlines/` the others;
+//! `hulls/` caches the convex solids of meshes, which can be recomputed at any time.
 
 use std::fs::{File, TryLockError};
 use std::io::{self, ErrorKind};
@@ -19,14 +19,17 @@ use actcheck_base::{Below, Diagnostics, FileKind};
 const FORMAT: u64 = 1;
 /// Format of a folder with a journal, which earlier versions do not read: they would miss its runs.
 const FORMAT_WITH_JOURNAL: u64 = 2;
-/// Format of a folder with outlines, which earlier versions do not read either. The newest that this program reads.
+/// Format of a folder with outlines, which earlier versions do not read either. The newest that
+/// this program reads.
 const FORMAT_WITH_OUTLINES: u64 = 3;
 const TITLE: &str = "actcheck history";
 /// Longest version file. Unit: bytes.
 const LONGEST_VERSION: u64 = 1_000;
-/// Longest file of a history that is read as a whole: those of this program have some megabytes. Unit: bytes.
+/// Longest file of a history that is read as a whole: those of this program have some megabytes.
+/// Unit: bytes.
 pub(super) const LONGEST: u64 = 256 << 20;
-/// The names in the folder of a history that this program opens, with their kinds. Others are left alone.
+/// The names in the folder of a history that this program opens, with their kinds. Others are left
+/// alone.
 const LAYOUT: [(&str, FileKind); 10] = [
     ("VERSION", FileKind::File),
     ("lock", FileKind::File),
@@ -39,7 +42,8 @@ const LAYOUT: [(&str, FileKind); 10] = [
     ("hulls", FileKind::Folder),
     ("sent", FileKind::Folder),
 ];
-/// Number of tries to lock a folder: a reader holds the lock for a moment if it finds the store incomplete.
+/// Number of tries to lock a folder: a reader holds the lock for a moment if it finds the store
+/// incomplete.
 const TRIES: usize = 10;
 /// Time between two tries.
 const PAUSE: Duration = Duration::from_millis(10);
@@ -48,7 +52,8 @@ const PAUSE: Duration = Duration::from_millis(10);
 #[derive(Debug)]
 pub(super) struct Folder {
     dir: PathBuf,
-    /// Holds the lock of an owner. The operating system releases it when the process ends, even after a crash.
+    /// Holds the lock of an owner. The operating system releases it when the process ends, even
+    /// after a crash.
     lock: Option<File>,
 }
 
@@ -61,15 +66,24 @@ impl Folder {
         check_layout(dir)?;
         let known = has_version(dir)?;
         if !known && !create {
-            return Err(if holds_other_things(dir) { fault::foreign(dir) } else { fault::none_there(dir) });
+            return Err(if holds_other_things(dir) {
+                fault::foreign(dir)
+            } else {
+                fault::none_there(dir)
+            });
         }
         if !known {
             if holds_other_things(dir) {
                 return Err(fault::foreign(dir));
             }
-            Below::new(dir).create_folder(dir).map_err(|error| fault::io(dir, "creating the folder", &error))?;
+            Below::new(dir)
+                .create_folder(dir)
+                .map_err(|error| fault::io(dir, "creating the folder", &error))?;
         }
-        let folder = Self { dir: dir.to_path_buf(), lock: Some(lock(dir)?) };
+        let folder = Self {
+            dir: dir.to_path_buf(),
+            lock: Some(lock(dir)?),
+        };
         if !known {
             folder.write_version(FORMAT)?;
         }
@@ -84,9 +98,16 @@ impl Folder {
         if !has_version(dir)? {
             // A process may have created the history meanwhile.
             let is_foreign = holds_other_things(dir) && !has_version(dir)?;
-            return Err(if is_foreign { fault::foreign(dir) } else { fault::none_there(dir) });
+            return Err(if is_foreign {
+                fault::foreign(dir)
+            } else {
+                fault::none_there(dir)
+            });
         }
-        Ok(Self { dir: dir.to_path_buf(), lock: None })
+        Ok(Self {
+            dir: dir.to_path_buf(),
+            lock: None,
+        })
     }
 
     /// Whether another process owns the folder.
@@ -95,24 +116,32 @@ impl Folder {
         lock.is_ok_and(|lock| matches!(lock.try_lock_shared(), Err(TryLockError::WouldBlock)))
     }
 
-    /// Marks the folder before its journal is created, or after it was removed, so that programs which know no journals
-    /// read only complete histories.
+    /// Marks the folder before its journal is created, or after it was removed, so that programs
+    /// which know no journals read only complete histories.
     pub(super) fn mark_journal(&self, exists: bool) -> Result<(), Diagnostics> {
         let format = match exists {
             _ if self.outlines().exists() => FORMAT_WITH_OUTLINES,
             true => FORMAT_WITH_JOURNAL,
             false => FORMAT,
         };
-        if version(&self.dir)? == Some(format) { Ok(()) } else { self.write_version(format) }
+        if version(&self.dir)? == Some(format) {
+            Ok(())
+        } else {
+            self.write_version(format)
+        }
     }
 
-    /// Whether there is a journal that no other process writes, and whether the version says that there is one.
+    /// Whether there is a journal that no other process writes, and whether the version says that
+    /// there is one.
     pub(super) fn has_journal(&self) -> (bool, bool) {
         if self.lock.is_none() && self.is_locked() {
             return (false, false);
         }
         let exists = self.below().kind(&self.dir.join(journal::NAME)).is_some();
-        (exists, version(&self.dir).is_ok_and(|version| version == Some(FORMAT_WITH_JOURNAL)))
+        (
+            exists,
+            version(&self.dir).is_ok_and(|version| version == Some(FORMAT_WITH_JOURNAL)),
+        )
     }
 
     /// Creates the folder of outlines, and marks the history before.
@@ -127,7 +156,10 @@ impl Folder {
 
     fn write_version(&self, format: u64) -> Result<(), Diagnostics> {
         self.below()
-            .write_atomic(&self.dir.join("VERSION"), format!("{TITLE} {format}\n").as_bytes())
+            .write_atomic(
+                &self.dir.join("VERSION"),
+                format!("{TITLE} {format}\n").as_bytes(),
+            )
             .map_err(|error| fault::io(&self.dir, "writing its version", &error))
     }
 
@@ -169,18 +201,34 @@ impl Folder {
     /// The ids of the runs that have a trace, sorted.
     pub(super) fn traced(&self) -> Vec<String> {
         let files = self.below().files(&self.traces()).into_iter();
-        files.filter_map(|file| Some(file.file_name()?.to_str()?.strip_suffix(".trace")?.to_owned())).collect()
+        files
+            .filter_map(|file| {
+                Some(
+                    file.file_name()?
+                        .to_str()?
+                        .strip_suffix(".trace")?
+                        .to_owned(),
+                )
+            })
+            .collect()
     }
 
     /// Whether a history has a file of this path in its folder.
     pub(super) fn writes(path: &Path) -> bool {
         let mut names = path.iter().map(|name| name.to_str().unwrap_or_default());
-        let (first, second) = (names.next().unwrap_or_default(), names.next().unwrap_or_default());
+        let (first, second) = (
+            names.next().unwrap_or_default(),
+            names.next().unwrap_or_default(),
+        );
         let ends = |endings: &[&str]| endings.iter().any(|ending| second.ends_with(ending));
         let is_ours = match first {
             "store" => {
-                let begins = ["MANIFEST-", "OPTIONS-", "LOG", "bulk-"].iter().any(|start| second.starts_with(start));
-                begins || ["CURRENT", "IDENTITY", "LOCK"].contains(&second) || ends(&[".sst", ".log", ".dbtmp"])
+                let begins = ["MANIFEST-", "OPTIONS-", "LOG", "bulk-"]
+                    .iter()
+                    .any(|start| second.starts_with(start));
+                begins
+                    || ["CURRENT", "IDENTITY", "LOCK"].contains(&second)
+                    || ends(&[".sst", ".log", ".dbtmp"])
             }
             "seal" => ["SUMS", "CURRENT"].contains(&second) || second.starts_with("MANIFEST-"),
             "traces" => ends(&[".trace"]),
@@ -200,8 +248,9 @@ impl Folder {
     }
 }
 
-/// Checks that files and folders of a history are files and folders, not links, pipes or devices. The library opens the
-/// files of the store and of its seal by their paths, so these are checked one by one.
+/// Checks that files and folders of a history are files and folders, not links, pipes or devices.
+/// The library opens the files of the store and of its seal by their paths, so these are checked
+/// one by one.
 ///
 /// # Errors
 /// `H027` one is of another kind.
@@ -215,14 +264,19 @@ fn check_layout(dir: &Path) -> Result<(), Diagnostics> {
         }
     }
     for folder in ["store", "seal"].map(|name| dir.join(name)) {
-        let entries = below.entries(&folder).map_err(|error| fault::io(dir, "reading the folder", &error))?;
+        let entries = below
+            .entries(&folder)
+            .map_err(|error| fault::io(dir, "reading the folder", &error))?;
         if let Some((name, kind)) = entries.iter().find(|(_, kind)| *kind != FileKind::File) {
             return Err(fault::not_plain(dir, &folder.join(name), *kind));
         }
         // RocksDB reads its logs and manifests to their ends before it opens a store.
         let mut paths = entries.iter().map(|(name, _)| folder.join(name));
         let is_table = |path: &Path| path.extension().is_some_and(|ending| ending == "sst");
-        let is_long = |path: &Path| path.symlink_metadata().is_ok_and(|found| found.len() > LONGEST_COPIED);
+        let is_long = |path: &Path| {
+            path.symlink_metadata()
+                .is_ok_and(|found| found.len() > LONGEST_COPIED)
+        };
         if let Some(path) = paths.find(|path| !is_table(path) && is_long(path)) {
             return Err(fault::too_long(dir, &path));
         }
@@ -243,7 +297,9 @@ pub(super) fn read(path: &Path) -> io::Result<Vec<u8>> {
 /// Whether the folder has a history that this program can read.
 fn has_version(dir: &Path) -> Result<bool, Diagnostics> {
     match version(dir)? {
-        Some(version) if version > FORMAT_WITH_OUTLINES => Err(fault::newer(dir, version, FORMAT_WITH_OUTLINES)),
+        Some(version) if version > FORMAT_WITH_OUTLINES => {
+            Err(fault::newer(dir, version, FORMAT_WITH_OUTLINES))
+        }
         version => Ok(version.is_some()),
     }
 }
@@ -259,29 +315,42 @@ fn version(dir: &Path) -> Result<Option<u64>, Diagnostics> {
         }
         Err(error) => return Err(fault::io(dir, "reading its version", &error)),
     };
-    match text.trim().strip_prefix(TITLE).and_then(|number| number.trim().parse::<u64>().ok()) {
+    match text
+        .trim()
+        .strip_prefix(TITLE)
+        .and_then(|number| number.trim().parse::<u64>().ok())
+    {
         Some(version) => Ok(Some(version)),
         None => Err(fault::foreign(dir)),
     }
 }
 
-/// Whether a folder without a version holds any files other than those left by `actcheck check` or by an interrupted
-/// start.
+/// Whether a folder without a version holds any files other than those left by `actcheck check` or
+/// by an interrupted start.
 fn holds_other_things(dir: &Path) -> bool {
-    let is_ours =
-        |name: &str| ["lock", "hulls"].contains(&name) || (name.starts_with("VERSION.") && name.ends_with(".tmp"));
+    let is_ours = |name: &str| {
+        ["lock", "hulls"].contains(&name)
+            || (name.starts_with("VERSION.") && name.ends_with(".tmp"))
+    };
     let entries = Below::new(dir).entries(dir).unwrap_or_default();
-    entries.iter().any(|(name, _)| !name.to_str().is_some_and(is_ours))
+    entries
+        .iter()
+        .any(|(name, _)| !name.to_str().is_some_and(is_ours))
 }
 
 fn lock(dir: &Path) -> Result<File, Diagnostics> {
-    let file = Below::new(dir).lock_file(&dir.join("lock")).map_err(|error| fault::io(dir, "locking it", &error))?;
+    let file = Below::new(dir)
+        .lock_file(&dir.join("lock"))
+        .map_err(|error| fault::io(dir, "locking it", &error))?;
     for _ in 0..TRIES {
         match file.try_lock() {
             Ok(()) => return Ok(file),
             Err(TryLockError::WouldBlock) => sleep(PAUSE),
-            // Some network file systems don't support locks; the store's own lock still protects it.
-            Err(TryLockError::Error(error)) if error.kind() == ErrorKind::Unsupported => return Ok(file),
+            // Some network file systems don't support locks; the store's own lock still protects
+            // it.
+            Err(TryLockError::Error(error)) if error.kind() == ErrorKind::Unsupported => {
+                return Ok(file);
+            }
             Err(TryLockError::Error(error)) => return Err(fault::io(dir, "locking it", &error)),
         }
     }

@@ -21,8 +21,8 @@ type Rows = Box<dyn Iterator<Item = Result<Vec<Option<Term>>, Diagnostics>>>;
 /// Triples of a graph.
 type Triples = Box<dyn Iterator<Item = Result<[Term; 3], Diagnostics>>>;
 
-/// The answer of another store, which is read while it is used. Its rows are in the order of the store. An iterator ends after
-/// an error (`H040`).
+/// The answer of another store, which is read while it is used. Its rows are in the order of the
+/// store. An iterator ends after an error (`H040`).
 pub enum ForeignAnswer {
     /// Of `ASK`.
     Boolean(bool),
@@ -50,21 +50,39 @@ impl ForeignAnswer {
             "application/n-triples" | "text/plain" => return Ok(graph(RdfFormat::NTriples, body)),
             "text/turtle" | "application/x-turtle" => return Ok(graph(RdfFormat::Turtle, body)),
             other => {
-                let named = if other.is_empty() { "without a media type".to_owned() } else { format!("as {other}") };
+                let named = if other.is_empty() {
+                    "without a media type".to_owned()
+                } else {
+                    format!("as {other}")
+                };
                 return Err(Diagnostic::error("H040", format!("the server answered {named}, which is not supported"))
                     .help("answers must be SPARQL results in JSON or TSV, or N-Triples or Turtle; a page in HTML is often a sign of a wrong address")
                     .into());
             }
         };
-        match QueryResultsParser::from_format(table).for_reader(body).map_err(|error| unreadable(&error))? {
+        match QueryResultsParser::from_format(table)
+            .for_reader(body)
+            .map_err(|error| unreadable(&error))?
+        {
             ReaderQueryResultsParserOutput::Boolean(value) => Ok(Self::Boolean(value)),
             ReaderQueryResultsParserOutput::Solutions(solutions) => {
-                let columns = solutions.variables().iter().map(|variable| variable.as_str().to_owned()).collect();
+                let columns = solutions
+                    .variables()
+                    .iter()
+                    .map(|variable| variable.as_str().to_owned())
+                    .collect();
                 let rows = solutions.map(|solution| {
                     let solution = solution.map_err(|error| unreadable(&error))?;
-                    Ok(solution.values().iter().map(|value| value.as_ref().map(from_store)).collect())
+                    Ok(solution
+                        .values()
+                        .iter()
+                        .map(|value| value.as_ref().map(from_store))
+                        .collect())
                 });
-                Ok(Self::Table { columns, rows: Box::new(until_error(rows)) })
+                Ok(Self::Table {
+                    columns,
+                    rows: Box::new(until_error(rows)),
+                })
             }
         }
     }
@@ -74,13 +92,19 @@ fn graph(format: RdfFormat, body: impl Read + 'static) -> ForeignAnswer {
     let triples = RdfParser::from_format(format).for_reader(body).map(|quad| {
         let quad = quad.map_err(|error| unparsed(&error))?;
         let property = Term::iri(quad.predicate.as_str());
-        Ok([from_store(&quad.subject.into()), property, from_store(&quad.object)])
+        Ok([
+            from_store(&quad.subject.into()),
+            property,
+            from_store(&quad.object),
+        ])
     });
     ForeignAnswer::Graph(Box::new(until_error(triples)))
 }
 
 /// Ends an iterator after its first error: parsers may repeat one for ever.
-fn until_error<T>(items: impl Iterator<Item = Result<T, Diagnostics>>) -> impl Iterator<Item = Result<T, Diagnostics>> {
+fn until_error<T>(
+    items: impl Iterator<Item = Result<T, Diagnostics>>,
+) -> impl Iterator<Item = Result<T, Diagnostics>> {
     let mut has_failed = false;
     items.take_while(move |item| !std::mem::replace(&mut has_failed, item.is_err()))
 }
@@ -111,7 +135,8 @@ fn malformed(error: &dyn std::fmt::Display) -> Diagnostics {
         .into()
 }
 
-/// Checks a query that another store called malformed. The prefixes of [`actcheck_base::names::PREFIXES`] need no declaration.
+/// Checks a query that another store called malformed. The prefixes of
+/// [`actcheck_base::names::PREFIXES`] need no declaration.
 ///
 /// # Errors
 /// `H010` it is not a query of SPARQL 1.1, `H011` it is an update.
@@ -135,7 +160,9 @@ mod tests {
 
     fn rows(media_type: &str, text: &'static str) -> Result<(Vec<String>, Vec<Row>), Diagnostics> {
         match ForeignAnswer::read(media_type, text.as_bytes())? {
-            ForeignAnswer::Table { columns, rows } => Ok((columns, rows.collect::<Result<_, _>>()?)),
+            ForeignAnswer::Table { columns, rows } => {
+                Ok((columns, rows.collect::<Result<_, _>>()?))
+            }
             ForeignAnswer::Boolean(value) => Ok((vec![value.to_string()], Vec::new())),
             ForeignAnswer::Graph(triples) => {
                 let rows = triples.map(|triple| triple.map(|triple| triple.map(Some).to_vec()));
@@ -148,14 +175,29 @@ mod tests {
     fn tables_and_graphs_are_read_in_all_formats() {
         let (columns, found) = rows("application/sparql-results+json", JSON).expect("it is valid");
         assert_eq!(columns, ["a", "b"]);
-        assert_eq!(found[0], [Some(Term::iri("http://x")), Some(Term::Integer(1))]);
+        assert_eq!(
+            found[0],
+            [Some(Term::iri("http://x")), Some(Term::Integer(1))]
+        );
         assert_eq!(found[1], [Some(Term::Blank("n".into())), None]);
-        let (_, tsv) = rows("text/tab-separated-values", "?a\t?b\n<http://x>\t1\n").expect("it is valid");
+        let (_, tsv) =
+            rows("text/tab-separated-values", "?a\t?b\n<http://x>\t1\n").expect("it is valid");
         assert_eq!(tsv, found[..1]);
         let boolean = r#"{"head":{},"boolean":true}"#;
-        assert_eq!(rows("application/json", boolean).expect("it is valid").0, ["true"]);
-        let (_, graph) = rows("text/turtle", "@prefix p: <http://x#> . p:a p:b 1 .").expect("it is valid");
-        assert_eq!(graph, [[Some(Term::iri("http://x#a")), Some(Term::iri("http://x#b")), Some(Term::Integer(1))]]);
+        assert_eq!(
+            rows("application/json", boolean).expect("it is valid").0,
+            ["true"]
+        );
+        let (_, graph) =
+            rows("text/turtle", "@prefix p: <http://x#> . p:a p:b 1 .").expect("it is valid");
+        assert_eq!(
+            graph,
+            [[
+                Some(Term::iri("http://x#a")),
+                Some(Term::iri("http://x#b")),
+                Some(Term::Integer(1))
+            ]]
+        );
     }
 
     #[test]
@@ -176,7 +218,8 @@ mod tests {
     #[test]
     fn queries_are_checked_with_the_known_prefixes() {
         let check = |text: &str| {
-            check_query(&Source::new("query", text)).map_err(|fault| fault.iter().next().map(|fault| fault.code))
+            check_query(&Source::new("query", text))
+                .map_err(|fault| fault.iter().next().map(|fault| fault.code))
         };
         assert_eq!(check("SELECT ?run { ?run a act:Run }"), Ok(()));
         assert_eq!(check("SELECT ?run { ?run a act:Run"), Err(Some("H010")));

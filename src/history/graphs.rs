@@ -1,8 +1,9 @@
 //! Facts as named graphs, for users' queries.
 //!
-//! A quad in a named graph takes about 250 bytes on disk. The graphs therefore omit properties that follow from others,
-//! properties that never change during a run, and all but the strongest contact of each pair. Nothing is lost: the
-//! trace has everything, and rules judge stored runs by facts that are extracted from it.
+//! A quad in a named graph takes about 250 bytes on disk. The graphs therefore omit properties that
+//! follow from others, properties that never change during a run, and all but the strongest contact
+//! of each pair. Nothing is lost: the trace has everything, and rules judge stored runs by facts
+//! that are extracted from it.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -13,8 +14,9 @@ use actcheck_base::{RunFacts, TermId, Terms, Triple, names};
 
 /// Properties of the world vocabulary that the graphs omit.
 ///
-/// `w:minZ` and `w:maxZ` are kept, because queries ask for heights; mass, friction, restitution and whether a body is
-/// fixed (a platform) are stored once, with the objects of the scene; joint limits belong to the robot.
+/// `w:minZ` and `w:maxZ` are kept, because queries ask for heights; mass, friction, restitution and
+/// whether a body is fixed (a platform) are stored once, with the objects of the scene; joint
+/// limits belong to the robot.
 pub(super) const LEFT_OUT: [&str; 13] = [
     "minX",
     "minY",
@@ -32,8 +34,16 @@ pub(super) const LEFT_OUT: [&str; 13] = [
 ];
 
 /// Classes whose members are recognisable by their properties.
-pub(super) const UNTYPED: [&str; 8] =
-    ["Joint", "Contact", "Hold", "Motion", "ActionPhase", "Percept", "PerceivedPlane", "PerceivedObject"];
+pub(super) const UNTYPED: [&str; 8] = [
+    "Joint",
+    "Contact",
+    "Hold",
+    "Motion",
+    "ActionPhase",
+    "Percept",
+    "PerceivedPlane",
+    "PerceivedObject",
+];
 
 /// The node of a part, whose IRI is below that of `node`.
 pub(super) fn below(node: &NamedNode, part: &str) -> NamedNode {
@@ -52,8 +62,12 @@ pub(super) fn during_graph(run: &NamedNode, step: usize) -> NamedNode {
 
 /// Returns whether the name of a graph is that of a state or of the events during an action.
 pub(super) fn holds_facts(graph: GraphNameRef<'_>) -> bool {
-    let GraphNameRef::NamedNode(node) = graph else { return false };
-    let Some((run, part)) = node.as_str().rsplit_once('/') else { return false };
+    let GraphNameRef::NamedNode(node) = graph else {
+        return false;
+    };
+    let Some((run, part)) = node.as_str().rsplit_once('/') else {
+        return false;
+    };
     run.starts_with(names::RUN) && (part == "during" || run.ends_with("/state"))
 }
 
@@ -62,7 +76,11 @@ pub(super) fn write(facts: &RunFacts, run: &NamedNode, quads: &mut Vec<Quad>) {
     let kept = Kept::of(&facts.terms);
     let stored = |triples: &[Triple]| {
         let weak = weak_contacts(triples, &facts.terms);
-        triples.iter().filter(|triple| kept.keeps(triple) && !weak.contains(&triple[0])).copied().collect()
+        triples
+            .iter()
+            .filter(|triple| kept.keeps(triple) && !weak.contains(&triple[0]))
+            .copied()
+            .collect()
     };
     write_graphs(facts, run, stored, quads);
 }
@@ -74,15 +92,31 @@ pub(super) fn complete(facts: &RunFacts, run: &NamedNode) -> Vec<Quad> {
     quads
 }
 
-/// Writes the triples of each state and action that `select` returns into the graph of that state or action.
-fn write_graphs(facts: &RunFacts, run: &NamedNode, select: impl Fn(&[Triple]) -> Vec<Triple>, quads: &mut Vec<Quad>) {
-    let terms: Vec<Term> = (0u32..).take(facts.terms.len()).map(|id| to_store(facts.terms.term(id))).collect();
+/// Writes the triples of each state and action that `select` returns into the graph of that state
+/// or action.
+fn write_graphs(
+    facts: &RunFacts,
+    run: &NamedNode,
+    select: impl Fn(&[Triple]) -> Vec<Triple>,
+    quads: &mut Vec<Quad>,
+) {
+    let terms: Vec<Term> = (0u32..)
+        .take(facts.terms.len())
+        .map(|id| to_store(facts.terms.term(id)))
+        .collect();
     let mut write = |triples: &[Triple], graph: NamedNode| {
         let graph = GraphName::NamedNode(graph);
         quads.extend(select(triples).into_iter().filter_map(|[s, p, o]| {
             let subject = NamedOrBlankNode::try_from(terms[s as usize].clone()).ok()?;
-            let Term::NamedNode(property) = &terms[p as usize] else { return None };
-            Some(Quad::new(subject, property.clone(), terms[o as usize].clone(), graph.clone()))
+            let Term::NamedNode(property) = &terms[p as usize] else {
+                return None;
+            };
+            Some(Quad::new(
+                subject,
+                property.clone(),
+                terms[o as usize].clone(),
+                graph.clone(),
+            ))
         }));
     };
     for (state, triples) in facts.snapshots.iter().enumerate() {
@@ -102,10 +136,14 @@ struct Kept {
 impl Kept {
     fn of(terms: &Terms) -> Self {
         let ids = |names: &[&str]| names.iter().filter_map(|name| w(terms, name)).collect();
-        Self { left_out: ids(&LEFT_OUT), untyped: ids(&UNTYPED) }
+        Self {
+            left_out: ids(&LEFT_OUT),
+            untyped: ids(&UNTYPED),
+        }
     }
 
-    /// Whether to keep a triple. The property need not be checked for `untyped`: only `rdf:type` has these values.
+    /// Whether to keep a triple. The property need not be checked for `untyped`: only `rdf:type`
+    /// has these values.
     fn keeps(&self, [_, property, value]: &Triple) -> bool {
         !self.left_out.contains(property) && !self.untyped.contains(value)
     }
@@ -117,20 +155,31 @@ fn w(terms: &Terms, local: &str) -> Option<TermId> {
 
 /// Contacts whose pair of bodies has a stronger contact, or an equal one with a smaller id.
 fn weak_contacts(triples: &[Triple], terms: &Terms) -> BTreeSet<TermId> {
-    let [Some(first), Some(second), Some(force)] = ["first", "second", "maxForce"].map(|name| w(terms, name)) else {
+    let [Some(first), Some(second), Some(force)] =
+        ["first", "second", "maxForce"].map(|name| w(terms, name))
+    else {
         return BTreeSet::new();
     };
     let mut contacts: BTreeMap<TermId, [Option<TermId>; 3]> = BTreeMap::new();
     for [subject, property, value] in triples {
-        if let Some(slot) = [first, second, force].iter().position(|known| known == property) {
+        if let Some(slot) = [first, second, force]
+            .iter()
+            .position(|known| known == property)
+        {
             contacts.entry(*subject).or_default()[slot] = Some(*value);
         }
     }
-    let force_of = |contact: &[Option<TermId>; 3]| contact[2].and_then(|id| terms.term(id).number()).unwrap_or(0.0);
+    let force_of = |contact: &[Option<TermId>; 3]| {
+        contact[2]
+            .and_then(|id| terms.term(id).number())
+            .unwrap_or(0.0)
+    };
     let mut strongest: BTreeMap<[Option<TermId>; 2], (TermId, f64)> = BTreeMap::new();
     let mut weak = BTreeSet::new();
     for (subject, contact) in &contacts {
-        let best = strongest.entry([contact[0], contact[1]]).or_insert((*subject, force_of(contact)));
+        let best = strongest
+            .entry([contact[0], contact[1]])
+            .or_insert((*subject, force_of(contact)));
         if best.0 != *subject {
             if force_of(contact) > best.1 {
                 weak.insert(best.0);

@@ -6,7 +6,8 @@ use std::io::Read;
 use flate2::read::GzDecoder;
 use flate2::{Crc, Decompress, FlushDecompress, Status};
 
-/// A header of this program: magic bytes, the method, no optional fields. Time and system, which follow, do not matter.
+/// A header of this program: magic bytes, the method, no optional fields. Time and system, which
+/// follow, do not matter.
 const HEADER: [u8; 4] = [0x1f, 0x8b, 8, 0];
 /// Length of a header without optional fields. Unit: bytes.
 const HEADER_LENGTH: usize = 10;
@@ -15,13 +16,13 @@ const HEADER_LENGTH: usize = 10;
 const TOO_LARGE: &str = "it expands to far more than this program writes";
 
 thread_local! {
-    /// Kept for the next part: memory that is given back and fetched again with each part costs as much as
-    /// decompressing, and threads wait for each other there.
+    /// Kept for the next part: memory that is given back and fetched again with each part costs as
+    /// much as decompressing, and threads wait for each other there.
     static STATE: RefCell<Decompress> = RefCell::new(Decompress::new(false));
 }
 
-/// The most bytes that are expected from `compressed` ones. Motion expands three to five times, and that of a robot at rest more;
-/// damaged or foreign bytes may expand a thousand times.
+/// The most bytes that are expected from `compressed` ones. Motion expands three to five times, and
+/// that of a robot at rest more; damaged or foreign bytes may expand a thousand times.
 pub(super) fn most_expanded(compressed: usize) -> u64 {
     const FEW: u64 = 32 << 20;
     FEW + 64 * compressed as u64
@@ -31,10 +32,21 @@ pub(super) fn most_expanded(compressed: usize) -> u64 {
 ///
 /// # Errors
 /// A message, if the bytes are damaged, or expand to far more than is expected.
-pub(super) fn read_expanded(decoder: impl Read, compressed: usize, out: &mut Vec<u8>) -> Result<(), String> {
+pub(super) fn read_expanded(
+    decoder: impl Read,
+    compressed: usize,
+    out: &mut Vec<u8>,
+) -> Result<(), String> {
     let (most, before) = (most_expanded(compressed), out.len());
-    decoder.take(most + 1).read_to_end(out).map_err(|error| error.to_string())?;
-    if (out.len() - before) as u64 > most { Err(TOO_LARGE.to_owned()) } else { Ok(()) }
+    decoder
+        .take(most + 1)
+        .read_to_end(out)
+        .map_err(|error| error.to_string())?;
+    if (out.len() - before) as u64 > most {
+        Err(TOO_LARGE.to_owned())
+    } else {
+        Ok(())
+    }
 }
 
 /// Returns the content of the gzip member at the start of `bytes`.
@@ -52,7 +64,9 @@ pub(super) fn expanded(bytes: &[u8]) -> Result<Vec<u8>, String> {
 
 /// The content, or `None` if the member is damaged or not of this program.
 fn quickly(bytes: &[u8]) -> Option<Vec<u8>> {
-    let body = bytes.get(HEADER_LENGTH..).filter(|_| bytes.starts_with(&HEADER))?;
+    let body = bytes
+        .get(HEADER_LENGTH..)
+        .filter(|_| bytes.starts_with(&HEADER))?;
     // The motion of bodies expands three to five times.
     let mut out = Vec::with_capacity(4 * bytes.len());
     let most = most_expanded(bytes.len());
@@ -60,7 +74,9 @@ fn quickly(bytes: &[u8]) -> Option<Vec<u8>> {
         state.reset(false);
         loop {
             let read = usize::try_from(state.total_in()).ok()?;
-            let status = state.decompress_vec(body.get(read..)?, &mut out, FlushDecompress::None).ok()?;
+            let status = state
+                .decompress_vec(body.get(read..)?, &mut out, FlushDecompress::None)
+                .ok()?;
             match status {
                 Status::StreamEnd => return usize::try_from(state.total_in()).ok(),
                 _ if out.len() as u64 > most => return None,
@@ -75,7 +91,8 @@ fn quickly(bytes: &[u8]) -> Option<Vec<u8>> {
     let length = length.first_chunk::<4>()?;
     let mut crc = Crc::new();
     crc.update(&out);
-    let is_whole = crc.sum() == u32::from_le_bytes(*sum) && crc.amount() == u32::from_le_bytes(*length);
+    let is_whole =
+        crc.sum() == u32::from_le_bytes(*sum) && crc.amount() == u32::from_le_bytes(*length);
     is_whole.then_some(out)
 }
 
@@ -86,7 +103,9 @@ mod tests {
 
     /// Bytes that repeat more or less often.
     fn content(length: usize, period: usize) -> Vec<u8> {
-        (0..length).map(|idx| ((idx % period) * (idx / 97) % 251) as u8).collect()
+        (0..length)
+            .map(|idx| ((idx % period) * (idx / 97) % 251) as u8)
+            .collect()
     }
 
     #[test]
@@ -95,9 +114,17 @@ mod tests {
             for period in [1, 7, 5000] {
                 let content = content(length, period);
                 let mut bytes = compressed(&content).unwrap();
-                assert_eq!(quickly(&bytes).as_ref(), Some(&content), "{length} {period}");
+                assert_eq!(
+                    quickly(&bytes).as_ref(),
+                    Some(&content),
+                    "{length} {period}"
+                );
                 bytes.extend(b"more");
-                assert_eq!(quickly(&bytes).as_ref(), Some(&content), "{length} {period}");
+                assert_eq!(
+                    quickly(&bytes).as_ref(),
+                    Some(&content),
+                    "{length} {period}"
+                );
                 assert_eq!(expanded(&bytes), Ok(content), "{length} {period}");
             }
         }
@@ -112,15 +139,23 @@ mod tests {
         assert_eq!(expanded(&bomb), Err(TOO_LARGE.to_owned()));
         let bomb = zstd::bulk::compress(&zeros, 3).unwrap();
         let read = zstd::stream::read::Decoder::new(bomb.as_slice()).unwrap();
-        assert_eq!(read_expanded(read, bomb.len(), &mut Vec::new()), Err(TOO_LARGE.to_owned()));
+        assert_eq!(
+            read_expanded(read, bomb.len(), &mut Vec::new()),
+            Err(TOO_LARGE.to_owned())
+        );
     }
 
     #[test]
     fn a_member_with_a_name_is_read() {
-        let mut encoder = flate2::GzBuilder::new().filename("trace").write(Vec::new(), flate2::Compression::fast());
+        let mut encoder = flate2::GzBuilder::new()
+            .filename("trace")
+            .write(Vec::new(), flate2::Compression::fast());
         std::io::Write::write_all(&mut encoder, b"content").unwrap();
         let bytes = encoder.finish().unwrap();
-        assert_eq!((quickly(&bytes), expanded(&bytes)), (None, Ok(b"content".to_vec())));
+        assert_eq!(
+            (quickly(&bytes), expanded(&bytes)),
+            (None, Ok(b"content".to_vec()))
+        );
     }
 
     #[test]
@@ -132,7 +167,10 @@ mod tests {
             damaged[place] ^= 0x55;
             let read = expanded(&damaged);
             // Time and system do not matter.
-            assert!(read.is_err() || (read.as_ref() == Ok(&content) && (4..10).contains(&place)), "{place}");
+            assert!(
+                read.is_err() || (read.as_ref() == Ok(&content) && (4..10).contains(&place)),
+                "{place}"
+            );
             assert!(expanded(&whole[..place]).is_err(), "{place}");
             assert_eq!(expanded(&next).as_ref(), Ok(&other), "{place}");
         }

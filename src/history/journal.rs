@@ -1,12 +1,15 @@
-//! The journal of a history: statements that its owner has stored, and that are not in the tables of the store yet.
+//! The journal of a history: statements that its owner has stored, and that are not in the tables
+//! of the store yet.
 //!
-//! The store writes each statement to its own log with all its texts in full, then to tables that it does not compress, and
-//! merges these soon. The journal takes a fiftieth of that, and many runs together go into compressed tables, each
-//! written once. A record is with the operating system when [`Journal::append`] returns, so that it survives a kill of
-//! the process. Readers add the journal to the contents of the tables.
+//! The store writes each statement to its own log with all its texts in full, then to tables that
+//! it does not compress, and merges these soon. The journal takes a fiftieth of that, and many runs
+//! together go into compressed tables, each written once. A record is with the operating system
+//! when [`Journal::append`] returns, so that it survives a kill of the process. Readers add the
+//! journal to the contents of the tables.
 //!
-//! A record has a header (size of the content, number of statements, checksum of the content, checksum of the header
-//! so far; four bytes each, the lowest first) and the compressed content: terms, and statements as numbers of terms.
+//! A record has a header (size of the content, number of statements, checksum of the content,
+//! checksum of the header so far; four bytes each, the lowest first) and the compressed content:
+//! terms, and statements as numbers of terms.
 
 use std::collections::{HashMap, HashSet};
 use std::fs::File;
@@ -17,7 +20,9 @@ use flate2::read::DeflateDecoder;
 use flate2::write::DeflateEncoder;
 use flate2::{Compression, Crc};
 use oxigraph::model::vocab::xsd;
-use oxigraph::model::{BlankNode, GraphName, Literal, NamedNode, NamedOrBlankNode, Quad, Term, TermRef};
+use oxigraph::model::{
+    BlankNode, GraphName, Literal, NamedNode, NamedOrBlankNode, Quad, Term, TermRef,
+};
 use serde::{Deserialize, Serialize};
 
 use crate::chosen::Chosen;
@@ -51,9 +56,16 @@ pub(super) struct Journal {
 }
 
 impl Journal {
-    /// The journal in the folder of a history, empty: the owner first puts the records of a killed process into the store.
+    /// The journal in the folder of a history, empty: the owner first puts the records of a killed
+    /// process into the store.
     pub(super) fn new(dir: &Path) -> Self {
-        Self { path: dir.join(NAME), file: None, length: 0, statements: 0, synced: false }
+        Self {
+            path: dir.join(NAME),
+            file: None,
+            length: 0,
+            statements: 0,
+            synced: false,
+        }
     }
 
     /// Whether it has no file yet.
@@ -65,22 +77,39 @@ impl Journal {
     ///
     /// # Errors
     /// The disk is full or can't be written.
-    pub(super) fn append(&mut self, Record { bytes: record, statements }: &Record) -> io::Result<()> {
+    pub(super) fn append(
+        &mut self,
+        Record {
+            bytes: record,
+            statements,
+        }: &Record,
+    ) -> io::Result<()> {
         let is_new = self.is_new();
         let file = match self.file.take() {
             Some(file) => file,
             None => below(&self.path).emptied(&self.path)?,
         };
         let file = self.file.insert(file);
-        let written = file.write_all(record).and_then(|()| if self.synced { file.sync_data() } else { Ok(()) });
+        let written = file.write_all(record).and_then(|()| {
+            if self.synced {
+                file.sync_data()
+            } else {
+                Ok(())
+            }
+        });
         if let Err(error) = written {
-            // Otherwise the next record would follow half a one. If this fails too, the disk does not work.
+            // Otherwise the next record would follow half a one. If this fails too, the disk does
+            // not work.
             let _ = cut(file, self.length);
             return Err(error);
         }
         self.length += record.len() as u64;
         self.statements += statements;
-        if is_new && self.synced { sync_folder(&self.path) } else { Ok(()) }
+        if is_new && self.synced {
+            sync_folder(&self.path)
+        } else {
+            Ok(())
+        }
     }
 
     /// Writes the journal to the disk.
@@ -88,7 +117,9 @@ impl Journal {
     /// # Errors
     /// The disk is full or can't be written.
     pub(super) fn sync(&self) -> io::Result<()> {
-        let Some(file) = &self.file else { return Ok(()) };
+        let Some(file) = &self.file else {
+            return Ok(());
+        };
         file.sync_data()?;
         sync_folder(&self.path)
     }
@@ -144,7 +175,11 @@ pub(super) struct Statements {
 impl Statements {
     /// Number of statements.
     pub(super) fn len(&self) -> usize {
-        self.of_default.iter().chain(&self.of_named).map(Vec::len).sum()
+        self.of_default
+            .iter()
+            .chain(&self.of_named)
+            .map(Vec::len)
+            .sum()
     }
 
     /// Iterates over all of them.
@@ -153,18 +188,24 @@ impl Statements {
     }
 }
 
-/// Returns the statements of a journal, and whether all of it could be read. Half a record at the end was left by a
-/// killed process: it was never reported. As many threads share the work.
+/// Returns the statements of a journal, and whether all of it could be read. Half a record at the
+/// end was left by a killed process: it was never reported. As many threads share the work.
 pub(super) fn statements(bytes: &[u8], threads: usize) -> (Statements, bool) {
     let records: Vec<Option<(usize, &[u8])>> = records(bytes).collect();
     let of_each = records.len().div_ceil(threads.max(1)).max(FEWEST_RECORDS);
     let decoded = |records: &[Option<(usize, &[u8])>]| {
         let (part, is_whole) = part_of(records.iter().copied(), &Wanted::all());
-        let (of_default, of_named) = part.quads.into_iter().partition(|quad| quad.graph_name.is_default_graph());
+        let (of_default, of_named) = part
+            .quads
+            .into_iter()
+            .partition(|quad| quad.graph_name.is_default_graph());
         (of_default, of_named, is_whole)
     };
     let parts: Vec<(Vec<Quad>, Vec<Quad>, bool)> = std::thread::scope(|scope| {
-        let threads: Vec<_> = records.chunks(of_each).map(|records| scope.spawn(|| decoded(records))).collect();
+        let threads: Vec<_> = records
+            .chunks(of_each)
+            .map(|records| scope.spawn(|| decoded(records)))
+            .collect();
         threads.into_iter().map(joined).collect()
     });
     let (mut all, mut all_whole) = (Statements::default(), true);
@@ -176,10 +217,13 @@ pub(super) fn statements(bytes: &[u8], threads: usize) -> (Statements, bool) {
     (all, all_whole)
 }
 
-/// Whether bytes follow the complete records of a journal. A process that was killed while it wrote leaves half a record; so
-/// does a copy or a disk that lost the end.
+/// Whether bytes follow the complete records of a journal. A process that was killed while it wrote
+/// leaves half a record; so does a copy or a disk that lost the end.
 pub(super) fn is_cut(bytes: &[u8]) -> bool {
-    let complete: usize = records(bytes).flatten().map(|(_, content)| HEADER + content.len()).sum();
+    let complete: usize = records(bytes)
+        .flatten()
+        .map(|(_, content)| HEADER + content.len())
+        .sum();
     complete < bytes.len()
 }
 
@@ -201,7 +245,10 @@ pub(super) fn part(bytes: &[u8], wanted: &Wanted) -> (Part, bool) {
     part_of(records(bytes), wanted)
 }
 
-fn part_of<'b>(records: impl Iterator<Item = Option<(usize, &'b [u8])>>, wanted: &Wanted) -> (Part, bool) {
+fn part_of<'b>(
+    records: impl Iterator<Item = Option<(usize, &'b [u8])>>,
+    wanted: &Wanted,
+) -> (Part, bool) {
     let (mut part, mut is_whole, mut inflated) = (Part::default(), true, Vec::new());
     for record in records {
         let read = record.and_then(|(count, content)| {
@@ -214,16 +261,16 @@ fn part_of<'b>(records: impl Iterator<Item = Option<(usize, &'b [u8])>>, wanted:
     (part, is_whole)
 }
 
-/// Iterates over the complete records of a journal: the number of statements and the compressed content of each, or
-/// `None` for a damaged one.
+/// Iterates over the complete records of a journal: the number of statements and the compressed
+/// content of each, or `None` for a damaged one.
 fn records(mut bytes: &[u8]) -> impl Iterator<Item = Option<(usize, &[u8])>> {
     std::iter::from_fn(move || {
         // Where a power cut left room for a record, there are zeros.
         if bytes.len() < HEADER || bytes.iter().all(|byte| *byte == 0) {
             return None;
         }
-        let [size, count, sum, header] =
-            [0, 4, 8, 12].map(|at| u32::from_le_bytes([bytes[at], bytes[at + 1], bytes[at + 2], bytes[at + 3]]));
+        let [size, count, sum, header] = [0, 4, 8, 12]
+            .map(|at| u32::from_le_bytes([bytes[at], bytes[at + 1], bytes[at + 2], bytes[at + 3]]));
         if sum_of(&bytes[..HEADER - 4]) != header {
             bytes = &[];
             return Some(None);
@@ -247,8 +294,8 @@ pub(super) enum Written<'a> {
     Typed(&'a str, &'a str),
 }
 
-/// Terms, and statements: the numbers of subject, property, value, and graph. Numbers of graphs begin at 1; the default
-/// graph is 0.
+/// Terms, and statements: the numbers of subject, property, value, and graph. Numbers of graphs
+/// begin at 1; the default graph is 0.
 pub(super) type Content<'a> = (Vec<Written<'a>>, Vec<[u32; 4]>);
 
 /// Replaces the terms of statements by numbers.
@@ -269,8 +316,12 @@ pub(super) fn numbered<'q>(quads: impl IntoIterator<Item = &'q Quad>) -> Content
                 GraphName::NamedNode(node) => number(node.as_ref().into()) + 1,
                 GraphName::BlankNode(node) => number(node.as_ref().into()) + 1,
             };
-            let [subject, property, value] =
-                [quad.subject.as_ref().into(), quad.predicate.as_ref().into(), quad.object.as_ref()].map(&mut number);
+            let [subject, property, value] = [
+                quad.subject.as_ref().into(),
+                quad.predicate.as_ref().into(),
+                quad.object.as_ref(),
+            ]
+            .map(&mut number);
             [subject, property, value, graph]
         })
         .collect();
@@ -302,7 +353,10 @@ impl Record {
         }
         let header = sum_of(&bytes[..HEADER - 4]);
         bytes[HEADER - 4..HEADER].copy_from_slice(&header.to_le_bytes());
-        Ok(Self { bytes, statements: quads.len() })
+        Ok(Self {
+            bytes,
+            statements: quads.len(),
+        })
     }
 }
 
@@ -333,11 +387,19 @@ fn decode(content: &[u8], count: usize, wanted: &Wanted, part: &mut Part) -> Opt
 }
 
 /// Adds the wanted statements. Returns `None` if they are damaged.
-pub(super) fn collect(written: &[Written<'_>], rows: &[[u32; 4]], wanted: &Wanted, part: &mut Part) -> Option<()> {
+pub(super) fn collect(
+    written: &[Written<'_>],
+    rows: &[[u32; 4]],
+    wanted: &Wanted,
+    part: &mut Part,
+) -> Option<()> {
     let chosen = Chosen::of(wanted, written);
     let mut terms: Vec<Option<Term>> = vec![None; written.len()];
     let mut term = |number: u32| {
-        let (known, written) = (terms.get_mut(number as usize)?, written.get(number as usize)?);
+        let (known, written) = (
+            terms.get_mut(number as usize)?,
+            written.get(number as usize)?,
+        );
         Some(known.get_or_insert_with(|| read_term(*written)).clone())
     };
     for row in rows {
@@ -351,8 +413,15 @@ pub(super) fn collect(written: &[Written<'_>], rows: &[[u32; 4]], wanted: &Wante
             None => GraphName::DefaultGraph,
             Some(number) => NamedOrBlankNode::try_from(term(number)?).ok()?.into(),
         };
-        let Term::NamedNode(property) = term(row[1])? else { return None };
-        part.quads.push(Quad::new(NamedOrBlankNode::try_from(term(row[0])?).ok()?, property, term(row[2])?, graph));
+        let Term::NamedNode(property) = term(row[1])? else {
+            return None;
+        };
+        part.quads.push(Quad::new(
+            NamedOrBlankNode::try_from(term(row[0])?).ok()?,
+            property,
+            term(row[2])?,
+            graph,
+        ));
     }
     Some(())
 }
@@ -362,8 +431,12 @@ pub(super) fn read_term(written: Written<'_>) -> Term {
         Written::Iri(iri) => NamedNode::new_unchecked(iri).into(),
         Written::Blank(label) => BlankNode::new_unchecked(label).into(),
         Written::Text(text) => Literal::new_simple_literal(text).into(),
-        Written::Tagged(text, tag) => Literal::new_language_tagged_literal_unchecked(text, tag).into(),
-        Written::Typed(text, datatype) => Literal::new_typed_literal(text, NamedNode::new_unchecked(datatype)).into(),
+        Written::Tagged(text, tag) => {
+            Literal::new_language_tagged_literal_unchecked(text, tag).into()
+        }
+        Written::Typed(text, datatype) => {
+            Literal::new_typed_literal(text, NamedNode::new_unchecked(datatype)).into()
+        }
     }
 }
 
@@ -393,7 +466,10 @@ mod tests {
             Literal::from(u64::MAX).into(),
         ];
         let with = |graph: &GraphName| -> Vec<Quad> {
-            values.iter().map(|value| Quad::new(node("s"), node("p"), value.clone(), graph.clone())).collect()
+            values
+                .iter()
+                .map(|value| Quad::new(node("s"), node("p"), value.clone(), graph.clone()))
+                .collect()
         };
         [with(&GraphName::DefaultGraph), with(&node("g").into())]
     }
@@ -406,7 +482,9 @@ mod tests {
     fn journalled(dir: &Path) -> Vec<u8> {
         let mut journal = Journal::new(dir);
         for quads in sample() {
-            journal.append(&Record::of(&quads).expect("they are few")).expect("it can be written");
+            journal
+                .append(&Record::of(&quads).expect("they are few"))
+                .expect("it can be written");
         }
         assert_eq!(journal.statements, 14);
         read(dir).expect("it can be read")
@@ -415,12 +493,23 @@ mod tests {
     #[test]
     fn a_journal_returns_the_statements_of_all_its_records() {
         let folder = ScratchFolder::create().expect("it can be created");
-        assert_eq!(statements(&read(folder.path()).expect("none is there")), (Vec::new(), true));
+        assert_eq!(
+            statements(&read(folder.path()).expect("none is there")),
+            (Vec::new(), true)
+        );
         let bytes = journalled(folder.path());
         assert_eq!(statements(&bytes), (sample().concat(), true));
-        assert_eq!(statements(&[bytes, vec![0; 40]].concat()), (sample().concat(), true));
-        Journal::new(folder.path()).remove().expect("it can be removed");
-        assert_eq!(statements(&read(folder.path()).expect("it is gone")), (Vec::new(), true));
+        assert_eq!(
+            statements(&[bytes, vec![0; 40]].concat()),
+            (sample().concat(), true)
+        );
+        Journal::new(folder.path())
+            .remove()
+            .expect("it can be removed");
+        assert_eq!(
+            statements(&read(folder.path()).expect("it is gone")),
+            (Vec::new(), true)
+        );
     }
 
     #[test]
@@ -428,9 +517,16 @@ mod tests {
         let mut bytes = Vec::new();
         let [of_default, of_named] = sample();
         for _ in 0..3 * FEWEST_RECORDS {
-            bytes.extend(Record::of(&[of_default.as_slice(), &of_named].concat()).expect("memory").bytes);
+            bytes.extend(
+                Record::of(&[of_default.as_slice(), &of_named].concat())
+                    .expect("memory")
+                    .bytes,
+            );
         }
-        let expected = [vec![of_default; 3 * FEWEST_RECORDS].concat(), vec![of_named; 3 * FEWEST_RECORDS].concat()];
+        let expected = [
+            vec![of_default; 3 * FEWEST_RECORDS].concat(),
+            vec![of_named; 3 * FEWEST_RECORDS].concat(),
+        ];
         assert_eq!(statements(&bytes), (expected.concat(), true));
         let last = bytes.len() - 1;
         bytes[last] ^= 1;
@@ -443,16 +539,32 @@ mod tests {
         let bytes = journalled(folder.path());
         let count = |query: &str| part(&bytes, &Wanted::query(query)).0.quads.len();
         assert_eq!(count("SELECT * { ?s <http://actions#p> ?o }"), 7);
-        assert_eq!(count("SELECT * { GRAPH act:g { ?s <http://actions#p> ?o } }"), 7);
+        assert_eq!(
+            count("SELECT * { GRAPH act:g { ?s <http://actions#p> ?o } }"),
+            7
+        );
         assert_eq!(count("SELECT * { ?s ?p ?o . GRAPH ?g { ?s ?p ?o } }"), 14);
         assert_eq!(count("SELECT * { ?s <http://actions#q> ?o }"), 0);
         assert_eq!(count("SELECT * { ?s ?p act:a }"), 1);
         assert_eq!(count("SELECT * { ?s ?p '\"a\"\\n' }"), 1);
         // The store compares numbers by value.
         assert_eq!(count("SELECT * { ?s ?p 1 }"), 7);
-        assert_eq!(part(&bytes, &Wanted::query("ASK { GRAPH ?g {} }")).0.graphs.len(), 1);
+        assert_eq!(
+            part(&bytes, &Wanted::query("ASK { GRAPH ?g {} }"))
+                .0
+                .graphs
+                .len(),
+            1
+        );
         let run = |iri: &str| part(&bytes, &Wanted::run(iri)).0.quads.len();
-        assert_eq!((run("http://actions#s"), run("http://actions#g"), run("http://actions")), (14, 7, 0));
+        assert_eq!(
+            (
+                run("http://actions#s"),
+                run("http://actions#g"),
+                run("http://actions")
+            ),
+            (14, 7, 0)
+        );
     }
 
     #[test]
@@ -462,7 +574,11 @@ mod tests {
         let [first, second] = sample().map(|quads| Record::of(&quads).expect("memory").bytes.len());
         assert_eq!(bytes.len(), first + second);
         for length in 0..bytes.len() {
-            let whole = if length < first { Vec::new() } else { sample()[0].clone() };
+            let whole = if length < first {
+                Vec::new()
+            } else {
+                sample()[0].clone()
+            };
             assert_eq!(statements(&bytes[..length]), (whole, true), "{length}");
         }
     }
@@ -485,8 +601,13 @@ mod tests {
     fn a_record_that_could_not_be_written_leaves_nothing() {
         let folder = ScratchFolder::create().expect("it can be created");
         let whole = journalled(folder.path());
-        let mut file = OpenOptions::new().append(true).open(folder.path().join(NAME)).expect("it exists");
-        file.write_all(b"half").and_then(|()| cut(&mut file, whole.len() as u64)).expect("it can be written");
+        let mut file = OpenOptions::new()
+            .append(true)
+            .open(folder.path().join(NAME))
+            .expect("it exists");
+        file.write_all(b"half")
+            .and_then(|()| cut(&mut file, whole.len() as u64))
+            .expect("it can be written");
         assert_eq!(read(folder.path()).expect("it can be read"), whole);
     }
 }

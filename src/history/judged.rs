@@ -1,4 +1,5 @@
-//! Runs with their outcomes, one after the other: the lists of a history with a million runs don't fit in memory.
+//! Runs with their outcomes, one after the other: the lists of a history with a million runs don't
+//! fit in memory.
 
 use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 use std::sync::Arc;
@@ -76,8 +77,9 @@ impl JudgedRun {
 }
 
 impl History {
-    /// Calls `each` with the runs that match a filter, sorted by the start of their campaign, then by index. Outlines are read
-    /// a few at a time. Returns the digests of the rules of later judgements.
+    /// Calls `each` with the runs that match a filter, sorted by the start of their campaign, then
+    /// by index. Outlines are read a few at a time. Returns the digests of the rules of later
+    /// judgements.
     ///
     /// # Errors
     /// The store can't be read; `H007` a file is damaged; `H026` an id is not an id.
@@ -89,26 +91,49 @@ impl History {
     ) -> Result<LaterRules, Diagnostics> {
         let mut reading = Reading::begin(self, filter, wish)?;
         let store = self.store_with(lists::of_runs)?;
-        let whole = lists::runs(&store, filter, self.threads()).map_err(|error| self.query_fault(&error))?;
-        self.check_ids("run", whole.iter().flat_map(|run| [&run.run, &run.campaign]))?;
+        let whole = lists::runs(&store, filter, self.threads())
+            .map_err(|error| self.query_fault(&error))?;
+        self.check_ids(
+            "run",
+            whole.iter().flat_map(|run| [&run.run, &run.campaign]),
+        )?;
         let mut order = lists::campaign_ids(&store).map_err(|error| self.query_fault(&error))?;
-        order.retain(|id| filter.campaign.as_ref().is_none_or(|campaign| campaign == id));
+        order.retain(|id| {
+            filter
+                .campaign
+                .as_ref()
+                .is_none_or(|campaign| campaign == id)
+        });
         self.check_ids("campaign", &order)?;
         let known: HashSet<String> = order.iter().cloned().collect();
-        let scenes = if wish.scenes { self.whole_scenes(&whole)? } else { BTreeMap::new() };
+        let scenes = if wish.scenes {
+            self.whole_scenes(&whole)?
+        } else {
+            BTreeMap::new()
+        };
         let mut of_campaign: HashMap<String, Vec<RunRow>> = HashMap::new();
         for row in whole {
             // A campaign without a start has no place in the order.
             if known.contains(&row.campaign) {
-                of_campaign.entry(row.campaign.clone()).or_default().push(row);
+                of_campaign
+                    .entry(row.campaign.clone())
+                    .or_default()
+                    .push(row);
             } else {
                 each(reading.whole(row, &scenes)?);
             }
         }
         let mut fault = Ok(());
         for campaign in &order {
-            let mut whole = of_campaign.remove(campaign).unwrap_or_default().into_iter().peekable();
-            let of_campaign = RunFilter { campaign: Some(campaign.clone()), ..filter.clone() };
+            let mut whole = of_campaign
+                .remove(campaign)
+                .unwrap_or_default()
+                .into_iter()
+                .peekable();
+            let of_campaign = RunFilter {
+                campaign: Some(campaign.clone()),
+                ..filter.clone()
+            };
             self.each_outlined(&of_campaign, &mut |outlined| {
                 let mut pass = || -> Result<(), Diagnostics> {
                     while let Some(row) = whole.next_if(|row| row.index <= outlined.row.index) {
@@ -149,7 +174,9 @@ impl<'h> Reading<'h> {
         let mut later: HashMap<String, Vec<LaterOutcome>> = HashMap::new();
         if wish.judgements != Judgements::None {
             let store = history.store_with(lists::of_outcomes)?;
-            for row in lists::outcomes(&store, filter).map_err(|error| history.query_fault(&error))? {
+            for row in
+                lists::outcomes(&store, filter).map_err(|error| history.query_fault(&error))?
+            {
                 whole.entry(row.run.clone()).or_default().push(row);
             }
         }
@@ -159,7 +186,14 @@ impl<'h> Reading<'h> {
                 later.entry(outcome.run.clone()).or_default().push(outcome);
             }
         }
-        Ok(Self { history, wish, texts: HashSet::new(), whole, later, rules: LaterRules::new() })
+        Ok(Self {
+            history,
+            wish,
+            texts: HashSet::new(),
+            whole,
+            later,
+            rules: LaterRules::new(),
+        })
     }
 
     fn text(&mut self, text: &str) -> Arc<str> {
@@ -171,7 +205,11 @@ impl<'h> Reading<'h> {
         new
     }
 
-    fn whole(&mut self, row: RunRow, scenes: &BTreeMap<String, SceneDigest>) -> Result<JudgedRun, Diagnostics> {
+    fn whole(
+        &mut self,
+        row: RunRow,
+        scenes: &BTreeMap<String, SceneDigest>,
+    ) -> Result<JudgedRun, Diagnostics> {
         let own = self.whole.remove(&row.run).unwrap_or_default();
         let outcomes = own.into_iter().map(|own| JudgedOutcome {
             step: own.step,
@@ -183,7 +221,11 @@ impl<'h> Reading<'h> {
         let mut outcomes: Vec<JudgedOutcome> = outcomes.collect();
         let scene = scenes.get(&row.run).cloned();
         self.add_later(&row.run, &mut outcomes)?;
-        Ok(JudgedRun { row, scene, outcomes })
+        Ok(JudgedRun {
+            row,
+            scene,
+            outcomes,
+        })
     }
 
     fn outlined(&mut self, outlined: &Outlined<'_>) -> Result<JudgedRun, Diagnostics> {
@@ -192,20 +234,39 @@ impl<'h> Reading<'h> {
         if self.wish.judgements != Judgements::None {
             for (step, [action, property], outcome, margin) in outlined.outcomes() {
                 let (action, property) = (self.text(action), self.text(property));
-                outcomes.push(JudgedOutcome { step, action, property, outcome, margin });
+                outcomes.push(JudgedOutcome {
+                    step,
+                    action,
+                    property,
+                    outcome,
+                    margin,
+                });
             }
             sort(&mut outcomes);
             self.add_later(&row.run, &mut outcomes)?;
         }
         let scene = self.wish.scenes.then(|| outlined.row.scene.clone());
-        Ok(JudgedRun { row, scene, outcomes })
+        Ok(JudgedRun {
+            row,
+            scene,
+            outcomes,
+        })
     }
 
     /// Replaces outcomes by later ones.
-    fn add_later(&mut self, run: &str, outcomes: &mut Vec<JudgedOutcome>) -> Result<(), Diagnostics> {
-        let Some(later) = self.later.remove(run) else { return Ok(()) };
+    fn add_later(
+        &mut self,
+        run: &str,
+        outcomes: &mut Vec<JudgedOutcome>,
+    ) -> Result<(), Diagnostics> {
+        let Some(later) = self.later.remove(run) else {
+            return Ok(());
+        };
         for later in later {
-            let of_step = outcomes.iter().find(|own| own.step == later.step).map(|own| Arc::clone(&own.action));
+            let of_step = outcomes
+                .iter()
+                .find(|own| own.step == later.step)
+                .map(|own| Arc::clone(&own.action));
             let action = match of_step {
                 Some(action) => action,
                 None => {
@@ -214,7 +275,10 @@ impl<'h> Reading<'h> {
                     self.text(&of_step.map_or_else(String::new, |action| action.action))
                 }
             };
-            self.rules.entry(later.property.clone()).or_default().insert(later.rule);
+            self.rules
+                .entry(later.property.clone())
+                .or_default()
+                .insert(later.rule);
             let new = JudgedOutcome {
                 step: later.step,
                 action,
@@ -222,7 +286,10 @@ impl<'h> Reading<'h> {
                 outcome: later.outcome,
                 margin: later.margin,
             };
-            match outcomes.iter_mut().find(|own| own.step == new.step && own.property == new.property) {
+            match outcomes
+                .iter_mut()
+                .find(|own| own.step == new.step && own.property == new.property)
+            {
                 Some(own) => *own = new,
                 None => outcomes.push(new),
             }

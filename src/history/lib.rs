@@ -1,4 +1,5 @@
-//! The history: campaigns, runs, scenes, facts and outcomes in an RDF store on disk, with traces in files beside it.
+//! The history: campaigns, runs, scenes, facts and outcomes in an RDF store on disk, with traces in
+//! files beside it.
 //!
 //! Never: judges, simulates, changes stored runs, or reads a clock.
 
@@ -71,7 +72,9 @@ pub use outlines::Restore;
 pub use parts::HistoryPart;
 pub use rdf_text::{RdfSyntax, rdf_text};
 pub use recheck::{NewestJudgements, Recheck, StoredJudgement};
-pub use record::{CampaignEnd, CampaignRecord, FindingRecord, Repetition, RunRecord, RunStatus, SkillRecord};
+pub use record::{
+    CampaignEnd, CampaignRecord, FindingRecord, Repetition, RunRecord, RunStatus, SkillRecord,
+};
 pub use rows::{ActionDetail, CampaignRow, ObjectDetail, OutcomeRow, RunDetail, RunFilter, RunRow};
 pub use scene_digest::SceneDigest;
 pub use store::History;

@@ -1,14 +1,17 @@
-//! Which queries may be evaluated inside a server: those that can be stopped at any moment and can't exhaust memory
-//! before that.
+//! Which queries may be evaluated inside a server: those that can be stopped at any moment and
+//! can't exhaust memory before that.
 //!
-//! The evaluator checks whether it was cancelled only when it reads the store. A query is light if every part of it
-//! reads the store all the time (patterns joined by shared variables, not products or hash joins), and if no expression
-//! makes a term longer than the terms of the store. Sorting and grouping then hold only rows that were read.
+//! The evaluator checks whether it was cancelled only when it reads the store. A query is light if
+//! every part of it reads the store all the time (patterns joined by shared variables, not products
+//! or hash joins), and if no expression makes a term longer than the terms of the store. Sorting
+//! and grouping then hold only rows that were read.
 
 use std::collections::BTreeSet;
 use std::sync::OnceLock;
 
-use spargebra::algebra::{AggregateExpression, AggregateFunction, Expression, Function, GraphPattern, OrderExpression};
+use spargebra::algebra::{
+    AggregateExpression, AggregateFunction, Expression, Function, GraphPattern, OrderExpression,
+};
 use spargebra::term::{NamedNodePattern, TermPattern, TriplePattern};
 use spargebra::{Query, SparqlParser};
 
@@ -42,15 +45,21 @@ pub(super) fn light(text: &str) -> Option<Query> {
 pub(super) fn parser() -> SparqlParser {
     static PARSER: OnceLock<SparqlParser> = OnceLock::new();
     let made = || {
-        names::PREFIXES.iter().fold(SparqlParser::new(), |parser, (prefix, namespace)| {
-            // Our namespaces are valid IRIs, so none is omitted.
-            parser.clone().with_prefix(*prefix, *namespace).unwrap_or(parser)
-        })
+        names::PREFIXES
+            .iter()
+            .fold(SparqlParser::new(), |parser, (prefix, namespace)| {
+                // Our namespaces are valid IRIs, so none is omitted.
+                parser
+                    .clone()
+                    .with_prefix(*prefix, *namespace)
+                    .unwrap_or(parser)
+            })
     };
     PARSER.get_or_init(made).clone()
 }
 
-/// Depth of nested brackets. Brackets in strings count too: such a query is only evaluated elsewhere.
+/// Depth of nested brackets. Brackets in strings count too: such a query is only evaluated
+/// elsewhere.
 fn depth(text: &str) -> usize {
     let (mut depth, mut deepest) = (0usize, 0);
     for byte in text.bytes() {
@@ -71,20 +80,25 @@ fn is_light(pattern: &GraphPattern) -> bool {
         | GraphPattern::Reduced { inner }
         | GraphPattern::Slice { inner, .. } => is_light(inner),
         GraphPattern::OrderBy { inner, expression } => {
-            let mut keys = expression.iter().map(|(OrderExpression::Asc(key) | OrderExpression::Desc(key))| key);
+            let mut keys = expression
+                .iter()
+                .map(|(OrderExpression::Asc(key) | OrderExpression::Desc(key))| key);
             is_light(inner) && keys.all(is_bounded)
         }
-        GraphPattern::Group { inner, aggregates, .. } => {
-            is_light(inner) && aggregates.iter().all(|(_, aggregate)| is_small(aggregate))
-        }
-        GraphPattern::Extend { inner, expression, .. } => is_light(inner) && is_bounded(expression),
+        GraphPattern::Group {
+            inner, aggregates, ..
+        } => is_light(inner) && aggregates.iter().all(|(_, aggregate)| is_small(aggregate)),
+        GraphPattern::Extend {
+            inner, expression, ..
+        } => is_light(inner) && is_bounded(expression),
         GraphPattern::Filter { inner, expr } => is_light(inner) && is_bounded(expr),
         GraphPattern::Union { left, right } => is_light(left) && is_light(right),
         _ => is_connected(pattern),
     }
 }
 
-/// Whether patterns are joined by shared variables, so that the evaluator looks each up in the store.
+/// Whether patterns are joined by shared variables, so that the evaluator looks each up in the
+/// store.
 fn is_connected(pattern: &GraphPattern) -> bool {
     let mut parts = Vec::new();
     if !collect(pattern, None, &mut parts) {
@@ -92,21 +106,39 @@ fn is_connected(pattern: &GraphPattern) -> bool {
     }
     // Parts without a variable are only tests.
     parts.retain(|variables: &BTreeSet<&str>| !variables.is_empty());
-    let Some(mut reached) = parts.pop() else { return true };
-    while let Some(next) = parts.iter().position(|variables| !variables.is_disjoint(&reached)) {
+    let Some(mut reached) = parts.pop() else {
+        return true;
+    };
+    while let Some(next) = parts
+        .iter()
+        .position(|variables| !variables.is_disjoint(&reached))
+    {
         reached.extend(parts.swap_remove(next));
     }
     parts.is_empty()
 }
 
-/// Collects the variables of each triple pattern. Returns `false` if there is anything but triple patterns.
-fn collect<'a>(pattern: &'a GraphPattern, graph: Option<&'a str>, parts: &mut Vec<BTreeSet<&'a str>>) -> bool {
+/// Collects the variables of each triple pattern. Returns `false` if there is anything but triple
+/// patterns.
+fn collect<'a>(
+    pattern: &'a GraphPattern,
+    graph: Option<&'a str>,
+    parts: &mut Vec<BTreeSet<&'a str>>,
+) -> bool {
     match pattern {
         GraphPattern::Bgp { patterns } => {
-            parts.extend(patterns.iter().map(|triple| variables(triple).chain(graph).collect()));
-            patterns.iter().all(|triple| is_plain(&triple.subject) && is_plain(&triple.object))
+            parts.extend(
+                patterns
+                    .iter()
+                    .map(|triple| variables(triple).chain(graph).collect()),
+            );
+            patterns
+                .iter()
+                .all(|triple| is_plain(&triple.subject) && is_plain(&triple.object))
         }
-        GraphPattern::Join { left, right } => collect(left, graph, parts) && collect(right, graph, parts),
+        GraphPattern::Join { left, right } => {
+            collect(left, graph, parts) && collect(right, graph, parts)
+        }
         GraphPattern::Graph { name, inner } => {
             let graph = match name {
                 NamedNodePattern::Variable(variable) => Some(variable.as_str()),
@@ -123,7 +155,9 @@ fn variables(triple: &TriplePattern) -> impl Iterator<Item = &str> {
         NamedNodePattern::Variable(variable) => Some(variable.as_str()),
         NamedNodePattern::NamedNode(_) => None,
     };
-    [name_of(&triple.subject), predicate, name_of(&triple.object)].into_iter().flatten()
+    [name_of(&triple.subject), predicate, name_of(&triple.object)]
+        .into_iter()
+        .flatten()
 }
 
 /// The name of a variable, or of a blank node, which is a variable too.
@@ -138,7 +172,10 @@ fn name_of(term: &TermPattern) -> Option<&str> {
 fn is_plain(term: &TermPattern) -> bool {
     matches!(
         term,
-        TermPattern::NamedNode(_) | TermPattern::BlankNode(_) | TermPattern::Literal(_) | TermPattern::Variable(_)
+        TermPattern::NamedNode(_)
+            | TermPattern::BlankNode(_)
+            | TermPattern::Literal(_)
+            | TermPattern::Variable(_)
     )
 }
 
@@ -244,7 +281,9 @@ mod tests {
 
     #[test]
     fn queries_that_may_not_stop_or_may_grow_are_not_light() {
-        let growing: String = (0..36).map(|n| format!("BIND(CONCAT(?x{n}, ?x{n}) AS ?x{})", n + 1)).collect();
+        let growing: String = (0..36)
+            .map(|n| format!("BIND(CONCAT(?x{n}, ?x{n}) AS ?x{})", n + 1))
+            .collect();
         for text in [
             format!("SELECT ?x36 {{ BIND('x' AS ?x0) {growing} }}"),
             "SELECT * { ?a ?b ?c . ?d ?e ?f }".to_owned(),
@@ -259,7 +298,11 @@ mod tests {
             "SELECT * { SERVICE <http://a> { ?a ?b ?c } }".to_owned(),
             format!("ASK {{ FILTER({}1{}) }}", "(".repeat(40), ")".repeat(40)),
             format!("ASK {{ FILTER(1{}) }}", "+1".repeat(5000)),
-            format!("ASK {{ FILTER({}1{}) }}", "xsd:integer(".repeat(4), ")".repeat(4)),
+            format!(
+                "ASK {{ FILTER({}1{}) }}",
+                "xsd:integer(".repeat(4),
+                ")".repeat(4)
+            ),
             "ASK {".to_owned(),
         ] {
             assert!(light(&text).is_none(), "{text}");

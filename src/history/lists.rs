@@ -52,7 +52,8 @@ SELECT ?run ?campaign ?index ?test ?status ?step ?action ?property ?outcome ?mar
     OPTIONAL { ?result act:margin ?margin }
 }";
 
-/// Judgements made after the run that no later one supersedes, without the run, which the store may lack.
+/// Judgements made after the run that no later one supersedes, without the run, which the store may
+/// lack.
 const RECHECKED: &str = "
 SELECT ?execution ?property ?outcome ?margin ?rule WHERE {
     GRAPH act:rechecked {
@@ -72,8 +73,8 @@ SELECT ?execution ?property ?at ?outcome ?rule WHERE {
     }
 }";
 
-/// Campaigns whose scenes were selected because they fail: shrunk runs, failed runs that ran again, and cases, which have
-/// the table `case` in their configuration. The prefix is [`FAILED_AGAIN`].
+/// Campaigns whose scenes were selected because they fail: shrunk runs, failed runs that ran again,
+/// and cases, which have the table `case` in their configuration. The prefix is [`FAILED_AGAIN`].
 pub(super) const SELECTED: &str = r"
 SELECT DISTINCT ?campaign WHERE {
     { ?ac_run act:shrunkFrom ?ac_original ; act:campaign ?campaign }
@@ -134,10 +135,13 @@ pub(super) fn of_selected_campaigns() -> Wanted {
     Wanted::queries(&[SELECTED, STARTS])
 }
 
-/// A pattern on one line that matches if a campaign is one of [`selected_campaigns`]. `campaign` is a variable.
+/// A pattern on one line that matches if a campaign is one of [`selected_campaigns`]. `campaign` is
+/// a variable.
 pub(super) fn is_selected(campaign: &str) -> String {
-    let pattern =
-        SELECTED.split_once('{').and_then(|(_, rest)| rest.rsplit_once('}')).map_or("", |(pattern, _)| pattern);
+    let pattern = SELECTED
+        .split_once('{')
+        .and_then(|(_, rest)| rest.rsplit_once('}'))
+        .map_or("", |(pattern, _)| pattern);
     let words: Vec<&str> = pattern.lines().map(str::trim).collect();
     words.join(" ").replace("?campaign", campaign)
 }
@@ -145,15 +149,23 @@ pub(super) fn is_selected(campaign: &str) -> String {
 type Row = Vec<Option<Term>>;
 
 fn text(row: &Row, column: usize) -> String {
-    row.get(column).and_then(Option::as_ref).map(text_of).unwrap_or_default()
+    row.get(column)
+        .and_then(Option::as_ref)
+        .map(text_of)
+        .unwrap_or_default()
 }
 
 fn id(row: &Row, column: usize) -> String {
-    row.get(column).and_then(Option::as_ref).map(id_of).unwrap_or_default()
+    row.get(column)
+        .and_then(Option::as_ref)
+        .map(id_of)
+        .unwrap_or_default()
 }
 
 fn optional<T: std::str::FromStr>(row: &Row, column: usize) -> Option<T> {
-    row.get(column).and_then(Option::as_ref).and_then(|term| text_of(term).parse().ok())
+    row.get(column)
+        .and_then(Option::as_ref)
+        .and_then(|term| text_of(term).parse().ok())
 }
 
 fn number<T: std::str::FromStr + Default>(row: &Row, column: usize) -> T {
@@ -165,8 +177,8 @@ pub(super) fn campaigns(store: &Store) -> Result<Vec<CampaignRow>, QueryEvaluati
     let mut rows = Vec::new();
     for row in select(store, CAMPAIGNS, Vec::new())? {
         let name = id(&row, 0);
-        let node =
-            Node::read(store, &campaign_node(&name)).map_err(|error| QueryEvaluationError::Dataset(Box::new(error)))?;
+        let node = Node::read(store, &campaign_node(&name))
+            .map_err(|error| QueryEvaluationError::Dataset(Box::new(error)))?;
         rows.push(campaign(name, number(&row, 1), &node));
     }
     Ok(rows)
@@ -199,54 +211,98 @@ fn campaign(id: String, runs: u64, node: &Node) -> CampaignRow {
 
 /// Ids of the campaigns that hold a shrunk run, ran failed runs again, or ran a case.
 pub(super) fn selected_campaigns(store: &Store) -> Result<BTreeSet<String>, QueryEvaluationError> {
-    Ok(select(store, SELECTED, Vec::new())?.iter().map(|row| id(row, 0)).collect())
+    Ok(select(store, SELECTED, Vec::new())?
+        .iter()
+        .map(|row| id(row, 0))
+        .collect())
 }
 
 /// Ids of all campaigns, sorted by start.
 pub(super) fn campaign_ids(store: &Store) -> Result<Vec<String>, QueryEvaluationError> {
-    Ok(select(store, STARTS, Vec::new())?.iter().map(|row| id(row, 0)).collect())
+    Ok(select(store, STARTS, Vec::new())?
+        .iter()
+        .map(|row| id(row, 0))
+        .collect())
 }
 
 /// Position of each campaign in the order of their starts.
 fn ranks(store: &Store) -> Result<BTreeMap<String, usize>, QueryEvaluationError> {
-    Ok(campaign_ids(store)?.into_iter().enumerate().map(|(rank, id)| (id, rank)).collect())
+    Ok(campaign_ids(store)?
+        .into_iter()
+        .enumerate()
+        .map(|(rank, id)| (id, rank))
+        .collect())
 }
 
 /// Values of the variables that a filter fixes.
 fn given(filter: &RunFilter) -> Vec<(&'static str, Term)> {
     let literal = |text: &str| Term::from(Literal::new_simple_literal(text));
-    let campaign = filter.campaign.as_ref().map(|id| ("campaign", Term::from(campaign_node(id))));
+    let campaign = filter
+        .campaign
+        .as_ref()
+        .map(|id| ("campaign", Term::from(campaign_node(id))));
     let test = filter.test.as_ref().map(|test| ("test", literal(test)));
-    let status = filter.status.map(|status| ("status", literal(status.word())));
+    let status = filter
+        .status
+        .map(|status| ("status", literal(status.word())));
     [campaign, test, status].into_iter().flatten().collect()
 }
 
 /// The rows of a query about runs that match a filter.
-fn of_filtered(store: &Store, query: &str, filter: &RunFilter) -> Result<Vec<Row>, QueryEvaluationError> {
+fn of_filtered(
+    store: &Store,
+    query: &str,
+    filter: &RunFilter,
+) -> Result<Vec<Row>, QueryEvaluationError> {
     let is_most = match &filter.campaign {
         None => true,
-        Some(id) => has_most_runs(store, id).map_err(|error| QueryEvaluationError::Dataset(Box::new(error)))?,
+        Some(id) => has_most_runs(store, id)
+            .map_err(|error| QueryEvaluationError::Dataset(Box::new(error)))?,
     };
     let read = if is_most { select_columns } else { select };
     read(store, query, given(filter))
 }
 
-/// Whether a campaign has so many of a store's runs that reading all runs takes less time than looking up its own.
+/// Whether a campaign has so many of a store's runs that reading all runs takes less time than
+/// looking up its own.
 fn has_most_runs(store: &Store, campaign: &str) -> Result<bool, StorageError> {
     let (of, node) = (iri("act:campaign"), campaign_node(campaign));
-    let runs = |value| store.quads_for_pattern(None, Some(of.as_ref()), value, Some(GraphNameRef::DefaultGraph));
+    let runs = |value| {
+        store.quads_for_pattern(
+            None,
+            Some(of.as_ref()),
+            value,
+            Some(GraphNameRef::DefaultGraph),
+        )
+    };
     let own = runs(Some(node.as_ref().into())).count();
     let all = runs(None).take(own * LOOK_UP_COST + 1);
-    Ok(all.map(|quad| quad.map(drop)).collect::<Result<Vec<()>, _>>()?.len() <= own * LOOK_UP_COST)
+    Ok(all
+        .map(|quad| quad.map(drop))
+        .collect::<Result<Vec<()>, _>>()?
+        .len()
+        <= own * LOOK_UP_COST)
 }
 
-/// The runs that match a filter, sorted by the start of their campaign, then by index. Up to two threads read them.
-pub(super) fn runs(store: &Store, filter: &RunFilter, threads: usize) -> Result<Vec<RunRow>, QueryEvaluationError> {
+/// The runs that match a filter, sorted by the start of their campaign, then by index. Up to two
+/// threads read them.
+pub(super) fn runs(
+    store: &Store,
+    filter: &RunFilter,
+    threads: usize,
+) -> Result<Vec<RunRow>, QueryEvaluationError> {
     let ranks = ranks(store)?;
-    let of_campaign = RunFilter { campaign: filter.campaign.clone(), ..RunFilter::default() };
-    let (runs, results) =
-        side_by_side(threads, || of_filtered(store, RUNS, filter), || of_filtered(store, RUN_RESULTS, &of_campaign));
-    let mut results: HashMap<String, Row> = results?.into_iter().map(|row| (id(&row, 0), row)).collect();
+    let of_campaign = RunFilter {
+        campaign: filter.campaign.clone(),
+        ..RunFilter::default()
+    };
+    let (runs, results) = side_by_side(
+        threads,
+        || of_filtered(store, RUNS, filter),
+        || of_filtered(store, RUN_RESULTS, &of_campaign),
+    );
+    let mut results: HashMap<String, Row> =
+        results?.into_iter().map(|row| (id(&row, 0), row)).collect();
     let joined = runs?.into_iter().filter_map(|row| {
         let run = id(&row, 0);
         let result = results.remove(&run)?;
@@ -270,17 +326,28 @@ pub(super) fn runs(store: &Store, filter: &RunFilter, threads: usize) -> Result<
 
 /// The place of a run in its repetition, from a row of [`RUN_RESULTS`].
 fn repetition(result: &Row) -> Option<Repetition> {
-    Some(Repetition { scene: optional(result, 5)?, number: optional(result, 6)? })
+    Some(Repetition {
+        scene: optional(result, 5)?,
+        number: optional(result, 6)?,
+    })
 }
 
 fn sort_by_rank(ranks: &BTreeMap<String, usize>, rows: &mut [RunRow]) {
-    rows.sort_by(|a, b| (ranks.get(&a.campaign), a.index, &a.run).cmp(&(ranks.get(&b.campaign), b.index, &b.run)));
+    rows.sort_by(|a, b| {
+        (ranks.get(&a.campaign), a.index, &a.run).cmp(&(ranks.get(&b.campaign), b.index, &b.run))
+    });
 }
 
 /// Outcomes of the runs that match a filter, in the same order, then by step and property.
-pub(super) fn outcomes(store: &Store, filter: &RunFilter) -> Result<Vec<OutcomeRow>, QueryEvaluationError> {
+pub(super) fn outcomes(
+    store: &Store,
+    filter: &RunFilter,
+) -> Result<Vec<OutcomeRow>, QueryEvaluationError> {
     let ranks = ranks(store)?;
-    let mut rows: Vec<OutcomeRow> = of_filtered(store, OUTCOMES, filter)?.iter().map(outcome_row).collect();
+    let mut rows: Vec<OutcomeRow> = of_filtered(store, OUTCOMES, filter)?
+        .iter()
+        .map(outcome_row)
+        .collect();
     sort_outcomes_by_rank(&ranks, &mut rows);
     Ok(rows)
 }
@@ -308,7 +375,8 @@ pub(super) struct LaterOutcome {
     pub rule: String,
 }
 
-/// The judgements made after runs that no other supersedes, also those after runs that the store lacks; unsorted.
+/// The judgements made after runs that no other supersedes, also those after runs that the store
+/// lacks; unsorted.
 pub(super) fn rechecked(store: &Store) -> Result<Vec<LaterOutcome>, QueryEvaluationError> {
     let of = |row: &Row| {
         let (run, step) = run_and_step(row)?;
@@ -321,7 +389,10 @@ pub(super) fn rechecked(store: &Store) -> Result<Vec<LaterOutcome>, QueryEvaluat
             rule: text(row, 4),
         })
     };
-    Ok(select(store, RECHECKED, Vec::new())?.iter().filter_map(of).collect())
+    Ok(select(store, RECHECKED, Vec::new())?
+        .iter()
+        .filter_map(of)
+        .collect())
 }
 
 /// The run and the step of an execution, from its IRI in the first column.
@@ -332,19 +403,40 @@ fn run_and_step(row: &Row) -> Option<(String, u32)> {
 }
 
 /// As [`later_judgements`], for runs that the store lacks.
-pub(super) fn later_judgements_alone(store: &Store) -> Result<Vec<(String, String)>, QueryEvaluationError> {
+pub(super) fn later_judgements_alone(
+    store: &Store,
+) -> Result<Vec<(String, String)>, QueryEvaluationError> {
     let judgement = |row: &Row| {
         let (run, step) = run_and_step(row)?;
         let values = (1..5).map(|column| text(row, column));
-        Some((run, std::iter::once(step.to_string()).chain(values).collect::<Vec<_>>().join(" ")))
+        Some((
+            run,
+            std::iter::once(step.to_string())
+                .chain(values)
+                .collect::<Vec<_>>()
+                .join(" "),
+        ))
     };
-    Ok(select(store, LATER_ALONE, Vec::new())?.iter().filter_map(judgement).collect())
+    Ok(select(store, LATER_ALONE, Vec::new())?
+        .iter()
+        .filter_map(judgement)
+        .collect())
 }
 
 /// Pairs of a run's id and a judgement made after the run, as one text; unsorted.
-pub(super) fn later_judgements(store: &Store) -> Result<Vec<(String, String)>, QueryEvaluationError> {
-    let judgement = |row: &Row| (1..6).map(|column| text(row, column)).collect::<Vec<_>>().join(" ");
-    Ok(select(store, LATER, Vec::new())?.iter().map(|row| (id(row, 0), judgement(row))).collect())
+pub(super) fn later_judgements(
+    store: &Store,
+) -> Result<Vec<(String, String)>, QueryEvaluationError> {
+    let judgement = |row: &Row| {
+        (1..6)
+            .map(|column| text(row, column))
+            .collect::<Vec<_>>()
+            .join(" ")
+    };
+    Ok(select(store, LATER, Vec::new())?
+        .iter()
+        .map(|row| (id(row, 0), judgement(row)))
+        .collect())
 }
 
 /// A row of [`OUTCOMES`].

@@ -5,7 +5,8 @@ use std::collections::BTreeSet;
 use crate::{History, Judgements, LaterRules, OutcomeRow, RunFilter, Wish, lists};
 use actcheck_base::Diagnostics;
 
-/// The newest outcomes of runs: later judgements where they exist, otherwise those of the campaign itself.
+/// The newest outcomes of runs: later judgements where they exist, otherwise those of the campaign
+/// itself.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct NewestOutcomes {
     /// In the order of [`History::outcomes`].
@@ -21,13 +22,17 @@ impl History {
     /// The store can't be read.
     pub fn newest_outcomes(&self, filter: &RunFilter) -> Result<NewestOutcomes, Diagnostics> {
         let mut rows = Vec::new();
-        let wish = Wish { judgements: Judgements::Newest, ..Wish::default() };
+        let wish = Wish {
+            judgements: Judgements::Newest,
+            ..Wish::default()
+        };
         let rules = self.each_judged(filter, wish, &mut |run| rows.extend(run.outcome_rows()))?;
         Ok(NewestOutcomes { rows, rules })
     }
 
-    /// Returns the ids of the campaigns whose scenes were selected because they fail: those that hold a shrunk run, those
-    /// that ran the failed runs of another campaign again, and cases. Statistics leave them out.
+    /// Returns the ids of the campaigns whose scenes were selected because they fail: those that
+    /// hold a shrunk run, those that ran the failed runs of another campaign again, and cases.
+    /// Statistics leave them out.
     ///
     /// # Errors
     /// The store can't be read.

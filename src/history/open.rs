@@ -24,7 +24,8 @@ use actcheck_base::Diagnostics;
 
 /// Time between two tries to read a history that another process is creating.
 const PAUSE: Duration = Duration::from_millis(10);
-/// Number of these tries. Creating takes some tenths of a second, because the store syncs each of its parts to the disk.
+/// Number of these tries. Creating takes some tenths of a second, because the store syncs each of
+/// its parts to the disk.
 const TRIES: usize = 300;
 
 /// An open store. All clones use the same one.
@@ -57,14 +58,17 @@ pub(super) struct Opened {
     snapshot: Option<Arc<Snapshot>>,
     /// The statements of the snapshot's journal that are in the store.
     loaded: Mutex<Wanted>,
-    /// Whether the store can be opened again from the snapshot: one that was salvaged is only in memory.
+    /// Whether the store can be opened again from the snapshot: one that was salvaged is only in
+    /// memory.
     can_rest: bool,
 }
 
 impl Opened {
     /// Whether the history has changed since a reader opened it.
     pub(super) fn is_stale(&self, folder: &Folder) -> bool {
-        self.snapshot.as_ref().is_some_and(|snapshot| snapshot.is_stale(folder))
+        self.snapshot
+            .as_ref()
+            .is_some_and(|snapshot| snapshot.is_stale(folder))
     }
 
     /// A handle of the store.
@@ -73,8 +77,16 @@ impl Opened {
     }
 
     /// Adds statements of the snapshot's journal to a reader's store, if they are not in it.
-    pub(super) fn load(&self, dir: &Path, wanted: impl FnOnce() -> Wanted) -> Result<(), Diagnostics> {
-        let Some(snapshot) = self.snapshot.as_ref().filter(|snapshot| !snapshot.journal.is_empty()) else {
+    pub(super) fn load(
+        &self,
+        dir: &Path,
+        wanted: impl FnOnce() -> Wanted,
+    ) -> Result<(), Diagnostics> {
+        let Some(snapshot) = self
+            .snapshot
+            .as_ref()
+            .filter(|snapshot| !snapshot.journal.is_empty())
+        else {
             return Ok(());
         };
         let mut loaded = self.loaded.lock().unwrap_or_else(PoisonError::into_inner);
@@ -96,8 +108,9 @@ impl History {
     /// Opens the history in a folder, and creates it if missing.
     ///
     /// # Errors
-    /// `H001` the folder can't be used, `H002` another process has it open, `H003` it holds other files, `H004` a newer
-    /// program wrote it, `H005` the disk is full, `H006`, `H007` it is damaged.
+    /// `H001` the folder can't be used, `H002` another process has it open, `H003` it holds other
+    /// files, `H004` a newer program wrote it, `H005` the disk is full, `H006`, `H007` it is
+    /// damaged.
     pub fn open(dir: &Path) -> Result<Self, Diagnostics> {
         Self::open_folder(Folder::lock_exclusive(dir, true)?, cores())
     }
@@ -110,7 +123,8 @@ impl History {
         Self::open_existing_with(dir, cores())
     }
 
-    /// Like [`History::open_existing`], with a number of threads instead of all cores: see [`History::use_threads`].
+    /// Like [`History::open_existing`], with a number of threads instead of all cores: see
+    /// [`History::use_threads`].
     ///
     /// # Errors
     /// As [`History::open_existing`].
@@ -118,22 +132,26 @@ impl History {
         Self::open_folder(Folder::lock_exclusive(dir, false)?, threads)
     }
 
-    /// Opens the state of an existing history at this moment for reading. It needs no permission to write the folder,
-    /// and other processes may read and write it at the same time, before and after.
+    /// Opens the state of an existing history at this moment for reading. It needs no permission to
+    /// write the folder, and other processes may read and write it at the same time, before and
+    /// after.
     ///
     /// # Errors
-    /// As [`History::open_existing`], but `H002` only if another process takes seconds to create it.
+    /// As [`History::open_existing`], but `H002` only if another process takes seconds to create
+    /// it.
     pub fn open_to_read(dir: &Path) -> Result<Self, Diagnostics> {
         let folder = Folder::to_read(dir)?;
         let opened = read_present(&folder, TRIES)?;
-        let tail = opened.snapshot.as_ref().map_or(Tail::Closed, |snapshot| Tail::of(&folder, &snapshot.journal));
+        let tail = opened.snapshot.as_ref().map_or(Tail::Closed, |snapshot| {
+            Tail::of(&folder, &snapshot.journal)
+        });
         let mut history = Self::with(opened, folder);
         history.tail = tail;
         Ok(history)
     }
 
-    /// Like [`History::open_to_read`], for a damaged history: reads everything that can be read into memory. Returns it
-    /// with the ids of the runs that are lost, sorted.
+    /// Like [`History::open_to_read`], for a damaged history: reads everything that can be read
+    /// into memory. Returns it with the ids of the runs that are lost, sorted.
     ///
     /// # Errors
     /// As [`History::open_to_read`], if nothing can be read.
@@ -142,15 +160,28 @@ impl History {
         let snapshot = Snapshot::salvage(&folder)?;
         let (journal, is_whole) = journal::statements(&snapshot.journal, cores());
         let opened = read_tables(&folder, Arc::new(snapshot))?;
-        let salvaged = salvage(&opened.store, journal.into_quads().collect(), is_whole, &folder.traced())
-            .map_err(|error| fault::store(dir, "reading it", &error))?;
-        let store = OpenStore { store: salvaged.store, snapshot: opened.snapshot.clone() };
-        let opened = Opened { store, snapshot: opened.snapshot, loaded: Mutex::new(Wanted::all()), can_rest: false };
+        let salvaged = salvage(
+            &opened.store,
+            journal.into_quads().collect(),
+            is_whole,
+            &folder.traced(),
+        )
+        .map_err(|error| fault::store(dir, "reading it", &error))?;
+        let store = OpenStore {
+            store: salvaged.store,
+            snapshot: opened.snapshot.clone(),
+        };
+        let opened = Opened {
+            store,
+            snapshot: opened.snapshot,
+            loaded: Mutex::new(Wanted::all()),
+            can_rest: false,
+        };
         Ok((Self::with(opened, folder), salvaged.lost))
     }
 
-    /// Takes a new snapshot if the history has changed since the last one. Returns whether it has. Answers that are
-    /// being read keep theirs. The owner's history is always up to date.
+    /// Takes a new snapshot if the history has changed since the last one. Returns whether it has.
+    /// Answers that are being read keep theirs. The owner's history is always up to date.
     ///
     /// # Errors
     /// As [`History::open_to_read`]; the earlier snapshot is then kept.
@@ -170,12 +201,14 @@ impl History {
         snapshot.is_some_and(|snapshot| snapshot.is_stale(&self.folder))
     }
 
-    /// Identifies the state of a reader's history: two that are equal have the same runs and judgements. `None` for the
-    /// owner's, which changes.
+    /// Identifies the state of a reader's history: two that are equal have the same runs and
+    /// judgements. `None` for the owner's, which changes.
     pub fn state(&self) -> Option<String> {
         let opened = self.opened.read().unwrap_or_else(PoisonError::into_inner);
         let resting = self.resting.lock().unwrap_or_else(PoisonError::into_inner);
-        let snapshot = opened.as_ref().map_or(resting.as_ref(), |opened| opened.snapshot.as_ref());
+        let snapshot = opened
+            .as_ref()
+            .map_or(resting.as_ref(), |opened| opened.snapshot.as_ref());
         snapshot.map(|snapshot| snapshot.state())
     }
 
@@ -186,8 +219,8 @@ impl History {
         {
             return Err(fault::damaged_file(folder.dir(), name));
         }
-        let journal =
-            journal::read(folder.dir()).map_err(|error| fault::io(folder.dir(), "reading its journal", &error))?;
+        let journal = journal::read(folder.dir())
+            .map_err(|error| fault::io(folder.dir(), "reading its journal", &error))?;
         let (tail, opened) = (Tail::of(&folder, &journal), own(&folder)?);
         drop(journal);
         let mut history = Self::with(opened, folder);
@@ -218,15 +251,21 @@ impl History {
         self.store_with(Wanted::all)
     }
 
-    /// Returns a handle of the store with the wanted statements at least: a reader's store lacks others that are in the
-    /// journal.
-    pub(super) fn store_with(&self, wanted: impl FnOnce() -> Wanted) -> Result<OpenStore, Diagnostics> {
+    /// Returns a handle of the store with the wanted statements at least: a reader's store lacks
+    /// others that are in the journal.
+    pub(super) fn store_with(
+        &self,
+        wanted: impl FnOnce() -> Wanted,
+    ) -> Result<OpenStore, Diagnostics> {
         self.complete_store()?;
         self.loaded_store_with(wanted)
     }
 
     /// Like [`History::store_with`], but without the statements that the owner has in the journal.
-    pub(super) fn loaded_store_with(&self, wanted: impl FnOnce() -> Wanted) -> Result<OpenStore, Diagnostics> {
+    pub(super) fn loaded_store_with(
+        &self,
+        wanted: impl FnOnce() -> Wanted,
+    ) -> Result<OpenStore, Diagnostics> {
         if self.is_resting() {
             self.wake()?;
         }
@@ -244,11 +283,14 @@ impl History {
             self.wake()?;
         }
         let opened = self.opened.read().unwrap_or_else(PoisonError::into_inner);
-        let opened = opened.as_ref().ok_or_else(|| fault::damaged(self.dir(), "it could not be opened again"))?;
+        let opened = opened
+            .as_ref()
+            .ok_or_else(|| fault::damaged(self.dir(), "it could not be opened again"))?;
         Ok(opened.store.clone())
     }
 
-    /// Closes the store of a reader until it is needed again, with the same state: each open store takes some megabytes.
+    /// Closes the store of a reader until it is needed again, with the same state: each open store
+    /// takes some megabytes.
     pub fn rest(&self) {
         let mut opened = self.opened.write().unwrap_or_else(PoisonError::into_inner);
         let mut resting = self.resting.lock().unwrap_or_else(PoisonError::into_inner);
@@ -261,7 +303,11 @@ impl History {
     /// Opens a store that rests.
     fn wake(&self) -> Result<(), Diagnostics> {
         let mut opened = self.opened.write().unwrap_or_else(PoisonError::into_inner);
-        let snapshot = self.resting.lock().unwrap_or_else(PoisonError::into_inner).take();
+        let snapshot = self
+            .resting
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .take();
         if let Some(snapshot) = snapshot {
             *opened = Some(read(&self.folder, snapshot)?);
         }
@@ -269,11 +315,14 @@ impl History {
     }
 
     fn is_resting(&self) -> bool {
-        self.resting.lock().unwrap_or_else(PoisonError::into_inner).is_some()
+        self.resting
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .is_some()
     }
 
-    /// Closes and reopens the store. Only then does it delete logs whose content is already in its tables; they are as
-    /// large as the tables of a hundred runs.
+    /// Closes and reopens the store. Only then does it delete logs whose content is already in its
+    /// tables; they are as large as the tables of a hundred runs.
     pub(super) fn reopen(&self) -> Result<(), Diagnostics> {
         let mut opened = self.opened.write().unwrap_or_else(PoisonError::into_inner);
         *opened = None;
@@ -287,7 +336,11 @@ impl Drop for History {
     fn drop(&mut self) {
         // The rest of the journal is taken over by the next owner.
         let _ = self.load_journal();
-        let opened = self.opened.get_mut().unwrap_or_else(PoisonError::into_inner).take();
+        let opened = self
+            .opened
+            .get_mut()
+            .unwrap_or_else(PoisonError::into_inner)
+            .take();
         if opened.is_some_and(|opened| opened.snapshot.is_none()) {
             // Without a new seal, the earlier one still covers its files.
             let _ = Seal::write(&self.folder);
@@ -299,18 +352,23 @@ impl Drop for History {
     }
 }
 
-/// Opens the present state of a store. A store that another process is creating lacks parts, as a damaged one does, so it is
-/// tried again for a moment.
+/// Opens the present state of a store. A store that another process is creating lacks parts, as a
+/// damaged one does, so it is tried again for a moment.
 fn read_present(folder: &Folder, tries: usize) -> Result<Opened, Diagnostics> {
     let (mut left, mut was_locked) = (tries, true);
     loop {
-        let faults = match Snapshot::take(folder).and_then(|snapshot| read(folder, Arc::new(snapshot))) {
-            Ok(opened) => return Ok(opened),
-            Err(faults) => faults,
-        };
+        let faults =
+            match Snapshot::take(folder).and_then(|snapshot| read(folder, Arc::new(snapshot))) {
+                Ok(opened) => return Ok(opened),
+                Err(faults) => faults,
+            };
         // The first owner seals the store when it closes it.
         let is_new = matches!(Seal::read(folder), Found::Missing);
-        if !is_new || faults.iter().all(|fault| !["H002", "H007"].contains(&fault.code)) {
+        if !is_new
+            || faults
+                .iter()
+                .all(|fault| !["H002", "H007"].contains(&fault.code))
+        {
             return Err(faults);
         }
         let is_locked = folder.is_locked();
@@ -322,7 +380,11 @@ fn read_present(folder: &Folder, tries: usize) -> Result<Opened, Diagnostics> {
             sleep(PAUSE);
         } else if !was_locked {
             let is_empty = folder.traced().is_empty();
-            return Err(if is_empty { fault::not_created(folder.dir()) } else { faults });
+            return Err(if is_empty {
+                fault::not_created(folder.dir())
+            } else {
+                faults
+            });
         }
         // If the owner is gone now, it may have completed the store after it was read.
         was_locked = is_locked;
@@ -353,18 +415,32 @@ fn read_tables(folder: &Folder, snapshot: Arc<Snapshot>) -> Result<Opened, Diagn
     opened(folder, store, snapshot)
 }
 
-fn opened(folder: &Folder, store: Result<Store, StorageError>, snapshot: Arc<Snapshot>) -> Result<Opened, Diagnostics> {
+fn opened(
+    folder: &Folder,
+    store: Result<Store, StorageError>,
+    snapshot: Arc<Snapshot>,
+) -> Result<Opened, Diagnostics> {
     let store = store.map_err(|error| fault::unread(folder.dir(), &error))?;
     let snapshot = Some(snapshot);
-    let store = OpenStore { store, snapshot: snapshot.clone() };
-    Ok(Opened { store, snapshot, loaded: Mutex::default(), can_rest: true })
+    let store = OpenStore {
+        store,
+        snapshot: snapshot.clone(),
+    };
+    Ok(Opened {
+        store,
+        snapshot,
+        loaded: Mutex::default(),
+        can_rest: true,
+    })
 }
 
 fn own(folder: &Folder) -> Result<Opened, Diagnostics> {
     let path = folder.store();
-    let store = Store::open(&path).map_err(|error| fault::store(folder.dir(), "opening its store", &error))?;
-    // Each opening leaves a log of over 100 kB, which is only useful to the store's developers; a process that was killed
-    // while it wrote tables leaves them under names that the store does not know.
+    let store = Store::open(&path)
+        .map_err(|error| fault::store(folder.dir(), "opening its store", &error))?;
+    // Each opening leaves a log of over 100 kB, which is only useful to the store's developers; a
+    // process that was killed while it wrote tables leaves them under names that the store does not
+    // know.
     for file in folder.below().files(&path) {
         let name = file.file_name().unwrap_or_default().to_string_lossy();
         if name.starts_with("LOG.old.") || name.starts_with("bulk-") {
@@ -372,8 +448,16 @@ fn own(folder: &Folder) -> Result<Opened, Diagnostics> {
             let _ = folder.below().remove(&file);
         }
     }
-    let store = OpenStore { store, snapshot: None };
-    Ok(Opened { store, snapshot: None, loaded: Mutex::default(), can_rest: false })
+    let store = OpenStore {
+        store,
+        snapshot: None,
+    };
+    Ok(Opened {
+        store,
+        snapshot: None,
+        loaded: Mutex::default(),
+        can_rest: false,
+    })
 }
 
 #[cfg(test)]
@@ -389,7 +473,8 @@ mod tests {
         }
     }
 
-    /// A reader met a store whose column families or version were not written yet, and called it damaged.
+    /// A reader met a store whose column families or version were not written yet, and called it
+    /// damaged.
     #[test]
     fn a_history_that_is_being_created_is_not_reported_as_damaged() {
         let scratch = ScratchFolder::create().expect("it can be created");
@@ -397,10 +482,15 @@ mod tests {
         drop(History::open(&dir).expect("it can be created"));
         fs::remove_dir_all(dir.join("seal")).expect("it was sealed");
         let store = dir.join("store");
-        let files = || fs::read_dir(&store).expect("it exists").map(|entry| entry.expect("it can be read").path());
+        let files = || {
+            fs::read_dir(&store)
+                .expect("it exists")
+                .map(|entry| entry.expect("it can be read").path())
+        };
         let named = |part: &str| {
             let is_named = |path: &std::path::PathBuf| {
-                path.file_name().is_some_and(|name| name.to_string_lossy().starts_with(part))
+                path.file_name()
+                    .is_some_and(|name| name.to_string_lossy().starts_with(part))
             };
             files().find(is_named).expect("the store has it")
         };
@@ -415,7 +505,10 @@ mod tests {
             let during = codes(&reader);
             drop(owner);
             let after = codes(&reader);
-            assert!(during.is_empty() || during == ["H002"], "{length}: {during:?}");
+            assert!(
+                during.is_empty() || during == ["H002"],
+                "{length}: {during:?}"
+            );
             assert!(after.is_empty() || after == ["H003"], "{length}: {after:?}");
             seen = [seen[0] + during.len(), seen[1] + after.len()];
         }

@@ -18,16 +18,18 @@ use actcheck_facts::{extract, extract_complete};
 pub struct HistoryPart {
     /// IRI of the campaign or run.
     pub node: String,
-    /// Whether an earlier state of it may have had statements that it lacks now: the end of a campaign that was continued.
+    /// Whether an earlier state of it may have had statements that it lacks now: the end of a
+    /// campaign that was continued.
     pub is_replaced: bool,
-    /// Graph (`None` is the default graph) and triple in N-Triples, without the full stop; sorted, without duplicates. Blank
-    /// nodes are IRIs below [`names::NODE`].
+    /// Graph (`None` is the default graph) and triple in N-Triples, without the full stop; sorted,
+    /// without duplicates. Blank nodes are IRIs below [`names::NODE`].
     pub statements: Vec<(Option<String>, String)>,
 }
 
 impl History {
-    /// Calls `each` with every part of the history: all statements of [`History::write_nquads`], or with `complete` those of
-    /// [`History::write_complete_nquads`]. First the campaigns, then their runs.
+    /// Calls `each` with every part of the history: all statements of [`History::write_nquads`], or
+    /// with `complete` those of [`History::write_complete_nquads`]. First the campaigns, then their
+    /// runs.
     ///
     /// # Errors
     /// The history can't be read; those of `each`.
@@ -44,27 +46,37 @@ impl History {
         }
         let class = iri("act:Run");
         let whole = subjects(&*store, "rdf:type", class.as_ref()).map_err(fault)?;
-        let whole: BTreeSet<String> =
-            whole.into_iter().map(|node| short_id(&text_of(&node.into())).to_owned()).collect();
+        let whole: BTreeSet<String> = whole
+            .into_iter()
+            .map(|node| short_id(&text_of(&node.into())).to_owned())
+            .collect();
         self.check_ids("run", &whole)?;
         for run in &whole {
             let node = run_node(run);
             let mut quads = about(&store, &node).map_err(fault)?;
             if complete {
                 quads.retain(|quad| !graphs::holds_facts(quad.graph_name.as_ref()));
-                quads.extend(graphs::complete(&extract_complete(&self.states(run)?), &node));
+                quads.extend(graphs::complete(
+                    &extract_complete(&self.states(run)?),
+                    &node,
+                ));
             }
             each(part(&node, false, quads))?;
         }
         for run in self.outline_ids()? {
-            let (node, Some(outline)) = (run_node(&run), self.outline(&run)?) else { continue };
+            let (node, Some(outline)) = (run_node(&run), self.outline(&run)?) else {
+                continue;
+            };
             let mut quads = outline.quads;
             quads.extend(self.later_about_outline(&run, &store)?);
             if complete {
-                quads.extend(graphs::complete(&extract_complete(&self.states(&run)?), &node));
+                quads.extend(graphs::complete(
+                    &extract_complete(&self.states(&run)?),
+                    &node,
+                ));
             } else {
-                let (_, trace) =
-                    trace_file::decode_head(&outline.head).map_err(|why| crate::fault::damaged(self.dir(), &why))?;
+                let (_, trace) = trace_file::decode_head(&outline.head)
+                    .map_err(|why| crate::fault::damaged(self.dir(), &why))?;
                 graphs::write(&extract(&trace), &node, &mut quads);
             }
             each(part(&node, false, quads))?;
@@ -103,7 +115,11 @@ fn part(node: &NamedNode, is_replaced: bool, quads: Vec<Quad>) -> HistoryPart {
         .collect();
     statements.sort_unstable();
     statements.dedup();
-    HistoryPart { node: node.as_str().to_owned(), is_replaced, statements }
+    HistoryPart {
+        node: node.as_str().to_owned(),
+        is_replaced,
+        statements,
+    }
 }
 
 /// A blank node as an IRI: each store gives blank nodes new identities whenever it receives them.

@@ -11,15 +11,15 @@ use crate::snapshot::Snapshot;
 use crate::{History, fault};
 use actcheck_base::Diagnostics;
 
-/// Number of statements in the journal at which they are written to tables: about 600 runs. From the second part on, the
-/// store merges tables and no longer compresses them; but readers take longer with a long journal, up to some tenths of a
-/// second.
+/// Number of statements in the journal at which they are written to tables: about 600 runs. From
+/// the second part on, the store merges tables and no longer compresses them; but readers take
+/// longer with a long journal, up to some tenths of a second.
 const MOST: usize = 450_000;
-/// Number of statements from which they are written to tables directly. A few are cheaper as a transaction, because
-/// tables are a dozen files.
+/// Number of statements from which they are written to tables directly. A few are cheaper as a
+/// transaction, because tables are a dozen files.
 const FEWEST_LOADED: usize = 4_000;
-/// Number of statements from which they are written to tables directly although the owner only wants to read them. Fewer
-/// make small tables, which the store soon merges.
+/// Number of statements from which they are written to tables directly although the owner only
+/// wants to read them. Fewer make small tables, which the store soon merges.
 const FEWEST_READ: usize = 100_000;
 /// Number of statements in a transaction.
 const TRANSACTION: usize = 20_000;
@@ -57,16 +57,24 @@ impl History {
         if journal.is_new() {
             self.folder.mark_journal(true)?;
         }
-        journal.append(record).map_err(|error| fault::io(self.dir(), doing, &error))
+        journal
+            .append(record)
+            .map_err(|error| fault::io(self.dir(), doing, &error))
     }
 
     pub(super) fn sync_journal(&self) -> Result<(), Diagnostics> {
-        self.journal().sync().map_err(|error| self.unwritten(&error))
+        self.journal()
+            .sync()
+            .map_err(|error| self.unwritten(&error))
     }
 
     /// Writes the statements of the journal into the store's tables, if there are many.
     pub(super) fn load_long_journal(&self) -> Result<(), Diagnostics> {
-        if self.journal().statements >= MOST { self.load_journal() } else { Ok(()) }
+        if self.journal().statements >= MOST {
+            self.load_journal()
+        } else {
+            Ok(())
+        }
     }
 
     /// Writes the statements of the journal into the store's tables.
@@ -84,8 +92,8 @@ impl History {
         })
     }
 
-    /// Whether many statements wait in the journal for others, to be written to tables together. A read by the owner writes
-    /// them at once, which makes the store larger.
+    /// Whether many statements wait in the journal for others, to be written to tables together. A
+    /// read by the owner writes them at once, which makes the store larger.
     pub fn has_waiting(&self) -> bool {
         self.journal().statements >= FEWEST_LOADED
     }
@@ -110,11 +118,16 @@ impl History {
     /// Writes the journal of a killed process into the store.
     pub(super) fn take_over_journal(&self) -> Result<(), Diagnostics> {
         let mut journal = self.journal();
-        self.take_over(&mut journal, |store, statements, threads| match statements.len() {
-            0 => Ok(()),
-            1..FEWEST_LOADED => extend(store, statements.into_quads().collect()).and_then(|()| store.flush()),
-            _ => load(store, statements, threads),
-        })
+        self.take_over(
+            &mut journal,
+            |store, statements, threads| match statements.len() {
+                0 => Ok(()),
+                1..FEWEST_LOADED => {
+                    extend(store, statements.into_quads().collect()).and_then(|()| store.flush())
+                }
+                _ => load(store, statements, threads),
+            },
+        )
     }
 
     fn take_over(
@@ -123,12 +136,14 @@ impl History {
         take: impl FnOnce(&Store, Statements, usize) -> Result<(), StorageError>,
     ) -> Result<(), Diagnostics> {
         let threads = self.threads();
-        let bytes = journal::read(self.dir()).map_err(|error| fault::io(self.dir(), "reading its journal", &error))?;
+        let bytes = journal::read(self.dir())
+            .map_err(|error| fault::io(self.dir(), "reading its journal", &error))?;
         let (statements, is_whole) = journal::statements(&bytes, threads);
         if !is_whole {
             return Err(fault::damaged(self.dir(), DAMAGED));
         }
-        take(&*self.bare_store()?, statements, threads).map_err(|error| self.fault("writing its tables", &error))?;
+        take(&*self.bare_store()?, statements, threads)
+            .map_err(|error| self.fault("writing its tables", &error))?;
         // Only then: a killed process leaves the statements in both.
         journal.remove().map_err(|error| self.unwritten(&error))
     }
@@ -140,22 +155,28 @@ impl History {
 
 /// Writes statements directly into tables.
 fn load(store: &Store, statements: Statements, threads: usize) -> Result<(), StorageError> {
-    // The library makes the tables of each batch in a thread. Default graph and named graphs have indexes of their own,
-    // so that there is still one table for each index. The library counts a thousand statements as a megabyte.
+    // The library makes the tables of each batch in a thread. Default graph and named graphs have
+    // indexes of their own, so that there is still one table for each index. The library counts a
+    // thousand statements as a megabyte.
     let threads = threads.min(2);
     let megabytes = threads * (statements.len() / 1000 + 1);
-    let mut loader = store.bulk_loader().with_num_threads(threads).with_max_memory_size_in_megabytes(megabytes);
+    let mut loader = store
+        .bulk_loader()
+        .with_num_threads(threads)
+        .with_max_memory_size_in_megabytes(megabytes);
     loader.load_quads(statements.of_named.into_iter().flatten())?;
     loader.load_quads(statements.of_default.into_iter().flatten())?;
     loader.commit()
 }
 
 fn extend(store: &Store, quads: Vec<Quad>) -> Result<(), StorageError> {
-    quads.chunks(TRANSACTION).try_for_each(|quads| store.extend(quads.iter().cloned()))
+    quads
+        .chunks(TRANSACTION)
+        .try_for_each(|quads| store.extend(quads.iter().cloned()))
 }
 
-/// Opens a snapshot, so that statements of its journal can be added: it is the reader's own. As long as its tables are
-/// empty, statements take a third of the time in memory.
+/// Opens a snapshot, so that statements of its journal can be added: it is the reader's own. As
+/// long as its tables are empty, statements take a third of the time in memory.
 pub(super) fn open(snapshot: &Snapshot) -> Result<Store, StorageError> {
     if snapshot.size <= MOST_EMPTY && Store::open_read_only(snapshot.store())?.is_empty()? {
         return Store::new();
@@ -163,8 +184,8 @@ pub(super) fn open(snapshot: &Snapshot) -> Result<Store, StorageError> {
     Store::open(snapshot.store())
 }
 
-/// Opens a snapshot, so that the statements of many outlines can be added: in memory, where they take a third of the time,
-/// unless it has many statements itself.
+/// Opens a snapshot, so that the statements of many outlines can be added: in memory, where they
+/// take a third of the time, unless it has many statements itself.
 pub(super) fn open_for_outlines(snapshot: &Snapshot) -> Result<Store, StorageError> {
     if snapshot.size > MOST_COPIED {
         return Store::open(snapshot.store());

@@ -3,7 +3,8 @@
 use std::collections::HashMap;
 
 use oxigraph::model::{
-    GraphName, GraphNameRef, NamedNodeRef, NamedOrBlankNode, NamedOrBlankNodeRef, Quad, QuadRef, Term, TermRef,
+    GraphName, GraphNameRef, NamedNodeRef, NamedOrBlankNode, NamedOrBlankNodeRef, Quad, QuadRef,
+    Term, TermRef,
 };
 use oxigraph::store::{StorageError, Store};
 
@@ -13,7 +14,11 @@ pub(super) trait QuadSource {
     ///
     /// # Errors
     /// The store can't be read.
-    fn about(&self, subject: NamedOrBlankNodeRef<'_>, graph: GraphNameRef<'_>) -> Result<Vec<Quad>, StorageError>;
+    fn about(
+        &self,
+        subject: NamedOrBlankNodeRef<'_>,
+        graph: GraphNameRef<'_>,
+    ) -> Result<Vec<Quad>, StorageError>;
 
     /// The subjects that have a value of a property in a graph, unsorted.
     ///
@@ -45,8 +50,13 @@ pub(super) trait QuadSource {
 }
 
 impl QuadSource for Store {
-    fn about(&self, subject: NamedOrBlankNodeRef<'_>, graph: GraphNameRef<'_>) -> Result<Vec<Quad>, StorageError> {
-        self.quads_for_pattern(Some(subject), None, None, Some(graph)).collect()
+    fn about(
+        &self,
+        subject: NamedOrBlankNodeRef<'_>,
+        graph: GraphNameRef<'_>,
+    ) -> Result<Vec<Quad>, StorageError> {
+        self.quads_for_pattern(Some(subject), None, None, Some(graph))
+            .collect()
     }
 
     fn with_value(
@@ -74,7 +84,8 @@ impl QuadSource for Store {
     }
 }
 
-/// The statements about one run, in memory: a store would take ten times as long to fill as to read.
+/// The statements about one run, in memory: a store would take ten times as long to fill as to
+/// read.
 #[derive(Debug)]
 pub(super) struct RunQuads {
     quads: Vec<Quad>,
@@ -93,7 +104,11 @@ impl RunQuads {
                 by_value.entry(quad.object.clone()).or_default().push(at);
             }
         }
-        Self { quads, by_subject, by_value }
+        Self {
+            quads,
+            by_subject,
+            by_value,
+        }
     }
 
     /// The statements, in their order.
@@ -103,10 +118,22 @@ impl RunQuads {
 }
 
 impl QuadSource for RunQuads {
-    fn about(&self, subject: NamedOrBlankNodeRef<'_>, graph: GraphNameRef<'_>) -> Result<Vec<Quad>, StorageError> {
+    fn about(
+        &self,
+        subject: NamedOrBlankNodeRef<'_>,
+        graph: GraphNameRef<'_>,
+    ) -> Result<Vec<Quad>, StorageError> {
         let graph = GraphName::from(graph);
-        let found = self.by_subject.get(&subject.into_owned()).into_iter().flatten();
-        Ok(found.map(|at| &self.quads[*at]).filter(|quad| quad.graph_name == graph).cloned().collect())
+        let found = self
+            .by_subject
+            .get(&subject.into_owned())
+            .into_iter()
+            .flatten();
+        Ok(found
+            .map(|at| &self.quads[*at])
+            .filter(|quad| quad.graph_name == graph)
+            .cloned()
+            .collect())
     }
 
     fn with_value(
@@ -116,7 +143,12 @@ impl QuadSource for RunQuads {
         graph: GraphNameRef<'_>,
     ) -> Result<Vec<NamedOrBlankNode>, StorageError> {
         let graph = GraphName::from(graph);
-        let found = self.by_value.get(&value.into_owned()).into_iter().flatten().map(|at| &self.quads[*at]);
+        let found = self
+            .by_value
+            .get(&value.into_owned())
+            .into_iter()
+            .flatten()
+            .map(|at| &self.quads[*at]);
         let has = |quad: &&Quad| quad.predicate.as_ref() == property && quad.graph_name == graph;
         Ok(found.filter(has).map(|quad| quad.subject.clone()).collect())
     }
@@ -127,11 +159,18 @@ impl QuadSource for RunQuads {
         value: TermRef<'_>,
         graph: GraphNameRef<'_>,
     ) -> Result<bool, StorageError> {
-        self.with_value(property, value, graph).map(|found| !found.is_empty())
+        self.with_value(property, value, graph)
+            .map(|found| !found.is_empty())
     }
 
     fn has(&self, quad: QuadRef<'_>) -> Result<bool, StorageError> {
-        let about = self.by_subject.get(&quad.subject.into_owned()).into_iter().flatten();
-        Ok(about.map(|at| &self.quads[*at]).any(|known| known.as_ref() == quad))
+        let about = self
+            .by_subject
+            .get(&quad.subject.into_owned())
+            .into_iter()
+            .flatten();
+        Ok(about
+            .map(|at| &self.quads[*at])
+            .any(|known| known.as_ref() == quad))
     }
 }

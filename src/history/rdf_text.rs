@@ -17,17 +17,22 @@ pub enum RdfSyntax {
     RdfXml,
 }
 
-/// Writes triples as text, in their order. Omits invalid triples (with a literal as subject, or a property that is not
-/// an IRI).
+/// Writes triples as text, in their order. Omits invalid triples (with a literal as subject, or a
+/// property that is not an IRI).
 pub fn rdf_text(triples: &[[Term; 3]], syntax: RdfSyntax) -> String {
     let mut writer = serializer(syntax).for_writer(Vec::new());
     for triple in triples.iter().filter_map(to_triple) {
-        // Writing to memory can't fail, and RDF/XML rejects only properties that can't be XML names.
+        // Writing to memory can't fail, and RDF/XML rejects only properties that can't be XML
+        // names.
         let _ = writer.serialize_triple(&triple);
     }
     let bytes = writer.finish().unwrap_or_default();
     let text = String::from_utf8_lossy(&bytes).into_owned();
-    if syntax == RdfSyntax::Turtle { with_ordered_prefixes(&text) } else { text }
+    if syntax == RdfSyntax::Turtle {
+        with_ordered_prefixes(&text)
+    } else {
+        text
+    }
 }
 
 /// Sorts the prefixes, which the library writes in random order.
@@ -58,7 +63,9 @@ pub(super) fn serializer(syntax: RdfSyntax) -> RdfSerializer {
 
 fn to_triple([subject, property, object]: &[Term; 3]) -> Option<Triple> {
     let subject = NamedOrBlankNode::try_from(to_store(subject)).ok()?;
-    let StoreTerm::NamedNode(property) = to_store(property) else { return None };
+    let StoreTerm::NamedNode(property) = to_store(property) else {
+        return None;
+    };
     Some(Triple::new(subject, property, to_store(object)))
 }
 
@@ -70,14 +77,24 @@ mod tests {
     fn triples_are_written_and_invalid_ones_omitted() {
         let (s, p) = (Term::iri("http://actions#a"), Term::iri("http://actions#b"));
         let triples = [
-            [s.clone(), p.clone(), Term::string("line\n\"quoted\" \\ <tag>")],
+            [
+                s.clone(),
+                p.clone(),
+                Term::string("line\n\"quoted\" \\ <tag>"),
+            ],
             [Term::Integer(1), p.clone(), s.clone()],
             [s.clone(), Term::Blank("x".into()), s],
         ];
         let text = rdf_text(&triples, RdfSyntax::NTriples);
-        assert_eq!(text, "<http://actions#a> <http://actions#b> \"line\\n\\\"quoted\\\" \\\\ <tag>\" .\n");
+        assert_eq!(
+            text,
+            "<http://actions#a> <http://actions#b> \"line\\n\\\"quoted\\\" \\\\ <tag>\" .\n"
+        );
         let turtle = rdf_text(&triples, RdfSyntax::Turtle);
-        assert!(turtle.starts_with("@prefix act:") && turtle.contains("act:a act:b"), "{turtle}");
+        assert!(
+            turtle.starts_with("@prefix act:") && turtle.contains("act:a act:b"),
+            "{turtle}"
+        );
         assert!(rdf_text(&triples, RdfSyntax::RdfXml).contains("&lt;tag&gt;"));
     }
 }

@@ -2,7 +2,9 @@
 
 use std::collections::BTreeMap;
 
-use oxigraph::model::{GraphNameRef, NamedOrBlankNode, NamedOrBlankNodeRef, Term, TermRef, Variable};
+use oxigraph::model::{
+    GraphNameRef, NamedOrBlankNode, NamedOrBlankNodeRef, Term, TermRef, Variable,
+};
 use oxigraph::sparql::{PreparedSparqlQuery, QueryEvaluationError, QueryResults};
 use oxigraph::store::{StorageError, Store};
 
@@ -38,22 +40,30 @@ impl Node {
     ) -> Result<Self, StorageError> {
         let mut node = Self::default();
         for quad in store.about(subject.into(), graph)? {
-            node.values.entry(quad.predicate.into_string()).or_default().push(quad.object);
+            node.values
+                .entry(quad.predicate.into_string())
+                .or_default()
+                .push(quad.object);
         }
         Ok(node)
     }
 
     /// All values of a property.
     pub(super) fn all(&self, property: &str) -> &[Term] {
-        self.values.get(iri(property).as_str()).map_or(&[], Vec::as_slice)
+        self.values
+            .get(iri(property).as_str())
+            .map_or(&[], Vec::as_slice)
     }
 
     /// The properties with their values, sorted by property.
     pub(super) fn properties(&self) -> impl Iterator<Item = (&str, &[Term])> {
-        self.values.iter().map(|(property, values)| (property.as_str(), values.as_slice()))
+        self.values
+            .iter()
+            .map(|(property, values)| (property.as_str(), values.as_slice()))
     }
 
-    /// The first value as text: of a literal its text, else the IRI. Returns `None` if the property has no value.
+    /// The first value as text: of a literal its text, else the IRI. Returns `None` if the property
+    /// has no value.
     pub(super) fn text(&self, property: &str) -> Option<String> {
         self.all(property).first().map(text_of)
     }
@@ -98,7 +108,10 @@ pub(super) fn id_of(term: &Term) -> String {
 
 /// The id in one of our IRIs; other IRIs are returned unchanged.
 pub(super) fn short_id(iri: &str) -> &str {
-    [names::RUN, names::CAMPAIGN, names::OBJ].iter().find_map(|namespace| iri.strip_prefix(namespace)).unwrap_or(iri)
+    [names::RUN, names::CAMPAIGN, names::OBJ]
+        .iter()
+        .find_map(|namespace| iri.strip_prefix(namespace))
+        .unwrap_or(iri)
 }
 
 /// The subjects that have a value of a property in the default graph, unsorted.
@@ -136,7 +149,11 @@ pub(super) fn select_columns(
     given: Vec<(&str, Term)>,
 ) -> Result<Vec<Vec<Option<Term>>>, QueryEvaluationError> {
     let query = parser().parse_query(query)?;
-    answered(store, evaluator(&Cancel::new()).for_query(by_columns(query)), given)
+    answered(
+        store,
+        evaluator(&Cancel::new()).for_query(by_columns(query)),
+        given,
+    )
 }
 
 fn answered(
@@ -159,6 +176,8 @@ fn answered(
     rows.map_err(|fault| match fault {
         Unfinished::Failed(error) => error,
         Unfinished::Damaged(error) => QueryEvaluationError::Dataset(error.into()),
-        Unfinished::Crashed | Unfinished::Stopped => QueryEvaluationError::Dataset("the evaluator crashed".into()),
+        Unfinished::Crashed | Unfinished::Stopped => {
+            QueryEvaluationError::Dataset("the evaluator crashed".into())
+        }
     })
 }

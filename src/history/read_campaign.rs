@@ -18,14 +18,25 @@ pub(super) fn beginning(store: &Store, id: &str) -> Result<Option<CampaignRecord
     let text = |node: &Node, property: &str| node.text(property).unwrap_or_default();
     let mut rules = Vec::new();
     for rule in parts(store, &node, "act:usedRule")? {
-        rules.push((text(&rule, "act:verifies"), text(&rule, "act:rulePath"), text(&rule, "act:ruleDigest")));
+        rules.push((
+            text(&rule, "act:verifies"),
+            text(&rule, "act:rulePath"),
+            text(&rule, "act:ruleDigest"),
+        ));
     }
     rules.sort();
     let mut findings = Vec::new();
     for found in parts(store, &node, "act:ruleFinding")? {
         let place = found.text("act:findingPlace");
-        let (code, message) = (text(&found, "act:findingCode"), text(&found, "act:findingText"));
-        findings.push(FindingRecord { code, message, place });
+        let (code, message) = (
+            text(&found, "act:findingCode"),
+            text(&found, "act:findingText"),
+        );
+        findings.push(FindingRecord {
+            code,
+            message,
+            place,
+        });
     }
     findings.sort();
     let mut models = Vec::new();
@@ -47,16 +58,24 @@ pub(super) fn beginning(store: &Store, id: &str) -> Result<Option<CampaignRecord
         seed: node.count("act:seed").unwrap_or_default(),
         planned_runs: node.count("act:plannedRuns").unwrap_or_default(),
         // Histories from before repetitions were introduced lack it.
-        repeat: node.count("act:repeat").and_then(|repeat| u32::try_from(repeat).ok()).unwrap_or(1).max(1),
+        repeat: node
+            .count("act:repeat")
+            .and_then(|repeat| u32::try_from(repeat).ok())
+            .unwrap_or(1)
+            .max(1),
         time_secs: node.number("act:timeBudget"),
         until_width: node.number("act:untilWidth"),
         max_failures: node.count("act:maxFailures"),
         shards: shards(&node),
-        strategy: node.text("act:strategy").unwrap_or_else(|| "random".to_owned()),
+        strategy: node
+            .text("act:strategy")
+            .unwrap_or_else(|| "random".to_owned()),
         started: text(&node, "prov:startedAtTime"),
         program_version: version(&node),
         program_digest: text(&node, "act:programDigest"),
-        physics: node.count("act:physics").and_then(|version| u32::try_from(version).ok()),
+        physics: node
+            .count("act:physics")
+            .and_then(|version| u32::try_from(version).ok()),
     }))
 }
 
@@ -70,7 +89,11 @@ pub(super) fn skill(node: &Node) -> Option<SkillRecord> {
 }
 
 fn shards(node: &Node) -> Vec<Shard> {
-    let mut shards: Vec<Shard> = node.all("act:shard").iter().filter_map(|shard| text_of(shard).parse().ok()).collect();
+    let mut shards: Vec<Shard> = node
+        .all("act:shard")
+        .iter()
+        .filter_map(|shard| text_of(shard).parse().ok())
+        .collect();
     shards.sort();
     shards
 }

@@ -16,13 +16,15 @@ pub struct CampaignRecord {
     pub config_text: String,
     /// Digest of that text.
     pub config_digest: String,
-    /// Path of the configuration relative to the history's folder; absolute if no relative path exists.
+    /// Path of the configuration relative to the history's folder; absolute if no relative path
+    /// exists.
     pub config_path: String,
     /// Digest of the ontology.
     pub ontology_digest: String,
     /// Property IRI, rule path and digest of the rule file (with its libraries), sorted.
     pub rules: Vec<(String, String, String)>,
-    /// Warnings about the ontology and the rules, sorted; empty if an earlier version wrote the campaign.
+    /// Warnings about the ontology and the rules, sorted; empty if an earlier version wrote the
+    /// campaign.
     pub findings: Vec<FindingRecord>,
     /// Digests of robot and models by name, sorted.
     pub models: Vec<(String, String)>,
@@ -68,7 +70,11 @@ pub struct FindingRecord {
 impl FindingRecord {
     /// The record of a diagnostic.
     pub fn of(found: &Diagnostic) -> Self {
-        Self { code: found.code.to_owned(), message: found.message.clone(), place: found.place() }
+        Self {
+            code: found.code.to_owned(),
+            message: found.message.clone(),
+            place: found.place(),
+        }
     }
 }
 
@@ -85,8 +91,7 @@ pub struct SkillRecord {
 
 impl SkillRecord {
     /// Remark on campaigns whose program received the ground truth.
-    pub const PRIVILEGED: &str =
-        "the program received the ground truth (`[skill] privileged = true`), which no real robot has";
+    pub const PRIVILEGED: &str = "the program received the ground truth (`[skill] privileged = true`), which no real robot has";
 }
 
 /// How a run ended as a whole.
@@ -112,7 +117,9 @@ impl RunStatus {
 
     /// Parses the word of a status. Returns `None` for any other word.
     pub fn from_word(word: &str) -> Option<Self> {
-        [Self::Completed, Self::Broken, Self::Timeout].into_iter().find(|status| status.word() == word)
+        [Self::Completed, Self::Broken, Self::Timeout]
+            .into_iter()
+            .find(|status| status.word() == word)
     }
 }
 
@@ -157,8 +164,8 @@ pub struct RunRecord {
     pub index: u64,
     /// Scene and repetition, if scenes are run more than once.
     pub repetition: Option<Repetition>,
-    /// Importance weight of its scene, if a search draws scenes from another distribution than the configuration's: the
-    /// nominal density divided by the sampling density.
+    /// Importance weight of its scene, if a search draws scenes from another distribution than the
+    /// configuration's: the nominal density divided by the sampling density.
     pub weight: Option<f64>,
     /// Names of the actions, joined by a space.
     pub test: String,
@@ -168,7 +175,8 @@ pub struct RunRecord {
     pub status: RunStatus,
     /// Why it did not complete; `None` if it did.
     pub reason: Option<String>,
-    /// The last lines that the program (which performs the actions) printed, if its fault ended the run.
+    /// The last lines that the program (which performs the actions) printed, if its fault ended the
+    /// run.
     pub program_output: Option<String>,
     /// Mean of the action scores (the paper's S).
     pub score: f64,

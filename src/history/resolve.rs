@@ -10,8 +10,8 @@ const LAST: &str = "@last";
 const LAST_FAILED: &str = "@last-failed";
 
 impl History {
-    /// Returns the id of a run, given its id, its IRI, `run:ID`, a unique prefix, or `@last` for the last run or
-    /// `@last-failed` for the last one in which a property failed.
+    /// Returns the id of a run, given its id, its IRI, `run:ID`, a unique prefix, or `@last` for
+    /// the last run or `@last-failed` for the last one in which a property failed.
     ///
     /// # Errors
     /// `H008` no run matches, or several do.
@@ -25,37 +25,76 @@ impl History {
             return Ok(name.to_owned());
         }
         let known = self.ids("act:Run")?;
-        let beginning: Vec<&String> = known.iter().filter(|id| !name.is_empty() && id.starts_with(name)).collect();
+        let beginning: Vec<&String> = known
+            .iter()
+            .filter(|id| !name.is_empty() && id.starts_with(name))
+            .collect();
         let fault = match beginning.as_slice() {
             [only] => return Ok((*only).clone()),
-            [] => Diagnostic::error("H008", format!("the history `{}` has no run `{name}`", self.dir().display()))
-                .help(match nearest(name, known.iter().map(String::as_str)) {
-                    Some(found) => format!("did you mean `{found}`? `actcheck list` shows all runs"),
-                    None => "`actcheck list` shows all runs".to_owned(),
-                }),
-            several => Diagnostic::error("H008", format!("`{name}` matches {} runs", several.len())).help(format!(
-                "name one of them: {}{}",
-                several.iter().take(5).map(|id| id.as_str()).collect::<Vec<_>>().join(", "),
-                if several.len() > 5 { ", …" } else { "" }
-            )),
+            [] => Diagnostic::error(
+                "H008",
+                format!("the history `{}` has no run `{name}`", self.dir().display()),
+            )
+            .help(match nearest(name, known.iter().map(String::as_str)) {
+                Some(found) => format!("did you mean `{found}`? `actcheck list` shows all runs"),
+                None => "`actcheck list` shows all runs".to_owned(),
+            }),
+            several => {
+                Diagnostic::error("H008", format!("`{name}` matches {} runs", several.len())).help(
+                    format!(
+                        "name one of them: {}{}",
+                        several
+                            .iter()
+                            .take(5)
+                            .map(|id| id.as_str())
+                            .collect::<Vec<_>>()
+                            .join(", "),
+                        if several.len() > 5 { ", …" } else { "" }
+                    ),
+                )
+            }
         };
         Err(fault.into())
     }
 
-    /// The last run of the newest campaign that has one, or the last run in which a property failed.
+    /// The last run of the newest campaign that has one, or the last run in which a property
+    /// failed.
     fn last(&self, failed: bool) -> Result<String, Diagnostics> {
-        let judgements = if failed { Judgements::Newest } else { Judgements::None };
+        let judgements = if failed {
+            Judgements::Newest
+        } else {
+            Judgements::None
+        };
         let mut last = None;
-        self.each_judged(&RunFilter::default(), Wish { judgements, ..Wish::default() }, &mut |run| {
-            if !failed || run.outcomes.iter().any(|own| own.outcome == Outcome::Failed) {
-                last = Some(run.row.run);
-            }
-        })?;
-        let which = if failed { "run in which a property failed" } else { "run" };
+        self.each_judged(
+            &RunFilter::default(),
+            Wish {
+                judgements,
+                ..Wish::default()
+            },
+            &mut |run| {
+                if !failed
+                    || run
+                        .outcomes
+                        .iter()
+                        .any(|own| own.outcome == Outcome::Failed)
+                {
+                    last = Some(run.row.run);
+                }
+            },
+        )?;
+        let which = if failed {
+            "run in which a property failed"
+        } else {
+            "run"
+        };
         last.ok_or_else(|| {
-            Diagnostic::error("H008", format!("the history `{}` has no {which}", self.dir().display()))
-                .help("`actcheck list` shows all runs")
-                .into()
+            Diagnostic::error(
+                "H008",
+                format!("the history `{}` has no {which}", self.dir().display()),
+            )
+            .help("`actcheck list` shows all runs")
+            .into()
         })
     }
 }

@@ -30,7 +30,8 @@ pub struct RunRow {
     pub index: u64,
     /// Scene and repetition, if scenes are run more than once.
     pub repetition: Option<Repetition>,
-    /// Importance weight of its scene, if scenes were drawn from another distribution than the configuration's.
+    /// Importance weight of its scene, if scenes were drawn from another distribution than the
+    /// configuration's.
     pub weight: Option<f64>,
     /// Names of the actions, joined by a space.
     pub test: String,
@@ -127,7 +128,8 @@ pub struct RunDetail {
     pub program_version: String,
     /// Initial pose of the base. Units: metres, metres, radians. Shape: x, y, heading.
     pub robot_base: [f64; 3],
-    /// Standard deviations of sensing by name of their term, such as `positionNoise`. Units: metres, radians.
+    /// Standard deviations of sensing by name of their term, such as `positionNoise`. Units:
+    /// metres, radians.
     pub noise: BTreeMap<String, f64>,
     /// Values of the designators.
     pub designators: BTreeMap<String, Vec<String>>,

@@ -18,7 +18,8 @@ use actcheck_base::{Diagnostics, Digest};
 /// The scene of a run, in two digests.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct SceneDigest {
-    /// The test, the world, the designators, the objects with their poses, and the pose of the robot's base.
+    /// The test, the world, the designators, the objects with their poses, and the pose of the
+    /// robot's base.
     pub arrangement: String,
     /// Mass, friction and restitution of the objects.
     pub physics: String,
@@ -36,7 +37,11 @@ impl History {
         })?;
         let wanted: BTreeSet<&String> = runs.iter().map(|row| &row.run).collect();
         outlines.retain(|run, _| wanted.contains(run));
-        let whole: Vec<RunRow> = runs.iter().filter(|row| !outlines.contains_key(&row.run)).cloned().collect();
+        let whole: Vec<RunRow> = runs
+            .iter()
+            .filter(|row| !outlines.contains_key(&row.run))
+            .cloned()
+            .collect();
         outlines.extend(self.whole_scenes(&whole)?);
         Ok(outlines)
     }
@@ -45,10 +50,14 @@ impl History {
     ///
     /// # Errors
     /// The store can't be read.
-    pub(super) fn whole_scenes(&self, runs: &[RunRow]) -> Result<BTreeMap<String, SceneDigest>, Diagnostics> {
+    pub(super) fn whole_scenes(
+        &self,
+        runs: &[RunRow],
+    ) -> Result<BTreeMap<String, SceneDigest>, Diagnostics> {
         let store = self.store_with(Wanted::details)?;
         let scene = |row: &RunRow| {
-            let digest = read(&*store, &run_node(&row.run)).map_err(|error| self.fault("reading scenes", &error))?;
+            let digest = read(&*store, &run_node(&row.run))
+                .map_err(|error| self.fault("reading scenes", &error))?;
             Ok((row.run.clone(), digest))
         };
         runs.iter().map(scene).collect()
@@ -63,7 +72,13 @@ pub(super) fn read(store: &impl QuadSource, run: &NamedNode) -> Result<SceneDige
     let node = Node::read(store, run)?;
     let objects = objects(store, run)?;
     let mut arrangement = Digest::new();
-    for property in ["act:test", "act:worldName", "w:baseX", "w:baseY", "w:baseYaw"] {
+    for property in [
+        "act:test",
+        "act:worldName",
+        "w:baseX",
+        "w:baseY",
+        "w:baseYaw",
+    ] {
         arrangement.update(node.text(property).unwrap_or_default().as_bytes());
     }
     for (designator, values) in designators(&node) {
@@ -73,13 +88,24 @@ pub(super) fn read(store: &impl QuadSource, run: &NamedNode) -> Result<SceneDige
     let mut physics = Digest::new();
     for object in &objects {
         add_place(object, &mut arrangement);
-        add_numbers([object.mass_kg, object.friction, object.restitution], &mut physics);
+        add_numbers(
+            [object.mass_kg, object.friction, object.restitution],
+            &mut physics,
+        );
     }
-    Ok(SceneDigest { arrangement: arrangement.finish(), physics: physics.finish() })
+    Ok(SceneDigest {
+        arrangement: arrangement.finish(),
+        physics: physics.finish(),
+    })
 }
 
 fn add_place(object: &ObjectDetail, digest: &mut Digest) {
-    for text in [&object.id, &object.model, &object.category, object.role.word()] {
+    for text in [
+        &object.id,
+        &object.model,
+        &object.category,
+        object.role.word(),
+    ] {
         digest.update(text.as_bytes());
     }
     add_numbers([object.x, object.y, object.z, object.yaw], digest);

@@ -1,9 +1,10 @@
-//! The state of a store at one moment, taken without its owner's help: readers need no lock, wait for no writer, and
-//! write nothing into the folder of the history.
+//! The state of a store at one moment, taken without its owner's help: readers need no lock, wait
+//! for no writer, and write nothing into the folder of the history.
 //!
-//! Tables never change after they are written, so the snapshot only holds them open; if the owner removes one, its
-//! content stays readable. The logs and the manifest, which are appended to, are copied. The owner removes a file only
-//! after it has written a manifest without it, so the files belong together if the manifest did not change meanwhile.
+//! Tables never change after they are written, so the snapshot only holds them open; if the owner
+//! removes one, its content stays readable. The logs and the manifest, which are appended to, are
+//! copied. The owner removes a file only after it has written a manifest without it, so the files
+//! belong together if the manifest did not change meanwhile.
 
 use std::fs::{self, File};
 use std::io::{self, ErrorKind, Read as _, Seek as _};
@@ -17,14 +18,15 @@ use crate::journal;
 use crate::seal::{CURRENT, Found, Seal, manifest_of};
 use actcheck_base::{Diagnostics, ScratchFolder, digest_of};
 
-/// Number of times that a snapshot is tried. The manifest changes a few times a second at most, and a try takes some
-/// milliseconds.
+/// Number of times that a snapshot is tried. The manifest changes a few times a second at most, and
+/// a try takes some milliseconds.
 const TRIES: usize = 200;
-/// Largest store that is compared with its seal before it is read: takes a few tenths of a second. Larger ones are
-/// compared by `actcheck health --integrity`. Unit: bytes.
+/// Largest store that is compared with its seal before it is read: takes a few tenths of a second.
+/// Larger ones are compared by `actcheck health --integrity`. Unit: bytes.
 pub(super) const MOST_COMPARED: u64 = 1 << 30;
 
-/// Longest log or manifest that is copied. A sparse file in a foreign store must not fill the disk. Unit: bytes.
+/// Longest log or manifest that is copied. A sparse file in a foreign store must not fill the disk.
+/// Unit: bytes.
 pub(super) const LONGEST_COPIED: u64 = 1 << 30;
 
 /// A store that can be opened for reading at [`Snapshot::store`].
@@ -40,8 +42,8 @@ pub(super) struct Snapshot {
     pub(super) journal: Vec<u8>,
 }
 
-/// Identifies the state of a store: current manifest, its size, the logs and the journal with their sizes, and the time
-/// of the last outline.
+/// Identifies the state of a store: current manifest, its size, the logs and the journal with their
+/// sizes, and the time of the last outline.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Stamp {
     manifest: Vec<u8>,
@@ -55,7 +57,8 @@ impl Snapshot {
     /// Takes a snapshot of a folder's store.
     ///
     /// # Errors
-    /// `H007` the store is damaged; `H001`, `H005` the system's folder for temporary files can't be written.
+    /// `H007` the store is damaged; `H001`, `H005` the system's folder for temporary files can't be
+    /// written.
     pub(super) fn take(folder: &Folder) -> Result<Self, Diagnostics> {
         let seal = match Seal::read(folder) {
             Found::Whole(seal) => Some(seal),
@@ -70,8 +73,8 @@ impl Snapshot {
         Err(missing(folder))
     }
 
-    /// Takes a snapshot of whatever is left of a damaged store: nothing is compared with the seal, and its copies replace
-    /// damaged originals.
+    /// Takes a snapshot of whatever is left of a damaged store: nothing is compared with the seal,
+    /// and its copies replace damaged originals.
     ///
     /// # Errors
     /// As [`Snapshot::take`].
@@ -82,12 +85,21 @@ impl Snapshot {
         let current = folder::read(&folder.store().join(CURRENT)).unwrap_or_default();
         let manifest = manifest_of(&current).map(|name| folder.store().join(name));
         let is_damaged = |path: PathBuf| {
-            let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-            folder::open(&path)
-                .map_or(true, |mut file| matches!(seal.is_damaged(&name, &mut file), Some(Ok(true) | Err(_))))
+            let name = path
+                .file_name()
+                .unwrap_or_default()
+                .to_string_lossy()
+                .into_owned();
+            folder::open(&path).map_or(true, |mut file| {
+                matches!(seal.is_damaged(&name, &mut file), Some(Ok(true) | Err(_)))
+            })
         };
         let damaged = seal.is_wrong_current(&current) || manifest.is_none_or(is_damaged);
-        let small = if damaged { folder.seal() } else { folder.store() };
+        let small = if damaged {
+            folder.seal()
+        } else {
+            folder.store()
+        };
         attempt(folder, &small, None)?.ok_or_else(|| missing(folder))
     }
 
@@ -107,23 +119,41 @@ impl Snapshot {
     }
 }
 
-/// Takes a snapshot whose manifest is in the folder `small`. Returns `None` if the manifest changed meanwhile.
-fn attempt(folder: &Folder, small: &Path, seal: Option<&Seal>) -> Result<Option<Snapshot>, Diagnostics> {
+/// Takes a snapshot whose manifest is in the folder `small`. Returns `None` if the manifest changed
+/// meanwhile.
+fn attempt(
+    folder: &Folder,
+    small: &Path,
+    seal: Option<&Seal>,
+) -> Result<Option<Snapshot>, Diagnostics> {
     let dir = folder.dir();
-    let Some(before) = stamp(folder, small) else { return Ok(None) };
+    let Some(before) = stamp(folder, small) else {
+        return Ok(None);
+    };
     if seal.is_some_and(|seal| seal.is_wrong_current(&before.manifest)) {
         return Err(fault::damaged_file(dir, CURRENT));
     }
     let scratch = ScratchFolder::create().map_err(|error| fault::temporary(dir, &error))?;
     let compared = seal.filter(|seal| seal.size() <= MOST_COMPARED);
-    // Read before the store's files: the owner puts statements into the store before it removes them from here.
-    let journal = journal::read(dir).map_err(|error| fault::io(dir, "reading its journal", &error))?;
+    // Read before the store's files: the owner puts statements into the store before it removes
+    // them from here.
+    let journal =
+        journal::read(dir).map_err(|error| fault::io(dir, "reading its journal", &error))?;
     let (mut tables, mut size) = (Vec::new(), 0);
     let manifest = manifest_of(&before.manifest).unwrap_or_default();
-    let entries =
-        folder.below().entries(&folder.store()).map_err(|error| fault::io(dir, "reading its store", &error))?;
-    let names: Vec<String> = entries.into_iter().filter_map(|(name, _)| name.into_string().ok()).collect();
-    for name in names.iter().map(String::as_str).filter(|name| name.ends_with(".sst") || name.ends_with(".log")) {
+    let entries = folder
+        .below()
+        .entries(&folder.store())
+        .map_err(|error| fault::io(dir, "reading its store", &error))?;
+    let names: Vec<String> = entries
+        .into_iter()
+        .filter_map(|(name, _)| name.into_string().ok())
+        .collect();
+    for name in names
+        .iter()
+        .map(String::as_str)
+        .filter(|name| name.ends_with(".sst") || name.ends_with(".log"))
+    {
         let from = folder.store().join(name);
         let mut file = match folder::open(&from) {
             Ok(file) => file,
@@ -135,10 +165,15 @@ fn attempt(folder: &Folder, small: &Path, seal: Option<&Seal>) -> Result<Option<
             if compared.map_err(|error| fault::io(dir, "reading its store", &error))? {
                 return Err(fault::damaged_file(dir, name));
             }
-            file.rewind().map_err(|error| fault::io(dir, "reading its store", &error))?;
+            file.rewind()
+                .map_err(|error| fault::io(dir, "reading its store", &error))?;
         }
         let to = scratch.path().join(name);
-        let linked = if name.ends_with(".sst") { link(&file, &from, &to) } else { copy(&mut file, &to) };
+        let linked = if name.ends_with(".sst") {
+            link(&file, &from, &to)
+        } else {
+            copy(&mut file, &to)
+        };
         linked.map_err(|error| fault::temporary(dir, &error))?;
         if name.ends_with(".sst") {
             size += file.metadata().map_or(0, |found| found.len());
@@ -146,25 +181,45 @@ fn attempt(folder: &Folder, small: &Path, seal: Option<&Seal>) -> Result<Option<
         }
     }
     for name in [manifest, "IDENTITY"] {
-        let from = if name == manifest { small.join(name) } else { folder.store().join(name) };
-        let Ok(mut file) = folder::open(&from) else { continue };
+        let from = if name == manifest {
+            small.join(name)
+        } else {
+            folder.store().join(name)
+        };
+        let Ok(mut file) = folder::open(&from) else {
+            continue;
+        };
         if let Some(Ok(true)) = seal.and_then(|seal| seal.is_damaged(name, &mut file)) {
             return Err(fault::damaged_file(dir, name));
         }
-        let copied = file.rewind().and_then(|()| copy(&mut file, &scratch.path().join(name)));
+        let copied = file
+            .rewind()
+            .and_then(|()| copy(&mut file, &scratch.path().join(name)));
         copied.map_err(|error| fault::temporary(dir, &error))?;
     }
-    fs::write(scratch.path().join(CURRENT), &before.manifest).map_err(|error| fault::temporary(dir, &error))?;
+    fs::write(scratch.path().join(CURRENT), &before.manifest)
+        .map_err(|error| fault::temporary(dir, &error))?;
     let copied = fs::metadata(scratch.path().join(manifest)).map_or(0, |found| found.len());
-    let is_same =
-        stamp(folder, small).is_some_and(|after| after.manifest == before.manifest && after.size == before.size);
+    let is_same = stamp(folder, small)
+        .is_some_and(|after| after.manifest == before.manifest && after.size == before.size);
     let whole = is_same && copied == before.size;
-    Ok(whole.then_some(Snapshot { scratch, stamp: before, _tables: tables, size, journal }))
+    Ok(whole.then_some(Snapshot {
+        scratch,
+        stamp: before,
+        _tables: tables,
+        size,
+        journal,
+    }))
 }
 
-/// The fault of a store without a readable manifest: another process is creating it, or it is damaged.
+/// The fault of a store without a readable manifest: another process is creating it, or it is
+/// damaged.
 fn missing(folder: &Folder) -> Diagnostics {
-    if folder.is_locked() { fault::in_use(folder.dir()) } else { fault::damaged_file(folder.dir(), CURRENT) }
+    if folder.is_locked() {
+        fault::in_use(folder.dir())
+    } else {
+        fault::damaged_file(folder.dir(), CURRENT)
+    }
 }
 
 /// Reads the stamp of a store. Returns `None` if it has no readable manifest.
@@ -172,19 +227,33 @@ fn stamp(folder: &Folder, store: &Path) -> Option<Stamp> {
     let current = folder::read(&store.join(CURRENT)).ok()?;
     let size = fs::metadata(store.join(manifest_of(&current)?)).ok()?.len();
     let logs = folder.below().files(store).into_iter().filter_map(|file| {
-        let name = file.file_name()?.to_str().filter(|name| name.ends_with(".log"))?.to_owned();
+        let name = file
+            .file_name()?
+            .to_str()
+            .filter(|name| name.ends_with(".log"))?
+            .to_owned();
         Some((name, fs::metadata(file).ok()?.len()))
     });
     let logs: Vec<(String, u64)> = logs.collect();
     let journal = fs::metadata(folder.dir().join(journal::NAME)).map_or(0, |found| found.len());
-    let outlines = fs::metadata(folder.outlines()).and_then(|found| found.modified()).ok();
-    Some(Stamp { manifest: current, size, logs, journal, outlines })
+    let outlines = fs::metadata(folder.outlines())
+        .and_then(|found| found.modified())
+        .ok();
+    Some(Stamp {
+        manifest: current,
+        size,
+        logs,
+        journal,
+        outlines,
+    })
 }
 
 /// Copies a file into the reader's folder for temporary files.
 fn copy(file: &mut File, to: &Path) -> io::Result<()> {
     if file.metadata()?.len() > LONGEST_COPIED {
-        return Err(io::Error::other("a file of its store is far longer than any that this program writes"));
+        return Err(io::Error::other(
+            "a file of its store is far longer than any that this program writes",
+        ));
     }
     io::copy(&mut file.take(LONGEST_COPIED), &mut File::create(to)?).map(drop)
 }
@@ -194,7 +263,11 @@ fn copy(file: &mut File, to: &Path) -> io::Result<()> {
 fn link(file: &File, from: &Path, to: &Path) -> io::Result<()> {
     use std::os::fd::AsRawFd as _;
     let open = PathBuf::from(format!("/proc/self/fd/{}", file.as_raw_fd()));
-    if open.exists() { std::os::unix::fs::symlink(open, to) } else { copied(from, to) }
+    if open.exists() {
+        std::os::unix::fs::symlink(open, to)
+    } else {
+        copied(from, to)
+    }
 }
 
 #[cfg(not(target_os = "linux"))]

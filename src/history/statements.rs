@@ -4,7 +4,8 @@ use oxigraph::model::{GraphName, Literal, NamedNode, NamedOrBlankNode, Quad, Ter
 
 use actcheck_base::names;
 
-/// Expands a prefixed name of [`names::PREFIXES`], such as `act:score`; any other text is used as an IRI.
+/// Expands a prefixed name of [`names::PREFIXES`], such as `act:score`; any other text is used as
+/// an IRI.
 pub(super) fn iri(name: &str) -> NamedNode {
     let expanded = name.split_once(':').and_then(|(prefix, local)| {
         let (_, namespace) = names::PREFIXES.iter().find(|(known, _)| *known == prefix)?;
@@ -13,11 +14,13 @@ pub(super) fn iri(name: &str) -> NamedNode {
     NamedNode::new_unchecked(expanded.unwrap_or_else(|| name.to_owned()))
 }
 
-/// A literal for a point in time, in the canonical form of XML Schema, which has no zeros at the end of its seconds: stores
-/// return it in this form.
+/// A literal for a point in time, in the canonical form of XML Schema, which has no zeros at the
+/// end of its seconds: stores return it in this form.
 pub(super) fn time(rfc3339: &str) -> Literal {
     let canonical = match rfc3339.strip_suffix('Z') {
-        Some(seconds) if seconds.contains('.') => format!("{}Z", seconds.trim_end_matches('0').trim_end_matches('.')),
+        Some(seconds) if seconds.contains('.') => {
+            format!("{}Z", seconds.trim_end_matches('0').trim_end_matches('.'))
+        }
         _ => rfc3339.to_owned(),
     };
     Literal::new_typed_literal(canonical, iri("xsd:dateTime"))
@@ -38,7 +41,10 @@ pub(super) struct Statements {
 impl Statements {
     /// Starts statements about a subject, in the default graph.
     pub(super) fn about(&mut self, subject: impl Into<NamedOrBlankNode>) -> About<'_> {
-        About { quads: &mut self.quads, subject: subject.into() }
+        About {
+            quads: &mut self.quads,
+            subject: subject.into(),
+        }
     }
 }
 
@@ -51,7 +57,12 @@ pub(super) struct About<'a> {
 impl About<'_> {
     /// Adds the value of a property.
     pub(super) fn has(&mut self, property: &str, value: impl Into<Term>) -> &mut Self {
-        self.quads.push(Quad::new(self.subject.clone(), iri(property), value, GraphName::DefaultGraph));
+        self.quads.push(Quad::new(
+            self.subject.clone(),
+            iri(property),
+            value,
+            GraphName::DefaultGraph,
+        ));
         self
     }
 
@@ -78,7 +89,8 @@ impl About<'_> {
 mod tests {
     use super::*;
 
-    /// Outlines are exported as they are written, but another store returned `22.43Z` for `22.430Z`.
+    /// Outlines are exported as they are written, but another store returned `22.43Z` for
+    /// `22.430Z`.
     #[test]
     fn times_are_written_as_stores_return_them() {
         for (written, canonical) in [
@@ -90,7 +102,12 @@ mod tests {
             assert_eq!(time(written).value(), canonical);
             let stored = oxigraph::store::Store::new().and_then(|store| {
                 let node = iri("act:Run");
-                let quad = Quad::new(node.clone(), node, time(written), oxigraph::model::GraphName::DefaultGraph);
+                let quad = Quad::new(
+                    node.clone(),
+                    node,
+                    time(written),
+                    oxigraph::model::GraphName::DefaultGraph,
+                );
                 store.insert(&quad)?;
                 store.iter().next().unwrap_or(Ok(quad))
             });

@@ -22,18 +22,20 @@ use crate::wanted::Wanted;
 use crate::write_campaign::{self, campaign_node};
 use crate::write_run::run_node;
 use crate::{
-    CampaignEnd, CampaignRecord, CampaignRow, Cancel, Judgements, OutcomeRow, QueryAnswer, RunDetail, RunFilter,
-    RunRecord, RunRow, RunVitals, Wish, detail, fault, query, trace_file, vitals,
+    CampaignEnd, CampaignRecord, CampaignRow, Cancel, Judgements, OutcomeRow, QueryAnswer,
+    RunDetail, RunFilter, RunRecord, RunRow, RunVitals, Wish, detail, fault, query, trace_file,
+    vitals,
 };
 use crate::{lists, read_campaign};
 use actcheck_base::{Diagnostic, Diagnostics, Digest, Source, names, nearest};
 
-/// A history that only this process may write, or that it only reads (after [`History::open_to_read`]).
+/// A history that only this process may write, or that it only reads (after
+/// [`History::open_to_read`]).
 ///
-/// A run that [`History::commit`] stored survives a kill of the process. Before a power cut, the operating system may not
-/// have written the last seconds to the disk; runs stored before [`History::flush`] survive that, too, and all runs after
-/// [`History::sync_each_run`].
-/// Its trace file is written first, so that every run in the store has one.
+/// A run that [`History::commit`] stored survives a kill of the process. Before a power cut, the
+/// operating system may not have written the last seconds to the disk; runs stored before
+/// [`History::flush`] survive that, too, and all runs after [`History::sync_each_run`]. Its trace
+/// file is written first, so that every run in the store has one.
 pub struct History {
     // Dropped before the folder, which releases the lock. `None` only if reopening failed.
     pub(super) opened: RwLock<Option<Opened>>,
@@ -56,8 +58,8 @@ pub struct History {
 }
 
 impl History {
-    /// Limits the threads that write its tables at the end of a campaign, and that read lists of runs: otherwise, all cores
-    /// do.
+    /// Limits the threads that write its tables at the end of a campaign, and that read lists of
+    /// runs: otherwise, all cores do.
     pub fn use_threads(&self, threads: usize) {
         self.threads.store(threads.max(1), Ordering::Relaxed);
     }
@@ -77,15 +79,17 @@ impl History {
         self.folder.dir()
     }
 
-    /// Returns an id for a new campaign: short, unique in this history, and the same for the same history,
-    /// configuration and seed.
+    /// Returns an id for a new campaign: short, unique in this history, and the same for the same
+    /// history, configuration and seed.
     ///
     /// # Errors
     /// The store can't be read.
     pub fn next_campaign_id(&self, config_digest: &str, seed: u64) -> Result<String, Diagnostics> {
         let known: BTreeSet<String> = self.campaign_ids()?.into_iter().collect();
         let first = known.len() as u64;
-        let free = (first..).map(|counter| campaign_id(config_digest, seed, counter)).find(|id| !known.contains(id));
+        let free = (first..)
+            .map(|counter| campaign_id(config_digest, seed, counter))
+            .find(|id| !known.contains(id));
         // There are nearly a million short ids; when all are used, a long one follows.
         Ok(free.unwrap_or_else(|| config_digest.to_owned()))
     }
@@ -98,7 +102,10 @@ impl History {
         self.check_ids("campaign", [&record.id])?;
         self.remove_orphans()?;
         let number = self.campaign_ids()?.len() as u64;
-        self.enter_quads(&write_campaign::beginning(record, number), "writing the campaign")?;
+        self.enter_quads(
+            &write_campaign::beginning(record, number),
+            "writing the campaign",
+        )?;
         self.flush()
     }
 
@@ -112,7 +119,12 @@ impl History {
             let mut ends = Vec::new();
             for property in write_campaign::end_properties() {
                 let (subject, graph) = (campaign.as_ref().into(), GraphNameRef::DefaultGraph);
-                for quad in store.quads_for_pattern(Some(subject), Some(property.as_ref()), None, Some(graph)) {
+                for quad in store.quads_for_pattern(
+                    Some(subject),
+                    Some(property.as_ref()),
+                    None,
+                    Some(graph),
+                ) {
                     ends.push(quad?);
                 }
             }
@@ -125,30 +137,48 @@ impl History {
         self.flush()
     }
 
-    /// Stores the outlines of several runs of a campaign in one file: all of them or, on an error, none.
+    /// Stores the outlines of several runs of a campaign in one file: all of them or, on an error,
+    /// none.
     ///
     /// # Errors
     /// As [`History::commit`].
-    pub fn commit_outlines(&self, campaign: &str, records: &[RunRecord]) -> Result<(), Diagnostics> {
+    pub fn commit_outlines(
+        &self,
+        campaign: &str,
+        records: &[RunRecord],
+    ) -> Result<(), Diagnostics> {
         self.check_ids("run", records.iter().map(|record| &record.id))?;
         let doing = "writing outlines";
-        let outlines = records.iter().map(Outline::of).collect::<Result<Vec<_>, _>>();
-        let outlines = outlines.map_err(|error| Diagnostic::error("H006", format!("{doing} failed: {error}")))?;
+        let outlines = records
+            .iter()
+            .map(Outline::of)
+            .collect::<Result<Vec<_>, _>>();
+        let outlines = outlines
+            .map_err(|error| Diagnostic::error("H006", format!("{doing} failed: {error}")))?;
         self.folder.begin_outlines()?;
-        self.shelf().add_all(campaign, &outlines).map_err(|error| fault::io(self.dir(), doing, &error))
+        self.shelf()
+            .add_all(campaign, &outlines)
+            .map_err(|error| fault::io(self.dir(), doing, &error))
     }
 
     /// Stores an outline.
-    pub(super) fn enter_outline(&self, campaign: &str, index: u64, outline: &Outline) -> Result<(), Diagnostics> {
+    pub(super) fn enter_outline(
+        &self,
+        campaign: &str,
+        index: u64,
+        outline: &Outline,
+    ) -> Result<(), Diagnostics> {
         let doing = format!("writing run {campaign}-{}", index + 1);
         self.folder.begin_outlines()?;
         let shelf = self.shelf();
         let synced = self.syncs_each_run();
         shelf
             .add(campaign, index, outline, synced)
-            .and_then(|()| match self.single_outlines.fetch_add(1, Ordering::Relaxed) % Shelf::RUNS_IN_A_FILE {
-                last if last + 1 == Shelf::RUNS_IN_A_FILE => shelf.pack(campaign),
-                _ => Ok(()),
+            .and_then(|()| {
+                match self.single_outlines.fetch_add(1, Ordering::Relaxed) % Shelf::RUNS_IN_A_FILE {
+                    last if last + 1 == Shelf::RUNS_IN_A_FILE => shelf.pack(campaign),
+                    _ => Ok(()),
+                }
             })
             .map_err(|error| fault::io(self.dir(), &doing, &error))
     }
@@ -159,7 +189,9 @@ impl History {
     /// Writing failed: `H005`, `H006`.
     pub fn flush(&self) -> Result<(), Diagnostics> {
         self.sync_journal()?;
-        self.bare_store()?.flush().map_err(|error| self.fault("writing to the disk", &error))
+        self.bare_store()?
+            .flush()
+            .map_err(|error| self.fault("writing to the disk", &error))
     }
 
     /// Writes the end of a campaign, and flushes everything to the disk.
@@ -167,8 +199,13 @@ impl History {
     /// # Errors
     /// Writing failed: `H005`, `H006`.
     pub fn finish_campaign(&self, id: &str, end: &CampaignEnd) -> Result<(), Diagnostics> {
-        self.enter_quads(&write_campaign::end(id, end), "writing the end of the campaign")?;
-        self.shelf().pack(id).map_err(|error| fault::io(self.dir(), "writing outlines", &error))?;
+        self.enter_quads(
+            &write_campaign::end(id, end),
+            "writing the end of the campaign",
+        )?;
+        self.shelf()
+            .pack(id)
+            .map_err(|error| fault::io(self.dir(), "writing outlines", &error))?;
         self.load_journal()?;
         self.flush()?;
         self.reopen()
@@ -179,8 +216,8 @@ impl History {
     /// # Errors
     /// The store can't be read; `H026` an id is not an id.
     pub fn campaigns(&self) -> Result<Vec<CampaignRow>, Diagnostics> {
-        let mut campaigns =
-            lists::campaigns(&*self.store_with(lists::of_campaigns)?).map_err(|error| self.query_fault(&error))?;
+        let mut campaigns = lists::campaigns(&*self.store_with(lists::of_campaigns)?)
+            .map_err(|error| self.query_fault(&error))?;
         for campaign in &mut campaigns {
             campaign.runs += self.count_outlined(&campaign.id)?;
         }
@@ -203,44 +240,57 @@ impl History {
                     Some(found) => format!("did you mean `{found}`?"),
                     None => "`actcheck list` shows all runs with their campaigns".to_owned(),
                 };
-                let message = format!("the history `{}` has no campaign `{id}`", self.dir().display());
+                let message = format!(
+                    "the history `{}` has no campaign `{id}`",
+                    self.dir().display()
+                );
                 Err(Diagnostic::error("H014", message).help(help).into())
             }
         }
     }
 
-    /// Returns the runs that match a filter, sorted by the start of their campaign, then by index. An unknown campaign
-    /// has no runs.
+    /// Returns the runs that match a filter, sorted by the start of their campaign, then by index.
+    /// An unknown campaign has no runs.
     ///
     /// # Errors
     /// The store can't be read; `H026` an id is not an id.
     pub fn runs(&self, filter: &RunFilter) -> Result<Vec<RunRow>, Diagnostics> {
         let mut runs = Vec::new();
-        let wish = Wish { judgements: Judgements::None, ..Wish::default() };
+        let wish = Wish {
+            judgements: Judgements::None,
+            ..Wish::default()
+        };
         self.each_judged(filter, wish, &mut |run| runs.push(run.row))?;
         Ok(runs)
     }
 
     /// The runs that are kept whole.
     pub(super) fn whole_runs(&self) -> Result<Vec<RunRow>, Diagnostics> {
-        lists::runs(&*self.store_with(lists::of_runs)?, &RunFilter::default(), self.threads())
-            .map_err(|error| self.query_fault(&error))
+        lists::runs(
+            &*self.store_with(lists::of_runs)?,
+            &RunFilter::default(),
+            self.threads(),
+        )
+        .map_err(|error| self.query_fault(&error))
     }
 
-    /// Returns the ids of all campaigns except those of [`History::selected_campaigns`], sorted by start.
+    /// Returns the ids of all campaigns except those of [`History::selected_campaigns`], sorted by
+    /// start.
     ///
     /// # Errors
     /// The store can't be read; `H026` an id is not an id.
     pub fn unselected_campaigns(&self) -> Result<Vec<String>, Diagnostics> {
         let selected = self.selected_campaigns()?;
         let store = self.store_with(lists::of_campaigns)?;
-        let mut campaigns = lists::campaign_ids(&store).map_err(|error| self.query_fault(&error))?;
+        let mut campaigns =
+            lists::campaign_ids(&store).map_err(|error| self.query_fault(&error))?;
         campaigns.retain(|id| !selected.contains(id));
         self.check_ids("campaign", &campaigns)?;
         Ok(campaigns)
     }
 
-    /// Returns the campaigns of [`History::unselected_campaigns`], each with its run ids, sorted as strings.
+    /// Returns the campaigns of [`History::unselected_campaigns`], each with its run ids, sorted as
+    /// strings.
     ///
     /// # Errors
     /// The store can't be read; `H026` an id is not an id.
@@ -250,8 +300,10 @@ impl History {
             let store = self.store_with(|| Wanted::values(&["act:campaign"]))?;
             let runs = subjects(&*store, "act:campaign", &campaign_node(&id));
             let runs = runs.map_err(|error| self.fault("reading", &error))?;
-            let mut runs: Vec<String> =
-                runs.into_iter().map(|run| short_id(&text_of(&run.into())).to_owned()).collect();
+            let mut runs: Vec<String> = runs
+                .into_iter()
+                .map(|run| short_id(&text_of(&run.into())).to_owned())
+                .collect();
             self.check_ids("run", &runs)?;
             runs.extend(self.outlined_ids(Some(&id))?);
             runs.sort();
@@ -260,14 +312,16 @@ impl History {
         Ok(found)
     }
 
-    /// Returns the outcomes of the runs that match a filter, in the order of [`History::runs`], then by step and
-    /// property.
+    /// Returns the outcomes of the runs that match a filter, in the order of [`History::runs`],
+    /// then by step and property.
     ///
     /// # Errors
     /// The store can't be read.
     pub fn outcomes(&self, filter: &RunFilter) -> Result<Vec<OutcomeRow>, Diagnostics> {
         let mut outcomes = Vec::new();
-        self.each_judged(filter, Wish::default(), &mut |run| outcomes.extend(run.outcome_rows()))?;
+        self.each_judged(filter, Wish::default(), &mut |run| {
+            outcomes.extend(run.outcome_rows())
+        })?;
         Ok(outcomes)
     }
 
@@ -289,15 +343,22 @@ impl History {
         read.map_err(|error| self.fault("reading a run", &error))
     }
 
-    /// Calls `each` with the health data of every run of a campaign: first those of outlines, file by file, then those of runs
-    /// that are kept whole, by index.
+    /// Calls `each` with the health data of every run of a campaign: first those of outlines, file
+    /// by file, then those of runs that are kept whole, by index.
     ///
     /// # Errors
     /// `H014` there is no such campaign; otherwise as [`History::trace`].
-    pub fn each_vitals(&self, campaign: &str, mut each: impl FnMut(&RunVitals)) -> Result<(), Diagnostics> {
+    pub fn each_vitals(
+        &self,
+        campaign: &str,
+        mut each: impl FnMut(&RunVitals),
+    ) -> Result<(), Diagnostics> {
         self.campaign(campaign)?;
         self.each_outlined_vitals(campaign, &mut each)?;
-        let filter = RunFilter { campaign: Some(campaign.to_owned()), ..RunFilter::default() };
+        let filter = RunFilter {
+            campaign: Some(campaign.to_owned()),
+            ..RunFilter::default()
+        };
         let whole = lists::runs(&*self.store_with(lists::of_runs)?, &filter, self.threads())
             .map_err(|error| self.query_fault(&error))?;
         let store = self.store_with(vitals::wanted)?;
@@ -310,10 +371,11 @@ impl History {
         Ok(())
     }
 
-    /// Answers a SPARQL query. The prefixes of [`actcheck_base::names::PREFIXES`] need no declaration.
+    /// Answers a SPARQL query. The prefixes of [`actcheck_base::names::PREFIXES`] need no
+    /// declaration.
     ///
-    /// The default graph holds campaigns, runs, executions, scenes and outcomes; facts are in the graphs that
-    /// `act:before`, `act:after` and `act:during` name.
+    /// The default graph holds campaigns, runs, executions, scenes and outcomes; facts are in the
+    /// graphs that `act:before`, `act:after` and `act:during` name.
     ///
     /// # Errors
     /// `H010` the text is not a query, `H011` it is an update, `H012` the evaluation failed.
@@ -321,7 +383,8 @@ impl History {
         self.query_from(&Source::new("query", sparql), &Cancel::new())
     }
 
-    /// Like [`History::query`], for a source text with a name, and with a handle that stops the query.
+    /// Like [`History::query`], for a source text with a name, and with a handle that stops the
+    /// query.
     ///
     /// # Errors
     /// As [`History::query`]; `H013` the query was stopped.
@@ -341,7 +404,12 @@ impl History {
         let (run, class) = (run_node(id), iri("act:Run"));
         // A question about one run is often followed by questions about others.
         self.store_with(|| Wanted::individuals("act:Run"))?
-            .contains(QuadRef::new(&run, rdf::TYPE, &class, GraphNameRef::DefaultGraph))
+            .contains(QuadRef::new(
+                &run,
+                rdf::TYPE,
+                &class,
+                GraphNameRef::DefaultGraph,
+            ))
             .map_err(|error| self.fault("reading", &error))
     }
 
@@ -349,13 +417,24 @@ impl History {
     pub(super) fn ids(&self, class: &str) -> Result<Vec<String>, Diagnostics> {
         let store = self.store_with(|| Wanted::individuals(class))?;
         let class = iri(class);
-        let found = subjects(&*store, "rdf:type", class.as_ref()).map_err(|error| self.fault("reading", &error))?;
-        let mut ids: Vec<String> = found.into_iter().map(|node| short_id(&text_of(&node.into())).to_owned()).collect();
+        let found = subjects(&*store, "rdf:type", class.as_ref())
+            .map_err(|error| self.fault("reading", &error))?;
+        let mut ids: Vec<String> = found
+            .into_iter()
+            .map(|node| short_id(&text_of(&node.into())).to_owned())
+            .collect();
         if class.as_str().ends_with("Run") {
             ids.extend(self.outlined_ids(None)?);
         }
         ids.sort();
-        self.check_ids(if class.as_str().ends_with("Run") { "run" } else { "campaign" }, &ids)?;
+        self.check_ids(
+            if class.as_str().ends_with("Run") {
+                "run"
+            } else {
+                "campaign"
+            },
+            &ids,
+        )?;
         Ok(ids)
     }
 
@@ -371,19 +450,25 @@ impl History {
         }
     }
 
-    /// A warning if campaigns of the history began later than now: the clock was ahead then, or is behind now.
+    /// A warning if campaigns of the history began later than now: the clock was ahead then, or is
+    /// behind now.
     ///
     /// # Errors
     /// The store can't be read.
     pub fn clock_warning(&self, now: &str) -> Result<Option<Diagnostic>, Diagnostics> {
         let campaigns = self.campaigns()?;
-        let Some(ahead) = campaigns.iter().filter(|row| row.started.as_str() > now).max_by_key(|row| &row.started)
+        let Some(ahead) = campaigns
+            .iter()
+            .filter(|row| row.started.as_str() > now)
+            .max_by_key(|row| &row.started)
         else {
             return Ok(None);
         };
-        let message = format!("campaign {} began at {}, but it is {now} now", ahead.id, ahead.started);
-        let help =
-            "the clock was ahead then, or is behind now: set it; campaigns keep the order in which they were added";
+        let message = format!(
+            "campaign {} began at {}, but it is {now} now",
+            ahead.id, ahead.started
+        );
+        let help = "the clock was ahead then, or is behind now: set it; campaigns keep the order in which they were added";
         Ok(Some(Diagnostic::warning("H032", message).help(help)))
     }
 
@@ -391,7 +476,8 @@ impl History {
         self.ids("act:Campaign")
     }
 
-    /// Removes traces without a run. Only killed processes leave them, and their campaigns have no end.
+    /// Removes traces without a run. Only killed processes leave them, and their campaigns have no
+    /// end.
     fn remove_orphans(&self) -> Result<(), Diagnostics> {
         self.shelf().clean();
         let mut ended = BTreeMap::new();
@@ -404,7 +490,10 @@ impl History {
                 Some(run) => {
                     let campaign = run.rsplit_once('-').map_or(run, |(campaign, _)| campaign);
                     if !ended.contains_key(campaign) {
-                        ended.insert(campaign.to_owned(), self.has_ended(&campaign_node(campaign))?);
+                        ended.insert(
+                            campaign.to_owned(),
+                            self.has_ended(&campaign_node(campaign))?,
+                        );
                     }
                     !ended[campaign] && !self.has_run(run)?
                 }
@@ -426,7 +515,10 @@ impl History {
             None,
             Some(GraphNameRef::DefaultGraph),
         );
-        ends.next().transpose().map(|end| end.is_some()).map_err(|error| self.fault("reading", &error))
+        ends.next()
+            .transpose()
+            .map(|end| end.is_some())
+            .map_err(|error| self.fault("reading", &error))
     }
 
     pub(super) fn fault(&self, doing: &str, error: &StorageError) -> Diagnostics {
@@ -436,15 +528,20 @@ impl History {
     pub(super) fn query_fault(&self, error: &QueryEvaluationError) -> Diagnostics {
         match error {
             QueryEvaluationError::Dataset(error) => fault::damaged(self.dir(), &error.to_string()),
-            other => {
-                Diagnostic::error("H012", format!("reading the history `{}` failed: {other}", self.dir().display()))
-                    .into()
-            }
+            other => Diagnostic::error(
+                "H012",
+                format!(
+                    "reading the history `{}` failed: {other}",
+                    self.dir().display()
+                ),
+            )
+            .into(),
         }
     }
 }
 
-/// Computes a campaign's id: a letter and three letters or digits, without characters that look alike.
+/// Computes a campaign's id: a letter and three letters or digits, without characters that look
+/// alike.
 pub(super) fn campaign_id(config_digest: &str, seed: u64, counter: u64) -> String {
     const LETTERS: &[u8] = b"abcdefghjkmnpqrstvwxyz";
     const ALL: &[u8] = b"abcdefghjkmnpqrstvwxyz23456789";
@@ -453,7 +550,11 @@ pub(super) fn campaign_id(config_digest: &str, seed: u64, counter: u64) -> Strin
     digest.update(&seed.to_le_bytes());
     digest.update(&counter.to_le_bytes());
     let bytes = digest.finish().into_bytes();
-    let number = |at: usize| bytes[at..at + 4].iter().fold(0usize, |sum, byte| sum * 256 + usize::from(*byte));
+    let number = |at: usize| {
+        bytes[at..at + 4]
+            .iter()
+            .fold(0usize, |sum, byte| sum * 256 + usize::from(*byte))
+    };
     [(LETTERS, 0), (ALL, 4), (ALL, 8), (ALL, 12)]
         .map(|(set, at)| char::from(set[number(at) % set.len()]))
         .iter()

@@ -1,28 +1,41 @@
 //! Reports syntax errors of queries at their place.
 //!
-//! The parser reports the furthest place where one of its alternatives failed, and every token that it expected there.
-//! The reported place of a failed keyword is off by the keyword's length; this module corrects it, so that the place is
-//! the one that users expect.
+//! The parser reports the furthest place where one of its alternatives failed, and every token that
+//! it expected there. The reported place of a failed keyword is off by the keyword's length; this
+//! module corrects it, so that the place is the one that users expect.
 
 use actcheck_base::{Diagnostic, Source, names, unclosed_braces};
 
 /// Expected words that a message lists; a syntax error can have a hundred.
 const EXPECTED_SHOWN: usize = 8;
 
-/// Converts a syntax error of the parser, such as `error at 1:8: expected one of …`, into a diagnostic with its place.
+/// Converts a syntax error of the parser, such as `error at 1:8: expected one of …`, into a
+/// diagnostic with its place.
 pub(super) fn syntax_fault(text: &Source, error: &str) -> Diagnostic {
     let place = error.strip_prefix("error at ").and_then(|rest| {
         let (place, expected) = rest.split_once(": ")?;
         let (line, column) = place.split_once(':')?;
-        Some((offset(&text.text, line.parse().ok()?, column.parse().ok()?), expected))
+        Some((
+            offset(&text.text, line.parse().ok()?, column.parse().ok()?),
+            expected,
+        ))
     });
     let Some((end, expected)) = place else {
-        return Diagnostic::error("H010", format!("this is not a SPARQL query: {error}")).in_source(text);
+        return Diagnostic::error("H010", format!("this is not a SPARQL query: {error}"))
+            .in_source(text);
     };
     let expected = expected.strip_prefix("expected ").unwrap_or(expected);
-    let expected: Vec<&str> = expected.strip_prefix("one of ").unwrap_or(expected).split(", ").map(str::trim).collect();
+    let expected: Vec<&str> = expected
+        .strip_prefix("one of ")
+        .unwrap_or(expected)
+        .split(", ")
+        .map(str::trim)
+        .collect();
     // Every other item is a keyword, a quoted character or a character class in brackets.
-    match expected.iter().find(|item| item.contains(' ') && !item.starts_with(['[', '"', '\''])) {
+    match expected
+        .iter()
+        .find(|item| item.contains(' ') && !item.starts_with(['[', '"', '\'']))
+    {
         Some(reason) => with_reason(text, end, reason),
         None => unexpected(text, end, &expected),
     }
@@ -36,8 +49,10 @@ fn with_reason(text: &Source, end: usize, reason: &str) -> Diagnostic {
     let fault = |message: String| Diagnostic::error("H010", message).at(text, start..before.len());
     if reason == "Prefix not found" {
         let known: Vec<&str> = names::PREFIXES.iter().map(|(prefix, _)| *prefix).collect();
-        return fault(format!("the prefix of `{word}` is unknown"))
-            .help(format!("declare it with `PREFIX`, or use a known one: {}", known.join(", ")));
+        return fault(format!("the prefix of `{word}` is unknown")).help(format!(
+            "declare it with `PREFIX`, or use a known one: {}",
+            known.join(", ")
+        ));
     }
     let mut letters = reason.chars();
     let first = letters.next().map(char::to_lowercase).into_iter().flatten();
@@ -54,7 +69,11 @@ fn unexpected(text: &Source, end: usize, expected: &[&str]) -> Diagnostic {
     let keyword = |item: &&str| item.len() > 1 && item.chars().all(|c| c.is_ascii_alphanumeric());
     // `[_]` is any character: a keyword was expected, but the text is shorter than it.
     let only_keywords = expected.iter().all(|item| *item == "[_]" || keyword(item));
-    let shortest = expected.iter().filter(|item| keyword(item)).map(|item| item.len()).min();
+    let shortest = expected
+        .iter()
+        .filter(|item| keyword(item))
+        .map(|item| item.len())
+        .min();
     let start = match shortest {
         Some(length) if only_keywords => back(&text.text, end, length),
         _ => end,
@@ -62,10 +81,17 @@ fn unexpected(text: &Source, end: usize, expected: &[&str]) -> Diagnostic {
     let rest = &text.text[start..];
     let skipped = rest.len() - rest.trim_start().len();
     let start = start + skipped;
-    let length = rest[skipped..].find(char::is_whitespace).unwrap_or(rest.len() - skipped);
+    let length = rest[skipped..]
+        .find(char::is_whitespace)
+        .unwrap_or(rest.len() - skipped);
     let stop = end.max(start + length).min(text.text.len()).max(start);
-    let found: String =
-        text.text[start..stop].split_whitespace().collect::<Vec<_>>().join(" ").chars().take(40).collect();
+    let found: String = text.text[start..stop]
+        .split_whitespace()
+        .collect::<Vec<_>>()
+        .join(" ")
+        .chars()
+        .take(40)
+        .collect();
     let message = match found.as_str() {
         "" => "the query ends too early".to_owned(),
         found => format!("this is not a SPARQL query: unexpected `{found}`"),
@@ -79,12 +105,14 @@ fn unexpected(text: &Source, end: usize, expected: &[&str]) -> Diagnostic {
     }
     match listed(expected) {
         Some(list) => fault.help(format!("expected {list}")),
-        None => fault.help("a query is `SELECT … WHERE { … }`, `ASK { … }`, `CONSTRUCT` or `DESCRIBE`"),
+        None => {
+            fault.help("a query is `SELECT … WHERE { … }`, `ASK { … }`, `CONSTRUCT` or `DESCRIBE`")
+        }
     }
 }
 
-/// Lists the expected tokens, without character classes, shortened to a readable number. Returns `None` if none is
-/// left.
+/// Lists the expected tokens, without character classes, shortened to a readable number. Returns
+/// `None` if none is left.
 fn listed(expected: &[&str]) -> Option<String> {
     let words: Vec<String> = expected
         .iter()
@@ -94,23 +122,37 @@ fn listed(expected: &[&str]) -> Option<String> {
     match words.len() {
         0 => None,
         count if count <= EXPECTED_SHOWN => Some(words.join(", ")),
-        count => Some(format!("{} and {} more", words[..EXPECTED_SHOWN].join(", "), count - EXPECTED_SHOWN)),
+        count => Some(format!(
+            "{} and {} more",
+            words[..EXPECTED_SHOWN].join(", "),
+            count - EXPECTED_SHOWN
+        )),
     }
 }
 
 /// Returns the offset of the place that many characters before another.
 fn back(text: &str, end: usize, characters: usize) -> usize {
-    text[..end].char_indices().rev().nth(characters.saturating_sub(1)).map_or(0, |(at, _)| at)
+    text[..end]
+        .char_indices()
+        .rev()
+        .nth(characters.saturating_sub(1))
+        .map_or(0, |(at, _)| at)
 }
 
-/// Byte offset of a line and a column (in characters), both counted from 1. Returns the text's length if there is no
-/// such place.
+/// Byte offset of a line and a column (in characters), both counted from 1. Returns the text's
+/// length if there is no such place.
 fn offset(text: &str, line: usize, column: usize) -> usize {
     let start = match line.checked_sub(2) {
         None => 0,
-        Some(idx) => text.match_indices('\n').nth(idx).map_or(text.len(), |(at, _)| at + 1),
+        Some(idx) => text
+            .match_indices('\n')
+            .nth(idx)
+            .map_or(text.len(), |(at, _)| at + 1),
     };
-    text[start..].char_indices().nth(column.saturating_sub(1)).map_or(text.len(), |(at, _)| start + at)
+    text[start..]
+        .char_indices()
+        .nth(column.saturating_sub(1))
+        .map_or(text.len(), |(at, _)| start + at)
 }
 
 #[cfg(test)]
@@ -129,9 +171,12 @@ mod tests {
     #[test]
     fn unparsable_parser_errors_are_still_reported() {
         let text = Source::new("q", "SELECT");
-        for error in
-            ["no place", "error at 1:x: expected a", "error at 9:9: expected one of ", "error at 1:3: expected é"]
-        {
+        for error in [
+            "no place",
+            "error at 1:x: expected a",
+            "error at 9:9: expected one of ",
+            "error at 1:3: expected é",
+        ] {
             assert_eq!(syntax_fault(&text, error).code, "H010");
         }
     }

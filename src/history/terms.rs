@@ -19,13 +19,14 @@ pub(super) fn to_store(term: &Term) -> StoreTerm {
         Term::Double(value) => Literal::from(*value).into(),
         Term::Boolean(value) => Literal::from(*value).into(),
         Term::Literal(text, datatype) => {
-            Literal::new_typed_literal(text.as_ref(), NamedNode::new_unchecked(datatype.as_ref())).into()
+            Literal::new_typed_literal(text.as_ref(), NamedNode::new_unchecked(datatype.as_ref()))
+                .into()
         }
     }
 }
 
-/// Converts a term of the store to ours. An invalid number, or one that is too large, remains a literal with its
-/// datatype.
+/// Converts a term of the store to ours. An invalid number, or one that is too large, remains a
+/// literal with its datatype.
 pub(super) fn from_store(term: &StoreTerm) -> Term {
     match term {
         StoreTerm::NamedNode(node) => Term::iri(node.as_str()),
@@ -78,8 +79,14 @@ mod tests {
             Term::Double(f64::NAN),
             Term::Double(f64::NEG_INFINITY),
             Term::Boolean(false),
-            Term::Literal("2026-08-01".into(), "http://www.w3.org/2001/XMLSchema#date".into()),
-            Term::Literal("99999999999999999999".into(), "http://www.w3.org/2001/XMLSchema#integer".into()),
+            Term::Literal(
+                "2026-08-01".into(),
+                "http://www.w3.org/2001/XMLSchema#date".into(),
+            ),
+            Term::Literal(
+                "99999999999999999999".into(),
+                "http://www.w3.org/2001/XMLSchema#integer".into(),
+            ),
         ];
         for term in terms {
             assert_eq!(from_store(&to_store(&term)), term);

@@ -24,23 +24,35 @@ pub(super) fn side_by_side<A, B: Send>(
     })
 }
 
-/// The items for which `keep` returns true, in their order. `threads` is the number of threads that examine them.
-pub(super) fn filtered<T: Sync>(threads: usize, items: &[T], keep: impl Fn(&T) -> bool + Sync) -> Vec<&T> {
+/// The items for which `keep` returns true, in their order. `threads` is the number of threads that
+/// examine them.
+pub(super) fn filtered<T: Sync>(
+    threads: usize,
+    items: &[T],
+    keep: impl Fn(&T) -> bool + Sync,
+) -> Vec<&T> {
     let next = AtomicUsize::new(0);
     let share = || {
         let mut kept = Vec::new();
         loop {
             let place = next.fetch_add(1, Ordering::Relaxed);
-            let Some(item) = items.get(place) else { return kept };
+            let Some(item) = items.get(place) else {
+                return kept;
+            };
             if keep(item) {
                 kept.push(place);
             }
         }
     };
     let mut kept: Vec<usize> = scope(|scope| {
-        let others: Vec<_> = (1..threads.min(items.len())).map(|_| scope.spawn(share)).collect();
+        let others: Vec<_> = (1..threads.min(items.len()))
+            .map(|_| scope.spawn(share))
+            .collect();
         let own = share();
-        others.into_iter().map(joined).fold(own, |kept, more| [kept, more].concat())
+        others
+            .into_iter()
+            .map(joined)
+            .fold(own, |kept, more| [kept, more].concat())
     });
     kept.sort_unstable();
     kept.into_iter().map(|place| &items[place]).collect()
@@ -48,7 +60,9 @@ pub(super) fn filtered<T: Sync>(threads: usize, items: &[T], keep: impl Fn(&T) -
 
 /// The result of a thread. A panic goes on in the caller's.
 pub(super) fn joined<T>(thread: ScopedJoinHandle<'_, T>) -> T {
-    thread.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))
+    thread
+        .join()
+        .unwrap_or_else(|panic| std::panic::resume_unwind(panic))
 }
 
 #[cfg(test)]
@@ -60,8 +74,16 @@ mod tests {
         let items: Vec<u32> = (0..1000).collect();
         let expected: Vec<&u32> = items.iter().filter(|item| **item % 7 == 3).collect();
         for threads in [0, 1, 2, 5, 2000] {
-            assert_eq!(filtered(threads, &items, |item| item % 7 == 3), expected, "{threads}");
-            assert_eq!(filtered(threads, &[] as &[u32], |_| true), [&0; 0], "{threads}");
+            assert_eq!(
+                filtered(threads, &items, |item| item % 7 == 3),
+                expected,
+                "{threads}"
+            );
+            assert_eq!(
+                filtered(threads, &[] as &[u32], |_| true),
+                [&0; 0],
+                "{threads}"
+            );
             assert_eq!(side_by_side(threads, || 1, || 2), (1, 2), "{threads}");
         }
     }

@@ -1,10 +1,11 @@
-//! The fields of a trace that its first format did not have. They follow that format in the file, so that traces of
-//! earlier versions can still be read.
+//! The fields of a trace that its first format did not have. They follow that format in the file,
+//! so that traces of earlier versions can still be read.
 
 use serde::{Deserialize, Serialize};
 
 use actcheck_data::{
-    ActionTrace, Clearance, CupState, Interval, LinkState, Look, RobotCourse, SelfPress, Snapshot, Trace,
+    ActionTrace, Clearance, CupState, Interval, LinkState, Look, RobotCourse, SelfPress, Snapshot,
+    Trace,
 };
 
 /// The later fields of a whole trace, in the order of its parts.
@@ -21,10 +22,17 @@ pub(super) struct Intervals(Vec<Option<Vec<Interval>>>);
 
 impl Intervals {
     pub(super) fn of(trace: &Trace) -> Self {
-        Self(trace.robot_courses.iter().map(|course| course.intervals.clone()).collect())
+        Self(
+            trace
+                .robot_courses
+                .iter()
+                .map(|course| course.intervals.clone())
+                .collect(),
+        )
     }
 
-    /// Sets the intervals of each action. Does nothing for traces of earlier versions, which have none.
+    /// Sets the intervals of each action. Does nothing for traces of earlier versions, which have
+    /// none.
     pub(super) fn fill(self, trace: &mut Trace) {
         for (course, intervals) in trace.robot_courses.iter_mut().zip(self.0) {
             course.intervals = intervals;
@@ -39,7 +47,11 @@ pub(super) struct Cups(Vec<Option<CupState>>);
 impl Cups {
     /// Returns `None` if the robot has fingers.
     pub(super) fn of(trace: &Trace) -> Option<Self> {
-        let cups: Vec<Option<CupState>> = trace.snapshots.iter().map(|snapshot| snapshot.robot.cup).collect();
+        let cups: Vec<Option<CupState>> = trace
+            .snapshots
+            .iter()
+            .map(|snapshot| snapshot.robot.cup)
+            .collect();
         cups.iter().any(Option::is_some).then_some(Self(cups))
     }
 
@@ -51,8 +63,8 @@ impl Cups {
     }
 }
 
-/// How hard links pressed each other in each action, and the bodies that had left the world in each snapshot, which follow
-/// [`Cups`] in the file if there are any.
+/// How hard links pressed each other in each action, and the bodies that had left the world in each
+/// snapshot, which follow [`Cups`] in the file if there are any.
 #[derive(Default, Serialize, Deserialize)]
 pub(super) struct Marks {
     presses: Vec<Vec<Option<SelfPress>>>,
@@ -62,7 +74,13 @@ pub(super) struct Marks {
 impl Marks {
     /// Returns `None` if no links met and nothing left the world.
     pub(super) fn of(trace: &Trace) -> Option<Self> {
-        let presses = |course: &RobotCourse| course.self_contacts.iter().map(|contact| contact.press).collect();
+        let presses = |course: &RobotCourse| {
+            course
+                .self_contacts
+                .iter()
+                .map(|contact| contact.press)
+                .collect()
+        };
         let left = |snapshot: &Snapshot| {
             let left = snapshot.bodies.iter().filter(|body| body.left_world);
             left.map(|body| body.id.clone()).collect()
@@ -71,7 +89,8 @@ impl Marks {
             presses: trace.robot_courses.iter().map(presses).collect(),
             left: trace.snapshots.iter().map(left).collect(),
         };
-        let is_empty = marks.presses.iter().flatten().all(Option::is_none) && marks.left.iter().all(Vec::is_empty);
+        let is_empty = marks.presses.iter().flatten().all(Option::is_none)
+            && marks.left.iter().all(Vec::is_empty);
         (!is_empty).then_some(marks)
     }
 
@@ -112,7 +131,11 @@ impl Details {
         Self {
             snapshots: trace.snapshots.iter().map(SnapshotDetails::of).collect(),
             actions: trace.actions.iter().map(ActionDetails::of).collect(),
-            clearances: trace.robot_courses.iter().map(|course| course.clearances.clone()).collect(),
+            clearances: trace
+                .robot_courses
+                .iter()
+                .map(|course| course.clearances.clone())
+                .collect(),
         }
     }
 
@@ -125,15 +148,24 @@ impl Details {
             details.fill(action);
         }
         for (course, clearances) in trace.robot_courses.iter_mut().zip(self.clearances) {
-            *course = RobotCourse { clearances, ..std::mem::take(course) };
+            *course = RobotCourse {
+                clearances,
+                ..std::mem::take(course)
+            };
         }
     }
 }
 
 impl SnapshotDetails {
     fn of(snapshot: &Snapshot) -> Self {
-        let bodies = snapshot.bodies.iter().map(|body| (body.size_m, body.grasp_distance_m));
-        Self { bodies: bodies.collect(), links: snapshot.robot.links.clone() }
+        let bodies = snapshot
+            .bodies
+            .iter()
+            .map(|body| (body.size_m, body.grasp_distance_m));
+        Self {
+            bodies: bodies.collect(),
+            links: snapshot.robot.links.clone(),
+        }
     }
 
     fn fill(self, snapshot: &mut Snapshot) {
@@ -147,9 +179,16 @@ impl SnapshotDetails {
 impl ActionDetails {
     fn of(action: &ActionTrace) -> Self {
         Self {
-            contact_points: action.contacts.iter().map(|contact| contact.point_m).collect(),
+            contact_points: action
+                .contacts
+                .iter()
+                .map(|contact| contact.point_m)
+                .collect(),
             percept_looks: action.percepts.iter().map(|percept| percept.look).collect(),
-            perceived_look: action.perceived.as_ref().and_then(|perceived| perceived.look),
+            perceived_look: action
+                .perceived
+                .as_ref()
+                .and_then(|perceived| perceived.look),
         }
     }
 

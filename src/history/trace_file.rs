@@ -1,7 +1,8 @@
-//! The file of a run: its choices and its trace, so that the run can be judged again, drawn and replayed.
+//! The file of a run: its choices and its trace, so that the run can be judged again, drawn and
+//! replayed.
 //!
-//! It has two compressed parts: first the data from which facts are extracted, then the motion of all bodies, which
-//! only pictures and replay need.
+//! It has two compressed parts: first the data from which facts are extracted, then the motion of
+//! all bodies, which only pictures and replay need.
 
 use std::io::Write;
 use std::sync::Arc;
@@ -13,22 +14,33 @@ use crate::frames;
 use crate::inflate::{expanded, most_expanded};
 use crate::trace_details::{Cups, Details, Intervals, Marks};
 use actcheck_base::Steps;
-use actcheck_data::{ActionTrace, Choice, Form, Frames, RobotCourse, Samples, SceneMap, Series, Snapshot, Trace};
+use actcheck_data::{
+    ActionTrace, Choice, Form, Frames, RobotCourse, Samples, SceneMap, Series, Snapshot, Trace,
+};
 
-/// Magic bytes at the start of each file. The last one is the format version; it increases whenever a type of the trace
-/// changes.
+/// Magic bytes at the start of each file. The last one is the format version; it increases whenever
+/// a type of the trace changes.
 const MAGIC: &[u8; 8] = b"actrace4";
-/// Magic bytes of files whose choices have the indices of candidates, without their names. All else is the same.
+/// Magic bytes of files whose choices have the indices of candidates, without their names. All else
+/// is the same.
 const WITHOUT_CANDIDATES: &[u8; 8] = b"actrace3";
 
-/// Maximum number of samples of an action: limits the memory that a corrupt file can request, whose constant series take a
-/// byte. A long action has some million.
+/// Maximum number of samples of an action: limits the memory that a corrupt file can request, whose
+/// constant series take a byte. A long action has some million.
 const MOST_SAMPLES: usize = 1 << 26;
 
-/// First part: choices, states, actions, time between frames, names of tracks, hash. The map, the forms of bodies, the
-/// courses of the robot, [`Details`] and [`Intervals`] follow it, then, of a robot with a suction cup, [`Cups`], and
-/// [`Marks`] if there are any. (Traces of earlier versions end before any of these.)
-type Head = (Vec<Choice>, Vec<Snapshot>, Vec<ActionTrace>, f64, Vec<String>, String);
+/// First part: choices, states, actions, time between frames, names of tracks, hash. The map, the
+/// forms of bodies, the courses of the robot, [`Details`] and [`Intervals`] follow it, then, of a
+/// robot with a suction cup, [`Cups`], and [`Marks`] if there are any. (Traces of earlier versions
+/// end before any of these.)
+type Head = (
+    Vec<Choice>,
+    Vec<Snapshot>,
+    Vec<ActionTrace>,
+    f64,
+    Vec<String>,
+    String,
+);
 
 /// Encodes a run's file.
 ///
@@ -36,8 +48,10 @@ type Head = (Vec<Choice>, Vec<Snapshot>, Vec<ActionTrace>, f64, Vec<String>, Str
 /// A message, if a part can't be encoded. (The current types never cause this.)
 pub(super) fn encode(choices: &[Choice], trace: &Trace) -> Result<Vec<u8>, String> {
     let head = compressed(&encode_head(choices, trace)?)?;
-    let course = compressed(&[frames::encode(&trace.frames.rows), encode_motions(trace)?].concat())?;
-    let length = u32::try_from(head.len()).map_err(|_| "its trace is larger than 4 GB".to_owned())?;
+    let course =
+        compressed(&[frames::encode(&trace.frames.rows), encode_motions(trace)?].concat())?;
+    let length =
+        u32::try_from(head.len()).map_err(|_| "its trace is larger than 4 GB".to_owned())?;
     Ok([MAGIC.as_slice(), &length.to_le_bytes(), &head, &course].concat())
 }
 
@@ -47,13 +61,28 @@ pub(super) fn encode(choices: &[Choice], trace: &Trace) -> Result<Vec<u8>, Strin
 /// As [`encode`].
 pub(super) fn encode_head(choices: &[Choice], trace: &Trace) -> Result<Vec<u8>, String> {
     let frames = &trace.frames;
-    let head = (choices, &trace.snapshots, &trace.actions, frames.period_secs, &frames.names, &trace.hash);
+    let head = (
+        choices,
+        &trace.snapshots,
+        &trace.actions,
+        frames.period_secs,
+        &frames.names,
+        &trace.hash,
+    );
     let mut head = postcard::to_stdvec(&head).map_err(|error| error.to_string())?;
-    let later = (&trace.map, &trace.forms, &trace.robot_courses, Details::of(trace), Intervals::of(trace));
+    let later = (
+        &trace.map,
+        &trace.forms,
+        &trace.robot_courses,
+        Details::of(trace),
+        Intervals::of(trace),
+    );
     head.extend(postcard::to_stdvec(&later).map_err(|error| error.to_string())?);
     let (cups, marks) = (Cups::of(trace), Marks::of(trace));
     if cups.is_some() || marks.is_some() {
-        head.extend(postcard::to_stdvec(&cups.unwrap_or_default()).map_err(|error| error.to_string())?);
+        head.extend(
+            postcard::to_stdvec(&cups.unwrap_or_default()).map_err(|error| error.to_string())?,
+        );
     }
     if let Some(marks) = marks {
         head.extend(postcard::to_stdvec(&marks).map_err(|error| error.to_string())?);
@@ -69,15 +98,21 @@ pub(super) fn decode(bytes: &[u8]) -> Result<(Vec<Choice>, Trace), String> {
     let (head, course) = parts(bytes)?;
     let (choices, mut trace) = decode_head(&expanded(head)?)?;
     let course = Arc::new(expanded(course)?);
-    let (rows, rest) = frames::decode_next(&course).ok_or("the motion of the bodies can't be read")?;
+    let (rows, rest) =
+        frames::decode_next(&course).ok_or("the motion of the bodies can't be read")?;
     trace.frames.rows = rows;
-    read_motions(&course, course.len() - rest.len(), &mut trace, decode_motion)
-        .ok_or("the motion of the robot can't be read")?;
+    read_motions(
+        &course,
+        course.len() - rest.len(),
+        &mut trace,
+        decode_motion,
+    )
+    .ok_or("the motion of the robot can't be read")?;
     Ok((choices, trace))
 }
 
-/// Encodes the robot's measurements and commands, which follow the motion of the bodies: joints and rows for each
-/// action, then the samples of each.
+/// Encodes the robot's measurements and commands, which follow the motion of the bodies: joints and
+/// rows for each action, then the samples of each.
 fn encode_motions(trace: &Trace) -> Result<Vec<u8>, String> {
     let mut out = Vec::new();
     for course in &trace.robot_courses {
@@ -90,22 +125,34 @@ fn encode_motions(trace: &Trace) -> Result<Vec<u8>, String> {
     Ok(out)
 }
 
-/// The stored description of a series, before its steps: thing, second thing, quantity, steps per unit.
+/// The stored description of a series, before its steps: thing, second thing, quantity, steps per
+/// unit.
 type SeriesHead = (String, String, String, u32);
 
 fn encode_samples(samples: &Samples, out: &mut Vec<u8>) -> Result<(), String> {
     let heads: Vec<SeriesHead> = samples
         .series
         .iter()
-        .map(|series| (series.thing.clone(), series.other.clone(), series.quantity.clone(), series.steps_per_unit))
+        .map(|series| {
+            (
+                series.thing.clone(),
+                series.other.clone(),
+                series.quantity.clone(),
+                series.steps_per_unit,
+            )
+        })
         .collect();
     let head = (samples.period_secs, samples.count as u64, heads);
     out.extend(postcard::to_stdvec(&head).map_err(|error| error.to_string())?);
-    samples.series.iter().for_each(|series| series.steps.encode(out));
+    samples
+        .series
+        .iter()
+        .for_each(|series| series.steps.encode(out));
     Ok(())
 }
 
-/// Decodes the samples of one action at a position of the expanded bytes, and returns the position after them.
+/// Decodes the samples of one action at a position of the expanded bytes, and returns the position
+/// after them.
 fn decode_samples(bytes: &Arc<Vec<u8>>, at: usize) -> Option<(Samples, usize)> {
     let ((period_secs, count, heads), rest): ((f64, u64, Vec<SeriesHead>), &[u8]) =
         postcard::take_from_bytes(bytes.get(at..)?).ok()?;
@@ -118,9 +165,22 @@ fn decode_samples(bytes: &Arc<Vec<u8>>, at: usize) -> Option<(Samples, usize)> {
     for (thing, other, quantity, steps_per_unit) in heads {
         let steps;
         (steps, at) = Steps::encoded(count, bytes, at)?;
-        series.push(Series { thing, other, quantity, steps_per_unit, steps });
+        series.push(Series {
+            thing,
+            other,
+            quantity,
+            steps_per_unit,
+            steps,
+        });
     }
-    Some((Samples { period_secs, count, series }, at))
+    Some((
+        Samples {
+            period_secs,
+            count,
+            series,
+        },
+        at,
+    ))
 }
 
 /// Decodes the robot's measurements and commands of one action, and returns the remaining bytes.
@@ -137,8 +197,9 @@ fn skip_motion<'b>(_: &mut RobotCourse, bytes: &'b [u8]) -> Option<&'b [u8]> {
     frames::skip_next(rest)
 }
 
-/// Reads the robot's motion at a position of the expanded bytes by `motion`, which returns the remaining bytes, and
-/// decodes the samples. Traces of earlier versions end before either and have none.
+/// Reads the robot's motion at a position of the expanded bytes by `motion`, which returns the
+/// remaining bytes, and decodes the samples. Traces of earlier versions end before either and have
+/// none.
 fn read_motions(
     bytes: &Arc<Vec<u8>>,
     at: usize,
@@ -162,8 +223,8 @@ fn read_motions(
     Some(())
 }
 
-/// Decodes the choices and the trace with the samples of its actions, but without the motion of bodies and joints:
-/// everything from which facts and quantities over time are extracted.
+/// Decodes the choices and the trace with the samples of its actions, but without the motion of
+/// bodies and joints: everything from which facts and quantities over time are extracted.
 ///
 /// # Errors
 /// A message that names the damaged part.
@@ -177,7 +238,8 @@ pub(super) fn decode_sampled(bytes: &[u8]) -> Result<(Vec<Choice>, Trace), Strin
     Ok((choices, trace))
 }
 
-/// Decodes the choices and the trace without the rows of its frames: everything from which facts are extracted.
+/// Decodes the choices and the trace without the rows of its frames: everything from which facts
+/// are extracted.
 ///
 /// # Errors
 /// A message that names the damaged part.
@@ -198,7 +260,8 @@ pub(super) fn decode_choices(bytes: &[u8]) -> Result<Vec<Choice>, String> {
 /// # Errors
 /// As [`decode_choices`].
 pub(super) fn head_choices(head: &[u8]) -> Result<Vec<Choice>, String> {
-    let (choices, _) = postcard::take_from_bytes(head).map_err(|error| error.to_string().to_lowercase())?;
+    let (choices, _) =
+        postcard::take_from_bytes(head).map_err(|error| error.to_string().to_lowercase())?;
     Ok(choices)
 }
 
@@ -217,8 +280,20 @@ pub(super) fn decode_head(head: &[u8]) -> Result<(Vec<Choice>, Trace), String> {
     let (cups, rest): (Cups, &[u8]) = part_of(rest).map_err(read)?;
     let (marks, _): (Marks, &[u8]) = part_of(rest).map_err(read)?;
     let (choices, snapshots, actions, period_secs, names, hash) = head;
-    let frames = Frames { period_secs, names, rows: Vec::new() };
-    let mut trace = Trace { snapshots, actions, frames, hash, map, forms, robot_courses };
+    let frames = Frames {
+        period_secs,
+        names,
+        rows: Vec::new(),
+    };
+    let mut trace = Trace {
+        snapshots,
+        actions,
+        frames,
+        hash,
+        map,
+        forms,
+        robot_courses,
+    };
     details.fill(&mut trace);
     intervals.fill(&mut trace);
     cups.fill(&mut trace);
@@ -227,15 +302,24 @@ pub(super) fn decode_head(head: &[u8]) -> Result<(Vec<Choice>, Trace), String> {
 }
 
 /// The next part, or an empty one if the file ends before it.
-fn part_of<'a, T: Default + serde::Deserialize<'a>>(rest: &'a [u8]) -> Result<(T, &'a [u8]), postcard::Error> {
-    if rest.is_empty() { Ok((T::default(), rest)) } else { postcard::take_from_bytes(rest) }
+fn part_of<'a, T: Default + serde::Deserialize<'a>>(
+    rest: &'a [u8],
+) -> Result<(T, &'a [u8]), postcard::Error> {
+    if rest.is_empty() {
+        Ok((T::default(), rest))
+    } else {
+        postcard::take_from_bytes(rest)
+    }
 }
 
 fn parts(bytes: &[u8]) -> Result<(&[u8], &[u8]), String> {
-    let rest = [MAGIC, WITHOUT_CANDIDATES].into_iter().find_map(|magic| bytes.strip_prefix(magic.as_slice()));
+    let rest = [MAGIC, WITHOUT_CANDIDATES]
+        .into_iter()
+        .find_map(|magic| bytes.strip_prefix(magic.as_slice()));
     let rest = rest.ok_or("it is not a trace of this format")?;
     let (length, rest) = rest.split_first_chunk::<4>().ok_or("it ends too early")?;
-    rest.split_at_checked(u32::from_le_bytes(*length) as usize).ok_or_else(|| "it ends too early".to_owned())
+    rest.split_at_checked(u32::from_le_bytes(*length) as usize)
+        .ok_or_else(|| "it ends too early".to_owned())
 }
 
 /// The bytes after the trace: the copy of its outcomes, or nothing.
@@ -244,15 +328,26 @@ fn parts(bytes: &[u8]) -> Result<(&[u8], &[u8]), String> {
 /// A message that names the damaged part.
 pub(super) fn after_trace(bytes: &[u8]) -> Result<&[u8], String> {
     let course = parts(bytes)?.1;
-    let (mut decoder, most) = (flate2::bufread::GzDecoder::new(course), most_expanded(course.len()));
-    let length = std::io::copy(&mut std::io::Read::take(&mut decoder, most), &mut std::io::sink());
+    let (mut decoder, most) = (
+        flate2::bufread::GzDecoder::new(course),
+        most_expanded(course.len()),
+    );
+    let length = std::io::copy(
+        &mut std::io::Read::take(&mut decoder, most),
+        &mut std::io::sink(),
+    );
     match length.map_err(|error| error.to_string())? {
-        length if length == most => Err("its motion expands to far more than this program writes".to_owned()),
+        length if length == most => {
+            Err("its motion expands to far more than this program writes".to_owned())
+        }
         _ => Ok(decoder.into_inner()),
     }
 }
 
 pub(super) fn compressed(bytes: &[u8]) -> Result<Vec<u8>, String> {
     let mut encoder = GzEncoder::new(Vec::new(), Compression::default());
-    encoder.write_all(bytes).and_then(|()| encoder.finish()).map_err(|error| error.to_string())
+    encoder
+        .write_all(bytes)
+        .and_then(|()| encoder.finish())
+        .map_err(|error| error.to_string())
 }

@@ -1,7 +1,8 @@
 //! A copy of a run's objects, actions and outcomes at the end of its trace file.
 //!
-//! They are read in a tenth of the time that the store takes, where each is many statements. Programs that know nothing of
-//! the copy do not read it; files without it, and damaged ones, are read from the store.
+//! They are read in a tenth of the time that the store takes, where each is many statements.
+//! Programs that know nothing of the copy do not read it; files without it, and damaged ones, are
+//! read from the store.
 
 use std::io::{Read as _, Seek as _, SeekFrom};
 use std::path::Path;
@@ -11,33 +12,40 @@ use crate::folder;
 use crate::inflate::expanded;
 use crate::trace_file::compressed;
 
-/// Last bytes of a file that has a copy. The last one is its version; it increases whenever a type of [`Parts`] changes.
+/// Last bytes of a file that has a copy. The last one is its version; it increases whenever a type
+/// of [`Parts`] changes.
 const MAGIC: &[u8; 8] = b"actpart2";
 /// Those of earlier versions, whose copies are not read.
 const OLDER: [&[u8; 8]; 1] = [b"actpart1"];
 /// Size of the length and the magic bytes after the copy. Unit: bytes.
 const TRAILER: u64 = 12;
 
-/// Appends the copy to the content of a trace file. `hash`: of the trace, so that a copy of another run is noticed.
+/// Appends the copy to the content of a trace file. `hash`: of the trace, so that a copy of another
+/// run is noticed.
 ///
 /// # Errors
 /// A message, if it can't be encoded. (The current types never cause this.)
 pub(super) fn appended(mut trace: Vec<u8>, hash: &str, parts: &Parts) -> Result<Vec<u8>, String> {
-    let parts = compressed(&postcard::to_stdvec(&(hash, parts)).map_err(|error| error.to_string())?)?;
-    let length = u32::try_from(parts.len()).map_err(|_| "it has more than 4 GB of outcomes".to_owned())?;
+    let parts =
+        compressed(&postcard::to_stdvec(&(hash, parts)).map_err(|error| error.to_string())?)?;
+    let length =
+        u32::try_from(parts.len()).map_err(|_| "it has more than 4 GB of outcomes".to_owned())?;
     trace.extend([parts.as_slice(), &length.to_le_bytes(), MAGIC].concat());
     Ok(trace)
 }
 
-/// Reads the copy and the hash of its trace. Returns `None` if the file has none that this program can read; its checksum
-/// shows damage.
+/// Reads the copy and the hash of its trace. Returns `None` if the file has none that this program
+/// can read; its checksum shows damage.
 pub(super) fn read(file: &Path) -> Option<(String, Parts)> {
     let mut file = folder::open(file).ok()?;
     let end = file.metadata().ok()?.len().checked_sub(TRAILER)?;
     file.seek(SeekFrom::Start(end)).ok()?;
     let mut length = [0; 4];
     file.read_exact(&mut length).ok()?;
-    file.seek(SeekFrom::Start(end.checked_sub(u32::from_le_bytes(length).into())?)).ok()?;
+    file.seek(SeekFrom::Start(
+        end.checked_sub(u32::from_le_bytes(length).into())?,
+    ))
+    .ok()?;
     let mut after = Vec::new();
     file.read_to_end(&mut after).ok()?;
     of_bytes(&after).ok()
@@ -54,7 +62,8 @@ pub(super) fn is_older(after: &[u8]) -> bool {
 /// A message, if it is damaged.
 pub(super) fn of_bytes(after: &[u8]) -> Result<(String, Parts), String> {
     let is_whole = || {
-        let (parts, trailer) = after.split_at_checked(after.len().checked_sub(TRAILER as usize)?)?;
+        let (parts, trailer) =
+            after.split_at_checked(after.len().checked_sub(TRAILER as usize)?)?;
         let (length, magic) = trailer.split_first_chunk::<4>()?;
         (magic == MAGIC && u32::from_le_bytes(*length) as usize == parts.len()).then_some(parts)
     };
@@ -119,7 +128,10 @@ mod tests {
         assert!(written.starts_with(b"trace"));
         std::fs::write(&file, &written).expect("it can be written");
         assert_eq!(read(&file), Some(("ab".to_owned(), sample())));
-        assert_eq!(of_bytes(&written["trace".len()..]), Ok(("ab".to_owned(), sample())));
+        assert_eq!(
+            of_bytes(&written["trace".len()..]),
+            Ok(("ab".to_owned(), sample()))
+        );
         // The bytes of the compressed part's header that hold no content may differ.
         let after_header = b"trace".len() + 10;
         for at in after_header..written.len() {

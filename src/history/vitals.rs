@@ -29,15 +29,16 @@ pub struct RunVitals {
     pub repetition: u64,
     /// Unit: seconds.
     pub wall_secs: f64,
-    /// Deepest penetration of two bodies. Unit: metres. `None` in runs of earlier versions, which did not measure it.
+    /// Deepest penetration of two bodies. Unit: metres. `None` in runs of earlier versions, which
+    /// did not measure it.
     pub deepest_penetration_m: Option<f64>,
-    /// Energy that the simulation created by error. Unit: joules. `None` in runs of earlier versions, which did not
-    /// measure it.
+    /// Energy that the simulation created by error. Unit: joules. `None` in runs of earlier
+    /// versions, which did not measure it.
     pub energy_gain_j: Option<f64>,
 }
 
-/// Values of many runs, read by property: a store finds all values of one property at once, which takes a tenth of the
-/// time of all properties of each run.
+/// Values of many runs, read by property: a store finds all values of one property at once, which
+/// takes a tenth of the time of all properties of each run.
 pub(super) struct Columns {
     discards: HashMap<String, f64>,
     wall_secs: HashMap<String, f64>,
@@ -47,7 +48,12 @@ pub(super) struct Columns {
 
 /// The statements that [`Columns`] reads.
 pub(super) fn wanted() -> Wanted {
-    let columns = ["act:discards", "act:wallSeconds", "act:deepestPenetration", "act:energyGain"];
+    let columns = [
+        "act:discards",
+        "act:wallSeconds",
+        "act:deepestPenetration",
+        "act:energyGain",
+    ];
     let discards = ["act:ofRun", "act:attempt", "act:reason"];
     let mut wanted = Wanted::values(&[&columns[..], &discards[..]].concat());
     wanted.add(Wanted::individuals("act:Discard"));
@@ -66,11 +72,18 @@ impl Columns {
     }
 
     /// The values of one run. The caller reads its choices from its trace file.
-    pub(super) fn of(&self, store: &Store, row: &RunRow, choices: Vec<Choice>) -> Result<RunVitals, StorageError> {
+    pub(super) fn of(
+        &self,
+        store: &Store,
+        row: &RunRow,
+        choices: Vec<Choice>,
+    ) -> Result<RunVitals, StorageError> {
         let node = run_node(&row.run);
         let value = |column: &HashMap<String, f64>| column.get(node.as_str()).copied();
         let discards = match value(&self.discards) {
-            Some(count) if count > 0.0 => detail::discards(store, &node, &Node::read(store, &node)?)?,
+            Some(count) if count > 0.0 => {
+                detail::discards(store, &node, &Node::read(store, &node)?)?
+            }
             _ => Vec::new(),
         };
         Ok(RunVitals {
@@ -90,10 +103,17 @@ impl Columns {
 /// The numbers that subjects have as values of a property, by IRI.
 fn column(store: &Store, property: &str) -> Result<HashMap<String, f64>, StorageError> {
     let property = iri(property);
-    let quads = store.quads_for_pattern(None, Some(property.as_ref()), None, Some(GraphNameRef::DefaultGraph));
+    let quads = store.quads_for_pattern(
+        None,
+        Some(property.as_ref()),
+        None,
+        Some(GraphNameRef::DefaultGraph),
+    );
     let value = |quad: Quad| match (quad.subject, text_of(&quad.object).parse::<f64>()) {
         (NamedOrBlankNode::NamedNode(node), Ok(value)) => Some((node.into_string(), value)),
         _ => None,
     };
-    quads.filter_map(|quad| quad.map(value).transpose()).collect()
+    quads
+        .filter_map(|quad| quad.map(value).transpose())
+        .collect()
 }

@@ -4,7 +4,8 @@ use std::io;
 
 use oxigraph::sparql::results::{QueryResultsFormat, QueryResultsSerializer};
 use oxigraph::sparql::{
-    PreparedSparqlQuery, QueryEvaluationError, QueryResults, QuerySolutionIter, QueryTripleIter, SparqlEvaluator,
+    PreparedSparqlQuery, QueryEvaluationError, QueryResults, QuerySolutionIter, QueryTripleIter,
+    SparqlEvaluator,
 };
 
 use crate::light::light;
@@ -44,7 +45,11 @@ impl WireSyntax {
     pub fn media_types(self) -> &'static [&'static str] {
         match self {
             Self::Json => &["application/sparql-results+json", "application/json"],
-            Self::Xml => &["application/sparql-results+xml", "application/xml", "text/xml"],
+            Self::Xml => &[
+                "application/sparql-results+xml",
+                "application/xml",
+                "text/xml",
+            ],
             Self::Csv => &["text/csv"],
             Self::Tsv => &["text/tab-separated-values"],
             Self::Turtle => &["text/turtle", "application/x-turtle"],
@@ -82,8 +87,8 @@ pub struct WireLimits {
 pub type WireAnswer = (WireSyntax, Vec<u8>);
 
 impl History {
-    /// Answers a query in the format that `choose` selects from those available. Can't be cancelled: to stop it early,
-    /// end the process.
+    /// Answers a query in the format that `choose` selects from those available. Can't be
+    /// cancelled: to stop it early, end the process.
     ///
     /// # Errors
     /// See [`WireFault`].
@@ -96,18 +101,23 @@ impl History {
         refuse_update(text).map_err(WireFault::Refused)?;
         refuse_excess(text).map_err(WireFault::Refused)?;
         if let Some(span) = service(&text.text) {
-            let fault = Diagnostic::error("H017", "`SERVICE` queries another endpoint, which is not supported");
+            let fault = Diagnostic::error(
+                "H017",
+                "`SERVICE` queries another endpoint, which is not supported",
+            );
             return Err(WireFault::Refused(fault.at(text, span).into()));
         }
-        let store = self.store_for_query(|| Wanted::query(&text.text)).map_err(WireFault::Failed)?;
+        let store = self
+            .store_for_query(|| Wanted::query(&text.text))
+            .map_err(WireFault::Failed)?;
         let query = prepare(text, &store, &Cancel::new()).map_err(WireFault::Malformed)?;
         let answer = evaluated(&store, query.prepared.clone(), text, choose, limits);
         query.check_texts(text).map_err(WireFault::Refused)?;
         answer
     }
 
-    /// Answers a light query within the process of a server: one that stops soon after `cancel`, and that can't exhaust
-    /// memory before. Returns `None` for any other text, valid or not.
+    /// Answers a light query within the process of a server: one that stops soon after `cancel`,
+    /// and that can't exhaust memory before. Returns `None` for any other text, valid or not.
     ///
     /// # Errors
     /// See [`WireFault`]. A cancelled query is [`WireFault::Failed`].
@@ -119,8 +129,12 @@ impl History {
         cancel: &Cancel,
     ) -> Option<Result<WireAnswer, WireFault>> {
         let query = light(&text.text)?;
-        let store = self.store_for_query(|| Wanted::parsed(&query)).map_err(WireFault::Failed);
-        let prepared = SparqlEvaluator::new().with_cancellation_token(cancel.token()).for_query(query);
+        let store = self
+            .store_for_query(|| Wanted::parsed(&query))
+            .map_err(WireFault::Failed);
+        let prepared = SparqlEvaluator::new()
+            .with_cancellation_token(cancel.token())
+            .for_query(query);
         Some(store.and_then(|store| evaluated(&store, prepared, text, choose, limits)))
     }
 }
@@ -133,12 +147,16 @@ fn evaluated(
     choose: impl Fn(&[WireSyntax]) -> Option<WireSyntax>,
     limits: WireLimits,
 ) -> Result<WireAnswer, WireFault> {
-    let failed = |error: QueryEvaluationError| WireFault::Failed(evaluation_fault(text, &error).into());
+    let failed =
+        |error: QueryEvaluationError| WireFault::Failed(evaluation_fault(text, &error).into());
     let written = match prepared.on_store(store).execute().map_err(failed)? {
         QueryResults::Boolean(value) => {
             let syntax = choose(&WireSyntax::TABLES).ok_or(WireFault::NotAcceptable)?;
             let serializer = QueryResultsSerializer::from_format(table_format(syntax));
-            serializer.serialize_boolean_to_writer(Vec::new(), value).map(|body| (syntax, body)).map_err(Into::into)
+            serializer
+                .serialize_boolean_to_writer(Vec::new(), value)
+                .map(|body| (syntax, body))
+                .map_err(Into::into)
         }
         QueryResults::Solutions(solutions) => {
             let syntax = choose(&WireSyntax::TABLES).ok_or(WireFault::NotAcceptable)?;
@@ -152,13 +170,15 @@ fn evaluated(
     written.map_err(|stop| match stop {
         Stop::TooMany => {
             let message = format!("the answer has more than {} rows", limits.rows);
-            let fault =
-                Diagnostic::error("H018", message).help("request less, or fetch it in parts with `LIMIT` and `OFFSET`");
+            let fault = Diagnostic::error("H018", message)
+                .help("request less, or fetch it in parts with `LIMIT` and `OFFSET`");
             WireFault::Refused(fault.into())
         }
         Stop::TooLarge => WireFault::TooLarge,
         Stop::Evaluation(error) => failed(error),
-        Stop::Writing(error) => WireFault::Failed(Diagnostic::error("H012", error.to_string()).into()),
+        Stop::Writing(error) => {
+            WireFault::Failed(Diagnostic::error("H012", error.to_string()).into())
+        }
     })
 }
 
@@ -172,7 +192,11 @@ enum Stop {
 
 impl From<io::Error> for Stop {
     fn from(error: io::Error) -> Self {
-        if error.kind() == io::ErrorKind::FileTooLarge { Self::TooLarge } else { Self::Writing(error) }
+        if error.kind() == io::ErrorKind::FileTooLarge {
+            Self::TooLarge
+        } else {
+            Self::Writing(error)
+        }
     }
 }
 
@@ -184,7 +208,10 @@ struct Bounded {
 
 impl Bounded {
     fn new(most: u64) -> Self {
-        Self { bytes: Vec::new(), most }
+        Self {
+            bytes: Vec::new(),
+            most,
+        }
     }
 }
 
@@ -217,10 +244,16 @@ fn table_format(syntax: WireSyntax) -> QueryResultsFormat {
     }
 }
 
-fn table(solutions: QuerySolutionIter<'_>, syntax: WireSyntax, limits: WireLimits) -> Result<Vec<u8>, Stop> {
+fn table(
+    solutions: QuerySolutionIter<'_>,
+    syntax: WireSyntax,
+    limits: WireLimits,
+) -> Result<Vec<u8>, Stop> {
     let serializer = QueryResultsSerializer::from_format(table_format(syntax));
-    let mut writer =
-        serializer.serialize_solutions_to_writer(Bounded::new(limits.bytes), solutions.variables().to_vec())?;
+    let mut writer = serializer.serialize_solutions_to_writer(
+        Bounded::new(limits.bytes),
+        solutions.variables().to_vec(),
+    )?;
     for (solution, number) in solutions.zip(1u64..) {
         if number > limits.rows {
             return Err(Stop::TooMany);
@@ -230,7 +263,11 @@ fn table(solutions: QuerySolutionIter<'_>, syntax: WireSyntax, limits: WireLimit
     Ok(writer.finish()?.bytes)
 }
 
-fn graph(triples: QueryTripleIter<'_>, syntax: WireSyntax, limits: WireLimits) -> Result<Vec<u8>, Stop> {
+fn graph(
+    triples: QueryTripleIter<'_>,
+    syntax: WireSyntax,
+    limits: WireLimits,
+) -> Result<Vec<u8>, Stop> {
     let syntax = match syntax {
         WireSyntax::NTriples => RdfSyntax::NTriples,
         WireSyntax::RdfXml => RdfSyntax::RdfXml,
@@ -246,22 +283,30 @@ fn graph(triples: QueryTripleIter<'_>, syntax: WireSyntax, limits: WireLimits) -
     Ok(writer.finish()?.bytes)
 }
 
-/// Returns the span of the keyword `SERVICE` outside of strings, IRIs, names and comments, or `None` if it does not
-/// occur.
+/// Returns the span of the keyword `SERVICE` outside of strings, IRIs, names and comments, or
+/// `None` if it does not occur.
 ///
-/// It misses keywords written with escapes. They do no harm: the evaluator has no client for other endpoints.
+/// It misses keywords written with escapes. They do no harm: the evaluator has no client for other
+/// endpoints.
 fn service(text: &str) -> Option<Span> {
     let bytes = text.as_bytes();
-    let is_name = |byte: &u8| byte.is_ascii_alphanumeric() || *byte > 127 || b"_:-.?$@%".contains(byte);
+    let is_name =
+        |byte: &u8| byte.is_ascii_alphanumeric() || *byte > 127 || b"_:-.?$@%".contains(byte);
     let mut at = 0;
     while at < bytes.len() {
         let rest = &bytes[at..];
         at += match rest[0] {
-            b'#' => rest.iter().position(|byte| *byte == b'\n').unwrap_or(rest.len()),
+            b'#' => rest
+                .iter()
+                .position(|byte| *byte == b'\n')
+                .unwrap_or(rest.len()),
             b'"' | b'\'' => quoted(rest),
             b'<' => iri(rest),
             byte if is_name(&byte) => {
-                let length = rest.iter().position(|byte| !is_name(byte)).unwrap_or(rest.len());
+                let length = rest
+                    .iter()
+                    .position(|byte| !is_name(byte))
+                    .unwrap_or(rest.len());
                 if rest[..length].eq_ignore_ascii_case(b"SERVICE") {
                     return Some(at..at + length);
                 }
@@ -282,7 +327,9 @@ fn quoted(rest: &[u8]) -> usize {
     while at < rest.len() {
         match rest[at] {
             b'\\' => at += 2,
-            byte if byte == quote && (!long || rest[at..].starts_with(&[quote; 3])) => return at + width,
+            byte if byte == quote && (!long || rest[at..].starts_with(&[quote; 3])) => {
+                return at + width;
+            }
             _ => at += 1,
         }
     }
@@ -291,7 +338,9 @@ fn quoted(rest: &[u8]) -> usize {
 
 /// Length of an IRI in angle brackets, or 1 if the bracket is a comparison.
 fn iri(rest: &[u8]) -> usize {
-    let end = rest[1..].iter().position(|byte| *byte <= b' ' || b"<>\"{}|^`".contains(byte));
+    let end = rest[1..]
+        .iter()
+        .position(|byte| *byte <= b' ' || b"<>\"{}|^`".contains(byte));
     match end {
         Some(length) if rest[1 + length] == b'>' => length + 2,
         _ => 1,
@@ -304,9 +353,11 @@ mod tests {
 
     #[test]
     fn the_keyword_is_found_outside_of_strings_and_comments() {
-        for text in
-            ["SELECT * { SERVICE <http://a> {} }", "ASK{service silent ?x{}}", "ASK { FILTER(1<2) SERVICE<a>{} }"]
-        {
+        for text in [
+            "SELECT * { SERVICE <http://a> {} }",
+            "ASK{service silent ?x{}}",
+            "ASK { FILTER(1<2) SERVICE<a>{} }",
+        ] {
             assert!(service(text).is_some(), "{text}");
         }
         for text in [

@@ -14,7 +14,8 @@ pub(super) fn campaign_node(id: &str) -> NamedNode {
     NamedNode::new_unchecked(format!("{}{id}", names::CAMPAIGN))
 }
 
-/// The quads that are written before the first run. `number`: of campaigns that the history has already.
+/// The quads that are written before the first run. `number`: of campaigns that the history has
+/// already.
 pub(super) fn beginning(record: &CampaignRecord, number: u64) -> Vec<Quad> {
     let mut statements = Statements::default();
     let campaign = campaign_node(&record.id);
@@ -38,7 +39,10 @@ pub(super) fn beginning(record: &CampaignRecord, number: u64) -> Vec<Quad> {
         .has("prov:startedAtTime", time(&record.started))
         .text("act:program", &program(&record.program_version))
         .text("act:programDigest", &record.program_digest)
-        .optional("act:physics", record.physics.map(|version| count(u64::from(version))));
+        .optional(
+            "act:physics",
+            record.physics.map(|version| count(u64::from(version))),
+        );
     if let Some(skill) = &record.skill {
         statements
             .about(campaign.clone())
@@ -47,11 +51,15 @@ pub(super) fn beginning(record: &CampaignRecord, number: u64) -> Vec<Quad> {
             .has("act:privileged", Literal::from(skill.privileged));
     }
     for shard in &record.shards {
-        statements.about(campaign.clone()).text("act:shard", &shard.to_string());
+        statements
+            .about(campaign.clone())
+            .text("act:shard", &shard.to_string());
     }
     for (number, (property, path, digest)) in record.rules.iter().enumerate() {
         let rule = NamedNode::new_unchecked(format!("{}/rule/{}", campaign.as_str(), number + 1));
-        statements.about(campaign.clone()).has("act:usedRule", rule.clone());
+        statements
+            .about(campaign.clone())
+            .has("act:usedRule", rule.clone());
         statements
             .about(rule)
             .is_a("act:UsedRule")
@@ -60,19 +68,31 @@ pub(super) fn beginning(record: &CampaignRecord, number: u64) -> Vec<Quad> {
             .text("act:ruleDigest", digest);
     }
     for (number, found) in record.findings.iter().enumerate() {
-        let finding = NamedNode::new_unchecked(format!("{}/finding/{}", campaign.as_str(), number + 1));
-        statements.about(campaign.clone()).has("act:ruleFinding", finding.clone());
+        let finding =
+            NamedNode::new_unchecked(format!("{}/finding/{}", campaign.as_str(), number + 1));
+        statements
+            .about(campaign.clone())
+            .has("act:ruleFinding", finding.clone());
         statements
             .about(finding)
             .is_a("act:RuleFinding")
             .text("act:findingCode", &found.code)
             .text("act:findingText", &found.message)
-            .optional("act:findingPlace", found.place.as_deref().map(Literal::new_simple_literal));
+            .optional(
+                "act:findingPlace",
+                found.place.as_deref().map(Literal::new_simple_literal),
+            );
     }
     for (number, (name, digest)) in record.models.iter().enumerate() {
         let model = NamedNode::new_unchecked(format!("{}/model/{}", campaign.as_str(), number + 1));
-        statements.about(campaign.clone()).has("act:usedModel", model.clone());
-        statements.about(model).is_a("act:UsedModel").text("act:model", name).text("act:digest", digest);
+        statements
+            .about(campaign.clone())
+            .has("act:usedModel", model.clone());
+        statements
+            .about(model)
+            .is_a("act:UsedModel")
+            .text("act:model", name)
+            .text("act:digest", digest);
     }
     statements.quads
 }
@@ -84,9 +104,15 @@ pub(super) fn end(id: &str, end: &CampaignEnd) -> Vec<Quad> {
     about
         .has("prov:endedAtTime", time(&end.ended))
         .optional("act:score", end.score.map(Literal::from))
-        .optional("act:scoreWithoutBroken", end.score_without_broken.map(Literal::from))
+        .optional(
+            "act:scoreWithoutBroken",
+            end.score_without_broken.map(Literal::from),
+        )
         .has("act:discards", count(end.discards))
-        .optional("act:endedBy", end.ended_by.as_deref().map(Literal::new_simple_literal))
+        .optional(
+            "act:endedBy",
+            end.ended_by.as_deref().map(Literal::new_simple_literal),
+        )
         .has("act:interrupted", Literal::from(end.interrupted));
     for (outcome, times) in &end.outcomes {
         about.has(&format!("act:{outcome}Count"), count(*times));
@@ -99,11 +125,17 @@ pub(super) fn end_properties() -> Vec<NamedNode> {
     let whole = CampaignEnd {
         score: Some(0.0),
         score_without_broken: Some(0.0),
-        outcomes: Outcome::ALL.into_iter().map(|outcome| (outcome, 0)).collect(),
+        outcomes: Outcome::ALL
+            .into_iter()
+            .map(|outcome| (outcome, 0))
+            .collect(),
         ended_by: Some(String::new()),
         ..CampaignEnd::default()
     };
-    end("", &whole).into_iter().map(|quad| quad.predicate).collect()
+    end("", &whole)
+        .into_iter()
+        .map(|quad| quad.predicate)
+        .collect()
 }
 
 /// The program's name and version as one text.

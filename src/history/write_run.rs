@@ -40,27 +40,55 @@ fn write_run(record: &RunRecord, run: &NamedNode, statements: &mut Statements) {
         .text("act:test", &record.test)
         .has("act:seed", count(record.seed))
         .has("act:index", count(record.index))
-        .optional("act:sceneNumber", record.repetition.map(|repetition| count(repetition.scene)))
-        .optional("act:repetition", record.repetition.map(|repetition| count(repetition.number)))
+        .optional(
+            "act:sceneNumber",
+            record.repetition.map(|repetition| count(repetition.scene)),
+        )
+        .optional(
+            "act:repetition",
+            record.repetition.map(|repetition| count(repetition.number)),
+        )
         .optional("act:weight", record.weight.map(Literal::from))
         .has("act:score", Literal::from(record.score))
         .text("act:status", record.status.word())
         .text("act:traceHash", &record.trace.hash)
         .has("act:discards", count(record.discards.len() as u64))
-        .optional("act:reason", record.reason.as_deref().map(Literal::new_simple_literal))
-        .optional("act:programOutput", record.program_output.as_deref().map(Literal::new_simple_literal))
-        .optional("act:shrunkFrom", record.shrunk_from.as_deref().map(run_node))
+        .optional(
+            "act:reason",
+            record.reason.as_deref().map(Literal::new_simple_literal),
+        )
+        .optional(
+            "act:programOutput",
+            record
+                .program_output
+                .as_deref()
+                .map(Literal::new_simple_literal),
+        )
+        .optional(
+            "act:shrunkFrom",
+            record.shrunk_from.as_deref().map(run_node),
+        )
         .has("prov:startedAtTime", time(&record.started))
         .has("act:wallSeconds", Literal::from(record.wall_secs))
         .has("act:elapsedSeconds", Literal::from(record.elapsed_secs))
-        .optional("act:deepestPenetration", record.quality.map(|quality| Literal::from(quality.deepest_penetration_m)))
-        .optional("act:energyGain", record.quality.map(|quality| Literal::from(quality.energy_gain_j)))
+        .optional(
+            "act:deepestPenetration",
+            record
+                .quality
+                .map(|quality| Literal::from(quality.deepest_penetration_m)),
+        )
+        .optional(
+            "act:energyGain",
+            record
+                .quality
+                .map(|quality| Literal::from(quality.energy_gain_j)),
+        )
         .text("act:program", &program(env!("CARGO_PKG_VERSION")));
     write_designators(&record.scene.designators, record, &mut about);
 }
 
-/// Writes the scenes that were discarded before the run's own, so that their number survives interrupting and resuming
-/// the campaign.
+/// Writes the scenes that were discarded before the run's own, so that their number survives
+/// interrupting and resuming the campaign.
 fn write_discards(record: &RunRecord, run: &NamedNode, statements: &mut Statements) {
     for (number, reason) in record.discards.iter().enumerate() {
         statements
@@ -73,12 +101,21 @@ fn write_discards(record: &RunRecord, run: &NamedNode, statements: &mut Statemen
 }
 
 /// Writes designators: as an object if the scene has one of that name, otherwise as a text.
-fn write_designators(designators: &BTreeMap<String, Vec<String>>, record: &RunRecord, about: &mut About<'_>) {
+fn write_designators(
+    designators: &BTreeMap<String, Vec<String>>,
+    record: &RunRecord,
+    about: &mut About<'_>,
+) {
     for (designator, values) in designators {
         let property = names::act(designator);
         about.has("act:designator", iri(&property));
         for value in values {
-            if record.scene.objects.iter().any(|object| object.id == *value) {
+            if record
+                .scene
+                .objects
+                .iter()
+                .any(|object| object.id == *value)
+            {
                 about.has(&property, iri(&thing_iri(value)));
             } else {
                 about.text(&property, value);
@@ -94,25 +131,50 @@ fn write_execution(record: &RunRecord, step: usize, run: &NamedNode, statements:
     about
         .is_a("act:ActionExecution")
         .has("act:ofRun", run.clone())
-        .optional("act:action", record.actions.get(step).map(|action| iri(action)))
+        .optional(
+            "act:action",
+            record.actions.get(step).map(|action| iri(action)),
+        )
         .has("act:step", Literal::from((step + 1) as u64))
-        .optional("act:score", record.action_scores.get(step).copied().map(Literal::from))
+        .optional(
+            "act:score",
+            record.action_scores.get(step).copied().map(Literal::from),
+        )
         .text("act:end", end_word(&action.end))
         .has("act:duration", Literal::from(action.duration_secs))
-        .optional("act:reported", action.report.as_ref().map(|report| Literal::from(report.succeeded)))
-        .optional("act:message", message(action).map(Literal::new_simple_literal));
+        .optional(
+            "act:reported",
+            action
+                .report
+                .as_ref()
+                .map(|report| Literal::from(report.succeeded)),
+        )
+        .optional(
+            "act:message",
+            message(action).map(Literal::new_simple_literal),
+        );
     write_designators(&action.parameters, record, &mut about);
     for (property, state) in [("act:before", step), ("act:after", step + 1)] {
         if state < record.facts.snapshots.len() {
             about.has(property, state_graph(run, state));
         }
     }
-    if record.facts.during.get(step).is_some_and(|during| !during.is_empty()) {
+    if record
+        .facts
+        .during
+        .get(step)
+        .is_some_and(|during| !during.is_empty())
+    {
         about.has("act:during", during_graph(run, step));
     }
     for judgement in record.judgements.get(step).into_iter().flatten() {
         let result = unique(&[node.as_str(), &judgement.property, "result"]);
-        write_assertion(judgement, &node, [assertion_of(&node, &judgement.property), result], statements);
+        write_assertion(
+            judgement,
+            &node,
+            [assertion_of(&node, &judgement.property), result],
+            statements,
+        );
     }
 }
 
@@ -139,7 +201,9 @@ fn message(action: &ActionTrace) -> Option<&str> {
         | ActionEnd::Timeout(reason)
         | ActionEnd::Cut(reason)
         | ActionEnd::NotPerformed(reason) => Some(reason),
-        ActionEnd::Completed | ActionEnd::NotReached => action.report.as_ref().map(|report| report.message.as_str()),
+        ActionEnd::Completed | ActionEnd::NotReached => {
+            action.report.as_ref().map(|report| report.message.as_str())
+        }
     }
 }
 
@@ -159,7 +223,10 @@ pub(super) fn write_assertion(
         .has("earl:result", result.clone());
     statements
         .about(result)
-        .has("earl:outcome", iri(&format!("earl:{}", judgement.outcome.earl())))
+        .has(
+            "earl:outcome",
+            iri(&format!("earl:{}", judgement.outcome.earl())),
+        )
         .text("act:outcome", judgement.outcome.word())
         .optional("act:margin", judgement.margin.map(Literal::from))
         .text("act:witness", &judgement.witness)

@@ -25,8 +25,8 @@ pub const NOISE_TERMS: [&str; 13] = [
     "landmarkHeadingNoise",
 ];
 
-/// Returns the sensing errors of a scene, most of them standard deviations, with the local names of their terms. Units:
-/// those of the terms.
+/// Returns the sensing errors of a scene, most of them standard deviations, with the local names of
+/// their terms. Units: those of the terms.
 pub fn noise(scene: &Scene) -> [(&'static str, f64); 13] {
     let sensing = &scene.sensing;
     let odometry = &sensing.odometry;
@@ -48,16 +48,24 @@ pub fn noise(scene: &Scene) -> [(&'static str, f64); 13] {
     std::array::from_fn(|idx| (NOISE_TERMS[idx], values[idx]))
 }
 
-/// Writes the scene of a run: values of the whole scene on the run's node, and one node for each object.
+/// Writes the scene of a run: values of the whole scene on the run's node, and one node for each
+/// object.
 pub(super) fn write(record: &RunRecord, run: &NamedNode, statements: &mut Statements) {
     let scene = &record.scene;
-    let standing = scene.objects.iter().filter(|object| object.role != Role::Platform).count();
+    let standing = scene
+        .objects
+        .iter()
+        .filter(|object| object.role != Role::Platform)
+        .count();
     let mut about = statements.about(run.clone());
     about
         .text("act:worldName", &scene.world)
         .text("act:robot", &scene.robot.profile.name)
         .has("act:objectCount", Literal::from(standing as u64));
-    for (property, value) in ["w:baseX", "w:baseY", "w:baseYaw"].into_iter().zip(scene.robot.base) {
+    for (property, value) in ["w:baseX", "w:baseY", "w:baseYaw"]
+        .into_iter()
+        .zip(scene.robot.base)
+    {
         about.has(property, Literal::from(value));
     }
     for (name, value) in noise(scene) {
@@ -68,11 +76,22 @@ pub(super) fn write(record: &RunRecord, run: &NamedNode, statements: &mut Statem
     }
 }
 
-fn write_object(record: &RunRecord, object: &SceneObject, run: &NamedNode, statements: &mut Statements) {
+fn write_object(
+    record: &RunRecord,
+    object: &SceneObject,
+    run: &NamedNode,
+    statements: &mut Statements,
+) {
     let thing = thing_iri(&object.id);
     let node = NamedNode::new_unchecked(format!("{}/scene/{}", run.as_str(), names::local(&thing)));
-    let extremes =
-        || record.trace.actions.iter().flat_map(|action| &action.extremes).filter(|extremes| extremes.id == object.id);
+    let extremes = || {
+        record
+            .trace
+            .actions
+            .iter()
+            .flat_map(|action| &action.extremes)
+            .filter(|extremes| extremes.id == object.id)
+    };
     let targets = |other: &SceneObject| other.role == Role::Target;
     let [x, y, z] = object.pose.position;
     let mut about = statements.about(node);
@@ -91,17 +110,32 @@ fn write_object(record: &RunRecord, object: &SceneObject, run: &NamedNode, state
         ("w:mass", object.mass_kg),
         ("w:friction", object.friction),
         ("w:restitution", object.restitution),
-        ("act:robotDistance", libm::hypot(x - scene_base(record)[0], y - scene_base(record)[1])),
+        (
+            "act:robotDistance",
+            libm::hypot(x - scene_base(record)[0], y - scene_base(record)[1]),
+        ),
     ] {
         about.has(property, Literal::from(value));
     }
-    about.optional("act:neighbourDistance", nearest(&record.scene, object, |other| other.role != Role::Platform));
+    about.optional(
+        "act:neighbourDistance",
+        nearest(&record.scene, object, |other| other.role != Role::Platform),
+    );
     if object.role != Role::Platform && object.role != Role::Target {
-        about.optional("act:targetDistance", nearest(&record.scene, object, targets));
+        about.optional(
+            "act:targetDistance",
+            nearest(&record.scene, object, targets),
+        );
     }
     about
-        .optional("act:displacement", largest(extremes().map(|extremes| extremes.max_displacement_m)))
-        .optional("act:maxTilt", largest(extremes().map(|extremes| extremes.max_tilt_rad)));
+        .optional(
+            "act:displacement",
+            largest(extremes().map(|extremes| extremes.max_displacement_m)),
+        )
+        .optional(
+            "act:maxTilt",
+            largest(extremes().map(|extremes| extremes.max_tilt_rad)),
+        );
 }
 
 fn scene_base(record: &RunRecord) -> [f64; 3] {
@@ -109,7 +143,11 @@ fn scene_base(record: &RunRecord) -> [f64; 3] {
 }
 
 /// Horizontal distance from an object to the nearest other object that satisfies `among`.
-fn nearest(scene: &Scene, object: &SceneObject, among: impl Fn(&SceneObject) -> bool) -> Option<Literal> {
+fn nearest(
+    scene: &Scene,
+    object: &SceneObject,
+    among: impl Fn(&SceneObject) -> bool,
+) -> Option<Literal> {
     let [x, y, _] = object.pose.position;
     scene
         .objects

@@ -12,18 +12,19 @@ use actcheck_base::{Diagnostic, Diagnostics, Digest, Files, Source, Term, names}
 
 /// Loads an ontology with its imports and linked rule files.
 ///
-/// Accepts Turtle and RDF/XML, distinguished by file extension or content. Relative file IRIs become
-/// machine-independent IRIs.
+/// Accepts Turtle and RDF/XML, distinguished by file extension or content. Relative file IRIs
+/// become machine-independent IRIs.
 ///
 /// # Errors
-/// Reports all faults at once: a file can't be read or parsed (O001 to O003), a success property is not a property
-/// (O004), a property has no rule or several (O005, O006), a parameter is missing or unknown (O007, O008), a rule file
-/// is missing, has an unknown extension or an absolute path (O009 to O011), the ontology has no action (O012), or a
-/// predicate is misspelt (O014).
+/// Reports all faults at once: a file can't be read or parsed (O001 to O003), a success property is
+/// not a property (O004), a property has no rule or several (O005, O006), a parameter is missing or
+/// unknown (O007, O008), a rule file is missing, has an unknown extension or an absolute path (O009
+/// to O011), the ontology has no action (O012), or a predicate is misspelt (O014).
 pub fn load(files: &Files, path: &Path) -> Result<Ontology, Diagnostics> {
     let mut found = Diagnostics::new();
     let graph = Graph::new(read::read(files, path, &mut found));
-    // Missing definitions may be in the part that could not be parsed, so further checks would mislead.
+    // Missing definitions may be in the part that could not be parsed, so further checks would
+    // mislead.
     if found.has_errors() {
         return Err(found);
     }
@@ -32,7 +33,11 @@ pub fn load(files: &Files, path: &Path) -> Result<Ontology, Diagnostics> {
     let properties: BTreeMap<String, Property> = graph
         .individuals(&names::act("Property"))
         .into_iter()
-        .filter_map(|iri| rules.remove(&iri).map(|rule| (iri.clone(), property(&graph, iri, rule))))
+        .filter_map(|iri| {
+            rules
+                .remove(&iri)
+                .map(|rule| (iri.clone(), property(&graph, iri, rule)))
+        })
         .collect();
     let actions: BTreeMap<String, Action> = check::action_iris(&graph)
         .into_iter()
@@ -48,7 +53,10 @@ pub fn load(files: &Files, path: &Path) -> Result<Ontology, Diagnostics> {
         found.extend(unlinked::rule_files(&graph));
     }
     let mut digest = Digest::new();
-    graph.sources().iter().for_each(|source| digest.update(source.text.as_bytes()));
+    graph
+        .sources()
+        .iter()
+        .for_each(|source| digest.update(source.text.as_bytes()));
     let warnings = found.clone();
     found.or(Ontology {
         sources: graph.sources().to_vec(),
@@ -64,7 +72,8 @@ pub fn load(files: &Files, path: &Path) -> Result<Ontology, Diagnostics> {
     })
 }
 
-/// Reads the terms of a vocabulary with its imports, such as `ontology/history.ttl`, which need have no actions.
+/// Reads the terms of a vocabulary with its imports, such as `ontology/history.ttl`, which need
+/// have no actions.
 ///
 /// # Errors
 /// A file can't be read or parsed (O001 to O003).
@@ -76,9 +85,18 @@ pub fn load_vocabulary(files: &Files, path: &Path) -> Result<Vocabulary, Diagnos
 
 /// Sorts faults by source file, then by position.
 fn in_order_of_place(found: Diagnostics, sources: &[Source]) -> Diagnostics {
-    let rank = |fault: &Diagnostic| sources.iter().position(|source| fault.source.as_ref() == Some(source));
+    let rank = |fault: &Diagnostic| {
+        sources
+            .iter()
+            .position(|source| fault.source.as_ref() == Some(source))
+    };
     let mut faults: Vec<Diagnostic> = found.into_iter().collect();
-    faults.sort_by_key(|fault| (rank(fault), fault.span.as_ref().map_or(0, |span| span.start)));
+    faults.sort_by_key(|fault| {
+        (
+            rank(fault),
+            fault.span.as_ref().map_or(0, |span| span.start),
+        )
+    });
     let mut sorted = Diagnostics::new();
     faults.into_iter().for_each(|fault| sorted.push(fault));
     sorted
@@ -88,17 +106,28 @@ fn in_order_of_place(found: Diagnostics, sources: &[Source]) -> Diagnostics {
 fn libraries(graph: &Graph, found: &mut Diagnostics) -> Vec<RuleFile> {
     let predicate = names::act("ruleLibrary");
     let mut libraries: BTreeMap<(String, Arc<str>), RuleFile> = BTreeMap::new();
-    for statement in graph.statements().iter().filter(|statement| *statement.predicate == *predicate) {
-        let Some(library) = rule_files::read(graph, statement, found) else { continue };
+    for statement in graph
+        .statements()
+        .iter()
+        .filter(|statement| *statement.predicate == *predicate)
+    {
+        let Some(library) = rule_files::read(graph, statement, found) else {
+            continue;
+        };
         if library.language != RuleLanguage::Datalog
             && let Some((source, span)) = &library.linked_at
         {
             let message = format!("the rule library `{}` is not Datalog", library.path);
             found.push(
-                Diagnostic::error("O010", message).at(source, span.clone()).help("rule libraries must end in `.rls`"),
+                Diagnostic::error("O010", message)
+                    .at(source, span.clone())
+                    .help("rule libraries must end in `.rls`"),
             );
         }
-        libraries.insert((library.path.clone(), Arc::clone(&library.source.name)), library);
+        libraries.insert(
+            (library.path.clone(), Arc::clone(&library.source.name)),
+            library,
+        );
     }
     libraries.into_values().collect()
 }
@@ -116,8 +145,11 @@ fn property_rules(graph: &Graph, found: &mut Diagnostics) -> BTreeMap<String, Ru
                 }
             }
             [_, second, ..] => {
-                let message =
-                    format!("the property `{}` is verified by {} rule files", names::local(&iri), links.len());
+                let message = format!(
+                    "the property `{}` is verified by {} rule files",
+                    names::local(&iri),
+                    links.len()
+                );
                 let (source, span) = graph.place(second, second.object.as_iri().unwrap_or(&iri));
                 found.push(
                     Diagnostic::error("O006", message)
@@ -147,9 +179,12 @@ fn action(graph: &Graph, iri: String) -> Action {
     let stated = |predicate: &str| check::inherited(graph, &iri, predicate);
     let iris = |predicate: &str| -> Vec<String> {
         let mut seen = BTreeSet::new();
-        let objects =
-            stated(predicate).into_iter().filter_map(|statement| statement.object.as_iri().map(str::to_owned));
-        objects.filter(|object| seen.insert(object.clone())).collect()
+        let objects = stated(predicate)
+            .into_iter()
+            .filter_map(|statement| statement.object.as_iri().map(str::to_owned));
+        objects
+            .filter(|object| seen.insert(object.clone()))
+            .collect()
     };
     Action {
         label: graph.label(&iri),
@@ -163,14 +198,23 @@ fn action(graph: &Graph, iri: String) -> Action {
 }
 
 fn locals<'a>(statements: impl Iterator<Item = &'a Statement>) -> BTreeSet<String> {
-    statements.filter_map(|statement| statement.object.as_iri()).map(|iri| names::local(iri).to_owned()).collect()
+    statements
+        .filter_map(|statement| statement.object.as_iri())
+        .map(|iri| names::local(iri).to_owned())
+        .collect()
 }
 
 fn triples(graph: &Graph) -> Vec<[Term; 3]> {
     let mut triples: Vec<[Term; 3]> = graph
         .statements()
         .iter()
-        .map(|statement| [statement.subject.clone(), Term::iri(&statement.predicate), statement.object.clone()])
+        .map(|statement| {
+            [
+                statement.subject.clone(),
+                Term::iri(&statement.predicate),
+                statement.object.clone(),
+            ]
+        })
         .collect();
     triples.sort();
     triples.dedup();
@@ -187,22 +231,35 @@ const PROPERTY_CLASSES: [(&str, &str); 5] = [
 ];
 
 fn vocabulary(graph: &Graph) -> Vocabulary {
-    let predicates: BTreeSet<String> =
-        PROPERTY_CLASSES.iter().map(|(space, local)| format!("{space}{local}")).collect();
+    let predicates: BTreeSet<String> = PROPERTY_CLASSES
+        .iter()
+        .map(|(space, local)| format!("{space}{local}"))
+        .collect();
     let term = |iri: &str| VocabularyTerm {
         is_property: !graph.classes_of(iri).is_disjoint(&predicates)
-            || graph.about(iri).any(|statement| *statement.predicate == *rdfs("domain")),
+            || graph
+                .about(iri)
+                .any(|statement| *statement.predicate == *rdfs("domain")),
         unit: graph.text(iri, &names::w("unit")),
         label: graph.text(iri, &rdfs("label")),
         comment: graph.text(iri, &rdfs("comment")),
     };
-    Vocabulary { terms: graph.subjects().map(|iri| (iri.to_owned(), term(iri))).collect() }
+    Vocabulary {
+        terms: graph
+            .subjects()
+            .map(|iri| (iri.to_owned(), term(iri)))
+            .collect(),
+    }
 }
 
 impl Ontology {
     /// Whether `class` equals `ancestor` or is a subclass of it.
     pub fn is_a(&self, class: &str, ancestor: &str) -> bool {
-        class == ancestor || self.superclasses.get(class).is_some_and(|above| above.contains(ancestor))
+        class == ancestor
+            || self
+                .superclasses
+                .get(class)
+                .is_some_and(|above| above.contains(ancestor))
     }
 
     /// Whether the ontology declares a class with this IRI.

@@ -4,15 +4,23 @@ use crate::Ontology;
 use actcheck_base::names;
 
 impl Ontology {
-    /// Returns the IRI of the class whose label or local name matches the longest suffix of the name's words. Digits
-    /// are ignored: `coke_can_2` is a can, `CoffeeTable` a coffee table. Returns `None` if no class matches.
+    /// Returns the IRI of the class whose label or local name matches the longest suffix of the
+    /// name's words. Digits are ignored: `coke_can_2` is a can, `CoffeeTable` a coffee table.
+    /// Returns `None` if no class matches.
     pub fn class_called(&self, name: &str) -> Option<&str> {
         let words = words(name);
         (0..words.len()).find_map(|start| {
             let wanted = words[start..].concat();
             self.superclasses.keys().map(String::as_str).find(|class| {
-                let label = self.vocabulary.terms.get(*class).and_then(|term| term.label.as_deref());
-                [Some(names::local(class)), label].into_iter().flatten().any(|called| letters(called) == wanted)
+                let label = self
+                    .vocabulary
+                    .terms
+                    .get(*class)
+                    .and_then(|term| term.label.as_deref());
+                [Some(names::local(class)), label]
+                    .into_iter()
+                    .flatten()
+                    .any(|called| letters(called) == wanted)
             })
         })
     }
@@ -27,7 +35,10 @@ fn words(name: &str) -> Vec<String> {
             words.push(String::new());
         }
         if letter.is_alphabetic() {
-            words.last_mut().expect("there is a first word").extend(letter.to_lowercase());
+            words
+                .last_mut()
+                .expect("there is a first word")
+                .extend(letter.to_lowercase());
         }
         was_lower = letter.is_lowercase();
     }
@@ -36,7 +47,10 @@ fn words(name: &str) -> Vec<String> {
 }
 
 fn letters(name: &str) -> String {
-    name.chars().filter(|letter| letter.is_alphabetic()).flat_map(char::to_lowercase).collect()
+    name.chars()
+        .filter(|letter| letter.is_alphabetic())
+        .flat_map(char::to_lowercase)
+        .collect()
 }
 
 #[cfg(test)]

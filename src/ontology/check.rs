@@ -5,14 +5,20 @@ use std::collections::{BTreeMap, BTreeSet};
 use crate::Action;
 use crate::graph::Graph;
 use crate::read::Statement;
-use actcheck_base::{Diagnostic, Diagnostics, Source, Span, did_you_mean, misspelt, names, nearest};
+use actcheck_base::{
+    Diagnostic, Diagnostics, Source, Span, did_you_mean, misspelt, names, nearest,
+};
 
-/// Individuals of `act:Action` or of its subclasses, and individuals of those (a special kind of Pick is a Pick).
+/// Individuals of `act:Action` or of its subclasses, and individuals of those (a special kind of
+/// Pick is a Pick).
 pub(super) fn action_iris(graph: &Graph) -> BTreeSet<String> {
     let mut actions = graph.individuals(&names::act("Action"));
     loop {
-        let kinds: Vec<String> =
-            graph.subjects().filter(|s| !graph.classes_of(s).is_disjoint(&actions)).map(str::to_owned).collect();
+        let kinds: Vec<String> = graph
+            .subjects()
+            .filter(|s| !graph.classes_of(s).is_disjoint(&actions))
+            .map(str::to_owned)
+            .collect();
         let before = actions.len();
         actions.extend(kinds);
         if actions.len() == before {
@@ -24,7 +30,10 @@ pub(super) fn action_iris(graph: &Graph) -> BTreeSet<String> {
 /// Statements about an individual and about all its classes, in reading order.
 pub(super) fn inherited<'a>(graph: &'a Graph, iri: &str, predicate: &str) -> Vec<&'a Statement> {
     let owners = owners(graph, iri);
-    let mut statements: Vec<&Statement> = owners.iter().flat_map(|owner| graph.stated(owner, predicate)).collect();
+    let mut statements: Vec<&Statement> = owners
+        .iter()
+        .flat_map(|owner| graph.stated(owner, predicate))
+        .collect();
     // All statements are in one slice in reading order, so their addresses give that order.
     statements.sort_by_key(|statement| std::ptr::from_ref::<Statement>(statement));
     statements
@@ -36,7 +45,12 @@ fn owners(graph: &Graph, iri: &str) -> BTreeSet<String> {
     let mut waiting = vec![iri.to_owned()];
     while let Some(next) = waiting.pop() {
         let above = graph.classes_of(&next);
-        waiting.extend(above.iter().filter(|class| !owners.contains(*class)).cloned());
+        waiting.extend(
+            above
+                .iter()
+                .filter(|class| !owners.contains(*class))
+                .cloned(),
+        );
         owners.extend(above);
     }
     owners
@@ -54,13 +68,18 @@ const PREDICATES: [&str; 8] = [
     "unit",
 ];
 
-/// Faults: predicates in the paper's namespace that the ontology does not declare and that are nearly the name of a known
-/// one (O014), so that their statements have no effect.
+/// Faults: predicates in the paper's namespace that the ontology does not declare and that are
+/// nearly the name of a known one (O014), so that their statements have no effect.
 pub(super) fn misspelt_predicates(graph: &Graph, found: &mut Diagnostics) {
     let mut reported = BTreeSet::new();
-    let declared: BTreeSet<&str> = graph.subjects().filter_map(|iri| iri.strip_prefix(names::ACT)).collect();
+    let declared: BTreeSet<&str> = graph
+        .subjects()
+        .filter_map(|iri| iri.strip_prefix(names::ACT))
+        .collect();
     for statement in graph.statements() {
-        let Some(local) = statement.predicate.strip_prefix(names::ACT) else { continue };
+        let Some(local) = statement.predicate.strip_prefix(names::ACT) else {
+            continue;
+        };
         if PREDICATES.contains(&local) || declared.contains(local) {
             continue;
         }
@@ -71,8 +90,11 @@ pub(super) fn misspelt_predicates(graph: &Graph, found: &mut Diagnostics) {
                 continue;
             }
             let message = format!("unknown predicate `act:{local}`; the statement has no effect");
-            found
-                .push(Diagnostic::error("O014", message).at(source, span).help(format!("did you mean `act:{known}`?")));
+            found.push(
+                Diagnostic::error("O014", message)
+                    .at(source, span)
+                    .help(format!("did you mean `act:{known}`?")),
+            );
         }
     }
 }
@@ -82,7 +104,9 @@ pub(super) fn unverified(graph: &Graph, iri: &str) -> Diagnostic {
     let name = names::local(iri);
     let fault = Diagnostic::error("O005", format!("no rule verifies the property `{name}`"));
     let file = snake_case(name);
-    at_first(graph, iri, fault).help(format!("link its rule file: `act:verifiedBy <../rules/{file}.rls>`"))
+    at_first(graph, iri, fault).help(format!(
+        "link its rule file: `act:verifiedBy <../rules/{file}.rls>`"
+    ))
 }
 
 fn snake_case(name: &str) -> String {
@@ -106,7 +130,8 @@ fn at_first(graph: &Graph, iri: &str, fault: Diagnostic) -> Diagnostic {
     }
 }
 
-/// Checks the properties and parameters of all actions. Reports each fault once, where it is stated.
+/// Checks the properties and parameters of all actions. Reports each fault once, where it is
+/// stated.
 pub(super) fn actions(graph: &Graph, actions: &BTreeMap<String, Action>, found: &mut Diagnostics) {
     if actions.is_empty() {
         let fault = Diagnostic::error("O012", "the ontology has no action")
@@ -116,26 +141,45 @@ pub(super) fn actions(graph: &Graph, actions: &BTreeMap<String, Action>, found: 
             None => fault,
         });
     }
-    let known = Known { properties: graph.individuals(&names::act("Property")), parameters: parameters(graph) };
+    let known = Known {
+        properties: graph.individuals(&names::act("Property")),
+        parameters: parameters(graph),
+    };
     let mut reported: BTreeSet<(String, usize)> = BTreeSet::new();
     for (name, action) in actions {
         for fault in faults_of(graph, &known, name, action) {
             // Report a faulty inherited statement once, not for every action that inherits it.
             let place = fault.span.as_ref().map_or(0, |span| span.start);
-            let source = fault.source.as_ref().map_or(String::new(), |source| source.name.to_string());
+            let source = fault
+                .source
+                .as_ref()
+                .map_or(String::new(), |source| source.name.to_string());
             let parameter_fault = fault.code == "O007";
-            if reported.insert((format!("{source} {} {}", fault.code, if parameter_fault { name } else { "" }), place))
-            {
+            if reported.insert((
+                format!(
+                    "{source} {} {}",
+                    fault.code,
+                    if parameter_fault { name } else { "" }
+                ),
+                place,
+            )) {
                 found.push(fault);
             }
         }
     }
 }
 
-/// Warnings: properties of something that is neither an action nor a class of one (O015), and properties that no action
-/// has (O016). Neither is ever judged.
-pub(super) fn never_judged(graph: &Graph, actions: &BTreeMap<String, Action>, found: &mut Diagnostics) {
-    let owners: BTreeSet<String> = actions.values().flat_map(|action| owners(graph, &action.iri)).collect();
+/// Warnings: properties of something that is neither an action nor a class of one (O015), and
+/// properties that no action has (O016). Neither is ever judged.
+pub(super) fn never_judged(
+    graph: &Graph,
+    actions: &BTreeMap<String, Action>,
+    found: &mut Diagnostics,
+) {
+    let owners: BTreeSet<String> = actions
+        .values()
+        .flat_map(|action| owners(graph, &action.iri))
+        .collect();
     let (mut reported, mut explained) = (BTreeSet::new(), BTreeSet::new());
     for statement in graph.statements() {
         let states = |predicate: &str| graph.means(&statement.predicate, &names::act(predicate));
@@ -144,14 +188,21 @@ pub(super) fn never_judged(graph: &Graph, actions: &BTreeMap<String, Action>, fo
             (false, true) => "preconditions",
             (false, false) => continue,
         };
-        let Some(subject) = statement.subject.as_iri().filter(|subject| !owners.contains(*subject)) else { continue };
+        let Some(subject) = statement
+            .subject
+            .as_iri()
+            .filter(|subject| !owners.contains(*subject))
+        else {
+            continue;
+        };
         explained.extend(statement.object.as_iri());
         if reported.insert((subject, kind)) {
             found.push(no_action(graph, actions, statement, subject, kind));
         }
     }
-    let has =
-        |action: &Action, iri: &String| action.success_properties.contains(iri) || action.preconditions.contains(iri);
+    let has = |action: &Action, iri: &String| {
+        action.success_properties.contains(iri) || action.preconditions.contains(iri)
+    };
     for iri in graph.individuals(&names::act("Property")) {
         if !explained.contains(iri.as_str()) && !actions.values().any(|action| has(action, &iri)) {
             found.push(of_no_action(graph, actions, &iri));
@@ -169,14 +220,24 @@ fn no_action(
 ) -> Diagnostic {
     let (source, span) = graph.place(statement, subject);
     let local = names::local(subject);
-    let is_class = graph.superclasses.get(subject).is_some_and(|above| above.contains(&names::act("Action")));
+    let is_class = graph
+        .superclasses
+        .get(subject)
+        .is_some_and(|above| above.contains(&names::act("Action")));
     let help = match nearest(local, actions.keys().map(String::as_str)) {
-        _ if is_class => format!("declare an action of this class: `act:MyAction a {}`", names::shorten(subject)),
+        _ if is_class => format!(
+            "declare an action of this class: `act:MyAction a {}`",
+            names::shorten(subject)
+        ),
         Some(found) => format!("did you mean `{found}`?"),
         None => format!("declare it: `{} a act:Action`", names::shorten(subject)),
     };
-    let message = format!("`{local}` is neither an action nor the class of one, so that its {kind} are never judged");
-    Diagnostic::warning("O015", message).at(source, span).help(help)
+    let message = format!(
+        "`{local}` is neither an action nor the class of one, so that its {kind} are never judged"
+    );
+    Diagnostic::warning("O015", message)
+        .at(source, span)
+        .help(help)
 }
 
 /// Warning: no action has a property (O016).
@@ -186,10 +247,18 @@ fn of_no_action(graph: &Graph, actions: &BTreeMap<String, Action>, iri: &str) ->
         .filter_map(|statement| statement.object.as_iri().map(names::local))
         .collect();
     let fits = |action: &&Action| needs.iter().all(|name| action.parameters.contains(*name));
-    let action = actions.values().find(fits).map_or("act:Pick".to_owned(), |action| names::shorten(&action.iri));
-    let message = format!("no action has the property `{}`, so that it is never judged", names::local(iri));
-    at_first(graph, iri, Diagnostic::warning("O016", message))
-        .help(format!("state it of an action, such as `{action} act:successProperty {}`", names::shorten(iri)))
+    let action = actions
+        .values()
+        .find(fits)
+        .map_or("act:Pick".to_owned(), |action| names::shorten(&action.iri));
+    let message = format!(
+        "no action has the property `{}`, so that it is never judged",
+        names::local(iri)
+    );
+    at_first(graph, iri, Diagnostic::warning("O016", message)).help(format!(
+        "state it of an action, such as `{action} act:successProperty {}`",
+        names::shorten(iri)
+    ))
 }
 
 /// Declared properties and parameters, to check references against.
@@ -200,17 +269,28 @@ struct Known {
 
 /// Local names of all designators.
 pub(super) fn parameters(graph: &Graph) -> BTreeSet<String> {
-    graph.individuals(&names::act("PropertyParameter")).iter().map(|iri| names::local(iri).to_owned()).collect()
+    graph
+        .individuals(&names::act("PropertyParameter"))
+        .iter()
+        .map(|iri| names::local(iri).to_owned())
+        .collect()
 }
 
 fn faults_of(graph: &Graph, known: &Known, name: &str, action: &Action) -> Vec<Diagnostic> {
     let mut faults = Vec::new();
     for statement in inherited(graph, &action.iri, &names::act("hasParameter")) {
-        faults.extend(unknown_parameter(graph, known, statement, &format!("the action `{name}` has")));
+        faults.extend(unknown_parameter(
+            graph,
+            known,
+            statement,
+            &format!("the action `{name}` has"),
+        ));
     }
     for predicate in ["successProperty", "precondition"] {
         for statement in inherited(graph, &action.iri, &names::act(predicate)) {
-            let Some(property) = statement.object.as_iri() else { continue };
+            let Some(property) = statement.object.as_iri() else {
+                continue;
+            };
             if known.properties.contains(property) {
                 faults.extend(missing_parameters(graph, known, name, action, property));
             } else {
@@ -227,13 +307,24 @@ fn no_property(graph: &Graph, known: &Known, statement: &Statement, property: &s
     let local = names::local(property);
     let help = match nearest(local, known.properties.iter().map(|iri| names::local(iri))) {
         Some(found) => format!("did you mean `{found}`?"),
-        None => format!("declare it: `{} a act:Property ; act:verifiedBy <…>`", names::shorten(property)),
+        None => format!(
+            "declare it: `{} a act:Property ; act:verifiedBy <…>`",
+            names::shorten(property)
+        ),
     };
-    Diagnostic::error("O004", format!("`{local}` is not a property")).at(source, span).help(help)
+    Diagnostic::error("O004", format!("`{local}` is not a property"))
+        .at(source, span)
+        .help(help)
 }
 
 /// Faults: parameters that a property needs but the action does not have (O007).
-fn missing_parameters(graph: &Graph, known: &Known, name: &str, action: &Action, property: &str) -> Vec<Diagnostic> {
+fn missing_parameters(
+    graph: &Graph,
+    known: &Known,
+    name: &str,
+    action: &Action,
+    property: &str,
+) -> Vec<Diagnostic> {
     let predicate = names::act("needsParameter");
     let needs = graph.stated(property, &predicate);
     let missing = needs.filter_map(|statement| {
@@ -262,7 +353,12 @@ fn missing_parameters(graph: &Graph, known: &Known, name: &str, action: &Action,
 }
 
 /// Fault: a parameter is not declared (O008). Returns `None` if it is declared.
-fn unknown_parameter(graph: &Graph, known: &Known, statement: &Statement, who: &str) -> Option<Diagnostic> {
+fn unknown_parameter(
+    graph: &Graph,
+    known: &Known,
+    statement: &Statement,
+    who: &str,
+) -> Option<Diagnostic> {
     let iri = statement.object.as_iri()?;
     let parameter = names::local(iri);
     if known.parameters.contains(parameter) {
@@ -270,27 +366,54 @@ fn unknown_parameter(graph: &Graph, known: &Known, statement: &Statement, who: &
     }
     let (source, span): (&Source, Span) = graph.place(statement, iri);
     let mentioned = mentioned_parameters(graph, parameter);
-    let candidates = known.parameters.iter().chain(&mentioned).map(String::as_str);
+    let candidates = known
+        .parameters
+        .iter()
+        .chain(&mentioned)
+        .map(String::as_str);
     let help = match nearest(parameter, candidates) {
         Some(near) => format!("did you mean `{near}`?"),
-        None => format!("declare it: `{} a act:PropertyParameter`", names::shorten(iri)),
+        None => format!(
+            "declare it: `{} a act:PropertyParameter`",
+            names::shorten(iri)
+        ),
     };
     let message = format!("{who} the parameter `{parameter}`, which is not declared");
-    Some(Diagnostic::error("O008", message).at(source, span).help(help))
+    Some(
+        Diagnostic::error("O008", message)
+            .at(source, span)
+            .help(help),
+    )
 }
 
-/// Candidates for suggestions if declarations are missing: names used as parameters elsewhere, and the standard
-/// designators.
+/// Candidates for suggestions if declarations are missing: names used as parameters elsewhere, and
+/// the standard designators.
 fn mentioned_parameters(graph: &Graph, except: &str) -> BTreeSet<String> {
     let predicates = [names::act("hasParameter"), names::act("needsParameter")];
     graph
         .statements()
         .iter()
-        .filter(|statement| predicates.iter().any(|predicate| *statement.predicate == **predicate))
-        .filter_map(|statement| statement.object.as_iri().map(|iri| names::local(iri).to_owned()))
+        .filter(|statement| {
+            predicates
+                .iter()
+                .any(|predicate| *statement.predicate == **predicate)
+        })
+        .filter_map(|statement| {
+            statement
+                .object
+                .as_iri()
+                .map(|iri| names::local(iri).to_owned())
+        })
         .chain(
-            ["pickObject", "placeSurface", "objectSurface", "surfaceObjects", "objectLocation", "world"]
-                .map(String::from),
+            [
+                "pickObject",
+                "placeSurface",
+                "objectSurface",
+                "surfaceObjects",
+                "objectLocation",
+                "world",
+            ]
+            .map(String::from),
         )
         .filter(|name| name != except)
         .collect()

@@ -2,10 +2,11 @@
 
 use std::path::{Path, PathBuf};
 
-/// Prefix of file IRIs. They contain the path relative to the ontology's folder, never an absolute path.
+/// Prefix of file IRIs. They contain the path relative to the ontology's folder, never an absolute
+/// path.
 const FILE: &str = "https://w3id.org/actcheck/file/";
-/// Placeholder for a parent folder. [`LEVELS`] of them precede the ontology's folder, enough for any sensible
-/// `../../…`.
+/// Placeholder for a parent folder. [`LEVELS`] of them precede the ontology's folder, enough for
+/// any sensible `../../…`.
 const ABOVE: &str = "~above~/";
 const LEVELS: usize = 12;
 /// The ontology's own folder.
@@ -15,7 +16,8 @@ pub(super) fn base_of(relative: &str) -> String {
     format!("{FILE}{}{HERE}{relative}", ABOVE.repeat(LEVELS))
 }
 
-/// Path of a file IRI relative to the ontology's folder, with slashes. Returns `None` for any other IRI.
+/// Path of a file IRI relative to the ontology's folder, with slashes. Returns `None` for any other
+/// IRI.
 ///
 /// A file `close_object.rls` next to the folder gives `../close_object.rls`.
 pub(super) fn relative_of(iri: &str) -> Option<String> {
@@ -23,7 +25,10 @@ pub(super) fn relative_of(iri: &str) -> Option<String> {
     let (rest, levels) = without_above(rest);
     match rest.strip_prefix(HERE) {
         Some(here) => Some(here.to_owned()),
-        None => Some(format!("{}{rest}", "../".repeat(LEVELS.saturating_sub(levels) + 1))),
+        None => Some(format!(
+            "{}{rest}",
+            "../".repeat(LEVELS.saturating_sub(levels) + 1)
+        )),
     }
 }
 
@@ -35,7 +40,8 @@ fn without_above(mut rest: &str) -> (&str, usize) {
     (rest, levels)
 }
 
-/// File IRI without placeholders, for statements: `…/file/ontology/actions.ttl`, `…/file/rules/moved_object.rls`.
+/// File IRI without placeholders, for statements: `…/file/ontology/actions.ttl`,
+/// `…/file/rules/moved_object.rls`.
 pub(super) fn plain(relative: &str) -> String {
     match relative.strip_prefix("../") {
         Some(beside) if !beside.starts_with("../") => format!("{FILE}{beside}"),
@@ -73,7 +79,15 @@ pub(super) fn beside(folder: &Path, relative: &str) -> PathBuf {
 /// Percent-encodes a file name for an IRI.
 pub(super) fn encoded(name: &str) -> String {
     let plain = |b: u8| b.is_ascii_alphanumeric() || b"-_.~".contains(&b);
-    name.bytes().map(|b| if plain(b) { char::from(b).to_string() } else { format!("%{b:02X}") }).collect()
+    name.bytes()
+        .map(|b| {
+            if plain(b) {
+                char::from(b).to_string()
+            } else {
+                format!("%{b:02X}")
+            }
+        })
+        .collect()
 }
 
 /// Decodes percent-encoded bytes, if the result is UTF-8.
@@ -82,7 +96,10 @@ fn decoded(text: &str) -> String {
     let mut out = Vec::with_capacity(bytes.len());
     let mut idx = 0;
     while let Some(byte) = bytes.get(idx) {
-        let hex = bytes.get(idx + 1..idx + 3).filter(|_| *byte == b'%').and_then(|hex| std::str::from_utf8(hex).ok());
+        let hex = bytes
+            .get(idx + 1..idx + 3)
+            .filter(|_| *byte == b'%')
+            .and_then(|hex| std::str::from_utf8(hex).ok());
         match hex.and_then(|hex| u8::from_str_radix(hex, 16).ok()) {
             Some(value) => {
                 out.push(value);

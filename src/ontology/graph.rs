@@ -25,7 +25,12 @@ impl Graph {
         }
         let superclasses = closure(&reading, &rdfs("subClassOf"));
         let superproperties = closure(&reading, &rdfs("subPropertyOf"));
-        Self { reading, by_subject, superclasses, superproperties }
+        Self {
+            reading,
+            by_subject,
+            superclasses,
+            superproperties,
+        }
     }
 
     pub(super) fn statements(&self) -> &[Statement] {
@@ -43,31 +48,45 @@ impl Graph {
 
     /// Statements about an IRI, in reading order.
     pub(super) fn about<'a>(&'a self, subject: &str) -> impl Iterator<Item = &'a Statement> {
-        self.by_subject.get(subject).into_iter().flatten().map(|idx| &self.reading.statements[*idx])
+        self.by_subject
+            .get(subject)
+            .into_iter()
+            .flatten()
+            .map(|idx| &self.reading.statements[*idx])
     }
 
     /// Statements with this subject, and this predicate or one of its sub-properties.
-    pub(super) fn stated<'a>(&'a self, subject: &str, predicate: &str) -> impl Iterator<Item = &'a Statement> {
-        self.about(subject).filter(move |statement| self.means(&statement.predicate, predicate))
+    pub(super) fn stated<'a>(
+        &'a self,
+        subject: &str,
+        predicate: &str,
+    ) -> impl Iterator<Item = &'a Statement> {
+        self.about(subject)
+            .filter(move |statement| self.means(&statement.predicate, predicate))
     }
 
     /// The first string value of a subject's predicate. Returns `None` if it has none.
     pub(super) fn text(&self, subject: &str, predicate: &str) -> Option<String> {
-        self.stated(subject, predicate).find_map(|statement| match &statement.object {
-            Term::String(text) | Term::LangString(text, _) => Some(text.to_string()),
-            _ => None,
-        })
+        self.stated(subject, predicate)
+            .find_map(|statement| match &statement.object {
+                Term::String(text) | Term::LangString(text, _) => Some(text.to_string()),
+                _ => None,
+            })
     }
 
     /// `rdfs:label`, or the local name if there is none.
     pub(super) fn label(&self, iri: &str) -> String {
-        self.text(iri, &rdfs("label")).unwrap_or_else(|| names::local(iri).to_owned())
+        self.text(iri, &rdfs("label"))
+            .unwrap_or_else(|| names::local(iri).to_owned())
     }
 
     /// Declared classes of an individual, with all their superclasses.
     pub(super) fn classes_of(&self, individual: &str) -> BTreeSet<String> {
         let mut classes = BTreeSet::new();
-        for class in self.stated(individual, &format!("{}type", names::RDF)).filter_map(|s| s.object.as_iri()) {
+        for class in self
+            .stated(individual, &format!("{}type", names::RDF))
+            .filter_map(|s| s.object.as_iri())
+        {
             classes.extend(self.superclasses.get(class).into_iter().flatten().cloned());
             classes.insert(class.to_owned());
         }
@@ -76,12 +95,18 @@ impl Graph {
 
     /// Individuals of a class or of its subclasses, sorted.
     pub(super) fn individuals(&self, class: &str) -> BTreeSet<String> {
-        self.subjects().filter(|subject| self.classes_of(subject).contains(class)).map(str::to_owned).collect()
+        self.subjects()
+            .filter(|subject| self.classes_of(subject).contains(class))
+            .map(str::to_owned)
+            .collect()
     }
 
     /// Source and span of an IRI in a statement.
     pub(super) fn place(&self, statement: &Statement, iri: &str) -> (&Source, Span) {
-        (&self.reading.sources[statement.text], self.reading.place(statement, iri))
+        (
+            &self.reading.sources[statement.text],
+            self.reading.place(statement, iri),
+        )
     }
 
     /// Bases of the relative paths in all sources, in the order of the sources.
@@ -96,14 +121,23 @@ impl Graph {
 
     /// Whether a predicate is the wanted one or one of its sub-properties.
     pub(super) fn means(&self, predicate: &str, wanted: &str) -> bool {
-        predicate == wanted || self.superproperties.get(predicate).is_some_and(|above| above.contains(wanted))
+        predicate == wanted
+            || self
+                .superproperties
+                .get(predicate)
+                .is_some_and(|above| above.contains(wanted))
     }
 }
 
 fn closure(reading: &Reading, predicate: &str) -> BTreeMap<String, BTreeSet<String>> {
     let mut direct: BTreeMap<&str, BTreeSet<&str>> = BTreeMap::new();
-    for statement in reading.statements.iter().filter(|statement| *statement.predicate == *predicate) {
-        if let (Some(below), Some(above)) = (statement.subject.as_iri(), statement.object.as_iri()) {
+    for statement in reading
+        .statements
+        .iter()
+        .filter(|statement| *statement.predicate == *predicate)
+    {
+        if let (Some(below), Some(above)) = (statement.subject.as_iri(), statement.object.as_iri())
+        {
             direct.entry(below).or_default().insert(above);
         }
     }
@@ -117,7 +151,10 @@ fn closure(reading: &Reading, predicate: &str) -> BTreeMap<String, BTreeSet<Stri
         }
         above
     };
-    direct.keys().map(|start| ((*start).to_owned(), above_of(start))).collect()
+    direct
+        .keys()
+        .map(|start| ((*start).to_owned(), above_of(start)))
+        .collect()
 }
 
 pub(super) fn rdfs(local: &str) -> String {

@@ -1,4 +1,5 @@
-//! Reads and checks the ontology: actions, properties, designators, categories and the vocabulary, from RDF files.
+//! Reads and checks the ontology: actions, properties, designators, categories and the vocabulary,
+//! from RDF files.
 //!
 //! Never: parses a rule, reads a configuration, or accesses the network.
 

@@ -15,7 +15,8 @@ pub(super) fn subject(node: &NamedOrBlankNode, blank: impl FnOnce(&str) -> Arc<s
     }
 }
 
-/// Converts an object; `blank` names blank nodes. Returns `None` for quoted triples, which ontologies do not use.
+/// Converts an object; `blank` names blank nodes. Returns `None` for quoted triples, which
+/// ontologies do not use.
 pub(super) fn object(term: &RdfTerm, blank: impl FnOnce(&str) -> Arc<str>) -> Option<Term> {
     match term {
         RdfTerm::NamedNode(iri) => Some(Term::iri(iri.as_str())),
@@ -63,21 +64,35 @@ fn double(text: &str) -> Option<f64> {
     }
 }
 
-/// Normalises a decimal: `+01.50` becomes `1.5`, `2` and `2.` become `2.0`. Returns `None` if the text is not a
-/// decimal.
+/// Normalises a decimal: `+01.50` becomes `1.5`, `2` and `2.` become `2.0`. Returns `None` if the
+/// text is not a decimal.
 fn canonical_decimal(text: &str) -> Option<String> {
     let (negative, digits) = match text.strip_prefix('-') {
         Some(rest) => (true, rest),
         None => (false, text.strip_prefix('+').unwrap_or(text)),
     };
     let (whole, fraction) = digits.split_once('.').unwrap_or((digits, ""));
-    if (whole.is_empty() && fraction.is_empty()) || !(whole.bytes().chain(fraction.bytes())).all(|b| b.is_ascii_digit())
+    if (whole.is_empty() && fraction.is_empty())
+        || !(whole.bytes().chain(fraction.bytes())).all(|b| b.is_ascii_digit())
     {
         return None;
     }
-    let (whole, fraction) = (whole.trim_start_matches('0'), fraction.trim_end_matches('0'));
-    let sign = if negative && !(whole.is_empty() && fraction.is_empty()) { "-" } else { "" };
-    let or_zero = |part: &str| if part.is_empty() { "0".to_owned() } else { part.to_owned() };
+    let (whole, fraction) = (
+        whole.trim_start_matches('0'),
+        fraction.trim_end_matches('0'),
+    );
+    let sign = if negative && !(whole.is_empty() && fraction.is_empty()) {
+        "-"
+    } else {
+        ""
+    };
+    let or_zero = |part: &str| {
+        if part.is_empty() {
+            "0".to_owned()
+        } else {
+            part.to_owned()
+        }
+    };
     Some(format!("{sign}{}.{}", or_zero(whole), or_zero(fraction)))
 }
 
@@ -92,6 +107,9 @@ mod tests {
         assert_eq!(typed("+07.50", xsd::DECIMAL), Term::Decimal("7.5".into()));
         assert_eq!(typed("-0", xsd::DECIMAL), Term::Decimal("0.0".into()));
         assert_eq!(typed("-INF", xsd::DOUBLE), Term::Double(f64::NEG_INFINITY));
-        assert_eq!(typed("x", xsd::INTEGER), Term::Literal("x".into(), xsd::INTEGER.as_str().into()));
+        assert_eq!(
+            typed("x", xsd::INTEGER),
+            Term::Literal("x".into(), xsd::INTEGER.as_str().into())
+        );
     }
 }

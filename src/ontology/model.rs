@@ -6,7 +6,8 @@ use actcheck_base::{Diagnostics, Source, Span, Term, digest_of, names};
 
 /// A checked ontology, including its imports.
 ///
-/// [`Ontology::default`] is empty: add statements, properties and libraries to apply rules without an ontology file.
+/// [`Ontology::default`] is empty: add statements, properties and libraries to apply rules without
+/// an ontology file.
 #[derive(Debug, Clone, Default)]
 #[non_exhaustive]
 pub struct Ontology {
@@ -80,7 +81,8 @@ pub struct RuleFile {
     pub source: Source,
     /// Its language, from the file extension.
     pub language: RuleLanguage,
-    /// Path relative to the ontology's folder, as written in the ontology. The history stores this path.
+    /// Path relative to the ontology's folder, as written in the ontology. The history stores this
+    /// path.
     pub path: String,
     /// Digest of its text.
     pub digest: String,
@@ -125,16 +127,35 @@ impl Property {
     pub fn new(iri: impl Into<String>, rule: RuleFile) -> Self {
         let iri = iri.into();
         let name = names::local(&iri).to_owned();
-        Self { label: name.clone(), name, iri, comment: None, rule, needs: BTreeSet::new(), unit: None }
+        Self {
+            label: name.clone(),
+            name,
+            iri,
+            comment: None,
+            rule,
+            needs: BTreeSet::new(),
+            unit: None,
+        }
     }
 }
 
 impl RuleFile {
-    /// Creates a rule file from its text. The language is SPARQL if the source's name ends in `.rq`, else Datalog.
+    /// Creates a rule file from its text. The language is SPARQL if the source's name ends in
+    /// `.rq`, else Datalog.
     pub fn new(source: Source) -> Self {
-        let language = if source.name.ends_with(".rq") { RuleLanguage::Sparql } else { RuleLanguage::Datalog };
+        let language = if source.name.ends_with(".rq") {
+            RuleLanguage::Sparql
+        } else {
+            RuleLanguage::Datalog
+        };
         let (path, digest) = (source.name.to_string(), digest_of(&source.text));
-        Self { source, language, path, digest, linked_at: None }
+        Self {
+            source,
+            language,
+            path,
+            digest,
+            linked_at: None,
+        }
     }
 }
 
@@ -151,6 +172,9 @@ impl RuleLanguage {
 impl VocabularyTerm {
     /// Creates a term that can be a predicate, without a description.
     pub fn property() -> Self {
-        Self { is_property: true, ..Self::default() }
+        Self {
+            is_property: true,
+            ..Self::default()
+        }
     }
 }

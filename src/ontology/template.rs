@@ -11,10 +11,15 @@ pub struct Template {
     pub ontology_entry: String,
 }
 
-/// Returns the template of a property `name` (`StaysUpright`) for an action (`Pick`). `rules_folder` is the folder of
-/// the rule file relative to the ontology file, with a trailing slash. `designator` names the object that the example
-/// tests.
-pub fn property_template(name: &str, action: &str, designator: &str, rules_folder: &str) -> Template {
+/// Returns the template of a property `name` (`StaysUpright`) for an action (`Pick`).
+/// `rules_folder` is the folder of the rule file relative to the ontology file, with a trailing
+/// slash. `designator` names the object that the example tests.
+pub fn property_template(
+    name: &str,
+    action: &str,
+    designator: &str,
+    rules_folder: &str,
+) -> Template {
     let rule_file = format!("{}.rls", snake_case(name));
     let words = snake_case(name).replace('_', " ");
     let rule_text = format!(
@@ -38,7 +43,11 @@ pub fn property_template(name: &str, action: &str, designator: &str, rules_folde
          act:needsParameter act:{designator} ;\n    act:unit \"rad\" ;\n    act:verifiedBy <{rules_folder}{rule_file}> .\n\
          act:{action} act:successProperty act:{name} .\n"
     );
-    Template { rule_file, rule_text, ontology_entry }
+    Template {
+        rule_file,
+        rule_text,
+        ontology_entry,
+    }
 }
 
 /// Converts `StaysUpright` to `stays_upright`.
@@ -62,7 +71,15 @@ mod tests {
         assert_eq!(snake_case("StaysUpright"), "stays_upright");
         let template = property_template("StaysUpright", "Pick", "pickObject", "../rules/");
         assert_eq!(template.rule_file, "stays_upright.rls");
-        assert!(template.ontology_entry.contains("act:verifiedBy <../rules/stays_upright.rls>"));
-        assert!(template.rule_text.contains("parameter(act:pickObject, ?object)"));
+        assert!(
+            template
+                .ontology_entry
+                .contains("act:verifiedBy <../rules/stays_upright.rls>")
+        );
+        assert!(
+            template
+                .rule_text
+                .contains("parameter(act:pickObject, ?object)")
+        );
     }
 }

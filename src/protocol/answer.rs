@@ -1,5 +1,5 @@
-//! Answers to a program's requests: pictures, points, and the objects of the reference perception. No simulated time
-//! passes.
+//! Answers to a program's requests: pictures, points, and the objects of the reference perception.
+//! No simulated time passes.
 
 use serde::Serialize;
 
@@ -40,9 +40,20 @@ pub fn answer(ask: &Ask, robot: &mut Operator<'_>) -> (Answer, Option<Vec<u8>>) 
     let (content, bytes) = match ask.what {
         What::Depth => depth(robot),
         What::Cloud => cloud(robot),
-        What::Objects => (Content::Objects { objects: objects(ask.of.as_deref(), robot) }, None),
+        What::Objects => (
+            Content::Objects {
+                objects: objects(ask.of.as_deref(), robot),
+            },
+            None,
+        ),
     };
-    (Answer { r#type: "answer", content }, bytes)
+    (
+        Answer {
+            r#type: "answer",
+            content,
+        },
+        bytes,
+    )
 }
 
 /// A picture, and the camera's pose by the robot's belief.
@@ -53,15 +64,27 @@ fn look(robot: &mut Operator<'_>) -> (DepthImage, nalgebra::Isometry3<f64>) {
 
 fn depth(robot: &mut Operator<'_>) -> (Content, Option<Vec<u8>>) {
     let (image, camera) = look(robot);
-    let DepthImage { width, height, focal_px, depths } = image;
-    let bytes = depths.iter().flat_map(|depth| depth.to_le_bytes()).collect();
+    let DepthImage {
+        width,
+        height,
+        focal_px,
+        depths,
+    } = image;
+    let bytes = depths
+        .iter()
+        .flat_map(|depth| depth.to_le_bytes())
+        .collect();
     let content = Content::Depth {
         camera_pose: WirePose::of(&Pose::from_isometry(&camera)),
         width,
         height,
         horizontal_fov_rad: robot.camera().field_of_view_rad,
         focal_px,
-        binary: [Binary { name: "depth", dtype: "f32", shape: vec![height, width] }],
+        binary: [Binary {
+            name: "depth",
+            dtype: "f32",
+            shape: vec![height, width],
+        }],
     };
     (content, Some(bytes))
 }
@@ -72,12 +95,28 @@ fn cloud(robot: &mut Operator<'_>) -> (Content, Option<Vec<u8>>) {
     for row in 0..image.height {
         for point in (0..image.width).filter_map(|column| image.point(column, row)) {
             let point = camera * point;
-            #[expect(clippy::cast_possible_truncation, reason = "depths have 32 bits, more digits would be invented")]
-            bytes.extend([point.x, point.y, point.z].into_iter().flat_map(|along| (along as f32).to_le_bytes()));
+            #[expect(
+                clippy::cast_possible_truncation,
+                reason = "depths have 32 bits, more digits would be invented"
+            )]
+            bytes.extend(
+                [point.x, point.y, point.z]
+                    .into_iter()
+                    .flat_map(|along| (along as f32).to_le_bytes()),
+            );
         }
     }
     let shape = vec![bytes.len() / 12, 3];
-    (Content::Cloud { binary: [Binary { name: "cloud", dtype: "f32", shape }] }, Some(bytes))
+    (
+        Content::Cloud {
+            binary: [Binary {
+                name: "cloud",
+                dtype: "f32",
+                shape,
+            }],
+        },
+        Some(bytes),
+    )
 }
 
 fn objects(of: Option<&str>, robot: &mut Operator<'_>) -> Vec<WireObject> {

@@ -52,7 +52,8 @@ struct HeadTarget {
     tilt_rad: Option<f64>,
 }
 
-/// Targets by joint name, in the order of the message. Duplicate names are kept, so that they can be reported.
+/// Targets by joint name, in the order of the message. Duplicate names are kept, so that they can
+/// be reported.
 #[derive(Debug, Default)]
 struct Targets(Vec<(String, f64)>);
 
@@ -84,12 +85,18 @@ impl WireCommand {
     /// Returns the number of ticks the command lasts, and its controls.
     ///
     /// # Errors
-    /// An unknown joint, a joint commanded by the wrong key, duplicate targets for a joint, or zero ticks.
+    /// An unknown joint, a joint commanded by the wrong key, duplicate targets for a joint, or zero
+    /// ticks.
     pub fn controls(self, joints: &Joints) -> Result<(u32, Controls), ExternalFault> {
         if self.ticks == 0 {
-            return Err(wrong("its command lasts 0 ticks; `ticks` must be at least 1".to_owned()));
+            return Err(wrong(
+                "its command lasts 0 ticks; `ticks` must be at least 1".to_owned(),
+            ));
         }
-        let mut taken = Taken { joints, seen: Vec::new() };
+        let mut taken = Taken {
+            joints,
+            seen: Vec::new(),
+        };
         let mut controls = Controls {
             positions: taken.list(&self.positions)?,
             velocities: taken.list(&self.velocities)?,
@@ -101,9 +108,17 @@ impl WireCommand {
         if controls.base_velocity.is_some() {
             taken.base()?;
         }
-        for (number, (name, angle)) in self.head.into_iter().flat_map(|head| head.targets()).enumerate() {
+        for (number, (name, angle)) in self
+            .head
+            .into_iter()
+            .flat_map(|head| head.targets())
+            .enumerate()
+        {
             let Some(angle) = angle else { continue };
-            let joint = joints.head.get(number).ok_or_else(|| wrong(format!("the robot's head has no {name}")))?;
+            let joint = joints
+                .head
+                .get(number)
+                .ok_or_else(|| wrong(format!("the robot's head has no {name}")))?;
             taken.once(*joint, name)?;
             controls.positions.push((*joint, angle));
         }
@@ -125,16 +140,26 @@ struct Taken<'a> {
 
 impl Taken<'_> {
     fn list(&mut self, targets: &Targets) -> Result<Vec<(usize, f64)>, ExternalFault> {
-        targets.0.iter().map(|(name, value)| Ok((self.joint(name)?, *value))).collect()
+        targets
+            .0
+            .iter()
+            .map(|(name, value)| Ok((self.joint(name)?, *value)))
+            .collect()
     }
 
     fn joint(&mut self, name: &str) -> Result<usize, ExternalFault> {
         let Some((joint, role)) = self.joints.by_name.get(name) else {
-            let help = actcheck_base::did_you_mean(name, self.joints.by_name.keys().map(String::as_str));
-            return Err(wrong(format!("the robot has no joint `{}`: {help}", short(name))));
+            let help =
+                actcheck_base::did_you_mean(name, self.joints.by_name.keys().map(String::as_str));
+            return Err(wrong(format!(
+                "the robot has no joint `{}`: {help}",
+                short(name)
+            )));
         };
         if *role == Role::Gripper {
-            return Err(wrong(format!("`{name}` is a finger joint; command it with `gripper`")));
+            return Err(wrong(format!(
+                "`{name}` is a finger joint; command it with `gripper`"
+            )));
         }
         self.once(*joint, name)?;
         Ok(*joint)
@@ -142,7 +167,9 @@ impl Taken<'_> {
 
     fn once(&mut self, joint: usize, name: &str) -> Result<(), ExternalFault> {
         if self.seen.contains(&joint) {
-            return Err(wrong(format!("its command has two targets for the joint `{name}`")));
+            return Err(wrong(format!(
+                "its command has two targets for the joint `{name}`"
+            )));
         }
         self.seen.push(joint);
         Ok(())
@@ -153,15 +180,23 @@ impl Taken<'_> {
         if !self.joints.drives {
             return Err(wrong("the robot has no mobile base".to_owned()));
         }
-        let of_base =
-            self.joints.by_name.iter().find(|(_, (idx, role))| *role == Role::Base && self.seen.contains(idx));
+        let of_base = self
+            .joints
+            .by_name
+            .iter()
+            .find(|(_, (idx, role))| *role == Role::Base && self.seen.contains(idx));
         match of_base {
-            Some((name, _)) => Err(wrong(format!("its command has a base velocity and a target for `{name}`"))),
+            Some((name, _)) => Err(wrong(format!(
+                "its command has a base velocity and a target for `{name}`"
+            ))),
             None => Ok(()),
         }
     }
 }
 
 fn wrong(reason: String) -> ExternalFault {
-    ExternalFault { late: false, reason }
+    ExternalFault {
+        late: false,
+        reason,
+    }
 }

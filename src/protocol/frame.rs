@@ -1,5 +1,5 @@
-//! Frames on a stream: four bytes of length, one byte of kind, the payload. Waiting ends by a timeout or by the
-//! caller's watch function.
+//! Frames on a stream: four bytes of length, one byte of kind, the payload. Waiting ends by a
+//! timeout or by the caller's watch function.
 
 use std::io::{ErrorKind, Read, Write};
 use std::ops::Range;
@@ -48,7 +48,12 @@ impl Wire {
         stream.set_nonblocking(false)?;
         stream.set_read_timeout(Some(POLL))?;
         stream.set_write_timeout(Some(POLL))?;
-        Ok(Self { stream, clock_secs, incoming: vec![0; 64 << 10], outgoing: Vec::with_capacity(64 << 10) })
+        Ok(Self {
+            stream,
+            clock_secs,
+            incoming: vec![0; 64 << 10],
+            outgoing: Vec::with_capacity(64 << 10),
+        })
     }
 
     /// Sends one message followed by the binary frames it announces.
@@ -68,7 +73,8 @@ impl Wire {
         let length = self.outgoing.len() - HEADER;
         self.outgoing[..HEADER].copy_from_slice(&header(JSON, length)?);
         for binary in binaries {
-            self.outgoing.extend_from_slice(&header(BYTES, binary.len())?);
+            self.outgoing
+                .extend_from_slice(&header(BYTES, binary.len())?);
             self.outgoing.extend_from_slice(binary);
         }
         let mut patience = self.patience(limit_secs);
@@ -83,12 +89,12 @@ impl Wire {
         Ok(())
     }
 
-    /// Receives the next message, a single JSON object, and returns the range of its bytes for [`Self::payload`].
-    /// `watch` is called while nothing arrives.
+    /// Receives the next message, a single JSON object, and returns the range of its bytes for
+    /// [`Self::payload`]. `watch` is called while nothing arrives.
     ///
     /// # Errors
-    /// Nothing arrives within `limit_secs`, the connection is closed, or the received data is not a valid frame, is too
-    /// long, or contains more than one frame.
+    /// Nothing arrives within `limit_secs`, the connection is closed, or the received data is not a
+    /// valid frame, is too long, or contains more than one frame.
     pub fn receive(
         &mut self,
         limit_secs: f64,
@@ -156,27 +162,41 @@ impl Patience {
         if self.idle_secs < self.limit_secs && (self.clock_secs)() < self.until_secs {
             return Ok(());
         }
-        Err(ExternalFault { late: true, reason: format!("it did not {what} within {} s", self.limit_secs) })
+        Err(ExternalFault {
+            late: true,
+            reason: format!("it did not {what} within {} s", self.limit_secs),
+        })
     }
 }
 
 fn header(kind: u8, length: usize) -> Result<[u8; HEADER], ExternalFault> {
-    let bytes = u32::try_from(length).ok().filter(|_| length <= TO_PROGRAM_LIMIT);
-    let [a, b, c, d] =
-        bytes.ok_or_else(|| broke(format!("a message of {length} bytes is too long"))).map(u32::to_le_bytes)?;
+    let bytes = u32::try_from(length)
+        .ok()
+        .filter(|_| length <= TO_PROGRAM_LIMIT);
+    let [a, b, c, d] = bytes
+        .ok_or_else(|| broke(format!("a message of {length} bytes is too long")))
+        .map(u32::to_le_bytes)?;
     Ok([a, b, c, d, kind])
 }
 
 /// The payload length announced by a header.
 fn payload_length(incoming: &[u8]) -> Result<usize, ExternalFault> {
-    let [a, b, c, d, kind, ..] = *incoming else { return Ok(0) };
+    let [a, b, c, d, kind, ..] = *incoming else {
+        return Ok(0);
+    };
     if kind != JSON {
-        let begun = String::from_utf8_lossy(&incoming[..HEADER]).escape_debug().to_string();
-        return Err(broke(format!("it sent `{begun}`, which is not a JSON frame: its fifth byte must be `J`")));
+        let begun = String::from_utf8_lossy(&incoming[..HEADER])
+            .escape_debug()
+            .to_string();
+        return Err(broke(format!(
+            "it sent `{begun}`, which is not a JSON frame: its fifth byte must be `J`"
+        )));
     }
     let length = u32::from_le_bytes([a, b, c, d]) as usize;
     if length > FROM_PROGRAM_LIMIT {
-        return Err(broke(format!("it sent a message of {length} bytes; the limit is {FROM_PROGRAM_LIMIT}")));
+        return Err(broke(format!(
+            "it sent a message of {length} bytes; the limit is {FROM_PROGRAM_LIMIT}"
+        )));
     }
     Ok(length)
 }
@@ -187,7 +207,10 @@ pub fn out_of_turn() -> ExternalFault {
 }
 
 fn broke(reason: String) -> ExternalFault {
-    ExternalFault { late: false, reason }
+    ExternalFault {
+        late: false,
+        reason,
+    }
 }
 
 fn gone() -> ExternalFault {

@@ -1,4 +1,5 @@
-//! Mutated messages of a program: each is understood or refused, without a panic, and the wait for it ends.
+//! Mutated messages of a program: each is understood or refused, without a panic, and the wait for
+//! it ends.
 
 use std::io::Write as _;
 use std::net::Shutdown;
@@ -44,9 +45,23 @@ const WORDS: [&str; 16] = [
 ];
 
 fn joints() -> Joints {
-    let roles = [("a", Role::Arm), ("b", Role::Arm), ("c", Role::Base), ("f", Role::Gripper), ("h", Role::Head)];
-    let by_name = roles.iter().enumerate().map(|(idx, (name, role))| ((*name).to_owned(), (idx, *role))).collect();
-    Joints { by_name, head: vec![4], drives: true }
+    let roles = [
+        ("a", Role::Arm),
+        ("b", Role::Arm),
+        ("c", Role::Base),
+        ("f", Role::Gripper),
+        ("h", Role::Head),
+    ];
+    let by_name = roles
+        .iter()
+        .enumerate()
+        .map(|(idx, (name, role))| ((*name).to_owned(), (idx, *role)))
+        .collect();
+    Joints {
+        by_name,
+        head: vec![4],
+        drives: true,
+    }
 }
 
 /// Parses a message as the type that it names.
@@ -54,13 +69,16 @@ fn understand(message: &[u8], joints: &Joints) -> Result<(), actcheck_actions::E
     match kind_of(message)?.as_str() {
         "hello" => parse::<Hello>("hello", message).map(drop),
         "ready" => parse::<Plain>("ready", message).map(drop),
-        "command" => parse::<WireCommand>("command", message)?.controls(joints).map(drop),
+        "command" => parse::<WireCommand>("command", message)?
+            .controls(joints)
+            .map(drop),
         "ask" => parse::<Ask>("ask", message).map(drop),
         _ => {
             let end: End = parse("end", message)?;
             let poses = end.perceived.iter().flatten().map(|thing| &thing.pose);
-            let poses =
-                poses.chain(end.held.iter().map(|held| &held.pose)).chain(end.plane.iter().map(|plane| &plane.pose));
+            let poses = poses
+                .chain(end.held.iter().map(|held| &held.pose))
+                .chain(end.plane.iter().map(|plane| &plane.pose));
             for pose in poses {
                 let length: f64 = pose.pose()?.rotation.iter().map(|part| part * part).sum();
                 assert!((length - 1.0).abs() < 1e-6, "{pose:?}");
@@ -78,11 +96,22 @@ fn mutated_frames_are_understood_or_refused() {
         let message = random.pick(&MESSAGES).as_bytes();
         // Either the whole frame is mutated, or only its payload.
         let whole = random.below(3) == 0;
-        let payload = if whole { message.to_vec() } else { random.text(message, &WORDS, &others) };
-        let mut frame = u32::try_from(payload.len()).expect("it is short").to_le_bytes().to_vec();
+        let payload = if whole {
+            message.to_vec()
+        } else {
+            random.text(message, &WORDS, &others)
+        };
+        let mut frame = u32::try_from(payload.len())
+            .expect("it is short")
+            .to_le_bytes()
+            .to_vec();
         frame.push(b'J');
         frame.extend(payload);
-        let frame = if whole { random.text(&frame, &WORDS, &others) } else { frame };
+        let frame = if whole {
+            random.text(&frame, &WORDS, &others)
+        } else {
+            frame
+        };
         let (ours, mut theirs) = UnixStream::pair().expect("a pair of sockets");
         let mut wire = Wire::new(ours, || 0.0).expect("it can be configured");
         std::thread::scope(|scope| {
@@ -95,7 +124,11 @@ fn mutated_frames_are_understood_or_refused() {
                 Ok(range) => {
                     assert!(range.len() <= FROM_PROGRAM_LIMIT);
                     if let Err(fault) = understand(wire.payload(range), &joints) {
-                        assert!(!fault.reason.is_empty() && fault.reason.len() < 10_000, "{}", fault.reason);
+                        assert!(
+                            !fault.reason.is_empty() && fault.reason.len() < 10_000,
+                            "{}",
+                            fault.reason
+                        );
                     }
                 }
                 Err(fault) => assert!(!fault.late && !fault.reason.is_empty(), "{}", fault.reason),

@@ -100,9 +100,21 @@ impl Joints {
     /// The joints of the robot in a world.
     pub fn of(world: &World) -> Self {
         let roles = roles(world);
-        let names = world.kinematics().joints().iter().map(|joint| joint.name.clone());
-        let by_name = names.zip(roles).enumerate().map(|(idx, (name, role))| (name, (idx, role))).collect();
-        Self { by_name, head: world.layout().head.clone(), drives: world.layout().base.is_some() }
+        let names = world
+            .kinematics()
+            .joints()
+            .iter()
+            .map(|joint| joint.name.clone());
+        let by_name = names
+            .zip(roles)
+            .enumerate()
+            .map(|(idx, (name, role))| (name, (idx, role)))
+            .collect();
+        Self {
+            by_name,
+            head: world.layout().head.clone(),
+            drives: world.layout().base.is_some(),
+        }
     }
 }
 
@@ -111,7 +123,12 @@ pub fn introduction(world: &World, worker: usize, privileged: bool) -> Introduct
     let (profile, camera) = (world.profile(), world.camera());
     let joints = world.kinematics().joints();
     let roles = roles(world);
-    let names = |wanted: &[usize]| wanted.iter().filter_map(|idx| Some(joints.get(*idx)?.name.as_str())).collect();
+    let names = |wanted: &[usize]| {
+        wanted
+            .iter()
+            .filter_map(|idx| Some(joints.get(*idx)?.name.as_str()))
+            .collect()
+    };
     let layout = world.layout();
     Introduction {
         r#type: "hello",
@@ -123,7 +140,11 @@ pub fn introduction(world: &World, worker: usize, privileged: bool) -> Introduct
         robot: Robot {
             name: &profile.name,
             urdf: &profile.urdf.text,
-            joints: joints.iter().zip(roles).map(|(joint, role)| wire_joint(joint, role)).collect(),
+            joints: joints
+                .iter()
+                .zip(roles)
+                .map(|(joint, role)| wire_joint(joint, role))
+                .collect(),
             base_joints: layout.base.map_or_else(Vec::new, |base| names(&base)),
             arm_joints: names(&layout.arm),
             gripper_joints: names(&layout.gripper.joints().collect::<Vec<_>>()),
@@ -153,9 +174,24 @@ fn wire_joint(joint: &Joint, role: Role) -> WireJoint<'_> {
         JointKind::Prismatic => "prismatic",
         JointKind::Revolute => "revolute",
     };
-    let Joint { name, lower, upper, velocity, effort, .. } = joint;
+    let Joint {
+        name,
+        lower,
+        upper,
+        velocity,
+        effort,
+        ..
+    } = joint;
     let [lower, upper, velocity, effort] = [*lower, *upper, *velocity, *effort].map(written);
-    WireJoint { name, kind, role: role.word(), lower, upper, velocity, effort }
+    WireJoint {
+        name,
+        kind,
+        role: role.word(),
+        lower,
+        upper,
+        velocity,
+        effort,
+    }
 }
 
 /// JSON has no infinity; the largest finite number replaces it.

@@ -1,8 +1,9 @@
-//! Robot skills in another process: messages over a socket, in lockstep with the simulation; management of the process,
-//! and handling of its faults. `clients/PROTOCOL.md` specifies the messages.
+//! Robot skills in another process: messages over a socket, in lockstep with the simulation;
+//! management of the process, and handling of its faults. `clients/PROTOCOL.md` specifies the
+//! messages.
 //!
-//! Never: advances simulated time unless the program commands it, shows ground truth to an unprivileged program, or
-//! leaves a process behind.
+//! Never: advances simulated time unless the program commands it, shows ground truth to an
+//! unprivileged program, or leaves a process behind.
 
 mod answer;
 mod command;

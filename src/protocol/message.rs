@@ -19,7 +19,8 @@ pub struct WirePose {
     pub quaternion_xyzw: [f64; 4],
 }
 
-/// An object, perceived or true. Frame of its pose: world, by the robot's belief unless it is ground truth.
+/// An object, perceived or true. Frame of its pose: world, by the robot's belief unless it is
+/// ground truth.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct WireObject {
     pub id: String,
@@ -89,7 +90,8 @@ struct Typed<'a> {
 /// # Errors
 /// The message is not a JSON object with a `type`.
 pub fn kind_of(message: &[u8]) -> Result<String, ExternalFault> {
-    let typed: Typed<'_> = serde_json::from_slice(message).map_err(|error| wrong("a message", &error, message))?;
+    let typed: Typed<'_> =
+        serde_json::from_slice(message).map_err(|error| wrong("a message", &error, message))?;
     Ok(short(&typed.kind))
 }
 
@@ -98,7 +100,8 @@ pub fn kind_of(message: &[u8]) -> Result<String, ExternalFault> {
 /// # Errors
 /// The message is not JSON, or has missing, unknown or invalid fields.
 pub fn parse<'a, T: Deserialize<'a>>(kind: &str, message: &'a [u8]) -> Result<T, ExternalFault> {
-    serde_json::from_slice(message).map_err(|error| wrong(&format!("a message `{kind}`"), &error, message))
+    serde_json::from_slice(message)
+        .map_err(|error| wrong(&format!("a message `{kind}`"), &error, message))
 }
 
 /// Longest quoted part of an invalid message. Unit: characters.
@@ -118,8 +121,15 @@ pub fn short(text: &str) -> String {
 fn wrong(what: &str, error: &serde_json::Error, message: &[u8]) -> ExternalFault {
     let error = short(&error.to_string());
     let text = String::from_utf8_lossy(&message[..message.len().min(4 * QUOTED)]);
-    let quoted: String = text.chars().take(QUOTED).flat_map(char::escape_debug).collect();
-    ExternalFault { late: false, reason: format!("it sent {what} that can't be parsed: {error}, in `{quoted}`") }
+    let quoted: String = text
+        .chars()
+        .take(QUOTED)
+        .flat_map(char::escape_debug)
+        .collect();
+    ExternalFault {
+        late: false,
+        reason: format!("it sent {what} that can't be parsed: {error}, in `{quoted}`"),
+    }
 }
 
 /// The program's introduction.
@@ -211,7 +221,10 @@ const SHORTEST: f64 = 1e-6;
 impl WirePose {
     /// A pose for the wire.
     pub fn of(pose: &Pose) -> Self {
-        Self { position_m: pose.position, quaternion_xyzw: pose.rotation }
+        Self {
+            position_m: pose.position,
+            quaternion_xyzw: pose.rotation,
+        }
     }
 
     /// A pose from the wire, with its quaternion normalised.
@@ -219,11 +232,25 @@ impl WirePose {
     /// # Errors
     /// The quaternion is not finite, or too short to be a rotation.
     pub fn pose(&self) -> Result<Pose, ExternalFault> {
-        let length = self.quaternion_xyzw.iter().map(|part| part * part).sum::<f64>().sqrt();
+        let length = self
+            .quaternion_xyzw
+            .iter()
+            .map(|part| part * part)
+            .sum::<f64>()
+            .sqrt();
         if !length.is_finite() || length < SHORTEST {
-            let reason = format!("it sent a pose whose quaternion {:?} is not a rotation", self.quaternion_xyzw);
-            return Err(ExternalFault { late: false, reason });
+            let reason = format!(
+                "it sent a pose whose quaternion {:?} is not a rotation",
+                self.quaternion_xyzw
+            );
+            return Err(ExternalFault {
+                late: false,
+                reason,
+            });
         }
-        Ok(Pose { position: self.position_m, rotation: self.quaternion_xyzw.map(|part| part / length) })
+        Ok(Pose {
+            position: self.position_m,
+            rotation: self.quaternion_xyzw.map(|part| part / length),
+        })
     }
 }

@@ -63,9 +63,20 @@ impl<'a> Observed<'a> {
         let [left, right] = measured.finger_efforts_n;
         Self {
             time_s: robot.elapsed_secs(),
-            joints: Joints { positions, velocities: &measured.velocities, efforts: &measured.loads },
-            base: Base { position_m, heading_rad, height_m },
-            gripper: Gripper { opening_m: measured.gripper_opening_m, force_n: left.min(right) },
+            joints: Joints {
+                positions,
+                velocities: &measured.velocities,
+                efforts: &measured.loads,
+            },
+            base: Base {
+                position_m,
+                heading_rad,
+                height_m,
+            },
+            gripper: Gripper {
+                opening_m: measured.gripper_opening_m,
+                force_n: left.min(right),
+            },
             budget_left_s: robot.budget_left_secs(),
             truth: privileged.then(|| truth(robot)),
         }
@@ -73,7 +84,10 @@ impl<'a> Observed<'a> {
 
     /// Converts the observation to a message.
     pub fn message(self) -> ObservationMessage<'a> {
-        ObservationMessage { kind: "observation", observed: self }
+        ObservationMessage {
+            kind: "observation",
+            observed: self,
+        }
     }
 }
 
@@ -85,5 +99,7 @@ fn truth(robot: &Operator<'_>) -> Truth {
         size_m: thing.size_m,
         furniture: thing.furniture,
     });
-    Truth { objects: objects.collect() }
+    Truth {
+        objects: objects.collect(),
+    }
 }

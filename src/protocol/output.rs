@@ -39,7 +39,10 @@ impl Output {
         std::thread::spawn(move || {
             let mut bytes = [0; 4096];
             while let Ok(n_bytes @ 1..) = pipe.read(&mut bytes) {
-                filled.lock().unwrap_or_else(PoisonError::into_inner).take(&bytes[..n_bytes]);
+                filled
+                    .lock()
+                    .unwrap_or_else(PoisonError::into_inner)
+                    .take(&bytes[..n_bytes]);
             }
             // The receiver may be gone.
             let _ = end.send(());
@@ -49,7 +52,10 @@ impl Output {
 
     /// Number of bytes printed so far.
     pub fn n_bytes(&self) -> u64 {
-        self.tail.lock().unwrap_or_else(PoisonError::into_inner).n_bytes
+        self.tail
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .n_bytes
     }
 
     /// The last lines of a program that has ended.
@@ -68,7 +74,9 @@ impl Tail {
         self.n_bytes += bytes.len() as u64;
         for piece in bytes.split_inclusive(|byte| *byte == b'\n') {
             let room = LONGEST.saturating_sub(self.begun.len());
-            let (text, ends) = piece.strip_suffix(b"\n").map_or((piece, false), |text| (text, true));
+            let (text, ends) = piece
+                .strip_suffix(b"\n")
+                .map_or((piece, false), |text| (text, true));
             self.begun.extend_from_slice(&text[..text.len().min(room)]);
             if ends {
                 let line = readable(&std::mem::take(&mut self.begun));

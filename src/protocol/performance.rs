@@ -48,11 +48,22 @@ pub struct Performance<'a> {
 }
 
 impl<'a> Performance<'a> {
-    /// One run with one of the campaign's programs. The program is started at the beginning of the run unless it is
-    /// already running.
-    /// When `stop` is set, the run ends between two messages.
-    pub fn new(programs: &'a Programs, run: RunName, clock_secs: fn() -> f64, stop: Arc<AtomicBool>) -> Self {
-        Self { lent: programs.lend(), run, clock_secs, stop, stopped: false, output: None }
+    /// One run with one of the campaign's programs. The program is started at the beginning of the
+    /// run unless it is already running. When `stop` is set, the run ends between two messages.
+    pub fn new(
+        programs: &'a Programs,
+        run: RunName,
+        clock_secs: fn() -> f64,
+        stop: Arc<AtomicBool>,
+    ) -> Self {
+        Self {
+            lent: programs.lend(),
+            run,
+            clock_secs,
+            stop,
+            stopped: false,
+            output: None,
+        }
     }
 
     /// Whether `stop` ended an action of the program, so that the run must not be stored.
@@ -65,19 +76,25 @@ impl<'a> Performance<'a> {
         self.output.as_deref()
     }
 
-    /// The program. It is started if it is not running, or if it is still busy with an action that a crash of the
-    /// simulation ended.
+    /// The program. It is started if it is not running, or if it is still busy with an action that
+    /// a crash of the simulation ended.
     fn started(&mut self, world: &World) -> Result<&mut Session, ExternalFault> {
         let stop = &*self.stop;
         let worker = &mut self.lent.worker;
         let programs = self.lent.programs;
         let session = match worker.session.take().filter(|session| session.idle) {
             Some(session) => session,
-            None => Session::start((&programs.skill, worker.number), &programs.tested, world, self.clock_secs, stop)
-                .map_err(|(fault, output)| {
-                    self.output = Some(output);
-                    fault
-                })?,
+            None => Session::start(
+                (&programs.skill, worker.number),
+                &programs.tested,
+                world,
+                self.clock_secs,
+                stop,
+            )
+            .map_err(|(fault, output)| {
+                self.output = Some(output);
+                fault
+            })?,
         };
         Ok(worker.session.insert(session))
     }
@@ -86,7 +103,16 @@ impl<'a> Performance<'a> {
     fn reset(&mut self, world: &World) -> Result<(), ExternalFault> {
         let RunName { run, index, seed } = self.run.clone();
         let stop = Arc::clone(&self.stop);
-        self.started(world).and_then(|session| session.reset(&ToProgram::Reset { run: &run, index, seed }, &stop))
+        self.started(world).and_then(|session| {
+            session.reset(
+                &ToProgram::Reset {
+                    run: &run,
+                    index,
+                    seed,
+                },
+                &stop,
+            )
+        })
     }
 
     /// Ends the program because of a fault of its own.
@@ -101,24 +127,37 @@ impl<'a> Performance<'a> {
 
     fn named(&self, fault: ExternalFault) -> ExternalFault {
         let text = &self.lent.programs.skill.text;
-        let last = self.output.iter().flatten().rev().find(|line| !line.trim().is_empty());
+        let last = self
+            .output
+            .iter()
+            .flatten()
+            .rev()
+            .find(|line| !line.trim().is_empty());
         let printed = last.map_or_else(String::new, |line| {
             let line: String = line.trim().chars().take(LONGEST_LINE).collect();
             format!("; its last output: {line}")
         });
         // The reason quotes the program, for example names of its actions.
         let reason = format!("the program `{text}`: {}{printed}", fault.reason);
-        ExternalFault { reason: printable(&reason).into_owned(), ..fault }
+        ExternalFault {
+            reason: printable(&reason).into_owned(),
+            ..fault
+        }
     }
 }
 
 impl ExternalSkill for Performance<'_> {
     fn begin_run(&mut self, world: &World) -> Result<(), ExternalFault> {
-        let is_reused = self.lent.worker.session.as_ref().is_some_and(|session| session.idle);
+        let is_reused = self
+            .lent
+            .worker
+            .session
+            .as_ref()
+            .is_some_and(|session| session.idle);
         let mut begun = self.reset(world);
         let is_stopped = self.stop.load(Ordering::Relaxed);
-        // A program that was ready at the end of its last run and is gone now belongs to no run. If its fault comes from this
-        // run, a new program shows it again.
+        // A program that was ready at the end of its last run and is gone now belongs to no run. If
+        // its fault comes from this run, a new program shows it again.
         if is_reused && !is_stopped && begun.as_ref().is_err_and(|fault| !fault.late) {
             self.lent.worker.session.take().map(Session::end);
             begun = self.reset(world);
@@ -129,19 +168,36 @@ impl ExternalSkill for Performance<'_> {
     }
 
     fn performs(&self, action: &str) -> bool {
-        self.lent.worker.session.as_ref().is_some_and(|session| session.actions.contains(action))
+        self.lent
+            .worker
+            .session
+            .as_ref()
+            .is_some_and(|session| session.actions.contains(action))
     }
 
-    fn perform(&mut self, call: &ActionCall, robot: &mut Operator<'_>) -> Result<ActionReport, Interrupt> {
+    fn perform(
+        &mut self,
+        call: &ActionCall,
+        robot: &mut Operator<'_>,
+    ) -> Result<ActionReport, Interrupt> {
         let privileged = self.lent.programs.skill.privileged;
         let Some(session) = &mut self.lent.worker.session else {
             let reason = format!("no program is running that performs {}", call.action);
-            return Err(Interrupt::ExternalSkill(ExternalFault { late: false, reason }));
+            return Err(Interrupt::ExternalSkill(ExternalFault {
+                late: false,
+                reason,
+            }));
         };
         session.idle = false;
         robot.begin(&call.action);
         let (stop, grasped) = (&*self.stop, Grasped::default());
-        let mut performed = Performed { session, robot, privileged, grasped, stop };
+        let mut performed = Performed {
+            session,
+            robot,
+            privileged,
+            grasped,
+            stop,
+        };
         let ended = performed.begin(call).and_then(|()| performed.follow());
         let outcome = match ended {
             Ok(end) => remember(call, &end, performed.grasped, performed.robot)
@@ -151,7 +207,9 @@ impl ExternalSkill for Performance<'_> {
         };
         self.stopped |= outcome == Err(Interrupt::Stopped);
         match outcome {
-            Err(Interrupt::ExternalSkill(fault)) => Err(Interrupt::ExternalSkill(self.give_up(fault))),
+            Err(Interrupt::ExternalSkill(fault)) => {
+                Err(Interrupt::ExternalSkill(self.give_up(fault)))
+            }
             other => {
                 if let Some(session) = &mut self.lent.worker.session {
                     session.idle = !session.lost;
@@ -164,9 +222,24 @@ impl ExternalSkill for Performance<'_> {
     fn end_run(&mut self, is_decided: bool) -> Result<(), ExternalFault> {
         let stop = Arc::clone(&self.stop);
         let RunName { run, index, seed } = self.run.clone();
-        let session = self.lent.worker.session.as_mut().filter(|session| session.idle);
-        let Some(session) = session.filter(|_| !stop.load(Ordering::Relaxed)) else { return Ok(()) };
-        let ready = session.check_ready(&ToProgram::Reset { run: &run, index, seed }, is_decided, &stop);
+        let session = self
+            .lent
+            .worker
+            .session
+            .as_mut()
+            .filter(|session| session.idle);
+        let Some(session) = session.filter(|_| !stop.load(Ordering::Relaxed)) else {
+            return Ok(());
+        };
+        let ready = session.check_ready(
+            &ToProgram::Reset {
+                run: &run,
+                index,
+                seed,
+            },
+            is_decided,
+            &stop,
+        );
         match ready {
             Err(_) if is_decided => {
                 self.lent.worker.session.take().map(Session::end);
@@ -181,8 +254,14 @@ impl ExternalSkill for Performance<'_> {
 }
 
 fn report(end: End) -> ActionReport {
-    let message = printable(&end.message).chars().take(LONGEST_MESSAGE).collect();
-    ActionReport { succeeded: end.succeeded, message }
+    let message = printable(&end.message)
+        .chars()
+        .take(LONGEST_MESSAGE)
+        .collect();
+    ActionReport {
+        succeeded: end.succeeded,
+        message,
+    }
 }
 
 /// An action in progress.
@@ -196,12 +275,22 @@ struct Performed<'a, 'b> {
 
 impl Performed<'_, '_> {
     fn begin(&mut self, call: &ActionCall) -> Result<(), Interrupt> {
-        let parameters = call.parameters.iter().map(|(name, values)| (name.as_str(), values.as_slice())).collect();
+        let parameters = call
+            .parameters
+            .iter()
+            .map(|(name, values)| (name.as_str(), values.as_slice()))
+            .collect();
         let values = call.parameters.values().flatten();
         let kinds: BTreeMap<&str, WireKind> = values
             .filter_map(|id| {
                 let kind = self.robot.kind_of(id)?;
-                Some((id.as_str(), WireKind { category: kind.category, size_m: kind.size_m }))
+                Some((
+                    id.as_str(),
+                    WireKind {
+                        category: kind.category,
+                        size_m: kind.size_m,
+                    },
+                ))
             })
             .collect();
         let measured = self.robot.observe();
@@ -213,7 +302,9 @@ impl Performed<'_, '_> {
             budget_s: self.robot.budget_left_secs(),
             observation: Observed::of(self.robot, &measured, self.privileged),
         };
-        self.session.send(&begin, &[]).map_err(Interrupt::ExternalSkill)
+        self.session
+            .send(&begin, &[])
+            .map_err(Interrupt::ExternalSkill)
     }
 
     /// Executes the program's commands and requests until it ends the action.
@@ -222,7 +313,8 @@ impl Performed<'_, '_> {
             let message = self.receive()?;
             match kind_of(message).map_err(Interrupt::ExternalSkill)?.as_str() {
                 "command" => {
-                    let command: WireCommand = parse("command", message).map_err(Interrupt::ExternalSkill)?;
+                    let command: WireCommand =
+                        parse("command", message).map_err(Interrupt::ExternalSkill)?;
                     self.obey(command)?;
                 }
                 "ask" => {
@@ -230,12 +322,18 @@ impl Performed<'_, '_> {
                     self.robot.count_request()?;
                     let (answer, bytes) = answer(&ask, self.robot);
                     let binaries: Vec<&[u8]> = bytes.iter().map(Vec::as_slice).collect();
-                    self.session.send(&answer, &binaries).map_err(Interrupt::ExternalSkill)?;
+                    self.session
+                        .send(&answer, &binaries)
+                        .map_err(Interrupt::ExternalSkill)?;
                 }
                 "end" => return parse("end", message).map_err(Interrupt::ExternalSkill),
                 other => {
-                    let reason = format!("it sent `{other}`, but `command`, `ask` or `end` was expected");
-                    return Err(Interrupt::ExternalSkill(ExternalFault { late: false, reason }));
+                    let reason =
+                        format!("it sent `{other}`, but `command`, `ask` or `end` was expected");
+                    return Err(Interrupt::ExternalSkill(ExternalFault {
+                        late: false,
+                        reason,
+                    }));
                 }
             }
         }
@@ -257,17 +355,21 @@ impl Performed<'_, '_> {
     }
 
     fn obey(&mut self, command: WireCommand) -> Result<(), Interrupt> {
-        let (ticks, controls) = command.controls(&self.session.joints).map_err(Interrupt::ExternalSkill)?;
+        let (ticks, controls) = command
+            .controls(&self.session.joints)
+            .map_err(Interrupt::ExternalSkill)?;
         self.robot.steer(&controls);
         self.robot.step(ticks)?;
         let measured = self.robot.observe();
         self.grasped.feel(self.robot, &measured);
         let observed = Observed::of(self.robot, &measured, self.privileged);
-        self.session.send(&observed.message(), &[]).map_err(Interrupt::ExternalSkill)
+        self.session
+            .send(&observed.message(), &[])
+            .map_err(Interrupt::ExternalSkill)
     }
 
-    /// Notifies the program that its action is over. If the program does not acknowledge, it is restarted for the next
-    /// run; the action still ends for its own reason.
+    /// Notifies the program that its action is over. If the program does not acknowledge, it is
+    /// restarted for the next run; the action still ends for its own reason.
     fn stop(&mut self, interrupt: Interrupt) -> Interrupt {
         let reason = match interrupt {
             Interrupt::ExternalSkill(_) => return interrupt,

@@ -38,7 +38,11 @@ pub(super) struct Lent<'a> {
 impl Programs {
     /// An empty pool. `tested` are the actions of all tests.
     pub fn new(skill: Skill, tested: BTreeSet<String>) -> Self {
-        Self { skill, tested, workers: Mutex::default() }
+        Self {
+            skill,
+            tested,
+            workers: Mutex::default(),
+        }
     }
 
     /// Takes a free worker, or creates one whose program is not started yet.
@@ -46,22 +50,41 @@ impl Programs {
         let mut workers = self.workers.lock().unwrap_or_else(PoisonError::into_inner);
         let worker = workers.free.pop().unwrap_or_else(|| {
             workers.n_workers += 1;
-            Worker { number: workers.n_workers - 1, session: None }
+            Worker {
+                number: workers.n_workers - 1,
+                session: None,
+            }
         });
-        Lent { programs: self, worker }
+        Lent {
+            programs: self,
+            worker,
+        }
     }
 }
 
 impl Drop for Lent<'_> {
     fn drop(&mut self) {
         let worker = std::mem::take(&mut self.worker);
-        self.programs.workers.lock().unwrap_or_else(PoisonError::into_inner).free.push(worker);
+        self.programs
+            .workers
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .free
+            .push(worker);
     }
 }
 
 impl Drop for Programs {
     fn drop(&mut self) {
-        let workers = std::mem::take(self.workers.get_mut().unwrap_or_else(PoisonError::into_inner));
-        workers.free.into_iter().filter_map(|worker| worker.session).for_each(Session::bye);
+        let workers = std::mem::take(
+            self.workers
+                .get_mut()
+                .unwrap_or_else(PoisonError::into_inner),
+        );
+        workers
+            .free
+            .into_iter()
+            .filter_map(|worker| worker.session)
+            .for_each(Session::bye);
     }
 }

@@ -1,4 +1,5 @@
-//! A program as a process: its socket, its limits, and the termination of it and all its descendants.
+//! A program as a process: its socket, its limits, and the termination of it and all its
+//! descendants.
 
 use std::collections::BTreeMap;
 use std::fs::{self, DirBuilder};
@@ -23,17 +24,16 @@ use actcheck_config::Skill;
 const POLL: Duration = Duration::from_millis(5);
 /// Grace period for a process that should exit, in steps of [`POLL`]: one second.
 const GRACE_POLLS: u32 = 200;
-/// Longest path of the folder of temporary files in which a socket can be: the whole path of a socket has at most 107 bytes,
-/// and on some systems 103. Unit: bytes.
+/// Longest path of the folder of temporary files in which a socket can be: the whole path of a
+/// socket has at most 107 bytes, and on some systems 103. Unit: bytes.
 const LONGEST_BASE: usize = 60;
 /// Number of passes that kill escaped processes, in case they start others meanwhile.
 const SWEEPS: usize = 10;
 
 /// Starts a program with limits on its memory (kilobytes) and CPU time (seconds).
-const LIMITED: &str =
-    r#"[ -z "$1" ] || ulimit -v "$1" || exit 126; [ -z "$2" ] || ulimit -t "$2" || exit 126; shift 2; exec "$@""#;
-/// Waits for the end of its input, which also occurs when actcheck is killed, then kills a process group and removes
-/// the socket's folder.
+const LIMITED: &str = r#"[ -z "$1" ] || ulimit -v "$1" || exit 126; [ -z "$2" ] || ulimit -t "$2" || exit 126; shift 2; exec "$@""#;
+/// Waits for the end of its input, which also occurs when actcheck is killed, then kills a process
+/// group and removes the socket's folder.
 const GUARD: &str = r#"read -r _; kill -s KILL -- "-$1" 2>/dev/null; rm -rf -- "$2""#;
 
 /// A running program.
@@ -59,7 +59,8 @@ impl Process {
     /// # Errors
     /// It can't be started.
     pub fn start(skill: &Skill, worker: usize) -> Result<Self, ExternalFault> {
-        let folder = private_folder().map_err(|error| cannot("the folder of its socket can't be created", &error))?;
+        let folder = private_folder()
+            .map_err(|error| cannot("the folder of its socket can't be created", &error))?;
         let started = Self::start_in(skill, worker, &folder);
         if started.is_err() {
             // The first error is the cause; a failed removal is ignored.
@@ -70,10 +71,14 @@ impl Process {
 
     fn start_in(skill: &Skill, worker: usize, folder: &Path) -> Result<Self, ExternalFault> {
         let socket = folder.join("skill.sock");
-        let listener = UnixListener::bind(&socket).map_err(|error| cannot("its socket can't be created", &error))?;
-        listener.set_nonblocking(true).map_err(|error| cannot("its socket can't be configured", &error))?;
+        let listener = UnixListener::bind(&socket)
+            .map_err(|error| cannot("its socket can't be created", &error))?;
+        listener
+            .set_nonblocking(true)
+            .map_err(|error| cannot("its socket can't be configured", &error))?;
         let address = format!("unix:{}", socket.display());
-        let (reader, writer) = std::io::pipe().map_err(|error| cannot("its output can't be captured", &error))?;
+        let (reader, writer) =
+            std::io::pipe().map_err(|error| cannot("its output can't be captured", &error))?;
         let mut command = limited(skill);
         command
             .envs(&skill.env)
@@ -83,9 +88,15 @@ impl Process {
             .current_dir(&skill.dir)
             .process_group(0)
             .stdin(Stdio::null())
-            .stdout(writer.try_clone().map_err(|error| cannot("its output can't be captured", &error))?)
+            .stdout(
+                writer
+                    .try_clone()
+                    .map_err(|error| cannot("its output can't be captured", &error))?,
+            )
             .stderr(writer);
-        let mut child = command.spawn().map_err(|error| cannot("it can't be started", &error))?;
+        let mut child = command
+            .spawn()
+            .map_err(|error| cannot("it can't be started", &error))?;
         // The command also holds ends of the pipe.
         drop(command);
         let output = Output::read(reader);
@@ -124,17 +135,25 @@ impl Process {
         loop {
             match self.listener.accept() {
                 Ok((stream, _)) => return Ok(stream),
-                Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::Interrupted) => {}
+                Err(error)
+                    if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::Interrupted) => {}
                 Err(error) => return Err(cannot("its connection can't be accepted", &error)),
             }
             if let Some(how) = self.ended() {
-                return Err(broke(format!("{how} before it connected to the address in ACTCHECK_ADDRESS")));
+                return Err(broke(format!(
+                    "{how} before it connected to the address in ACTCHECK_ADDRESS"
+                )));
             }
             if stop.load(Ordering::Relaxed) {
-                return Err(ExternalFault { late: true, reason: "it was stopped before it connected".to_owned() });
+                return Err(ExternalFault {
+                    late: true,
+                    reason: "it was stopped before it connected".to_owned(),
+                });
             }
             if waited_secs.max(clock_secs() - began) >= limit_secs {
-                let reason = format!("it did not connect to the address in ACTCHECK_ADDRESS within {limit_secs} s");
+                let reason = format!(
+                    "it did not connect to the address in ACTCHECK_ADDRESS within {limit_secs} s"
+                );
                 return Err(ExternalFault { late: true, reason });
             }
             std::thread::sleep(POLL);
@@ -147,13 +166,14 @@ impl Process {
         self.child.try_wait().ok().flatten().map(how)
     }
 
-    /// Waits briefly for a possible exit and returns how the process ended. Returns `None` if it is still running.
+    /// Waits briefly for a possible exit and returns how the process ended. Returns `None` if it is
+    /// still running.
     pub fn ends_soon(&mut self) -> Option<String> {
         self.ends_within(GRACE_POLLS / 4)
     }
 
-    /// Waits for the exit of a program that has closed its connection, and returns how it ended. On a busy machine, an
-    /// interpreter takes a while to exit. Returns `None` if it is still running.
+    /// Waits for the exit of a program that has closed its connection, and returns how it ended. On
+    /// a busy machine, an interpreter takes a while to exit. Returns `None` if it is still running.
     pub fn ends_after_closing(&mut self) -> Option<String> {
         self.ends_within(3 * GRACE_POLLS)
     }
@@ -173,13 +193,18 @@ impl Process {
         self.ends_within(GRACE_POLLS);
     }
 
-    /// Looks for its descendants: once it has ended, those that left its group and its environment can't be found.
+    /// Looks for its descendants: once it has ended, those that left its group and its environment
+    /// can't be found.
     pub fn notice_descendants(&mut self) {
-        let Ok(leader) = i32::try_from(self.child.id()) else { return };
+        let Ok(leader) = i32::try_from(self.child.id()) else {
+            return;
+        };
         let mut parents: Vec<i32> = self.descendants.keys().copied().chain([leader]).collect();
         while let Some(parent) = parents.pop() {
             for child in children_of(parent) {
-                if let (Some(started), false) = (start_time(child), self.descendants.contains_key(&child)) {
+                if let (Some(started), false) =
+                    (start_time(child), self.descendants.contains_key(&child))
+                {
                     self.descendants.insert(child, started);
                     parents.push(child);
                 }
@@ -228,23 +253,43 @@ fn limited(skill: &Skill) -> Command {
     let written = |limit: Option<u64>| limit.map_or_else(String::new, |limit| limit.to_string());
     let mut command = Command::new("sh");
     command.args(["-c", LIMITED, "sh"]);
-    command.arg(written(skill.memory_mb.map(|memory_mb| memory_mb * 1024))).arg(written(skill.cpu_secs));
+    command
+        .arg(written(skill.memory_mb.map(|memory_mb| memory_mb * 1024)))
+        .arg(written(skill.cpu_secs));
     command.arg(&skill.program).args(&skill.args);
     command
 }
 
 fn guard(child: &Child, folder: &Path) -> std::io::Result<Child> {
     let mut command = Command::new("sh");
-    command.args(["-c", GUARD, "sh"]).arg(child.id().to_string()).arg(folder);
+    command
+        .args(["-c", GUARD, "sh"])
+        .arg(child.id().to_string())
+        .arg(folder);
     // A separate process group, so that it survives Ctrl-C.
-    command.process_group(0).stdin(Stdio::piped()).stdout(Stdio::null()).stderr(Stdio::null()).spawn()
+    command
+        .process_group(0)
+        .stdin(Stdio::piped())
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .spawn()
 }
 
 /// Ids of the children of a process. Empty if the system has no such list.
 fn children_of(pid: i32) -> Vec<i32> {
-    let threads = fs::read_dir(format!("/proc/{pid}/task")).into_iter().flatten().flatten();
-    let lists = threads.filter_map(|thread| fs::read_to_string(thread.path().join("children")).ok());
-    lists.flat_map(|list| list.split_whitespace().filter_map(|id| id.parse().ok()).collect::<Vec<i32>>()).collect()
+    let threads = fs::read_dir(format!("/proc/{pid}/task"))
+        .into_iter()
+        .flatten()
+        .flatten();
+    let lists =
+        threads.filter_map(|thread| fs::read_to_string(thread.path().join("children")).ok());
+    lists
+        .flat_map(|list| {
+            list.split_whitespace()
+                .filter_map(|id| id.parse().ok())
+                .collect::<Vec<i32>>()
+        })
+        .collect()
 }
 
 /// When a process started, in the system's unit; `None` if it has ended.
@@ -258,7 +303,11 @@ fn start_time(pid: i32) -> Option<String> {
 /// The folder of temporary files, unless a socket in it would have a path that is too long.
 fn base_of_sockets() -> PathBuf {
     let base = std::env::temp_dir();
-    if base.as_os_str().len() <= LONGEST_BASE { base } else { PathBuf::from("/tmp") }
+    if base.as_os_str().len() <= LONGEST_BASE {
+        base
+    } else {
+        PathBuf::from("/tmp")
+    }
 }
 
 /// Creates a new folder that only this user can access.
@@ -293,12 +342,18 @@ fn sweep(address: &str) {
 
 /// Ids of processes with these bytes in their environment.
 fn holders(needle: &[u8]) -> Vec<i32> {
-    let Ok(processes) = fs::read_dir("/proc") else { return Vec::new() };
-    let numbers = processes.flatten().filter_map(|entry| entry.file_name().to_str()?.parse().ok());
+    let Ok(processes) = fs::read_dir("/proc") else {
+        return Vec::new();
+    };
+    let numbers = processes
+        .flatten()
+        .filter_map(|entry| entry.file_name().to_str()?.parse().ok());
     numbers
         .filter(|pid: &i32| {
             let environment = fs::read(format!("/proc/{pid}/environ")).unwrap_or_default();
-            environment.windows(needle.len()).any(|window| window == needle)
+            environment
+                .windows(needle.len())
+                .any(|window| window == needle)
         })
         .collect()
 }
@@ -319,5 +374,8 @@ fn cannot(what: &str, error: &std::io::Error) -> ExternalFault {
 }
 
 fn broke(reason: String) -> ExternalFault {
-    ExternalFault { late: false, reason }
+    ExternalFault {
+        late: false,
+        reason,
+    }
 }

@@ -1,5 +1,6 @@
-//! Keeps the results of a program's action for later actions: its percepts and the held object. They come from the
-//! program's report or from the robot's own perception and touch, never from ground truth.
+//! Keeps the results of a program's action for later actions: its percepts and the held object.
+//! They come from the program's report or from the robot's own perception and touch, never from
+//! ground truth.
 
 use nalgebra::Isometry3;
 
@@ -38,7 +39,11 @@ impl Grasped {
 impl Taken {
     fn now(robot: &Operator<'_>) -> Self {
         let grasp = robot.kinematics().grasp(&robot.observe().positions);
-        Self { grasp, heading: Pose::from_isometry(&robot.base()).yaw(), n_percepts: robot.percepts.len() }
+        Self {
+            grasp,
+            heading: Pose::from_isometry(&robot.base()).yaw(),
+            n_percepts: robot.percepts.len(),
+        }
     }
 }
 
@@ -46,12 +51,20 @@ impl Taken {
 ///
 /// # Errors
 /// A pose of the message is invalid.
-pub fn remember(call: &ActionCall, end: &End, grasped: Grasped, robot: &mut Operator<'_>) -> Result<(), ExternalFault> {
+pub fn remember(
+    call: &ActionCall,
+    end: &End,
+    grasped: Grasped,
+    robot: &mut Operator<'_>,
+) -> Result<(), ExternalFault> {
     if end.perceived.is_some() || end.plane.is_some() {
         let perceived = perceived(end)?;
         robot.remember(perceived);
     }
-    let told = end.held.map(|held| Ok((upright(&held.pose)?, held.size_m))).transpose()?;
+    let told = end
+        .held
+        .map(|held| Ok((upright(&held.pose)?, held.size_m)))
+        .transpose()?;
     let Some(taken) = grasped.0.or_else(|| told.map(|_| Taken::now(robot))) else {
         robot.hold(None);
         return Ok(());
@@ -60,13 +73,26 @@ pub fn remember(call: &ActionCall, end: &End, grasped: Grasped, robot: &mut Oper
     if told.is_none() && robot.memory().held.is_some() {
         return Ok(());
     }
-    let Some(id) = call.value(TARGET) else { return Ok(()) };
-    let before = told.or_else(|| seen_before(id, &taken, robot)).map(|(foot, size_m)| (foot, size_m, taken));
-    let Some((foot, size_m, taken)) = before.or_else(|| seen_now(id, robot)) else { return Ok(()) };
+    let Some(id) = call.value(TARGET) else {
+        return Ok(());
+    };
+    let before = told
+        .or_else(|| seen_before(id, &taken, robot))
+        .map(|(foot, size_m)| (foot, size_m, taken));
+    let Some((foot, size_m, taken)) = before.or_else(|| seen_now(id, robot)) else {
+        return Ok(());
+    };
     let opening_m = robot.observe().gripper_opening_m;
     let grasp_from_foot = foot.inverse() * taken.grasp;
-    let held =
-        Held { id: id.to_owned(), size_m, foot, grasp_from_foot, heading: taken.heading, opening_m, wall_m: None };
+    let held = Held {
+        id: id.to_owned(),
+        size_m,
+        foot,
+        grasp_from_foot,
+        heading: taken.heading,
+        opening_m,
+        wall_m: None,
+    };
     robot.hold(Some(held));
     Ok(())
 }
@@ -74,12 +100,20 @@ pub fn remember(call: &ActionCall, end: &End, grasped: Grasped, robot: &mut Oper
 /// Pose of an object's foot, and its size.
 type Seen = (Isometry3<f64>, [f64; 3]);
 
-/// The last percept of an object before the hand closed: from this action, or from the pictures of an earlier one.
+/// The last percept of an object before the hand closed: from this action, or from the pictures of
+/// an earlier one.
 fn seen_before(id: &str, taken: &Taken, robot: &Operator<'_>) -> Option<Seen> {
-    let percept = robot.percepts.iter().take(taken.n_percepts).rev().find(|percept| percept.id == id);
+    let percept = robot
+        .percepts
+        .iter()
+        .take(taken.n_percepts)
+        .rev()
+        .find(|percept| percept.id == id);
     match percept {
         Some(percept) => Some((percept.pose.to_isometry(), percept.size_m)),
-        None => robot.recall(id).map(|known| (known.pose.to_isometry(), known.size_m)),
+        None => robot
+            .recall(id)
+            .map(|known| (known.pose.to_isometry(), known.size_m)),
     }
 }
 
@@ -90,13 +124,26 @@ fn seen_now(id: &str, robot: &mut Operator<'_>) -> Option<(Isometry3<f64>, [f64;
 }
 
 fn perceived(end: &End) -> Result<Perceived, ExternalFault> {
-    let plane = end.plane.map(|plane| Ok(PerceivedPlane { pose: plane.pose.pose()?, size_m: plane.size_m }));
+    let plane = end.plane.map(|plane| {
+        Ok(PerceivedPlane {
+            pose: plane.pose.pose()?,
+            size_m: plane.size_m,
+        })
+    });
     let things = end.perceived.iter().flatten().map(|thing| {
         let pose = upright(&thing.pose)?;
         let category = thing.category.as_deref().map(names::category);
-        Ok(PerceivedThing { category, pose: Pose::from_isometry(&pose), size_m: thing.size_m })
+        Ok(PerceivedThing {
+            category,
+            pose: Pose::from_isometry(&pose),
+            size_m: thing.size_m,
+        })
     });
-    Ok(Perceived { plane: plane.transpose()?, things: things.collect::<Result<_, ExternalFault>>()?, look: None })
+    Ok(Perceived {
+        plane: plane.transpose()?,
+        things: things.collect::<Result<_, ExternalFault>>()?,
+        look: None,
+    })
 }
 
 /// Reduces a pose to position and yaw: objects are upright on their foot.

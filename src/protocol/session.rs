@@ -15,7 +15,8 @@ use actcheck_world::World;
 
 /// Longest program name that is kept. Unit: characters.
 const LONGEST_NAME: usize = 80;
-/// Limit on a program's output in one run. Unit: bytes. More than a line for each control tick of an hour.
+/// Limit on a program's output in one run. Unit: bytes. More than a line for each control tick of
+/// an hour.
 const PRINTED_LIMIT: u64 = 32 << 20;
 
 /// A program that has introduced itself.
@@ -41,11 +42,13 @@ pub struct Session {
 }
 
 impl Session {
-    /// Starts the program of a worker and exchanges introductions. `tested` are the actions of all tests.
+    /// Starts the program of a worker and exchanges introductions. `tested` are the actions of all
+    /// tests.
     ///
     /// # Errors
-    /// The program can't be started, is late, uses another protocol version, violates the protocol, or performs none of
-    /// the tested actions, or `stop` is set. The error includes its last output lines.
+    /// The program can't be started, is late, uses another protocol version, violates the protocol,
+    /// or performs none of the tested actions, or `stop` is set. The error includes its last output
+    /// lines.
     pub fn start(
         (skill, worker): (&Skill, usize),
         tested: &BTreeSet<String>,
@@ -55,10 +58,18 @@ impl Session {
     ) -> Result<Self, (ExternalFault, Vec<String>)> {
         let mut process = Process::start(skill, worker).map_err(|fault| (fault, Vec::new()))?;
         let began = clock_secs();
-        let stream = process.accept(skill.startup_secs, clock_secs, stop).map_err(|fault| (fault, process.end()))?;
+        let stream = process
+            .accept(skill.startup_secs, clock_secs, stop)
+            .map_err(|fault| (fault, process.end()))?;
         let wire = Wire::new(stream, clock_secs).map_err(|error| {
             let reason = format!("its connection can't be used: {error}");
-            (ExternalFault { late: false, reason }, process.end())
+            (
+                ExternalFault {
+                    late: false,
+                    reason,
+                },
+                process.end(),
+            )
         })?;
         let mut session = Self {
             process,
@@ -104,18 +115,33 @@ impl Session {
         let hello: Hello = parse("hello", message)?;
         if hello.protocol != PROTOCOL {
             let told = hello.protocol;
-            return Err(broke(format!("it uses protocol version {told}, but version {PROTOCOL} is required")));
+            return Err(broke(format!(
+                "it uses protocol version {told}, but version {PROTOCOL} is required"
+            )));
         }
         self.actions = hello.actions.into_iter().collect();
         if self.actions.is_disjoint(tested) {
-            let list = |names: &BTreeSet<String>| names.iter().map(String::as_str).collect::<Vec<_>>().join(", ");
-            let named = if self.actions.is_empty() { "none".to_owned() } else { list(&self.actions) };
+            let list = |names: &BTreeSet<String>| {
+                names
+                    .iter()
+                    .map(String::as_str)
+                    .collect::<Vec<_>>()
+                    .join(", ")
+            };
+            let named = if self.actions.is_empty() {
+                "none".to_owned()
+            } else {
+                list(&self.actions)
+            };
             return Err(broke(format!(
                 "it performs none of the tests' actions: it offers {named}, the tests use {}",
                 list(tested)
             )));
         }
-        self.name = printable(&hello.name.unwrap_or_default()).chars().take(LONGEST_NAME).collect();
+        self.name = printable(&hello.name.unwrap_or_default())
+            .chars()
+            .take(LONGEST_NAME)
+            .collect();
         Ok(())
     }
 
@@ -132,8 +158,9 @@ impl Session {
         parse("ready", message).map(|Plain { .. }| ())
     }
 
-    /// Checks after the last action of a run that the program is ready for another run, by the same `reset` once more: it may
-    /// have exited, or sent a message out of turn, at any time after its `end`. `hurried`: waits only briefly.
+    /// Checks after the last action of a run that the program is ready for another run, by the same
+    /// `reset` once more: it may have exited, or sent a message out of turn, at any time after its
+    /// `end`. `hurried`: waits only briefly.
     ///
     /// # Errors
     /// A fault of the program, or `stop` is set.
@@ -144,14 +171,22 @@ impl Session {
         stop: &AtomicBool,
     ) -> Result<(), ExternalFault> {
         let patience_secs = self.timeout_secs;
-        self.timeout_secs = if hurried { patience_secs.min(HURRIED_SECS) } else { patience_secs };
+        self.timeout_secs = if hurried {
+            patience_secs.min(HURRIED_SECS)
+        } else {
+            patience_secs
+        };
         self.process.notice_descendants();
         let ready = self.reset_again(reset, stop);
         self.timeout_secs = patience_secs;
         ready
     }
 
-    fn reset_again(&mut self, reset: &ToProgram<'_>, stop: &AtomicBool) -> Result<(), ExternalFault> {
+    fn reset_again(
+        &mut self,
+        reset: &ToProgram<'_>,
+        stop: &AtomicBool,
+    ) -> Result<(), ExternalFault> {
         self.send(reset, &[])?;
         let range = self.wait(&|| stop.load(Ordering::Relaxed))?;
         let message = self.wire.payload(range);
@@ -161,14 +196,18 @@ impl Session {
         parse("ready", message).map(|Plain { .. }| ())
     }
 
-    /// Notifies the program that its action is over, and waits for the acknowledgement: only briefly if `hurried`,
-    /// because the time of the run is over.
+    /// Notifies the program that its action is over, and waits for the acknowledgement: only
+    /// briefly if `hurried`, because the time of the run is over.
     ///
     /// # Errors
     /// A fault of the program.
     pub fn abort(&mut self, reason: &str, hurried: bool) -> Result<(), ExternalFault> {
         let patience_secs = self.timeout_secs;
-        self.timeout_secs = if hurried { patience_secs.min(HURRIED_SECS) } else { patience_secs };
+        self.timeout_secs = if hurried {
+            patience_secs.min(HURRIED_SECS)
+        } else {
+            patience_secs
+        };
         let acknowledged = self.exchange_abort(reason);
         self.timeout_secs = patience_secs;
         acknowledged
@@ -185,9 +224,15 @@ impl Session {
     ///
     /// # Errors
     /// The message can't be delivered.
-    pub fn send(&mut self, message: &impl serde::Serialize, binaries: &[&[u8]]) -> Result<(), ExternalFault> {
+    pub fn send(
+        &mut self,
+        message: &impl serde::Serialize,
+        binaries: &[&[u8]],
+    ) -> Result<(), ExternalFault> {
         let limit_secs = self.timeout_secs;
-        self.wire.send(message, binaries, limit_secs).map_err(|fault| self.cause(fault))
+        self.wire
+            .send(message, binaries, limit_secs)
+            .map_err(|fault| self.cause(fault))
     }
 
     /// Receives the program's next message.
@@ -199,7 +244,8 @@ impl Session {
         Ok(self.wire.payload(range))
     }
 
-    /// As [`Self::receive`], but also gives up once `is_over`. Returns the range of the message for [`Wire::payload`].
+    /// As [`Self::receive`], but also gives up once `is_over`. Returns the range of the message for
+    /// [`Wire::payload`].
     ///
     /// # Errors
     /// As [`Self::receive`].
@@ -207,23 +253,36 @@ impl Session {
         let limit_secs = self.timeout_secs;
         let (process, before) = (&mut self.process, self.printed_before);
         let mut watch = || match process.output.n_bytes() - before {
-            too_much @ PRINTED_LIMIT.. => Err(broke(format!("it printed {too_much} bytes in one run"))),
-            _ if is_over() => Err(ExternalFault { late: true, reason: "its run was over".to_owned() }),
+            too_much @ PRINTED_LIMIT.. => {
+                Err(broke(format!("it printed {too_much} bytes in one run")))
+            }
+            _ if is_over() => Err(ExternalFault {
+                late: true,
+                reason: "its run was over".to_owned(),
+            }),
             _ => process.ended().map_or(Ok(()), |how| Err(broke(how))),
         };
         let received = self.wire.receive(limit_secs, &mut watch);
         received.map_err(|fault| self.cause(fault))
     }
 
-    /// Replaces a closed connection by the exit of the process if it exits, which is more informative.
+    /// Replaces a closed connection by the exit of the process if it exits, which is more
+    /// informative.
     fn cause(&mut self, fault: ExternalFault) -> ExternalFault {
         cause_of(&mut self.process, fault)
     }
 
     /// Notifies the program of its fault if it still reads, and returns the fault.
     pub fn refuse(&mut self, fault: ExternalFault) -> ExternalFault {
-        // The run is over because of this fault; a failure to deliver the notification changes nothing.
-        let told = self.wire.send(&ToProgram::Error { reason: &fault.reason }, &[], REFUSAL_SECS);
+        // The run is over because of this fault; a failure to deliver the notification changes
+        // nothing.
+        let told = self.wire.send(
+            &ToProgram::Error {
+                reason: &fault.reason,
+            },
+            &[],
+            REFUSAL_SECS,
+        );
         self.refused = told.is_ok() && !fault.late;
         fault
     }
@@ -263,9 +322,14 @@ fn expect(kind: &str, expected: &str) -> Result<(), ExternalFault> {
     if kind == expected {
         return Ok(());
     }
-    Err(broke(format!("it sent `{kind}`, but `{expected}` was expected")))
+    Err(broke(format!(
+        "it sent `{kind}`, but `{expected}` was expected"
+    )))
 }
 
 fn broke(reason: String) -> ExternalFault {
-    ExternalFault { late: false, reason }
+    ExternalFault {
+        late: false,
+        reason,
+    }
 }

@@ -21,7 +21,12 @@ impl Address {
         let wrong = |why: &str, help: &str| {
             // Credentials must not get into logs.
             let shown = without_credentials(text);
-            Err(Diagnostic::error("X090", format!("`{shown}` can't be used as an address: {why}")).help(help).into())
+            Err(Diagnostic::error(
+                "X090",
+                format!("`{shown}` can't be used as an address: {why}"),
+            )
+            .help(help)
+            .into())
         };
         let example = "write it as in `http://localhost:3030/history/update`";
         let Ok(uri) = text.trim().parse::<Uri>() else {
@@ -53,10 +58,17 @@ impl Address {
         Ok(Self { uri })
     }
 
-    /// The address that a redirect names, relative to this one. Returns `None` if it is not an address.
+    /// The address that a redirect names, relative to this one. Returns `None` if it is not an
+    /// address.
     pub(crate) fn redirected(&self, location: &str) -> Option<Self> {
         let location = location.trim().split('#').next().unwrap_or_default();
-        let root = || format!("{}://{}", self.uri.scheme_str().unwrap_or("http"), self.server());
+        let root = || {
+            format!(
+                "{}://{}",
+                self.uri.scheme_str().unwrap_or("http"),
+                self.server()
+            )
+        };
         let absolute = if location.contains("://") {
             location.to_owned()
         } else if location.starts_with("//") {
@@ -64,14 +76,18 @@ impl Address {
         } else if location.starts_with('/') {
             format!("{}{location}", root())
         } else {
-            let folder = self.uri.path().rsplit_once('/').map_or("", |(folder, _)| folder);
+            let folder = self
+                .uri
+                .path()
+                .rsplit_once('/')
+                .map_or("", |(folder, _)| folder);
             format!("{}{folder}/{location}", root())
         };
         Self::parse(&absolute).ok()
     }
 
-    /// Whether requests to another address may have the credentials of this one: it is the same server, and not less
-    /// protected.
+    /// Whether requests to another address may have the credentials of this one: it is the same
+    /// server, and not less protected.
     pub(crate) fn is_trusted(&self, other: &Self) -> bool {
         let is_encrypted = |address: &Self| address.uri.scheme_str() == Some("https");
         self.host().eq_ignore_ascii_case(other.host())
@@ -87,7 +103,8 @@ impl Address {
             Some((_, "")) => "",
             Some(_) => "&",
         };
-        let encoded = value.map(|value| form_urlencoded::byte_serialize(value.as_bytes()).collect::<String>());
+        let encoded = value
+            .map(|value| form_urlencoded::byte_serialize(value.as_bytes()).collect::<String>());
         match encoded {
             // A space is `%20` in all servers, `+` only in forms.
             Some(value) => format!("{text}{separator}{name}={}", value.replace('+', "%20")),
@@ -101,12 +118,18 @@ impl Address {
     }
 
     fn port(&self) -> u16 {
-        let usual = if self.uri.scheme_str() == Some("https") { 443 } else { 80 };
+        let usual = if self.uri.scheme_str() == Some("https") {
+            443
+        } else {
+            80
+        };
         self.uri.port_u16().unwrap_or(usual)
     }
 
     fn server(&self) -> &str {
-        self.uri.authority().map_or("", |authority| authority.as_str())
+        self.uri
+            .authority()
+            .map_or("", |authority| authority.as_str())
     }
 }
 
@@ -135,18 +158,37 @@ mod tests {
 
     #[test]
     fn wrong_addresses_are_refused_without_showing_passwords() {
-        for wrong in ["", "history", "ftp://a/b", "http://", "/a/b", "http:///a", "http://a b/", "http://ü/"] {
+        for wrong in [
+            "",
+            "history",
+            "ftp://a/b",
+            "http://",
+            "/a/b",
+            "http:///a",
+            "http://a b/",
+            "http://ü/",
+        ] {
             assert!(Address::parse(wrong).is_err(), "{wrong}");
         }
-        let refused = Address::parse("http://me:secret@example.org/x").expect_err("it has credentials");
+        let refused =
+            Address::parse("http://me:secret@example.org/x").expect_err("it has credentials");
         let message = refused.iter().map(ToString::to_string).collect::<String>();
-        assert!(!message.contains("secret") && message.contains("…@example.org"), "{message}");
-        assert_eq!(address("http://localhost:3030/ds").to_string(), "http://localhost:3030/ds");
+        assert!(
+            !message.contains("secret") && message.contains("…@example.org"),
+            "{message}"
+        );
+        assert_eq!(
+            address("http://localhost:3030/ds").to_string(),
+            "http://localhost:3030/ds"
+        );
     }
 
     #[test]
     fn https_depends_on_the_build() {
-        assert_eq!(Address::parse("https://example.org/").is_ok(), cfg!(feature = "https"));
+        assert_eq!(
+            Address::parse("https://example.org/").is_ok(),
+            cfg!(feature = "https")
+        );
     }
 
     #[test]
@@ -158,16 +200,27 @@ mod tests {
             ("/c", "http://a:80/c"),
             ("c#part", "http://a:80/x/c"),
         ] {
-            assert_eq!(from.redirected(location).map(|to| to.to_string()).as_deref(), Some(to), "{location}");
+            assert_eq!(
+                from.redirected(location)
+                    .map(|to| to.to_string())
+                    .as_deref(),
+                Some(to),
+                "{location}"
+            );
         }
         assert_eq!(from.redirected("ftp://b"), None);
         assert!(from.is_trusted(&address("http://A/c")));
-        assert!(!from.is_trusted(&address("http://a:81/c")) && !from.is_trusted(&address("http://b/c")));
+        assert!(
+            !from.is_trusted(&address("http://a:81/c")) && !from.is_trusted(&address("http://b/c"))
+        );
     }
 
     #[test]
     fn parameters_are_encoded_and_appended() {
-        assert_eq!(address("http://a/g").with_parameter("default", None), "http://a/g?default");
+        assert_eq!(
+            address("http://a/g").with_parameter("default", None),
+            "http://a/g?default"
+        );
         assert_eq!(
             address("http://a/g?b=1").with_parameter("graph", Some("http://c/d e?#")),
             "http://a/g?b=1&graph=http%3A%2F%2Fc%2Fd%20e%3F%23"

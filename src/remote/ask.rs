@@ -25,26 +25,35 @@ pub struct Answer {
 /// Sends a query to a SPARQL endpoint.
 ///
 /// # Errors
-/// `X091`, `X092`, `X093`: there is no answer; the faults of `is_wrong`, which is asked if the server calls the query malformed.
+/// `X091`, `X092`, `X093`: there is no answer; the faults of `is_wrong`, which is asked if the
+/// server calls the query malformed.
 pub fn ask(
     client: &Client,
     address: &Address,
     query: &str,
     is_wrong: impl FnOnce() -> Result<(), Diagnostics>,
 ) -> Result<Answer, Diagnostics> {
-    let form = form_urlencoded::Serializer::new(String::new()).append_pair("query", query).finish();
+    let form = form_urlencoded::Serializer::new(String::new())
+        .append_pair("query", query)
+        .finish();
     let request = Request {
         method: Method::POST,
         address,
         target: address.to_string(),
         headers: vec![
-            ("content-type", "application/x-www-form-urlencoded".to_owned()),
+            (
+                "content-type",
+                "application/x-www-form-urlencoded".to_owned(),
+            ),
             ("accept", ACCEPTED.to_owned()),
         ],
         content: Content::Bytes(form.as_bytes()),
     };
     match client.send(&request) {
-        Ok(response) => Ok(Answer { media_type: response.media_type(), body: Box::new(response.into_reader()) }),
+        Ok(response) => Ok(Answer {
+            media_type: response.media_type(),
+            body: Box::new(response.into_reader()),
+        }),
         Err(fault) => {
             if matches!(fault, Fault::Refused { status: 400, .. }) {
                 is_wrong()?;

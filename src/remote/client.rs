@@ -52,8 +52,8 @@ pub struct Client {
 }
 
 impl Client {
-    /// Creates a client whose requests get an answer within `timeout` each: sending and the time until the answer begins, and
-    /// each part of the answer. `stop` ends waits.
+    /// Creates a client whose requests get an answer within `timeout` each: sending and the time
+    /// until the answer begins, and each part of the answer. `stop` ends waits.
     pub fn new(credentials: Credentials, timeout: Duration, stop: Arc<AtomicBool>) -> Self {
         let config = Agent::config_builder()
             .http_status_as_error(false)
@@ -66,7 +66,12 @@ impl Client {
             .user_agent(format!("actcheck/{}", env!("CARGO_PKG_VERSION")));
         #[cfg(feature = "https")]
         let config = config.tls_config(crate::tls::config());
-        Self { agent: config.build().into(), credentials, stop, has_answered: AtomicBool::new(false) }
+        Self {
+            agent: config.build().into(),
+            credentials,
+            stop,
+            has_answered: AtomicBool::new(false),
+        }
     }
 
     /// Whether the caller stopped it.
@@ -74,24 +79,32 @@ impl Client {
         self.stop.load(Ordering::Relaxed)
     }
 
-    /// Sends a request until it has an answer with a status of success. Waits longer after each failure of a kind that may
-    /// pass.
+    /// Sends a request until it has an answer with a status of success. Waits longer after each
+    /// failure of a kind that may pass.
     pub(crate) fn send(&self, request: &Request<'_>) -> Result<Response, Fault> {
         self.retried(request, Ok)
     }
 
-    /// Like [`Self::send`], but also sends the request again if the answer's body ends too early. Returns the body, up to `most`
-    /// bytes.
+    /// Like [`Self::send`], but also sends the request again if the answer's body ends too early.
+    /// Returns the body, up to `most` bytes.
     #[cfg(any(test, feature = "object-storage"))]
     pub(crate) fn body(&self, request: &Request<'_>, most: u64) -> Result<Vec<u8>, Fault> {
         self.retried(request, |response| {
             let mut bytes = Vec::new();
-            let read = std::io::Read::read_to_end(&mut std::io::Read::take(response.into_reader(), most), &mut bytes);
-            read.map(|_| bytes).map_err(|error| Fault::unreachable(format!("its answer was cut off: {error}")))
+            let read = std::io::Read::read_to_end(
+                &mut std::io::Read::take(response.into_reader(), most),
+                &mut bytes,
+            );
+            read.map(|_| bytes)
+                .map_err(|error| Fault::unreachable(format!("its answer was cut off: {error}")))
         })
     }
 
-    fn retried<T>(&self, request: &Request<'_>, read: impl Fn(Response) -> Result<T, Fault>) -> Result<T, Fault> {
+    fn retried<T>(
+        &self,
+        request: &Request<'_>,
+        read: impl Fn(Response) -> Result<T, Fault>,
+    ) -> Result<T, Fault> {
         let (mut tries, mut waited) = (0, Duration::ZERO);
         loop {
             if self.is_stopped() {
@@ -103,23 +116,31 @@ impl Client {
             };
             tries += 1;
             let wait = match &fault {
-                // A server that never answered is more likely a wrong address than one that restarts.
-                Fault::Unreachable { is_temporary: true, .. }
-                    if tries < FIRST_TRIES || self.has_answered.load(Ordering::Relaxed) =>
-                {
+                // A server that never answered is more likely a wrong address than one that
+                // restarts.
+                Fault::Unreachable {
+                    is_temporary: true, ..
+                } if tries < FIRST_TRIES || self.has_answered.load(Ordering::Relaxed) => {
                     wait_after(tries, None)
                 }
-                Fault::Refused { status, retry_after, .. } if is_temporary(*status) => wait_after(tries, *retry_after),
+                Fault::Refused {
+                    status,
+                    retry_after,
+                    ..
+                } if is_temporary(*status) => wait_after(tries, *retry_after),
                 _ => None,
             };
             let wait = wait.filter(|wait| waited + *wait <= LONGEST_ASKED);
-            let Some(wait) = wait else { return Err(fault.after(tries)) };
+            let Some(wait) = wait else {
+                return Err(fault.after(tries));
+            };
             self.wait(wait)?;
             waited += wait;
         }
     }
 
-    /// Sends a request, also to the places that the same server redirects it to, with the same method and content.
+    /// Sends a request, also to the places that the same server redirects it to, with the same
+    /// method and content.
     fn follow(&self, request: &Request<'_>) -> Result<Response, Fault> {
         let mut target = request.target.clone();
         for _ in 0..=MOST_REDIRECTS {
@@ -138,15 +159,24 @@ impl Client {
                 }
                 status => {
                     let retry_after = response.retry_after();
-                    return Err(Fault::Refused { status, words: response.words(), retry_after });
+                    return Err(Fault::Refused {
+                        status,
+                        words: response.words(),
+                        retry_after,
+                    });
                 }
             }
         }
-        Err(Fault::Unreachable { why: "it redirects in a circle".to_owned(), is_temporary: false })
+        Err(Fault::Unreachable {
+            why: "it redirects in a circle".to_owned(),
+            is_temporary: false,
+        })
     }
 
     fn once(&self, request: &Request<'_>, target: &str) -> Result<Response, Fault> {
-        let mut new = HttpRequest::builder().method(request.method.clone()).uri(target);
+        let mut new = HttpRequest::builder()
+            .method(request.method.clone())
+            .uri(target);
         for (name, value) in &request.headers {
             new = new.header(*name, value);
         }
@@ -170,21 +200,32 @@ impl Client {
         }
     }
 
-    fn run(&self, request: Result<HttpRequest<impl AsSendBody>, ureq::http::Error>) -> Result<Response, Fault> {
-        let never = |why: String| Fault::Unreachable { why, is_temporary: false };
+    fn run(
+        &self,
+        request: Result<HttpRequest<impl AsSendBody>, ureq::http::Error>,
+    ) -> Result<Response, Fault> {
+        let never = |why: String| Fault::Unreachable {
+            why,
+            is_temporary: false,
+        };
         let request = request.map_err(|error| never(error.to_string()))?;
-        self.agent.run(request).map(Response::new).map_err(|error| match error {
-            ureq::Error::Io(error) => Fault::unreachable(error.to_string()),
-            ureq::Error::Timeout(ureq::Timeout::Connect | ureq::Timeout::Resolve) => {
-                Fault::unreachable("no connection within the time limit")
-            }
-            ureq::Error::Timeout(_) => Fault::unreachable("no answer within the time limit (`--timeout`)"),
-            ureq::Error::HostNotFound => Fault::unreachable("there is no server of this name"),
-            ureq::Error::ConnectionFailed | ureq::Error::Protocol(_) | ureq::Error::BodyStalled => {
-                Fault::unreachable(error.to_string())
-            }
-            other => never(other.to_string()),
-        })
+        self.agent
+            .run(request)
+            .map(Response::new)
+            .map_err(|error| match error {
+                ureq::Error::Io(error) => Fault::unreachable(error.to_string()),
+                ureq::Error::Timeout(ureq::Timeout::Connect | ureq::Timeout::Resolve) => {
+                    Fault::unreachable("no connection within the time limit")
+                }
+                ureq::Error::Timeout(_) => {
+                    Fault::unreachable("no answer within the time limit (`--timeout`)")
+                }
+                ureq::Error::HostNotFound => Fault::unreachable("there is no server of this name"),
+                ureq::Error::ConnectionFailed
+                | ureq::Error::Protocol(_)
+                | ureq::Error::BodyStalled => Fault::unreachable(error.to_string()),
+                other => never(other.to_string()),
+            })
     }
 
     fn wait(&self, wait: Duration) -> Result<(), Fault> {
@@ -216,14 +257,29 @@ mod tests {
                 let (mut stream, _) = listener.accept().expect("a client connects");
                 let _ = stream.read(&mut [0; 1024]);
                 let head = "HTTP/1.1 200 OK\r\nconnection: close\r\ncontent-length: 5\r\n\r\n";
-                stream.write_all(format!("{head}{body}").as_bytes()).expect("the client reads");
+                stream
+                    .write_all(format!("{head}{body}").as_bytes())
+                    .expect("the client reads");
             }
         });
-        let client = Client::new(Credentials::default(), Duration::from_secs(5), Arc::default());
+        let client = Client::new(
+            Credentials::default(),
+            Duration::from_secs(5),
+            Arc::default(),
+        );
         let to = Address::parse(&address).expect("it is valid");
         let content = Content::Bytes(&[]);
-        let request = Request { method: Method::POST, address: &to, target: address, headers: Vec::new(), content };
-        assert_eq!(client.body(&request, 100).ok().as_deref(), Some("whole".as_bytes()));
+        let request = Request {
+            method: Method::POST,
+            address: &to,
+            target: address,
+            headers: Vec::new(),
+            content,
+        };
+        assert_eq!(
+            client.body(&request, 100).ok().as_deref(),
+            Some("whole".as_bytes())
+        );
         server.join().expect("it has answered all");
     }
 }

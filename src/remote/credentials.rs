@@ -18,14 +18,23 @@ pub struct Credentials {
 
 impl fmt::Debug for Credentials {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(if self.header.is_some() { "Credentials(…)" } else { "Credentials(none)" })
+        f.write_str(if self.header.is_some() {
+            "Credentials(…)"
+        } else {
+            "Credentials(none)"
+        })
     }
 }
 
 impl Credentials {
     /// A name and a password (HTTP basic authentication).
     pub fn basic(user: &str, password: &str) -> Self {
-        Self { header: Some(format!("Basic {}", BASE64_STANDARD.encode(format!("{user}:{password}")))) }
+        Self {
+            header: Some(format!(
+                "Basic {}",
+                BASE64_STANDARD.encode(format!("{user}:{password}"))
+            )),
+        }
     }
 
     /// A token (bearer authentication).
@@ -35,10 +44,17 @@ impl Credentials {
     pub fn token(token: &str) -> Result<Self, Diagnostics> {
         let token = token.trim();
         if token.is_empty() || !token.bytes().all(|byte| byte.is_ascii_graphic()) {
-            let fault = Diagnostic::error("X096", "the token must consist of printable ASCII characters");
-            return Err(fault.help("set ACTCHECK_SPARQL_TOKEN to the token alone, without `Bearer`").into());
+            let fault = Diagnostic::error(
+                "X096",
+                "the token must consist of printable ASCII characters",
+            );
+            return Err(fault
+                .help("set ACTCHECK_SPARQL_TOKEN to the token alone, without `Bearer`")
+                .into());
         }
-        Ok(Self { header: Some(format!("Bearer {token}")) })
+        Ok(Self {
+            header: Some(format!("Bearer {token}")),
+        })
     }
 
     /// The entry of a server in the text of a netrc file, or none if there is no entry.
@@ -64,7 +80,10 @@ mod tests {
         // The example of RFC 7617.
         assert_eq!(basic.header(), Some("Basic QWxhZGRpbjpvcGVuIHNlc2FtZQ=="));
         assert_eq!(format!("{basic:?}"), "Credentials(…)");
-        assert_eq!(Credentials::token(" abc\n").expect("it is valid").header(), Some("Bearer abc"));
+        assert_eq!(
+            Credentials::token(" abc\n").expect("it is valid").header(),
+            Some("Bearer abc")
+        );
         assert!(Credentials::token("a\nb").is_err() && Credentials::token("").is_err());
     }
 }

@@ -15,7 +15,11 @@ pub(crate) enum Fault {
         is_temporary: bool,
     },
     /// The server answered with an error.
-    Refused { status: u16, words: String, retry_after: Option<Duration> },
+    Refused {
+        status: u16,
+        words: String,
+        retry_after: Option<Duration>,
+    },
     /// The server named another server.
     Redirected(String),
     /// The caller stopped it.
@@ -24,15 +28,19 @@ pub(crate) enum Fault {
 
 impl Fault {
     pub fn unreachable(why: impl Into<String>) -> Self {
-        Self::Unreachable { why: why.into(), is_temporary: true }
+        Self::Unreachable {
+            why: why.into(),
+            is_temporary: true,
+        }
     }
 
     /// Adds the number of tries to the message, if there was more than one.
     pub fn after(self, tries: u32) -> Self {
         match self {
-            Self::Unreachable { why, is_temporary } if tries > 1 => {
-                Self::Unreachable { why: format!("{why} ({tries} tries)"), is_temporary }
-            }
+            Self::Unreachable { why, is_temporary } if tries > 1 => Self::Unreachable {
+                why: format!("{why} ({tries} tries)"),
+                is_temporary,
+            },
             other => other,
         }
     }
@@ -73,7 +81,9 @@ fn advice(status: u16) -> &'static str {
              for graphs (`--protocol`)"
         }
         413 => "one run is too large for the server: raise its limit on the size of requests",
-        500.. => "the server failed repeatedly; its log has the reason. A command that sends continues where it was",
+        500.. => {
+            "the server failed repeatedly; its log has the reason. A command that sends continues where it was"
+        }
         _ => "its message has the reason",
     }
 }

@@ -1,4 +1,5 @@
-//! The record of the parts that a store has accepted, so that the same command continues where it was.
+//! The record of the parts that a store has accepted, so that the same command continues where it
+//! was.
 
 use std::collections::HashSet;
 use std::fs::File;
@@ -19,12 +20,25 @@ pub(crate) struct Ledger {
 }
 
 impl Ledger {
-    /// Opens a record, or begins one for the store at `address`. Returns it with the reason why it can't be kept, if any.
+    /// Opens a record, or begins one for the store at `address`. Returns it with the reason why it
+    /// can't be kept, if any.
     pub fn open(path: &Path, address: &str, from_start: bool) -> (Self, Option<io::Error>) {
         let heading = format!("accepted by {address}\n");
         match open(path, &heading, from_start) {
-            Ok((accepted, file)) => (Self { accepted, file: Some(file) }, None),
-            Err(error) => (Self { accepted: HashSet::new(), file: None }, Some(error)),
+            Ok((accepted, file)) => (
+                Self {
+                    accepted,
+                    file: Some(file),
+                },
+                None,
+            ),
+            Err(error) => (
+                Self {
+                    accepted: HashSet::new(),
+                    file: None,
+                },
+                Some(error),
+            ),
         }
     }
 
@@ -37,7 +51,9 @@ impl Ledger {
     pub fn add(&mut self, parts: &[u128]) -> io::Result<()> {
         self.accepted.extend(parts);
         let lines: String = parts.iter().map(|part| format!("{part:032x}\n")).collect();
-        self.file.as_mut().map_or(Ok(()), |file| file.write_all(lines.as_bytes()))
+        self.file
+            .as_mut()
+            .map_or(Ok(()), |file| file.write_all(lines.as_bytes()))
     }
 }
 
@@ -60,7 +76,13 @@ fn open(path: &Path, heading: &str, from_start: bool) -> io::Result<(HashSet<u12
     };
     file.set_len((heading.len() + whole.len()) as u64)?;
     file.seek(io::SeekFrom::End(0))?;
-    Ok((whole.lines().filter_map(|line| u128::from_str_radix(line, 16).ok()).collect(), file))
+    Ok((
+        whole
+            .lines()
+            .filter_map(|line| u128::from_str_radix(line, 16).ok())
+            .collect(),
+        file,
+    ))
 }
 
 /// The digest of a part: of its name and its statements.
@@ -87,7 +109,8 @@ mod tests {
         let opened = |from_start| Ledger::open(&path, "http://a", from_start).0;
         opened(false).add(&[1, 2]).expect("it can be written");
         let mut file = File::options().append(true).open(&path).expect("it exists");
-        file.write_all(b"0000000000000000000000000000").expect("it can be written");
+        file.write_all(b"0000000000000000000000000000")
+            .expect("it can be written");
         let mut ledger = opened(false);
         assert!(ledger.has(1) && ledger.has(2) && !ledger.has(0));
         ledger.add(&[3]).expect("it can be written");

@@ -1,7 +1,8 @@
-//! HTTP: sends statements to stores of others, and asks there. Copies files into folders and object storage.
+//! HTTP: sends statements to stores of others, and asks there. Copies files into folders and object
+//! storage.
 //!
-//! Every request may be sent twice: a store that already has a statement ignores it, so that a request whose answer was lost
-//! is repeated.
+//! Every request may be sent twice: a store that already has a statement ignores it, so that a
+//! request whose answer was lost is repeated.
 //!
 //! Never: reads a history or an environment variable, or prints.
 

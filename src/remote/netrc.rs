@@ -1,7 +1,7 @@
 //! Reads netrc files: names and passwords by server.
 
-/// The name and password of a server; without an entry of its own, those of the entry `default`. Unknown words are skipped, as
-/// other programs do.
+/// The name and password of a server; without an entry of its own, those of the entry `default`.
+/// Unknown words are skipped, as other programs do.
 pub(crate) fn netrc_entry(text: &str, host: &str) -> Option<(String, String)> {
     let mut words = words(text).into_iter();
     let (mut default, mut own): (Option<Entry>, Option<Entry>) = (None, None);
@@ -9,7 +9,10 @@ pub(crate) fn netrc_entry(text: &str, host: &str) -> Option<(String, String)> {
     while let Some(word) = words.next() {
         match word.as_str() {
             "machine" => {
-                let is_own = words.next().is_some_and(|name| name.eq_ignore_ascii_case(host)) && own.is_none();
+                let is_own = words
+                    .next()
+                    .is_some_and(|name| name.eq_ignore_ascii_case(host))
+                    && own.is_none();
                 current = if is_own { Place::Own } else { Place::Elsewhere };
             }
             "default" => current = Place::Default,
@@ -20,7 +23,11 @@ pub(crate) fn netrc_entry(text: &str, host: &str) -> Option<(String, String)> {
                     Place::Default => default.get_or_insert_default(),
                     Place::Elsewhere => continue,
                 };
-                let part = if word == "login" { &mut entry.user } else { &mut entry.password };
+                let part = if word == "login" {
+                    &mut entry.user
+                } else {
+                    &mut entry.password
+                };
                 *part = Some(value);
             }
             _ => {}

@@ -14,8 +14,8 @@ pub enum Protocol {
     Quads,
 }
 
-/// The body of an update that inserts statements, which are sorted by graph. Statements about the nodes `replaced` in the
-/// default graph are removed by the same update.
+/// The body of an update that inserts statements, which are sorted by graph. Statements about the
+/// nodes `replaced` in the default graph are removed by the same update.
 pub(crate) fn update(statements: &[Statement], replaced: &[String]) -> String {
     let mut text = String::new();
     for node in replaced {
@@ -75,12 +75,19 @@ mod tests {
     #[test]
     fn statements_are_written_for_each_protocol() {
         let of = |graph: Option<&str>, triple: &str| (graph.map(str::to_owned), triple.to_owned());
-        let statements = [of(None, "<a> <b> 1"), of(None, "<a> <b> 2"), of(Some("g"), "<a> <b> 3")];
+        let statements = [
+            of(None, "<a> <b> 1"),
+            of(None, "<a> <b> 2"),
+            of(Some("g"), "<a> <b> 3"),
+        ];
         assert_eq!(
             update(&statements, &["a".to_owned()]),
             "DELETE WHERE { <a> ?p ?o } ;\nINSERT DATA {\n<a> <b> 1 .\n<a> <b> 2 .\nGRAPH <g> {\n<a> <b> 3 .\n}\n}\n"
         );
-        assert_eq!(quads(&statements), "<a> <b> 1 .\n<a> <b> 2 .\n<a> <b> 3 <g> .\n");
+        assert_eq!(
+            quads(&statements),
+            "<a> <b> 1 .\n<a> <b> 2 .\n<a> <b> 3 <g> .\n"
+        );
         let groups: Vec<String> = by_graph(&statements).map(triples).collect();
         assert_eq!(groups, ["<a> <b> 1 .\n<a> <b> 2 .\n", "<a> <b> 3 .\n"]);
     }

@@ -22,28 +22,49 @@ pub(crate) struct Response {
 
 impl Response {
     pub fn new(response: HttpResponse<Body>) -> Self {
-        Self { status: response.status().as_u16(), response }
+        Self {
+            status: response.status().as_u16(),
+            response,
+        }
     }
 
-    /// The value of a header, without spaces around it. Returns `None` if there is none, or if it is not text.
+    /// The value of a header, without spaces around it. Returns `None` if there is none, or if it
+    /// is not text.
     pub fn header(&self, name: &str) -> Option<&str> {
-        self.response.headers().get(name)?.to_str().ok().map(str::trim)
+        self.response
+            .headers()
+            .get(name)?
+            .to_str()
+            .ok()
+            .map(str::trim)
     }
 
     /// Its media type in lower case, without parameters; empty if the server did not name one.
     pub fn media_type(&self) -> String {
         let named = self.header("content-type").unwrap_or_default();
-        named.split(';').next().unwrap_or_default().trim().to_ascii_lowercase()
+        named
+            .split(';')
+            .next()
+            .unwrap_or_default()
+            .trim()
+            .to_ascii_lowercase()
     }
 
     /// The wait that the server asks for.
     pub fn retry_after(&self) -> Option<Duration> {
-        self.header("retry-after")?.parse().ok().map(Duration::from_secs)
+        self.header("retry-after")?
+            .parse()
+            .ok()
+            .map(Duration::from_secs)
     }
 
     /// The body as a stream.
     pub fn into_reader(self) -> impl Read + Send + 'static {
-        self.response.into_body().into_with_config().limit(u64::MAX).reader()
+        self.response
+            .into_body()
+            .into_with_config()
+            .limit(u64::MAX)
+            .reader()
     }
 
     /// Reads a short rest of the body.
@@ -57,15 +78,26 @@ impl Response {
         let is_html = self.media_type().contains("html");
         let mut bytes = Vec::new();
         // The part before an error is shown.
-        let _ = self.into_reader().take(MOST_OF_REFUSAL).read_to_end(&mut bytes);
+        let _ = self
+            .into_reader()
+            .take(MOST_OF_REFUSAL)
+            .read_to_end(&mut bytes);
         let text = String::from_utf8_lossy(&bytes);
-        first_lines(&if is_html { without_tags(&text) } else { text.into_owned() })
+        first_lines(&if is_html {
+            without_tags(&text)
+        } else {
+            text.into_owned()
+        })
     }
 }
 
 /// The first lines of a text that are not empty, each shortened.
 fn first_lines(text: &str) -> String {
-    let lines = text.lines().map(str::trim).filter(|line| !line.is_empty()).take(SHOWN_LINES);
+    let lines = text
+        .lines()
+        .map(str::trim)
+        .filter(|line| !line.is_empty())
+        .take(SHOWN_LINES);
     let shortened = lines.map(|line| match line.char_indices().nth(SHOWN_CHARS) {
         Some((end, _)) => format!("{}…", &line[..end]),
         None => line.to_owned(),
@@ -100,8 +132,14 @@ mod tests {
         let long = "x".repeat(1000);
         let shown = first_lines(&format!("\n  one\n\n{long}\n3\n4\n5\n6\n7"));
         assert_eq!(shown.lines().count(), 6);
-        assert!(shown.starts_with("one\nxxx") && shown.contains('…') && shown.ends_with('6'), "{shown}");
+        assert!(
+            shown.starts_with("one\nxxx") && shown.contains('…') && shown.ends_with('6'),
+            "{shown}"
+        );
         let page = "<html><head><title>Error 400</title></head><body><h1>Bad query</h1>line 3</body></html>";
-        assert_eq!(first_lines(&without_tags(page)), "Error 400\nBad query\nline 3");
+        assert_eq!(
+            first_lines(&without_tags(page)),
+            "Error 400\nBad query\nline 3"
+        );
     }
 }

@@ -15,8 +15,8 @@ use actcheck_base::{Diagnostic, Diagnostics};
 /// Largest body of a request, except for a part that is larger. Unit: bytes.
 const MOST_BYTES: usize = 8 << 20;
 
-/// A statement: its graph, `None` for the default graph, and its triple in N-Triples without the full stop. Without blank
-/// nodes, so that it can be sent twice.
+/// A statement: its graph, `None` for the default graph, and its triple in N-Triples without the
+/// full stop. Without blank nodes, so that it can be sent twice.
 pub(crate) type Statement = (Option<String>, String);
 
 /// A part that a store gets as a whole.
@@ -24,10 +24,11 @@ pub(crate) type Statement = (Option<String>, String);
 pub struct Part {
     /// Its name, unique in the history.
     pub name: String,
-    /// A node whose statements in the default graph are replaced, because a later state of it may lack some of them. Only
-    /// updates can do that.
+    /// A node whose statements in the default graph are replaced, because a later state of it may
+    /// lack some of them. Only updates can do that.
     pub replaced: Option<String>,
-    /// Its statements, sorted: the graph (`None` is the default graph) and the triple in N-Triples, without the full stop.
+    /// Its statements, sorted: the graph (`None` is the default graph) and the triple in N-Triples,
+    /// without the full stop.
     pub statements: Vec<(Option<String>, String)>,
 }
 
@@ -73,8 +74,8 @@ struct Batch {
 }
 
 impl<'a> Upload<'a> {
-    /// Begins or continues an upload. `record` is the file in which accepted parts are recorded. Returns a warning if it can't
-    /// be written.
+    /// Begins or continues an upload. `record` is the file in which accepted parts are recorded.
+    /// Returns a warning if it can't be written.
     pub fn new(
         client: &'a Client,
         address: &'a Address,
@@ -83,15 +84,29 @@ impl<'a> Upload<'a> {
     ) -> (Self, Option<Diagnostic>) {
         let (ledger, fault) = Ledger::open(record, &address.to_string(), options.from_start);
         let warning = fault.map(|error| unrecorded(record, &error));
-        (Self { client, address, options, ledger, batch: Batch::default(), sent: Sent::default() }, warning)
+        (
+            Self {
+                client,
+                address,
+                options,
+                ledger,
+                batch: Batch::default(),
+                sent: Sent::default(),
+            },
+            warning,
+        )
     }
 
     /// Adds a part, and sends the batch if it is full.
     ///
     /// # Errors
-    /// `X030`, `X091`, `X092`, `X093`: the store did not accept a batch. Batches accepted before are recorded.
+    /// `X030`, `X091`, `X092`, `X093`: the store did not accept a batch. Batches accepted before
+    /// are recorded.
     pub fn add(&mut self, part: Part) -> Result<(), Diagnostics> {
-        let texts = part.statements.iter().map(|(graph, triple)| (graph.as_deref().unwrap_or(""), triple.as_str()));
+        let texts = part
+            .statements
+            .iter()
+            .map(|(graph, triple)| (graph.as_deref().unwrap_or(""), triple.as_str()));
         let id = digest(&part.name, texts);
         if self.ledger.has(id) {
             self.sent.known += part.statements.len() as u64;
@@ -137,11 +152,15 @@ impl<'a> Upload<'a> {
     fn deliver(&mut self, statements: &[Statement], replaced: &[String]) -> Result<(), Fault> {
         let target = self.address.to_string();
         let sent = match self.options.protocol {
-            Protocol::Update => {
-                self.post(target, "application/sparql-update; charset=utf-8", &update(statements, replaced))
-            }
+            Protocol::Update => self.post(
+                target,
+                "application/sparql-update; charset=utf-8",
+                &update(statements, replaced),
+            ),
             Protocol::Quads => self.post(target, "application/n-quads", &quads(statements)),
-            Protocol::GraphStore => return by_graph(statements).try_for_each(|group| self.deliver_graph(group)),
+            Protocol::GraphStore => {
+                return by_graph(statements).try_for_each(|group| self.deliver_graph(group));
+            }
         };
         self.or_in_halves(sent, statements, |upload, half, is_first| {
             upload.deliver(half, if is_first { replaced } else { &[] })
@@ -154,7 +173,9 @@ impl<'a> Upload<'a> {
             None => self.address.with_parameter("default", None),
         };
         let sent = self.post(target, "application/n-triples", &triples(statements));
-        self.or_in_halves(sent, statements, |upload, half, _| upload.deliver_graph(half))
+        self.or_in_halves(sent, statements, |upload, half, _| {
+            upload.deliver_graph(half)
+        })
     }
 
     /// Sends both halves of statements if the server refused all of them for their size.
@@ -179,7 +200,10 @@ impl<'a> Upload<'a> {
             method: Method::POST,
             address: self.address,
             target,
-            headers: vec![("content-type", media_type.to_owned()), ("accept", "*/*".to_owned())],
+            headers: vec![
+                ("content-type", media_type.to_owned()),
+                ("accept", "*/*".to_owned()),
+            ],
             content: Content::Bytes(body.as_bytes()),
         };
         self.client.send(&request)?.finish();
@@ -194,7 +218,10 @@ fn size((graph, triple): &Statement) -> usize {
 }
 
 fn unrecorded(record: &Path, error: &io::Error) -> Diagnostic {
-    let message = format!("{} can't be written: {error}; the upload can't be resumed", record.display());
+    let message = format!(
+        "{} can't be written: {error}; the upload can't be resumed",
+        record.display()
+    );
     Diagnostic::warning("X095", message)
         .help("if it ends early, the same command sends everything again, which does no harm")
 }

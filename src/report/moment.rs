@@ -1,11 +1,12 @@
-//! Finds the moments of a run that a failed property is about: the one at which it was decided, as the starting point for
-//! playback, and the one that its witness describes.
+//! Finds the moments of a run that a failed property is about: the one at which it was decided, as
+//! the starting point for playback, and the one that its witness describes.
 
 use actcheck_data::{BodyState, Trace};
 
 /// A displacement beyond this counts as moved. Unit: metres.
 const MOVED_M: f64 = 0.01;
-/// A contact that ends closer than this to the end of its action does not count as lost. Unit: seconds.
+/// A contact that ends closer than this to the end of its action does not count as lost. Unit:
+/// seconds.
 const LOST_SECS: f64 = 0.2;
 /// Lead time: playback starts this long before the deciding event. Unit: seconds.
 const BEFORE_SECS: f64 = 0.3;
@@ -34,34 +35,43 @@ impl Event {
         }
     }
 
-    /// Whether a witness describes the event itself. Otherwise it describes the state after the action.
+    /// Whether a witness describes the event itself. Otherwise it describes the state after the
+    /// action.
     fn is_stated(self) -> bool {
         matches!(self, Self::Touched | Self::Moved)
     }
 }
 
-/// Returns the moment that decided an outcome, from the objects that its witness names. Unit: seconds since the run
-/// began.
+/// Returns the moment that decided an outcome, from the objects that its witness names. Unit:
+/// seconds since the run began.
 ///
-/// In this order: the robot first touched named furniture or a named object that is not a parameter of the action; such
-/// an object moved;
-/// the robot lost contact with the named objects; if it never touched them, a link was nearest to them. If none
-/// applies, returns the end of the action. All but the last are shifted earlier by [`BEFORE_SECS`].
+/// In this order: the robot first touched named furniture or a named object that is not a parameter
+/// of the action; such an object moved; the robot lost contact with the named objects; if it never
+/// touched them, a link was nearest to them. If none applies, returns the end of the action. All
+/// but the last are shifted earlier by [`BEFORE_SECS`].
 pub(super) fn deciding_moment(trace: &Trace, action_idx: usize, witness: &str) -> f64 {
     let (start, end) = span(trace, action_idx);
     let event = deciding_event(trace, action_idx, &Named::of(trace, action_idx, witness));
-    event.map_or(end, |(secs, _)| (start + secs - BEFORE_SECS).clamp(start, end))
+    event.map_or(end, |(secs, _)| {
+        (start + secs - BEFORE_SECS).clamp(start, end)
+    })
 }
 
-/// Returns the moment that the witness of a failure describes, and the event that decided the outcome if that was
-/// earlier. Unit: seconds since the run began.
+/// Returns the moment that the witness of a failure describes, and the event that decided the
+/// outcome if that was earlier. Unit: seconds since the run began.
 ///
-/// If the witness names something that the robot touched or moved although it must not, the moment is that event. Any
-/// other witness describes the state after the action.
-pub(super) fn stated_moment(trace: &Trace, action_idx: usize, witness: &str) -> (f64, Option<Event>) {
+/// If the witness names something that the robot touched or moved although it must not, the moment
+/// is that event. Any other witness describes the state after the action.
+pub(super) fn stated_moment(
+    trace: &Trace,
+    action_idx: usize,
+    witness: &str,
+) -> (f64, Option<Event>) {
     let (start, end) = span(trace, action_idx);
     let mut named = Named::of(trace, action_idx, witness);
-    named.furniture.retain(|id| !carries(trace, action_idx + 1, id, &named.things));
+    named
+        .furniture
+        .retain(|id| !carries(trace, action_idx + 1, id, &named.things));
     match deciding_event(trace, action_idx, &named) {
         Some((secs, event)) if event.is_stated() => ((start + secs).clamp(start, end), None),
         Some((_, event)) => (end, Some(event)),
@@ -71,15 +81,28 @@ pub(super) fn stated_moment(trace: &Trace, action_idx: usize, witness: &str) -> 
 
 /// Start and end of an action. Unit: seconds since the run began.
 fn span(trace: &Trace, action_idx: usize) -> (f64, f64) {
-    let at = |idx: usize| trace.snapshots.get(idx).or(trace.snapshots.last()).map_or(0.0, |state| state.time_secs);
+    let at = |idx: usize| {
+        trace
+            .snapshots
+            .get(idx)
+            .or(trace.snapshots.last())
+            .map_or(0.0, |state| state.time_secs)
+    };
     let (start, end) = (at(action_idx) - at(0), at(action_idx + 1) - at(0));
     (start, end.max(start))
 }
 
-/// Whether an object carried one of some others in a snapshot: then a witness names it as the place of the other.
+/// Whether an object carried one of some others in a snapshot: then a witness names it as the place
+/// of the other.
 fn carries(trace: &Trace, snapshot_idx: usize, id: &str, others: &[String]) -> bool {
-    let bodies = trace.snapshots.get(snapshot_idx).into_iter().flat_map(|state| &state.bodies);
-    bodies.filter(|body| others.contains(&body.id)).any(|body| body.rests_on.iter().any(|under| under == id))
+    let bodies = trace
+        .snapshots
+        .get(snapshot_idx)
+        .into_iter()
+        .flat_map(|state| &state.bodies);
+    bodies
+        .filter(|body| others.contains(&body.id))
+        .any(|body| body.rests_on.iter().any(|under| under == id))
 }
 
 /// The ids that a witness names.
@@ -93,14 +116,38 @@ struct Named {
 
 impl Named {
     fn of(trace: &Trace, action_idx: usize, witness: &str) -> Self {
-        let parameters = || trace.actions.get(action_idx).into_iter().flat_map(|action| action.parameters.values());
-        let bodies = trace.snapshots.first().into_iter().flat_map(|state| &state.bodies);
-        let (furniture, things): (Vec<&BodyState>, Vec<&BodyState>) =
-            bodies.filter(|body| names(witness, &body.id)).partition(|body| body.fixed);
-        let ids = |bodies: Vec<&BodyState>| bodies.into_iter().map(|body| body.id.clone()).collect::<Vec<_>>();
+        let parameters = || {
+            trace
+                .actions
+                .get(action_idx)
+                .into_iter()
+                .flat_map(|action| action.parameters.values())
+        };
+        let bodies = trace
+            .snapshots
+            .first()
+            .into_iter()
+            .flat_map(|state| &state.bodies);
+        let (furniture, things): (Vec<&BodyState>, Vec<&BodyState>) = bodies
+            .filter(|body| names(witness, &body.id))
+            .partition(|body| body.fixed);
+        let ids = |bodies: Vec<&BodyState>| {
+            bodies
+                .into_iter()
+                .map(|body| body.id.clone())
+                .collect::<Vec<_>>()
+        };
         let things = ids(things);
-        let others = things.iter().filter(|id| !parameters().flatten().any(|value| value == *id)).cloned().collect();
-        Self { furniture: ids(furniture), things, others }
+        let others = things
+            .iter()
+            .filter(|id| !parameters().flatten().any(|value| value == *id))
+            .cloned()
+            .collect();
+        Self {
+            furniture: ids(furniture),
+            things,
+            others,
+        }
     }
 }
 
@@ -111,20 +158,35 @@ fn deciding_event(trace: &Trace, action_idx: usize, named: &Named) -> Option<(f6
     let by_robot = |ids: &[&String]| -> Vec<(f64, f64)> {
         let touches = action.contacts.iter().filter(|contact| {
             let [a, b] = &contact.pair;
-            [(a, b), (b, a)].iter().any(|(robot, thing)| robot.starts_with("robot/") && ids.contains(thing))
+            [(a, b), (b, a)]
+                .iter()
+                .any(|(robot, thing)| robot.starts_with("robot/") && ids.contains(thing))
         });
-        touches.map(|contact| (contact.start_secs, contact.end_secs)).collect()
+        touches
+            .map(|contact| (contact.start_secs, contact.end_secs))
+            .collect()
     };
     let touchable: Vec<&String> = named.furniture.iter().chain(&named.others).collect();
-    if let Some(first) = by_robot(&touchable).into_iter().map(|(start, _)| start).min_by(f64::total_cmp) {
+    if let Some(first) = by_robot(&touchable)
+        .into_iter()
+        .map(|(start, _)| start)
+        .min_by(f64::total_cmp)
+    {
         return Some((first, Event::Touched));
     }
-    let moved = named.others.iter().filter_map(|id| first_movement(trace, id, start, end));
+    let moved = named
+        .others
+        .iter()
+        .filter_map(|id| first_movement(trace, id, start, end));
     if let Some(first) = moved.min_by(f64::total_cmp) {
         return Some((first, Event::Moved));
     }
     let things: Vec<&String> = named.things.iter().collect();
-    match by_robot(&things).into_iter().map(|(_, end)| end).max_by(f64::total_cmp) {
+    match by_robot(&things)
+        .into_iter()
+        .map(|(_, end)| end)
+        .max_by(f64::total_cmp)
+    {
         Some(last) => (start + last < end - LOST_SECS).then_some((last, Event::Lost)),
         None => nearest(trace, &things, start, end).map(|secs| (secs, Event::Nearest)),
     }
@@ -134,12 +196,13 @@ fn deciding_event(trace: &Trace, action_idx: usize, named: &Named) -> Option<(f6
 pub(super) fn names(text: &str, word: &str) -> bool {
     let of_word = |c: char| c.is_alphanumeric() || c == '_';
     !word.is_empty()
-        && text
-            .match_indices(word)
-            .any(|(at, _)| !text[..at].ends_with(of_word) && !text[at + word.len()..].starts_with(of_word))
+        && text.match_indices(word).any(|(at, _)| {
+            !text[..at].ends_with(of_word) && !text[at + word.len()..].starts_with(of_word)
+        })
 }
 
-/// Positions of a track in the frames of an action, with times since the action began. Units: seconds, metres.
+/// Positions of a track in the frames of an action, with times since the action began. Units:
+/// seconds, metres.
 fn positions<'a>(
     trace: &'a Trace,
     slot: usize,
@@ -147,38 +210,65 @@ fn positions<'a>(
     end: f64,
 ) -> impl Iterator<Item = (f64, [f64; 3])> + use<'a> {
     let secs = |idx: usize| idx as f64 * trace.frames.period_secs;
-    let at = move |row: &Vec<f32>| row.get(7 * slot..7 * slot + 3).map(|at| [at[0], at[1], at[2]].map(f64::from));
-    let rows = trace.frames.rows.iter().enumerate().map(move |(idx, row)| (secs(idx), row));
+    let at = move |row: &Vec<f32>| {
+        row.get(7 * slot..7 * slot + 3)
+            .map(|at| [at[0], at[1], at[2]].map(f64::from))
+    };
+    let rows = trace
+        .frames
+        .rows
+        .iter()
+        .enumerate()
+        .map(move |(idx, row)| (secs(idx), row));
     rows.filter(move |(secs, _)| (start..=end).contains(secs))
         .filter_map(move |(secs, row)| Some((secs - start, at(row)?)))
 }
 
 fn distance(a: [f64; 3], b: [f64; 3]) -> f64 {
-    (0..3).map(|axis| (a[axis] - b[axis]).powi(2)).sum::<f64>().sqrt()
+    (0..3)
+        .map(|axis| (a[axis] - b[axis]).powi(2))
+        .sum::<f64>()
+        .sqrt()
 }
 
-/// When an object had moved, since the action began. Returns `None` if it did not. Unit: seconds; `start` and `end`
-/// since the run began.
+/// When an object had moved, since the action began. Returns `None` if it did not. Unit: seconds;
+/// `start` and `end` since the run began.
 fn first_movement(trace: &Trace, id: &str, start: f64, end: f64) -> Option<f64> {
     let slot = trace.frames.names.iter().position(|name| name == id)?;
     let mut track = positions(trace, slot, start, end);
     let (_, place) = track.next()?;
-    track.find(|(_, now)| distance(*now, place) > MOVED_M).map(|(secs, _)| secs)
+    track
+        .find(|(_, now)| distance(*now, place) > MOVED_M)
+        .map(|(secs, _)| secs)
 }
 
-/// When a link of the robot was nearest to any of the objects, since the action began. Unit: seconds; `start` and `end`
-/// since the run began.
+/// When a link of the robot was nearest to any of the objects, since the action began. Unit:
+/// seconds; `start` and `end` since the run began.
 fn nearest(trace: &Trace, ids: &[&String], start: f64, end: f64) -> Option<f64> {
     let slots = |wanted: &dyn Fn(&str) -> bool| -> Vec<usize> {
-        trace.frames.names.iter().enumerate().filter(|(_, name)| wanted(name)).map(|(slot, _)| slot).collect()
+        trace
+            .frames
+            .names
+            .iter()
+            .enumerate()
+            .filter(|(_, name)| wanted(name))
+            .map(|(slot, _)| slot)
+            .collect()
     };
-    let (links, things) = (slots(&|name| name.starts_with("robot/")), slots(&|name| ids.iter().any(|id| *id == name)));
-    let pairs = things.iter().flat_map(|thing| links.iter().map(move |link| (*thing, *link)));
+    let (links, things) = (
+        slots(&|name| name.starts_with("robot/")),
+        slots(&|name| ids.iter().any(|id| *id == name)),
+    );
+    let pairs = things
+        .iter()
+        .flat_map(|thing| links.iter().map(move |link| (*thing, *link)));
     let apart = pairs.flat_map(|(thing, link)| {
         let both = positions(trace, thing, start, end).zip(positions(trace, link, start, end));
         both.map(|((secs, thing), (_, link))| (secs, distance(thing, link)))
     });
-    apart.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(secs, _)| secs)
+    apart
+        .min_by(|a, b| a.1.total_cmp(&b.1))
+        .map(|(secs, _)| secs)
 }
 
 #[cfg(test)]
@@ -225,10 +315,18 @@ mod tests {
             links: Vec::new(),
             cup: None,
         };
-        Snapshot { time_secs, bodies: vec![body("table_1", true, "floor"), body("glass_1", false, "table_1")], robot }
+        Snapshot {
+            time_secs,
+            bodies: vec![
+                body("table_1", true, "floor"),
+                body("glass_1", false, "table_1"),
+            ],
+            robot,
+        }
     }
 
-    /// A pick of `glass_1` on `table_1` from 2 s to 12 s, in which the robot touched things for a second each.
+    /// A pick of `glass_1` on `table_1` from 2 s to 12 s, in which the robot touched things for a
+    /// second each.
     fn picked(touched: &[(&str, f64)]) -> Trace {
         let parameters = BTreeMap::from([("pickObject".to_owned(), vec!["glass_1".to_owned()])]);
         let contacts = touched.iter().map(|(thing, start)| ContactEpisode {
@@ -238,11 +336,19 @@ mod tests {
             max_force_n: 5.0,
             point_m: None,
         });
-        let action = ActionTrace { contacts: contacts.collect(), ..ActionTrace::not_reached("Pick", &parameters) };
-        Trace { snapshots: vec![snapshot(2.0), snapshot(12.0)], actions: vec![action], ..Trace::default() }
+        let action = ActionTrace {
+            contacts: contacts.collect(),
+            ..ActionTrace::not_reached("Pick", &parameters)
+        };
+        Trace {
+            snapshots: vec![snapshot(2.0), snapshot(12.0)],
+            actions: vec![action],
+            ..Trace::default()
+        }
     }
 
-    /// The sentence "48.8 cm from the gripper" was shown with the hand at the glass, where the robot lost it.
+    /// The sentence "48.8 cm from the gripper" was shown with the hand at the glass, where the
+    /// robot lost it.
     #[test]
     fn a_sentence_about_the_state_after_an_action_is_shown_at_its_end() {
         let trace = picked(&[("glass_1", 5.0)]);
@@ -254,7 +360,10 @@ mod tests {
     #[test]
     fn a_sentence_about_a_contact_is_shown_when_it_begins() {
         let trace = picked(&[("glass_1", 5.0), ("table_1", 3.0)]);
-        assert_eq!(stated_moment(&trace, 0, "the robot pressed table_1 with 90 N"), (3.0, None));
+        assert_eq!(
+            stated_moment(&trace, 0, "the robot pressed table_1 with 90 N"),
+            (3.0, None)
+        );
     }
 
     #[test]
@@ -266,13 +375,20 @@ mod tests {
 
     #[test]
     fn a_sentence_that_names_nothing_is_shown_at_the_end() {
-        assert_eq!(stated_moment(&picked(&[]), 0, "the action reported failed"), (10.0, None));
+        assert_eq!(
+            stated_moment(&picked(&[]), 0, "the action reported failed"),
+            (10.0, None)
+        );
     }
 
     #[test]
     fn names_match_whole_words_only() {
         assert!(names("glass_1 is 57.5 cm from the gripper", "glass_1"));
         assert!(names("touched (glass_1)", "glass_1"));
-        assert!(!names("glass_12 fell", "glass_1") && !names("a glass_1b", "glass_1") && !names("x", ""));
+        assert!(
+            !names("glass_12 fell", "glass_1")
+                && !names("a glass_1b", "glass_1")
+                && !names("x", "")
+        );
     }
 }

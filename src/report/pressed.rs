@@ -3,8 +3,8 @@
 use crate::moment::names;
 use actcheck_data::{ActionTrace, ContactEpisode, Trace};
 
-/// A contact with at least this force is shown even if no failure names it. Unit: newtons. It slides 14 kg of furniture
-/// with a friction coefficient of 0.5.
+/// A contact with at least this force is shown even if no failure names it. Unit: newtons. It
+/// slides 14 kg of furniture with a friction coefficient of 0.5.
 const HARD_N: f64 = 70.0;
 /// The designator of the object that the robot may touch.
 const TARGET: &str = "pickObject";
@@ -22,38 +22,53 @@ pub(super) struct Pressed {
     pub force_n: f64,
     /// Start and end, since the run began. Unit: seconds.
     pub secs: [f64; 2],
-    /// Position at the largest force. Unit: metres. Frame: world. `None` in runs of earlier versions.
+    /// Position at the largest force. Unit: metres. Frame: world. `None` in runs of earlier
+    /// versions.
     pub point_m: Option<[f64; 3]>,
 }
 
 impl Pressed {
     /// The contact in a few words: `base_link presses coffee_table_1: 759 N`.
     pub(super) fn label(&self) -> String {
-        let force = if self.force_n < 10.0 { format!("{:.1}", self.force_n) } else { format!("{:.0}", self.force_n) };
-        let thing = if self.thing == "floor" { "the floor" } else { &self.thing };
+        let force = if self.force_n < 10.0 {
+            format!("{:.1}", self.force_n)
+        } else {
+            format!("{:.0}", self.force_n)
+        };
+        let thing = if self.thing == "floor" {
+            "the floor"
+        } else {
+            &self.thing
+        };
         format!("{} presses {thing}: {force} N", self.link)
     }
 
     /// The contact with its time and its position.
     pub(super) fn sentence(&self) -> String {
         let [start, end] = self.secs;
-        let place =
-            self.point_m.map_or_else(String::new, |[x, y, z]| format!(", at x = {x:.2}, y = {y:.2}, z = {z:.2} m"));
+        let place = self.point_m.map_or_else(String::new, |[x, y, z]| {
+            format!(", at x = {x:.2}, y = {y:.2}, z = {z:.2} m")
+        });
         format!("{}, from {start:.1} s to {end:.1} s{place}", self.label())
     }
 }
 
-/// Returns the hardest contact that the witness of a failure names. `action_idx` is the index of its action.
+/// Returns the hardest contact that the witness of a failure names. `action_idx` is the index of
+/// its action.
 pub(super) fn pressed_in(trace: &Trace, action_idx: usize, witness: &str) -> Option<Pressed> {
     hardest(of_action(trace, action_idx).filter(|pressed| is_named(pressed, witness)))
 }
 
-/// Returns the hardest contact of a run, given the failures of its actions: index of the action and witness. Contacts
-/// that no failure names count if they are hard.
-pub(super) fn hardest_of_run<'a>(trace: &Trace, failures: impl Iterator<Item = (usize, &'a str)>) -> Option<Pressed> {
+/// Returns the hardest contact of a run, given the failures of its actions: index of the action and
+/// witness. Contacts that no failure names count if they are hard.
+pub(super) fn hardest_of_run<'a>(
+    trace: &Trace,
+    failures: impl Iterator<Item = (usize, &'a str)>,
+) -> Option<Pressed> {
     let named = failures.filter_map(|(idx, witness)| pressed_in(trace, idx, witness));
-    let hard =
-        (0..trace.actions.len()).flat_map(|idx| of_action(trace, idx)).filter(|pressed| pressed.force_n >= HARD_N);
+    let hard = (0..trace.actions.len())
+        .flat_map(|idx| of_action(trace, idx))
+        .filter(|pressed| pressed.force_n >= HARD_N);
     hardest(named.chain(hard))
 }
 
@@ -66,39 +81,53 @@ fn is_named(pressed: &Pressed, text: &str) -> bool {
     names(text, &pressed.thing) && (names(text, &pressed.link) || !text.contains(" pressed "))
 }
 
-/// All contacts of the robot during an action, except with the object that it may touch or holds, and of its wheels
-/// with the floor.
+/// All contacts of the robot during an action, except with the object that it may touch or holds,
+/// and of its wheels with the floor.
 fn of_action(trace: &Trace, idx: usize) -> impl Iterator<Item = Pressed> {
     let begin = trace.snapshots.first().map_or(0.0, |state| state.time_secs);
     let before = trace.snapshots.get(idx);
     let start = before.map_or(begin, |state| state.time_secs) - begin;
     let action = trace.actions.get(idx);
-    let contacts = action.into_iter().flat_map(|action| action.contacts.iter().map(move |contact| (action, contact)));
+    let contacts = action
+        .into_iter()
+        .flat_map(|action| action.contacts.iter().map(move |contact| (action, contact)));
     contacts.filter_map(move |(action, contact)| {
         let (link, thing) = sides(contact)?;
         let held = before.is_some_and(|state| {
             let touches = [&state.robot.left_touches, &state.robot.right_touches];
-            touches.into_iter().all(|touched| touched.iter().any(|other| other == thing))
+            touches
+                .into_iter()
+                .all(|touched| touched.iter().any(|other| other == thing))
         });
         let rolls = thing == "floor" && contact.start_secs <= 0.0;
-        (!held && !rolls && !is_target(action, thing) && !fingers_meet(trace, idx, contact)).then(|| Pressed {
-            link: link.to_owned(),
-            thing: thing.to_owned(),
-            force_n: contact.max_force_n,
-            secs: [start + contact.start_secs, start + contact.end_secs],
-            point_m: contact.point_m,
-        })
+        (!held && !rolls && !is_target(action, thing) && !fingers_meet(trace, idx, contact)).then(
+            || Pressed {
+                link: link.to_owned(),
+                thing: thing.to_owned(),
+                force_n: contact.max_force_n,
+                secs: [start + contact.start_secs, start + contact.end_secs],
+                point_m: contact.point_m,
+            },
+        )
     })
 }
 
 /// Whether a contact is one of two links of the hand, whose fingers may meet.
 fn fingers_meet(trace: &Trace, idx: usize, contact: &ContactEpisode) -> bool {
-    let own = trace.robot_courses.get(idx).map(|course| course.self_contacts.as_slice()).unwrap_or_default();
-    own.iter().any(|own| own.pair == contact.pair && own.press.is_some_and(|press| press.of_hand))
+    let own = trace
+        .robot_courses
+        .get(idx)
+        .map(|course| course.self_contacts.as_slice())
+        .unwrap_or_default();
+    own.iter()
+        .any(|own| own.pair == contact.pair && own.press.is_some_and(|press| press.of_hand))
 }
 
 fn is_target(action: &ActionTrace, thing: &str) -> bool {
-    action.parameters.get(TARGET).is_some_and(|ids| ids.iter().any(|id| id == thing))
+    action
+        .parameters
+        .get(TARGET)
+        .is_some_and(|ids| ids.iter().any(|id| id == thing))
 }
 
 /// The link and the other side of a contact. Returns `None` if it is not one of the robot's.
@@ -121,13 +150,25 @@ mod tests {
 
     fn contact(pair: [&str; 2], start_secs: f64, max_force_n: f64) -> ContactEpisode {
         let point_m = Some([1.0, 0.25, 0.5]);
-        ContactEpisode { pair: pair.map(str::to_owned), start_secs, end_secs: start_secs + 2.0, max_force_n, point_m }
+        ContactEpisode {
+            pair: pair.map(str::to_owned),
+            start_secs,
+            end_secs: start_secs + 2.0,
+            max_force_n,
+            point_m,
+        }
     }
 
     fn trace(contacts: Vec<ContactEpisode>) -> Trace {
         let parameters = BTreeMap::from([(TARGET.to_owned(), vec!["glass_1".to_owned()])]);
-        let action = ActionTrace { contacts, ..ActionTrace::not_reached("Pick", &parameters) };
-        Trace { actions: vec![action], ..Trace::default() }
+        let action = ActionTrace {
+            contacts,
+            ..ActionTrace::not_reached("Pick", &parameters)
+        };
+        Trace {
+            actions: vec![action],
+            ..Trace::default()
+        }
     }
 
     fn label(trace: &Trace, failures: &[(usize, &str)]) -> Option<String> {
@@ -144,7 +185,10 @@ mod tests {
             contact(["mug_1", "table_1"], 3.0, 800.0),
         ];
         let trace = trace(contacts);
-        assert_eq!(label(&trace, &[]).as_deref(), Some("base_link presses coffee_table_1: 759 N"));
+        assert_eq!(
+            label(&trace, &[]).as_deref(),
+            Some("base_link presses coffee_table_1: 759 N")
+        );
         let found = hardest_of_run(&trace, std::iter::empty()).map(|pressed| pressed.sentence());
         let told = "base_link presses coffee_table_1: 759 N, from 3.0 s to 5.0 s, at x = 1.00, y = 0.25, z = 0.50 m";
         assert_eq!(found.as_deref(), Some(told));
@@ -158,9 +202,15 @@ mod tests {
             contact(["bowl_1", "robot/arm"], 1.0, 9.0),
         ]);
         assert_eq!(label(&trace, &[]), None);
-        assert_eq!(label(&trace, &[(0, "mug_1 moved 2 cm")]).as_deref(), Some("hand presses mug_1: 3.2 N"));
+        assert_eq!(
+            label(&trace, &[(0, "mug_1 moved 2 cm")]).as_deref(),
+            Some("hand presses mug_1: 3.2 N")
+        );
         let named = [(0, "the robot's hand pressed bowl_1 with 6 N")];
-        assert_eq!(label(&trace, &named).as_deref(), Some("hand presses bowl_1: 6.0 N"));
+        assert_eq!(
+            label(&trace, &named).as_deref(),
+            Some("hand presses bowl_1: 6.0 N")
+        );
         assert_eq!(label(&trace, &[(0, "glass_1 did not move")]), None);
     }
 
@@ -170,9 +220,20 @@ mod tests {
         let pair = ["robot/left", "robot/right"];
         let mut trace = trace(vec![contact(pair, 1.0, 80.0)]);
         for (of_hand, expected) in [(true, None), (false, Some("left presses right: 80 N"))] {
-            let press = Some(SelfPress { max_force_n: 80.0, of_hand });
-            let met = SelfCollision { pair: pair.map(str::to_owned), start_secs: 1.0, max_depth_m: 0.0, press };
-            trace.robot_courses = vec![RobotCourse { self_contacts: vec![met], ..RobotCourse::default() }];
+            let press = Some(SelfPress {
+                max_force_n: 80.0,
+                of_hand,
+            });
+            let met = SelfCollision {
+                pair: pair.map(str::to_owned),
+                start_secs: 1.0,
+                max_depth_m: 0.0,
+                press,
+            };
+            trace.robot_courses = vec![RobotCourse {
+                self_contacts: vec![met],
+                ..RobotCourse::default()
+            }];
             assert_eq!(label(&trace, &[]).as_deref(), expected);
         }
     }
@@ -180,6 +241,9 @@ mod tests {
     #[test]
     fn of_two_links_both_are_named() {
         let trace = trace(vec![contact(["robot/arm", "robot/head"], 1.0, 90.0)]);
-        assert_eq!(label(&trace, &[]).as_deref(), Some("arm presses head: 90 N"));
+        assert_eq!(
+            label(&trace, &[]).as_deref(),
+            Some("arm presses head: 90 N")
+        );
     }
 }

@@ -2,7 +2,8 @@
 
 use quick_xml::escape::escape;
 
-/// Escapes the text of an element. XML 1.0 can't represent most control characters; they become U+FFFD.
+/// Escapes the text of an element. XML 1.0 can't represent most control characters; they become
+/// U+FFFD.
 pub(crate) fn text(raw: &str) -> String {
     let printable = |letter| match letter {
         '\t' | '\n' | '\r' => letter,
@@ -12,8 +13,8 @@ pub(crate) fn text(raw: &str) -> String {
     escape(raw.chars().map(printable).collect::<String>()).replace('\r', "&#13;")
 }
 
-/// Escapes an attribute's value. Tabs and line ends are written as character references, because parsers normalise them
-/// otherwise.
+/// Escapes an attribute's value. Tabs and line ends are written as character references, because
+/// parsers normalise them otherwise.
 pub(crate) fn attribute(raw: &str) -> String {
     text(raw).replace('\t', "&#9;").replace('\n', "&#10;")
 }

@@ -15,9 +15,11 @@ pub enum When {
     After,
 }
 
-/// The facts that rules judge: triples before, during and after an action, and the values of its parameters.
+/// The facts that rules judge: triples before, during and after an action, and the values of its
+/// parameters.
 ///
-/// Triples come from Turtle text or from terms. Facts about a single state belong to [`When::After`].
+/// Triples come from Turtle text or from terms. Facts about a single state belong to
+/// [`When::After`].
 ///
 /// ```
 /// use actcheck_base::Term;
@@ -72,9 +74,9 @@ impl Facts {
 
     /// Adds the triples of Turtle text.
     ///
-    /// Literals keep their datatype: `0.5` is a decimal, as in Turtle, and `0.5e0` a double. Both are numbers in
-    /// arithmetic and in comparisons such as `<`. In atoms and with `=`, rules compare terms: `0.5` in a rule is the
-    /// double, which differs from the decimal.
+    /// Literals keep their datatype: `0.5` is a decimal, as in Turtle, and `0.5e0` a double. Both
+    /// are numbers in arithmetic and in comparisons such as `<`. In atoms and with `=`, rules
+    /// compare terms: `0.5` in a rule is the double, which differs from the decimal.
     ///
     /// # Errors
     /// `O002` for each syntax error, at most five; then no triple is added.
@@ -87,7 +89,8 @@ impl Facts {
         Ok(self)
     }
 
-    /// Sets a parameter of the action. Rules read it as `parameter(ex:target, ?value)` if its name is `ex:target`.
+    /// Sets a parameter of the action. Rules read it as `parameter(ex:target, ?value)` if its name
+    /// is `ex:target`.
     pub fn set_parameter(&mut self, name: Term, value: Term) -> &mut Self {
         let (name, value) = (self.terms.intern(name), self.terms.intern(value));
         self.parameters.retain(|[known, _]| *known != name);
@@ -132,7 +135,9 @@ mod tests {
     fn blank_nodes_of_two_texts_differ() {
         let mut facts = Facts::new();
         for _ in 0..2 {
-            facts.add_turtle(When::After, "_:a <http://x/p> 1 .").expect("the text is valid");
+            facts
+                .add_turtle(When::After, "_:a <http://x/p> 1 .")
+                .expect("the text is valid");
         }
         assert_ne!(facts.after[0], facts.after[1]);
     }
@@ -140,7 +145,9 @@ mod tests {
     #[test]
     fn a_syntax_error_is_reported_with_its_place() {
         let mut facts = Facts::new();
-        let found = facts.add_turtle(When::Before, "<http://x/a> <http://x/p>").expect_err("the object is missing");
+        let found = facts
+            .add_turtle(When::Before, "<http://x/a> <http://x/p>")
+            .expect_err("the object is missing");
         assert!(found.to_string().contains("facts.ttl:1:"), "{found}");
         assert!(facts.is_empty());
     }
@@ -149,7 +156,9 @@ mod tests {
     fn a_parameter_has_one_value() {
         let mut facts = Facts::new();
         let name = Term::iri("http://example.org/target");
-        facts.set_parameter(name.clone(), Term::Integer(1)).set_parameter(name, Term::Integer(2));
+        facts
+            .set_parameter(name.clone(), Term::Integer(1))
+            .set_parameter(name, Term::Integer(2));
         assert_eq!(facts.as_action().parameters.len(), 1);
     }
 }

@@ -1,7 +1,9 @@
-//! A rule engine with explanations: Datalog rules over facts, judged with a witness, a margin, and proofs.
+//! A rule engine with explanations: Datalog rules over facts, judged with a witness, a margin, and
+//! proofs.
 //!
-//! Rules decide whether a property holds for the facts of an action: the triples before, during and after it. They
-//! derive `success` or `violation`; every outcome has an explanation, as text or as a tree.
+//! Rules decide whether a property holds for the facts of an action: the triples before, during and
+//! after it. They derive `success` or `violation`; every outcome has an explanation, as text or as
+//! a tree.
 //!
 //! ```
 //! use actcheck_base::Outcome;
@@ -49,8 +51,9 @@
 //! | [`RuleBook`] | the rules of all properties of an ontology, evaluated together |
 //! | [`standalone::Program`] | a Datalog program with predicates of its own, without actions |
 //!
-//! Two languages query the same facts: Datalog in `.rls` files (Nemo's dialect) and, with the feature `sparql`, SPARQL
-//! in `.rq` files. The stages in order: [`syntax`], `check`, `engine` (with `naive`, its oracle), `book`, [`explain`].
+//! Two languages query the same facts: Datalog in `.rls` files (Nemo's dialect) and, with the
+//! feature `sparql`, SPARQL in `.rq` files. The stages in order: [`syntax`], `check`, `engine`
+//! (with `naive`, its oracle), `book`, [`explain`].
 //!
 //! # Features
 //!

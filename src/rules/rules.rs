@@ -13,9 +13,10 @@ const PROPERTY: &str = "https://w3id.org/actcheck/property/rules";
 
 /// The rules of one property, checked and planned. Can be shared between threads.
 ///
-/// The rules derive `success` or `violation`. The property holds if there is a `success`, or if there is no
-/// `violation`. Further predicates give the evidence: `margin(?m)`, the distance from flipping; `because(?text)`, an
-/// explanation; `applicable(…)`, without which the property is inapplicable.
+/// The rules derive `success` or `violation`. The property holds if there is a `success`, or if
+/// there is no `violation`. Further predicates give the evidence: `margin(?m)`, the distance from
+/// flipping; `because(?text)`, an explanation; `applicable(…)`, without which the property is
+/// inapplicable.
 ///
 /// To decide many properties at once, describe them in an [`Ontology`] and use [`RuleBook`].
 ///
@@ -57,9 +58,16 @@ impl Rules {
     /// Applies the rules to facts.
     pub fn judge(&self, facts: &Facts) -> Decision {
         let property = PROPERTY.to_owned();
-        let mut results = self.book.judge(&facts.as_action(), std::slice::from_ref(&property), &self.budget);
+        let mut results = self.book.judge(
+            &facts.as_action(),
+            std::slice::from_ref(&property),
+            &self.budget,
+        );
         let result = results.remove(PROPERTY);
-        Decision::new(result.unwrap_or_else(|| Err(RuleFault::Value("the property was not judged".to_owned()))))
+        Decision::new(
+            result
+                .unwrap_or_else(|| Err(RuleFault::Value("the property was not judged".to_owned()))),
+        )
     }
 
     /// Explains the outcome: the proofs of `success` or `violation`, or the rule that came closest.
@@ -67,17 +75,19 @@ impl Rules {
     /// # Errors
     /// The fault because of which the property could not be decided.
     pub fn why(&self, facts: &Facts) -> Result<Explanation, RuleFault> {
-        self.book.explain(&facts.as_action(), PROPERTY, &self.budget)
+        self.book
+            .explain(&facts.as_action(), PROPERTY, &self.budget)
     }
 
-    /// Explains why a statement such as `near(ex:cup, _)` is not derived: the closest rule, its satisfied conditions
-    /// and the one that failed. If it is derived, explains it by its proofs. `_` matches any value; the statement may
-    /// use the prefixes of the rule text.
+    /// Explains why a statement such as `near(ex:cup, _)` is not derived: the closest rule, its
+    /// satisfied conditions and the one that failed. If it is derived, explains it by its proofs.
+    /// `_` matches any value; the statement may use the prefixes of the rule text.
     ///
     /// # Errors
     /// The statement is invalid or its predicate unknown, or the rules could not be evaluated.
     pub fn why_not(&self, facts: &Facts, statement: &str) -> Result<Explanation, RuleFault> {
-        self.book.explain_statement(&facts.as_action(), PROPERTY, statement, &self.budget)
+        self.book
+            .explain_statement(&facts.as_action(), PROPERTY, statement, &self.budget)
     }
 
     /// Returns the warnings about the rule texts.
@@ -123,15 +133,16 @@ pub struct RulesBuilder {
 }
 
 impl RulesBuilder {
-    /// Adds a library: Datalog rules whose predicates the rules may use. Messages and proofs cite its name.
+    /// Adds a library: Datalog rules whose predicates the rules may use. Messages and proofs cite
+    /// its name.
     #[must_use]
     pub fn library(mut self, name: &str, text: &str) -> Self {
         self.libraries.push(Source::new(name, text));
         self
     }
 
-    /// Adds statements that hold for all facts, in Turtle or RDF/XML. Rules read them and their OWL 2 RL closure as
-    /// `ontology(s, p, o)`.
+    /// Adds statements that hold for all facts, in Turtle or RDF/XML. Rules read them and their OWL
+    /// 2 RL closure as `ontology(s, p, o)`.
     #[must_use]
     pub fn background(mut self, name: &str, text: &str) -> Self {
         self.background.push(Source::new(name, text));
@@ -145,8 +156,9 @@ impl RulesBuilder {
         self
     }
 
-    /// Parses, checks and plans the rules of the property. Messages and proofs cite the name. A name that ends in
-    /// `.rq` is a SPARQL query, which needs the feature `sparql`; any other text is Datalog.
+    /// Parses, checks and plans the rules of the property. Messages and proofs cite the name. A
+    /// name that ends in `.rq` is a SPARQL query, which needs the feature `sparql`; any other text
+    /// is Datalog.
     ///
     /// # Errors
     /// All errors of all texts, each with its code, place and remedy.
@@ -162,9 +174,15 @@ impl RulesBuilder {
         found.or(())?;
         ontology.libraries = self.libraries.into_iter().map(RuleFile::new).collect();
         let mut property = Property::new(PROPERTY, RuleFile::new(Source::new(name, text)));
-        property.label = name.rsplit_once('.').map_or(name, |(stem, _)| stem).to_owned();
+        property.label = name
+            .rsplit_once('.')
+            .map_or(name, |(stem, _)| stem)
+            .to_owned();
         ontology.properties.insert(PROPERTY.to_owned(), property);
-        Ok(Rules { book: RuleBook::prepare_within(&ontology, &self.budget)?, budget: self.budget })
+        Ok(Rules {
+            book: RuleBook::prepare_within(&ontology, &self.budget)?,
+            budget: self.budget,
+        })
     }
 }
 
@@ -195,24 +213,31 @@ pub struct Decision {
 
 impl Decision {
     fn new(result: Result<Findings, RuleFault>) -> Self {
-        let outcome = result.as_ref().map_or_else(RuleFault::outcome, Findings::outcome);
+        let outcome = result
+            .as_ref()
+            .map_or_else(RuleFault::outcome, Findings::outcome);
         Self { outcome, result }
     }
 
-    /// Returns the distance from flipping: positive if the property passed. Returns `None` if the rules derive no
-    /// `margin`.
+    /// Returns the distance from flipping: positive if the property passed. Returns `None` if the
+    /// rules derive no `margin`.
     pub fn margin(&self) -> Option<f64> {
         self.result.as_ref().ok()?.margin
     }
 
-    /// Returns the tuples of `success` or `violation` that prove the outcome, at most [`Findings::WITNESS_LIMIT`].
+    /// Returns the tuples of `success` or `violation` that prove the outcome, at most
+    /// [`Findings::WITNESS_LIMIT`].
     pub fn witness(&self) -> &[WitnessRow] {
-        self.result.as_ref().map_or(&[], |findings| &findings.witness)
+        self.result
+            .as_ref()
+            .map_or(&[], |findings| &findings.witness)
     }
 
     /// Returns the explanations that the rules derive with `because`.
     pub fn because(&self) -> &[String] {
-        self.result.as_ref().map_or(&[], |findings| &findings.because)
+        self.result
+            .as_ref()
+            .map_or(&[], |findings| &findings.because)
     }
 }
 
@@ -226,7 +251,8 @@ mod tests {
         success(?a) :- near(?a, ex:goal) .";
 
     fn facts(x: f64) -> Facts {
-        let turtle = format!("@prefix ex: <http://example.org/> . ex:cup ex:x {x:?} . ex:goal ex:x 1.0 .");
+        let turtle =
+            format!("@prefix ex: <http://example.org/> . ex:cup ex:x {x:?} . ex:goal ex:x 1.0 .");
         Facts::from_turtle(&turtle).expect("the text is valid")
     }
 
@@ -241,17 +267,35 @@ mod tests {
     #[test]
     fn why_not_names_the_failed_condition() {
         let rules = Rules::parse(RULES).expect("the rules are valid");
-        let text = rules.why_not(&facts(0.25), "near(ex:cup, ex:goal)").expect("it is derivable").to_text();
-        assert!(text.contains("is not derived") && text.contains("missing ABS(?x - ?y) < 0.5"), "{text}");
-        let text = rules.why_not(&facts(0.75), "near(ex:cup, _)").expect("it is derivable").to_text();
-        assert!(text.contains("is derived") && text.contains("(fact)"), "{text}");
+        let text = rules
+            .why_not(&facts(0.25), "near(ex:cup, ex:goal)")
+            .expect("it is derivable")
+            .to_text();
+        assert!(
+            text.contains("is not derived") && text.contains("missing ABS(?x - ?y) < 0.5"),
+            "{text}"
+        );
+        let text = rules
+            .why_not(&facts(0.75), "near(ex:cup, _)")
+            .expect("it is derivable")
+            .to_text();
+        assert!(
+            text.contains("is derived") && text.contains("(fact)"),
+            "{text}"
+        );
     }
 
     #[test]
     fn why_not_of_a_term_without_facts_names_the_closest_rule() {
         let rules = Rules::parse(RULES).expect("the rules are valid");
-        let text = rules.why_not(&facts(0.75), "success(ex:mug)").expect("it is derivable").to_text();
-        assert!(text.contains("success(<http://example.org/mug>) came closest"), "{text}");
+        let text = rules
+            .why_not(&facts(0.75), "success(ex:mug)")
+            .expect("it is derivable")
+            .to_text();
+        assert!(
+            text.contains("success(<http://example.org/mug>) came closest"),
+            "{text}"
+        );
     }
 
     #[test]
@@ -271,11 +315,20 @@ mod tests {
 
     #[test]
     fn errors_of_all_texts_have_places() {
-        let found = Rules::parse("success(?x) :- after(?y, <http://x/p>, 1) .").expect_err("?x is unbound");
+        let found =
+            Rules::parse("success(?x) :- after(?y, <http://x/p>, 1) .").expect_err("?x is unbound");
         assert!(found.to_string().contains("rules.rls:1:"), "{found}");
-        let builder = Rules::builder().background("a.ttl", "x").background("b.ttl", "y");
-        let found = builder.build("rules.rls", RULES).expect_err("both backgrounds are invalid").to_string();
-        assert!(found.contains("a.ttl") && found.contains("b.ttl"), "{found}");
+        let builder = Rules::builder()
+            .background("a.ttl", "x")
+            .background("b.ttl", "y");
+        let found = builder
+            .build("rules.rls", RULES)
+            .expect_err("both backgrounds are invalid")
+            .to_string();
+        assert!(
+            found.contains("a.ttl") && found.contains("b.ttl"),
+            "{found}"
+        );
     }
 
     #[test]
@@ -283,56 +336,109 @@ mod tests {
         let warned = |text: &str| {
             let prefixes = "@prefix w: <https://w3id.org/actcheck/world#> .";
             let rules = Rules::parse(&format!("{prefixes} {text}")).expect("the rules are valid");
-            rules.warnings().iter().any(|warning| warning.code == "R057" && warning.place().is_some())
+            rules
+                .warnings()
+                .iter()
+                .any(|warning| warning.code == "R057" && warning.place().is_some())
         };
         let kept = "kept(?o) :- after(?o, w:z, _), always(w:tilt(?o) < 0.5) .";
         assert!(warned(&format!("{kept} success(?o) :- kept(?o) .")));
-        assert!(warned(&format!("{kept} held(?o) :- kept(?o) . violation(?o) :- after(?o, w:z, _), ~held(?o) .")));
-        assert!(!warned(&format!("{kept} success(?o) :- kept(?o) . margin(0.1) :- kept(_) .")));
-        assert!(!warned("success(?o) :- after(?o, w:z, _), always(w:tilt(?o) < 0.5) ."));
+        assert!(warned(&format!(
+            "{kept} held(?o) :- kept(?o) . violation(?o) :- after(?o, w:z, _), ~held(?o) ."
+        )));
+        assert!(!warned(&format!(
+            "{kept} success(?o) :- kept(?o) . margin(0.1) :- kept(_) ."
+        )));
+        assert!(!warned(
+            "success(?o) :- after(?o, w:z, _), always(w:tilt(?o) < 0.5) ."
+        ));
     }
 
     #[test]
     #[cfg(feature = "sparql")]
     fn a_property_is_a_function_of_the_facts() {
-        for query in ["ASK { FILTER(RAND() < 0.5) }", "SELECT (NOW() AS ?because) { ?s ?p ?o }"] {
-            let found = Rules::builder().build("rules.rq", query).expect_err("it varies");
-            assert!(found.iter().any(|fault| fault.code == "R064" && fault.place().is_some()), "{found}");
+        for query in [
+            "ASK { FILTER(RAND() < 0.5) }",
+            "SELECT (NOW() AS ?because) { ?s ?p ?o }",
+        ] {
+            let found = Rules::builder()
+                .build("rules.rq", query)
+                .expect_err("it varies");
+            assert!(
+                found
+                    .iter()
+                    .any(|fault| fault.code == "R064" && fault.place().is_some()),
+                "{found}"
+            );
         }
     }
 
-    /// The next sample of a quantity, in the ways in which a property may say it: 20 s of five objects at 60 Hz.
+    /// The next sample of a quantity, in the ways in which a property may say it: 20 s of five
+    /// objects at 60 Hz.
     #[test]
     fn a_property_may_compare_each_sample_with_the_next() {
         let mut course = Course::new(1.0 / 60.0, 1200);
         for object in 0..5 {
-            let values = (0..1200).map(|sample| f64::from(sample) * 0.001 + f64::from(object)).collect();
-            let key = [names::w("z"), format!("http://example.org/o{object}"), String::new()];
+            let values = (0..1200)
+                .map(|sample| f64::from(sample) * 0.001 + f64::from(object))
+                .collect();
+            let key = [
+                names::w("z"),
+                format!("http://example.org/o{object}"),
+                String::new(),
+            ];
             course.set(key, Signal::Values(values));
         }
         let mut facts = Facts::new();
         facts.set_course(course);
         let sample = "sample(?o, ?i, ?z) :- course(?o, w:z, ?t, ?z), ?i = INT(ROUND(?t * 60)) .";
         for (rules, body) in [
-            ("", "course(?o, w:z, ?t, ?a), course(?o, w:z, ?u, ?b), ROUND(?u * 60) = ROUND(?t * 60) + 1"),
-            ("", "course(?o, w:z, ?t, ?a), ROUND(?t * 60) + 1 = ROUND(?u * 60), course(?o, w:z, ?u, ?b)"),
-            ("", "course(?o, w:z, ?t, ?a), course(?o, w:z, ?u, ?b), ?i = ROUND(?t * 60), ?i + 1 = ROUND(?u * 60)"),
-            (sample, "sample(?o, ?i, ?a), ?j = ?i + 1, sample(?o, ?j, ?b)"),
-            (sample, "sample(?o, ?i, ?a), sample(?o, ?j, ?b), ?i = ?j - 1"),
+            (
+                "",
+                "course(?o, w:z, ?t, ?a), course(?o, w:z, ?u, ?b), ROUND(?u * 60) = ROUND(?t * 60) + 1",
+            ),
+            (
+                "",
+                "course(?o, w:z, ?t, ?a), ROUND(?t * 60) + 1 = ROUND(?u * 60), course(?o, w:z, ?u, ?b)",
+            ),
+            (
+                "",
+                "course(?o, w:z, ?t, ?a), course(?o, w:z, ?u, ?b), ?i = ROUND(?t * 60), ?i + 1 = ROUND(?u * 60)",
+            ),
+            (
+                sample,
+                "sample(?o, ?i, ?a), ?j = ?i + 1, sample(?o, ?j, ?b)",
+            ),
+            (
+                sample,
+                "sample(?o, ?i, ?a), sample(?o, ?j, ?b), ?i = ?j - 1",
+            ),
             (sample, "sample(?o, ?i, ?a), sample(?o, ?i + 1, ?b)"),
         ] {
             let count = "steps(?o, #count(?a)) :- step(?o, ?a) . success(?o) :- steps(?o, 1199) .";
             let text = format!("{rules} step(?o, ?a) :- {body}, ABS(?b - ?a) < 0.002 . {count}");
-            let rules = Rules::builder().budget(Budget { secs: 5.0, ..Budget::default() }).build("rules.rls", &text);
+            let rules = Rules::builder()
+                .budget(Budget {
+                    secs: 5.0,
+                    ..Budget::default()
+                })
+                .build("rules.rls", &text);
             let decision = rules.expect("the rules are valid").judge(&facts);
-            assert_eq!((decision.outcome, decision.witness().len()), (Outcome::Passed, 5), "{text}: {decision:?}");
+            assert_eq!(
+                (decision.outcome, decision.witness().len()),
+                (Outcome::Passed, 5),
+                "{text}: {decision:?}"
+            );
         }
     }
 
     #[test]
     fn an_exceeded_budget_is_a_timeout() {
         let rules = Rules::builder()
-            .budget(Budget { tuples: 1, ..Budget::default() })
+            .budget(Budget {
+                tuples: 1,
+                ..Budget::default()
+            })
             .build("rules.rls", RULES)
             .expect("the rules are valid");
         assert_eq!(rules.judge(&facts(0.75)).outcome, Outcome::Timeout);
@@ -341,20 +447,41 @@ mod tests {
     #[test]
     #[cfg(not(feature = "sparql"))]
     fn a_query_without_the_feature_is_reported() {
-        let found = Rules::builder().build("rules.rq", "ASK {}").expect_err("the feature is off");
-        assert!(found.iter().any(|diagnostic| diagnostic.code == "R062" && diagnostic.help.is_some()), "{found}");
+        let found = Rules::builder()
+            .build("rules.rq", "ASK {}")
+            .expect_err("the feature is off");
+        assert!(
+            found
+                .iter()
+                .any(|diagnostic| diagnostic.code == "R062" && diagnostic.help.is_some()),
+            "{found}"
+        );
     }
 
     #[test]
     #[cfg(feature = "sparql")]
     fn a_query_that_is_nested_too_deeply_is_refused_at_its_place() {
         for query in [
-            format!("ASK {{ FILTER({}true{}) }}", "(".repeat(5_000), ")".repeat(5_000)),
+            format!(
+                "ASK {{ FILTER({}true{}) }}",
+                "(".repeat(5_000),
+                ")".repeat(5_000)
+            ),
             format!("ASK {}{}", "{".repeat(5_000), "}".repeat(5_000)),
-            format!("ASK {{ {}{{ ?s ?p ?o }} }}", "{ ?s ?p ?o } UNION ".repeat(20_000)),
+            format!(
+                "ASK {{ {}{{ ?s ?p ?o }} }}",
+                "{ ?s ?p ?o } UNION ".repeat(20_000)
+            ),
         ] {
-            let found = Rules::builder().build("rules.rq", &query).expect_err("it would exhaust the stack");
-            assert!(found.iter().any(|fault| fault.code == "R060" && fault.place().is_some()), "{found}");
+            let found = Rules::builder()
+                .build("rules.rq", &query)
+                .expect_err("it would exhaust the stack");
+            assert!(
+                found
+                    .iter()
+                    .any(|fault| fault.code == "R060" && fault.place().is_some()),
+                "{found}"
+            );
         }
     }
 
@@ -362,7 +489,9 @@ mod tests {
     #[cfg(feature = "sparql")]
     fn a_query_may_use_the_facts() {
         let ask = "ASK { GRAPH act:after { ?a <http://example.org/x> ?x FILTER(?x < 0.5) } }";
-        let rules = Rules::builder().build("rules.rq", ask).expect("the query is valid");
+        let rules = Rules::builder()
+            .build("rules.rq", ask)
+            .expect("the query is valid");
         assert_eq!(rules.judge(&facts(0.25)).outcome, Outcome::Passed);
         assert_eq!(rules.judge(&facts(0.75)).outcome, Outcome::Failed);
     }

@@ -1,4 +1,5 @@
-//! The time and memory that an evaluation may still use, shared by joins, built-ins and explanations.
+//! The time and memory that an evaluation may still use, shared by joins, built-ins and
+//! explanations.
 
 use std::cell::{Cell, OnceCell};
 use std::sync::Arc;
@@ -20,13 +21,14 @@ pub(crate) enum Stop {
     Time,
     /// The caller requested a stop.
     Requested,
-    /// A value that a rule reads does not exist: a quantity over time was not recorded, or a sum is too large. The watch
-    /// has the text.
+    /// A value that a rule reads does not exist: a quantity over time was not recorded, or a sum is
+    /// too large. The watch has the text.
     Value,
 }
 
-/// Minimum running time before a requested stop takes effect. The properties of a pick take about a millisecond, so
-/// runs in progress are judged completely, and longer evaluations still stop quickly.
+/// Minimum running time before a requested stop takes effect. The properties of a pick take about a
+/// millisecond, so runs in progress are judged completely, and longer evaluations still stop
+/// quickly.
 const STOP_GRACE_PERIOD: Duration = Duration::from_millis(200);
 
 /// The time limit and stop request of an evaluation, checked from time to time.
@@ -69,7 +71,8 @@ const WORK_PER_CHECK: usize = 1 << 18;
 
 /// Accounts for the memory of rows and texts, and checks the clock inside built-ins.
 ///
-/// A built-in that is refused memory or time has no value; [`Watch::stopped`] then returns the reason.
+/// A built-in that is refused memory or time has no value; [`Watch::stopped`] then returns the
+/// reason.
 #[derive(Debug)]
 pub(crate) struct Watch {
     deadline: Deadline,
@@ -112,7 +115,8 @@ impl Watch {
         self.fails_consequents
     }
 
-    /// Returns a watch with the same deadline and the memory that is left. Its limits don't stop the evaluation.
+    /// Returns a watch with the same deadline and the memory that is left. Its limits don't stop
+    /// the evaluation.
     pub(crate) fn trial(&self) -> Self {
         Self {
             deadline: self.deadline.clone(),
@@ -128,7 +132,9 @@ impl Watch {
 
     /// Checks the clock and the stop request.
     pub(crate) fn check(&self) -> Result<(), Stop> {
-        self.deadline.check().inspect_err(|stop| self.stop.set(Some(*stop)))
+        self.deadline
+            .check()
+            .inspect_err(|stop| self.stop.set(Some(*stop)))
     }
 
     /// Returns the reason if a built-in or an allocation was refused.
@@ -136,7 +142,8 @@ impl Watch {
         self.stop.get().map_or(Ok(()), Err)
     }
 
-    /// Stops the evaluation because a value does not exist, such as a quantity that was not recorded.
+    /// Stops the evaluation because a value does not exist, such as a quantity that was not
+    /// recorded.
     pub(crate) fn no_value(&self, text: String) {
         self.missing.get_or_init(|| text);
         self.stop.set(Some(Stop::Value));
@@ -144,7 +151,9 @@ impl Watch {
 
     /// Returns which value does not exist.
     pub(crate) fn value_text(&self) -> &str {
-        self.missing.get().map_or("a value does not exist", String::as_str)
+        self.missing
+            .get()
+            .map_or("a value does not exist", String::as_str)
     }
 
     /// Accounts for memory until it is released.
@@ -177,7 +186,8 @@ impl Watch {
         self.made.set(0);
     }
 
-    /// Accounts for the text that a built-in will create. Returns `None` if the time or memory budget is spent.
+    /// Accounts for the text that a built-in will create. Returns `None` if the time or memory
+    /// budget is spent.
     pub(crate) fn make(&self, bytes: usize) -> Option<()> {
         self.made.set(self.made.get().saturating_add(bytes));
         self.room(self.made.get()).ok()?;

@@ -9,14 +9,15 @@ use crate::placement::Reach;
 use crate::surroundings::Surroundings;
 use crate::{Space, placement};
 use actcheck_data::{
-    ChoiceName, Choices, Location, ObjectAxis, ObjectModel, PlacedObject, Pose, RobotStart, Role, Scene, SceneObject,
-    Surface,
+    ChoiceName, Choices, Location, ObjectAxis, ObjectModel, PlacedObject, Pose, RobotStart, Role,
+    Scene, SceneObject, Surface,
 };
 
-/// Maximum number of tries to place one object; then the scene is discarded. On a half-full table about every second
-/// try succeeds, so after fifty failures further tries are not worthwhile.
+/// Maximum number of tries to place one object; then the scene is discarded. On a half-full table
+/// about every second try succeeds, so after fifty failures further tries are not worthwhile.
 pub(super) const TRIES: u32 = 50;
-/// Gap between two platforms on an empty floor, wide enough for a robot to drive through. Unit: metres.
+/// Gap between two platforms on an empty floor, wide enough for a robot to drive through. Unit:
+/// metres.
 const PLACE_GAP_M: f64 = 1.2;
 /// Name of the world if the configuration names none.
 const DEFAULT_WORLD: &str = "empty";
@@ -48,12 +49,13 @@ pub enum Discard {
 
 /// Draws one scene. It depends only on the choices.
 ///
-/// If the world has no surfaces of its own, the centre of the platform is the origin. The robot starts on the
-/// platform's negative x side, or somewhere else if the test begins with a drive. Apart from that, all tests of a
-/// configuration draw from the same space.
+/// If the world has no surfaces of its own, the centre of the platform is the origin. The robot
+/// starts on the platform's negative x side, or somewhere else if the test begins with a drive.
+/// Apart from that, all tests of a configuration draw from the same space.
 ///
 /// # Errors
-/// No free place was found for an object or the robot, or the scene has nothing for a value of an action.
+/// No free place was found for an object or the robot, or the scene has nothing for a value of an
+/// action.
 pub fn draw(space: &Space, test: usize, choices: &mut Choices) -> Result<Scene, Discard> {
     let mut builder = SceneBuilder {
         space,
@@ -73,7 +75,11 @@ pub fn draw(space: &Space, test: usize, choices: &mut Choices) -> Result<Scene, 
         Some(world) if world.surfaces().next().is_some() => builder.take_platform(world),
         _ => builder.set_platform(),
     };
-    let mounted = surface.as_ref().map(|surface| builder.mount(surface)).transpose()?.flatten();
+    let mounted = surface
+        .as_ref()
+        .map(|surface| builder.mount(surface))
+        .transpose()?
+        .flatten();
     if let Some(surface) = surface {
         if !space.targets.is_empty() {
             builder.set_target(&surface)?;
@@ -98,16 +104,29 @@ pub fn draw(space: &Space, test: usize, choices: &mut Choices) -> Result<Scene, 
     let mut map = world.map(Surroundings::scene_map).unwrap_or_default();
     map.locations.extend(builder.front.clone());
     builder.set_obstacles(base, world, drives, &map)?;
-    let parts: Vec<SceneObject> = builder.objects.iter().flat_map(SceneObject::moving_parts).collect();
+    let parts: Vec<SceneObject> = builder
+        .objects
+        .iter()
+        .flat_map(SceneObject::moving_parts)
+        .collect();
     builder.objects.extend(parts);
     let steps = builder.set_steps(test)?;
     let root_height_m = builder.ground_m + space.robot.mount_height_m;
-    let name = builder.designators.get("world").and_then(|names| names.first()).cloned();
+    let name = builder
+        .designators
+        .get("world")
+        .and_then(|names| names.first())
+        .cloned();
     Ok(Scene {
         world: name.unwrap_or_else(|| DEFAULT_WORLD.to_owned()),
         map,
         objects: builder.objects,
-        robot: RobotStart { profile: Arc::clone(&space.robot), base, root_height_m, knows: Arc::clone(&space.knows) },
+        robot: RobotStart {
+            profile: Arc::clone(&space.robot),
+            base,
+            root_height_m,
+            knows: Arc::clone(&space.knows),
+        },
         designators: builder.designators,
         steps,
         sensing: space.sensing.clone(),
@@ -154,10 +173,13 @@ impl<'a> SceneBuilder<'a> {
     fn choose_names(&mut self) {
         for (designator, values) in &self.space.names {
             // In a world, the location depends on the surface.
-            let is_of_world =
-                !self.space.worlds.is_empty() && ["world", "objectLocation"].contains(&designator.as_str());
+            let is_of_world = !self.space.worlds.is_empty()
+                && ["world", "objectLocation"].contains(&designator.as_str());
             if !values.is_empty() && !is_of_world {
-                let value = values[self.choices.candidate(designator.as_str().into(), values.clone())].clone();
+                let value = values[self
+                    .choices
+                    .candidate(designator.as_str().into(), values.clone())]
+                .clone();
                 self.designators.insert(designator.clone(), vec![value]);
             }
         }
@@ -171,53 +193,83 @@ impl<'a> SceneBuilder<'a> {
         }
         let names = worlds.iter().map(|world| world.map.name.clone()).collect();
         let world = &worlds[self.choices.candidate(ChoiceName::World, names)];
-        self.designators.insert("world".to_owned(), vec![world.map.name.clone()]);
+        self.designators
+            .insert("world".to_owned(), vec![world.map.name.clone()]);
         Some(world)
     }
 
     /// Chooses one of the world's surfaces, and a location in front of it.
     fn take_platform(&mut self, world: &'a Surroundings) -> Option<Surface> {
-        let there: Vec<&SceneObject> = self.space.surface_names.iter().filter_map(|name| world.surface(name)).collect();
+        let there: Vec<&SceneObject> = self
+            .space
+            .surface_names
+            .iter()
+            .filter_map(|name| world.surface(name))
+            .collect();
         if there.is_empty() {
             return None;
         }
         let names = there.iter().map(|platform| platform.id.clone()).collect();
         let platform = there[self.choices.candidate(ChoiceName::SurfaceName, names)];
-        self.designators.insert("objectSurface".to_owned(), vec![platform.id.clone()]);
+        self.designators
+            .insert("objectSurface".to_owned(), vec![platform.id.clone()]);
         self.choose_location(world, Some(&platform.id));
         self.platform = Some(platform.pose);
         self.objects.push(platform.clone());
         platform.model.surface
     }
 
-    /// Chooses one of the world's locations that the configuration names, either in front of the surface or of no
-    /// surface; any of them if the scene has no surface for objects.
+    /// Chooses one of the world's locations that the configuration names, either in front of the
+    /// surface or of no surface; any of them if the scene has no surface for objects.
     fn choose_location(&mut self, world: &Surroundings, surface: Option<&str>) {
         let named = self.space.names.get("objectLocation").into_iter().flatten();
         let there = named.filter(|name| {
-            let location = world.map.locations.iter().find(|location| location.name == **name);
+            let location = world
+                .map
+                .locations
+                .iter()
+                .find(|location| location.name == **name);
             // If the world has no locations, the names are the robot's own.
             world.map.locations.is_empty()
                 || location.is_some_and(|location| {
-                    location.surface.as_deref().is_none_or(|of| surface.is_none_or(|surface| of == surface))
+                    location
+                        .surface
+                        .as_deref()
+                        .is_none_or(|of| surface.is_none_or(|surface| of == surface))
                 })
         });
         let there: Vec<String> = there.cloned().collect();
         if !there.is_empty() {
-            let chosen = there[self.choices.candidate(ChoiceName::LocationName, there.clone())].clone();
-            self.designators.insert("objectLocation".to_owned(), vec![chosen]);
+            let chosen = there[self
+                .choices
+                .candidate(ChoiceName::LocationName, there.clone())]
+            .clone();
+            self.designators
+                .insert("objectLocation".to_owned(), vec![chosen]);
         }
     }
 
-    /// Chooses the surface to place the object on: another surface of the world if it has one, or a second platform
-    /// beside the first.
+    /// Chooses the surface to place the object on: another surface of the world if it has one, or a
+    /// second platform beside the first.
     fn set_place(&mut self, world: Option<&'a Surroundings>) {
-        let first = self.designators.get("objectSurface").and_then(|ids| ids.first()).cloned();
+        let first = self
+            .designators
+            .get("objectSurface")
+            .and_then(|ids| ids.first())
+            .cloned();
         let id = match world.filter(|world| world.surfaces().next().is_some()) {
             Some(world) => {
-                let there = self.space.place_names.iter().filter(|name| world.surface(name).is_some());
+                let there = self
+                    .space
+                    .place_names
+                    .iter()
+                    .filter(|name| world.surface(name).is_some());
                 let there: Vec<String> = there.cloned().collect();
-                let others: Vec<String> = there.iter().filter(|name| Some(*name) != first.as_ref()).cloned().collect();
+                let others: Vec<String> = there
+                    .iter()
+                    .filter(|name| Some(*name) != first.as_ref())
+                    .cloned()
+                    .collect();
                 let names = if others.is_empty() { there } else { others };
                 if names.is_empty() {
                     return;
@@ -225,11 +277,20 @@ impl<'a> SceneBuilder<'a> {
                 names[self.choices.candidate(ChoiceName::PlaceName, names.clone())].clone()
             }
             None => {
-                let Some(model) = self.choose(ChoiceName::PlaceModel, &self.space.places) else { return };
-                let beside = self.objects.first().map_or(0.0, |platform| platform.model.size_m[1] / 2.0);
-                let pose = Pose::upright([0.0, beside + PLACE_GAP_M + model.size_m[1] / 2.0, 0.0], 0.0);
+                let Some(model) = self.choose(ChoiceName::PlaceModel, &self.space.places) else {
+                    return;
+                };
+                let beside = self
+                    .objects
+                    .first()
+                    .map_or(0.0, |platform| platform.model.size_m[1] / 2.0);
+                let pose = Pose::upright(
+                    [0.0, beside + PLACE_GAP_M + model.size_m[1] / 2.0, 0.0],
+                    0.0,
+                );
                 let id = self.free_id(&model);
-                self.objects.insert(self.objects.len().min(1), platform(id.clone(), model, pose));
+                self.objects
+                    .insert(self.objects.len().min(1), platform(id.clone(), model, pose));
                 id
             }
         };
@@ -238,8 +299,16 @@ impl<'a> SceneBuilder<'a> {
 
     /// Adds the rest of the world's furniture and walls, after the platforms.
     fn surround(&mut self, world: &Surroundings) {
-        let taken = self.objects.first().filter(|object| object.role == Role::Platform).map(|object| object.id.clone());
-        let at = self.objects.iter().take_while(|object| object.role == Role::Platform).count();
+        let taken = self
+            .objects
+            .first()
+            .filter(|object| object.role == Role::Platform)
+            .map(|object| object.id.clone());
+        let at = self
+            .objects
+            .iter()
+            .take_while(|object| object.role == Role::Platform)
+            .count();
         let rest: Vec<SceneObject> = world.others(taken.as_deref()).cloned().collect();
         self.objects.splice(at..at, rest);
         if self.platform.is_none() {
@@ -251,15 +320,21 @@ impl<'a> SceneBuilder<'a> {
         let model = self.choose(ChoiceName::SurfaceModel, &self.space.surfaces)?;
         let surface = model.surface;
         let id = self.free_id(&model);
-        self.objects.push(platform(id.clone(), model, Pose::IDENTITY));
-        self.designators.insert("objectSurface".to_owned(), vec![id]);
+        self.objects
+            .push(platform(id.clone(), model, Pose::IDENTITY));
+        self.designators
+            .insert("objectSurface".to_owned(), vec![id]);
         surface
     }
 
-    /// Places the target on the reachable part of the surface. Nominal: the centre, or the middle of the arm's reach.
+    /// Places the target on the reachable part of the surface. Nominal: the centre, or the middle
+    /// of the arm's reach.
     fn set_target(&mut self, surface: &Surface) -> Result<(), Discard> {
         let target = PlacedObject::Target;
-        if let Some(model) = self.choose(ChoiceName::Object(target, ObjectAxis::Model), &self.space.targets) {
+        if let Some(model) = self.choose(
+            ChoiceName::Object(target, ObjectAxis::Model),
+            &self.space.targets,
+        ) {
             let nominal = self.reach.map_or([0.0; 2], |reach| reach.middle());
             let id = self.place(target, model, Role::Target, surface, nominal)?;
             self.designators.insert("pickObject".to_owned(), vec![id]);
@@ -280,9 +355,14 @@ impl<'a> SceneBuilder<'a> {
     /// Places other objects on the surface where the target is to be placed.
     fn clutter_place(&mut self) -> Result<(), Discard> {
         let counts = self.space.other_counts.at_place;
-        let id = self.designators.get("placeSurface").and_then(|ids| ids.first());
+        let id = self
+            .designators
+            .get("placeSurface")
+            .and_then(|ids| ids.first());
         let place = self.objects.iter().find(|object| Some(&object.id) == id);
-        let Some((surface, pose)) = place.and_then(|place| Some((place.model.surface?, place.pose))) else {
+        let Some((surface, pose)) =
+            place.and_then(|place| Some((place.model.surface?, place.pose)))
+        else {
             return Ok(());
         };
         if self.space.others.is_empty() || counts.1 == 0 {
@@ -294,8 +374,8 @@ impl<'a> SceneBuilder<'a> {
         placed.map(|_| ())
     }
 
-    /// Places other objects anywhere on a surface and returns their ids. Nominal: the fewest, on a ring around the
-    /// centre, the first at the far side.
+    /// Places other objects anywhere on a surface and returns their ids. Nominal: the fewest, on a
+    /// ring around the centre, the first at the far side.
     fn place_others(
         &mut self,
         role: Role,
@@ -312,9 +392,16 @@ impl<'a> SceneBuilder<'a> {
         let mut ids = Vec::new();
         for number in 1..=count {
             let object = numbered(number);
-            if let Some(model) = self.choose(ChoiceName::Object(object, ObjectAxis::Model), &self.space.others) {
+            if let Some(model) = self.choose(
+                ChoiceName::Object(object, ObjectAxis::Model),
+                &self.space.others,
+            ) {
                 // Only shrunk runs leave objects out; the ids of the others do not change.
-                if self.choices.exception(ChoiceName::Object(object, ObjectAxis::LeftOut), 2) == 1 {
+                if self
+                    .choices
+                    .exception(ChoiceName::Object(object, ObjectAxis::LeftOut), 2)
+                    == 1
+                {
                     self.left_out.push(model.name.clone());
                     continue;
                 }
@@ -327,7 +414,11 @@ impl<'a> SceneBuilder<'a> {
     }
 
     /// Chooses one of the models. Nominal: the first. Returns `None` if there are no models.
-    pub(super) fn choose(&mut self, name: ChoiceName, models: &[Arc<ObjectModel>]) -> Option<Arc<ObjectModel>> {
+    pub(super) fn choose(
+        &mut self,
+        name: ChoiceName,
+        models: &[Arc<ObjectModel>],
+    ) -> Option<Arc<ObjectModel>> {
         if models.is_empty() {
             return None;
         }
@@ -335,8 +426,8 @@ impl<'a> SceneBuilder<'a> {
         models.get(self.choices.candidate(name, names)).cloned()
     }
 
-    /// Places an object on a free part of the surface and returns its id. Nominal: the position `nominal`, yaw 0, and
-    /// the model's own mass, friction and restitution.
+    /// Places an object on a free part of the surface and returns its id. Nominal: the position
+    /// `nominal`, yaw 0, and the model's own mass, friction and restitution.
     fn place(
         &mut self,
         object: PlacedObject,
@@ -349,12 +440,23 @@ impl<'a> SceneBuilder<'a> {
         let model = self.sized(object, model);
         let mass_scale = self.simple(object, ObjectAxis::MassScale, physics.mass_scale);
         let friction_scale = self.simple(object, ObjectAxis::FrictionScale, physics.friction_scale);
-        let restitution = self.between(object, ObjectAxis::Restitution, physics.restitution, model.restitution);
+        let restitution = self.between(
+            object,
+            ObjectAxis::Restitution,
+            physics.restitution,
+            model.restitution,
+        );
         for _ in 0..TRIES {
-            let Some(pose) = self.try_place(object, &model, role, surface, nominal) else { continue };
+            let Some(pose) = self.try_place(object, &model, role, surface, nominal) else {
+                continue;
+            };
             let pose = self.on_platform(pose);
             let solid = Solid::new(&model, &pose);
-            if self.solids.iter().any(|standing| standing.is_in_the_way_of(&solid)) {
+            if self
+                .solids
+                .iter()
+                .any(|standing| standing.is_in_the_way_of(&solid))
+            {
                 continue;
             }
             let id = self.free_id(&model);
@@ -371,10 +473,15 @@ impl<'a> SceneBuilder<'a> {
             });
             return Ok(id);
         }
-        Err(Discard::NoPlace { model: model.name.clone(), name: object.to_string(), tries: TRIES })
+        Err(Discard::NoPlace {
+            model: model.name.clone(),
+            name: object.to_string(),
+            tries: TRIES,
+        })
     }
 
-    /// Draws a pose on the surface. Returns `None` if the object would overhang the edge at the drawn yaw.
+    /// Draws a pose on the surface. Returns `None` if the object would overhang the edge at the
+    /// drawn yaw.
     fn try_place(
         &mut self,
         object: PlacedObject,
@@ -383,9 +490,17 @@ impl<'a> SceneBuilder<'a> {
         surface: &Surface,
         nominal: [f64; 2],
     ) -> Option<Pose> {
-        let share = if role == Role::Target { self.space.lying.0 } else { self.space.lying.1 };
+        let share = if role == Role::Target {
+            self.space.lying.0
+        } else {
+            self.space.lying.1
+        };
         let lies = share > 0.0 && self.simple(object, ObjectAxis::Stands, (0.0, 1.0)) < share;
-        let stance = if lies { placement::lying(model) } else { placement::standing(model) };
+        let stance = if lies {
+            placement::lying(model)
+        } else {
+            placement::standing(model)
+        };
         let yaw = self.simple(object, ObjectAxis::Yaw, (-PI, PI));
         let whole = placement::area(surface, &stance, yaw)?;
         let reach = self.reach.filter(|_| role == Role::Target);
@@ -400,7 +515,11 @@ impl<'a> SceneBuilder<'a> {
             return None;
         }
         let foot = Pose::upright([x, y, surface.height_m], yaw);
-        Some(if lies { Pose::from_isometry(&(foot.to_isometry() * stance.foot_from_model)) } else { foot })
+        Some(if lies {
+            Pose::from_isometry(&(foot.to_isometry() * stance.foot_from_model))
+        } else {
+            foot
+        })
     }
 
     /// Transforms a pose from the platform's frame to the world.
@@ -422,19 +541,32 @@ impl<'a> SceneBuilder<'a> {
     }
 
     fn simple(&mut self, object: PlacedObject, axis: ObjectAxis, (low, high): (f64, f64)) -> f64 {
-        self.choices.simple(ChoiceName::Object(object, axis), low, high)
+        self.choices
+            .simple(ChoiceName::Object(object, axis), low, high)
     }
 
-    fn between(&mut self, object: PlacedObject, axis: ObjectAxis, (low, high): (f64, f64), nominal: f64) -> f64 {
-        self.choices.real(ChoiceName::Object(object, axis), low, high, nominal)
+    fn between(
+        &mut self,
+        object: PlacedObject,
+        axis: ObjectAxis,
+        (low, high): (f64, f64),
+        nominal: f64,
+    ) -> f64 {
+        self.choices
+            .real(ChoiceName::Object(object, axis), low, high, nominal)
     }
 
     /// Returns an id: the model's name and the first free number.
     pub(super) fn free_id(&self, model: &ObjectModel) -> String {
         let standing = self.objects.iter().map(|object| &object.model.name);
-        let taken = standing.chain(&self.left_out).filter(|name| **name == model.name).count();
+        let taken = standing
+            .chain(&self.left_out)
+            .filter(|name| **name == model.name)
+            .count();
         let ids = (taken + 1..).map(|number| format!("{}_{number}", model.name));
         // Furniture of a world may have any name.
-        ids.into_iter().find(|id| !self.objects.iter().any(|object| object.id == *id)).unwrap_or_default()
+        ids.into_iter()
+            .find(|id| !self.objects.iter().any(|object| object.id == *id))
+            .unwrap_or_default()
     }
 }

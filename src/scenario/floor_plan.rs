@@ -1,6 +1,7 @@
 //! The robot's map of the floor.
 //!
-//! Never: contains objects that a scene adds to its world. The robot perceives obstacles and objects with its sensors.
+//! Never: contains objects that a scene adds to its world. The robot perceives obstacles and
+//! objects with its sensors.
 
 use nalgebra::Point3;
 
@@ -18,7 +19,8 @@ pub struct FloorPlan {
     pub locations: Vec<Location>,
     /// Rooms; empty if the floor is unbounded.
     pub rooms: Vec<Room>,
-    /// Poses of the base for working at a surface. Units: metres, metres, radians. Shape: id and x, y, heading.
+    /// Poses of the base for working at a surface. Units: metres, metres, radians. Shape: id and x,
+    /// y, heading.
     pub fronts: Vec<(String, [f64; 3])>,
 }
 
@@ -39,20 +41,33 @@ impl FloorPlan {
             outlines: outlines(&scene.objects).collect(),
             locations: scene.map.locations.clone(),
             rooms: scene.map.rooms.clone(),
-            fronts: surfaces.map(|object| (object.id.clone(), front_of(object))).collect(),
+            fronts: surfaces
+                .map(|object| (object.id.clone(), front_of(object)))
+                .collect(),
         }
     }
 
-    /// Returns the pose of the base at a location, or in front of a surface, by name. Returns `None` if the map has no
-    /// such place.
+    /// Returns the pose of the base at a location, or in front of a surface, by name. Returns
+    /// `None` if the map has no such place.
     pub fn place(&self, name: &str) -> Option<[f64; 3]> {
-        let location = self.locations.iter().find(|location| location.name == name).map(|location| location.at);
-        location.or_else(|| self.fronts.iter().find(|(id, _)| id == name).map(|(_, at)| *at))
+        let location = self
+            .locations
+            .iter()
+            .find(|location| location.name == name)
+            .map(|location| location.at);
+        location.or_else(|| {
+            self.fronts
+                .iter()
+                .find(|(id, _)| id == name)
+                .map(|(_, at)| *at)
+        })
     }
 }
 
 fn furniture(objects: &[SceneObject]) -> impl Iterator<Item = &SceneObject> {
-    objects.iter().filter(|object| object.role == Role::Platform)
+    objects
+        .iter()
+        .filter(|object| object.role == Role::Platform)
 }
 
 /// The outlines of walls and furniture that a robot can't drive below.
@@ -72,16 +87,27 @@ impl Outline {
                 around.1[axis] = around.1[axis].max(high[axis]);
             }
         }
-        let (low, high) = if model.parts.is_empty() { ([0.0; 2], [0.0; 2]) } else { around };
-        let middle = pose.to_isometry() * Point3::new((low[0] + high[0]) / 2.0, (low[1] + high[1]) / 2.0, 0.0);
+        let (low, high) = if model.parts.is_empty() {
+            ([0.0; 2], [0.0; 2])
+        } else {
+            around
+        };
+        let middle = pose.to_isometry()
+            * Point3::new((low[0] + high[0]) / 2.0, (low[1] + high[1]) / 2.0, 0.0);
         let upright = Pose::upright([middle.x, middle.y, 0.0], pose.yaw());
-        Self { pose: upright, size_m: [high[0] - low[0], high[1] - low[1]] }
+        Self {
+            pose: upright,
+            size_m: [high[0] - low[0], high[1] - low[1]],
+        }
     }
 }
 
 /// The pose of the base in front of a platform, on its negative x side and facing it.
 pub(super) fn front_of(platform: &SceneObject) -> [f64; 3] {
-    let edge = platform.model.surface.map_or(0.0, |surface| surface.size_m[0] / 2.0);
+    let edge = platform
+        .model
+        .surface
+        .map_or(0.0, |surface| surface.size_m[0] / 2.0);
     let at = platform.pose.to_isometry() * Point3::new(-edge - FRONT_GAP_M, 0.0, 0.0);
     [at.x, at.y, platform.pose.yaw()]
 }

@@ -19,7 +19,8 @@ pub struct Parameter {
 pub enum ParameterKind {
     /// A range of numbers.
     Range,
-    /// A range for the position of another object along this axis of the surface, near the target's.
+    /// A range for the position of another object along this axis of the surface, near the
+    /// target's.
     Beside(ObjectAxis),
     /// This many unordered alternatives.
     OneOf(usize),
@@ -28,11 +29,11 @@ pub enum ParameterKind {
 }
 
 impl Space {
-    /// Returns the parameters with more than one value, the most important ones first: the number of objects, the
-    /// target, the robot's start, and the model and position of each other object.
+    /// Returns the parameters with more than one value, the most important ones first: the number
+    /// of objects, the target, the robot's start, and the model and position of each other object.
     ///
-    /// Yaw, mass and friction of the other objects are left out: they affect a scene least, and a search learns faster
-    /// without them. They are drawn at random.
+    /// Yaw, mass and friction of the other objects are left out: they affect a scene least, and a
+    /// search learns faster without them. They are drawn at random.
     pub fn parameters(&self) -> Vec<Parameter> {
         let mut found = Vec::new();
         let mut add = |name: ChoiceName, kind: ParameterKind| match kind {
@@ -42,13 +43,24 @@ impl Space {
         let (least, most) = self.other_counts.beside_target;
         let most = if self.others.is_empty() { 0 } else { most };
         if most > 0 {
-            add(ChoiceName::OtherCount, ParameterKind::Count((most - least + 1) as usize));
+            add(
+                ChoiceName::OtherCount,
+                ParameterKind::Count((most - least + 1) as usize),
+            );
         }
-        self.names.iter().for_each(|(name, values)| add(name.as_str().into(), ParameterKind::OneOf(values.len())));
-        add(ChoiceName::SurfaceModel, ParameterKind::OneOf(self.surfaces.len()));
+        self.names.iter().for_each(|(name, values)| {
+            add(name.as_str().into(), ParameterKind::OneOf(values.len()))
+        });
+        add(
+            ChoiceName::SurfaceModel,
+            ParameterKind::OneOf(self.surfaces.len()),
+        );
         if !self.targets.is_empty() {
             let of_target = |axis| ChoiceName::Object(PlacedObject::Target, axis);
-            add(of_target(ObjectAxis::Model), ParameterKind::OneOf(self.targets.len()));
+            add(
+                of_target(ObjectAxis::Model),
+                ParameterKind::OneOf(self.targets.len()),
+            );
             let physics = &self.physics;
             let ranges: [(ObjectAxis, Range); 6] = [
                 (ObjectAxis::X, (0.0, 1.0)),
@@ -66,7 +78,10 @@ impl Space {
         }
         for number in 1..=most {
             let of_other = |axis| ChoiceName::Object(PlacedObject::Other(number), axis);
-            add(of_other(ObjectAxis::Model), ParameterKind::OneOf(self.others.len()));
+            add(
+                of_other(ObjectAxis::Model),
+                ParameterKind::OneOf(self.others.len()),
+            );
             for axis in [ObjectAxis::X, ObjectAxis::Y] {
                 add(of_other(axis), ParameterKind::Beside(axis));
             }
@@ -77,13 +92,20 @@ impl Space {
     /// Possible ids of other objects: the first id of each model.
     pub fn other_ids(&self) -> Vec<String> {
         let targets = self.target_ids();
-        let mut ids: Vec<String> = self.others.iter().map(|model| format!("{}_1", model.name)).collect();
+        let mut ids: Vec<String> = self
+            .others
+            .iter()
+            .map(|model| format!("{}_1", model.name))
+            .collect();
         ids.retain(|id| !targets.contains(id));
         ids
     }
 
     /// Possible ids of the target, one for each model.
     pub fn target_ids(&self) -> Vec<String> {
-        self.targets.iter().map(|model| format!("{}_1", model.name)).collect()
+        self.targets
+            .iter()
+            .map(|model| format!("{}_1", model.name))
+            .collect()
     }
 }

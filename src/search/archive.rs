@@ -21,8 +21,8 @@ pub(crate) struct Tried {
 }
 
 impl Tried {
-    /// Returns the margin of a property, clamped to agree with its outcome, or `None` if the margin is unknown or not
-    /// finite.
+    /// Returns the margin of a property, clamped to agree with its outcome, or `None` if the margin
+    /// is unknown or not finite.
     pub fn margin(&self, property: usize) -> Option<f64> {
         let result = self.results.get(property)?;
         match result.margin.filter(|margin| margin.is_finite()) {
@@ -33,7 +33,9 @@ impl Tried {
     }
 
     pub fn failed(&self, property: usize) -> bool {
-        self.results.get(property).is_some_and(|result| result.failed)
+        self.results
+            .get(property)
+            .is_some_and(|result| result.failed)
     }
 }
 
@@ -55,23 +57,38 @@ pub(crate) struct Archive {
 impl Archive {
     /// Number of properties with results.
     pub fn properties(&self) -> usize {
-        self.tried.iter().map(|tried| tried.results.len()).max().unwrap_or(0)
+        self.tried
+            .iter()
+            .map(|tried| tried.results.len())
+            .max()
+            .unwrap_or(0)
     }
 
     /// Whether the margins of a property differ, so that a strategy can learn from them.
     pub fn has_informative_margins(&self, property: usize) -> bool {
         let mut margins = self.tried.iter().filter_map(|tried| tried.margin(property));
-        margins.next().is_some_and(|first| margins.any(|margin| margin != first))
+        margins
+            .next()
+            .is_some_and(|first| margins.any(|margin| margin != first))
     }
 
-    /// Returns the points of a property with their margins, lowest first, without those in closed balls.
+    /// Returns the points of a property with their margins, lowest first, without those in closed
+    /// balls.
     pub fn open(&self, space: &Space, property: usize) -> Vec<(&[f64], f64)> {
-        let closed: Vec<&ClosedRegion> = self.closed.iter().filter(|closed| closed.property == property).collect();
+        let closed: Vec<&ClosedRegion> = self
+            .closed
+            .iter()
+            .filter(|closed| closed.property == property)
+            .collect();
         let mut found: Vec<(&[f64], f64)> = self
             .tried
             .iter()
             .filter_map(|tried| Some((tried.point.as_slice(), tried.margin(property)?)))
-            .filter(|(point, _)| closed.iter().all(|ball| space.distance(&ball.centre, point) > ball.radius))
+            .filter(|(point, _)| {
+                closed
+                    .iter()
+                    .all(|ball| space.distance(&ball.centre, point) > ball.radius)
+            })
             .collect();
         found.sort_by(|a, b| a.1.total_cmp(&b.1));
         found

@@ -21,7 +21,8 @@ const LEAST_EXPLAINED: f64 = 0.15;
 /// Ridge penalty, as an equivalent number of points.
 const RIDGE: f64 = 0.5;
 
-/// Proposes points near the model's minimum and, after the first failure, near the points with margins closest to 0.
+/// Proposes points near the model's minimum and, after the first failure, near the points with
+/// margins closest to 0.
 pub(crate) fn propose(space: &Space, archive: &Archive, property: usize) -> Proposal {
     let mut components = Vec::new();
     let open = archive.open(space, property);
@@ -31,43 +32,68 @@ pub(crate) fn propose(space: &Space, archive: &Archive, property: usize) -> Prop
     if open.first().is_some_and(|(_, margin)| *margin <= 0.0) {
         let mut edge = open;
         edge.sort_by(|a, b| a.1.abs().total_cmp(&b.1.abs()));
-        components.extend(edge.iter().take(EDGE_POINTS).map(|(point, _)| about(space, point, EDGE_SIGMA)));
+        components.extend(
+            edge.iter()
+                .take(EDGE_POINTS)
+                .map(|(point, _)| about(space, point, EDGE_SIGMA)),
+        );
     }
     Proposal(components)
 }
 
 /// Returns normal distributions about a point. Most draws keep the point's category.
 fn about(space: &Space, point: &[f64], sigma: f64) -> Component {
-    let axes = space.dimensions().iter().zip(point).map(|(dimension, value)| match dimension.categories() {
-        _ if !dimension.is_learnt() => Marginal::uniform(),
-        None => Marginal::Normal { mean: *value, sigma },
-        Some(count) => {
-            let mut shares = vec![sigma; count];
-            shares[bucket(*value, count)] = 1.0;
-            Marginal::steps(&shares)
-        }
-    });
+    let axes = space
+        .dimensions()
+        .iter()
+        .zip(point)
+        .map(|(dimension, value)| match dimension.categories() {
+            _ if !dimension.is_learnt() => Marginal::uniform(),
+            None => Marginal::Normal {
+                mean: *value,
+                sigma,
+            },
+            Some(count) => {
+                let mut shares = vec![sigma; count];
+                shares[bucket(*value, count)] = 1.0;
+                Marginal::steps(&shares)
+            }
+        });
     Component(axes.collect())
 }
 
-/// A model of the margin: the sum of a parabola for each continuous axis and a constant for each category.
+/// A model of the margin: the sum of a parabola for each continuous axis and a constant for each
+/// category.
 struct Model {
     coefficients: DVector<f64>,
 }
 
 impl Model {
-    /// Fits a weighted ridge regression to all open points, in which low margins weigh most. Returns `None` if there
-    /// are too few points or the model explains too little.
+    /// Fits a weighted ridge regression to all open points, in which low margins weigh most.
+    /// Returns `None` if there are too few points or the model explains too little.
     fn fit(space: &Space, open: &[(&[f64], f64)]) -> Option<Self> {
-        let width = 1 + space.dimensions().iter().map(|dimension| terms(*dimension)).sum::<usize>();
+        let width = 1 + space
+            .dimensions()
+            .iter()
+            .map(|dimension| terms(*dimension))
+            .sum::<usize>();
         if open.len() < width {
             return None;
         }
-        let rows: Vec<DVector<f64>> = open.iter().map(|(point, _)| features(space, point)).collect();
-        // The weight decreases linearly with the rank, from 1 for the lowest margin to nearly 0 for the highest.
+        let rows: Vec<DVector<f64>> = open
+            .iter()
+            .map(|(point, _)| features(space, point))
+            .collect();
+        // The weight decreases linearly with the rank, from 1 for the lowest margin to nearly 0 for
+        // the highest.
         let weight = |rank: usize| 1.0 - rank as f64 / open.len() as f64;
         let total: f64 = (0..open.len()).map(weight).sum();
-        let mean = open.iter().enumerate().map(|(rank, (_, margin))| weight(rank) * margin).sum::<f64>() / total;
+        let mean = open
+            .iter()
+            .enumerate()
+            .map(|(rank, (_, margin))| weight(rank) * margin)
+            .sum::<f64>()
+            / total;
         let mut gram = DMatrix::<f64>::zeros(width, width);
         let mut moment = DVector::<f64>::zeros(width);
         for (rank, (row, (_, margin))) in rows.iter().zip(open).enumerate() {
@@ -85,7 +111,8 @@ impl Model {
         }
         // Each coefficient also explains some noise: use Theil's adjusted R² (1961).
         let freedom = (open.len() as f64 - 1.0) / (open.len() as f64 - width as f64).max(1.0);
-        (spread > 0.0 && 1.0 - freedom * missed / spread > LEAST_EXPLAINED).then_some(Self { coefficients })
+        (spread > 0.0 && 1.0 - freedom * missed / spread > LEAST_EXPLAINED)
+            .then_some(Self { coefficients })
     }
 
     /// Returns normal distributions about the model's minimum, which is separable by axis.
@@ -107,7 +134,11 @@ impl Model {
 }
 
 fn terms(dimension: Dimension) -> usize {
-    if dimension.is_learnt() { dimension.categories().unwrap_or(2) } else { 0 }
+    if dimension.is_learnt() {
+        dimension.categories().unwrap_or(2)
+    } else {
+        0
+    }
 }
 
 fn features(space: &Space, point: &[f64]) -> DVector<f64> {
@@ -117,7 +148,10 @@ fn features(space: &Space, point: &[f64]) -> DVector<f64> {
             _ if !dimension.is_learnt() => {}
             None => row.extend([value - 0.5, (value - 0.5) * (value - 0.5)]),
             Some(count) => {
-                row.extend((0..count).map(|category| f64::from(u8::from(category == bucket(*value, count)))));
+                row.extend(
+                    (0..count)
+                        .map(|category| f64::from(u8::from(category == bucket(*value, count)))),
+                );
             }
         }
     }

@@ -1,4 +1,5 @@
-//! Estimates the probability of a failure under the nominal distribution from importance-weighted points.
+//! Estimates the probability of a failure under the nominal distribution from importance-weighted
+//! points.
 
 use statrs::distribution::{ContinuousCDF, Gamma};
 
@@ -31,7 +32,11 @@ impl Weighted {
     pub fn add(&mut self, weight: f64, largest: f64, failed: bool) {
         self.points += 1;
         self.largest = self.largest.max(largest);
-        let sums = if failed { &mut self.failed } else { &mut self.passed };
+        let sums = if failed {
+            &mut self.failed
+        } else {
+            &mut self.passed
+        };
         sums[0] += weight;
         sums[1] += weight * weight;
     }
@@ -43,9 +48,10 @@ impl Weighted {
 
     /// Estimates the probability of a failure. Returns `None` without points.
     ///
-    /// The interval counts the event (failure or pass) with less total weight, so that it is valid for rare failures,
-    /// rare passes, and unseen events: an unseen event may have up to the largest weight. Source: the conservative
-    /// gamma interval of Fay and Feuer (1997) for weighted sums of counts.
+    /// The interval counts the event (failure or pass) with less total weight, so that it is valid
+    /// for rare failures, rare passes, and unseen events: an unseen event may have up to the
+    /// largest weight. Source: the conservative gamma interval of Fay and Feuer (1997) for weighted
+    /// sums of counts.
     pub fn estimate(&self) -> Option<Estimate> {
         if self.points == 0 {
             return None;
@@ -62,7 +68,11 @@ impl Weighted {
             // The rate is the unbiased one of the failures; the ends come from the passes.
             let [_, low, high] = of(self.passed);
             let rate = (self.failed[0] / points).clamp(0.0, 1.0);
-            Estimate { rate, low: (1.0 - high).min(rate), high: (1.0 - low).max(rate) }
+            Estimate {
+                rate,
+                low: (1.0 - high).min(rate),
+                high: (1.0 - low).max(rate),
+            }
         })
     }
 }
@@ -73,8 +83,15 @@ fn gamma_interval(sum: f64, variance: f64, largest: f64) -> (f64, f64) {
         let shape = sum * sum / variance;
         Gamma::new(shape, 1.0).map_or(sum, |gamma| variance / sum * gamma.inverse_cdf(level))
     };
-    let low = if sum > 0.0 { quantile(sum, variance, TAIL) } else { 0.0 };
-    (low.min(sum), quantile(sum + largest, variance + largest * largest, 1.0 - TAIL).max(sum))
+    let low = if sum > 0.0 {
+        quantile(sum, variance, TAIL)
+    } else {
+        0.0
+    };
+    (
+        low.min(sum),
+        quantile(sum + largest, variance + largest * largest, 1.0 - TAIL).max(sum),
+    )
 }
 
 #[cfg(test)]
@@ -87,10 +104,16 @@ mod tests {
         sums.estimate().expect("the sums have points")
     }
 
-    /// For equal weights, the interval has Garwood's exact limits of a Poisson mean (table of 1936).
+    /// For equal weights, the interval has Garwood's exact limits of a Poisson mean (table of
+    /// 1936).
     #[test]
     fn equal_weights_give_the_exact_poisson_interval() {
-        for (count, low, high) in [(0, 0.0, 3.689), (1, 0.025_32, 5.572), (5, 1.623, 11.668), (10, 4.795, 18.390)] {
+        for (count, low, high) in [
+            (0, 0.0, 3.689),
+            (1, 0.025_32, 5.572),
+            (5, 1.623, 11.668),
+            (10, 4.795, 18.390),
+        ] {
             let found = counted(count, 1000);
             assert!((found.low * 1000.0 - low).abs() < 2e-3, "{found:?}");
             assert!((found.high * 1000.0 - high).abs() < 2e-3, "{found:?}");

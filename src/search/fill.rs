@@ -3,7 +3,8 @@
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 
-/// Returns a separate generator for each purpose and index, so that purposes don't affect each other's numbers.
+/// Returns a separate generator for each purpose and index, so that purposes don't affect each
+/// other's numbers.
 pub(crate) fn stream(seed: u64, purpose: u64, index: u64) -> ChaCha8Rng {
     let mut generator = ChaCha8Rng::seed_from_u64(seed);
     generator.set_stream((purpose << 48) | index);
@@ -21,21 +22,26 @@ pub(crate) fn random(seed: u64, index: u64, width: usize) -> Vec<f64> {
     (0..width).map(|_| unit(&mut generator)).collect()
 }
 
-/// Maximum number of axes of Halton's sequence; further axes are random. Axes with large bases are correlated for many
-/// points.
+/// Maximum number of axes of Halton's sequence; further axes are random. Axes with large bases are
+/// correlated for many points.
 const HALTON_AXES: usize = 12;
 
-/// Returns the point of an index in Halton's sequence, shifted modulo 1 by a vector derived from the seed.
+/// Returns the point of an index in Halton's sequence, shifted modulo 1 by a vector derived from
+/// the seed.
 ///
-/// Source: Halton (1960); the shift of Cranley and Patterson (1976) makes each point uniform, so that means over points
-/// are unbiased.
+/// Source: Halton (1960); the shift of Cranley and Patterson (1976) makes each point uniform, so
+/// that means over points are unbiased.
 pub(crate) fn halton(seed: u64, index: u64, width: usize) -> Vec<f64> {
     let mut generator = stream(seed, 2, 0);
     let mut point: Vec<f64> = primes(width.min(HALTON_AXES))
         .into_iter()
         .map(|base| {
             let shifted = radical_inverse(index, base) + unit(&mut generator);
-            if shifted >= 1.0 { shifted - 1.0 } else { shifted }
+            if shifted >= 1.0 {
+                shifted - 1.0
+            } else {
+                shifted
+            }
         })
         .collect();
     let mut rest = stream(seed, 6, index);
@@ -46,7 +52,12 @@ pub(crate) fn halton(seed: u64, index: u64, width: usize) -> Vec<f64> {
 /// Returns `count` points, one in each of `count` slices of every axis.
 ///
 /// Source: McKay, Beckman and Conover (1979).
-pub(crate) fn latin_hypercube(seed: u64, generation: u64, count: usize, width: usize) -> Vec<Vec<f64>> {
+pub(crate) fn latin_hypercube(
+    seed: u64,
+    generation: u64,
+    count: usize,
+    width: usize,
+) -> Vec<Vec<f64>> {
     let mut generator = stream(seed, 3, generation);
     let mut points = vec![Vec::with_capacity(width); count];
     for _ in 0..width {
@@ -76,7 +87,11 @@ fn primes(count: usize) -> Vec<u64> {
     let mut found: Vec<u64> = Vec::with_capacity(count);
     let mut candidate = 2;
     while found.len() < count {
-        if found.iter().take_while(|prime| *prime * *prime <= candidate).all(|prime| candidate % prime != 0) {
+        if found
+            .iter()
+            .take_while(|prime| *prime * *prime <= candidate)
+            .all(|prime| candidate % prime != 0)
+        {
             found.push(candidate);
         }
         candidate += 1;
@@ -93,14 +108,17 @@ mod tests {
     fn a_latin_hypercube_has_one_point_in_each_slice() {
         let points = latin_hypercube(7, 3, 20, 8);
         for axis in 0..8 {
-            let mut slices: Vec<usize> = points.iter().map(|point| (point[axis] * 20.0) as usize).collect();
+            let mut slices: Vec<usize> = points
+                .iter()
+                .map(|point| (point[axis] * 20.0) as usize)
+                .collect();
             slices.sort_unstable();
             assert_eq!(slices, (0..20).collect::<Vec<_>>());
         }
     }
 
-    /// Each cell of a 4 × 4 grid over two axes has nearly equally many points; the counts of random points vary far
-    /// more.
+    /// Each cell of a 4 × 4 grid over two axes has nearly equally many points; the counts of random
+    /// points vary far more.
     #[test]
     fn halton_points_are_more_uniform_than_random_ones() {
         let spread = |point: &dyn Fn(u64) -> Vec<f64>| {
@@ -118,7 +136,13 @@ mod tests {
     fn the_sequence_equals_haltons() {
         let first: Vec<f64> = (1..6).map(|index| radical_inverse(index, 3)).collect();
         let known = [1.0 / 3.0, 2.0 / 3.0, 1.0 / 9.0, 4.0 / 9.0, 7.0 / 9.0];
-        assert!(first.iter().zip(known).all(|(found, known)| (found - known).abs() < 1e-12), "{first:?}");
+        assert!(
+            first
+                .iter()
+                .zip(known)
+                .all(|(found, known)| (found - known).abs() < 1e-12),
+            "{first:?}"
+        );
         assert_eq!(primes(6), [2, 3, 5, 7, 11, 13]);
     }
 }

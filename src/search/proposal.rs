@@ -22,8 +22,8 @@ pub enum Marginal {
         /// Standard deviation before truncation, positive.
         sigma: f64,
     },
-    /// The quantile of a normally distributed number far from its mean. The distance is uniform from this many standard
-    /// deviations to four.
+    /// The quantile of a normally distributed number far from its mean. The distance is uniform
+    /// from this many standard deviations to four.
     Far(f64),
     /// Normal about the value of an earlier axis, truncated to [0, 1].
     Beside {
@@ -42,8 +42,8 @@ impl Marginal {
         Self::Steps(vec![1.0])
     }
 
-    /// Returns a piecewise constant distribution with shares proportional to these numbers, or the uniform one if they
-    /// are negative, not finite or all 0.
+    /// Returns a piecewise constant distribution with shares proportional to these numbers, or the
+    /// uniform one if they are negative, not finite or all 0.
     pub fn steps(proportions: &[f64]) -> Self {
         let sum: f64 = proportions.iter().sum();
         if sum.is_finite() && sum > 0.0 && proportions.iter().all(|share| *share >= 0.0) {
@@ -68,8 +68,10 @@ impl Marginal {
                 if !(*nearest..=FARTHEST).contains(&deviation.abs()) {
                     return 0.0;
                 }
-                // Divide by the normal density, the derivative of the quantile with respect to the deviation.
-                let normal = libm::exp(-0.5 * deviation * deviation) / libm::sqrt(std::f64::consts::TAU);
+                // Divide by the normal density, the derivative of the quantile with respect to the
+                // deviation.
+                let normal =
+                    libm::exp(-0.5 * deviation * deviation) / libm::sqrt(std::f64::consts::TAU);
                 0.5 / (FARTHEST - nearest) / normal
             }
             Self::Steps(shares) => shares[bucket(value, shares.len())] * shares.len() as f64,
@@ -99,7 +101,11 @@ impl Marginal {
                     below += shares[step];
                     step += 1;
                 }
-                let within = if shares[step] > 0.0 { (share - below) / shares[step] } else { 0.5 };
+                let within = if shares[step] > 0.0 {
+                    (share - below) / shares[step]
+                } else {
+                    0.5
+                };
                 (step as f64 + within.clamp(0.0, 1.0)) / shares.len() as f64
             }
         };
@@ -107,9 +113,13 @@ impl Marginal {
     }
 }
 
-/// Returns the distribution about the value of an earlier axis, or about the middle if it has no value.
+/// Returns the distribution about the value of an earlier axis, or about the middle if it has no
+/// value.
 fn beside(axis: usize, sigma: f64, earlier: &[f64]) -> Marginal {
-    Marginal::Normal { mean: earlier.get(axis).copied().unwrap_or(0.5), sigma }
+    Marginal::Normal {
+        mean: earlier.get(axis).copied().unwrap_or(0.5),
+        sigma,
+    }
 }
 
 /// Evaluates a normal distribution function at 0 and 1.
@@ -127,14 +137,19 @@ fn quantile(share: f64) -> f64 {
     std::f64::consts::SQRT_2 * erf_inv(2.0 * share - 1.0)
 }
 
-/// A distribution with one marginal for each axis. Axes are independent, except for [`Marginal::Beside`].
+/// A distribution with one marginal for each axis. Axes are independent, except for
+/// [`Marginal::Beside`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct Component(pub Vec<Marginal>);
 
 impl Component {
     /// Returns the density relative to the uniform one.
     pub(super) fn density(&self, point: &[f64]) -> f64 {
-        self.0.iter().zip(point).map(|(marginal, value)| marginal.density(*value, point)).product()
+        self.0
+            .iter()
+            .zip(point)
+            .map(|(marginal, value)| marginal.density(*value, point))
+            .product()
     }
 
     /// Draws a point.
@@ -158,7 +173,11 @@ impl Proposal {
         if self.0.is_empty() {
             return 1.0;
         }
-        self.0.iter().map(|component| component.density(point)).sum::<f64>() / self.0.len() as f64
+        self.0
+            .iter()
+            .map(|component| component.density(point))
+            .sum::<f64>()
+            / self.0.len() as f64
     }
 
     /// Draws a point.
@@ -186,17 +205,24 @@ mod tests {
 
     fn far() -> Proposal {
         let everywhere = Component(vec![Marginal::uniform(), Marginal::uniform()]);
-        Proposal(vec![Component(vec![Marginal::Far(0.0), Marginal::Far(1.0)]), everywhere])
+        Proposal(vec![
+            Component(vec![Marginal::Far(0.0), Marginal::Far(1.0)]),
+            everywhere,
+        ])
     }
 
     #[test]
     fn a_density_has_mean_one() {
         let density = skewed();
-        let mean = (0..40_000).map(|index| density.density(&random(1, index, 2))).sum::<f64>() / 40_000.0;
+        let mean = (0..40_000)
+            .map(|index| density.density(&random(1, index, 2)))
+            .sum::<f64>()
+            / 40_000.0;
         assert!((mean - 1.0).abs() < 0.02, "{mean}");
     }
 
-    /// Samples follow the reported density: weighted by its inverse, every quarter has an equal share.
+    /// Samples follow the reported density: weighted by its inverse, every quarter has an equal
+    /// share.
     #[test]
     fn samples_follow_the_density() {
         for density in [skewed(), far()] {
@@ -204,9 +230,13 @@ mod tests {
             let mut quarters = [0.0; 4];
             for _ in 0..40_000 {
                 let point = density.draw(&mut generator, 2);
-                quarters[bucket(point[0], 2) * 2 + bucket(point[1], 2)] += 1.0 / density.density(&point) / 40_000.0;
+                quarters[bucket(point[0], 2) * 2 + bucket(point[1], 2)] +=
+                    1.0 / density.density(&point) / 40_000.0;
             }
-            assert!(quarters.iter().all(|share| (share - 0.25).abs() < 0.01), "{quarters:?}");
+            assert!(
+                quarters.iter().all(|share| (share - 0.25).abs() < 0.01),
+                "{quarters:?}"
+            );
         }
     }
 
@@ -223,7 +253,10 @@ mod tests {
     #[test]
     fn invalid_proportions_are_uniform() {
         assert_eq!(Marginal::steps(&[0.0, 0.0]), Marginal::Steps(vec![1.0]));
-        assert_eq!(Marginal::steps(&[f64::NAN, 1.0]), Marginal::Steps(vec![1.0]));
+        assert_eq!(
+            Marginal::steps(&[f64::NAN, 1.0]),
+            Marginal::Steps(vec![1.0])
+        );
         assert_eq!(Proposal::default().density(&[0.3]), 1.0);
     }
 }

@@ -7,16 +7,19 @@ pub enum Dimension {
     Continuous,
     /// One of this many unordered values: value `i` of `k` is the interval [i/k, (i+1)/k).
     Categorical(usize),
-    /// A quantile of a normal distribution about the nominal value: the middle is nominal, the ends are unusual.
+    /// A quantile of a normal distribution about the nominal value: the middle is nominal, the ends
+    /// are unusual.
     Normal,
     /// One of this many ordered values, the last of which is the hardest. Intervals are as in
     /// [`Dimension::Categorical`].
     Rising(usize),
-    /// A quantile in [0, 1) of a position on the same side as the earlier axis with this index, which is the position
-    /// of another object. Equal values put the two objects next to each other, which is unusual.
+    /// A quantile in [0, 1) of a position on the same side as the earlier axis with this index,
+    /// which is the position of another object. Equal values put the two objects next to each
+    /// other, which is unusual.
     Beside(usize),
-    /// Like [`Dimension::Normal`], for a quantity that matters only if objects are close to each other. There are many
-    /// such axes, and each seldom matters, so that no strategy learns from them.
+    /// Like [`Dimension::Normal`], for a quantity that matters only if objects are close to each
+    /// other. There are many such axes, and each seldom matters, so that no strategy learns from
+    /// them.
     Aside,
 }
 
@@ -25,7 +28,9 @@ impl Dimension {
     pub(crate) fn categories(self) -> Option<usize> {
         match self {
             Self::Categorical(count) => Some(count),
-            Self::Continuous | Self::Normal | Self::Rising(_) | Self::Beside(_) | Self::Aside => None,
+            Self::Continuous | Self::Normal | Self::Rising(_) | Self::Beside(_) | Self::Aside => {
+                None
+            }
         }
     }
 
@@ -42,16 +47,20 @@ pub struct Space {
 }
 
 impl Space {
-    /// Creates the cube with these axes. An axis without values becomes an axis with one value; an axis beside no
-    /// earlier axis becomes continuous.
+    /// Creates the cube with these axes. An axis without values becomes an axis with one value; an
+    /// axis beside no earlier axis becomes continuous.
     pub fn new(dimensions: impl IntoIterator<Item = Dimension>) -> Self {
         let whole = |(index, dimension)| match dimension {
             Dimension::Beside(other) if other >= index => Dimension::Continuous,
             Dimension::Categorical(count) => Dimension::Categorical(count.max(1)),
             Dimension::Rising(count) => Dimension::Rising(count.max(1)),
-            Dimension::Continuous | Dimension::Normal | Dimension::Beside(_) | Dimension::Aside => dimension,
+            Dimension::Continuous | Dimension::Normal | Dimension::Beside(_) | Dimension::Aside => {
+                dimension
+            }
         };
-        Self { dimensions: dimensions.into_iter().enumerate().map(whole).collect() }
+        Self {
+            dimensions: dimensions.into_iter().enumerate().map(whole).collect(),
+        }
     }
 
     /// The axes, in order.
@@ -59,12 +68,16 @@ impl Space {
         &self.dimensions
     }
 
-    /// Returns the root mean square distance of two points over the learnt axes. Different values of a categorical axis
-    /// have distance 1.
+    /// Returns the root mean square distance of two points over the learnt axes. Different values
+    /// of a categorical axis have distance 1.
     pub(crate) fn distance(&self, a: &[f64], b: &[f64]) -> f64 {
         let (mut sum, mut count) = (0.0, 0);
-        for ((dimension, a), b) in
-            self.dimensions.iter().zip(a).zip(b).filter(|((dimension, _), _)| dimension.is_learnt())
+        for ((dimension, a), b) in self
+            .dimensions
+            .iter()
+            .zip(a)
+            .zip(b)
+            .filter(|((dimension, _), _)| dimension.is_learnt())
         {
             let gap = match dimension.categories() {
                 None => a - b,

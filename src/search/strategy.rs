@@ -7,21 +7,28 @@ pub enum Strategy {
     Random,
     /// Halton's sequence with a random shift. Fills the cube evenly in low dimensions.
     Halton,
-    /// Latin hypercube: each generation of n points has one point in each of n slices of every axis.
+    /// Latin hypercube: each generation of n points has one point in each of n slices of every
+    /// axis.
     LatinHypercube,
     /// Normal distributions fitted to the points with the lowest margins.
     CrossEntropy,
     /// A multi-armed bandit for each axis, whose arms are slices.
     Bandit,
-    /// A quadratic model of the margin. Samples its minimum, and after the first failure also the boundary between pass
-    /// and fail.
+    /// A quadratic model of the margin. Samples its minimum, and after the first failure also the
+    /// boundary between pass and fail.
     Boundary,
 }
 
 impl Strategy {
     /// All strategies, in the order of help texts.
-    pub const ALL: [Self; 6] =
-        [Self::Random, Self::Halton, Self::LatinHypercube, Self::CrossEntropy, Self::Bandit, Self::Boundary];
+    pub const ALL: [Self; 6] = [
+        Self::Random,
+        Self::Halton,
+        Self::LatinHypercube,
+        Self::CrossEntropy,
+        Self::Bandit,
+        Self::Boundary,
+    ];
 
     /// Returns the name used in config files.
     pub fn name(self) -> &'static str {
@@ -37,7 +44,9 @@ impl Strategy {
 
     /// Returns the strategy of a name, or `None` if the name is unknown.
     pub fn by_name(name: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|strategy| strategy.name() == name)
+        Self::ALL
+            .into_iter()
+            .find(|strategy| strategy.name() == name)
     }
 
     /// Whether the strategy learns from margins.

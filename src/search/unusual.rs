@@ -1,4 +1,5 @@
-//! Points that are unusual a priori, one kind at a time: large perception errors, and objects close to each other.
+//! Points that are unusual a priori, one kind at a time: large perception errors, and objects close
+//! to each other.
 
 use super::proposal::{Component, Marginal};
 use super::space::{Dimension, Space};
@@ -6,7 +7,8 @@ use super::space::{Dimension, Space};
 /// Noise is unusual from this many standard deviations: about 5 % of all noise.
 const FAR: f64 = 2.0;
 
-/// Standard deviation of the distance between objects placed beside each other, as a share of the axis.
+/// Standard deviation of the distance between objects placed beside each other, as a share of the
+/// axis.
 const BESIDE: f64 = 0.2;
 
 /// Exponent of the preference for many objects: a count's weight is its rank to this power.
@@ -18,27 +20,34 @@ const FIRST_TURN: usize = 2;
 /// Ratio of the lengths of successive turns.
 const LONGER: usize = 3;
 
-/// Returns the kinds of unusual points of a space. In the first, perception errors of the target and the base are
-/// large; in the second, there are many other objects, close to the target, with large perception errors. All other
-/// axes stay uniform.
+/// Returns the kinds of unusual points of a space. In the first, perception errors of the target
+/// and the base are large; in the second, there are many other objects, close to the target, with
+/// large perception errors. All other axes stay uniform.
 ///
-/// Each point has one kind, because the kinds mask each other: a misplaced gripper in a crowd always fails in the same
-/// way.
+/// Each point has one kind, because the kinds mask each other: a misplaced gripper in a crowd
+/// always fails in the same way.
 ///
-/// Based on scaled-sigma sampling (Sun, Li and others, 2015), which finds rare failures of circuits by enlarging the
-/// noise. Here the distance is uniform from [`FAR`] to four standard deviations.
+/// Based on scaled-sigma sampling (Sun, Li and others, 2015), which finds rare failures of circuits
+/// by enlarging the noise. Here the distance is uniform from [`FAR`] to four standard deviations.
 pub(crate) fn kinds(space: &Space) -> Vec<Component> {
     let of = |axis: fn(&Dimension) -> Option<Marginal>| {
         let axes: Vec<Option<Marginal>> = space.dimensions().iter().map(axis).collect();
         let is_there = axes.iter().any(Option::is_some);
-        is_there.then(|| Component(axes.into_iter().map(|axis| axis.unwrap_or_else(Marginal::uniform)).collect()))
+        is_there.then(|| {
+            Component(
+                axes.into_iter()
+                    .map(|axis| axis.unwrap_or_else(Marginal::uniform))
+                    .collect(),
+            )
+        })
     };
     [of(astray), of(crowded)].into_iter().flatten().collect()
 }
 
-/// Returns the kind of a generation's unusual point with this number. Kinds take turns; the first turn has two points,
-/// and each further turn is three times as long. Frequent failures of the first kind need only a few points, and the
-/// next kind does not wait for rare failures of the first.
+/// Returns the kind of a generation's unusual point with this number. Kinds take turns; the first
+/// turn has two points, and each further turn is three times as long. Frequent failures of the
+/// first kind need only a few points, and the next kind does not wait for rare failures of the
+/// first.
 pub(crate) fn kind_at(number: usize, kinds: usize) -> usize {
     let (mut turn, mut end) = (0, FIRST_TURN);
     while number >= end {
@@ -58,10 +67,15 @@ fn astray(dimension: &Dimension) -> Option<Marginal> {
 fn crowded(dimension: &Dimension) -> Option<Marginal> {
     match dimension {
         Dimension::Aside => Some(Marginal::Far(FAR)),
-        Dimension::Rising(count @ 2..) => {
-            Some(Marginal::steps(&(1..=*count).map(|rank| (rank as f64).powi(MANY)).collect::<Vec<_>>()))
-        }
-        Dimension::Beside(axis) => Some(Marginal::Beside { axis: *axis, sigma: BESIDE }),
+        Dimension::Rising(count @ 2..) => Some(Marginal::steps(
+            &(1..=*count)
+                .map(|rank| (rank as f64).powi(MANY))
+                .collect::<Vec<_>>(),
+        )),
+        Dimension::Beside(axis) => Some(Marginal::Beside {
+            axis: *axis,
+            sigma: BESIDE,
+        }),
         _ => None,
     }
 }
@@ -80,10 +94,21 @@ mod tests {
 
     #[test]
     fn unusual_kinds_depend_on_the_space() {
-        let kinds_of = |dimensions: &[Dimension]| kinds(&Space::new(dimensions.iter().copied())).len();
-        assert_eq!(kinds_of(&[Dimension::Continuous, Dimension::Categorical(3)]), 0);
+        let kinds_of =
+            |dimensions: &[Dimension]| kinds(&Space::new(dimensions.iter().copied())).len();
+        assert_eq!(
+            kinds_of(&[Dimension::Continuous, Dimension::Categorical(3)]),
+            0
+        );
         assert_eq!(kinds_of(&[Dimension::Continuous, Dimension::Rising(3)]), 1);
         assert_eq!(kinds_of(&[Dimension::Normal, Dimension::Rising(1)]), 1);
-        assert_eq!(kinds_of(&[Dimension::Continuous, Dimension::Normal, Dimension::Beside(0)]), 2);
+        assert_eq!(
+            kinds_of(&[
+                Dimension::Continuous,
+                Dimension::Normal,
+                Dimension::Beside(0)
+            ]),
+            2
+        );
     }
 }

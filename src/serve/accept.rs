@@ -2,8 +2,8 @@
 
 use actcheck_history::WireSyntax;
 
-/// Returns the offered format with the highest quality; of equal ones, the first. Returns `None` if the client accepts
-/// none.
+/// Returns the offered format with the highest quality; of equal ones, the first. Returns `None` if
+/// the client accepts none.
 pub(super) fn choose(accept: &str, offered: &[WireSyntax]) -> Option<WireSyntax> {
     let wanted: Vec<(&str, f64)> = accept.split(',').filter_map(range).collect();
     if wanted.is_empty() {
@@ -11,7 +11,11 @@ pub(super) fn choose(accept: &str, offered: &[WireSyntax]) -> Option<WireSyntax>
     }
     let mut best: Option<(f64, WireSyntax)> = None;
     for syntax in offered {
-        let liked = syntax.media_types().iter().map(|media_type| quality(media_type, &wanted)).fold(0.0, f64::max);
+        let liked = syntax
+            .media_types()
+            .iter()
+            .map(|media_type| quality(media_type, &wanted))
+            .fold(0.0, f64::max);
         if liked > 0.0 && best.is_none_or(|(before, _)| liked > before) {
             best = Some((liked, *syntax));
         }
@@ -23,9 +27,12 @@ pub(super) fn choose(accept: &str, offered: &[WireSyntax]) -> Option<WireSyntax>
 fn range(item: &str) -> Option<(&str, f64)> {
     let mut parts = item.split(';').map(str::trim);
     let range = parts.next().filter(|range| range.contains('/'))?;
-    let quality = parts.find_map(|part| part.strip_prefix("q=").or_else(|| part.strip_prefix("Q=")));
+    let quality =
+        parts.find_map(|part| part.strip_prefix("q=").or_else(|| part.strip_prefix("Q=")));
     // An invalid quality is ignored.
-    let quality = quality.and_then(|text| text.trim().parse::<f64>().ok()).filter(|q| (0.0..=1.0).contains(q));
+    let quality = quality
+        .and_then(|text| text.trim().parse::<f64>().ok())
+        .filter(|q| (0.0..=1.0).contains(q));
     Some((range, quality.unwrap_or(1.0)))
 }
 
@@ -38,9 +45,17 @@ fn quality(media_type: &str, wanted: &[(&str, f64)]) -> f64 {
         Some(("*", "*")) => 1,
         _ => 0,
     };
-    let found = wanted.iter().map(|(range, quality)| (fits(range), *quality)).filter(|(fit, _)| *fit > 0);
+    let found = wanted
+        .iter()
+        .map(|(range, quality)| (fits(range), *quality))
+        .filter(|(fit, _)| *fit > 0);
     // Of equally specific ranges, the first counts.
-    found.fold((0, 0.0), |best, next| if next.0 > best.0 { next } else { best }).1
+    found
+        .fold(
+            (0, 0.0),
+            |best, next| if next.0 > best.0 { next } else { best },
+        )
+        .1
 }
 
 #[cfg(test)]
@@ -54,10 +69,26 @@ mod tests {
             ("*/*", Some(WireSyntax::Json), Some(WireSyntax::Turtle)),
             ("text/csv", Some(WireSyntax::Csv), None),
             ("text/*", Some(WireSyntax::Xml), Some(WireSyntax::Turtle)),
-            ("text/html,application/xml;q=0.9,*/*;q=0.8", Some(WireSyntax::Xml), Some(WireSyntax::RdfXml)),
-            ("application/sparql-results+json;q=0.1, TEXT/CSV ; q=0.2", Some(WireSyntax::Csv), None),
-            ("*/*;q=0.5, application/sparql-results+json;q=0", Some(WireSyntax::Json), Some(WireSyntax::Turtle)),
-            ("application/n-triples, text/turtle;q=0.5", None, Some(WireSyntax::NTriples)),
+            (
+                "text/html,application/xml;q=0.9,*/*;q=0.8",
+                Some(WireSyntax::Xml),
+                Some(WireSyntax::RdfXml),
+            ),
+            (
+                "application/sparql-results+json;q=0.1, TEXT/CSV ; q=0.2",
+                Some(WireSyntax::Csv),
+                None,
+            ),
+            (
+                "*/*;q=0.5, application/sparql-results+json;q=0",
+                Some(WireSyntax::Json),
+                Some(WireSyntax::Turtle),
+            ),
+            (
+                "application/n-triples, text/turtle;q=0.5",
+                None,
+                Some(WireSyntax::NTriples),
+            ),
             ("image/png", None, None),
             ("text/csv;q=0", None, None),
             ("nonsense,;;q=,/", None, None),

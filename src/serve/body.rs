@@ -1,4 +1,5 @@
-//! The body of a response, handed to the connection in pieces, so that a client that stops reading is noticed.
+//! The body of a response, handed to the connection in pieces, so that a client that stops reading
+//! is noticed.
 
 use std::convert::Infallible;
 use std::pin::Pin;
@@ -24,9 +25,17 @@ pub(super) struct AnswerBody {
 
 impl AnswerBody {
     /// A body of a response on a connection.
-    pub fn new(bytes: impl Into<Bytes>, doing: Arc<Doing>, memory: Option<OwnedSemaphorePermit>) -> Self {
+    pub fn new(
+        bytes: impl Into<Bytes>,
+        doing: Arc<Doing>,
+        memory: Option<OwnedSemaphorePermit>,
+    ) -> Self {
         doing.writes();
-        Self { bytes: bytes.into(), doing, _memory: memory }
+        Self {
+            bytes: bytes.into(),
+            doing,
+            _memory: memory,
+        }
     }
 }
 
@@ -34,7 +43,10 @@ impl Body for AnswerBody {
     type Data = Bytes;
     type Error = Infallible;
 
-    fn poll_frame(mut self: Pin<&mut Self>, _: &mut Context<'_>) -> Poll<Option<Result<Frame<Bytes>, Infallible>>> {
+    fn poll_frame(
+        mut self: Pin<&mut Self>,
+        _: &mut Context<'_>,
+    ) -> Poll<Option<Result<Frame<Bytes>, Infallible>>> {
         if self.bytes.is_empty() {
             return Poll::Ready(None);
         }

@@ -1,4 +1,5 @@
-//! The open connections: a limited number, of which idle ones make room for new ones and stalled ones are closed.
+//! The open connections: a limited number, of which idle ones make room for new ones and stalled
+//! ones are closed.
 
 use std::collections::BTreeMap;
 use std::future::Future;
@@ -19,8 +20,8 @@ const WAITS: u64 = 0;
 /// A request is being answered.
 const BUSY: u64 = u64::MAX;
 
-/// The state of a connection: [`WAITS`], [`BUSY`], or the moment until which the client must accept the next piece of
-/// an answer. Unit: milliseconds since the server started.
+/// The state of a connection: [`WAITS`], [`BUSY`], or the moment until which the client must accept
+/// the next piece of an answer. Unit: milliseconds since the server started.
 #[derive(Debug)]
 pub(super) struct Doing {
     state: AtomicU64,
@@ -35,7 +36,8 @@ impl Doing {
 
     /// A piece of an answer is being written.
     pub fn writes(&self) {
-        self.state.store(self.now() + WRITE_PATIENCE_MS, Ordering::Relaxed);
+        self.state
+            .store(self.now() + WRITE_PATIENCE_MS, Ordering::Relaxed);
     }
 
     /// The connection waits for the next request.
@@ -66,11 +68,16 @@ impl Connections {
     /// No connections.
     pub fn new() -> Arc<Self> {
         let most = most_files().map_or(MOST, |files| (files / 2).clamp(16, MOST));
-        Arc::new(Self { open: Mutex::default(), next: AtomicU64::new(0), started: Instant::now(), most })
+        Arc::new(Self {
+            open: Mutex::default(),
+            next: AtomicU64::new(0),
+            started: Instant::now(),
+            most,
+        })
     }
 
-    /// Serves a new connection on a thread. If there are too many, the oldest one without a request is closed. Returns `false`, with
-    /// `serve` unused, if all of them have one.
+    /// Serves a new connection on a thread. If there are too many, the oldest one without a request
+    /// is closed. Returns `false`, with `serve` unused, if all of them have one.
     pub fn add<F: Future<Output = ()> + Send + 'static>(
         self: &Arc<Self>,
         thread: &Handle,
@@ -78,19 +85,33 @@ impl Connections {
     ) -> bool {
         let mut open = self.open.lock().unwrap_or_else(PoisonError::into_inner);
         if open.len() >= self.most {
-            let waits = |(doing, _): &(Arc<Doing>, AbortHandle)| doing.state.load(Ordering::Relaxed) == WAITS;
-            let Some(oldest) = open.iter().find(|(_, entry)| waits(entry)).map(|(id, _)| *id) else { return false };
+            let waits = |(doing, _): &(Arc<Doing>, AbortHandle)| {
+                doing.state.load(Ordering::Relaxed) == WAITS
+            };
+            let Some(oldest) = open
+                .iter()
+                .find(|(_, entry)| waits(entry))
+                .map(|(id, _)| *id)
+            else {
+                return false;
+            };
             if let Some((_, task)) = open.remove(&oldest) {
                 task.abort();
             }
         }
         let id = self.next.fetch_add(1, Ordering::Relaxed);
-        let doing = Arc::new(Doing { state: AtomicU64::new(WAITS), started: self.started });
+        let doing = Arc::new(Doing {
+            state: AtomicU64::new(WAITS),
+            started: self.started,
+        });
         let (serving, all) = (serve(Arc::clone(&doing)), Arc::clone(self));
         // The task can't remove its entry before it is made, because the lock is held.
         let task = thread.spawn(async move {
             serving.await;
-            all.open.lock().unwrap_or_else(PoisonError::into_inner).remove(&id);
+            all.open
+                .lock()
+                .unwrap_or_else(PoisonError::into_inner)
+                .remove(&id);
         });
         open.insert(id, (doing, task.abort_handle()));
         true
@@ -111,14 +132,19 @@ impl Connections {
     /// Number of open connections.
     #[cfg(test)]
     fn len(&self) -> usize {
-        self.open.lock().unwrap_or_else(PoisonError::into_inner).len()
+        self.open
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .len()
     }
 }
 
 /// Maximum number of open files of this process; `None` if the system does not report it.
 fn most_files() -> Option<usize> {
     let limits = std::fs::read_to_string("/proc/self/limits").ok()?;
-    let line = limits.lines().find_map(|line| line.strip_prefix("Max open files"))?;
+    let line = limits
+        .lines()
+        .find_map(|line| line.strip_prefix("Max open files"))?;
     line.split_whitespace().next()?.parse().ok()
 }
 
@@ -128,7 +154,9 @@ mod tests {
 
     #[test]
     fn the_oldest_idle_connection_makes_room() {
-        let runtime = tokio::runtime::Builder::new_current_thread().build().unwrap();
+        let runtime = tokio::runtime::Builder::new_current_thread()
+            .build()
+            .unwrap();
         runtime.block_on(async {
             let connections = Arc::new(Connections {
                 open: Mutex::default(),

@@ -20,7 +20,13 @@ pub struct Counts {
 impl Default for Counts {
     fn default() -> Self {
         let [served, refused, failed, moved] = [0; 4].map(AtomicU64::new);
-        Self { served, refused, failed, moved, times: [0; BUCKETS].map(AtomicU64::new) }
+        Self {
+            served,
+            refused,
+            failed,
+            moved,
+            times: [0; BUCKETS].map(AtomicU64::new),
+        }
     }
 }
 
@@ -43,17 +49,27 @@ impl Counts {
         self.moved.fetch_add(1, Ordering::Relaxed);
     }
 
-    /// The time within which this share of the requests was answered, to 19 %. `None` before the first. Unit:
-    /// milliseconds.
+    /// The time within which this share of the requests was answered, to 19 %. `None` before the
+    /// first. Unit: milliseconds.
     pub fn quantile_ms(&self, share: f64) -> Option<f64> {
-        let counts: Vec<u64> = self.times.iter().map(|count| count.load(Ordering::Relaxed)).collect();
+        let counts: Vec<u64> = self
+            .times
+            .iter()
+            .map(|count| count.load(Ordering::Relaxed))
+            .collect();
         let all: u64 = counts.iter().sum();
-        #[expect(clippy::cast_precision_loss, reason = "a rank among requests need not be exact")]
+        #[expect(
+            clippy::cast_precision_loss,
+            reason = "a rank among requests need not be exact"
+        )]
         let wanted = share * all as f64;
         let mut so_far = 0;
         for (bucket, count) in (0u16..).zip(counts) {
             so_far += count;
-            #[expect(clippy::cast_precision_loss, reason = "a rank among requests need not be exact")]
+            #[expect(
+                clippy::cast_precision_loss,
+                reason = "a rank among requests need not be exact"
+            )]
             if count > 0 && so_far as f64 >= wanted {
                 return Some(2f64.powf(f64::from(bucket + 1) / 4.0) / 1000.0);
             }
@@ -64,7 +80,10 @@ impl Counts {
     /// The counts as JSON.
     pub(super) fn json(&self) -> String {
         let of = |counter: &AtomicU64| counter.load(Ordering::Relaxed);
-        let time = |share| self.quantile_ms(share).map_or_else(|| "null".to_owned(), |ms| format!("{ms:.3}"));
+        let time = |share| {
+            self.quantile_ms(share)
+                .map_or_else(|| "null".to_owned(), |ms| format!("{ms:.3}"))
+        };
         format!(
             "{{\"served\":{},\"refused\":{},\"failed\":{},\"moved\":{},\"p50_ms\":{},\"p99_ms\":{}}}\n",
             of(&self.served),
@@ -80,7 +99,13 @@ impl Counts {
 impl fmt::Display for Counts {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let of = |counter: &AtomicU64| counter.load(Ordering::Relaxed);
-        write!(f, "{} requests served, {} refused, {} failed", of(&self.served), of(&self.refused), of(&self.failed))?;
+        write!(
+            f,
+            "{} requests served, {} refused, {} failed",
+            of(&self.served),
+            of(&self.refused),
+            of(&self.failed)
+        )?;
         match self.quantile_ms(0.99) {
             Some(ms) => write!(f, "; 99 % of them within {ms:.1} ms"),
             None => Ok(()),
@@ -90,7 +115,11 @@ impl fmt::Display for Counts {
 
 fn bucket(time: Duration) -> usize {
     let micros = time.as_secs_f64() * 1e6;
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "it is between 0 and 4 × 37")]
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "it is between 0 and 4 × 37"
+    )]
     let bucket = (micros.max(1.0).log2() * 4.0) as usize;
     bucket.min(BUCKETS - 1)
 }
@@ -110,7 +139,15 @@ mod tests {
             let found = counts.quantile_ms(share).unwrap();
             assert!(found >= ms && found <= ms * 1.2, "{share}: {found}");
         }
-        assert!(counts.to_string().starts_with("99 requests served, 1 refused, 1 failed; 99 % of them within 2."));
-        assert!(counts.json().starts_with("{\"served\":99,\"refused\":1,\"failed\":1,\"moved\":0,\"p50_ms\":2."));
+        assert!(
+            counts
+                .to_string()
+                .starts_with("99 requests served, 1 refused, 1 failed; 99 % of them within 2.")
+        );
+        assert!(
+            counts
+                .json()
+                .starts_with("{\"served\":99,\"refused\":1,\"failed\":1,\"moved\":0,\"p50_ms\":2.")
+        );
     }
 }

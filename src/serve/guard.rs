@@ -19,23 +19,38 @@ pub(super) struct Origin<'a> {
 
 /// Checks the origin of a request.
 ///
-/// The page of another site could make its own name resolve to this machine (DNS rebinding) and then read the
-/// responses. Therefore the host must be an IP address, `localhost`, or an allowed name. It could also send requests
-/// here whose responses it can't read, but which take time: browsers mark these.
+/// The page of another site could make its own name resolve to this machine (DNS rebinding) and
+/// then read the responses. Therefore the host must be an IP address, `localhost`, or an allowed
+/// name. It could also send requests here whose responses it can't read, but which take time:
+/// browsers mark these.
 pub(super) fn guard(from: &Origin<'_>, allowed: &[String]) -> Result<(), Refusal> {
-    let Some(host) = from.host else { return Err(Refusal::new(400, "the header `Host` is missing")) };
+    let Some(host) = from.host else {
+        return Err(Refusal::new(400, "the header `Host` is missing"));
+    };
     for host in [Some(host), from.target_host].into_iter().flatten() {
         if !is_known(name(host), allowed) {
-            let why = format!("`{}` is not a name of this server; `--allow-host` adds one", name(host));
+            let why = format!(
+                "`{}` is not a name of this server; `--allow-host` adds one",
+                name(host)
+            );
             return Err(Refusal::new(421, why));
         }
     }
-    let same = |origin: &str| origin.split_once("://").is_some_and(|(_, of)| of.eq_ignore_ascii_case(host));
+    let same = |origin: &str| {
+        origin
+            .split_once("://")
+            .is_some_and(|(_, of)| of.eq_ignore_ascii_case(host))
+    };
     // `none`: the user entered the address.
     if from.origin.is_some_and(|origin| !same(origin))
-        || from.site.is_some_and(|site| !["same-origin", "none"].contains(&site))
+        || from
+            .site
+            .is_some_and(|site| !["same-origin", "none"].contains(&site))
     {
-        return Err(Refusal::new(403, "requests from pages of another origin are forbidden"));
+        return Err(Refusal::new(
+            403,
+            "requests from pages of another origin are forbidden",
+        ));
     }
     Ok(())
 }
@@ -71,11 +86,23 @@ mod tests {
             (Some("127.0.0.1.evil.example"), None, Some(421)),
             (Some(""), None, Some(421)),
             (None, None, Some(400)),
-            (Some("localhost:7878"), Some("http://evil.example"), Some(403)),
+            (
+                Some("localhost:7878"),
+                Some("http://evil.example"),
+                Some(403),
+            ),
             (Some("localhost:7878"), Some("null"), Some(403)),
-            (Some("localhost:7878"), Some("http://localhost:1"), Some(403)),
+            (
+                Some("localhost:7878"),
+                Some("http://localhost:1"),
+                Some(403),
+            ),
         ] {
-            let from = Origin { host, origin, ..Origin::default() };
+            let from = Origin {
+                host,
+                origin,
+                ..Origin::default()
+            };
             let refused = guard(&from, &allowed).err().map(|refusal| refusal.status);
             assert_eq!(refused, status, "{host:?} {origin:?}");
         }
@@ -92,7 +119,12 @@ mod tests {
             (Some("anything"), None, Some(403)),
             (None, Some("evil.example"), Some(421)),
         ] {
-            let from = Origin { host: Some("localhost:7878"), target_host, site, ..Origin::default() };
+            let from = Origin {
+                host: Some("localhost:7878"),
+                target_host,
+                site,
+                ..Origin::default()
+            };
             let refused = guard(&from, &[]).err().map(|refusal| refusal.status);
             assert_eq!(refused, status, "{site:?} {target_host:?}");
         }

@@ -1,7 +1,8 @@
-//! Where queries are evaluated. A light query gets a short slice of time in the server itself; every other query, and a
-//! light one that needs more, goes to a worker process with limits on time and memory. Queries that take long there
-//! wait for each other, so that they never occupy all processes. Each queue is in the order of arrival; a connection has
-//! one query at a time, so none gets more than its share.
+//! Where queries are evaluated. A light query gets a short slice of time in the server itself;
+//! every other query, and a light one that needs more, goes to a worker process with limits on time
+//! and memory. Queries that take long there wait for each other, so that they never occupy all
+//! processes. Each queue is in the order of arrival; a connection has one query at a time, so none
+//! gets more than its share.
 
 use std::collections::HashSet;
 use std::hash::{DefaultHasher, Hash, Hasher};
@@ -68,8 +69,14 @@ pub(super) struct Lanes {
 }
 
 impl Lanes {
-    /// Empty queues for at most `most_queries` processes. Called in the runtime whose threads evaluate slices.
-    pub fn new(snapshots: Snapshots, counts: Arc<Counts>, worker: Worker, most_queries: usize) -> Self {
+    /// Empty queues for at most `most_queries` processes. Called in the runtime whose threads
+    /// evaluate slices.
+    pub fn new(
+        snapshots: Snapshots,
+        counts: Arc<Counts>,
+        worker: Worker,
+        most_queries: usize,
+    ) -> Self {
         Self {
             snapshots,
             counts,
@@ -89,7 +96,10 @@ impl Lanes {
     ///
     /// # Errors
     /// Too many queries are waiting.
-    pub async fn evaluate(self: &Arc<Self>, question: &Arc<Question>) -> Result<Evaluated, Refusal> {
+    pub async fn evaluate(
+        self: &Arc<Self>,
+        question: &Arc<Question>,
+    ) -> Result<Evaluated, Refusal> {
         let mut hasher = DefaultHasher::new();
         question.query.hash(&mut hasher);
         let hash = hasher.finish();
@@ -106,9 +116,9 @@ impl Lanes {
         self.there(question).await.map(Evaluated::There)
     }
 
-    /// Evaluates a light query in this process: for a moment on the thread of its connection, which saves the way to
-    /// another thread, and if it takes longer, for a slice of time on another one. Returns `None` if it is not light, or
-    /// not finished after that.
+    /// Evaluates a light query in this process: for a moment on the thread of its connection, which
+    /// saves the way to another thread, and if it takes longer, for a slice of time on another one.
+    /// Returns `None` if it is not light, or not finished after that.
     async fn here(self: &Arc<Self>, question: &Arc<Question>) -> Option<Answered> {
         if let Some(history) = self.snapshots.ready() {
             let cancel = Cancel::new();
@@ -123,7 +133,10 @@ impl Lanes {
     }
 
     async fn in_slice(self: &Arc<Self>, question: &Arc<Question>) -> Option<Answered> {
-        let slice = timeout(LIGHT_WAIT, Arc::clone(&self.slices).acquire_owned()).await.ok()?.ok()?;
+        let slice = timeout(LIGHT_WAIT, Arc::clone(&self.slices).acquire_owned())
+            .await
+            .ok()?
+            .ok()?;
         let stopper = Stopper(Cancel::new());
         let (lanes, question, cancel) = (Arc::clone(self), Arc::clone(question), stopper.0.clone());
         let task = self.evaluating.spawn_blocking(move || {
@@ -152,12 +165,23 @@ impl Lanes {
         }
         let long = acquire(&self.long).await;
         let slot = acquire(&self.processes).await;
-        Ok(self.ask(question, question.most_secs, vec![long, slot]).await)
+        Ok(self
+            .ask(question, question.most_secs, vec![long, slot])
+            .await)
     }
 
-    /// Asks a process on a thread of its own, which holds the slots until the process is free again.
-    async fn ask(self: &Arc<Self>, question: &Question, secs: f64, slots: Vec<Option<OwnedSemaphorePermit>>) -> Asked {
-        let Ok(line) = serde_json::to_string(&Question { most_secs: secs, ..question.clone() }) else {
+    /// Asks a process on a thread of its own, which holds the slots until the process is free
+    /// again.
+    async fn ask(
+        self: &Arc<Self>,
+        question: &Question,
+        secs: f64,
+        slots: Vec<Option<OwnedSemaphorePermit>>,
+    ) -> Asked {
+        let Ok(line) = serde_json::to_string(&Question {
+            most_secs: secs,
+            ..question.clone()
+        }) else {
             return Asked::Crashed;
         };
         let time = START + Duration::try_from_secs_f64(secs).unwrap_or(Duration::MAX / 2);
@@ -174,7 +198,13 @@ impl Lanes {
         receiver.await.unwrap_or(Asked::Crashed)
     }
 
-    fn ask_a_process(&self, line: &str, time: Duration, room: u64, is_gone: &dyn Fn() -> bool) -> Asked {
+    fn ask_a_process(
+        &self,
+        line: &str,
+        time: Duration,
+        room: u64,
+        is_gone: &dyn Fn() -> bool,
+    ) -> Asked {
         loop {
             let known = lock(&self.idle).pop();
             let mut process = match known.map_or_else(|| self.worker.start(room), Ok) {
@@ -204,7 +234,10 @@ impl Lanes {
         if before < MOST_WAITING {
             Ok(place)
         } else {
-            Err(Refusal::new(503, "too many queries are waiting: try again soon"))
+            Err(Refusal::new(
+                503,
+                "too many queries are waiting: try again soon",
+            ))
         }
     }
 }

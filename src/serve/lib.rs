@@ -1,12 +1,13 @@
 //! Serves a history over HTTP: a read-only SPARQL 1.1 endpoint, a query page, and the report.
 //!
-//! Light queries, which can be stopped at any moment and can't exhaust memory before, are answered by the server itself,
-//! within a slice of time. All others are answered by worker processes with limits on time, memory and size of the answer.
-//! So no query can block or crash the server or exhaust its memory. All of them read snapshots of the history, which other
-//! processes can use and change meanwhile.
+//! Light queries, which can be stopped at any moment and can't exhaust memory before, are answered
+//! by the server itself, within a slice of time. All others are answered by worker processes with
+//! limits on time, memory and size of the answer. So no query can block or crash the server or
+//! exhaust its memory. All of them read snapshots of the history, which other processes can use and
+//! change meanwhile.
 //!
-//! Never: writes to a history, reads a file named in a request, connects to another host, or answers a page of another
-//! origin.
+//! Never: writes to a history, reads a file named in a request, connects to another host, or
+//! answers a page of another origin.
 
 mod accept;
 mod answer;

@@ -78,6 +78,11 @@ mod tests {
             query: nasty.clone(),
         };
         let page = page(&nasty, &[example]);
-        assert!(!page.contains("<script>") && !page.contains("'1'") && page.matches("<script").count() == 1, "{page}");
+        assert!(
+            !page.contains("<script>")
+                && !page.contains("'1'")
+                && page.matches("<script").count() == 1,
+            "{page}"
+        );
     }
 }

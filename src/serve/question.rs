@@ -19,7 +19,10 @@ pub(super) struct Refusal {
 
 impl Refusal {
     pub fn new(status: u16, why: impl Into<String>) -> Self {
-        Self { status, why: why.into() }
+        Self {
+            status,
+            why: why.into(),
+        }
     }
 }
 
@@ -33,13 +36,16 @@ pub(super) fn question(parts: &Parts<'_>) -> Result<String, Refusal> {
         }
         ("POST", "application/sparql-query") => {
             unknown(&in_target())?;
-            let text = std::str::from_utf8(parts.body).map_err(|_| Refusal::new(400, "the query is not UTF-8"))?;
+            let text = std::str::from_utf8(parts.body)
+                .map_err(|_| Refusal::new(400, "the query is not UTF-8"))?;
             Ok(text.to_owned())
         }
         ("POST", "application/sparql-update") => Err(update()),
         ("POST", other) => Err(Refusal::new(
             415,
-            format!("send queries as application/x-www-form-urlencoded or application/sparql-query, not as `{other}`"),
+            format!(
+                "send queries as application/x-www-form-urlencoded or application/sparql-query, not as `{other}`"
+            ),
         )),
         _ => Err(Refusal::new(405, "send queries by GET or POST")),
     }
@@ -47,7 +53,13 @@ pub(super) fn question(parts: &Parts<'_>) -> Result<String, Refusal> {
 
 /// The media type in lower case, without its parameters.
 fn media_type(header: Option<&str>) -> String {
-    header.unwrap_or_default().split(';').next().unwrap_or_default().trim().to_ascii_lowercase()
+    header
+        .unwrap_or_default()
+        .split(';')
+        .next()
+        .unwrap_or_default()
+        .trim()
+        .to_ascii_lowercase()
 }
 
 fn pairs(encoded: &[u8]) -> Vec<(String, String)> {
@@ -56,7 +68,10 @@ fn pairs(encoded: &[u8]) -> Vec<(String, String)> {
 
 fn only_query(pairs: Vec<(String, String)>) -> Result<String, Refusal> {
     unknown(&pairs)?;
-    let mut queries = pairs.into_iter().filter(|(name, _)| name == "query").map(|(_, value)| value);
+    let mut queries = pairs
+        .into_iter()
+        .filter(|(name, _)| name == "query")
+        .map(|(_, value)| value);
     match (queries.next(), queries.next()) {
         (Some(query), None) => Ok(query),
         (None, _) => Err(Refusal::new(400, "the parameter `query` is missing")),
@@ -72,7 +87,9 @@ fn unknown(pairs: &[(String, String)]) -> Result<(), Refusal> {
             "default-graph-uri" | "named-graph-uri" => {
                 return Err(Refusal::new(
                     400,
-                    format!("`{name}` is not supported: name graphs in the query, with FROM or GRAPH"),
+                    format!(
+                        "`{name}` is not supported: name graphs in the query, with FROM or GRAPH"
+                    ),
                 ));
             }
             _ => {}
@@ -89,16 +106,36 @@ fn update() -> Refusal {
 mod tests {
     use super::*;
 
-    fn asked(method: &str, query: Option<&str>, content_type: Option<&str>, body: &[u8]) -> Result<String, u16> {
-        question(&Parts { method, query, content_type, body }).map_err(|refusal| refusal.status)
+    fn asked(
+        method: &str,
+        query: Option<&str>,
+        content_type: Option<&str>,
+        body: &[u8],
+    ) -> Result<String, u16> {
+        question(&Parts {
+            method,
+            query,
+            content_type,
+            body,
+        })
+        .map_err(|refusal| refusal.status)
     }
 
     #[test]
     fn a_query_can_be_sent_in_three_ways() {
         let form = Some("application/x-www-form-urlencoded; charset=UTF-8");
-        assert_eq!(asked("GET", Some("query=ASK%20%7B%7D&format=json"), None, b""), Ok("ASK {}".to_owned()));
-        assert_eq!(asked("POST", None, form, b"query=ASK+%7B%7D"), Ok("ASK {}".to_owned()));
-        assert_eq!(asked("POST", None, Some("Application/SPARQL-Query"), b"ASK {}"), Ok("ASK {}".to_owned()));
+        assert_eq!(
+            asked("GET", Some("query=ASK%20%7B%7D&format=json"), None, b""),
+            Ok("ASK {}".to_owned())
+        );
+        assert_eq!(
+            asked("POST", None, form, b"query=ASK+%7B%7D"),
+            Ok("ASK {}".to_owned())
+        );
+        assert_eq!(
+            asked("POST", None, Some("Application/SPARQL-Query"), b"ASK {}"),
+            Ok("ASK {}".to_owned())
+        );
     }
 
     #[test]
@@ -107,18 +144,49 @@ mod tests {
         for (status, method, query, content_type, body) in [
             (400, "GET", None, None, &b""[..]),
             (400, "GET", Some("query=a&query=b"), None, b""),
-            (400, "GET", Some("query=a&default-graph-uri=http://a"), None, b""),
-            (400, "POST", Some("named-graph-uri=x"), Some("application/sparql-query"), b"ASK {}"),
-            (400, "POST", None, Some("application/sparql-query"), b"\xff\xfe"),
+            (
+                400,
+                "GET",
+                Some("query=a&default-graph-uri=http://a"),
+                None,
+                b"",
+            ),
+            (
+                400,
+                "POST",
+                Some("named-graph-uri=x"),
+                Some("application/sparql-query"),
+                b"ASK {}",
+            ),
+            (
+                400,
+                "POST",
+                None,
+                Some("application/sparql-query"),
+                b"\xff\xfe",
+            ),
             (403, "POST", None, form, b"update=DROP+ALL"),
-            (403, "POST", None, Some("application/sparql-update"), b"DROP ALL"),
+            (
+                403,
+                "POST",
+                None,
+                Some("application/sparql-update"),
+                b"DROP ALL",
+            ),
             (405, "PUT", Some("query=a"), None, b""),
             (405, "DELETE", None, None, b""),
             (415, "POST", None, Some("text/plain"), b"ASK {}"),
             (415, "POST", None, None, b"ASK {}"),
         ] {
-            assert_eq!(asked(method, query, content_type, body), Err(status), "{method} {query:?} {content_type:?}");
+            assert_eq!(
+                asked(method, query, content_type, body),
+                Err(status),
+                "{method} {query:?} {content_type:?}"
+            );
         }
-        assert_eq!(asked("GET", Some("query=%ff%00%"), None, b""), Ok("\u{fffd}\0%".to_owned()));
+        assert_eq!(
+            asked("GET", Some("query=%ff%00%"), None, b""),
+            Ok("\u{fffd}\0%".to_owned())
+        );
     }
 }

@@ -10,9 +10,9 @@ use crate::question::Refusal;
 
 /// Policy of the query page: load its script and stylesheet, and connect to this server.
 pub(super) const PAGE_POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; form-action 'self'; base-uri 'none'; frame-ancestors 'none'";
-/// Policy of the report, a single file with inline scripts and images that connects to no server. The file also has a
-/// policy of its own, which names its scripts by digest; both apply. This one adds `frame-ancestors`, which only a
-/// header can set.
+/// Policy of the report, a single file with inline scripts and images that connects to no server.
+/// The file also has a policy of its own, which names its scripts by digest; both apply. This one
+/// adds `frame-ancestors`, which only a header can set.
 pub(super) const REPORT_POLICY: &str = "default-src 'none'; script-src 'unsafe-inline' blob:; style-src 'unsafe-inline'; img-src data: blob:; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
 /// Policy of answers, which are not pages.
 pub(super) const NO_POLICY: &str = "default-src 'none'; frame-ancestors 'none'; sandbox";
@@ -28,30 +28,58 @@ pub(super) struct Reply {
 impl Reply {
     /// A page or a file of one.
     pub fn page(media_type: &str, policy: &'static str, body: impl Into<Bytes>) -> Self {
-        Self { status: 200, media_type: media_type.to_owned(), policy, body: body.into() }
+        Self {
+            status: 200,
+            media_type: media_type.to_owned(),
+            policy,
+            body: body.into(),
+        }
     }
 
     /// An answer to a query.
     pub fn answer(status: u16, media_type: &str, body: Vec<u8>) -> Self {
-        let charset = if media_type.starts_with("text/") { "; charset=utf-8" } else { "" };
-        Self { status, media_type: format!("{media_type}{charset}"), policy: NO_POLICY, body: body.into() }
+        let charset = if media_type.starts_with("text/") {
+            "; charset=utf-8"
+        } else {
+            ""
+        };
+        Self {
+            status,
+            media_type: format!("{media_type}{charset}"),
+            policy: NO_POLICY,
+            body: body.into(),
+        }
     }
 }
 
 impl From<Refusal> for Reply {
     fn from(Refusal { status, why }: Refusal) -> Self {
-        Self::answer(status, "text/plain", format!("{}\n", why.trim_end()).into_bytes())
+        Self::answer(
+            status,
+            "text/plain",
+            format!("{}\n", why.trim_end()).into_bytes(),
+        )
     }
 }
 
 impl From<Answered> for Reply {
-    fn from(Answered { status, media_type, body }: Answered) -> Self {
+    fn from(
+        Answered {
+            status,
+            media_type,
+            body,
+        }: Answered,
+    ) -> Self {
         Self::answer(status, media_type, body)
     }
 }
 
 /// Turns a reply into a response, without its body if only the head was requested.
-pub(super) fn response(reply: Reply, head: bool, body: impl FnOnce(Bytes) -> AnswerBody) -> Response<AnswerBody> {
+pub(super) fn response(
+    reply: Reply,
+    head: bool,
+    body: impl FnOnce(Bytes) -> AnswerBody,
+) -> Response<AnswerBody> {
     let status = StatusCode::from_u16(reply.status).unwrap_or(StatusCode::INTERNAL_SERVER_ERROR);
     let length = reply.body.len();
     let mut response = Response::new(body(if head { Bytes::new() } else { reply.body }));
@@ -70,7 +98,10 @@ pub(super) fn response(reply: Reply, head: bool, body: impl FnOnce(Bytes) -> Ans
     set(header::X_FRAME_OPTIONS, "DENY");
     set(header::REFERRER_POLICY, "no-referrer");
     set(header::CACHE_CONTROL, "no-store");
-    set(HeaderName::from_static("cross-origin-resource-policy"), "same-origin");
+    set(
+        HeaderName::from_static("cross-origin-resource-policy"),
+        "same-origin",
+    );
     set(header::VARY, "Accept");
     match reply.status {
         405 => set(header::ALLOW, "GET, HEAD, POST"),

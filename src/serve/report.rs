@@ -1,4 +1,5 @@
-//! The report of the present history. Rendering it takes seconds, so it is cached until the history changes.
+//! The report of the present history. Rendering it takes seconds, so it is cached until the history
+//! changes.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -39,7 +40,8 @@ impl LiveReport {
     /// Renders the page.
     ///
     /// # Errors
-    /// A refusal if the page can't be rendered, and no page was rendered before, or if that takes too long.
+    /// A refusal if the page can't be rendered, and no page was rendered before, or if that takes
+    /// too long.
     pub fn render(&self) -> Result<Bytes, Refusal> {
         // Another request may have rendered it while this one waited.
         if let Some(page) = self.cached() {
@@ -48,7 +50,11 @@ impl LiveReport {
         let ended = self.worker.run(MOST_TIME, MOST_BYTES);
         let mut kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
         match ended {
-            Ended::Itself { code: Some(0), output, .. } => {
+            Ended::Itself {
+                code: Some(0),
+                output,
+                ..
+            } => {
                 // Rendering updates the tables beside the history.
                 let page = Bytes::from(output);
                 *kept = Some((state(&self.history), page.clone()));
@@ -64,17 +70,27 @@ impl LiveReport {
             }
             Ended::Late => Err(Refusal::new(504, "the report took too long")),
             Ended::TooMuch => Err(Refusal::new(500, "the report is too large to send")),
-            Ended::NotStarted(why) => Err(Refusal::new(500, format!("the report process could not be started: {why}"))),
+            Ended::NotStarted(why) => Err(Refusal::new(
+                500,
+                format!("the report process could not be started: {why}"),
+            )),
         }
     }
 }
 
 fn state(history: &Path) -> State {
-    let files = FOLDERS.iter().flat_map(|part| std::fs::read_dir(history.join(part)).into_iter().flatten());
+    let files = FOLDERS
+        .iter()
+        .flat_map(|part| std::fs::read_dir(history.join(part)).into_iter().flatten());
     files
         .filter_map(Result::ok)
         // The store's log files change with every access.
         .filter(|entry| !entry.file_name().to_string_lossy().starts_with("LOG"))
-        .filter_map(|entry| entry.metadata().ok().map(|data| (entry.path(), (data.len(), data.modified().ok()))))
+        .filter_map(|entry| {
+            entry
+                .metadata()
+                .ok()
+                .map(|data| (entry.path(), (data.len(), data.modified().ok())))
+        })
         .collect()
 }

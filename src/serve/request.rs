@@ -31,25 +31,37 @@ pub(super) fn origin(request: &request::Parts) -> Result<Origin<'_>, Refusal> {
     }
     Ok(Origin {
         host: text(headers, &header::HOST),
-        target_host: request.uri.authority().map(hyper::http::uri::Authority::as_str),
+        target_host: request
+            .uri
+            .authority()
+            .map(hyper::http::uri::Authority::as_str),
         // An unreadable origin is a foreign one.
-        origin: headers.get(header::ORIGIN).map(|value| value.to_str().unwrap_or("null")),
-        site: headers.get("sec-fetch-site").map(|value| value.to_str().unwrap_or("cross-site")),
+        origin: headers
+            .get(header::ORIGIN)
+            .map(|value| value.to_str().unwrap_or("null")),
+        site: headers
+            .get("sec-fetch-site")
+            .map(|value| value.to_str().unwrap_or("cross-site")),
     })
 }
 
 /// Reads the body of a request. Fails if it is too long or arrives too slowly.
-pub(super) async fn read(request: &request::Parts, body: &mut Incoming) -> Result<Vec<u8>, Refusal> {
+pub(super) async fn read(
+    request: &request::Parts,
+    body: &mut Incoming,
+) -> Result<Vec<u8>, Refusal> {
     let too_long = || Refusal::new(413, format!("a request may have at most {MOST_BODY} bytes"));
-    let length = text(&request.headers, &header::CONTENT_LENGTH).and_then(|length| length.parse::<u64>().ok());
+    let length = text(&request.headers, &header::CONTENT_LENGTH)
+        .and_then(|length| length.parse::<u64>().ok());
     if length.is_some_and(|length| length > MOST_BODY) {
         return Err(too_long());
     }
     let all = async {
         let mut bytes = Vec::new();
         while let Some(frame) = poll_fn(|context| Pin::new(&mut *body).poll_frame(context)).await {
-            let frame =
-                frame.map_err(|error| Refusal::new(400, format!("the request can't be read: {error}")))?.into_data();
+            let frame = frame
+                .map_err(|error| Refusal::new(400, format!("the request can't be read: {error}")))?
+                .into_data();
             bytes.extend_from_slice(&frame.unwrap_or_default());
             if bytes.len() as u64 > MOST_BODY {
                 return Err(too_long());
@@ -61,6 +73,14 @@ pub(super) async fn read(request: &request::Parts, body: &mut Incoming) -> Resul
 }
 
 async fn in_time<T>(all: impl Future<Output = Result<T, Refusal>>) -> Result<T, Refusal> {
-    let late = || Refusal::new(408, format!("the request took longer than {} s to arrive", PATIENCE.as_secs()));
+    let late = || {
+        Refusal::new(
+            408,
+            format!(
+                "the request took longer than {} s to arrive",
+                PATIENCE.as_secs()
+            ),
+        )
+    };
     timeout(PATIENCE, all).await.unwrap_or_else(|_| Err(late()))
 }

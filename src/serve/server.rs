@@ -31,13 +31,15 @@ use crate::snapshot::Snapshots;
 use crate::threads::Threads;
 use crate::worker::{Asked, Worker};
 
-/// Maximum size of the head of a request: twice the longest target that the library accepts. Unit: bytes.
+/// Maximum size of the head of a request: twice the longest target that the library accepts. Unit:
+/// bytes.
 const MOST_HEAD: usize = 128 << 10;
 /// Stack of a thread that evaluates light queries; only the used part takes memory. Unit: bytes.
 const STACK: usize = 64 << 20;
 /// Threads for connections for each processor: a query may occupy one for a moment.
 const THREADS: usize = 4;
-/// Threads that evaluate light queries, besides one for each processor: for stopped queries that have not ended yet.
+/// Threads that evaluate light queries, besides one for each processor: for stopped queries that
+/// have not ended yet.
 const SPARE_THREADS: usize = 6;
 /// Number of the largest allowed answers that may wait for their clients at a time.
 const MOST_ANSWERS: u64 = 4;
@@ -113,11 +115,19 @@ pub fn serve(options: ServeOptions) -> std::io::Result<Serving> {
         .build()?;
     let inside = runtime.enter();
     let listener = tokio::net::TcpListener::from_std(listener)?;
-    let app = Arc::new(App::new(options, Threads::start(processors() * THREADS, STACK)?));
+    let app = Arc::new(App::new(
+        options,
+        Threads::start(processors() * THREADS, STACK)?,
+    ));
     drop(inside);
     let (counts, lanes) = (Arc::clone(&app.counts), Arc::clone(&app.lanes));
     runtime.spawn(app.run(listener));
-    Ok(Serving { address, counts, runtime: Some(runtime), lanes })
+    Ok(Serving {
+        address,
+        counts,
+        runtime: Some(runtime),
+        lanes,
+    })
 }
 
 /// State shared by all requests.
@@ -137,7 +147,10 @@ struct App {
 
 impl App {
     fn new(options: ServeOptions, threads: Threads) -> Self {
-        let worker = |arguments: &[String]| Worker { program: options.program.clone(), arguments: arguments.to_vec() };
+        let worker = |arguments: &[String]| Worker {
+            program: options.program.clone(),
+            arguments: arguments.to_vec(),
+        };
         let report = LiveReport {
             worker: worker(&options.report_arguments),
             history: options.history.clone(),
@@ -146,8 +159,14 @@ impl App {
         let page = page::page(&options.history.display().to_string(), &options.examples).into();
         let counts = Arc::new(Counts::default());
         let worker = worker(&options.query_arguments);
-        let lanes = Lanes::new(Snapshots::new(&options.history), Arc::clone(&counts), worker, options.most_queries);
-        let units = usize::try_from(memory_units(options.most_bytes) * MOST_ANSWERS).unwrap_or(usize::MAX);
+        let lanes = Lanes::new(
+            Snapshots::new(&options.history),
+            Arc::clone(&counts),
+            worker,
+            options.most_queries,
+        );
+        let units =
+            usize::try_from(memory_units(options.most_bytes) * MOST_ANSWERS).unwrap_or(usize::MAX);
         Self {
             lanes: Arc::new(lanes),
             report: Arc::new(report),
@@ -183,9 +202,12 @@ impl App {
                     }
                 },
             };
-            // Without it, small answers wait for the acknowledgement of earlier ones; the connection works anyway.
+            // Without it, small answers wait for the acknowledgement of earlier ones; the
+            // connection works anyway.
             let _ = stream.set_nodelay(true);
-            let Some(thread) = self.threads.next() else { continue };
+            let Some(thread) = self.threads.next() else {
+                continue;
+            };
             let (app, mut slot) = (Arc::clone(&self), Some(stream));
             let added = self.connections.add(thread, |doing| {
                 let stream = slot.take();
@@ -212,48 +234,89 @@ impl App {
         });
         let mut server = http1::Builder::new();
         server.auto_date_header(has_date());
-        server.timer(TokioTimer::new()).header_read_timeout(PATIENCE).max_buf_size(MOST_HEAD);
+        server
+            .timer(TokioTimer::new())
+            .header_read_timeout(PATIENCE)
+            .max_buf_size(MOST_HEAD);
         // The error is the client's: it sent no HTTP, was too slow, or has gone away.
         let _ = server.serve_connection(TokioIo::new(stream), service).await;
     }
 
-    async fn respond(self: Arc<Self>, request: Request<Incoming>, doing: Arc<Doing>) -> Response<AnswerBody> {
+    async fn respond(
+        self: Arc<Self>,
+        request: Request<Incoming>,
+        doing: Arc<Doing>,
+    ) -> Response<AnswerBody> {
         doing.answers();
         let began = Instant::now();
         let (parts, mut body) = request.into_parts();
-        let reply = self.reply(&parts, &mut body).await.unwrap_or_else(Reply::from);
+        let reply = self
+            .reply(&parts, &mut body)
+            .await
+            .unwrap_or_else(Reply::from);
         let memory = self.reserve(reply.body.len() as u64).await;
         self.counts.record(reply.status, began.elapsed());
-        response(reply, parts.method == Method::HEAD, |bytes| AnswerBody::new(bytes, doing, memory))
+        response(reply, parts.method == Method::HEAD, |bytes| {
+            AnswerBody::new(bytes, doing, memory)
+        })
     }
 
     /// Reserves memory for a large answer until it is sent.
     async fn reserve(&self, bytes: u64) -> Option<OwnedSemaphorePermit> {
-        let units = u32::try_from(memory_units(bytes)).unwrap_or(u32::MAX).min(self.options_units());
+        let units = u32::try_from(memory_units(bytes))
+            .unwrap_or(u32::MAX)
+            .min(self.options_units());
         if bytes <= MEMORY_UNIT {
             return None;
         }
-        Arc::clone(&self.memory).acquire_many_owned(units).await.ok()
+        Arc::clone(&self.memory)
+            .acquire_many_owned(units)
+            .await
+            .ok()
     }
 
     fn options_units(&self) -> u32 {
-        u32::try_from(memory_units(self.options.most_bytes)).unwrap_or(u32::MAX).max(1)
+        u32::try_from(memory_units(self.options.most_bytes))
+            .unwrap_or(u32::MAX)
+            .max(1)
     }
 
     async fn reply(&self, request: &request::Parts, body: &mut Incoming) -> Result<Reply, Refusal> {
         guard(&origin(request)?, &self.options.hosts)?;
-        let (path, reads) = (request.uri.path(), matches!(request.method, Method::GET | Method::HEAD));
+        let (path, reads) = (
+            request.uri.path(),
+            matches!(request.method, Method::GET | Method::HEAD),
+        );
         match path {
             "/sparql" => self.sparql(request, body).await,
             "/" | "/style.css" | "/query.js" | "/report" | "/health" if !reads => {
                 Err(Refusal::new(405, "use GET or HEAD"))
             }
-            "/" => Ok(Reply::page("text/html; charset=utf-8", PAGE_POLICY, self.page.clone())),
-            "/style.css" => Ok(Reply::page("text/css; charset=utf-8", NO_POLICY, page::STYLE)),
-            "/query.js" => Ok(Reply::page("text/javascript; charset=utf-8", NO_POLICY, page::SCRIPT)),
-            "/health" => Ok(Reply::page("application/json", NO_POLICY, self.counts.json())),
+            "/" => Ok(Reply::page(
+                "text/html; charset=utf-8",
+                PAGE_POLICY,
+                self.page.clone(),
+            )),
+            "/style.css" => Ok(Reply::page(
+                "text/css; charset=utf-8",
+                NO_POLICY,
+                page::STYLE,
+            )),
+            "/query.js" => Ok(Reply::page(
+                "text/javascript; charset=utf-8",
+                NO_POLICY,
+                page::SCRIPT,
+            )),
+            "/health" => Ok(Reply::page(
+                "application/json",
+                NO_POLICY,
+                self.counts.json(),
+            )),
             "/report" => self.live_report().await,
-            _ => Err(Refusal::new(404, "not found: see /, /report, /sparql and /health")),
+            _ => Err(Refusal::new(
+                404,
+                "not found: see /, /report, /sparql and /health",
+            )),
         }
     }
 
@@ -269,13 +332,19 @@ impl App {
                     // The receiver is gone if the client is.
                     let _ = sender.send(page);
                 });
-                receiver.await.map_err(|_| Refusal::new(500, "the report crashed"))??
+                receiver
+                    .await
+                    .map_err(|_| Refusal::new(500, "the report crashed"))??
             }
         };
         Ok(Reply::page("text/html; charset=utf-8", REPORT_POLICY, page))
     }
 
-    async fn sparql(&self, request: &request::Parts, body: &mut Incoming) -> Result<Reply, Refusal> {
+    async fn sparql(
+        &self,
+        request: &request::Parts,
+        body: &mut Incoming,
+    ) -> Result<Reply, Refusal> {
         let body = read(request, body).await?;
         let parts = Parts {
             method: request.method.as_str(),
@@ -284,10 +353,27 @@ impl App {
             body: &body,
         };
         let query = question(&parts)?;
-        let accepts = request.headers.get_all(header::ACCEPT).iter().filter_map(|value| value.to_str().ok());
+        let accepts = request
+            .headers
+            .get_all(header::ACCEPT)
+            .iter()
+            .filter_map(|value| value.to_str().ok());
         let accept = accepts.collect::<Vec<&str>>().join(",");
-        let ServeOptions { most_rows, most_bytes, most_secs, most_memory, .. } = self.options;
-        let question = Arc::new(Question { query, accept, most_rows, most_bytes, most_secs, most_memory });
+        let ServeOptions {
+            most_rows,
+            most_bytes,
+            most_secs,
+            most_memory,
+            ..
+        } = self.options;
+        let question = Arc::new(Question {
+            query,
+            accept,
+            most_rows,
+            most_bytes,
+            most_secs,
+            most_memory,
+        });
         match self.lanes.evaluate(&question).await? {
             Evaluated::Here(answered) => Ok(answered.into()),
             Evaluated::There(asked) => self.asked(asked),
@@ -296,14 +382,31 @@ impl App {
 
     /// The reply with the result of a process.
     fn asked(&self, asked: Asked) -> Result<Reply, Refusal> {
-        let ServeOptions { most_secs, most_memory, most_bytes, .. } = self.options;
+        let ServeOptions {
+            most_secs,
+            most_memory,
+            most_bytes,
+            ..
+        } = self.options;
         let why = match asked {
-            Asked::Answer(head, body) => return Ok(Reply::answer(head.status, &head.media_type, body)),
+            Asked::Answer(head, body) => {
+                return Ok(Reply::answer(head.status, &head.media_type, body));
+            }
             Asked::TooMuch => return Ok(too_large(most_bytes).into()),
-            Asked::Late => return Err(Refusal::new(504, format!("the query took longer than {most_secs} s"))),
-            Asked::MemorySpent => format!("the query took more than {} MB of memory", most_memory / 1_000_000),
+            Asked::Late => {
+                return Err(Refusal::new(
+                    504,
+                    format!("the query took longer than {most_secs} s"),
+                ));
+            }
+            Asked::MemorySpent => format!(
+                "the query took more than {} MB of memory",
+                most_memory / 1_000_000
+            ),
             Asked::NotStarted(why) => format!("the query process could not be started: {why}"),
-            Asked::Crashed | Asked::NotTaken | Asked::Gone => "the query crashed the evaluator".to_owned(),
+            Asked::Crashed | Asked::NotTaken | Asked::Gone => {
+                "the query crashed the evaluator".to_owned()
+            }
         };
         Err(Refusal::new(500, why))
     }
@@ -313,7 +416,8 @@ fn memory_units(bytes: u64) -> u64 {
     bytes.div_ceil(MEMORY_UNIT)
 }
 
-/// Whether the clock shows a time that the header `Date` can have: the library panics before 1970 and after 9999.
+/// Whether the clock shows a time that the header `Date` can have: the library panics before 1970
+/// and after 9999.
 fn has_date() -> bool {
     const YEAR_10000_SECS: u64 = 253_402_300_800;
     let since = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH);

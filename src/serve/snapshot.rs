@@ -1,4 +1,5 @@
-//! The state of the history that queries read: opened once and shared, and renewed when the history has changed.
+//! The state of the history that queries read: opened once and shared, and renewed when the history
+//! has changed.
 
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -26,7 +27,9 @@ pub(super) struct Snapshots {
 
 impl std::fmt::Debug for Snapshots {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("Snapshots").field("dir", &self.dir).finish_non_exhaustive()
+        f.debug_struct("Snapshots")
+            .field("dir", &self.dir)
+            .finish_non_exhaustive()
     }
 }
 
@@ -62,7 +65,8 @@ impl Snapshots {
             }
             None => {
                 let history = Arc::new(History::open_to_read(&self.dir)?);
-                *self.open.write().unwrap_or_else(PoisonError::into_inner) = Some(Arc::clone(&history));
+                *self.open.write().unwrap_or_else(PoisonError::into_inner) =
+                    Some(Arc::clone(&history));
                 history
             }
         };
@@ -70,8 +74,8 @@ impl Snapshots {
         Ok(history)
     }
 
-    /// Returns the present history if that takes no time: it is open, and has not changed. Otherwise
-    /// [`Snapshots::get`] must be called.
+    /// Returns the present history if that takes no time: it is open, and has not changed.
+    /// Otherwise [`Snapshots::get`] must be called.
     pub fn ready(&self) -> Option<Arc<History>> {
         let history = self.known()?;
         if !self.is_checked() {
@@ -90,7 +94,10 @@ impl Snapshots {
     }
 
     fn known(&self) -> Option<Arc<History>> {
-        self.open.read().unwrap_or_else(PoisonError::into_inner).clone()
+        self.open
+            .read()
+            .unwrap_or_else(PoisonError::into_inner)
+            .clone()
     }
 
     fn is_checked(&self) -> bool {
@@ -99,6 +106,7 @@ impl Snapshots {
 
     fn check_after(&self, time: Duration) {
         let next = (self.started.elapsed() + time).as_micros();
-        self.next_check.store(u64::try_from(next).unwrap_or(u64::MAX), Ordering::Release);
+        self.next_check
+            .store(u64::try_from(next).unwrap_or(u64::MAX), Ordering::Release);
     }
 }

@@ -47,9 +47,12 @@ impl Watch {
 
     /// Begins a task, which may take `secs` and as long as the process uses at most `memory`.
     ///
-    /// Units: seconds, bytes. The memory limit works only on systems that report memory in `/proc`, such as Linux.
+    /// Units: seconds, bytes. The memory limit works only on systems that report memory in `/proc`,
+    /// such as Linux.
     pub fn begin(&self, secs: f64, memory: u64) {
-        let until = Duration::try_from_secs_f64(secs).ok().and_then(|secs| Instant::now().checked_add(secs));
+        let until = Duration::try_from_secs_f64(secs)
+            .ok()
+            .and_then(|secs| Instant::now().checked_add(secs));
         *self.task.lock().unwrap_or_else(PoisonError::into_inner) = Some(Limits { until, memory });
     }
 
@@ -62,6 +65,15 @@ impl Watch {
 /// Resident memory of this process; `None` if the system does not report it. Unit: bytes.
 pub(super) fn resident() -> Option<u64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
-    let line = status.lines().find_map(|line| line.strip_prefix("VmRSS:"))?;
-    Some(line.trim().trim_end_matches("kB").trim().parse::<u64>().ok()? * 1024)
+    let line = status
+        .lines()
+        .find_map(|line| line.strip_prefix("VmRSS:"))?;
+    Some(
+        line.trim()
+            .trim_end_matches("kB")
+            .trim()
+            .parse::<u64>()
+            .ok()?
+            * 1024,
+    )
 }

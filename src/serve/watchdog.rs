@@ -28,7 +28,9 @@ struct Running {
 
 impl std::fmt::Debug for Running {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("Running").field("queries", &self.queries.len()).finish_non_exhaustive()
+        f.debug_struct("Running")
+            .field("queries", &self.queries.len())
+            .finish_non_exhaustive()
     }
 }
 
@@ -50,7 +52,10 @@ impl Watchdog {
         if running.queries.len() == 1 {
             self.shared.begun.notify_one();
         }
-        Watched { shared: &self.shared, id }
+        Watched {
+            shared: &self.shared,
+            id,
+        }
     }
 }
 
@@ -70,14 +75,20 @@ impl Shared {
         let mut running = self.lock();
         while !running.ended {
             if running.queries.is_empty() {
-                running = self.begun.wait(running).unwrap_or_else(PoisonError::into_inner);
+                running = self
+                    .begun
+                    .wait(running)
+                    .unwrap_or_else(PoisonError::into_inner);
                 continue;
             }
             drop(running);
             // Most queries end meanwhile; the thread does not wake up for each.
             std::thread::sleep(time);
             running = self.lock();
-            let late = running.queries.iter().filter(|(_, since, _)| since.elapsed() >= time);
+            let late = running
+                .queries
+                .iter()
+                .filter(|(_, since, _)| since.elapsed() >= time);
             late.for_each(|(_, _, query)| query.cancel());
         }
     }

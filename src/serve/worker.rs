@@ -1,5 +1,5 @@
-//! Child processes of this program: one for a single task, or one that answers question after question. A process that
-//! takes too long or writes too much is killed.
+//! Child processes of this program: one for a single task, or one that answers question after
+//! question. A process that takes too long or writes too much is killed.
 
 use std::io::{BufRead as _, BufReader, Read, Write};
 use std::path::PathBuf;
@@ -20,8 +20,13 @@ pub(super) struct Worker {
 /// The end of a task.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) enum Ended {
-    /// The process exited, with its exit code (`None` if a signal killed it) and the contents of stdout and stderr.
-    Itself { code: Option<i32>, output: Vec<u8>, errors: Vec<u8> },
+    /// The process exited, with its exit code (`None` if a signal killed it) and the contents of
+    /// stdout and stderr.
+    Itself {
+        code: Option<i32>,
+        output: Vec<u8>,
+        errors: Vec<u8>,
+    },
     /// It exceeded its time limit.
     Late,
     /// It wrote more than allowed.
@@ -57,29 +62,44 @@ const MOST_ERRORS: u64 = 64 * 1024;
 const LOOK_EVERY: Duration = Duration::from_millis(50);
 
 impl Worker {
-    /// Starts the process for a single task, and waits until it exits or is killed. `room` is the maximum length of
-    /// stdout. Unit: bytes.
+    /// Starts the process for a single task, and waits until it exits or is killed. `room` is the
+    /// maximum length of stdout. Unit: bytes.
     pub fn run(&self, time: Duration, room: u64) -> Ended {
         let mut command = self.command();
-        match command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn() {
+        match command
+            .stdin(Stdio::null())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+        {
             Ok(child) => watched(child, time, room),
             Err(error) => Ended::NotStarted(error.to_string()),
         }
     }
 
-    /// Starts a process that answers questions. `room` is the maximum length of an answer. Unit: bytes.
+    /// Starts a process that answers questions. `room` is the maximum length of an answer. Unit:
+    /// bytes.
     ///
     /// # Errors
     /// It can't be started.
     pub fn start(&self, room: u64) -> std::io::Result<Process> {
         let mut command = self.command();
-        let mut child = command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::null()).spawn()?;
+        let mut child = command
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::null())
+            .spawn()?;
         let (stdin, stdout) = (child.stdin.take(), child.stdout.take());
         let (sender, answers) = channel();
         if let Some(stdout) = stdout {
             std::thread::spawn(move || read_answers(BufReader::new(stdout), &sender, room));
         }
-        Ok(Process { child, stdin, answers, is_new: true })
+        Ok(Process {
+            child,
+            stdin,
+            answers,
+            is_new: true,
+        })
     }
 
     fn command(&self) -> Command {
@@ -106,11 +126,15 @@ enum Piece {
 }
 
 impl Process {
-    /// Asks a question, a line of JSON. After any result but [`Asked::Answer`] the process can't be used again.
+    /// Asks a question, a line of JSON. After any result but [`Asked::Answer`] the process can't be
+    /// used again.
     pub fn ask(&mut self, question: &str, time: Duration, is_gone: &dyn Fn() -> bool) -> Asked {
         let until = Instant::now().checked_add(time);
         let is_new = std::mem::replace(&mut self.is_new, false);
-        let written = self.stdin.as_mut().is_some_and(|stdin| writeln!(stdin, "{question}").is_ok());
+        let written = self
+            .stdin
+            .as_mut()
+            .is_some_and(|stdin| writeln!(stdin, "{question}").is_ok());
         if written && let Some(asked) = self.wait(until, is_gone) {
             return asked;
         }
@@ -130,7 +154,9 @@ impl Process {
                 Ok(Piece::Answer(head, body)) => return Some(Asked::Answer(head, body)),
                 Ok(Piece::TooMuch) => return Some(Asked::TooMuch),
                 Err(RecvTimeoutError::Timeout) if is_gone() => return Some(Asked::Gone),
-                Err(RecvTimeoutError::Timeout) if left(until).is_zero() => return Some(Asked::Late),
+                Err(RecvTimeoutError::Timeout) if left(until).is_zero() => {
+                    return Some(Asked::Late);
+                }
                 Err(RecvTimeoutError::Timeout) => {}
                 Err(RecvTimeoutError::Disconnected) => return None,
             }
@@ -143,7 +169,9 @@ impl Process {
         loop {
             match self.child.try_wait() {
                 Ok(Some(status)) => return status.code(),
-                Ok(None) if Instant::now() < patience => std::thread::sleep(Duration::from_millis(2)),
+                Ok(None) if Instant::now() < patience => {
+                    std::thread::sleep(Duration::from_millis(2))
+                }
                 _ => return None,
             }
         }
@@ -162,7 +190,9 @@ impl Drop for Process {
 fn read_answers(mut stdout: BufReader<ChildStdout>, sender: &Sender<Piece>, room: u64) {
     let mut line = String::new();
     while let Ok(1..) = stdout.read_line(&mut line) {
-        let Ok(head) = serde_json::from_str::<Head>(&line) else { return };
+        let Ok(head) = serde_json::from_str::<Head>(&line) else {
+            return;
+        };
         line.clear();
         if head.length > room {
             // The receiver is gone if the question was given up.
@@ -171,7 +201,10 @@ fn read_answers(mut stdout: BufReader<ChildStdout>, sender: &Sender<Piece>, room
         }
         let mut body = Vec::new();
         let read = stdout.by_ref().take(head.length).read_to_end(&mut body);
-        if read.is_err() || body.len() as u64 != head.length || sender.send(Piece::Answer(head, body)).is_err() {
+        if read.is_err()
+            || body.len() as u64 != head.length
+            || sender.send(Piece::Answer(head, body)).is_err()
+        {
             return;
         }
     }
@@ -180,7 +213,10 @@ fn read_answers(mut stdout: BufReader<ChildStdout>, sender: &Sender<Piece>, room
 fn watched(mut child: Child, time: Duration, room: u64) -> Ended {
     let until = Instant::now().checked_add(time);
     // Each stream has its own thread, so that a full pipe can't block the other.
-    let errors = child.stderr.take().map(|stream| reading(stream, MOST_ERRORS));
+    let errors = child
+        .stderr
+        .take()
+        .map(|stream| reading(stream, MOST_ERRORS));
     let output = child.stdout.take().map(|stream| reading(stream, room + 1));
     let output = match output.map(|receiver| receiver.recv_timeout(left(until))) {
         Some(Ok(output)) => output,
@@ -190,12 +226,20 @@ fn watched(mut child: Child, time: Duration, room: u64) -> Ended {
     if output.len() as u64 > room {
         return end(child, Ended::TooMuch);
     }
-    let errors = errors.and_then(|receiver| receiver.recv_timeout(left(until)).ok()).unwrap_or_default();
+    let errors = errors
+        .and_then(|receiver| receiver.recv_timeout(left(until)).ok())
+        .unwrap_or_default();
     // Its streams are closed, so it has exited or is about to.
     let patience = Instant::now() + Duration::from_secs(1);
     loop {
         match child.try_wait() {
-            Ok(Some(status)) => return Ended::Itself { code: status.code(), output, errors },
+            Ok(Some(status)) => {
+                return Ended::Itself {
+                    code: status.code(),
+                    output,
+                    errors,
+                };
+            }
             Ok(None) if Instant::now() < patience => std::thread::sleep(Duration::from_millis(2)),
             _ => return end(child, Ended::Late),
         }
@@ -216,7 +260,9 @@ fn reading(stream: impl Read + Send + 'static, most: u64) -> Receiver<Vec<u8>> {
 
 fn left(until: Option<Instant>) -> Duration {
     // `None` is a deadline beyond the range of the clock: it is never reached.
-    until.map_or(Duration::from_secs(u64::from(u32::MAX)), |until| until.saturating_duration_since(Instant::now()))
+    until.map_or(Duration::from_secs(u64::from(u32::MAX)), |until| {
+        until.saturating_duration_since(Instant::now())
+    })
 }
 
 fn end(mut child: Child, how: Ended) -> Ended {

@@ -22,8 +22,9 @@ pub enum Fate {
 
 /// Returns the outcomes of an action's success properties, in the action's order.
 ///
-/// `findings` holds the rules' findings for these properties and for the action's preconditions. It is ignored unless
-/// the fate is `Completed`. A property without findings is `broken`: verdicts are never invented.
+/// `findings` holds the rules' findings for these properties and for the action's preconditions. It
+/// is ignored unless the fate is `Completed`. A property without findings is `broken`: verdicts are
+/// never invented.
 pub fn judge(
     ontology: &Ontology,
     action: &Action,
@@ -37,12 +38,20 @@ pub fn judge(
         let (outcome, margin, witness) = match fate {
             Fate::Broken(reason) => (Outcome::Broken, None, reason.clone()),
             Fate::Timeout(reason) => (Outcome::Timeout, None, reason.clone()),
-            Fate::NotReached => (Outcome::Untested, None, "the action was never reached".to_owned()),
+            Fate::NotReached => (
+                Outcome::Untested,
+                None,
+                "the action was never reached".to_owned(),
+            ),
             Fate::NotPerformed(reason) => (Outcome::Inapplicable, None, reason.clone()),
             Fate::Completed => match (&unmet, findings.get(iri)) {
                 (Some(unmet), _) => unmet.clone(),
                 (None, Some(result)) => outcome_of(result, property),
-                (None, None) => (Outcome::Broken, None, "no rule was evaluated for this property".to_owned()),
+                (None, None) => (
+                    Outcome::Broken,
+                    None,
+                    "no rule was evaluated for this property".to_owned(),
+                ),
             },
         };
         Judgement {
@@ -58,11 +67,11 @@ pub fn judge(
     action.success_properties.iter().map(decide).collect()
 }
 
-/// Returns the reason why an action must not be performed: the first of its preconditions that does not hold, and its
-/// witness. `findings` holds the rules' findings for its preconditions.
+/// Returns the reason why an action must not be performed: the first of its preconditions that does
+/// not hold, and its witness. `findings` holds the rules' findings for its preconditions.
 ///
-/// Returns `None` if all hold or are inapplicable, and if one can't be decided: the action is then performed, and its
-/// properties get the outcome of that precondition.
+/// Returns `None` if all hold or are inapplicable, and if one can't be decided: the action is then
+/// performed, and its properties get the outcome of that precondition.
 pub fn reason_not_to_perform(
     ontology: &Ontology,
     action: &Action,
@@ -72,8 +81,8 @@ pub fn reason_not_to_perform(
     (outcome == Outcome::Inapplicable).then_some(reason)
 }
 
-/// Returns the outcome that all success properties share if a precondition does not hold, or `None` if all
-/// preconditions hold or are inapplicable.
+/// Returns the outcome that all success properties share if a precondition does not hold, or `None`
+/// if all preconditions hold or are inapplicable.
 fn unmet_precondition(
     ontology: &Ontology,
     action: &Action,
@@ -84,16 +93,29 @@ fn unmet_precondition(
         let label = property.map_or_else(|| names::local(iri), |p| p.label.as_str());
         match findings.get(iri).map(|result| outcome_of(result, property)) {
             Some((Outcome::Passed | Outcome::Inapplicable, ..)) => None,
-            Some((Outcome::Failed, _, words)) => {
-                Some((Outcome::Inapplicable, None, format!("the precondition `{label}` does not hold: {words}")))
-            }
-            Some((outcome, _, words)) => Some((outcome, None, format!("the precondition `{label}`: {words}"))),
-            None => Some((Outcome::Broken, None, format!("the precondition `{label}` was not evaluated"))),
+            Some((Outcome::Failed, _, words)) => Some((
+                Outcome::Inapplicable,
+                None,
+                format!("the precondition `{label}` does not hold: {words}"),
+            )),
+            Some((outcome, _, words)) => Some((
+                outcome,
+                None,
+                format!("the precondition `{label}`: {words}"),
+            )),
+            None => Some((
+                Outcome::Broken,
+                None,
+                format!("the precondition `{label}` was not evaluated"),
+            )),
         }
     })
 }
 
-fn outcome_of(result: &Result<Findings, RuleFault>, property: Option<&Property>) -> (Outcome, Option<f64>, String) {
+fn outcome_of(
+    result: &Result<Findings, RuleFault>,
+    property: Option<&Property>,
+) -> (Outcome, Option<f64>, String) {
     match result {
         Err(fault) => (fault.outcome(), None, fault.reason().to_owned()),
         Ok(found) => {
@@ -103,7 +125,8 @@ fn outcome_of(result: &Result<Findings, RuleFault>, property: Option<&Property>)
     }
 }
 
-/// Returns the rule author's explanation, or else the witness tuples as text, or else the distance from holding.
+/// Returns the rule author's explanation, or else the witness tuples as text, or else the distance
+/// from holding.
 fn words(found: &Findings, property: Option<&Property>) -> String {
     if !found.because.is_empty() {
         return found.because.join("; ");
@@ -119,12 +142,18 @@ fn words(found: &Findings, property: Option<&Property>) -> String {
         }
         return rows.join("; ");
     }
-    let unit = property.and_then(|p| p.unit.as_deref()).filter(|unit| *unit != "1").unwrap_or("");
+    let unit = property
+        .and_then(|p| p.unit.as_deref())
+        .filter(|unit| *unit != "1")
+        .unwrap_or("");
     match (found.holds, found.margin) {
         (true, _) => "nothing violates it".to_owned(),
-        (false, Some(margin)) => {
-            format!("no success was derived; missed by {} {unit}", short(-margin)).trim_end().to_owned()
-        }
+        (false, Some(margin)) => format!(
+            "no success was derived; missed by {} {unit}",
+            short(-margin)
+        )
+        .trim_end()
+        .to_owned(),
         (false, None) => "no success was derived".to_owned(),
     }
 }
@@ -133,7 +162,13 @@ fn spell(row: &WitnessRow) -> String {
     let values: Vec<String> = row
         .values
         .iter()
-        .map(|(name, term)| if name.is_empty() { readable(term) } else { format!("{name} = {}", readable(term)) })
+        .map(|(name, term)| {
+            if name.is_empty() {
+                readable(term)
+            } else {
+                format!("{name} = {}", readable(term))
+            }
+        })
         .collect();
     format!("{}({})", row.predicate, values.join(", "))
 }
@@ -154,7 +189,11 @@ fn short(value: f64) -> String {
     }
     let decimals = (3 - value.abs().log10().floor() as i32).clamp(0, 9);
     let text = format!("{value:.*}", usize::try_from(decimals).unwrap_or(0));
-    if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
+    if text.contains('.') {
+        text.trim_end_matches('0').trim_end_matches('.').to_owned()
+    } else {
+        text
+    }
 }
 
 #[cfg(test)]
@@ -175,13 +214,22 @@ mod tests {
     #[test]
     fn a_tool_fault_is_not_a_robot_failure() {
         assert_eq!(outcome_of(&found(false), None).0, Outcome::Failed);
-        assert_eq!(outcome_of(&Err(RuleFault::BudgetSpent("rule x".into())), None).0, Outcome::Timeout);
-        assert_eq!(outcome_of(&Err(RuleFault::Value("no number".into())), None).0, Outcome::Broken);
+        assert_eq!(
+            outcome_of(&Err(RuleFault::BudgetSpent("rule x".into())), None).0,
+            Outcome::Timeout
+        );
+        assert_eq!(
+            outcome_of(&Err(RuleFault::Value("no number".into())), None).0,
+            Outcome::Broken
+        );
     }
 
     #[test]
     fn witnesses_include_the_margin() {
-        assert_eq!(outcome_of(&found(false), None).2, "no success was derived; missed by 0.016");
+        assert_eq!(
+            outcome_of(&found(false), None).2,
+            "no success was derived; missed by 0.016"
+        );
         assert_eq!(short(0.000_412_34), "0.0004123");
         assert_eq!(short(1234.6), "1235");
     }

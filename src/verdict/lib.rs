@@ -1,4 +1,5 @@
-//! Turns the rules' findings into outcomes with witness and margin, and outcomes into scores and rates.
+//! Turns the rules' findings into outcomes with witness and margin, and outcomes into scores and
+//! rates.
 //!
 //! Never: evaluates a rule, reads a trace, or reduces the six outcomes to pass and fail.
 

@@ -4,7 +4,8 @@ use std::collections::BTreeSet;
 
 use actcheck_base::{Judgement, Outcome, names};
 
-/// How the failures of a scene compare with the expected ones. Properties are identified by their local names.
+/// How the failures of a scene compare with the expected ones. Properties are identified by their
+/// local names.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Recurrence {
     /// Exactly the expected properties fail. If none is expected, none fails.
@@ -19,8 +20,12 @@ pub enum Recurrence {
 
 impl Recurrence {
     /// Compares the properties expected to fail with the judgements of all actions.
-    pub fn of<'a>(expected: &BTreeSet<String>, judgements: impl Iterator<Item = &'a Judgement>) -> Self {
-        let (mut failed, mut undecided, mut decided) = (BTreeSet::new(), BTreeSet::new(), BTreeSet::new());
+    pub fn of<'a>(
+        expected: &BTreeSet<String>,
+        judgements: impl Iterator<Item = &'a Judgement>,
+    ) -> Self {
+        let (mut failed, mut undecided, mut decided) =
+            (BTreeSet::new(), BTreeSet::new(), BTreeSet::new());
         for judgement in judgements {
             let name = names::local(&judgement.property).to_owned();
             match judgement.outcome {
@@ -30,9 +35,16 @@ impl Recurrence {
             };
         }
         if !failed.is_empty() {
-            return if failed == *expected { Self::AsBefore } else { Self::Otherwise(failed) };
+            return if failed == *expected {
+                Self::AsBefore
+            } else {
+                Self::Otherwise(failed)
+            };
         }
-        let gone = expected.iter().filter(|name| !decided.contains(*name)).cloned();
+        let gone = expected
+            .iter()
+            .filter(|name| !decided.contains(*name))
+            .cloned();
         undecided.extend(gone);
         match undecided.is_empty() {
             false => Self::Undecided(undecided),
@@ -58,7 +70,11 @@ mod tests {
     use super::*;
 
     /// Properties expected to fail, outcome of each property, and the resulting recurrence.
-    type Row = (&'static [&'static str], &'static [(&'static str, Outcome)], Recurrence);
+    type Row = (
+        &'static [&'static str],
+        &'static [(&'static str, Outcome)],
+        Recurrence,
+    );
 
     fn recurrence(expected: &[&str], outcomes: &[(&str, Outcome)]) -> Recurrence {
         let judgements: Vec<Judgement> = outcomes
@@ -84,18 +100,50 @@ mod tests {
     fn every_kind_of_recurrence_is_distinguished() {
         use Outcome::{Broken, Failed, Inapplicable, Passed};
         let cases: [Row; 9] = [
-            (&["A"], &[("A", Failed), ("B", Passed)], Recurrence::AsBefore),
-            (&["A"], &[("A", Passed), ("B", Passed), ("A", Failed)], Recurrence::AsBefore),
-            (&["A"], &[("A", Passed), ("B", Passed)], Recurrence::NoLonger),
-            (&["A"], &[("A", Inapplicable), ("B", Passed)], Recurrence::NoLonger),
-            (&["A"], &[("A", Failed), ("B", Failed)], Recurrence::Otherwise(set(&["A", "B"]))),
+            (
+                &["A"],
+                &[("A", Failed), ("B", Passed)],
+                Recurrence::AsBefore,
+            ),
+            (
+                &["A"],
+                &[("A", Passed), ("B", Passed), ("A", Failed)],
+                Recurrence::AsBefore,
+            ),
+            (
+                &["A"],
+                &[("A", Passed), ("B", Passed)],
+                Recurrence::NoLonger,
+            ),
+            (
+                &["A"],
+                &[("A", Inapplicable), ("B", Passed)],
+                Recurrence::NoLonger,
+            ),
+            (
+                &["A"],
+                &[("A", Failed), ("B", Failed)],
+                Recurrence::Otherwise(set(&["A", "B"])),
+            ),
             (&[], &[("A", Failed)], Recurrence::Otherwise(set(&["A"]))),
             (&[], &[("A", Passed)], Recurrence::AsBefore),
-            (&["A"], &[("A", Broken), ("B", Broken)], Recurrence::Undecided(set(&["A", "B"]))),
-            (&["Gone"], &[("A", Passed)], Recurrence::Undecided(set(&["Gone"]))),
+            (
+                &["A"],
+                &[("A", Broken), ("B", Broken)],
+                Recurrence::Undecided(set(&["A", "B"])),
+            ),
+            (
+                &["Gone"],
+                &[("A", Passed)],
+                Recurrence::Undecided(set(&["Gone"])),
+            ),
         ];
         for (expected, outcomes, recurs) in cases {
-            assert_eq!(recurrence(expected, outcomes), recurs, "{expected:?} {outcomes:?}");
+            assert_eq!(
+                recurrence(expected, outcomes),
+                recurs,
+                "{expected:?} {outcomes:?}"
+            );
         }
         assert_eq!(recurrence(&[], &[]), Recurrence::Undecided(set(&[])));
     }

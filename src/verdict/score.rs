@@ -50,11 +50,14 @@ impl Counts {
 
     /// Returns the sum of all counts.
     pub fn total(self) -> u64 {
-        Outcome::ALL.into_iter().map(|outcome| self.get(outcome)).sum()
+        Outcome::ALL
+            .into_iter()
+            .map(|outcome| self.get(outcome))
+            .sum()
     }
 
-    /// Returns the number of passed and failed outcomes, the denominator of a pass rate. Only these are evidence about
-    /// the robot.
+    /// Returns the number of passed and failed outcomes, the denominator of a pass rate. Only these
+    /// are evidence about the robot.
     pub fn decided(self) -> u64 {
         self.passed + self.failed
     }
@@ -73,13 +76,17 @@ impl Counts {
 
 /// Computes A: the share of an action's properties that passed, in [0, 1].
 ///
-/// Inapplicable properties are not counted in the denominator. An action without applicable properties scores 0, like
-/// an action whose properties were all broken, timed out or untested: one that was not performed never raises the score of a
-/// run. Source: the paper, equation 1.
+/// Inapplicable properties are not counted in the denominator. An action without applicable
+/// properties scores 0, like an action whose properties were all broken, timed out or untested: one
+/// that was not performed never raises the score of a run. Source: the paper, equation 1.
 pub fn action_score(outcomes: impl IntoIterator<Item = Outcome>) -> f64 {
     let counts = Counts::of(outcomes);
     let applicable = counts.total() - counts.inapplicable;
-    if applicable == 0 { 0.0 } else { counts.passed as f64 / applicable as f64 }
+    if applicable == 0 {
+        0.0
+    } else {
+        counts.passed as f64 / applicable as f64
+    }
 }
 
 /// Computes S: the mean of A over a test's actions, in [0, 1]. Source: the paper, equation 2.
@@ -87,9 +94,12 @@ pub fn run_score(action_scores: &[f64]) -> f64 {
     mean(action_scores.iter().copied()).unwrap_or(0.0)
 }
 
-/// Returns the mean of the values, or `None` if there are none. T is the mean of S over runs (the paper, equation 3).
+/// Returns the mean of the values, or `None` if there are none. T is the mean of S over runs (the
+/// paper, equation 3).
 pub fn mean(values: impl IntoIterator<Item = f64>) -> Option<f64> {
-    let (sum, count) = values.into_iter().fold((0.0, 0u64), |(sum, count), value| (sum + value, count + 1));
+    let (sum, count) = values
+        .into_iter()
+        .fold((0.0, 0u64), |(sum, count), value| (sum + value, count + 1));
     (count > 0).then(|| sum / count as f64)
 }
 
@@ -123,7 +133,13 @@ mod tests {
                 .into_iter()
                 .zip([5, 3, 5, 4])
                 .map(|(passed, all)| {
-                    action_score((0..all).map(|i| if i < passed { Outcome::Passed } else { Outcome::Failed }))
+                    action_score((0..all).map(|i| {
+                        if i < passed {
+                            Outcome::Passed
+                        } else {
+                            Outcome::Failed
+                        }
+                    }))
                 })
                 .collect();
             run_score(&scores)
@@ -134,8 +150,14 @@ mod tests {
 
     #[test]
     fn a_run_that_tested_nothing_is_not_passed() {
-        assert_eq!(action_score([Outcome::Inapplicable, Outcome::Inapplicable]), 0.0);
-        assert_eq!(action_score([Outcome::Broken, Outcome::Timeout, Outcome::Untested]), 0.0);
+        assert_eq!(
+            action_score([Outcome::Inapplicable, Outcome::Inapplicable]),
+            0.0
+        );
+        assert_eq!(
+            action_score([Outcome::Broken, Outcome::Timeout, Outcome::Untested]),
+            0.0
+        );
         assert_eq!(action_score([]), 0.0);
         assert_eq!(action_score([Outcome::Passed, Outcome::Inapplicable]), 1.0);
         assert_eq!(action_score([Outcome::Passed, Outcome::Broken]), 0.5);

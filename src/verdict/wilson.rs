@@ -16,15 +16,18 @@ pub struct Interval {
     pub high: f64,
 }
 
-/// Computes Wilson's score interval (1927), which is valid for few trials and for rates of 0 and 1. Returns `None`
-/// without trials.
+/// Computes Wilson's score interval (1927), which is valid for few trials and for rates of 0 and 1.
+/// Returns `None` without trials.
 ///
 /// `successes` is clamped to `trials`.
 pub fn wilson(successes: u64, trials: u64) -> Option<Interval> {
     if trials == 0 {
         return None;
     }
-    #[expect(clippy::cast_precision_loss, reason = "counts of runs are far below 2^52")]
+    #[expect(
+        clippy::cast_precision_loss,
+        reason = "counts of runs are far below 2^52"
+    )]
     let (successes, trials) = (successes.min(trials) as f64, trials as f64);
     wilson_share(successes / trials, trials)
 }
@@ -38,10 +41,19 @@ pub fn wilson_share(rate: f64, trials: f64) -> Option<Interval> {
     }
     let denominator = 1.0 + Z * Z / trials;
     let centre = (rate + Z * Z / (2.0 * trials)) / denominator;
-    let half = Z / denominator * libm::sqrt(rate * (1.0 - rate) / trials + Z * Z / (4.0 * trials * trials));
+    let half = Z / denominator
+        * libm::sqrt(rate * (1.0 - rate) / trials + Z * Z / (4.0 * trials * trials));
     // At rates of 0 and 1, the end equals the rate exactly; avoid rounding errors.
-    let low = if rate == 0.0 { 0.0 } else { (centre - half).max(0.0) };
-    let high = if rate == 1.0 { 1.0 } else { (centre + half).min(1.0) };
+    let low = if rate == 0.0 {
+        0.0
+    } else {
+        (centre - half).max(0.0)
+    };
+    let high = if rate == 1.0 {
+        1.0
+    } else {
+        (centre + half).min(1.0)
+    };
     Some(Interval { rate, low, high })
 }
 
@@ -50,19 +62,27 @@ pub fn wilson_share(rate: f64, trials: f64) -> Option<Interval> {
 /// Source: the interval is widest at a rate of one half, where its width is z / √(n + z²).
 pub fn trials_for_width(width: f64) -> u64 {
     let trials = Z * Z * (1.0 / (width * width) - 1.0);
-    if trials.is_finite() && trials < 1e18 { trials.max(1.0).ceil() as u64 } else { u64::MAX }
+    if trials.is_finite() && trials < 1e18 {
+        trials.max(1.0).ceil() as u64
+    } else {
+        u64::MAX
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    /// Examples of Newcombe (1998), "Two-sided confidence intervals for the single proportion", table I, method 3.
+    /// Examples of Newcombe (1998), "Two-sided confidence intervals for the single proportion",
+    /// table I, method 3.
     #[test]
     fn intervals_match_published_values() {
-        for (successes, trials, low, high) in
-            [(81, 263, 0.2553, 0.3662), (15, 148, 0.0624, 0.1605), (0, 20, 0.0, 0.1611), (1, 29, 0.0061, 0.1718)]
-        {
+        for (successes, trials, low, high) in [
+            (81, 263, 0.2553, 0.3662),
+            (15, 148, 0.0624, 0.1605),
+            (0, 20, 0.0, 0.1611),
+            (1, 29, 0.0061, 0.1718),
+        ] {
             let interval = wilson(successes, trials).expect("the trials are not zero");
             assert!((interval.low - low).abs() < 5e-5, "{interval:?}");
             assert!((interval.high - high).abs() < 5e-5, "{interval:?}");
@@ -73,10 +93,18 @@ mod tests {
     fn the_number_of_trials_for_a_width_is_sufficient() {
         for width in [0.02, 0.05, 0.1, 0.3] {
             let trials = trials_for_width(width).next_multiple_of(2);
-            let spread = |trials| wilson(trials / 2, trials).map_or(1.0, |interval| interval.high - interval.low);
-            assert!(spread(trials) <= width && spread(trials - 4) > width, "{width}: {trials}");
+            let spread = |trials| {
+                wilson(trials / 2, trials).map_or(1.0, |interval| interval.high - interval.low)
+            };
+            assert!(
+                spread(trials) <= width && spread(trials - 4) > width,
+                "{width}: {trials}"
+            );
         }
-        assert_eq!((trials_for_width(1.0), trials_for_width(0.0)), (1, u64::MAX));
+        assert_eq!(
+            (trials_for_width(1.0), trials_for_width(0.0)),
+            (1, u64::MAX)
+        );
     }
 
     #[test]

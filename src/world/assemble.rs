@@ -2,8 +2,9 @@
 
 use nalgebra::{Isometry3, Rotation3, Translation3, UnitQuaternion, Vector3};
 use rapier3d::prelude::{
-    ActiveHooks, GenericJoint, InteractionGroups, JointAxesMask, JointAxis, MassProperties, MotorModel,
-    MultibodyJointHandle, PhysicsWorld, RigidBodyBuilder, RigidBodyHandle, SpringCoefficients,
+    ActiveHooks, GenericJoint, InteractionGroups, JointAxesMask, JointAxis, MassProperties,
+    MotorModel, MultibodyJointHandle, PhysicsWorld, RigidBodyBuilder, RigidBodyHandle,
+    SpringCoefficients,
 };
 
 use crate::WorldError;
@@ -15,44 +16,66 @@ use crate::layout::{Layout, Named};
 use crate::motor::Motor;
 use actcheck_data::RobotProfile;
 
-/// Position error at which a motor reaches its effort limit. Unit: metres. Stiffness is the effort limit divided by
-/// this.
+/// Position error at which a motor reaches its effort limit. Unit: metres. Stiffness is the effort
+/// limit divided by this.
 const SATURATION_M: f64 = 1e-3;
 /// As [`SATURATION_M`], for revolute joints. Unit: radians.
 const SATURATION_RAD: f64 = 0.02;
 /// Ratio of a motor's damping to its stiffness. Unit: seconds.
 const DAMPING_SECS: f64 = 0.02;
-/// A joint's viscous friction is strong from this share of its motor's damping on: the motor then makes up for it.
+/// A joint's viscous friction is strong from this share of its motor's damping on: the motor then
+/// makes up for it.
 const STRONG_FRICTION: f64 = 0.1;
-/// As [`DAMPING_SECS`], for fingers, which close with their full force up to nearly their largest speed.
+/// As [`DAMPING_SECS`], for fingers, which close with their full force up to nearly their largest
+/// speed.
 const FINGER_DAMPING_SECS: f64 = 0.1;
-/// Inertia of the motor of a finger, as the finger feels it. Unit: kilograms. Fingers of hobby grippers have gears of 1:50
-/// and more on rotors of some 1e-7 kg·m²; the number is an illustration. Without it, light fingers on a heavy hand swing
-/// sideways with a heavy object between them, and their grip alternates.
+/// Inertia of the motor of a finger, as the finger feels it. Unit: kilograms. Fingers of hobby
+/// grippers have gears of 1:50 and more on rotors of some 1e-7 kg·m²; the number is an
+/// illustration. Without it, light fingers on a heavy hand swing sideways with a heavy object
+/// between them, and their grip alternates.
 const ROTOR_KG: f64 = 0.05;
 /// Friction of the robot's links other than the fingers: painted metal and plastic.
 const LINK_FRICTION: f64 = 0.4;
-/// Natural frequency of the joint limits. Unit: hertz. The engine's default limits make a loaded joint bounce back.
+/// Natural frequency of the joint limits. Unit: hertz. The engine's default limits make a loaded
+/// joint bounce back.
 pub(super) const STOP_FREQUENCY_HZ: f32 = 60.0;
 /// Damping ratio of the joint limits.
 pub(super) const STOP_DAMPING: f32 = 5.0;
-/// Joint ranges wider than this get no limits in the engine, which saves solver time. Unit: metres or radians.
+/// Joint ranges wider than this get no limits in the engine, which saves solver time. Unit: metres
+/// or radians.
 pub(super) const WIDEST_RANGE: f64 = 20.0;
 
 /// Returns the home posture, with the base at its start pose and the fingers half open.
-pub(super) fn home(profile: &RobotProfile, model: &RobotModel, named: &Named, base: [f64; 3]) -> Vec<f64> {
-    let mut positions: Vec<f64> = model.joints.iter().map(|joint| 0.0_f64.clamp(joint.lower, joint.upper)).collect();
+pub(super) fn home(
+    profile: &RobotProfile,
+    model: &RobotModel,
+    named: &Named,
+    base: [f64; 3],
+) -> Vec<f64> {
+    let mut positions: Vec<f64> = model
+        .joints
+        .iter()
+        .map(|joint| 0.0_f64.clamp(joint.lower, joint.upper))
+        .collect();
     for (idx, position) in named.layout.arm.iter().zip(&profile.home) {
         positions[*idx] = position.clamp(model.joints[*idx].lower, model.joints[*idx].upper);
     }
     for (idx, position) in named.layout.base.iter().flatten().zip(base) {
         positions[*idx] = position;
     }
-    named.layout.gripper.set(&mut positions, profile.max_opening_m / 2.0);
+    named
+        .layout
+        .gripper
+        .set(&mut positions, profile.max_opening_m / 2.0);
     for idx in named.layout.gripper.joints() {
         positions[idx] = positions[idx].clamp(model.joints[idx].lower, model.joints[idx].upper);
     }
-    for (idx, joint) in model.joints.iter().enumerate().filter(|(idx, _)| !named.layout.gripper.contains(*idx)) {
+    for (idx, joint) in model
+        .joints
+        .iter()
+        .enumerate()
+        .filter(|(idx, _)| !named.layout.gripper.contains(*idx))
+    {
         if let Some((leader, factor, offset)) = joint.mimic {
             positions[idx] = (factor * positions[leader] + offset).clamp(joint.lower, joint.upper);
         }
@@ -70,7 +93,11 @@ pub(super) fn insert_links(
     let on_floor = links_on_floor(model, named, profile);
     let mut bodies = Vec::with_capacity(model.links.len());
     for (idx, (link, pose)) in model.links.iter().zip(poses).enumerate() {
-        let builder = if idx == 0 { RigidBodyBuilder::fixed() } else { RigidBodyBuilder::dynamic() };
+        let builder = if idx == 0 {
+            RigidBodyBuilder::fixed()
+        } else {
+            RigidBodyBuilder::dynamic()
+        };
         let inertia = link.inertia.map(to_real);
         let matrix = rapier3d::math::Matrix::from_cols_array(&[
             inertia.m11,
@@ -83,20 +110,41 @@ pub(super) fn insert_links(
             inertia.m23,
             inertia.m33,
         ]);
-        let mass = MassProperties::with_inertia_matrix(to_vector(&link.com), to_real(link.mass), matrix);
-        let body = engine.insert_body(builder.pose(to_pose(pose)).additional_mass_properties(mass).can_sleep(false));
+        let mass =
+            MassProperties::with_inertia_matrix(to_vector(&link.com), to_real(link.mass), matrix);
+        let body = engine.insert_body(
+            builder
+                .pose(to_pose(pose))
+                .additional_mass_properties(mass)
+                .can_sleep(false),
+        );
         let own_joint = idx.checked_sub(1);
-        let is_further = own_joint.is_some_and(|joint| named.layout.gripper.moves_further_finger(joint));
+        let is_further =
+            own_joint.is_some_and(|joint| named.layout.gripper.moves_further_finger(joint));
         let is_finger = is_further || named.finger_links.contains(&idx);
-        let friction = if is_finger { profile.finger_friction } else { LINK_FRICTION };
+        let friction = if is_finger {
+            profile.finger_friction
+        } else {
+            LINK_FRICTION
+        };
         let mut hooks = ActiveHooks::FILTER_CONTACT_PAIRS;
         // `LinkPairs` then drops contacts that can't close: solving all of them takes long.
         if link.has_many_pieces() {
             hooks |= ActiveHooks::MODIFY_SOLVER_CONTACTS;
         }
         for (shape, pose) in link.form().shapes() {
-            let collider = same_shape(shape, pose, Owner::Link(idx), friction, link.has_many_pieces());
-            let groups = if on_floor[idx] { off_floor() } else { InteractionGroups::all() };
+            let collider = same_shape(
+                shape,
+                pose,
+                Owner::Link(idx),
+                friction,
+                link.has_many_pieces(),
+            );
+            let groups = if on_floor[idx] {
+                off_floor()
+            } else {
+                InteractionGroups::all()
+            };
             let collider = collider.active_hooks(hooks);
             engine.insert_collider(collider.density(0.0).collision_groups(groups), Some(body));
         }
@@ -105,10 +153,16 @@ pub(super) fn insert_links(
     bodies
 }
 
-/// Marks the links below a planar base, such as wheels, which do not collide with the floor. The planar joints support
-/// and move the base; wheels in contact with the floor would disturb it.
-pub(super) fn links_on_floor(model: &RobotModel, named: &Named, profile: &RobotProfile) -> Vec<bool> {
-    let Layout { arm, head, gripper, .. } = &named.layout;
+/// Marks the links below a planar base, such as wheels, which do not collide with the floor. The
+/// planar joints support and move the base; wheels in contact with the floor would disturb it.
+pub(super) fn links_on_floor(
+    model: &RobotModel,
+    named: &Named,
+    profile: &RobotProfile,
+) -> Vec<bool> {
+    let Layout {
+        arm, head, gripper, ..
+    } = &named.layout;
     let mut on_floor = vec![profile.planar_base];
     for (idx, joint) in model.joints.iter().enumerate() {
         let lifted = arm.contains(&idx) || head.contains(&idx) || gripper.contains(idx);
@@ -125,11 +179,16 @@ pub(super) fn insert_joint(
     bodies: &[RigidBodyHandle],
 ) -> Option<MultibodyJointHandle> {
     let data = engine_joint(joint);
-    let handle = engine.multibody_joints.insert(bodies[joint.parent], bodies[idx + 1], data, true)?;
+    let handle =
+        engine
+            .multibody_joints
+            .insert(bodies[joint.parent], bodies[idx + 1], data, true)?;
     if let Some((multibody, link)) = engine.multibody_joints.get_mut(handle) {
         // `LinkPairs` decides which links collide.
         multibody.set_self_contacts_enabled(true);
-        let dof = multibody.link(link).map(rapier3d::prelude::MultibodyLink::assembly_id);
+        let dof = multibody
+            .link(link)
+            .map(rapier3d::prelude::MultibodyLink::assembly_id);
         if let Some(dof) = dof {
             multibody.damping_mut()[dof] = to_real(joint.damping);
         }
@@ -152,17 +211,22 @@ pub(super) fn insert_joints(
             reason: format!("joint `{}` closes a loop", joint.name),
         })?;
         let gripper = &named.layout.gripper;
-        let saturation = if joint.kind == JointKind::Prismatic { SATURATION_M } else { SATURATION_RAD };
-        let armature = gripper.armature(idx, ROTOR_KG);
-        let (saturation, max_effort, damping_secs) = match gripper.lever_m(idx).zip(gripper.effort_per_n(idx)) {
-            Some((lever_m, effort_per_n)) => {
-                let effort = joint.effort.min(profile.grip_force_n * effort_per_n);
-                (SATURATION_M / lever_m, effort, FINGER_DAMPING_SECS)
-            }
-            // The coupling moves it.
-            None if gripper.follows(idx) => (saturation, 0.0, DAMPING_SECS),
-            None => (saturation, joint.effort, DAMPING_SECS),
+        let saturation = if joint.kind == JointKind::Prismatic {
+            SATURATION_M
+        } else {
+            SATURATION_RAD
         };
+        let armature = gripper.armature(idx, ROTOR_KG);
+        let (saturation, max_effort, damping_secs) =
+            match gripper.lever_m(idx).zip(gripper.effort_per_n(idx)) {
+                Some((lever_m, effort_per_n)) => {
+                    let effort = joint.effort.min(profile.grip_force_n * effort_per_n);
+                    (SATURATION_M / lever_m, effort, FINGER_DAMPING_SECS)
+                }
+                // The coupling moves it.
+                None if gripper.follows(idx) => (saturation, 0.0, DAMPING_SECS),
+                None => (saturation, joint.effort, DAMPING_SECS),
+            };
         let stiffness = (max_effort / saturation).max(1.0);
         let damping = stiffness * damping_secs;
         let axis = engine_axis(joint);
@@ -182,13 +246,18 @@ pub(super) fn insert_joints(
             effort: 0.0,
             strength: 1.0,
             fastest: gripper.fastest(idx, joint.velocity),
-            friction: if joint.damping > STRONG_FRICTION * damping { joint.damping } else { 0.0 },
+            friction: if joint.damping > STRONG_FRICTION * damping {
+                joint.damping
+            } else {
+                0.0
+            },
         });
     }
     Ok(motors)
 }
 
-/// Returns the engine's axis of a joint, whose joints move along or about the x axis of a local frame.
+/// Returns the engine's axis of a joint, whose joints move along or about the x axis of a local
+/// frame.
 fn engine_axis(joint: &Joint) -> JointAxis {
     match joint.kind {
         JointKind::Prismatic => JointAxis::LinX,
@@ -210,7 +279,10 @@ fn engine_joint(joint: &Joint) -> GenericJoint {
     data.set_local_frame2(to_pose(&frame));
     data.set_motor_model(axis, MotorModel::ForceBased);
     if joint.upper - joint.lower < WIDEST_RANGE {
-        data.softness = SpringCoefficients { natural_frequency: STOP_FREQUENCY_HZ, damping_ratio: STOP_DAMPING };
+        data.softness = SpringCoefficients {
+            natural_frequency: STOP_FREQUENCY_HZ,
+            damping_ratio: STOP_DAMPING,
+        };
         data.set_limits(axis, [to_real(joint.lower), to_real(joint.upper)]);
     }
     data

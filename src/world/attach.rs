@@ -4,7 +4,8 @@ use std::collections::BTreeMap;
 
 use nalgebra::{Isometry3, Rotation3, Translation3, UnitQuaternion, Vector3};
 use rapier3d::prelude::{
-    ActiveHooks, GenericJoint, JointAxesMask, JointAxis, MotorModel, PhysicsWorld, RigidBodyHandle, SpringCoefficients,
+    ActiveHooks, GenericJoint, JointAxesMask, JointAxis, MotorModel, PhysicsWorld, RigidBodyHandle,
+    SpringCoefficients,
 };
 
 use crate::World;
@@ -12,8 +13,8 @@ use crate::convert::{to_pose, to_real};
 use crate::object::Object;
 use actcheck_data::{PartJoint, SceneObject};
 
-/// Gain of the control of velocity that friction is: it acts with its full force at any speed above a few millimetres per
-/// second. Unit: N·s/m per newton, or N·m·s per newton metre.
+/// Gain of the control of velocity that friction is: it acts with its full force at any speed above
+/// a few millimetres per second. Unit: N·s/m per newton, or N·m·s per newton metre.
 const FRICTION_GAIN: f64 = 200.0;
 /// Natural frequency of the joints. Unit: hertz. Stiff, so that a drawer does not leave its rails.
 const FREQUENCY_HZ: f32 = 60.0;
@@ -37,18 +38,28 @@ pub(super) struct Attachment {
 
 /// Attaches the parts among the objects, which are in the order of the scene.
 pub(super) fn attach(engine: &mut PhysicsWorld, scene: &[SceneObject], objects: &mut [Object]) {
-    let indices: BTreeMap<&str, usize> =
-        scene.iter().enumerate().map(|(idx, object)| (object.id.as_str(), idx)).collect();
+    let indices: BTreeMap<&str, usize> = scene
+        .iter()
+        .enumerate()
+        .map(|(idx, object)| (object.id.as_str(), idx))
+        .collect();
     for (idx, part) in scene.iter().enumerate() {
-        let Some(attached) = &part.attached else { continue };
-        let (Some(to), Some(whole)) = (indices.get(attached.to.as_str()), indices.get(attached.whole.as_str())) else {
+        let Some(attached) = &part.attached else {
+            continue;
+        };
+        let (Some(to), Some(whole)) = (
+            indices.get(attached.to.as_str()),
+            indices.get(attached.whole.as_str()),
+        ) else {
             continue;
         };
         let axis = Vector3::from(attached.joint.axis);
-        let along = Rotation3::rotation_between(&Vector3::x(), &axis)
-            .unwrap_or_else(|| Rotation3::from_axis_angle(&Vector3::z_axis(), std::f64::consts::PI));
+        let along = Rotation3::rotation_between(&Vector3::x(), &axis).unwrap_or_else(|| {
+            Rotation3::from_axis_angle(&Vector3::z_axis(), std::f64::consts::PI)
+        });
         let at = Translation3::from(Vector3::from(attached.joint.anchor_m));
-        let frame = attached.frame.to_isometry() * Isometry3::from_parts(at, UnitQuaternion::from(along));
+        let frame =
+            attached.frame.to_isometry() * Isometry3::from_parts(at, UnitQuaternion::from(along));
         let attachment = Attachment {
             to: *to,
             whole: *whole,
@@ -57,7 +68,12 @@ pub(super) fn attach(engine: &mut PhysicsWorld, scene: &[SceneObject], objects: 
             joint: attached.joint,
         };
         insert(engine, objects[*to].body, objects[idx].body, &attachment);
-        for handle in engine.bodies.get(objects[idx].body).map(|body| body.colliders().to_vec()).unwrap_or_default() {
+        for handle in engine
+            .bodies
+            .get(objects[idx].body)
+            .map(|body| body.colliders().to_vec())
+            .unwrap_or_default()
+        {
             if let Some(collider) = engine.colliders.get_mut(handle) {
                 collider.set_active_hooks(ActiveHooks::FILTER_CONTACT_PAIRS);
             }
@@ -66,8 +82,19 @@ pub(super) fn attach(engine: &mut PhysicsWorld, scene: &[SceneObject], objects: 
     }
 }
 
-fn insert(engine: &mut PhysicsWorld, carrier: RigidBodyHandle, part: RigidBodyHandle, attachment: &Attachment) {
-    let PartJoint { slides, range, damping, friction, .. } = attachment.joint;
+fn insert(
+    engine: &mut PhysicsWorld,
+    carrier: RigidBodyHandle,
+    part: RigidBodyHandle,
+    attachment: &Attachment,
+) {
+    let PartJoint {
+        slides,
+        range,
+        damping,
+        friction,
+        ..
+    } = attachment.joint;
     let (locked, axis) = match slides {
         true => (JointAxesMask::LOCKED_PRISMATIC_AXES, JointAxis::LinX),
         false => (JointAxesMask::LOCKED_REVOLUTE_AXES, JointAxis::AngX),
@@ -99,21 +126,31 @@ fn insert(engine: &mut PhysicsWorld, carrier: RigidBodyHandle, part: RigidBodyHa
 }
 
 impl World {
-    /// Returns the pose of the moved frame of a part's joint in its fixed one. Returns `None` if it is not a part.
+    /// Returns the pose of the moved frame of a part's joint in its fixed one. Returns `None` if it
+    /// is not a part.
     fn moved(&self, object: &Object) -> Option<(Isometry3<f64>, PartJoint)> {
         let attachment = object.attached.as_ref()?;
         let carrier = self.pose_of(&self.objects[attachment.to]) * attachment.on_carrier;
-        Some((carrier.inverse() * (self.pose_of(object) * attachment.on_part), attachment.joint))
+        Some((
+            carrier.inverse() * (self.pose_of(object) * attachment.on_part),
+            attachment.joint,
+        ))
     }
 
-    /// Returns how far a part is off the axis of its joint. Returns `None` if it is not a part. Unit: metres.
+    /// Returns how far a part is off the axis of its joint. Returns `None` if it is not a part.
+    /// Unit: metres.
     pub(super) fn off_its_joint_m(&self, object: &Object) -> Option<f64> {
         let (moved, joint) = self.moved(object)?;
-        let along = if joint.slides { 0.0 } else { moved.translation.x };
+        let along = if joint.slides {
+            0.0
+        } else {
+            moved.translation.x
+        };
         Some(Vector3::new(along, moved.translation.y, moved.translation.z).norm())
     }
 
-    /// Returns the position of the joint of an object that is a part of another one. Units: metres or radians.
+    /// Returns the position of the joint of an object that is a part of another one. Units: metres
+    /// or radians.
     pub(super) fn part_position(&self, object: &Object) -> Option<f64> {
         let (moved, joint) = self.moved(object)?;
         Some(match joint.slides {
@@ -126,6 +163,8 @@ impl World {
     /// Returns the whole that each part belongs to, by their indices in the scene.
     pub(super) fn wholes(&self) -> BTreeMap<usize, usize> {
         let parts = self.objects.iter().enumerate();
-        parts.filter_map(|(idx, object)| Some((idx, object.attached.as_ref()?.whole))).collect()
+        parts
+            .filter_map(|(idx, object)| Some((idx, object.attached.as_ref()?.whole)))
+            .collect()
     }
 }

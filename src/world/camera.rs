@@ -1,9 +1,9 @@
-//! A depth camera on the robot's camera link, or fixed in the world: casts one ray per pixel against all colliders,
-//! including the robot's own links.
+//! A depth camera on the robot's camera link, or fixed in the world: casts one ray per pixel
+//! against all colliders, including the robot's own links.
 //!
-//! An image's noise is one recorded choice, `sense.camera.frame`: a seed from which the noise of each pixel is derived.
-//! Its nominal value, 0, is an image without noise. So a replay sees the same image, and a shrunk run shows whether the
-//! failure needs camera noise.
+//! An image's noise is one recorded choice, `sense.camera.frame`: a seed from which the noise of
+//! each pixel is derived. Its nominal value, 0, is an image without noise. So a replay sees the
+//! same image, and a shrunk run shows whether the failure needs camera noise.
 
 use nalgebra::{Isometry3, Point3};
 use parry3d::shape::Shape;
@@ -15,8 +15,8 @@ use crate::engine::{Owner, SHELL};
 use crate::rays::{Lens, Solids};
 use actcheck_data::{Camera, ChoiceName, Choices, Look, Pose, Stream};
 
-/// Distance from the lens within which the camera does not see its own link: housings surround their lens, and their
-/// convex hulls close its opening. Unit: metres.
+/// Distance from the lens within which the camera does not see its own link: housings surround
+/// their lens, and their convex hulls close its opening. Unit: metres.
 const HOUSING_M: f64 = 0.1;
 
 /// Number of noise seeds, including 0 (no noise).
@@ -31,8 +31,8 @@ pub struct DepthImage {
     pub height: usize,
     /// Focal length. Unit: pixels.
     pub focal_px: f64,
-    /// Depth along the forward axis of each pixel, row by row from the upper left; 0 if nothing was measured. Unit:
-    /// metres.
+    /// Depth along the forward axis of each pixel, row by row from the upper left; 0 if nothing was
+    /// measured. Unit: metres.
     pub depths: Vec<f32>,
 }
 
@@ -44,14 +44,18 @@ impl DepthImage {
         (depth > 0.0).then(|| Point3::new(depth, depth * left, depth * up))
     }
 
-    /// Projects a point to the image: column from the left, row from the top. Returns `None` if it is behind the
-    /// camera.
+    /// Projects a point to the image: column from the left, row from the top. Returns `None` if it
+    /// is behind the camera.
     pub fn pixel(&self, point: &Point3<f64>) -> Option<[f64; 2]> {
         self.lens().pixel(point)
     }
 
     fn lens(&self) -> Lens {
-        Lens { width: self.width, height: self.height, focal_px: self.focal_px }
+        Lens {
+            width: self.width,
+            height: self.height,
+            focal_px: self.focal_px,
+        }
     }
 }
 
@@ -61,12 +65,16 @@ impl World {
         self.look_at_every(1, choices)
     }
 
-    /// Takes an image of which only every n-th pixel of every n-th row is measured, from the first on: the others are 0.
+    /// Takes an image of which only every n-th pixel of every n-th row is measured, from the first
+    /// on: the others are 0.
     pub fn look_at_every(&self, stride: usize, choices: &mut Choices) -> DepthImage {
         let began_secs = self.watch_secs();
         let camera = &self.sensing.camera;
         let frame = choices.index(ChoiceName::CameraFrame, FRAMES);
-        let noise = (frame > 0).then(|| Noise { camera, stream: Stream::new(frame as u64) });
+        let noise = (frame > 0).then(|| Noise {
+            camera,
+            stream: Stream::new(frame as u64),
+        });
         let eye = self.robot.kinematics.camera(&self.robot.state().0);
         let solids = Solids::new(lens(camera), &eye, self.solids(&eye));
         let image = picture(camera, &solids, noise.as_ref(), stride);
@@ -89,11 +97,22 @@ impl World {
     fn solids(&self, eye: &Isometry3<f64>) -> impl Iterator<Item = (Isometry3<f64>, &dyn Shape)> {
         let lens = to_vector(&eye.translation.vector);
         let own = self.robot.kinematics.camera_link();
-        let visible = self.engine.colliders.iter().map(|(_, collider)| collider).filter(move |collider| {
-            let Owner::Link(link) = Owner::from_tag(collider.user_data) else { return collider.user_data & SHELL == 0 };
-            let away = f64::from(collider.shape().distance_to_point(collider.position(), lens, true));
-            away > if Some(link) == own { HOUSING_M } else { 0.0 }
-        });
+        let visible = self
+            .engine
+            .colliders
+            .iter()
+            .map(|(_, collider)| collider)
+            .filter(move |collider| {
+                let Owner::Link(link) = Owner::from_tag(collider.user_data) else {
+                    return collider.user_data & SHELL == 0;
+                };
+                let away = f64::from(collider.shape().distance_to_point(
+                    collider.position(),
+                    lens,
+                    true,
+                ));
+                away > if Some(link) == own { HOUSING_M } else { 0.0 }
+            });
         visible.map(|collider| (self.shown_at(collider), collider.shape()))
     }
 
@@ -111,30 +130,52 @@ impl World {
 
 fn lens(camera: &Camera) -> Lens {
     let (width, height) = (camera.width as usize, camera.height as usize);
-    Lens { width, height, focal_px: f64::from(camera.width) / 2.0 / libm::tan(camera.field_of_view_rad / 2.0) }
+    Lens {
+        width,
+        height,
+        focal_px: f64::from(camera.width) / 2.0 / libm::tan(camera.field_of_view_rad / 2.0),
+    }
 }
 
-fn picture(camera: &Camera, solids: &Solids<'_>, noise: Option<&Noise<'_>>, stride: usize) -> DepthImage {
+fn picture(
+    camera: &Camera,
+    solids: &Solids<'_>,
+    noise: Option<&Noise<'_>>,
+    stride: usize,
+) -> DepthImage {
     let lens = lens(camera);
-    let Lens { width, height, focal_px } = lens;
+    let Lens {
+        width,
+        height,
+        focal_px,
+    } = lens;
     let mut depths = vec![0.0; width * height];
     for row in (0..height).step_by(stride) {
         for column in (0..width).step_by(stride) {
             let [left, up] = solids.slopes(column, row);
             let stretch = (1.0 + left * left + up * up).sqrt();
-            let depth = solids.first(column, row, camera.max_range_m / stretch).and_then(|hit| {
-                let range = hit.along * stretch;
-                let pixel = (row * width + column) as u64;
-                let measured = match noise {
-                    None => range,
-                    Some(noise) => noise.measure(pixel, range, || solids.sine(column, row, hit, stretch))?,
-                };
-                (range >= camera.min_range_m && measured > 0.0).then_some(to_real(measured / stretch))
-            });
+            let depth = solids
+                .first(column, row, camera.max_range_m / stretch)
+                .and_then(|hit| {
+                    let range = hit.along * stretch;
+                    let pixel = (row * width + column) as u64;
+                    let measured = match noise {
+                        None => range,
+                        Some(noise) => noise
+                            .measure(pixel, range, || solids.sine(column, row, hit, stretch))?,
+                    };
+                    (range >= camera.min_range_m && measured > 0.0)
+                        .then_some(to_real(measured / stretch))
+                });
             depths[row * width + column] = depth.unwrap_or(0.0);
         }
     }
-    DepthImage { width, height, focal_px, depths }
+    DepthImage {
+        width,
+        height,
+        focal_px,
+        depths,
+    }
 }
 
 /// The noise of one image.
@@ -144,21 +185,30 @@ struct Noise<'a> {
 }
 
 impl Noise<'_> {
-    /// Returns the measured range of a pixel, or `None` if it is dropped. `sine` computes the sine of the angle between
-    /// ray and surface.
+    /// Returns the measured range of a pixel, or `None` if it is dropped. `sine` computes the sine
+    /// of the angle between ray and surface.
     fn measure(&self, pixel: u64, range: f64, sine: impl FnOnce() -> f64) -> Option<f64> {
         let grazing = self.camera.grazing_rad;
-        let lost = if grazing > 0.0 { lost_at(sine(), grazing) } else { 0.0 };
+        let lost = if grazing > 0.0 {
+            lost_at(sine(), grazing)
+        } else {
+            0.0
+        };
         let kept = (1.0 - lost) * (1.0 - self.camera.dropout);
         let error = self.camera.range_noise_m * range * range * self.stream.bell(2 * pixel);
         (self.stream.unit(2 * pixel + 1) < kept).then_some(range + error)
     }
 }
 
-/// Share of pixels dropped on a surface seen at an angle with this sine: 1 at 0, and 0 from `grazing` on.
+/// Share of pixels dropped on a surface seen at an angle with this sine: 1 at 0, and 0 from
+/// `grazing` on.
 fn lost_at(sine: f64, grazing: f64) -> f64 {
     // An angle is at least its sine, so the slow arc sine is only needed for grazing rays.
-    if sine >= grazing { 0.0 } else { (1.0 - libm::asin(sine) / grazing).max(0.0) }
+    if sine >= grazing {
+        0.0
+    } else {
+        (1.0 - libm::asin(sine) / grazing).max(0.0)
+    }
 }
 
 #[cfg(test)]
@@ -168,11 +218,22 @@ mod tests {
     use super::*;
     use crate::robot::tests::{alone, lonely};
 
-    const SMALL: Camera = Camera { width: 64, height: 48, ..Camera::IDEAL };
+    const SMALL: Camera = Camera {
+        width: 64,
+        height: 48,
+        ..Camera::IDEAL
+    };
 
     fn look(shapes: &[(f64, &dyn Shape)]) -> DepthImage {
-        let placed = shapes.iter().map(|(ahead, shape)| (Isometry3::translation(*ahead, 0.0, 0.0), *shape));
-        picture(&SMALL, &Solids::new(lens(&SMALL), &Isometry3::identity(), placed), None, 1)
+        let placed = shapes
+            .iter()
+            .map(|(ahead, shape)| (Isometry3::translation(*ahead, 0.0, 0.0), *shape));
+        picture(
+            &SMALL,
+            &Solids::new(lens(&SMALL), &Isometry3::identity(), placed),
+            None,
+            1,
+        )
     }
 
     fn middle(image: &DepthImage) -> f64 {
@@ -185,21 +246,29 @@ mod tests {
         let open = lonely();
         let mut profile = open.robot.profile.as_ref().clone();
         let housing = "<link name=\"head_camera_link\"><collision><geometry><box size=\"0.1 0.1 0.1\"/></geometry></collision></link>";
-        let text = profile.urdf.text.replace("<link name=\"head_camera_link\"/>", housing);
+        let text = profile
+            .urdf
+            .text
+            .replace("<link name=\"head_camera_link\"/>", housing);
         assert_ne!(text, *profile.urdf.text);
         profile.urdf.text = text.into();
         let housed = alone(profile);
         let image = open.look(&mut Choices::random(1, 0));
-        assert!(image.depths.iter().any(|depth| *depth > 0.0), "it sees the floor");
+        assert!(
+            image.depths.iter().any(|depth| *depth > 0.0),
+            "it sees the floor"
+        );
         assert_eq!(housed.look(&mut Choices::random(1, 0)), image);
     }
 
     #[test]
     fn a_sparse_image_has_the_same_pixels() {
         let world = lonely();
-        let [image, sparse] = [1, 3].map(|stride| world.look_at_every(stride, &mut Choices::random(2, 0)));
+        let [image, sparse] =
+            [1, 3].map(|stride| world.look_at_every(stride, &mut Choices::random(2, 0)));
         for (idx, (depth, of_sparse)) in image.depths.iter().zip(&sparse.depths).enumerate() {
-            let taken = (idx / image.width).is_multiple_of(3) && (idx % image.width).is_multiple_of(3);
+            let taken =
+                (idx / image.width).is_multiple_of(3) && (idx % image.width).is_multiple_of(3);
             assert_eq!(*of_sparse, if taken { *depth } else { 0.0 }, "pixel {idx}");
         }
     }
@@ -211,7 +280,11 @@ mod tests {
         // The outermost pixel centres are half a pixel inside the field of view.
         let corner = image.point(0, 0).expect("the wall fills the picture");
         let outermost = 2.0 * libm::tan(0.5) * (63.0 / 64.0);
-        assert!((corner.y - outermost).abs() < 1e-4 && (corner.z - outermost * 47.0 / 63.0).abs() < 1e-4, "{corner}");
+        assert!(
+            (corner.y - outermost).abs() < 1e-4
+                && (corner.z - outermost * 47.0 / 63.0).abs() < 1e-4,
+            "{corner}"
+        );
         let [column, row] = image.pixel(&corner).expect("it is in front");
         assert!((column - 0.5).abs() < 1e-4 && (row - 0.5).abs() < 1e-4);
     }
@@ -228,15 +301,35 @@ mod tests {
 
     #[test]
     fn noise_grows_with_distance_and_grazing_rays_are_lost() {
-        let camera = Camera { range_noise_m: 0.01, dropout: 0.25, grazing_rad: 0.4, ..SMALL };
-        let noise = Noise { camera: &camera, stream: Stream::new(5) };
-        let values: Vec<Option<f64>> = (0..20_000).map(|pixel| noise.measure(pixel, 2.0, || 1.0)).collect();
+        let camera = Camera {
+            range_noise_m: 0.01,
+            dropout: 0.25,
+            grazing_rad: 0.4,
+            ..SMALL
+        };
+        let noise = Noise {
+            camera: &camera,
+            stream: Stream::new(5),
+        };
+        let values: Vec<Option<f64>> = (0..20_000)
+            .map(|pixel| noise.measure(pixel, 2.0, || 1.0))
+            .collect();
         let seen: Vec<f64> = values.iter().filter_map(|value| *value).collect();
-        let variance = seen.iter().map(|range| (range - 2.0).powi(2)).sum::<f64>() / seen.len() as f64;
+        let variance =
+            seen.iter().map(|range| (range - 2.0).powi(2)).sum::<f64>() / seen.len() as f64;
         assert!((variance.sqrt() - 0.04).abs() < 0.001, "{variance}");
-        assert!((seen.len() as f64 / 2e4 - 0.75).abs() < 0.01, "{}", seen.len());
-        let grazing = (0..20_000).filter(|pixel| noise.measure(*pixel, 2.0, || libm::sin(0.1)).is_some()).count();
-        assert!((grazing as f64 / 2e4 - 0.75 * 0.25).abs() < 0.01, "{grazing}");
+        assert!(
+            (seen.len() as f64 / 2e4 - 0.75).abs() < 0.01,
+            "{}",
+            seen.len()
+        );
+        let grazing = (0..20_000)
+            .filter(|pixel| noise.measure(*pixel, 2.0, || libm::sin(0.1)).is_some())
+            .count();
+        assert!(
+            (grazing as f64 / 2e4 - 0.75 * 0.25).abs() < 0.01,
+            "{grazing}"
+        );
         assert_eq!(noise.measure(0, 2.0, || 0.0), None);
     }
 }

@@ -56,12 +56,20 @@ impl World {
                 if *smallest <= 0.0 || self.are_balls_apart(link, object, *smallest) {
                     continue;
                 }
-                let boxes = boxes.get_or_insert_with(|| self.boxed(self.robot.bodies[link]).collect());
+                let boxes =
+                    boxes.get_or_insert_with(|| self.boxed(self.robot.bodies[link]).collect());
                 for (solid, its_box) in &solids {
                     for (link, link_box) in boxes.iter() {
                         if *smallest > 0.0 && gap(its_box, link_box) < *smallest {
-                            let found = distance(solid.position(), solid.shape(), link.position(), link.shape());
-                            *smallest = smallest.min(found.map_or(f64::INFINITY, |found| f64::from(found.distance)));
+                            let found = distance(
+                                solid.position(),
+                                solid.shape(),
+                                link.position(),
+                                link.shape(),
+                            );
+                            *smallest = smallest.min(
+                                found.map_or(f64::INFINITY, |found| f64::from(found.distance)),
+                            );
                         }
                     }
                 }
@@ -74,10 +82,15 @@ impl World {
     pub(super) fn clearances(&self) -> Vec<Clearance> {
         let objects = self.objects.iter().zip(&self.recorder.clearance.smallest_m);
         let near = objects.filter(|(_, smallest)| **smallest < RANGE_M);
-        near.map(|(object, smallest)| Clearance { id: object.id.clone(), smallest_m: *smallest }).collect()
+        near.map(|(object, smallest)| Clearance {
+            id: object.id.clone(),
+            smallest_m: *smallest,
+        })
+        .collect()
     }
 
-    /// Returns the distance from a point to the surface of an object's shapes; negative inside. Unit: metres.
+    /// Returns the distance from a point to the surface of an object's shapes; negative inside.
+    /// Unit: metres.
     pub(super) fn distance_to(&self, object: &Object, point: &Point3<f64>) -> f64 {
         let point = to_vector(&point.coords);
         let distances = self.colliders_of(object.body).map(|solid| {
@@ -90,7 +103,8 @@ impl World {
 
     /// Returns the colliders of a body with their boxes.
     pub(super) fn boxed(&self, body: RigidBodyHandle) -> impl Iterator<Item = (&Collider, Aabb)> {
-        self.colliders_of(body).map(|collider| (collider, collider.compute_aabb()))
+        self.colliders_of(body)
+            .map(|collider| (collider, collider.compute_aabb()))
     }
 }
 
@@ -117,15 +131,21 @@ pub(super) fn apart((one, its_box): &Boxed<'_>, (other, other_box): &Boxed<'_>, 
         return most;
     }
     let found = distance(one.position(), one.shape(), other.position(), other.shape());
-    found.map_or(0.0, |found| f64::from(found.distance)).min(most)
+    found
+        .map_or(0.0, |found| f64::from(found.distance))
+        .min(most)
 }
 
-/// Returns a lower bound of the distance of two colliders, of their boxes in their own frames. Unit: metres.
+/// Returns a lower bound of the distance of two colliders, of their boxes in their own frames.
+/// Unit: metres.
 fn turned_boxes_apart(one: &Collider, other: &Collider) -> f64 {
     let pose = from_pose(&one.position().inv_mul(other.position()));
     let [(middle, half), (other_middle, other_half)] = [one, other].map(|collider| {
         let bounds = collider.shape().compute_local_aabb();
-        (Point3::from(from_vector(bounds.center())), from_vector(bounds.half_extents()))
+        (
+            Point3::from(from_vector(bounds.center())),
+            from_vector(bounds.half_extents()),
+        )
     });
     let turned = Turned::new(pose.rotation.to_rotation_matrix().into_inner());
     turned.boxes_apart(pose * other_middle - middle, [&half, &other_half])
@@ -145,7 +165,10 @@ mod tests {
     /// A box of 10 cm, half a metre aside of the origin of its body, as a drawer may be.
     fn aside(pose: &Isometry3<f64>) -> SceneObject {
         let at = Isometry3::translation(0.5, 0.0, 0.0);
-        let part = Part { pose: Pose::from_isometry(&at), shape: Shape::Box { size: [0.1; 3] } };
+        let part = Part {
+            pose: Pose::from_isometry(&at),
+            shape: Shape::Box { size: [0.1; 3] },
+        };
         let model = ObjectModel {
             name: "drawer".to_owned(),
             category: String::new(),
@@ -185,16 +208,28 @@ mod tests {
             let object = object::insert(&mut world.engine, 0, &aside(&pose));
             world.objects.push(object);
             world.begin_clearance();
-            let links = world.robot.bodies.iter().flat_map(|body| world.colliders_of(*body));
+            let links = world
+                .robot
+                .bodies
+                .iter()
+                .flat_map(|body| world.colliders_of(*body));
             let solids: Vec<&Collider> = world.colliders_of(world.objects[0].body).collect();
             let all = links.flat_map(|link| solids.iter().map(move |solid| (link, *solid)));
             let nearest = all.map(|(link, solid)| {
-                let found = distance(solid.position(), solid.shape(), link.position(), link.shape());
+                let found = distance(
+                    solid.position(),
+                    solid.shape(),
+                    link.position(),
+                    link.shape(),
+                );
                 found.map_or(f64::INFINITY, |found| f64::from(found.distance))
             });
             let nearest = nearest.fold(RANGE_M, f64::min);
             let found = world.recorder.clearance.smallest_m[0];
-            assert!((found - nearest).abs() < 1e-6, "trial {trial}: {found} instead of {nearest}");
+            assert!(
+                (found - nearest).abs() < 1e-6,
+                "trial {trial}: {found} instead of {nearest}"
+            );
             n_near += usize::from(nearest < RANGE_M);
         }
         assert!(n_near > 10, "{n_near} near");
@@ -207,8 +242,11 @@ mod tests {
         let mut choices = Choices::random(8, 0);
         let hulls: Vec<_> = (0..3)
             .map(|_| {
-                let mut number = || crate::convert::to_real(choices.real("at".into(), -0.06, 0.06, 0.0));
-                let corners: Vec<Vector> = (0..20).map(|_| Vector::new(number(), number(), number())).collect();
+                let mut number =
+                    || crate::convert::to_real(choices.real("at".into(), -0.06, 0.06, 0.0));
+                let corners: Vec<Vector> = (0..20)
+                    .map(|_| Vector::new(number(), number(), number()))
+                    .collect();
                 crate::hull::Hull::of(&corners).expect("the corners are not in a plane")
             })
             .collect();
@@ -221,7 +259,9 @@ mod tests {
             );
             let shape = SharedShape::new(hull.with_memory());
             let collider = ColliderBuilder::new(shape).position(to_pose(&place));
-            world.engine.insert_collider(collider, Some(world.robot.bodies[links[idx % 2]]));
+            world
+                .engine
+                .insert_collider(collider, Some(world.robot.bodies[links[idx % 2]]));
         }
         let (mut n_near, mut n_touching) = (0, 0);
         for _ in 0..200 {
@@ -230,23 +270,38 @@ mod tests {
                 world.robot.positions[idx] += number(0.3);
             }
             world.robot.put_state(&mut world.engine);
-            let [solids, others] = links.map(|link| world.colliders_of(world.robot.bodies[link]).collect::<Vec<_>>());
+            let [solids, others] = links.map(|link| {
+                world
+                    .colliders_of(world.robot.bodies[link])
+                    .collect::<Vec<_>>()
+            });
             let gaps = solids.iter().flat_map(|one| {
                 others.iter().map(|other| {
-                    let found = distance(one.position(), one.shape(), other.position(), other.shape());
+                    let found =
+                        distance(one.position(), one.shape(), other.position(), other.shape());
                     f64::from(found.expect("both are convex").distance)
                 })
             });
             let nearest = gaps.fold(0.25, f64::min);
-            assert_eq!(world.gap_of_links(links[0], links[1]).to_bits(), nearest.to_bits());
-            (n_near, n_touching) = (n_near + u32::from(nearest < 0.25), n_touching + u32::from(nearest == 0.0));
+            assert_eq!(
+                world.gap_of_links(links[0], links[1]).to_bits(),
+                nearest.to_bits()
+            );
+            (n_near, n_touching) = (
+                n_near + u32::from(nearest < 0.25),
+                n_touching + u32::from(nearest == 0.0),
+            );
         }
-        assert!(n_near - n_touching > 40, "{n_near} near, of which {n_touching} touch");
+        assert!(
+            n_near - n_touching > 40,
+            "{n_near} near, of which {n_touching} touch"
+        );
     }
 
     #[test]
     fn the_gap_of_two_boxes_is_the_distance_of_their_nearest_points() {
-        let unit = |x: f32, y: f32| Aabb::new(Vector::new(x, y, 0.0), Vector::new(x + 1.0, y + 1.0, 1.0));
+        let unit =
+            |x: f32, y: f32| Aabb::new(Vector::new(x, y, 0.0), Vector::new(x + 1.0, y + 1.0, 1.0));
         assert!((gap(&unit(0.0, 0.0), &unit(4.0, 5.0)) - 5.0).abs() < 1e-6);
         assert_eq!(gap(&unit(0.0, 0.0), &unit(0.5, 0.5)), 0.0);
     }

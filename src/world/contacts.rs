@@ -4,7 +4,9 @@ use std::collections::BTreeMap;
 
 use nalgebra::{Point3, Vector3};
 use parry3d::query::TrackedContact;
-use rapier3d::prelude::{Collider, ContactData, ContactManifold, ContactPair, PhysicsWorld, SolverContact};
+use rapier3d::prelude::{
+    Collider, ContactData, ContactManifold, ContactPair, PhysicsWorld, SolverContact,
+};
 
 use crate::World;
 use crate::convert::{from_pose, from_vector};
@@ -12,7 +14,8 @@ use crate::engine::Owner;
 use crate::inertia::Twist;
 use crate::share::Share;
 
-/// Contact forces below this are solver noise: a tenth of the weight of the lightest shipped model. Unit: newtons.
+/// Contact forces below this are solver noise: a tenth of the weight of the lightest shipped model.
+/// Unit: newtons.
 pub const CONTACT_FLOOR_NEWTONS: f64 = 0.05;
 
 /// The contact of two bodies at one moment.
@@ -31,20 +34,33 @@ pub struct Touch {
 }
 
 impl Touch {
-    const NONE: Self =
-        Self { normal_n: 0.0, depth_m: 0.0, force_n: Vector3::new(0.0, 0.0, 0.0), point_m: [0.0; 3], strongest_n: 0.0 };
+    const NONE: Self = Self {
+        normal_n: 0.0,
+        depth_m: 0.0,
+        force_n: Vector3::new(0.0, 0.0, 0.0),
+        point_m: [0.0; 3],
+        strongest_n: 0.0,
+    };
 
     /// A touch at one point, with this force on the second of the pair.
     pub(super) fn at(normal_n: f64, force_n: Vector3<f64>, point_m: [f64; 3]) -> Self {
-        Self { normal_n, depth_m: 0.0, force_n, point_m, strongest_n: normal_n }
+        Self {
+            normal_n,
+            depth_m: 0.0,
+            force_n,
+            point_m,
+            strongest_n: normal_n,
+        }
     }
 }
 
-/// Largest force of contacts on a hand that the engine moves alone: a loaded arm gives way. Unit: newtons.
+/// Largest force of contacts on a hand that the engine moves alone: a loaded arm gives way. Unit:
+/// newtons.
 const MOST_PUSH: f64 = 20.0;
 
 impl World {
-    /// Returns all contacts above [`CONTACT_FLOOR_NEWTONS`] and the seal of a suction cup, by ordered pair of owners.
+    /// Returns all contacts above [`CONTACT_FLOOR_NEWTONS`] and the seal of a suction cup, by
+    /// ordered pair of owners.
     pub(super) fn touches(&self) -> BTreeMap<(Owner, Owner), Touch> {
         let mut found = touches(&self.engine);
         found.extend(self.seal_touch());
@@ -54,11 +70,18 @@ impl World {
         found
     }
 
-    /// Returns the force of all contacts on the robot's hand in the last step, with its torque about the world's
-    /// origin. Returns zero if the engine does not move the hand. Frame: world.
+    /// Returns the force of all contacts on the robot's hand in the last step, with its torque
+    /// about the world's origin. Returns zero if the engine does not move the hand. Frame: world.
     pub(super) fn push_on_hand(&self) -> Twist {
         let mut push = Twist::ZERO;
-        let Some(hand) = self.robot.hand.as_ref().filter(|_| self.robot.share != Share::Nothing) else { return push };
+        let Some(hand) = self
+            .robot
+            .hand
+            .as_ref()
+            .filter(|_| self.robot.share != Share::Nothing)
+        else {
+            return push;
+        };
         let engine = &self.engine;
         let per_second = 1.0 / f64::from(engine.integration_parameters.dt);
         let is_ours = |handle| {
@@ -66,14 +89,20 @@ impl World {
             let owner = collider.map(|collider| Owner::from_tag(collider.user_data));
             matches!(owner, Some(Owner::Link(link)) if hand.has(link))
         };
-        for pair in engine.narrow_phase.contact_pairs().filter(|pair| has_solved(pair)) {
+        for pair in engine
+            .narrow_phase
+            .contact_pairs()
+            .filter(|pair| has_solved(pair))
+        {
             // Links of the hand push each other with opposite forces.
             let sign = match (is_ours(pair.collider1), is_ours(pair.collider2)) {
                 (true, false) => -per_second,
                 (false, true) => per_second,
                 _ => continue,
             };
-            let Some(one) = engine.colliders.get(pair.collider1) else { continue };
+            let Some(one) = engine.colliders.get(pair.collider1) else {
+                continue;
+            };
             for manifold in pair.solver_manifolds() {
                 let normal = from_vector(manifold.data.normal);
                 for point in solved(manifold).filter(|point| point.data.impulse > 0.0) {
@@ -86,26 +115,40 @@ impl World {
         push
     }
 
-    /// Returns whether contacts push a hand that moves alone harder than its arm would hold unmoved.
+    /// Returns whether contacts push a hand that moves alone harder than its arm would hold
+    /// unmoved.
     pub(super) fn is_pushed_hard(&self) -> bool {
         self.robot.push_on_hand.shift.norm() > MOST_PUSH
     }
 }
 
-/// Returns whether the engine solved any point of a pair of colliders in the last step: it keeps many pairs that are near.
+/// Returns whether the engine solved any point of a pair of colliders in the last step: it keeps
+/// many pairs that are near.
 pub(super) fn has_solved(pair: &ContactPair) -> bool {
-    pair.solver_manifolds().iter().any(|manifold| !manifold.data.solver_contacts.is_empty())
+    pair.solver_manifolds()
+        .iter()
+        .any(|manifold| !manifold.data.solver_contacts.is_empty())
 }
 
-/// Returns the points of a contact that the engine solved in the last step. It leaves out some of those that it found: they
-/// keep the impulse of an earlier step.
-pub(super) fn solved(manifold: &ContactManifold) -> impl Iterator<Item = &TrackedContact<ContactData>> {
-    let indices = manifold.data.solver_contacts.iter().flat_map(SolverContact::contact_indices);
+/// Returns the points of a contact that the engine solved in the last step. It leaves out some of
+/// those that it found: they keep the impulse of an earlier step.
+pub(super) fn solved(
+    manifold: &ContactManifold,
+) -> impl Iterator<Item = &TrackedContact<ContactData>> {
+    let indices = manifold
+        .data
+        .solver_contacts
+        .iter()
+        .flat_map(SolverContact::contact_indices);
     indices.filter_map(|index| manifold.points.get(usize::try_from(index).ok()?))
 }
 
-/// Returns the impulse of normal force and friction on the second of a pair in the last step. Unit: N·s.
-pub(super) fn impulse_of(point: &TrackedContact<ContactData>, normal: &Vector3<f64>) -> Vector3<f64> {
+/// Returns the impulse of normal force and friction on the second of a pair in the last step. Unit:
+/// N·s.
+pub(super) fn impulse_of(
+    point: &TrackedContact<ContactData>,
+    normal: &Vector3<f64>,
+) -> Vector3<f64> {
     let impulse = f64::from(point.data.impulse);
     // The engine keeps friction only for the last substep, and as it acts on the first of the pair.
     let last = f64::from(point.data.warmstart_impulse);
@@ -113,15 +156,26 @@ pub(super) fn impulse_of(point: &TrackedContact<ContactData>, normal: &Vector3<f
     normal * impulse - from_vector(point.data.warmstart_tangent_world) * share
 }
 
-/// Returns the contacts above [`CONTACT_FLOOR_NEWTONS`] that the engine found, by ordered pair of owners.
+/// Returns the contacts above [`CONTACT_FLOOR_NEWTONS`] that the engine found, by ordered pair of
+/// owners.
 fn touches(engine: &PhysicsWorld) -> BTreeMap<(Owner, Owner), Touch> {
     let mut found: BTreeMap<(Owner, Owner), Touch> = BTreeMap::new();
     let per_second = 1.0 / f64::from(engine.integration_parameters.dt);
-    for pair in engine.narrow_phase.contact_pairs().filter(|pair| has_solved(pair)) {
+    for pair in engine
+        .narrow_phase
+        .contact_pairs()
+        .filter(|pair| has_solved(pair))
+    {
         let of = |handle| engine.colliders.get(handle);
-        let (Some(one), Some(other)) = (of(pair.collider1), of(pair.collider2)) else { continue };
+        let (Some(one), Some(other)) = (of(pair.collider1), of(pair.collider2)) else {
+            continue;
+        };
         let [first, second] = [one, other].map(|collider| Owner::from_tag(collider.user_data));
-        let (key, sign) = if first <= second { ((first, second), 1.0) } else { ((second, first), -1.0) };
+        let (key, sign) = if first <= second {
+            ((first, second), 1.0)
+        } else {
+            ((second, first), -1.0)
+        };
         for manifold in pair.solver_manifolds() {
             let normal = from_vector(manifold.data.normal);
             for point in solved(manifold) {
@@ -134,8 +188,10 @@ fn touches(engine: &PhysicsWorld) -> BTreeMap<(Owner, Owner), Touch> {
                 touch.normal_n += impulse * per_second;
                 if impulse * per_second > touch.strongest_n {
                     touch.strongest_n = impulse * per_second;
-                    touch.point_m =
-                        (from_pose(one.position()) * Point3::from(from_vector(point.local_p1))).coords.into();
+                    touch.point_m = (from_pose(one.position())
+                        * Point3::from(from_vector(point.local_p1)))
+                    .coords
+                    .into();
                 }
                 touch.force_n += impulse_of(point, &normal) * (sign * per_second);
             }

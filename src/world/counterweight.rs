@@ -9,8 +9,9 @@ use crate::kinematics::{holding_efforts, motion};
 
 /// Number of postures in which the weight is measured, besides that with all joints at 0.
 const N_POSTURES: usize = 64;
-/// Part of a joint's range by which it differs from one posture to the next; that of each further joint is the part of
-/// this one's multiple after the decimal point. It makes any number of postures even: the golden ratio.
+/// Part of a joint's range by which it differs from one posture to the next; that of each further
+/// joint is the part of this one's multiple after the decimal point. It makes any number of
+/// postures even: the golden ratio.
 const STRIDE: f64 = 0.618_033_988_749_894_9;
 
 /// A joint that can't hold the arm by its motor alone, and is simulated as balanced.
@@ -20,7 +21,8 @@ pub struct BalancedJoint {
     pub name: String,
     /// Largest effort of its motor. Unit: newtons or newton metres.
     pub effort: f64,
-    /// The effort that holds the arm's own weight in the worst measured posture. Unit: newtons or newton metres.
+    /// The effort that holds the arm's own weight in the worst measured posture. Unit: newtons or
+    /// newton metres.
     pub weight: f64,
 }
 
@@ -30,7 +32,11 @@ pub(super) fn balance(model: &mut RobotModel, arm: &[String]) {
     for (joint, weight) in model.joints.iter_mut().zip(weights) {
         let is_of_arm = joint.mimic.is_none() && arm.contains(&joint.name);
         if is_of_arm && weight > joint.effort && joint.effort > 0.0 {
-            model.balanced.push(BalancedJoint { name: joint.name.clone(), effort: joint.effort, weight });
+            model.balanced.push(BalancedJoint {
+                name: joint.name.clone(),
+                effort: joint.effort,
+                weight,
+            });
             joint.effort += weight;
         }
     }
@@ -43,13 +49,22 @@ fn weights(model: &RobotModel) -> Vec<f64> {
         let mut poses = vec![Isometry3::identity()];
         for (idx, joint) in model.joints.iter().enumerate() {
             let (lower, upper) = match joint.kind {
-                JointKind::Revolute => (joint.lower.max(-std::f64::consts::PI), joint.upper.min(std::f64::consts::PI)),
-                JointKind::Prismatic if joint.upper - joint.lower < f64::INFINITY => (joint.lower, joint.upper),
+                JointKind::Revolute => (
+                    joint.lower.max(-std::f64::consts::PI),
+                    joint.upper.min(std::f64::consts::PI),
+                ),
+                JointKind::Prismatic if joint.upper - joint.lower < f64::INFINITY => {
+                    (joint.lower, joint.upper)
+                }
                 JointKind::Prismatic => (0.0, 0.0),
             };
             #[expect(clippy::cast_precision_loss, reason = "Both numbers are small.")]
             let part = (posture as f64 * ((idx + 1) as f64 * STRIDE).fract()).fract();
-            let position = if posture == 0 { 0.0_f64.max(lower).min(upper) } else { lower + part * (upper - lower) };
+            let position = if posture == 0 {
+                0.0_f64.max(lower).min(upper)
+            } else {
+                lower + part * (upper - lower)
+            };
             poses.push(poses[joint.parent] * joint.origin * motion(joint, position));
         }
         for (weight, effort) in weights.iter_mut().zip(holding_efforts(model, &poses)) {
@@ -65,12 +80,17 @@ mod tests {
     use actcheck_base::{Files, Source};
     use std::path::Path;
 
-    /// A beam of 2 kg whose middle is 0.4 m from its hinge needs 2 kg · 9.81 m/s² · 0.4 m when it is level.
+    /// A beam of 2 kg whose middle is 0.4 m from its hinge needs 2 kg · 9.81 m/s² · 0.4 m when it
+    /// is level.
     #[test]
     fn a_beam_needs_its_weight_times_its_lever() {
         let path = Path::new("models/robots/mobile_manipulator.toml");
-        let mut profile = actcheck_config::robot::read(&Files::Shipped, path).expect("the shipped robot is valid");
-        assert_eq!(RobotModel::read(&profile).expect("it is valid").balanced, []);
+        let mut profile = actcheck_config::robot::read(&Files::Shipped, path)
+            .expect("the shipped robot is valid");
+        assert_eq!(
+            RobotModel::read(&profile).expect("it is valid").balanced,
+            []
+        );
         let beam = |effort: f64| {
             format!(
                 "<robot name=\"beam\"><link name=\"base\"/><link name=\"beam\"><inertial><origin xyz=\"0.4 0 0\"/>\
@@ -85,7 +105,9 @@ mod tests {
             RobotModel::read(&profile).expect("it is valid")
         };
         let model = read(5.0);
-        let [balanced] = model.balanced.as_slice() else { panic!("{:?}", model.balanced) };
+        let [balanced] = model.balanced.as_slice() else {
+            panic!("{:?}", model.balanced)
+        };
         let expected = 2.0 * 9.81 * 0.4;
         assert!((balanced.weight - expected).abs() < 1e-9, "{balanced:?}");
         assert!((model.joints[0].effort - 5.0 - expected).abs() < 1e-9);

@@ -1,5 +1,5 @@
-//! Converts a URDF to the simulated tree: movable links, with fixed links and those of joints without a role merged into
-//! them.
+//! Converts a URDF to the simulated tree: movable links, with fixed links and those of joints
+//! without a role merged into them.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
@@ -48,7 +48,8 @@ pub struct Joint {
     pub upper: f64,
     /// Largest force or torque.
     pub effort: f64,
-    /// Largest velocity: the joint's limit, or less if its motor can't reach that against its viscous friction.
+    /// Largest velocity: the joint's limit, or less if its motor can't reach that against its
+    /// viscous friction.
     pub velocity: f64,
     /// Viscous friction.
     pub damping: f64,
@@ -79,23 +80,34 @@ pub struct Link {
     points: Arc<Mutex<PointsBySpacing>>,
 }
 
-/// Points on a link, by the bits of their spacing: plans ask for the same few spacings again and again.
+/// Points on a link, by the bits of their spacing: plans ask for the same few spacings again and
+/// again.
 type PointsBySpacing = BTreeMap<u64, Arc<[Point3<f64>]>>;
 
 impl Link {
-    /// Returns points on its shapes, at most about `spacing` apart, in the link's frame. Unit: metres.
+    /// Returns points on its shapes, at most about `spacing` apart, in the link's frame. Unit:
+    /// metres.
     pub(crate) fn points(&self, spacing: f64) -> Arc<[Point3<f64>]> {
         let of = |solid: &Part| {
             let pose = solid.pose.to_isometry();
-            spread(&solid.shape, spacing).into_iter().map(move |point| pose * point)
+            spread(&solid.shape, spacing)
+                .into_iter()
+                .map(move |point| pose * point)
         };
         let mut known = self.points.lock().unwrap_or_else(PoisonError::into_inner);
-        Arc::clone(known.entry(spacing.to_bits()).or_insert_with(|| self.solids.iter().flat_map(of).collect()))
+        Arc::clone(
+            known
+                .entry(spacing.to_bits())
+                .or_insert_with(|| self.solids.iter().flat_map(of).collect()),
+        )
     }
 
     /// Returns its shapes for measurements.
     pub(crate) fn surface(&self) -> Arc<Surface> {
-        Arc::clone(self.surface.get_or_init(|| Arc::new(Surface::of(&self.solids))))
+        Arc::clone(
+            self.surface
+                .get_or_init(|| Arc::new(Surface::of(&self.solids))),
+        )
     }
 
     /// Returns its shapes for collisions with other links.
@@ -111,7 +123,8 @@ pub struct RobotModel {
     pub links: Vec<Link>,
     /// One less than `links`.
     pub joints: Vec<Joint>,
-    /// For every URDF link: the index of the link that it was merged into, and its pose in that link's frame.
+    /// For every URDF link: the index of the link that it was merged into, and its pose in that
+    /// link's frame.
     frames: BTreeMap<String, (usize, Isometry3<f64>)>,
     /// For every URDF link with shapes: the link that it was merged into, and its solids there.
     shapes: BTreeMap<String, (usize, Range<usize>)>,
@@ -133,21 +146,28 @@ pub struct RobotModel {
     name: String,
 }
 
-/// Moment of inertia of links lighter than [`LEAST_LINK_KG`]: that of a ball of this mass with a radius of 1 cm. Unit:
-/// kg·m².
+/// Moment of inertia of links lighter than [`LEAST_LINK_KG`]: that of a ball of this mass with a
+/// radius of 1 cm. Unit: kg·m².
 const LEAST_INERTIA: f64 = 4e-7;
 
 impl RobotModel {
     /// Reads the robot of a profile's URDF.
     ///
     /// # Errors
-    /// [`WorldError`] if the text is not a URDF, is not a single tree, or contains unsupported elements.
+    /// [`WorldError`] if the text is not a URDF, is not a single tree, or contains unsupported
+    /// elements.
     pub fn read(profile: &RobotProfile) -> Result<Self, WorldError> {
         let name = profile.urdf.name.to_string();
-        let robot = urdf_rs::read_from_string(&profile.urdf.text)
-            .map_err(|error| WorldError::Urdf { name: name.clone(), reason: one_line(&error.to_string()) })?;
+        let robot =
+            urdf_rs::read_from_string(&profile.urdf.text).map_err(|error| WorldError::Urdf {
+                name: name.clone(),
+                reason: one_line(&error.to_string()),
+            })?;
         if robot.links.is_empty() {
-            return Err(WorldError::Urdf { name, reason: "it has no links".to_owned() });
+            return Err(WorldError::Urdf {
+                name,
+                reason: "it has no links".to_owned(),
+            });
         }
         Folding::new(&robot, name, profile)?.fold(profile)
     }
@@ -157,38 +177,55 @@ impl RobotModel {
     /// # Errors
     /// [`WorldError::Missing`] with the nearest name.
     pub fn joint(&self, joint: &str) -> Result<usize, WorldError> {
-        self.joints.iter().position(|known| known.name == joint).ok_or_else(|| WorldError::Missing {
-            name: self.name.clone(),
-            kind: "movable joint",
-            missing: joint.to_owned(),
-            help: did_you_mean(
-                joint,
-                self.joints.iter().map(|known| &known.name).chain(&self.rigid).map(String::as_str),
-            ),
-        })
+        self.joints
+            .iter()
+            .position(|known| known.name == joint)
+            .ok_or_else(|| WorldError::Missing {
+                name: self.name.clone(),
+                kind: "movable joint",
+                missing: joint.to_owned(),
+                help: did_you_mean(
+                    joint,
+                    self.joints
+                        .iter()
+                        .map(|known| &known.name)
+                        .chain(&self.rigid)
+                        .map(String::as_str),
+                ),
+            })
     }
 
-    /// All URDF links, each with the link that it was merged into and its pose in that link's frame, by name.
+    /// All URDF links, each with the link that it was merged into and its pose in that link's
+    /// frame, by name.
     pub(crate) fn frames(&self) -> impl Iterator<Item = (&str, &(usize, Isometry3<f64>))> {
-        self.frames.iter().map(|(name, frame)| (name.as_str(), frame))
+        self.frames
+            .iter()
+            .map(|(name, frame)| (name.as_str(), frame))
     }
 
-    /// All URDF links with shapes, each with the link that it was merged into and its solids there, by name.
+    /// All URDF links with shapes, each with the link that it was merged into and its solids there,
+    /// by name.
     pub(crate) fn shapes_of_links(&self) -> impl Iterator<Item = (&str, usize, Range<usize>)> {
-        self.shapes.iter().map(|(name, (link, solids))| (name.as_str(), *link, solids.clone()))
+        self.shapes
+            .iter()
+            .map(|(name, (link, solids))| (name.as_str(), *link, solids.clone()))
     }
 
-    /// Returns the index of the link that a URDF link was merged into, and its pose in that link's frame.
+    /// Returns the index of the link that a URDF link was merged into, and its pose in that link's
+    /// frame.
     ///
     /// # Errors
     /// [`WorldError::Missing`] with the nearest name.
     pub fn frame(&self, link: &str) -> Result<(usize, Isometry3<f64>), WorldError> {
-        self.frames.get(link).copied().ok_or_else(|| WorldError::Missing {
-            name: self.name.clone(),
-            kind: "link",
-            missing: link.to_owned(),
-            help: did_you_mean(link, self.frames.keys().map(String::as_str)),
-        })
+        self.frames
+            .get(link)
+            .copied()
+            .ok_or_else(|| WorldError::Missing {
+                name: self.name.clone(),
+                kind: "link",
+                missing: link.to_owned(),
+                help: did_you_mean(link, self.frames.keys().map(String::as_str)),
+            })
     }
 }
 
@@ -205,23 +242,40 @@ struct Folding<'a> {
 }
 
 impl<'a> Folding<'a> {
-    fn new(robot: &'a urdf_rs::Robot, name: String, profile: &'a RobotProfile) -> Result<Self, WorldError> {
-        let links = robot.links.iter().map(|link| (link.name.as_str(), link)).collect();
+    fn new(
+        robot: &'a urdf_rs::Robot,
+        name: String,
+        profile: &'a RobotProfile,
+    ) -> Result<Self, WorldError> {
+        let links = robot
+            .links
+            .iter()
+            .map(|link| (link.name.as_str(), link))
+            .collect();
         let mut children: BTreeMap<&str, Vec<&urdf_rs::Joint>> = BTreeMap::new();
         let mut parents: BTreeMap<&str, &str> = BTreeMap::new();
         for joint in &robot.joints {
-            if parents.insert(joint.child.link.as_str(), joint.parent.link.as_str()).is_some() {
+            if parents
+                .insert(joint.child.link.as_str(), joint.parent.link.as_str())
+                .is_some()
+            {
                 let reason = format!("the link `{}` has two parents", joint.child.link);
                 return Err(WorldError::Urdf { name, reason });
             }
-            children.entry(joint.parent.link.as_str()).or_default().push(joint);
+            children
+                .entry(joint.parent.link.as_str())
+                .or_default()
+                .push(joint);
         }
         let out = RobotModel {
             links: Vec::new(),
             joints: Vec::new(),
             frames: BTreeMap::new(),
             shapes: BTreeMap::new(),
-            floats: robot.joints.iter().any(|joint| joint.joint_type == urdf_rs::JointType::Floating),
+            floats: robot
+                .joints
+                .iter()
+                .any(|joint| joint.joint_type == urdf_rs::JointType::Floating),
             own_leaders: BTreeMap::new(),
             passing: BTreeSet::new(),
             rigid: Vec::new(),
@@ -230,16 +284,36 @@ impl<'a> Folding<'a> {
             assumed_speeds: Vec::new(),
             name,
         };
-        Ok(Self { robot, links, children, meshes: &profile.meshes, surfaces: &profile.surfaces, out })
+        Ok(Self {
+            robot,
+            links,
+            children,
+            meshes: &profile.meshes,
+            surfaces: &profile.surfaces,
+            out,
+        })
     }
 
     fn fold(mut self, profile: &RobotProfile) -> Result<RobotModel, WorldError> {
-        let is_child = |name: &str| self.robot.joints.iter().any(|joint| joint.child.link == name);
-        let roots: Vec<&str> =
-            self.robot.links.iter().map(|link| link.name.as_str()).filter(|name| !is_child(name)).collect();
+        let is_child = |name: &str| {
+            self.robot
+                .joints
+                .iter()
+                .any(|joint| joint.child.link == name)
+        };
+        let roots: Vec<&str> = self
+            .robot
+            .links
+            .iter()
+            .map(|link| link.name.as_str())
+            .filter(|name| !is_child(name))
+            .collect();
         let [root] = roots.as_slice() else {
             let reason = format!("it has {} roots instead of one", roots.len());
-            return Err(WorldError::Urdf { name: self.out.name, reason });
+            return Err(WorldError::Urdf {
+                name: self.out.name,
+                reason,
+            });
         };
         if let (true, Some(names)) = (profile.planar_base, &profile.base_joints) {
             self.add_planar_base(names);
@@ -249,26 +323,53 @@ impl<'a> Folding<'a> {
         // Links whose children are still to be visited, with the merged link that they belong to.
         let mut open = vec![(*root, self.out.links.len() - 1, Isometry3::identity())];
         while let Some((name, into, at)) = open.pop() {
-            self.merge(name, into, &at, !profile.no_collision_links.iter().any(|without| without == name))?;
-            for joint in self.children.get(name).cloned().unwrap_or_default().into_iter().rev() {
+            self.merge(
+                name,
+                into,
+                &at,
+                !profile
+                    .no_collision_links
+                    .iter()
+                    .any(|without| without == name),
+            )?;
+            for joint in self
+                .children
+                .get(name)
+                .cloned()
+                .unwrap_or_default()
+                .into_iter()
+                .rev()
+            {
                 let origin = at * isometry(&joint.origin);
                 if is_rigid(joint) {
                     open.push((&joint.child.link, into, origin));
                 } else if !needed.contains(joint) {
                     let rigid = self.movable(joint, into, origin)?;
                     self.out.rigid.push(joint.name.clone());
-                    open.push((&joint.child.link, into, origin * motion(&rigid, needed.rest(joint))));
+                    open.push((
+                        &joint.child.link,
+                        into,
+                        origin * motion(&rigid, needed.rest(joint)),
+                    ));
                 } else {
                     self.out.joints.push(self.movable(joint, into, origin)?);
                     self.out.links.push(empty_link(&joint.child.link));
-                    open.push((&joint.child.link, self.out.links.len() - 1, Isometry3::identity()));
+                    open.push((
+                        &joint.child.link,
+                        self.out.links.len() - 1,
+                        Isometry3::identity(),
+                    ));
                 }
             }
         }
         self.resolve_mimics(&needed)?;
         let link = |name: &str| self.out.frames.get(name).map(|(link, _)| *link);
-        let pairs = disabled_collisions(&profile.urdf.text).filter_map(|[a, b]| Some((link(&a)?, link(&b)?)));
-        self.out.passing = pairs.filter(|(a, b)| a != b).map(|(a, b)| (a.min(b), a.max(b))).collect();
+        let pairs = disabled_collisions(&profile.urdf.text)
+            .filter_map(|[a, b]| Some((link(&a)?, link(&b)?)));
+        self.out.passing = pairs
+            .filter(|(a, b)| a != b)
+            .map(|(a, b)| (a.min(b), a.max(b)))
+            .collect();
         for link in &mut self.out.links {
             if link.mass == 0.0 {
                 link.weigh();
@@ -286,7 +387,8 @@ impl<'a> Folding<'a> {
         Ok(self.out)
     }
 
-    /// Adds an omnidirectional base below the URDF's root, with the speeds and efforts of the mobile manipulator.
+    /// Adds an omnidirectional base below the URDF's root, with the speeds and efforts of the
+    /// mobile manipulator.
     fn add_planar_base(&mut self, names: &[String; 3]) {
         let axes = [Vector3::x_axis(), Vector3::y_axis(), Vector3::z_axis()];
         for (parent, (name, axis)) in names.iter().zip(axes).enumerate() {
@@ -294,7 +396,11 @@ impl<'a> Folding<'a> {
             self.out.links.push(empty_link(name));
             self.out.joints.push(Joint {
                 name: name.clone(),
-                kind: if turns { JointKind::Revolute } else { JointKind::Prismatic },
+                kind: if turns {
+                    JointKind::Revolute
+                } else {
+                    JointKind::Prismatic
+                },
                 parent,
                 origin: Isometry3::identity(),
                 axis,
@@ -308,12 +414,22 @@ impl<'a> Folding<'a> {
         }
     }
 
-    /// Merges a URDF link into a movable link: mass, inertia (by the parallel axis theorem) and shapes, if it has them.
-    fn merge(&mut self, name: &str, into: usize, at: &Isometry3<f64>, has_shapes: bool) -> Result<(), WorldError> {
+    /// Merges a URDF link into a movable link: mass, inertia (by the parallel axis theorem) and
+    /// shapes, if it has them.
+    fn merge(
+        &mut self,
+        name: &str,
+        into: usize,
+        at: &Isometry3<f64>,
+        has_shapes: bool,
+    ) -> Result<(), WorldError> {
         self.out.frames.insert(name.to_owned(), (into, *at));
         let Some(source) = self.links.get(name) else {
             let reason = format!("a joint refers to a missing link `{name}`");
-            return Err(WorldError::Urdf { name: self.out.name.clone(), reason });
+            return Err(WorldError::Urdf {
+                name: self.out.name.clone(),
+                reason,
+            });
         };
         let inertial = at * isometry(&source.inertial.origin);
         let added = Mass {
@@ -334,16 +450,26 @@ impl<'a> Folding<'a> {
             let first = before + solids.len();
             solids.extend(shapes.into_iter().map(|shape| Part { pose, shape }));
             let pieces = first..before + solids.len();
-            materials.extend(self.material(&collision.geometry, origin).map(|of| (pieces, Arc::new(of))));
+            materials.extend(
+                self.material(&collision.geometry, origin)
+                    .map(|of| (pieces, Arc::new(of))),
+            );
         }
         let link = &mut self.out.links[into];
         link.materials.extend(materials);
-        let sum = Mass { mass: link.mass, com: link.com, inertia: link.inertia }.plus(&added);
+        let sum = Mass {
+            mass: link.mass,
+            com: link.com,
+            inertia: link.inertia,
+        }
+        .plus(&added);
         (link.mass, link.com, link.inertia) = (sum.mass, sum.com, sum.inertia);
         let first = link.solids.len();
         link.solids.extend(solids);
         if link.solids.len() > first {
-            self.out.shapes.insert(name.to_owned(), (into, first..link.solids.len()));
+            self.out
+                .shapes
+                .insert(name.to_owned(), (into, first..link.solids.len()));
         }
         Ok(())
     }
@@ -353,16 +479,25 @@ impl<'a> Folding<'a> {
         Ok(match geometry {
             urdf_rs::Geometry::Box { size } => vec![Shape::Box { size: size.0 }],
             urdf_rs::Geometry::Cylinder { radius, length } => {
-                vec![Shape::Cylinder { radius: *radius, height: *length }]
+                vec![Shape::Cylinder {
+                    radius: *radius,
+                    height: *length,
+                }]
             }
             urdf_rs::Geometry::Sphere { radius } => vec![Shape::Sphere { radius: *radius }],
-            urdf_rs::Geometry::Capsule { radius, length } => vec![Shape::Capsule { radius: *radius, height: *length }],
+            urdf_rs::Geometry::Capsule { radius, length } => vec![Shape::Capsule {
+                radius: *radius,
+                height: *length,
+            }],
             urdf_rs::Geometry::Mesh { filename, scale } => {
                 let scale = scale.map_or([1.0; 3], |scale| scale.0);
-                let solids = self.meshes.get(filename).ok_or_else(|| WorldError::Unsupported {
-                    name: self.out.name.clone(),
-                    what: format!("the mesh {filename} of `{link}`, which was not loaded,"),
-                })?;
+                let solids = self
+                    .meshes
+                    .get(filename)
+                    .ok_or_else(|| WorldError::Unsupported {
+                        name: self.out.name.clone(),
+                        what: format!("the mesh {filename} of `{link}`, which was not loaded,"),
+                    })?;
                 solids.iter().map(|solid| solid.scaled(scale)).collect()
             }
         })
@@ -370,7 +505,9 @@ impl<'a> Folding<'a> {
 
     /// Returns the mesh of a collision geometry, as its file has it; `None` for a primitive.
     fn material(&self, geometry: &urdf_rs::Geometry, origin: Isometry3<f64>) -> Option<Material> {
-        let urdf_rs::Geometry::Mesh { filename, scale } = geometry else { return None };
+        let urdf_rs::Geometry::Mesh { filename, scale } = geometry else {
+            return None;
+        };
         let scale = scale.map_or([1.0; 3], |scale| scale.0);
         let mesh = match self.surfaces.get(filename).map(Vec::as_slice) {
             Some([only]) => Arc::clone(only),
@@ -384,19 +521,33 @@ impl<'a> Folding<'a> {
         Some(Material::new(mesh, scale, origin))
     }
 
-    fn movable(&self, joint: &urdf_rs::Joint, parent: usize, origin: Isometry3<f64>) -> Result<Joint, WorldError> {
+    fn movable(
+        &self,
+        joint: &urdf_rs::Joint,
+        parent: usize,
+        origin: Isometry3<f64>,
+    ) -> Result<Joint, WorldError> {
         let kind = match joint.joint_type {
             urdf_rs::JointType::Prismatic => JointKind::Prismatic,
             urdf_rs::JointType::Revolute | urdf_rs::JointType::Continuous => JointKind::Revolute,
             _ => {
                 let what = format!("the type of joint `{}`", joint.name);
-                return Err(WorldError::Unsupported { name: self.out.name.clone(), what });
+                return Err(WorldError::Unsupported {
+                    name: self.out.name.clone(),
+                    what,
+                });
             }
         };
         let limited = joint.joint_type != urdf_rs::JointType::Continuous;
-        let damping = joint.dynamics.as_ref().map_or(0.0, |dynamics| dynamics.damping);
-        let (lower, upper) =
-            if limited { (joint.limit.lower, joint.limit.upper) } else { (f64::NEG_INFINITY, f64::INFINITY) };
+        let damping = joint
+            .dynamics
+            .as_ref()
+            .map_or(0.0, |dynamics| dynamics.damping);
+        let (lower, upper) = if limited {
+            (joint.limit.lower, joint.limit.upper)
+        } else {
+            (f64::NEG_INFINITY, f64::INFINITY)
+        };
         Ok(Joint {
             name: joint.name.clone(),
             kind,
@@ -420,9 +571,12 @@ impl<'a> Folding<'a> {
             let (factor, offset) = (mimic.multiplier.unwrap_or(1.0), mimic.offset.unwrap_or(0.0));
             self.out.joints[follower].mimic = Some((leader, factor, offset));
         }
-        // Each follows the joint at the end of its chain: the engine closes one coupling better than two.
+        // Each follows the joint at the end of its chain: the engine closes one coupling better
+        // than two.
         for idx in 0..self.out.joints.len() {
-            if let (Some(_), (leader, factor, offset)) = (self.out.joints[idx].mimic, self.out.leader_of(idx)) {
+            if let (Some(_), (leader, factor, offset)) =
+                (self.out.joints[idx].mimic, self.out.leader_of(idx))
+            {
                 self.out.joints[idx].mimic = Some((leader, factor, offset));
             }
         }
@@ -438,37 +592,64 @@ fn joined(meshes: &[Arc<Mesh>]) -> Mesh {
     for mesh in meshes {
         let before = u32::try_from(all.vertices.len()).unwrap_or(u32::MAX);
         all.vertices.extend(&mesh.vertices);
-        all.triangles.extend(mesh.triangles.iter().map(|corners| corners.map(|idx| idx.saturating_add(before))));
+        all.triangles.extend(
+            mesh.triangles
+                .iter()
+                .map(|corners| corners.map(|idx| idx.saturating_add(before))),
+        );
     }
     all
 }
 
-/// The pairs of links in the `<disable_collisions>` of a text: an element of SRDF, which the URDF of a converted robot has.
+/// The pairs of links in the `<disable_collisions>` of a text: an element of SRDF, which the URDF
+/// of a converted robot has.
 fn disabled_collisions(text: &str) -> impl Iterator<Item = [String; 2]> + '_ {
-    text.split("<disable_collisions ").skip(1).filter_map(|element| {
-        let element = element.split('>').next()?;
-        let attribute = |name: &str| {
-            let value = element.split(name).nth(1)?.trim_start().strip_prefix('=')?.trim_start();
-            let quote = value.chars().next().filter(|mark| ['"', '\''].contains(mark))?;
-            let value = value[1..].split(quote).next()?;
-            Some(value.replace("&quot;", "\"").replace("&lt;", "<").replace("&gt;", ">").replace("&amp;", "&"))
-        };
-        Some([attribute("link1")?, attribute("link2")?])
-    })
+    text.split("<disable_collisions ")
+        .skip(1)
+        .filter_map(|element| {
+            let element = element.split('>').next()?;
+            let attribute = |name: &str| {
+                let value = element
+                    .split(name)
+                    .nth(1)?
+                    .trim_start()
+                    .strip_prefix('=')?
+                    .trim_start();
+                let quote = value
+                    .chars()
+                    .next()
+                    .filter(|mark| ['"', '\''].contains(mark))?;
+                let value = value[1..].split(quote).next()?;
+                Some(
+                    value
+                        .replace("&quot;", "\"")
+                        .replace("&lt;", "<")
+                        .replace("&gt;", ">")
+                        .replace("&amp;", "&"),
+                )
+            };
+            Some([attribute("link1")?, attribute("link2")?])
+        })
 }
 
 /// Density of links without `<inertial>`: that of water. Unit: kg/m³.
 const DENSITY: f64 = 1000.0;
 
 impl Link {
-    /// Gives the link the mass of water with the volume of its shapes, spread over the box around them.
+    /// Gives the link the mass of water with the volume of its shapes, spread over the box around
+    /// them.
     fn weigh(&mut self) {
         if self.solids.is_empty() {
             return;
         }
         let (low, high) = bounds(&self.solids);
         let sizes = (high - low).component_mul(&(high - low));
-        self.mass = DENSITY * self.solids.iter().map(|part| part.shape.volume()).sum::<f64>();
+        self.mass = DENSITY
+            * self
+                .solids
+                .iter()
+                .map(|part| part.shape.volume())
+                .sum::<f64>();
         self.com = (low + high) / 2.0;
         let spread = Vector3::new(sizes.y + sizes.z, sizes.x + sizes.z, sizes.x + sizes.y);
         self.inertia = Matrix3::from_diagonal(&(spread * self.mass / 12.0));
@@ -486,10 +667,18 @@ impl Mass {
     fn plus(&self, other: &Self) -> Self {
         let mass = self.mass + other.mass;
         if mass <= 0.0 {
-            return Self { mass: 0.0, com: Vector3::zeros(), inertia: Matrix3::zeros() };
+            return Self {
+                mass: 0.0,
+                com: Vector3::zeros(),
+                inertia: Matrix3::zeros(),
+            };
         }
         let com = (self.com * self.mass + other.com * other.mass) / mass;
-        Self { mass, com, inertia: self.about(&com) + other.about(&com) }
+        Self {
+            mass,
+            com,
+            inertia: self.about(&com) + other.about(&com),
+        }
     }
 
     fn about(&self, point: &Vector3<f64>) -> Matrix3<f64> {
@@ -521,23 +710,34 @@ fn isometry(pose: &urdf_rs::Pose) -> Isometry3<f64> {
 }
 
 fn matrix(i: &urdf_rs::Inertia) -> Matrix3<f64> {
-    Matrix3::new(i.ixx, i.ixy, i.ixz, i.ixy, i.iyy, i.iyz, i.ixz, i.iyz, i.izz)
+    Matrix3::new(
+        i.ixx, i.ixy, i.ixz, i.ixy, i.iyy, i.iyz, i.ixz, i.iyz, i.izz,
+    )
 }
 
 fn one_line(text: &str) -> String {
     text.split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
-/// Whether a joint does not move: it is fixed, or moves the whole robot over the floor, which a profile's `base` does.
+/// Whether a joint does not move: it is fixed, or moves the whole robot over the floor, which a
+/// profile's `base` does.
 fn is_rigid(joint: &urdf_rs::Joint) -> bool {
-    matches!(joint.joint_type, urdf_rs::JointType::Fixed | urdf_rs::JointType::Planar | urdf_rs::JointType::Floating)
+    matches!(
+        joint.joint_type,
+        urdf_rs::JointType::Fixed | urdf_rs::JointType::Planar | urdf_rs::JointType::Floating
+    )
 }
 
-/// Share of a motor's largest effort with which it moves steadily; the rest accelerates and carries.
+/// Share of a motor's largest effort with which it moves steadily; the rest accelerates and
+/// carries.
 const STEADY_SHARE: f64 = 0.75;
 
-/// The largest velocity that a motor can reach against viscous friction. Many published models have a friction with which
-/// their velocity limit can't be reached.
+/// The largest velocity that a motor can reach against viscous friction. Many published models have
+/// a friction with which their velocity limit can't be reached.
 fn reachable(limit: f64, effort: f64, damping: f64) -> f64 {
-    if damping > 0.0 && effort > 0.0 { limit.min(STEADY_SHARE * effort / damping) } else { limit }
+    if damping > 0.0 && effort > 0.0 {
+        limit.min(STEADY_SHARE * effort / damping)
+    } else {
+        limit
+    }
 }

@@ -1,6 +1,7 @@
 //! The drives of a joint: its motor's law, as a soft constraint on its velocity within bounds.
 
-/// A soft constraint on the velocity of one joint: its impulse is `gain · (wanted − velocity)`, within bounds.
+/// A soft constraint on the velocity of one joint: its impulse is `gain · (wanted − velocity)`,
+/// within bounds.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Drive {
     pub(super) joint: usize,
@@ -15,10 +16,17 @@ pub(super) struct Drive {
 impl Drive {
     /// Returns a drive without effect.
     pub(super) fn none(joint: usize) -> Self {
-        Self { joint, gain: 0.0, wanted: 0.0, bounds: [0.0, 0.0], at: None }
+        Self {
+            joint,
+            gain: 0.0,
+            wanted: 0.0,
+            bounds: [0.0, 0.0],
+            at: None,
+        }
     }
 
-    /// Updates whether the drive has reached a bound at this velocity. Returns whether that has changed.
+    /// Updates whether the drive has reached a bound at this velocity. Returns whether that has
+    /// changed.
     pub(super) fn update(&mut self, velocity: f64) -> bool {
         let impulse = self.gain * (self.wanted - velocity);
         let at = if impulse < self.bounds[0] {
@@ -61,11 +69,21 @@ impl Law {
     /// Returns the motor's drive for a substep of `secs`.
     pub(super) fn drive(self, joint: usize, position: f64, limits: [f64; 2], secs: f64) -> Drive {
         let resistance = secs * self.stiffness + self.damping;
-        let pull = if resistance > 0.0 { self.stiffness / resistance } else { 0.0 };
+        let pull = if resistance > 0.0 {
+            self.stiffness / resistance
+        } else {
+            0.0
+        };
         let [slowest, fastest] = limits.map(|limit| (limit - position) / secs);
         let velocity = self.velocity.max(slowest).min(fastest);
         let most = self.most * secs;
         let wanted = velocity - (position - self.target) * pull;
-        Drive { joint, gain: secs * resistance, wanted, bounds: [-most, most], at: None }
+        Drive {
+            joint,
+            gain: secs * resistance,
+            wanted,
+            bounds: [-most, most],
+            at: None,
+        }
     }
 }

@@ -7,30 +7,38 @@ use crate::robot::Robot;
 
 /// Length of the push: a substep of the default physics. Unit: seconds.
 const PUSH_SECS: f64 = 1.0 / 960.0;
-/// An arm is light if a push meets less than this in some direction. Held objects have masses of this order, and the hand then moves
-/// within a step as they push it. The lightest shipped arm has 1.1 kg. Unit: kilograms.
+/// An arm is light if a push meets less than this in some direction. Held objects have masses of
+/// this order, and the hand then moves within a step as they push it. The lightest shipped arm has
+/// 1.1 kg. Unit: kilograms.
 pub(super) const LIGHT_KG: f64 = 0.8;
-/// The engine moves the hand alone only while it touches less than this share of the least mass that a push meets: the arm answers
-/// a push one step later, and swings with an object of nearly its own mass, which then slips. With the shipped arm, that begins at
-/// 0.7 kg.
+/// The engine moves the hand alone only while it touches less than this share of the least mass
+/// that a push meets: the arm answers a push one step later, and swings with an object of nearly
+/// its own mass, which then slips. With the shipped arm, that begins at 0.7 kg.
 pub(super) const CARRIED_SHARE: f64 = 0.5;
 
 impl Robot {
-    /// Returns the least mass that a push at the grasp frame meets in any direction: the robot's effective mass there, with the
-    /// resistance of its motors during the push. Returns `None` if the hand can't move alone.
+    /// Returns the least mass that a push at the grasp frame meets in any direction: the robot's
+    /// effective mass there, with the resistance of its motors during the push. Returns `None` if
+    /// the hand can't move alone.
     ///
     /// Source: O. Khatib, "Inertial properties in robotic manipulation: an object-level framework", 1995.
     pub(super) fn least_effective_mass_kg(&self) -> Option<f64> {
         let joints: Vec<usize> = self.joints_to(self.hand.as_ref()?.link).collect();
         let poses = self.kinematics.links(&self.positions);
         let at_rest = vec![0.0; self.motors.len()];
-        let resistances = self.motors.iter().zip(&self.model.joints).map(|(motor, joint)| {
-            motor.armature + PUSH_SECS * (joint.damping + motor.damping + PUSH_SECS * motor.stiffness)
-        });
+        let resistances = self
+            .motors
+            .iter()
+            .zip(&self.model.joints)
+            .map(|(motor, joint)| {
+                motor.armature
+                    + PUSH_SECS * (joint.damping + motor.damping + PUSH_SECS * motor.stiffness)
+            });
         let inertias = inertias(&self.model, &poses, &at_rest).with_rotors(resistances);
         let point = Point3::from(self.kinematics.grasp(&self.positions).translation.vector);
         let column = |axis: usize| {
-            let change = inertias.answer(&joints, &Twist::by_force(&Vector3::ith(axis, 1.0), &point));
+            let change =
+                inertias.answer(&joints, &Twist::by_force(&Vector3::ith(axis, 1.0), &point));
             change.shift + change.turn.cross(&point.coords)
         };
         let mobility = Matrix3::from_columns(&[column(0), column(1), column(2)]);
@@ -45,17 +53,25 @@ mod tests {
     use actcheck_base::Files;
     use std::path::Path;
 
-    /// A hand on a vertical slide yields along the slide alone. Its mass there is that of the links, with the resistance of the motor.
+    /// A hand on a vertical slide yields along the slide alone. Its mass there is that of the
+    /// links, with the resistance of the motor.
     #[test]
     fn the_effective_mass_of_a_hand_on_a_slide_is_its_own() {
-        let world = alone(hand(&turning(0.0, 0.6), &turning(-0.6, 0.0), &["left", "right"]));
+        let world = alone(hand(
+            &turning(0.0, 0.6),
+            &turning(-0.6, 0.0),
+            &["left", "right"],
+        ));
         let robot = &world.robot;
         let secs = super::PUSH_SECS;
         let resistance = secs * (secs * robot.motors[0].stiffness + robot.motors[0].damping);
         // The palm and two fingers.
         let expected = 0.3 + resistance;
         let found = robot.least_effective_mass_kg().expect("it has a hand");
-        assert!((found / expected - 1.0).abs() < 1e-9, "{found} kg instead of {expected} kg");
+        assert!(
+            (found / expected - 1.0).abs() < 1e-9,
+            "{found} kg instead of {expected} kg"
+        );
     }
 
     #[test]
@@ -64,8 +80,14 @@ mod tests {
             let path = format!("models/robots/{name}.toml");
             let profile = actcheck_config::robot::read(&Files::Shipped, Path::new(&path));
             let world = alone(profile.expect("the shipped robot is valid"));
-            let mass_kg = world.robot.least_effective_mass_kg().expect("it has a hand");
-            assert!(mass_kg > super::LIGHT_KG && !world.robot.is_light, "{name}: {mass_kg} kg");
+            let mass_kg = world
+                .robot
+                .least_effective_mass_kg()
+                .expect("it has a hand");
+            assert!(
+                mass_kg > super::LIGHT_KG && !world.robot.is_light,
+                "{name}: {mass_kg} kg"
+            );
         }
     }
 }

@@ -3,8 +3,9 @@
 use nalgebra::Vector3;
 use rapier3d::math::Pose;
 use rapier3d::prelude::{
-    CoefficientCombineRule, ColliderBuilder, Group, IntegrationParameters, InteractionGroups, InteractionTestMode,
-    PhysicsWorld, RigidBodyBuilder, RigidBodyHandle, SharedShape, SpringCoefficients,
+    CoefficientCombineRule, ColliderBuilder, Group, IntegrationParameters, InteractionGroups,
+    InteractionTestMode, PhysicsWorld, RigidBodyBuilder, RigidBodyHandle, SharedShape,
+    SpringCoefficients,
 };
 
 use crate::convert::{to_pose, to_real, to_vector};
@@ -49,16 +50,17 @@ impl Owner {
 /// Mark in the user data of a collider that replaces others: see `shell.rs`.
 pub const SHELL: u128 = 1 << 127;
 
-/// Natural frequency of contacts between moving bodies. Unit: hertz. Reduces the penetration in a grasp from 1.8 mm (at
-/// 30 Hz, the engine's default) to a few tenths of a millimetre.
+/// Natural frequency of contacts between moving bodies. Unit: hertz. Reduces the penetration in a
+/// grasp from 1.8 mm (at 30 Hz, the engine's default) to a few tenths of a millimetre.
 const CONTACT_FREQUENCY_HZ: f32 = 90.0;
-/// Natural frequency of contacts with static bodies. Unit: hertz. Stiffer contacts lift a rolling rim a little in every
-/// step, which keeps objects rocking; at 20 Hz a salt mill sinks in and tilts.
+/// Natural frequency of contacts with static bodies. Unit: hertz. Stiffer contacts lift a rolling
+/// rim a little in every step, which keeps objects rocking; at 20 Hz a salt mill sinks in and
+/// tilts.
 const SUPPORT_FREQUENCY_HZ: f32 = 30.0;
 /// Damping ratio of contacts: the engine's default, which keeps stacks at rest.
 const CONTACT_DAMPING: f32 = 10.0;
-/// The engine's unit of length. It keeps pairs of shapes whose boxes are nearer to each other than 8 cm in this unit, and
-/// looks at them in every step. Unit: metres.
+/// The engine's unit of length. It keeps pairs of shapes whose boxes are nearer to each other than
+/// 8 cm in this unit, and looks at them in every step. Unit: metres.
 pub const LENGTH_UNIT: f32 = 0.125;
 /// Friction coefficient of the floor: that of wood.
 const FLOOR_FRICTION: f32 = 0.5;
@@ -75,17 +77,22 @@ pub fn engine(physics: &Physics) -> Result<PhysicsWorld, WorldError> {
         );
         return Err(WorldError::Scene { what });
     }
-    let softness = |frequency| SpringCoefficients { natural_frequency: frequency, damping_ratio: CONTACT_DAMPING };
+    let softness = |frequency| SpringCoefficients {
+        natural_frequency: frequency,
+        damping_ratio: CONTACT_DAMPING,
+    };
     let defaults = IntegrationParameters::default();
     let parameters = IntegrationParameters {
         length_unit: LENGTH_UNIT,
         normalized_allowed_linear_error: defaults.normalized_allowed_linear_error / LENGTH_UNIT,
-        normalized_max_corrective_velocity: defaults.normalized_max_corrective_velocity / LENGTH_UNIT,
+        normalized_max_corrective_velocity: defaults.normalized_max_corrective_velocity
+            / LENGTH_UNIT,
         normalized_prediction_distance: defaults.normalized_prediction_distance / LENGTH_UNIT,
         normalized_max_linear_velocity: defaults.normalized_max_linear_velocity / LENGTH_UNIT,
         dt: 1.0 / to_real(f64::from(physics.steps_per_second)),
         num_solver_iterations: physics.iterations as usize,
-        // Without it, friction acts only in the second of the solver's two passes, and every grasp slips slowly.
+        // Without it, friction acts only in the second of the solver's two passes, and every grasp
+        // slips slowly.
         friction_in_bias_pass: true,
         contact_softness: softness(CONTACT_FREQUENCY_HZ),
         static_contact_softness: softness(SUPPORT_FREQUENCY_HZ),
@@ -95,7 +102,12 @@ pub fn engine(physics: &Physics) -> Result<PhysicsWorld, WorldError> {
     };
     let gravity = to_vector(&Vector3::new(0.0, 0.0, -GRAVITY));
     let narrow_phase = fresh::narrow_phase();
-    Ok(PhysicsWorld { gravity, integration_parameters: parameters, narrow_phase, ..PhysicsWorld::default() })
+    Ok(PhysicsWorld {
+        gravity,
+        integration_parameters: parameters,
+        narrow_phase,
+        ..PhysicsWorld::default()
+    })
 }
 
 /// The collision group of the floor.
@@ -103,54 +115,91 @@ pub const FLOOR_GROUP: Group = Group::GROUP_32;
 
 /// Returns the collision groups of a body that does not collide with the floor.
 pub fn off_floor() -> InteractionGroups {
-    InteractionGroups::new(Group::ALL, Group::ALL.difference(FLOOR_GROUP), InteractionTestMode::And)
+    InteractionGroups::new(
+        Group::ALL,
+        Group::ALL.difference(FLOOR_GROUP),
+        InteractionTestMode::And,
+    )
 }
 
-/// Adds the floor: a slab with its top at z = 0. Returns a fixed body at the origin, without a shape, for joints to the floor.
+/// Adds the floor: a slab with its top at z = 0. Returns a fixed body at the origin, without a
+/// shape, for joints to the floor.
 pub fn add_floor(engine: &mut PhysicsWorld) -> RigidBodyHandle {
     let half = to_real(fault::WORLD_RADIUS_M + 1.0);
     let floor = ColliderBuilder::cuboid(half, half, 0.5)
         .position(to_pose(&nalgebra::Isometry3::translation(0.0, 0.0, -0.5)))
         .friction(FLOOR_FRICTION)
         .friction_combine_rule(CoefficientCombineRule::GeometricMean)
-        .collision_groups(InteractionGroups::new(FLOOR_GROUP, Group::ALL, InteractionTestMode::And))
+        .collision_groups(InteractionGroups::new(
+            FLOOR_GROUP,
+            Group::ALL,
+            InteractionTestMode::And,
+        ))
         .user_data(Owner::Floor.to_tag());
     engine.insert_collider(floor, None);
     engine.insert_body(RigidBodyBuilder::fixed())
 }
 
-/// Returns a collider for a convex solid in its body's frame. Returns `None` for tubes, which the caller must decompose
-/// first, and for points without a volume.
+/// Returns a collider for a convex solid in its body's frame. Returns `None` for tubes, which the
+/// caller must decompose first, and for points without a volume.
 ///
-/// The friction of two surfaces is the geometric mean of their coefficients: a scene's value is that against the same
-/// material.
-pub fn collider(solid: &Part, owner: Owner, friction: f64, restitution: f64) -> Option<ColliderBuilder> {
+/// The friction of two surfaces is the geometric mean of their coefficients: a scene's value is
+/// that against the same material.
+pub fn collider(
+    solid: &Part,
+    owner: Owner,
+    friction: f64,
+    restitution: f64,
+) -> Option<ColliderBuilder> {
     let mut pose = solid.pose.to_isometry();
     let builder = match &solid.shape {
-        Shape::Box { size: [x, y, z] } => ColliderBuilder::cuboid(to_real(x / 2.0), to_real(y / 2.0), to_real(z / 2.0)),
+        Shape::Box { size: [x, y, z] } => {
+            ColliderBuilder::cuboid(to_real(x / 2.0), to_real(y / 2.0), to_real(z / 2.0))
+        }
         Shape::Cylinder { radius, height } => {
             // The axis of the engine's cylinders is y.
-            pose.rotation *= nalgebra::UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::FRAC_PI_2);
+            pose.rotation *= nalgebra::UnitQuaternion::from_axis_angle(
+                &Vector3::x_axis(),
+                std::f64::consts::FRAC_PI_2,
+            );
             ColliderBuilder::cylinder(to_real(height / 2.0), to_real(*radius))
         }
         Shape::Sphere { radius } => ColliderBuilder::ball(to_real(*radius)),
-        Shape::Capsule { radius, height } => ColliderBuilder::capsule_z(to_real(height / 2.0), to_real(*radius)),
+        Shape::Capsule { radius, height } => {
+            ColliderBuilder::capsule_z(to_real(height / 2.0), to_real(*radius))
+        }
         Shape::Hull { points, .. } => hull(points)?,
         Shape::Mesh { mesh } => hull(&mesh.vertices)?,
         Shape::Tube { .. } => return None,
     };
-    Some(with_surface(builder.position(to_pose(&pose)).restitution(to_real(restitution)), owner, friction))
+    Some(with_surface(
+        builder
+            .position(to_pose(&pose))
+            .restitution(to_real(restitution)),
+        owner,
+        friction,
+    ))
 }
 
-/// Returns the collider of a shape that another one has already, at the same pose. A hull `with_memory` remembers the shapes
-/// around it.
-pub fn same_shape(shape: &SharedShape, pose: &Pose, owner: Owner, friction: f64, with_memory: bool) -> ColliderBuilder {
+/// Returns the collider of a shape that another one has already, at the same pose. A hull
+/// `with_memory` remembers the shapes around it.
+pub fn same_shape(
+    shape: &SharedShape,
+    pose: &Pose,
+    owner: Owner,
+    friction: f64,
+    with_memory: bool,
+) -> ColliderBuilder {
     // Hulls remember boxes and shapes around them, which are others in each simulation.
     let own = match shape.as_shape::<Hull>().filter(|_| with_memory) {
         Some(hull) => SharedShape::new(hull.with_memory()),
         None => SharedShape(shape.clone_dyn().into()),
     };
-    with_surface(ColliderBuilder::new(own).position(*pose).restitution(0.0), owner, friction)
+    with_surface(
+        ColliderBuilder::new(own).position(*pose).restitution(0.0),
+        owner,
+        friction,
+    )
 }
 
 fn with_surface(builder: ColliderBuilder, owner: Owner, friction: f64) -> ColliderBuilder {
@@ -162,7 +211,10 @@ fn with_surface(builder: ColliderBuilder, owner: Owner, friction: f64) -> Collid
 
 /// Returns the convex hull of points, or `None` if they lie in a plane.
 fn hull(points: &[[f64; 3]]) -> Option<ColliderBuilder> {
-    let points: Vec<_> = points.iter().map(|point| to_vector(&Vector3::from(*point))).collect();
+    let points: Vec<_> = points
+        .iter()
+        .map(|point| to_vector(&Vector3::from(*point)))
+        .collect();
     Some(ColliderBuilder::new(SharedShape::new(Hull::of(&points)?)))
 }
 
@@ -172,7 +224,13 @@ mod tests {
 
     #[test]
     fn owners_are_recovered_from_their_numbers() {
-        for owner in [Owner::Floor, Owner::Object(0), Owner::Object(7), Owner::Link(0), Owner::Link(12)] {
+        for owner in [
+            Owner::Floor,
+            Owner::Object(0),
+            Owner::Object(7),
+            Owner::Link(0),
+            Owner::Link(12),
+        ] {
             for marks in [0, SHELL] {
                 assert_eq!(Owner::from_tag(owner.to_tag() | marks), owner);
             }

@@ -20,19 +20,29 @@ impl Factor {
             let known: f64 = this[..row].iter().map(|value| value * value).sum();
             this[row] = (this[row] - known).sqrt();
         }
-        Self { lower: matrix, size }
+        Self {
+            lower: matrix,
+            size,
+        }
     }
 
     /// Solves the equations for this right side, in place.
     pub(super) fn solve(&self, side: &mut [f64]) {
         for row in 0..self.size {
             let factors = &self.lower[row * self.size..row * self.size + row + 1];
-            let known: f64 = factors[..row].iter().zip(side.iter()).map(|(a, b)| a * b).sum();
+            let known: f64 = factors[..row]
+                .iter()
+                .zip(side.iter())
+                .map(|(a, b)| a * b)
+                .sum();
             side[row] = (side[row] - known) / factors[row];
         }
         for row in (0..self.size).rev() {
             side[row] /= self.lower[row * self.size + row];
-            let (before, value) = (&self.lower[row * self.size..row * self.size + row], side[row]);
+            let (before, value) = (
+                &self.lower[row * self.size..row * self.size + row],
+                side[row],
+            );
             for (other, factor) in side.iter_mut().zip(before) {
                 *other -= factor * value;
             }
@@ -48,8 +58,10 @@ mod tests {
     fn solutions_fulfil_their_equations() {
         let matrix = vec![4.0, 1.0, -2.0, 1.0, 5.0, 0.5, -2.0, 0.5, 6.0];
         let expected = [1.5, -2.0, 0.25];
-        let mut side: Vec<f64> =
-            matrix.chunks(3).map(|row| row.iter().zip(expected).map(|(a, b)| a * b).sum()).collect();
+        let mut side: Vec<f64> = matrix
+            .chunks(3)
+            .map(|row| row.iter().zip(expected).map(|(a, b)| a * b).sum())
+            .collect();
         Factor::new(matrix, 3).solve(&mut side);
         for (found, expected) in side.iter().zip(expected) {
             assert!((found - expected).abs() < 1e-12, "{side:?}");

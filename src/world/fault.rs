@@ -4,11 +4,11 @@ use std::fmt;
 
 use actcheck_data::Pose;
 
-/// Radius of the world: a body farther from the origin, horizontally, has left it. Unit: metres. The floor ends a metre
-/// farther out; scenes are a few metres wide.
+/// Radius of the world: a body farther from the origin, horizontally, has left it. Unit: metres.
+/// The floor ends a metre farther out; scenes are a few metres wide.
 pub const WORLD_RADIUS_M: f64 = 14.0;
-/// Depth below the floor at which a body has left the world. Unit: metres. Contacts penetrate by a few millimetres at
-/// most.
+/// Depth below the floor at which a body has left the world. Unit: metres. Contacts penetrate by a
+/// few millimetres at most.
 pub const WORLD_DEPTH_M: f64 = 0.3;
 
 /// An invalid state of the simulation, never caused by the robot's behaviour.
@@ -23,7 +23,8 @@ pub enum Fault {
         /// Its position. Unit: metres.
         position: [f64; 3],
     },
-    /// The state, the target or a limit of this joint is not a number, or its limits contradict each other.
+    /// The state, the target or a limit of this joint is not a number, or its limits contradict
+    /// each other.
     Joint(String),
     /// The physics engine panicked, with these words.
     Engine(String),
@@ -33,10 +34,16 @@ impl fmt::Display for Fault {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::NotFinite(id) => write!(f, "the state of {id} is not a number"),
-            Self::LeftWorld { id, position: [x, y, z] } => {
+            Self::LeftWorld {
+                id,
+                position: [x, y, z],
+            } => {
                 write!(f, "{id} left the world at ({x:.2}, {y:.2}, {z:.2})")
             }
-            Self::Joint(name) => write!(f, "the state or a limit of the joint {name} is not a valid number"),
+            Self::Joint(name) => write!(
+                f,
+                "the state or a limit of the joint {name} is not a valid number"
+            ),
             Self::Engine(words) => write!(f, "a fault in the physics engine: {words}"),
         }
     }

@@ -6,17 +6,33 @@ use crate::World;
 use actcheck_data::{Part, Shape};
 
 impl World {
-    /// Returns the shapes of all objects and links by their names in traces, in the frame of the object or link. Pieces
-    /// of meshes are reduced to their outermost points.
+    /// Returns the shapes of all objects and links by their names in traces, in the frame of the
+    /// object or link. Pieces of meshes are reduced to their outermost points.
     pub fn forms(&self) -> Vec<(String, Vec<Part>)> {
-        let objects = self.objects.iter().map(|object| (object.id.clone(), reduced(&object.model.parts)));
-        let links = self.robot.model.links.iter().filter(|link| !link.solids.is_empty());
-        objects.chain(links.map(|link| (format!("robot/{}", link.name), reduced(&link.solids)))).collect()
+        let objects = self
+            .objects
+            .iter()
+            .map(|object| (object.id.clone(), reduced(&object.model.parts)));
+        let links = self
+            .robot
+            .model
+            .links
+            .iter()
+            .filter(|link| !link.solids.is_empty());
+        objects
+            .chain(links.map(|link| (format!("robot/{}", link.name), reduced(&link.solids))))
+            .collect()
     }
 }
 
 fn reduced(parts: &[Part]) -> Vec<Part> {
-    parts.iter().map(|part| Part { pose: part.pose, shape: outermost(&part.shape) }).collect()
+    parts
+        .iter()
+        .map(|part| Part {
+            pose: part.pose,
+            shape: outermost(&part.shape),
+        })
+        .collect()
 }
 
 /// Reduces a hull or mesh to its extreme points in 26 directions; returns other shapes unchanged.
@@ -29,12 +45,18 @@ fn outermost(shape: &Shape) -> Shape {
     let along = |point: &[f64; 3], direction: &Vector3<f64>| Vector3::from(*point).dot(direction);
     let mut farthest: Vec<[f64; 3]> = directions()
         .filter_map(|direction| {
-            points.iter().max_by(|a, b| along(a, &direction).total_cmp(&along(b, &direction))).copied()
+            points
+                .iter()
+                .max_by(|a, b| along(a, &direction).total_cmp(&along(b, &direction)))
+                .copied()
         })
         .collect();
     farthest.sort_by(|a, b| a.partial_cmp(b).unwrap_or(std::cmp::Ordering::Equal));
     farthest.dedup();
-    Shape::Hull { points: farthest, volume: shape.volume() }
+    Shape::Hull {
+        points: farthest,
+        volume: shape.volume(),
+    }
 }
 
 /// Directions to the faces, edges and corners of a cube.

@@ -1,8 +1,9 @@
 //! Moves the robot through free space, where it touches nothing, without the engine.
 //!
-//! The engine rebuilds and factorises the robot's mass matrix in each substep, and solves contacts and joints by
-//! iteration. Without contacts, the same motors, joint stops and couplings follow from one small system of linear
-//! equations, which is solved exactly. Motors act as in the engine: implicit springs with a largest force.
+//! The engine rebuilds and factorises the robot's mass matrix in each substep, and solves contacts
+//! and joints by iteration. Without contacts, the same motors, joint stops and couplings follow
+//! from one small system of linear equations, which is solved exactly. Motors act as in the engine:
+//! implicit springs with a largest force.
 
 use nalgebra::Isometry3;
 use rapier3d::prelude::PhysicsWorld;
@@ -14,7 +15,8 @@ use crate::inertia::{Inertias, Twist, inertias};
 use crate::robot::Robot;
 use crate::share::{Hand, Share};
 
-/// Impulse per error of velocity of a coupling between two joints: nearly rigid. Unit: kilograms or kg·m².
+/// Impulse per error of velocity of a coupling between two joints: nearly rigid. Unit: kilograms or
+/// kg·m².
 const COUPLING_GAIN: f64 = 1e4;
 /// As [`COUPLING_GAIN`], for a joint whose velocity is given.
 const GIVEN_GAIN: f64 = 1e6;
@@ -24,11 +26,12 @@ const MOST_CHANGES: usize = 8;
 /// Most factors that are kept in a control tick.
 const MOST_FACTORS: usize = 8;
 
-/// The joint of each drive with its gain, unless it is at a bound, and the factor of the equations with these gains.
+/// The joint of each drive with its gain, unless it is at a bound, and the factor of the equations
+/// with these gains.
 type Factored = (Vec<(usize, Option<f64>)>, Factor);
 
-/// The equations of motion in one control tick: those terms that its substeps have in common. They are those at its
-/// beginning.
+/// The equations of motion in one control tick: those terms that its substeps have in common. They
+/// are those at its beginning.
 pub(super) struct Equations {
     inertias: Inertias,
     /// Length of a substep. Unit: seconds.
@@ -51,7 +54,10 @@ impl Equations {
         let gain = |drive: &Drive| drive.at.is_none().then_some(drive.gain);
         let is_of = |(known, _): &Factored| {
             known.len() == self.drives.len()
-                && known.iter().zip(&self.drives).all(|(known, drive)| *known == (drive.joint, gain(drive)))
+                && known
+                    .iter()
+                    .zip(&self.drives)
+                    .all(|(known, drive)| *known == (drive.joint, gain(drive)))
         };
         let at = self.factors.iter().position(is_of).unwrap_or_else(|| {
             let size = self.momenta.len();
@@ -59,7 +65,11 @@ impl Equations {
             for drive in self.drives.iter().filter(|drive| drive.at.is_none()) {
                 matrix[drive.joint * size + drive.joint] += drive.gain;
             }
-            let free = self.drives.iter().map(|drive| (drive.joint, gain(drive))).collect();
+            let free = self
+                .drives
+                .iter()
+                .map(|drive| (drive.joint, gain(drive)))
+                .collect();
             self.factors.truncate(MOST_FACTORS - 1);
             self.factors.insert(0, (free, Factor::new(matrix, size)));
             0
@@ -69,13 +79,16 @@ impl Equations {
 }
 
 impl Robot {
-    /// Moves the joints by a step of the engine's length, with the engine's substeps, without moving the links. Joints
-    /// that the engine moves keep their velocities.
+    /// Moves the joints by a step of the engine's length, with the engine's substeps, without
+    /// moving the links. Joints that the engine moves keep their velocities.
     pub(super) fn move_freely(&mut self, engine: &PhysicsWorld) {
         let parameters = &engine.integration_parameters;
         let n_substeps = parameters.num_solver_iterations;
         let secs = f64::from(parameters.dt) / n_substeps as f64;
-        let mut step = self.equations.take().unwrap_or_else(|| self.equations(secs));
+        let mut step = self
+            .equations
+            .take()
+            .unwrap_or_else(|| self.equations(secs));
         self.begin_step(&mut step);
         for _ in 0..n_substeps {
             self.set_drives(&mut step);
@@ -118,13 +131,15 @@ impl Robot {
         })
     }
 
-    /// Sets the momenta that gravity, contacts and given velocities add in the substeps of the next step.
+    /// Sets the momenta that gravity, contacts and given velocities add in the substeps of the next
+    /// step.
     fn begin_step(&self, step: &mut Equations) {
         let secs = step.secs;
         // At first, no drive of the step is at a bound.
         step.drives.clear();
         step.added.clear();
-        step.added.extend(step.inertias.bias.iter().map(|bias| -secs * bias));
+        step.added
+            .extend(step.inertias.bias.iter().map(|bias| -secs * bias));
         if let Some((hand, push)) = self.load() {
             for joint in self.joints_to(hand.link) {
                 step.added[joint] += secs * step.inertias.effort_of(joint, push);
@@ -137,7 +152,10 @@ impl Robot {
 
     /// Returns the hand and the push of contacts on it, if the engine moves it.
     fn load(&self) -> Option<(&Hand, &Twist)> {
-        self.hand.as_ref().filter(|_| self.share == Share::Hand).map(|hand| (hand, &self.push_on_hand))
+        self.hand
+            .as_ref()
+            .filter(|_| self.share == Share::Hand)
+            .map(|hand| (hand, &self.push_on_hand))
     }
 
     /// Returns whether the engine gives the velocity of a joint.
@@ -145,8 +163,9 @@ impl Robot {
         self.share == Share::Hand && self.shares(joint)
     }
 
-    /// Sets the drives of all motors, followed by those of the stops that are passed. Motors in the engine have no
-    /// drive here, but their place. Motors that were at a bound in the last substep are there at first.
+    /// Sets the drives of all motors, followed by those of the stops that are passed. Motors in the
+    /// engine have no drive here, but their place. Motors that were at a bound in the last substep
+    /// are there at first.
     fn set_drives(&self, step: &mut Equations) {
         let limits = |idx: usize| match &self.model.joints[idx] {
             joint if joint.upper - joint.lower < WIDEST_RANGE => [joint.lower, joint.upper],
@@ -160,7 +179,12 @@ impl Robot {
                 false => motor.law.drive(idx, *position, limits(idx), secs),
             };
             match step.drives.get_mut(idx) {
-                Some(last) => *last = Drive { at: last.at, ..drive },
+                Some(last) => {
+                    *last = Drive {
+                        at: last.at,
+                        ..drive
+                    }
+                }
                 None => step.drives.push(drive),
             }
         }
@@ -168,14 +192,30 @@ impl Robot {
         let recovery = turn / (secs * turn + 2.0 * f64::from(STOP_DAMPING));
         let rest = 1.0 / (secs * recovery) - 1.0;
         let softness = rest * rest / ((1.0 + rest) * 4.0 * f64::from(STOP_DAMPING * STOP_DAMPING));
-        for (idx, position) in self.positions.iter().enumerate().filter(|(idx, _)| !self.is_given(*idx)) {
+        for (idx, position) in self
+            .positions
+            .iter()
+            .enumerate()
+            .filter(|(idx, _)| !self.is_given(*idx))
+        {
             let [lower, upper] = limits(idx);
             let past = (position - upper).max(0.0) - (lower - position).max(0.0);
             if past != 0.0 {
-                let bounds = if past > 0.0 { [f64::NEG_INFINITY, 0.0] } else { [0.0, f64::INFINITY] };
-                let apparent = *step.apparent[idx].get_or_insert_with(|| step.inertias.apparent(idx));
+                let bounds = if past > 0.0 {
+                    [f64::NEG_INFINITY, 0.0]
+                } else {
+                    [0.0, f64::INFINITY]
+                };
+                let apparent =
+                    *step.apparent[idx].get_or_insert_with(|| step.inertias.apparent(idx));
                 let gain = apparent / softness;
-                step.drives.push(Drive { joint: idx, gain, wanted: -past * recovery, bounds, at: None });
+                step.drives.push(Drive {
+                    joint: idx,
+                    gain,
+                    wanted: -past * recovery,
+                    bounds,
+                    at: None,
+                });
             }
         }
     }
@@ -183,8 +223,17 @@ impl Robot {
     /// Sets the velocities to those after a substep. Finds the drives that are at a bound by trial.
     fn solve(&mut self, step: &mut Equations) {
         step.inertias.momenta(&self.velocities, &mut step.momenta);
-        step.momenta.iter_mut().zip(&step.added).for_each(|(momentum, added)| *momentum += added);
-        for (idx, joint) in self.model.joints.iter().enumerate().filter(|(idx, _)| !self.is_given(*idx)) {
+        step.momenta
+            .iter_mut()
+            .zip(&step.added)
+            .for_each(|(momentum, added)| *momentum += added);
+        for (idx, joint) in self
+            .model
+            .joints
+            .iter()
+            .enumerate()
+            .filter(|(idx, _)| !self.is_given(*idx))
+        {
             if let Some((leader, factor, offset)) = joint.mimic {
                 let off = self.positions[idx] - factor * self.positions[leader] - offset;
                 for (row, share) in [(idx, 1.0), (leader, -factor)] {
@@ -223,13 +272,20 @@ mod tests {
         let (positions, velocities) = world.robot.state();
         let poses = world.robot.kinematics.links(&positions);
         let armatures = world.robot.motors.iter().map(|motor| motor.armature);
-        (positions, inertias(&world.robot.model, &poses, &velocities).with_rotors(armatures))
+        (
+            positions,
+            inertias(&world.robot.model, &poses, &velocities).with_rotors(armatures),
+        )
     }
 
     /// Gives every joint a new target, within the limits, and steps for half a second.
     fn wander(world: &mut World, choices: &mut Choices) {
         let mut command = world.hold();
-        for (target, joint) in command.positions.iter_mut().zip(world.kinematics().joints()) {
+        for (target, joint) in command
+            .positions
+            .iter_mut()
+            .zip(world.kinematics().joints())
+        {
             let way = choices.real("way".into(), -0.4, 0.4, 0.0);
             *target = (*target + way).clamp(joint.lower, joint.upper);
         }
@@ -241,7 +297,11 @@ mod tests {
     fn at_rest_the_joints_carry_the_weight_of_their_links() {
         let world = lonely();
         let (positions, found) = dynamics(&world);
-        for (bias, holding) in found.bias.iter().zip(world.kinematics().holding_efforts(&positions)) {
+        for (bias, holding) in found
+            .bias
+            .iter()
+            .zip(world.kinematics().holding_efforts(&positions))
+        {
             assert!((bias - holding).abs() < 1e-9, "{bias} instead of {holding}");
         }
     }
@@ -255,7 +315,11 @@ mod tests {
             wander(&mut world, &mut choices);
             let (_, found) = dynamics(&world);
             let robot = &world.robot;
-            let (multibody, _) = world.engine.multibody_joints.get_mut(robot.motors[0].joint).expect("it has joints");
+            let (multibody, _) = world
+                .engine
+                .multibody_joints
+                .get_mut(robot.motors[0].joint)
+                .expect("it has joints");
             let theirs = multibody.dof_inverse_inertia(&world.engine.bodies);
             for joint in 0..robot.motors.len() {
                 let product = found.apparent(joint) * f64::from(theirs[joint]);
@@ -270,15 +334,23 @@ mod tests {
         wander(&mut world, &mut choices);
         let robot = &world.robot;
         let (mut positions, _) = dynamics(&world);
-        let mut velocities: Vec<f64> = positions.iter().map(|_| choices.real("v".into(), -0.5, 0.5, 0.0)).collect();
+        let mut velocities: Vec<f64> = positions
+            .iter()
+            .map(|_| choices.real("v".into(), -0.5, 0.5, 0.0))
+            .collect();
         let energies = |positions: &[f64], velocities: &[f64]| {
             let poses = robot.kinematics.links(positions);
             let now = inertias(&robot.model, &poses, velocities);
             let mut momenta = Vec::new();
             now.momenta(velocities, &mut momenta);
-            let kinetic: f64 = momenta.iter().zip(velocities).map(|(p, v)| p * v / 2.0).sum();
+            let kinetic: f64 = momenta
+                .iter()
+                .zip(velocities)
+                .map(|(p, v)| p * v / 2.0)
+                .sum();
             let links = robot.model.links.iter().zip(&poses);
-            let heights = links.map(|(link, pose)| link.mass * (pose * nalgebra::Point3::from(link.com)).z);
+            let heights =
+                links.map(|(link, pose)| link.mass * (pose * nalgebra::Point3::from(link.com)).z);
             (kinetic, kinetic + GRAVITY * heights.sum::<f64>())
         };
         let (kinetic, before) = energies(&positions, &velocities);
@@ -288,11 +360,20 @@ mod tests {
             let now = inertias(&robot.model, &poses, &velocities);
             let mut changes: Vec<f64> = now.bias.iter().map(|bias| -secs * bias).collect();
             Factor::new(now.mass, changes.len()).solve(&mut changes);
-            velocities.iter_mut().zip(&changes).for_each(|(velocity, change)| *velocity += change);
-            positions.iter_mut().zip(&velocities).for_each(|(position, velocity)| *position += velocity * secs);
+            velocities
+                .iter_mut()
+                .zip(&changes)
+                .for_each(|(velocity, change)| *velocity += change);
+            positions
+                .iter_mut()
+                .zip(&velocities)
+                .for_each(|(position, velocity)| *position += velocity * secs);
         }
         let (_, after) = energies(&positions, &velocities);
-        assert!((after - before).abs() < 1e-3 * kinetic, "{before} J became {after} J, with {kinetic} J of motion");
+        assert!(
+            (after - before).abs() < 1e-3 * kinetic,
+            "{before} J became {after} J, with {kinetic} J of motion"
+        );
     }
 
     #[test]
@@ -300,7 +381,10 @@ mod tests {
         let (mut free, mut engine) = (lonely(), lonely());
         engine.leave_to_engine();
         // As many substeps in both: the engine solves motors and couplings only by iteration.
-        free.take_shortcuts(Shortcuts { few_substeps: false, ..Shortcuts::ALL });
+        free.take_shortcuts(Shortcuts {
+            few_substeps: false,
+            ..Shortcuts::ALL
+        });
         (free.substeps, engine.substeps) = (4, 4);
         let [mut ones, mut others] = [Choices::random(8, 0), Choices::random(8, 0)];
         for _ in 0..6 {
@@ -330,13 +414,20 @@ mod tests {
         world.substeps = 2;
         world.step(&command);
         let after = world.observe();
-        assert!((after.velocities[lift] - before.velocities[lift]).abs() < 2e-3, "its speed continues");
+        assert!(
+            (after.velocities[lift] - before.velocities[lift]).abs() < 2e-3,
+            "its speed continues"
+        );
         let expected = before.positions[lift] + before.velocities[lift] * world.tick_secs();
-        assert!((after.positions[lift] - expected).abs() < 1e-4, "its motion continues");
+        assert!(
+            (after.positions[lift] - expected).abs() < 1e-4,
+            "its motion continues"
+        );
         wander(&mut world, &mut choices);
         assert_eq!(world.fault(), None);
     }
-    /// Half of the substeps make a joint faster that is as fast as it can be, by the error of the substeps.
+    /// Half of the substeps make a joint faster that is as fast as it can be, by the error of the
+    /// substeps.
     #[test]
     fn twice_the_substeps_change_the_speed_of_a_joint_little() {
         let mut world = lonely();
@@ -352,6 +443,9 @@ mod tests {
         let after = world.observe();
         assert!((after.velocities[lift] / before.velocities[lift] - 1.0).abs() < 0.05);
         let expected = before.positions[lift] + before.velocities[lift] * world.tick_secs();
-        assert!((after.positions[lift] - expected).abs() < 1e-4, "its motion continues");
+        assert!(
+            (after.positions[lift] - expected).abs() < 1e-4,
+            "its motion continues"
+        );
     }
 }

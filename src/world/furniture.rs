@@ -1,13 +1,15 @@
 //! Furniture that slides when it is pushed.
 //!
-//! Furniture is static: that is fast, and objects rest on it quietly. Once the robot pushes it harder than its friction
-//! on the floor can resist, it becomes a body that slides on the floor against this friction, until it is left alone.
+//! Furniture is static: that is fast, and objects rest on it quietly. Once the robot pushes it
+//! harder than its friction on the floor can resist, it becomes a body that slides on the floor
+//! against this friction, until it is left alone.
 
 use std::collections::BTreeMap;
 
 use rapier3d::prelude::{
-    GenericJoint, Group, ImpulseJointHandle, InteractionGroups, InteractionTestMode, JointAxesMask, JointAxis,
-    LockedAxes, MotorModel, PhysicsWorld, RigidBodyBuilder, RigidBodyHandle, RigidBodyType,
+    GenericJoint, Group, ImpulseJointHandle, InteractionGroups, InteractionTestMode, JointAxesMask,
+    JointAxis, LockedAxes, MotorModel, PhysicsWorld, RigidBodyBuilder, RigidBodyHandle,
+    RigidBodyType,
 };
 
 use crate::World;
@@ -22,10 +24,11 @@ use actcheck_data::Role;
 const STOPPED: f64 = 2e-3;
 /// Time without a push after which stopped furniture is static again. Unit: seconds.
 const LEFT_ALONE_SECS: f64 = 0.3;
-/// Gain of the friction's velocity control. High: friction acts with its full force at any speed. Unit: N·s/m per
-/// newton of friction.
+/// Gain of the friction's velocity control. High: friction acts with its full force at any speed.
+/// Unit: N·s/m per newton of friction.
 const GAIN: f64 = 200.0;
-/// Lever of the friction against turning, as a share of the longer side: the mean distance of the legs.
+/// Lever of the friction against turning, as a share of the longer side: the mean distance of the
+/// legs.
 const LEVER_SHARE: f64 = 0.4;
 
 /// One piece of furniture while it slides.
@@ -38,7 +41,8 @@ pub(super) struct Sliding {
 }
 
 impl World {
-    /// Lets furniture slide that is pushed harder than its friction, and stops furniture that is left alone.
+    /// Lets furniture slide that is pushed harder than its friction, and stops furniture that is
+    /// left alone.
     pub(super) fn move_furniture(&mut self, touches: &BTreeMap<(Owner, Owner), Touch>) {
         let pushes = pushes(touches);
         for idx in 0..self.objects.len() {
@@ -59,9 +63,16 @@ impl World {
     }
 
     fn keep_sliding(&mut self, idx: usize, mut sliding: Sliding, pushed: bool) {
-        let Some(body) = self.engine.bodies.get(self.objects[idx].body) else { return };
-        let moves = from_vector(body.linvel()).norm() > STOPPED || from_vector(body.angvel()).norm() > STOPPED;
-        sliding.alone_secs = if pushed || moves { 0.0 } else { sliding.alone_secs + self.tick_secs() };
+        let Some(body) = self.engine.bodies.get(self.objects[idx].body) else {
+            return;
+        };
+        let moves = from_vector(body.linvel()).norm() > STOPPED
+            || from_vector(body.angvel()).norm() > STOPPED;
+        sliding.alone_secs = if pushed || moves {
+            0.0
+        } else {
+            sliding.alone_secs + self.tick_secs()
+        };
         if sliding.alone_secs > LEFT_ALONE_SECS {
             self.sliding.remove(&idx);
             fix(&mut self.engine, &self.objects[idx], sliding);
@@ -90,17 +101,26 @@ fn pushes(touches: &BTreeMap<(Owner, Owner), Touch>) -> BTreeMap<usize, f64> {
             *force = [force[0] - touch.force_n.x, force[1] - touch.force_n.y];
         }
     }
-    forces.into_iter().map(|(idx, [x, y])| (idx, (x * x + y * y).sqrt())).collect()
+    forces
+        .into_iter()
+        .map(|(idx, [x, y])| (idx, (x * x + y * y).sqrt()))
+        .collect()
 }
 
-/// Makes a piece of furniture slide: it keeps its height and stays upright, and friction resists its motion.
+/// Makes a piece of furniture slide: it keeps its height and stays upright, and friction resists
+/// its motion.
 fn release(engine: &mut PhysicsWorld, object: &Object) -> Sliding {
-    let pose = engine.bodies.get(object.body).map_or(to_pose(&object.placed), |body| *body.position());
+    let pose = engine
+        .bodies
+        .get(object.body)
+        .map_or(to_pose(&object.placed), |body| *body.position());
     let anchor = engine.insert_body(RigidBodyBuilder::fixed().pose(pose));
     if let Some(body) = engine.bodies.get_mut(object.body) {
         body.set_body_type(RigidBodyType::Dynamic, true);
         body.set_locked_axes(
-            LockedAxes::TRANSLATION_LOCKED_Z | LockedAxes::ROTATION_LOCKED_X | LockedAxes::ROTATION_LOCKED_Y,
+            LockedAxes::TRANSLATION_LOCKED_Z
+                | LockedAxes::ROTATION_LOCKED_X
+                | LockedAxes::ROTATION_LOCKED_Y,
             true,
         );
     }
@@ -109,13 +129,23 @@ fn release(engine: &mut PhysicsWorld, object: &Object) -> Sliding {
     let [length, width, _] = object.model.size_m;
     let torque = friction * LEVER_SHARE * length.max(width);
     let mut joint = GenericJoint::new(JointAxesMask::empty());
-    for (axis, most) in [(JointAxis::LinX, friction), (JointAxis::LinY, friction), (JointAxis::AngZ, torque)] {
+    for (axis, most) in [
+        (JointAxis::LinX, friction),
+        (JointAxis::LinY, friction),
+        (JointAxis::AngZ, torque),
+    ] {
         joint.set_motor_model(axis, MotorModel::ForceBased);
         joint.set_motor(axis, 0.0, 0.0, 0.0, to_real(most * GAIN));
         joint.set_motor_max_force(axis, to_real(most));
     }
-    let joint = engine.impulse_joints.insert(anchor, object.body, joint, true);
-    Sliding { joint, anchor, alone_secs: 0.0 }
+    let joint = engine
+        .impulse_joints
+        .insert(anchor, object.body, joint, true);
+    Sliding {
+        joint,
+        anchor,
+        alone_secs: 0.0,
+    }
 }
 
 /// Makes a piece of furniture static again, where it is now.
@@ -125,11 +155,19 @@ fn fix(engine: &mut PhysicsWorld, object: &Object, sliding: Sliding) {
     if let Some(body) = engine.bodies.get_mut(object.body) {
         body.set_body_type(RigidBodyType::Fixed, true);
     }
-    set_groups(engine, object.body, InteractionGroups::new(Group::ALL, Group::ALL, InteractionTestMode::And));
+    set_groups(
+        engine,
+        object.body,
+        InteractionGroups::new(Group::ALL, Group::ALL, InteractionTestMode::And),
+    );
 }
 
 fn set_groups(engine: &mut PhysicsWorld, body: RigidBodyHandle, groups: InteractionGroups) {
-    let handles = engine.bodies.get(body).map(|body| body.colliders().to_vec()).unwrap_or_default();
+    let handles = engine
+        .bodies
+        .get(body)
+        .map(|body| body.colliders().to_vec())
+        .unwrap_or_default();
     for handle in handles {
         if let Some(collider) = engine.colliders.get_mut(handle) {
             collider.set_collision_groups(groups);

@@ -1,8 +1,9 @@
 //! A convex hull whose corners are packed for the processor's vector instructions.
 //!
-//! The library goes through the corners of a hull one by one. A robot whose meshes were split has hundreds of hulls, and a fifth of
-//! the time of its runs went into the boxes around them and their outermost corners. A sweep of a fast link also asks for the
-//! centre of mass and the thickness of each of its hulls, which the library calculates anew each time. The results here are the
+//! The library goes through the corners of a hull one by one. A robot whose meshes were split has
+//! hundreds of hulls, and a fifth of the time of its runs went into the boxes around them and their
+//! outermost corners. A sweep of a fast link also asks for the centre of mass and the thickness of
+//! each of its hulls, which the library calculates anew each time. The results here are the
 //! library's, bit for bit, but for rounding errors of the boxes.
 
 use std::sync::{Arc, Mutex, OnceLock};
@@ -13,8 +14,8 @@ use parry3d::mass_properties::MassProperties;
 use parry3d::math::{Matrix, Pose, Real, Vector};
 use parry3d::query::{PointProjection, PointQuery, Ray, RayCast, RayIntersection};
 use parry3d::shape::{
-    ConvexPolyhedron, FeatureId, PolygonalFeature, PolygonalFeatureMap, Shape, ShapeType, SubShapeId, SupportMap,
-    TypedShape,
+    ConvexPolyhedron, FeatureId, PolygonalFeature, PolygonalFeatureMap, Shape, ShapeType,
+    SubShapeId, SupportMap, TypedShape,
 };
 
 /// Number of corners that are looked at together.
@@ -30,8 +31,8 @@ const ROUNDING_M: Real = 1e-5;
 /// A convex hull. Its clones share the corners.
 pub(crate) struct Hull {
     solid: Arc<Solid>,
-    /// The box around it at the pose for which it was last calculated. Most hulls are at rest for many steps. With a memory, the
-    /// box is relative to the middle of its bounding ball.
+    /// The box around it at the pose for which it was last calculated. Most hulls are at rest for
+    /// many steps. With a memory, the box is relative to the middle of its bounding ball.
     last: Mutex<Option<(Pose, Aabb)>>,
     /// The shapes around it, if it remembers them.
     pub(crate) neighbours: Option<Neighbours>,
@@ -40,8 +41,8 @@ pub(crate) struct Hull {
 /// A convex hull in its own frame.
 struct Solid {
     hull: ConvexPolyhedron,
-    /// The corners of the hull in their order: the coordinates x, y and z of [`LANES`] at a time. The last ones are copies of the
-    /// first.
+    /// The corners of the hull in their order: the coordinates x, y and z of [`LANES`] at a time.
+    /// The last ones are copies of the first.
     corners: Vec<[[Real; LANES]; 3]>,
     bounds: Aabb,
     ball: BoundingSphere,
@@ -53,7 +54,11 @@ struct Solid {
 impl Clone for Hull {
     fn clone(&self) -> Self {
         let neighbours = self.neighbours.as_ref().map(|_| Neighbours::default());
-        Self { solid: Arc::clone(&self.solid), last: Mutex::new(None), neighbours }
+        Self {
+            solid: Arc::clone(&self.solid),
+            last: Mutex::new(None),
+            neighbours,
+        }
     }
 }
 
@@ -63,18 +68,36 @@ impl Hull {
         let hull = ConvexPolyhedron::from_convex_hull(points)?;
         let first = *hull.points().first()?;
         let pack = |chunk: &[Vector]| {
-            [0, 1, 2].map(|axis| std::array::from_fn(|lane| chunk.get(lane).unwrap_or(&first)[axis]))
+            [0, 1, 2]
+                .map(|axis| std::array::from_fn(|lane| chunk.get(lane).unwrap_or(&first)[axis]))
         };
         let corners = hull.points().chunks(LANES).map(pack).collect();
-        let (bounds, ball) = (hull.compute_local_aabb(), hull.compute_local_bounding_sphere());
+        let (bounds, ball) = (
+            hull.compute_local_aabb(),
+            hull.compute_local_bounding_sphere(),
+        );
         let thickness = hull.ccd_thickness();
-        let solid = Solid { hull, corners, bounds, ball, thickness, unit_mass: OnceLock::new() };
-        Some(Self { solid: Arc::new(solid), last: Mutex::new(None), neighbours: None })
+        let solid = Solid {
+            hull,
+            corners,
+            bounds,
+            ball,
+            thickness,
+            unit_mass: OnceLock::new(),
+        };
+        Some(Self {
+            solid: Arc::new(solid),
+            last: Mutex::new(None),
+            neighbours: None,
+        })
     }
 
     /// Returns the same hull, which remembers the shapes around it.
     pub(crate) fn with_memory(&self) -> Self {
-        Self { neighbours: Some(Neighbours::default()), ..self.clone() }
+        Self {
+            neighbours: Some(Neighbours::default()),
+            ..self.clone()
+        }
     }
 
     /// Returns the library's hull.
@@ -82,8 +105,8 @@ impl Hull {
         &self.solid.hull
     }
 
-    /// Returns a box around it at a pose that is too large by at most twice [`ROOMY_M`]. It moves with the hull until this has turned
-    /// so far that its corners may have left the margin.
+    /// Returns a box around it at a pose that is too large by at most twice [`ROOMY_M`]. It moves
+    /// with the hull until this has turned so far that its corners may have left the margin.
     fn roomy_bounds(&self, pose: &Pose) -> Aabb {
         let ball = &self.solid.ball;
         let middle = pose.transform_point(ball.center);
@@ -92,9 +115,12 @@ impl Hull {
             Aabb::new(exact.mins - middle, exact.maxs - middle).loosened(ROOMY_M)
         };
         // Another thread has it if it is locked.
-        let Ok(mut last) = self.last.try_lock() else { return around().translated(middle) };
+        let Ok(mut last) = self.last.try_lock() else {
+            return around().translated(middle);
+        };
         let is_near = |known: &Pose| {
-            2.0 * (known.rotation.inverse() * pose.rotation).xyz().length() * ball.radius < ROOMY_M - ROUNDING_M
+            2.0 * (known.rotation.inverse() * pose.rotation).xyz().length() * ball.radius
+                < ROOMY_M - ROUNDING_M
         };
         let bounds = match *last {
             Some((known, bounds)) if is_near(&known) => bounds,
@@ -103,7 +129,8 @@ impl Hull {
         bounds.translated(middle)
     }
 
-    /// Returns the index of the corner that is farthest along a direction: the first one of equal ones.
+    /// Returns the index of the corner that is farthest along a direction: the first one of equal
+    /// ones.
     fn outermost(&self, direction: Vector) -> usize {
         // Half of the corners of a chunk at a time: fewer candidates remain in the end.
         let mut best = [Real::NEG_INFINITY; HALF];
@@ -135,7 +162,10 @@ impl Solid {
     fn bounds_at(&self, pose: &Pose) -> Aabb {
         let turn = Matrix::from_quat(pose.rotation);
         let rows = [turn.row(0), turn.row(1), turn.row(2)].map(|row| row.to_array());
-        let (mut low, mut high) = ([[Real::INFINITY; LANES]; 3], [[Real::NEG_INFINITY; LANES]; 3]);
+        let (mut low, mut high) = (
+            [[Real::INFINITY; LANES]; 3],
+            [[Real::NEG_INFINITY; LANES]; 3],
+        );
         for [x, y, z] in &self.corners {
             for lane in 0..LANES {
                 let (x, y, z) = (x[lane], y[lane], z[lane]);
@@ -149,7 +179,10 @@ impl Solid {
         }
         let least = low.map(|lanes| lanes.into_iter().fold(Real::INFINITY, Real::min));
         let most = high.map(|lanes| lanes.into_iter().fold(Real::NEG_INFINITY, Real::max));
-        Aabb::new(Vector::from_array(least) + pose.translation, Vector::from_array(most) + pose.translation)
+        Aabb::new(
+            Vector::from_array(least) + pose.translation,
+            Vector::from_array(most) + pose.translation,
+        )
     }
 }
 
@@ -170,8 +203,15 @@ impl PolygonalFeatureMap for Hull {
 }
 
 impl RayCast for Hull {
-    fn cast_local_ray_and_get_normal(&self, ray: &Ray, most: Real, solid: bool) -> Option<RayIntersection> {
-        self.solid.hull.cast_local_ray_and_get_normal(ray, most, solid)
+    fn cast_local_ray_and_get_normal(
+        &self,
+        ray: &Ray,
+        most: Real,
+        solid: bool,
+    ) -> Option<RayIntersection> {
+        self.solid
+            .hull
+            .cast_local_ray_and_get_normal(ray, most, solid)
     }
 }
 
@@ -207,7 +247,9 @@ impl Shape for Hull {
             return self.roomy_bounds(pose);
         }
         // Another thread has it if it is locked.
-        let Ok(mut last) = self.last.try_lock() else { return self.solid.bounds_at(pose) };
+        let Ok(mut last) = self.last.try_lock() else {
+            return self.solid.bounds_at(pose);
+        };
         match *last {
             Some((known, bounds)) if known == *pose => bounds,
             _ => last.insert((*pose, self.solid.bounds_at(pose))).1,
@@ -216,7 +258,11 @@ impl Shape for Hull {
 
     fn mass_properties(&self, density: Real) -> MassProperties {
         let of = || self.solid.hull.mass_properties(density);
-        if density.to_bits() == Real::to_bits(1.0) { *self.solid.unit_mass.get_or_init(of) } else { of() }
+        if density.to_bits() == Real::to_bits(1.0) {
+            *self.solid.unit_mass.get_or_init(of)
+        } else {
+            of()
+        }
     }
 
     fn shape_type(&self) -> ShapeType {
@@ -247,8 +293,15 @@ impl Shape for Hull {
         Some((self, 0.0))
     }
 
-    fn feature_normal_at_point(&self, part: SubShapeId, feature: FeatureId, point: Vector) -> Option<Vector> {
-        self.solid.hull.feature_normal_at_point(part, feature, point)
+    fn feature_normal_at_point(
+        &self,
+        part: SubShapeId,
+        feature: FeatureId,
+        point: Vector,
+    ) -> Option<Vector> {
+        self.solid
+            .hull
+            .feature_normal_at_point(part, feature, point)
     }
 }
 
@@ -264,8 +317,13 @@ mod tests {
         let mut number = || choices.real("at".into(), -1.0, 1.0, 0.0);
         let points: Vec<Vector> = (0..n_points)
             .map(|_| {
-                let at =
-                    [number(), number(), number()].map(|at| if trial.is_multiple_of(3) { at.signum() } else { at });
+                let at = [number(), number(), number()].map(|at| {
+                    if trial.is_multiple_of(3) {
+                        at.signum()
+                    } else {
+                        at
+                    }
+                });
                 crate::convert::to_vector(&at.into())
             })
             .collect();
@@ -280,8 +338,15 @@ mod tests {
             let theirs = hull.polyhedron();
             let mut number = || crate::convert::to_real(choices.real("at".into(), -1.0, 1.0, 0.0));
             let axes = [Vector::X, -Vector::X, Vector::Y, -Vector::Z, Vector::ZERO];
-            let direction = *axes.get(trial % 11).unwrap_or(&Vector::new(number(), number(), number()));
-            assert_eq!(hull.local_support_point(direction), theirs.local_support_point(direction), "trial {trial}");
+            let direction =
+                *axes
+                    .get(trial % 11)
+                    .unwrap_or(&Vector::new(number(), number(), number()));
+            assert_eq!(
+                hull.local_support_point(direction),
+                theirs.local_support_point(direction),
+                "trial {trial}"
+            );
             let rotation = Rotation::from_xyzw(number(), number(), number(), number()).normalize();
             let pose = Pose::from_parts(Vector::new(number(), number(), number()), rotation);
             let (one, other) = (hull.compute_aabb(&pose), theirs.compute_aabb(&pose));
@@ -291,11 +356,22 @@ mod tests {
                 (found.inv_mass, found.local_com, found.inv_principal_inertia)
             };
             for density in [1.0, 1.0, 700.0] {
-                assert_eq!(of_mass(&hull, density), of_mass(theirs, density), "trial {trial}");
+                assert_eq!(
+                    of_mass(&hull, density),
+                    of_mass(theirs, density),
+                    "trial {trial}"
+                );
             }
-            assert_eq!(hull.ccd_thickness().to_bits(), theirs.ccd_thickness().to_bits(), "trial {trial}");
+            assert_eq!(
+                hull.ccd_thickness().to_bits(),
+                theirs.ccd_thickness().to_bits(),
+                "trial {trial}"
+            );
             // A few of the last bits of coordinates up to 3.
-            assert!((one.mins - other.mins).length() + (one.maxs - other.maxs).length() < 4e-6, "trial {trial}");
+            assert!(
+                (one.mins - other.mins).length() + (one.maxs - other.maxs).length() < 4e-6,
+                "trial {trial}"
+            );
         }
     }
 
@@ -307,19 +383,27 @@ mod tests {
         for trial in 0..40 {
             let plain = hull(&mut choices, trial);
             let known = plain.with_memory();
-            let mut number = |most: f64| crate::convert::to_real(choices.real("at".into(), -most, most, 0.0));
+            let mut number =
+                |most: f64| crate::convert::to_real(choices.real("at".into(), -most, most, 0.0));
             let turn = Vector::new(number(1.0), number(1.0), number(1.0));
             let way = Vector::new(number(1.0), number(1.0), number(1.0));
             let mut last = None;
             for step in 0..200_u16 {
                 let share = Real::from(step) / 200.0;
-                let pose = Pose::from_parts(way * share, Rotation::from_scaled_axis(turn * share * 0.05));
+                let pose =
+                    Pose::from_parts(way * share, Rotation::from_scaled_axis(turn * share * 0.05));
                 let (exact, roomy) = (plain.compute_aabb(&pose), known.compute_aabb(&pose));
                 assert!(roomy.contains(&exact), "trial {trial}, step {step}");
-                let most = (exact.mins - roomy.mins).max(roomy.maxs - exact.maxs).max_element();
-                assert!(most < 2.0 * ROOMY_M + 1e-5, "{most} m in trial {trial}, step {step}");
+                let most = (exact.mins - roomy.mins)
+                    .max(roomy.maxs - exact.maxs)
+                    .max_element();
+                assert!(
+                    most < 2.0 * ROOMY_M + 1e-5,
+                    "{most} m in trial {trial}, step {step}"
+                );
                 let size = roomy.maxs - roomy.mins;
-                n_kept += usize::from(last.is_some_and(|last: Vector| (last - size).length() < 1e-6));
+                n_kept +=
+                    usize::from(last.is_some_and(|last: Vector| (last - size).length() < 1e-6));
                 last = Some(size);
             }
         }

@@ -1,8 +1,8 @@
 //! The links that can touch nothing in a tick.
 //!
-//! Where only the hand can touch something, the engine need not look for contacts of the other links. Of an arm of a hundred
-//! pieces, it would move each piece in its tree of boxes in every step. A link that never moves is not idle: an object may fall
-//! onto it.
+//! Where only the hand can touch something, the engine need not look for contacts of the other
+//! links. Of an arm of a hundred pieces, it would move each piece in its tree of boxes in every
+//! step. A link that never moves is not idle: an object may fall onto it.
 
 use rapier3d::prelude::RigidBody;
 
@@ -10,17 +10,27 @@ use crate::World;
 use crate::reach::Reach;
 
 impl World {
-    /// Takes the shapes of idle links out of the engine's search for contacts, and puts back those of the others, in a tick in which
-    /// the robot can touch this.
+    /// Takes the shapes of idle links out of the engine's search for contacts, and puts back those
+    /// of the others, in a tick in which the robot can touch this.
     pub(super) fn leave_out_idle(&mut self, reach: Reach) {
         if !self.robot.model.has_many_pieces() {
             return;
         }
         for (link, body) in self.robot.bodies.iter().enumerate() {
             let is_idle = self.is_idle(link, reach);
-            for handle in self.engine.bodies.get(*body).map(RigidBody::colliders).unwrap_or_default() {
+            for handle in self
+                .engine
+                .bodies
+                .get(*body)
+                .map(RigidBody::colliders)
+                .unwrap_or_default()
+            {
                 // Asking for a change would already be one.
-                if self.engine.colliders.get(*handle).is_some_and(|collider| collider.is_enabled() == is_idle)
+                if self
+                    .engine
+                    .colliders
+                    .get(*handle)
+                    .is_some_and(|collider| collider.is_enabled() == is_idle)
                     && let Some(collider) = self.engine.colliders.get_mut(*handle)
                 {
                     collider.set_enabled(!is_idle);
@@ -51,8 +61,13 @@ mod tests {
         let mut profile = lonely().robot.profile.as_ref().clone();
         let link = "<link name=\"wrist_flex_link\">";
         assert!(profile.urdf.text.contains(link));
-        let piece = "<collision><geometry><box size=\"0.02 0.02 0.02\"/></geometry></collision>".repeat(4);
-        profile.urdf.text = profile.urdf.text.replace(link, &format!("{link}{piece}")).into();
+        let piece =
+            "<collision><geometry><box size=\"0.02 0.02 0.02\"/></geometry></collision>".repeat(4);
+        profile.urdf.text = profile
+            .urdf
+            .text
+            .replace(link, &format!("{link}{piece}"))
+            .into();
         alone(profile)
     }
 
@@ -72,10 +87,16 @@ mod tests {
         let mut world = with_pieces();
         let all = searched(&world);
         assert!(all.contains("wrist_flex_link") && all.contains("base_link"));
-        let hand = BTreeSet::from(["finger_left_link", "finger_right_link", "wrist_roll_link"].map(str::to_owned));
+        let hand = BTreeSet::from(
+            ["finger_left_link", "finger_right_link", "wrist_roll_link"].map(str::to_owned),
+        );
         let none = BTreeSet::new();
-        for (reach, expected) in [(Reach::Hand, &hand), (Reach::Apart, &none), (Reach::All, &all), (Reach::Hand, &hand)]
-        {
+        for (reach, expected) in [
+            (Reach::Hand, &hand),
+            (Reach::Apart, &none),
+            (Reach::All, &all),
+            (Reach::Hand, &hand),
+        ] {
             world.leave_out_idle(reach);
             assert_eq!(searched(&world), *expected, "{reach:?}");
         }
@@ -99,8 +120,10 @@ mod tests {
                 for handle in world.engine.bodies[*body].colliders() {
                     let collider = &world.engine.colliders[*handle];
                     let on_link = collider.position_wrt_parent().expect("it is on a link");
-                    let expected = from_pose(world.engine.bodies[*body].position()) * from_pose(on_link);
-                    let off = from_pose(collider.position()).translation.vector - expected.translation.vector;
+                    let expected =
+                        from_pose(world.engine.bodies[*body].position()) * from_pose(on_link);
+                    let off = from_pose(collider.position()).translation.vector
+                        - expected.translation.vector;
                     assert!(off.norm() < 1e-5, "{} m off", off.norm());
                 }
             }

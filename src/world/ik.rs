@@ -26,7 +26,8 @@ const HEADED_ITERATIONS: usize = 30;
 const FEW_ITERATIONS: usize = 5;
 /// A heading that changes by less in an iteration follows no further. Unit: radians.
 const FOLLOWS_RAD: f64 = 2e-3;
-/// The search ends without a solution if the error stays above this factor of the least one for so many iterations.
+/// The search ends without a solution if the error stays above this factor of the least one for so
+/// many iterations.
 const LEAST_PROGRESS: f64 = 0.99;
 const MOST_WITHOUT_PROGRESS: usize = 12;
 /// Weight of the heading in these.
@@ -34,10 +35,12 @@ const HEADING_WEIGHT: f64 = 0.2;
 /// Largest change of a joint in one iteration. Units: metres or radians.
 const LARGEST_STEP: f64 = 0.3;
 
-/// Returns joint positions near `seed` that reach the target, or `None` if the solver does not converge.
+/// Returns joint positions near `seed` that reach the target, or `None` if the solver does not
+/// converge.
 ///
-/// Uses damped least squares; a joint that reaches its limit is held there and the others are solved again. Most targets that are
-/// tried are out of reach: the search ends when it gets no nearer.
+/// Uses damped least squares; a joint that reaches its limit is held there and the others are
+/// solved again. Most targets that are tried are out of reach: the search ends when it gets no
+/// nearer.
 pub fn solve(kinematics: &Kinematics, seed: &[f64], reach: &Reach) -> Option<Vec<f64>> {
     let mut positions = started(kinematics, seed);
     let mut jacobian = vec![Vector6::zeros(); positions.len()];
@@ -58,9 +61,15 @@ pub fn solve(kinematics: &Kinematics, seed: &[f64], reach: &Reach) -> Option<Vec
     None
 }
 
-/// As [`solve`] for an arm with fewer than six joints, which moves its hand in a vertical plane: the target may turn about
-/// the vertical, by at most `most_rad`. Returns the turn too. Unit: radians.
-pub fn solve_turned(kinematics: &Kinematics, seed: &[f64], reach: &Reach, most_rad: f64) -> Option<(Vec<f64>, f64)> {
+/// As [`solve`] for an arm with fewer than six joints, which moves its hand in a vertical plane:
+/// the target may turn about the vertical, by at most `most_rad`. Returns the turn too. Unit:
+/// radians.
+pub fn solve_turned(
+    kinematics: &Kinematics,
+    seed: &[f64],
+    reach: &Reach,
+    most_rad: f64,
+) -> Option<(Vec<f64>, f64)> {
     let mut positions = started(kinematics, seed);
     let mut jacobian = vec![Vector6::zeros(); positions.len()];
     let mut joints = Mobile::new(&reach.mobility);
@@ -149,10 +158,15 @@ impl Mobile {
     fn new(mobility: &[f64]) -> Self {
         let weights = mobility.iter().copied().enumerate();
         let joints: Vec<(usize, f64)> = weights.filter(|(_, weight)| *weight != 0.0).collect();
-        Self { free: Vec::with_capacity(joints.len()), change: Vec::with_capacity(joints.len()), joints }
+        Self {
+            free: Vec::with_capacity(joints.len()),
+            change: Vec::with_capacity(joints.len()),
+            joints,
+        }
     }
 
-    /// Performs one iteration. Joints that would pass a limit stop at it, and the others compensate.
+    /// Performs one iteration. Joints that would pass a limit stop at it, and the others
+    /// compensate.
     fn step(
         &mut self,
         kinematics: &Kinematics,
@@ -167,7 +181,10 @@ impl Mobile {
             for ((idx, weight), change) in self.free.iter_mut().zip(&self.change) {
                 let (joint, wanted) = (&kinematics.joints()[*idx], positions[*idx] + change);
                 let outside = wanted < joint.lower - 1e-9 || wanted > joint.upper + 1e-9;
-                if *weight > 0.0 && outside && at_limit(positions[*idx], wanted, joint.lower, joint.upper) {
+                if *weight > 0.0
+                    && outside
+                    && at_limit(positions[*idx], wanted, joint.lower, joint.upper)
+                {
                     *weight = 0.0;
                     held_one = true;
                 }
@@ -183,17 +200,23 @@ impl Mobile {
     }
 }
 
-/// Whether the joint is already at the limit that it would pass (to a millionth of a radian or metre).
+/// Whether the joint is already at the limit that it would pass (to a millionth of a radian or
+/// metre).
 fn at_limit(position: f64, wanted: f64, lower: f64, upper: f64) -> bool {
     (wanted < lower && position <= lower + 1e-6) || (wanted > upper && position >= upper - 1e-6)
 }
 
-/// Computes W·Jᵀ·(J·W·Jᵀ + λ²·I)⁻¹·e, scaled down so that no component exceeds the largest step. `jacobian`: its columns,
-/// one for each joint. Writes the changes of the `free` joints.
+/// Computes W·Jᵀ·(J·W·Jᵀ + λ²·I)⁻¹·e, scaled down so that no component exceeds the largest step.
+/// `jacobian`: its columns, one for each joint. Writes the changes of the `free` joints.
 ///
-/// Sums are in a fixed order: products of matrices whose size is only known at run time use other instructions, which round
-/// differently, on other processors.
-fn least_squares(jacobian: &[Vector6<f64>], error: &Vector6<f64>, free: &[(usize, f64)], change: &mut Vec<f64>) {
+/// Sums are in a fixed order: products of matrices whose size is only known at run time use other
+/// instructions, which round differently, on other processors.
+fn least_squares(
+    jacobian: &[Vector6<f64>],
+    error: &Vector6<f64>,
+    free: &[(usize, f64)],
+    change: &mut Vec<f64>,
+) {
     change.clear();
     let mut square = Matrix6::identity() * (DAMPING * DAMPING);
     for (idx, weight) in free.iter().filter(|(_, weight)| *weight != 0.0) {
@@ -210,9 +233,13 @@ fn least_squares(jacobian: &[Vector6<f64>], error: &Vector6<f64>, free: &[(usize
         false => weight * jacobian[*idx].dot(&solved),
     };
     change.extend(free.iter().map(of_joint));
-    let largest = change.iter().fold(0.0, |largest: f64, change| largest.max(change.abs()));
+    let largest = change
+        .iter()
+        .fold(0.0, |largest: f64, change| largest.max(change.abs()));
     if largest > LARGEST_STEP {
-        change.iter_mut().for_each(|change| *change *= LARGEST_STEP / largest);
+        change
+            .iter_mut()
+            .for_each(|change| *change *= LARGEST_STEP / largest);
     }
 }
 
@@ -220,7 +247,9 @@ fn least_squares(jacobian: &[Vector6<f64>], error: &Vector6<f64>, free: &[(usize
 fn pose_error(from: &Isometry3<f64>, to: &Isometry3<f64>) -> Vector6<f64> {
     let linear = to.translation.vector - from.translation.vector;
     let angular = (to.rotation * from.rotation.inverse()).scaled_axis();
-    Vector6::new(linear.x, linear.y, linear.z, angular.x, angular.y, angular.z)
+    Vector6::new(
+        linear.x, linear.y, linear.z, angular.x, angular.y, angular.z,
+    )
 }
 
 #[cfg(test)]
@@ -228,8 +257,9 @@ mod tests {
     use super::*;
     use crate::robot::tests::lonely;
 
-    /// With five of its joints, an arm reaches the places and slants of its own postures, whatever their heading: the hand
-    /// turns by the angle that is returned, and nothing else about the target changes.
+    /// With five of its joints, an arm reaches the places and slants of its own postures, whatever
+    /// their heading: the hand turns by the angle that is returned, and nothing else about the
+    /// target changes.
     #[test]
     fn an_arm_of_five_joints_reaches_targets_that_are_turned_by_an_unreachable_angle() {
         let world = lonely();
@@ -246,18 +276,31 @@ mod tests {
                 let joint = &kinematics.joints()[*idx];
                 posture[*idx] = (posture[*idx] + off).clamp(joint.lower, joint.upper);
             }
-            let target = turned(&kinematics.grasp(&posture), 0.15 * libm::cos(f64::from(trial)));
-            let reach = Reach { target, mobility: mobility.clone() };
+            let target = turned(
+                &kinematics.grasp(&posture),
+                0.15 * libm::cos(f64::from(trial)),
+            );
+            let reach = Reach {
+                target,
+                mobility: mobility.clone(),
+            };
             n_exact += u32::from(solve(kinematics, &start, &reach).is_some());
-            let Some((found, turn)) = solve_turned(kinematics, &start, &reach, 0.3) else { continue };
+            let Some((found, turn)) = solve_turned(kinematics, &start, &reach, 0.3) else {
+                continue;
+            };
             n_reached += 1;
             let error = pose_error(&kinematics.grasp(&found), &turned(&target, turn));
             assert!(is_reached(&error), "{error}");
             assert!(turn.abs() <= 0.3, "{turn}");
-            let moved = (0..start.len()).filter(|idx| !five.contains(idx)).all(|idx| found[idx] == start[idx]);
+            let moved = (0..start.len())
+                .filter(|idx| !five.contains(idx))
+                .all(|idx| found[idx] == start[idx]);
             assert!(moved, "only the five joints move");
         }
-        assert!(n_reached >= 36 && n_exact < n_reached, "{n_reached} reached, {n_exact} without a turn");
+        assert!(
+            n_reached >= 36 && n_exact < n_reached,
+            "{n_reached} reached, {n_exact} without a turn"
+        );
         // A larger turn than allowed is not a solution.
         let target = turned(&kinematics.grasp(&start), 1.0);
         let found = solve_turned(kinematics, &start, &Reach { target, mobility }, 0.1);

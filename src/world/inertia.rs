@@ -12,7 +12,8 @@ use crate::kinematics::{GRAVITY, axis_in_world, holding_efforts};
 pub(super) struct Inertias {
     /// Mass matrix, row by row. Units: kilograms or kg·m².
     pub(super) mass: Vec<f64>,
-    /// Efforts that keep all joints at their velocities: against gravity, centrifugal and Coriolis forces.
+    /// Efforts that keep all joints at their velocities: against gravity, centrifugal and Coriolis
+    /// forces.
     pub(super) bias: Vec<f64>,
     /// Motion of each joint at unit velocity.
     axes: Vec<Twist>,
@@ -37,8 +38,8 @@ impl Inertias {
         self
     }
 
-    /// Returns the effort of a force, with its torque about the world's origin, on a joint that moves its point of
-    /// application.
+    /// Returns the effort of a force, with its torque about the world's origin, on a joint that
+    /// moves its point of application.
     pub(super) fn effort_of(&self, joint: usize, force: &Twist) -> f64 {
         self.axes[joint].dot(force)
     }
@@ -51,18 +52,22 @@ impl Inertias {
         1.0 / unit[joint]
     }
 
-    /// Returns the change of a link's motion by an impulse on it. `joints` are those that move the link.
+    /// Returns the change of a link's motion by an impulse on it. `joints` are those that move the
+    /// link.
     pub(super) fn answer(&self, joints: &[usize], impulse: &Twist) -> Twist {
         let mut changes = vec![0.0; self.bias.len()];
         for joint in joints {
             changes[*joint] = self.effort_of(*joint, impulse);
         }
         self.factor().solve(&mut changes);
-        joints.iter().fold(Twist::ZERO, |sum, joint| sum.plus(self.axes[*joint], changes[*joint]))
+        joints.iter().fold(Twist::ZERO, |sum, joint| {
+            sum.plus(self.axes[*joint], changes[*joint])
+        })
     }
 
     fn factor(&self) -> &Factor {
-        self.factor.get_or_init(|| Factor::new(self.mass.clone(), self.bias.len()))
+        self.factor
+            .get_or_init(|| Factor::new(self.mass.clone(), self.bias.len()))
     }
 }
 
@@ -76,16 +81,24 @@ pub struct Dynamics {
 impl Dynamics {
     /// Returns the dynamics with the links at these poses and the joints at these velocities.
     pub(crate) fn new(model: &RobotModel, poses: &[Isometry3<f64>], velocities: &[f64]) -> Self {
-        Self { inertias: inertias(model, poses, velocities), holding: holding_efforts(model, poses) }
+        Self {
+            inertias: inertias(model, poses, velocities),
+            holding: holding_efforts(model, poses),
+        }
     }
 
-    /// Returns the effort of a joint that accelerates all joints. Units of the accelerations: m/s² or rad/s².
+    /// Returns the effort of a joint that accelerates all joints. Units of the accelerations: m/s²
+    /// or rad/s².
     pub fn effort_to_accelerate(&self, joint: usize, accelerations: &[f64]) -> f64 {
         let row = &self.inertias.mass[joint * accelerations.len()..];
-        row.iter().zip(accelerations).map(|(inertia, acceleration)| inertia * acceleration).sum()
+        row.iter()
+            .zip(accelerations)
+            .map(|(inertia, acceleration)| inertia * acceleration)
+            .sum()
     }
 
-    /// Returns the effort of a joint against centrifugal and Coriolis forces. It grows with the square of the speed.
+    /// Returns the effort of a joint against centrifugal and Coriolis forces. It grows with the
+    /// square of the speed.
     pub fn effort_of_velocity(&self, joint: usize) -> f64 {
         self.inertias.bias[joint] - self.holding[joint]
     }
@@ -106,13 +119,22 @@ pub(super) struct Twist {
 impl Twist {
     /// Returns a force that acts at a point.
     pub(super) fn by_force(force: &Vector3<f64>, point: &Point3<f64>) -> Self {
-        Self { turn: point.coords.cross(force), shift: *force }
+        Self {
+            turn: point.coords.cross(force),
+            shift: *force,
+        }
     }
 
-    pub(super) const ZERO: Self = Self { turn: Vector3::new(0.0, 0.0, 0.0), shift: Vector3::new(0.0, 0.0, 0.0) };
+    pub(super) const ZERO: Self = Self {
+        turn: Vector3::new(0.0, 0.0, 0.0),
+        shift: Vector3::new(0.0, 0.0, 0.0),
+    };
 
     pub(super) fn plus(self, other: Self, times: f64) -> Self {
-        Self { turn: self.turn + other.turn * times, shift: self.shift + other.shift * times }
+        Self {
+            turn: self.turn + other.turn * times,
+            shift: self.shift + other.shift * times,
+        }
     }
 
     fn dot(&self, other: &Self) -> f64 {
@@ -153,9 +175,13 @@ impl Bulk {
     }
 }
 
-/// Returns the dynamics of a robot with its links at these poses and its joints at these velocities. Units: metres,
-/// radians, seconds.
-pub(super) fn inertias(model: &RobotModel, poses: &[Isometry3<f64>], velocities: &[f64]) -> Inertias {
+/// Returns the dynamics of a robot with its links at these poses and its joints at these
+/// velocities. Units: metres, radians, seconds.
+pub(super) fn inertias(
+    model: &RobotModel,
+    poses: &[Isometry3<f64>],
+    velocities: &[f64],
+) -> Inertias {
     let n_joints = model.joints.len();
     let axes: Vec<Twist> = model
         .joints
@@ -163,8 +189,14 @@ pub(super) fn inertias(model: &RobotModel, poses: &[Isometry3<f64>], velocities:
         .map(|joint| {
             let (axis, point) = axis_in_world(joint, poses);
             match joint.kind {
-                JointKind::Prismatic => Twist { turn: Vector3::zeros(), shift: axis },
-                JointKind::Revolute => Twist { turn: axis, shift: point.cross(&axis) },
+                JointKind::Prismatic => Twist {
+                    turn: Vector3::zeros(),
+                    shift: axis,
+                },
+                JointKind::Revolute => Twist {
+                    turn: axis,
+                    shift: point.cross(&axis),
+                },
             }
         })
         .collect();
@@ -177,11 +209,18 @@ pub(super) fn inertias(model: &RobotModel, poses: &[Isometry3<f64>], velocities:
             let com = (pose * Point3::from(link.com)).coords;
             let spread = Matrix3::identity() * com.norm_squared() - com * com.transpose();
             let about = turned * link.inertia * turned.transpose() + spread * link.mass;
-            Bulk { mass: link.mass, moment: com * link.mass, about }
+            Bulk {
+                mass: link.mass,
+                moment: com * link.mass,
+                about,
+            }
         })
         .collect();
     // The root accelerates upwards instead of gravity pulling downwards.
-    let up = Twist { turn: Vector3::zeros(), shift: Vector3::z() * GRAVITY };
+    let up = Twist {
+        turn: Vector3::zeros(),
+        shift: Vector3::z() * GRAVITY,
+    };
     let (mut motions, mut changes) = (vec![Twist::ZERO], vec![up]);
     for (idx, joint) in model.joints.iter().enumerate() {
         let parent = motions[joint.parent];
@@ -191,7 +230,10 @@ pub(super) fn inertias(model: &RobotModel, poses: &[Isometry3<f64>], velocities:
     let mut forces: Vec<Twist> = bulks
         .iter()
         .zip(motions.iter().zip(&changes))
-        .map(|(bulk, (motion, change))| bulk.momentum(change).plus(motion.bends(&bulk.momentum(motion)), 1.0))
+        .map(|(bulk, (motion, change))| {
+            bulk.momentum(change)
+                .plus(motion.bends(&bulk.momentum(motion)), 1.0)
+        })
         .collect();
     let (mut mass, mut bias) = (vec![0.0; n_joints * n_joints], vec![0.0; n_joints]);
     // Children come after their parents.
@@ -212,5 +254,10 @@ pub(super) fn inertias(model: &RobotModel, poses: &[Isometry3<f64>], velocities:
         onto.about += bulk.about;
         forces[joint.parent] = forces[joint.parent].plus(force, 1.0);
     }
-    Inertias { mass, bias, axes, factor: OnceCell::new() }
+    Inertias {
+        mass,
+        bias,
+        axes,
+        factor: OnceCell::new(),
+    }
 }

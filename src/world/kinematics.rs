@@ -40,13 +40,14 @@ pub struct Kinematics {
     passing: BTreeSet<(usize, usize)>,
     /// Links of the hand: only its own joints move them against each other.
     hand: BTreeSet<usize>,
-    /// Joints that carry the hand and mimic others, as those of a telescope: the joint, its leader, factor and offset.
+    /// Joints that carry the hand and mimic others, as those of a telescope: the joint, its leader,
+    /// factor and offset.
     followers: Vec<(usize, usize, f64, f64)>,
 }
 
 impl Kinematics {
-    /// Creates the geometry of a robot with its root at `root`. `grasp` is the merged link and the pose in its
-    /// frame.
+    /// Creates the geometry of a robot with its root at `root`. `grasp` is the merged link and the
+    /// pose in its frame.
     pub(crate) fn new(
         model: Arc<RobotModel>,
         root: Isometry3<f64>,
@@ -55,16 +56,29 @@ impl Kinematics {
     ) -> Self {
         let path = path_to(&model, grasp.0);
         let (passing, hand, followers) = (BTreeSet::new(), BTreeSet::new(), Vec::new());
-        Self { model, root, grasp, path, camera, passing, hand, followers }
+        Self {
+            model,
+            root,
+            grasp,
+            path,
+            camera,
+            passing,
+            hand,
+            followers,
+        }
     }
 
     /// The same geometry with joints that follow others, if they carry the hand.
     pub(crate) fn with_followers(self, gripper: &Gripper) -> Self {
         let joints = &self.model.joints;
         let parent = |joint: &usize| joints[*joint].parent.checked_sub(1);
-        let path = std::iter::successors(self.grasp.0.checked_sub(1), parent).filter(|idx| !gripper.contains(*idx));
-        let followers =
-            path.filter_map(|idx| joints[idx].mimic.map(|(leader, factor, offset)| (idx, leader, factor, offset)));
+        let path = std::iter::successors(self.grasp.0.checked_sub(1), parent)
+            .filter(|idx| !gripper.contains(*idx));
+        let followers = path.filter_map(|idx| {
+            joints[idx]
+                .mimic
+                .map(|(leader, factor, offset)| (idx, leader, factor, offset))
+        });
         let followers = followers.collect();
         Self { followers, ..self }
     }
@@ -83,22 +97,36 @@ impl Kinematics {
     /// Returns the joints that carry the hand and follow a joint, with their factors.
     pub fn followers_of(&self, joint: usize) -> impl Iterator<Item = (usize, f64)> + '_ {
         let of = move |follower: &&(usize, usize, f64, f64)| follower.1 == joint;
-        self.followers.iter().filter(of).map(|(follower, _, factor, _)| (*follower, *factor))
+        self.followers
+            .iter()
+            .filter(of)
+            .map(|(follower, _, factor, _)| (*follower, *factor))
     }
 
-    /// The same geometry with pairs of links that pass through each other, and the links of the hand.
-    pub(crate) fn with_passing(self, passing: BTreeSet<(usize, usize)>, hand: BTreeSet<usize>) -> Self {
-        Self { passing, hand, ..self }
+    /// The same geometry with pairs of links that pass through each other, and the links of the
+    /// hand.
+    pub(crate) fn with_passing(
+        self,
+        passing: BTreeSet<(usize, usize)>,
+        hand: BTreeSet<usize>,
+    ) -> Self {
+        Self {
+            passing,
+            hand,
+            ..self
+        }
     }
 
-    /// Returns whether two links belong to the hand: an arm that moves does not bring them together.
+    /// Returns whether two links belong to the hand: an arm that moves does not bring them
+    /// together.
     pub(crate) fn are_of_hand(&self, first: usize, second: usize) -> bool {
         self.hand.contains(&first) && self.hand.contains(&second)
     }
 
     /// Returns whether two links pass through each other.
     pub(crate) fn pass(&self, first: usize, second: usize) -> bool {
-        self.passing.contains(&(first.min(second), first.max(second)))
+        self.passing
+            .contains(&(first.min(second), first.max(second)))
     }
 
     /// Returns the pose of the root. Frame: world.
@@ -113,15 +141,23 @@ impl Kinematics {
 
     /// Returns the URDF name of a link, by its index in [`Kinematics::links`].
     pub fn link_name(&self, link: usize) -> &str {
-        self.model.links.get(link).map_or("", |link| link.name.as_str())
+        self.model
+            .links
+            .get(link)
+            .map_or("", |link| link.name.as_str())
     }
 
-    /// Samples points on the robot's collision shapes, at most about `spacing` apart. Returns each with the index of
-    /// its link, in the link's frame. Unit: metres.
+    /// Samples points on the robot's collision shapes, at most about `spacing` apart. Returns each
+    /// with the index of its link, in the link's frame. Unit: metres.
     pub fn surface_points(&self, spacing: f64) -> Vec<(usize, Point3<f64>)> {
         let links = self.model.links.iter().enumerate();
         links
-            .flat_map(|(idx, link)| link.points(spacing).iter().map(|point| (idx, *point)).collect::<Vec<_>>())
+            .flat_map(|(idx, link)| {
+                link.points(spacing)
+                    .iter()
+                    .map(|point| (idx, *point))
+                    .collect::<Vec<_>>()
+            })
             .collect()
     }
 
@@ -142,7 +178,9 @@ impl Kinematics {
 
     /// Returns the pose of the link at the end of a path.
     fn along(&self, path: &[usize], positions: &[f64]) -> Isometry3<f64> {
-        path.iter().fold(self.root, |parent, idx| self.moved(&parent, *idx, positions))
+        path.iter().fold(self.root, |parent, idx| {
+            self.moved(&parent, *idx, positions)
+        })
     }
 
     /// The pose of the link that a joint moves, from that of its parent.
@@ -198,27 +236,37 @@ impl Kinematics {
         let links = self.model.links.iter().zip(self.links(positions));
         links
             .flat_map(|(link, pose)| {
-                link.solids.iter().map(move |solid| (pose * solid.pose.to_isometry(), solid.shape.clone()))
+                link.solids
+                    .iter()
+                    .map(move |solid| (pose * solid.pose.to_isometry(), solid.shape.clone()))
             })
             .collect()
     }
 
-    /// Returns the pose and the Jacobian of the grasp link; joints that follow others move with these. Shape: 6 × joints,
-    /// linear above angular.
+    /// Returns the pose and the Jacobian of the grasp link; joints that follow others move with
+    /// these. Shape: 6 × joints, linear above angular.
     pub fn grasp_jacobian(&self, positions: &[f64]) -> (Isometry3<f64>, Vec<Vector6<f64>>) {
         let mut jacobian = vec![Vector6::zeros(); self.model.joints.len()];
         let grasp = self.fill_jacobian(positions, &mut jacobian);
         (grasp, jacobian)
     }
 
-    /// As [`Kinematics::grasp_jacobian`], into columns that were made for the same joints: 0 or an earlier Jacobian.
-    pub(crate) fn fill_jacobian(&self, positions: &[f64], jacobian: &mut [Vector6<f64>]) -> Isometry3<f64> {
+    /// As [`Kinematics::grasp_jacobian`], into columns that were made for the same joints: 0 or an
+    /// earlier Jacobian.
+    pub(crate) fn fill_jacobian(
+        &self,
+        positions: &[f64],
+        jacobian: &mut [Vector6<f64>],
+    ) -> Isometry3<f64> {
         let mut pose = self.root;
         for idx in &self.path {
             let joint = &self.model.joints[*idx];
             let frame = pose * joint.origin;
             // The axis and a point on it, until the place of the grasp is known.
-            let (axis, point) = (frame.rotation * joint.axis.into_inner(), frame.translation.vector);
+            let (axis, point) = (
+                frame.rotation * joint.axis.into_inner(),
+                frame.translation.vector,
+            );
             jacobian[*idx] = Vector6::new(point.x, point.y, point.z, axis.x, axis.y, axis.z);
             pose = frame * motion(joint, positions[*idx]);
         }
@@ -230,9 +278,15 @@ impl Kinematics {
                 JointKind::Prismatic => (axis, Vector3::zeros()),
                 JointKind::Revolute => (axis.cross(&(grasp.translation.vector - point)), axis),
             };
-            jacobian[*idx] = Vector6::new(linear.x, linear.y, linear.z, angular.x, angular.y, angular.z);
+            jacobian[*idx] = Vector6::new(
+                linear.x, linear.y, linear.z, angular.x, angular.y, angular.z,
+            );
         }
-        for (_, leader, ..) in self.followers.iter().filter(|(_, leader, ..)| !self.path.contains(leader)) {
+        for (_, leader, ..) in self
+            .followers
+            .iter()
+            .filter(|(_, leader, ..)| !self.path.contains(leader))
+        {
             jacobian[*leader] = Vector6::zeros();
         }
         for (joint, leader, factor, _) in &self.followers {
@@ -242,20 +296,24 @@ impl Kinematics {
         grasp
     }
 
-    /// Returns the downward pitch of the hand if no joint of the arm changes it, because all that turn are vertical. Unit:
-    /// radians.
+    /// Returns the downward pitch of the hand if no joint of the arm changes it, because all that
+    /// turn are vertical. Unit: radians.
     pub fn only_pitch(&self, arm: &[usize], positions: &[f64]) -> Option<f64> {
         let links = self.links(positions);
         let keeps_pitch = |idx: &usize| {
             let joint = &self.model.joints[*idx];
-            let axis = links[joint.parent].rotation * (joint.origin.rotation * joint.axis.into_inner());
+            let axis =
+                links[joint.parent].rotation * (joint.origin.rotation * joint.axis.into_inner());
             joint.kind == JointKind::Prismatic || axis.z.abs() > VERTICAL
         };
         let ahead = self.grasp(positions).rotation * Vector3::x();
-        arm.iter().all(keeps_pitch).then(|| libm::asin((-ahead.z).clamp(-1.0, 1.0)))
+        arm.iter()
+            .all(keeps_pitch)
+            .then(|| libm::asin((-ahead.z).clamp(-1.0, 1.0)))
     }
 
-    /// Returns the forces and torques that compensate gravity. Units: newtons or newton metres. Shape: one per joint.
+    /// Returns the forces and torques that compensate gravity. Units: newtons or newton metres.
+    /// Shape: one per joint.
     pub fn holding_efforts(&self, positions: &[f64]) -> Vec<f64> {
         self.holding_efforts_at(&self.links(positions))
     }
@@ -279,15 +337,21 @@ fn path_to(model: &RobotModel, link: usize) -> Vec<usize> {
     path
 }
 
-/// Returns the forces and torques that compensate gravity, with the links at these poses. Units: newtons or newton metres.
-/// Shape: one per joint.
+/// Returns the forces and torques that compensate gravity, with the links at these poses. Units:
+/// newtons or newton metres. Shape: one per joint.
 pub(crate) fn holding_efforts(model: &RobotModel, poses: &[Isometry3<f64>]) -> Vec<f64> {
-    // Mass and first moment of each subtree, accumulated from the leaves: children come after their parents.
+    // Mass and first moment of each subtree, accumulated from the leaves: children come after their
+    // parents.
     let mut weights: Vec<(f64, Vector3<f64>)> = model
         .links
         .iter()
         .zip(poses)
-        .map(|(link, pose)| (link.mass, (pose * Point3::from(link.com)).coords * link.mass))
+        .map(|(link, pose)| {
+            (
+                link.mass,
+                (pose * Point3::from(link.com)).coords * link.mass,
+            )
+        })
         .collect();
     let mut efforts = vec![0.0; model.joints.len()];
     for (idx, joint) in model.joints.iter().enumerate().rev() {
@@ -306,22 +370,30 @@ pub(crate) fn holding_efforts(model: &RobotModel, poses: &[Isometry3<f64>]) -> V
 
 pub(super) fn motion(joint: &Joint, position: f64) -> Isometry3<f64> {
     match joint.kind {
-        JointKind::Prismatic => {
-            Isometry3::from_parts(Translation3::from(joint.axis.into_inner() * position), UnitQuaternion::identity())
-        }
-        JointKind::Revolute => {
-            Isometry3::from_parts(Translation3::identity(), UnitQuaternion::from_axis_angle(&joint.axis, position))
-        }
+        JointKind::Prismatic => Isometry3::from_parts(
+            Translation3::from(joint.axis.into_inner() * position),
+            UnitQuaternion::identity(),
+        ),
+        JointKind::Revolute => Isometry3::from_parts(
+            Translation3::identity(),
+            UnitQuaternion::from_axis_angle(&joint.axis, position),
+        ),
     }
 }
 
 /// Returns the direction of a joint's axis and a point on it. Frame: world.
-pub(super) fn axis_in_world(joint: &Joint, poses: &[Isometry3<f64>]) -> (Vector3<f64>, Vector3<f64>) {
+pub(super) fn axis_in_world(
+    joint: &Joint,
+    poses: &[Isometry3<f64>],
+) -> (Vector3<f64>, Vector3<f64>) {
     axis_from(joint, &poses[joint.parent])
 }
 
 /// As [`axis_in_world`], from the pose of the parent.
 fn axis_from(joint: &Joint, parent: &Isometry3<f64>) -> (Vector3<f64>, Vector3<f64>) {
     let frame = parent * joint.origin;
-    (frame.rotation * joint.axis.into_inner(), frame.translation.vector)
+    (
+        frame.rotation * joint.axis.into_inner(),
+        frame.translation.vector,
+    )
 }

@@ -41,13 +41,25 @@ pub(super) struct Named {
 
 impl Named {
     pub(super) fn find(profile: &RobotProfile, model: &RobotModel) -> Result<Self, WorldError> {
-        let joints = |names: &[String]| names.iter().map(|name| model.joint(name)).collect::<Result<Vec<_>, _>>();
+        let joints = |names: &[String]| {
+            names
+                .iter()
+                .map(|name| model.joint(name))
+                .collect::<Result<Vec<_>, _>>()
+        };
         let base = match &profile.base_joints {
-            Some([x, y, heading]) => Some([model.joint(x)?, model.joint(y)?, model.joint(heading)?]),
+            Some([x, y, heading]) => {
+                Some([model.joint(x)?, model.joint(y)?, model.joint(heading)?])
+            }
             None => None,
         };
         let [left_link, right_link] = &profile.finger_links;
-        let grasp = frame(model, &profile.grasp_link, profile.grasp_offset_m, profile.grasp_turned_rad)?;
+        let grasp = frame(
+            model,
+            &profile.grasp_link,
+            profile.grasp_offset_m,
+            profile.grasp_turned_rad,
+        )?;
         let camera = camera(model, profile)?;
         let finger_links = [model.frame(left_link)?.0, model.frame(right_link)?.0];
         let layout = Layout {
@@ -58,24 +70,39 @@ impl Named {
         };
         let probe = Probe::new(model, finger_links, grasp);
         let fingers = links_of_fingers(model, &layout.gripper, &probe);
-        Ok(Self { layout, finger_links, fingers, grasp, camera })
+        Ok(Self {
+            layout,
+            finger_links,
+            fingers,
+            grasp,
+            camera,
+        })
     }
 
-    /// Returns the pairs of links that pass through each other, with the smaller index first: those of the hand, but not
-    /// the two fingertips, and those of a wrist, because their convex shapes overlap where the real ones do not; and those
-    /// that the file names.
+    /// Returns the pairs of links that pass through each other, with the smaller index first: those
+    /// of the hand, but not the two fingertips, and those of a wrist, because their convex shapes
+    /// overlap where the real ones do not; and those that the file names.
     pub(super) fn passing(&self, model: &RobotModel) -> BTreeSet<(usize, usize)> {
         let all = self.links_of_hand(model);
         let [left, right] = self.finger_links;
-        let pairs = all.iter().flat_map(|first| all.range(first + 1..).map(|second| (*first, *second)));
+        let pairs = all
+            .iter()
+            .flat_map(|first| all.range(first + 1..).map(|second| (*first, *second)));
         let of_gripper = pairs.filter(|pair| *pair != (left.min(right), left.max(right)));
-        of_gripper.chain(wrist::passing(model)).chain(model.passing.iter().copied()).collect()
+        of_gripper
+            .chain(wrist::passing(model))
+            .chain(model.passing.iter().copied())
+            .collect()
     }
 
-    /// Returns the links of the gripper's mechanism, those that carry them, and the hand's other fingers.
+    /// Returns the links of the gripper's mechanism, those that carry them, and the hand's other
+    /// fingers.
     pub(super) fn links_of_hand(&self, model: &RobotModel) -> BTreeSet<usize> {
         let gripper = &self.layout.gripper;
-        let palms: BTreeSet<usize> = gripper.joints().map(|joint| model.joints[joint].parent).collect();
+        let palms: BTreeSet<usize> = gripper
+            .joints()
+            .map(|joint| model.joints[joint].parent)
+            .collect();
         let moved_by = |begins: &dyn Fn(usize) -> bool| {
             let mut moved = vec![false; model.links.len()];
             for (idx, joint) in model.joints.iter().enumerate() {
@@ -83,14 +110,21 @@ impl Named {
             }
             moved
         };
-        // A link that carries an arm or the head too, such as a torso with the fingers of two arms, is not a hand.
-        let is_elsewhere = |idx: &usize| self.layout.arm.contains(idx) || self.layout.head.contains(idx);
+        // A link that carries an arm or the head too, such as a torso with the fingers of two arms,
+        // is not a hand.
+        let is_elsewhere =
+            |idx: &usize| self.layout.arm.contains(idx) || self.layout.head.contains(idx);
         let is_hand = |palm: usize| {
             let below = moved_by(&|idx| model.joints[idx].parent == palm);
             palm > 0 && !(0..model.joints.len()).any(|idx| below[idx + 1] && is_elsewhere(&idx))
         };
-        let hands: BTreeSet<usize> = palms.iter().copied().filter(|palm| is_hand(*palm)).collect();
-        let moved = moved_by(&|idx| gripper.contains(idx) || hands.contains(&model.joints[idx].parent));
+        let hands: BTreeSet<usize> = palms
+            .iter()
+            .copied()
+            .filter(|palm| is_hand(*palm))
+            .collect();
+        let moved =
+            moved_by(&|idx| gripper.contains(idx) || hands.contains(&model.joints[idx].parent));
         let moved = (0..model.links.len()).filter(|link| moved[*link]);
         moved.chain(palms).collect()
     }
@@ -113,16 +147,20 @@ pub(super) fn camera(model: &RobotModel, profile: &RobotProfile) -> Result<Mount
     match frame(model, link, offset_m, profile.camera_turned_rad) {
         Ok((link, pose)) => Ok(Mount::Link(link, pose)),
         // A link of this name takes precedence: it is where the URDF says.
-        Err(_) if link == RobotProfile::MAP => Ok(Mount::World(moved(offset_m, profile.camera_turned_rad))),
+        Err(_) if link == RobotProfile::MAP => {
+            Ok(Mount::World(moved(offset_m, profile.camera_turned_rad)))
+        }
         Err(error) => Err(error),
     }
 }
 
 fn moved(offset_m: [f64; 3], [roll, pitch, yaw]: [f64; 3]) -> Isometry3<f64> {
-    Translation3::from(Vector3::from(offset_m)) * UnitQuaternion::from_euler_angles(roll, pitch, yaw)
+    Translation3::from(Vector3::from(offset_m))
+        * UnitQuaternion::from_euler_angles(roll, pitch, yaw)
 }
 
-/// Returns the largest force of each finger that the motors of a robot's gripper can give. Unit: newtons.
+/// Returns the largest force of each finger that the motors of a robot's gripper can give. Unit:
+/// newtons.
 ///
 /// # Errors
 /// As [`check_robot`].
@@ -133,29 +171,42 @@ pub fn grip_limit_n(profile: &RobotProfile) -> Result<f64, WorldError> {
     Ok(gripper.motors().map(of).fold(f64::INFINITY, f64::min))
 }
 
-/// Returns the force along the fingers of a robot's gripper, relative to that across them, with which they push a round object
-/// of this diameter out of the hand: fingers that turn are a wedge around it. Negative if they push it towards the palm.
-/// Friction with a greater coefficient holds the object. Returns `None` if they can't be closed on it. Unit: metres.
+/// Returns the force along the fingers of a robot's gripper, relative to that across them, with
+/// which they push a round object of this diameter out of the hand: fingers that turn are a wedge
+/// around it. Negative if they push it towards the palm. Friction with a greater coefficient holds
+/// the object. Returns `None` if they can't be closed on it. Unit: metres.
 ///
 /// # Errors
 /// As [`check_robot`].
 pub fn outward_push(profile: &RobotProfile, diameter_m: f64) -> Result<Option<f64>, WorldError> {
     let model = RobotModel::read(profile)?;
     let named = Named::find(profile, &model)?;
-    Ok(crate::gripper::outward_push(&model, &named.layout.gripper, named.finger_links, named.grasp, diameter_m))
+    Ok(crate::gripper::outward_push(
+        &model,
+        &named.layout.gripper,
+        named.finger_links,
+        named.grasp,
+        diameter_m,
+    ))
 }
 
-/// Returns the links of a robot whose collision shapes are between its fingers: nothing can be grasped there.
+/// Returns the links of a robot whose collision shapes are between its fingers: nothing can be
+/// grasped there.
 ///
 /// # Errors
 /// As [`check_robot`].
 pub fn shapes_between_fingers(profile: &RobotProfile) -> Result<Vec<String>, WorldError> {
     let model = RobotModel::read(profile)?;
     let named = Named::find(profile, &model)?;
-    Ok(crate::gripper::between_fingers(&model, named.finger_links, named.grasp))
+    Ok(crate::gripper::between_fingers(
+        &model,
+        named.finger_links,
+        named.grasp,
+    ))
 }
 
-/// Returns the joints of a robot's arm that can't hold its weight by their motors alone. They are simulated as balanced.
+/// Returns the joints of a robot's arm that can't hold its weight by their motors alone. They are
+/// simulated as balanced.
 ///
 /// # Errors
 /// [`WorldError`] if the URDF can't be read.
@@ -163,8 +214,8 @@ pub fn balanced_joints(profile: &RobotProfile) -> Result<Vec<BalancedJoint>, Wor
     RobotModel::read(profile).map(|model| model.balanced)
 }
 
-/// Returns the joints with a role whose largest effort is 0 in the URDF, and so unknown, and the effort that they are
-/// simulated with. Unit: newtons or newton metres.
+/// Returns the joints with a role whose largest effort is 0 in the URDF, and so unknown, and the
+/// effort that they are simulated with. Unit: newtons or newton metres.
 ///
 /// # Errors
 /// [`WorldError`] if the URDF can't be read.
@@ -172,7 +223,8 @@ pub fn assumed_efforts(profile: &RobotProfile) -> Result<(Vec<String>, f64), Wor
     RobotModel::read(profile).map(|model| (model.assumed, UNKNOWN_EFFORT))
 }
 
-/// As [`assumed_efforts`], for joints whose largest speed is 0. Units: rad/s for those that turn, m/s for those that slide.
+/// As [`assumed_efforts`], for joints whose largest speed is 0. Units: rad/s for those that turn,
+/// m/s for those that slide.
 ///
 /// # Errors
 /// [`WorldError`] if the URDF can't be read.

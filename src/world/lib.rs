@@ -1,7 +1,7 @@
 //! Simulates a `Scene`: the only crate that uses the physics engine.
 //!
-//! Never: decides the robot's actions, judges success, or attaches an object to the hand by a constraint, other than the
-//! seal of a suction cup, which breaks beyond its limits.
+//! Never: decides the robot's actions, judges success, or attaches an object to the hand by a
+//! constraint, other than the seal of a suction cup, which breaks beyond its limits.
 
 mod assemble;
 mod assumed;
@@ -84,8 +84,8 @@ pub use gripper::Gripper;
 pub use inertia::Dynamics;
 pub use kinematics::{GRAVITY, Kinematics};
 pub use layout::{
-    Layout, assumed_efforts, assumed_speeds, balanced_joints, check_robot, grip_limit_n, outward_push,
-    shapes_between_fingers,
+    Layout, assumed_efforts, assumed_speeds, balanced_joints, check_robot, grip_limit_n,
+    outward_push, shapes_between_fingers,
 };
 pub use overlaps::Overlap;
 pub use propose::{Proposal, complete, is_incomplete, propose};
@@ -100,6 +100,6 @@ pub use sphere_tree::{Cluster, Sphere, sphere_tree};
 pub use suction::would_seal;
 pub use views::robot_views;
 
-/// Version of the physics: the same scene and commands give the same bits only with the same version. It rises with each
-/// change of these bits.
+/// Version of the physics: the same scene and commands give the same bits only with the same
+/// version. It rises with each change of these bits.
 pub const PHYSICS_VERSION: u32 = 19;

@@ -10,21 +10,30 @@ use crate::convert::to_pose;
 use crate::engine::{Owner, collider};
 
 impl Kinematics {
-    /// Returns the largest depth of the links that one joint moves in those that another joint moves; 0 if they are
-    /// apart. Joints are given by index. Unit: metres.
+    /// Returns the largest depth of the links that one joint moves in those that another joint
+    /// moves; 0 if they are apart. Joints are given by index. Unit: metres.
     pub fn depth_between(&self, positions: &[f64], first: usize, second: usize) -> f64 {
         let poses = self.links(positions);
-        let (these, those) = (self.shapes_beyond(first, &poses), self.shapes_beyond(second, &poses));
+        let (these, those) = (
+            self.shapes_beyond(first, &poses),
+            self.shapes_beyond(second, &poses),
+        );
         let pairs = these.iter().flat_map(|a| those.iter().map(move |b| (a, b)));
         let depths = pairs.map(|((at_a, a), (at_b, b))| {
-            let met = contact(at_a, a.as_ref(), at_b, b.as_ref(), 0.0).ok().flatten();
+            let met = contact(at_a, a.as_ref(), at_b, b.as_ref(), 0.0)
+                .ok()
+                .flatten();
             met.map_or(0.0, |met| -f64::from(met.dist))
         });
         depths.fold(0.0, f64::max)
     }
 
     /// Returns the shapes of all links that a joint moves, with their poses.
-    fn shapes_beyond(&self, joint: usize, poses: &[Isometry3<f64>]) -> Vec<(EnginePose, SharedShape)> {
+    fn shapes_beyond(
+        &self,
+        joint: usize,
+        poses: &[Isometry3<f64>],
+    ) -> Vec<(EnginePose, SharedShape)> {
         // The link with this index is moved by the joint before it.
         let mut moved = vec![joint + 1];
         for (idx, other) in self.joints().iter().enumerate() {
@@ -33,7 +42,11 @@ impl Kinematics {
             }
         }
         let mut shapes = Vec::new();
-        for (link, solids) in self.solids_of_links().enumerate().filter(|(link, _)| moved.contains(link)) {
+        for (link, solids) in self
+            .solids_of_links()
+            .enumerate()
+            .filter(|(link, _)| moved.contains(link))
+        {
             for solid in solids {
                 if let Some(form) = collider(solid, Owner::Floor, 0.0, 0.0) {
                     shapes.push((to_pose(&poses[link]) * form.position, form.shape));
@@ -53,7 +66,8 @@ mod tests {
         let world = lonely();
         let (kinematics, layout) = (world.kinematics(), world.layout());
         let mut positions = world.observe().positions;
-        let depth = |positions: &[f64]| kinematics.depth_between(positions, layout.arm[0], layout.head[0]);
+        let depth =
+            |positions: &[f64]| kinematics.depth_between(positions, layout.arm[0], layout.head[0]);
         assert_eq!(depth(&positions), 0.0);
         positions[layout.arm[0]] = 0.5;
         let deepest = (0..20).map(|step| {

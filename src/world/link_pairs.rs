@@ -1,11 +1,13 @@
-//! The pairs of the robot's links that collide with each other in the simulation, and of parts of objects.
+//! The pairs of the robot's links that collide with each other in the simulation, and of parts of
+//! objects.
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use rapier3d::dynamics::IntegrationParameters;
 use rapier3d::pipeline::{ContactModificationContext, ModifiableContacts};
 use rapier3d::prelude::{
-    Group, InteractionGroups, InteractionTestMode, PairFilterContext, PhysicsHooks, Real, SolverFlags,
+    Group, InteractionGroups, InteractionTestMode, PairFilterContext, PhysicsHooks, Real,
+    SolverFlags,
 };
 
 use crate::World;
@@ -17,22 +19,25 @@ use parry3d::math::Vector;
 
 /// Number of collision groups for links.
 const LINK_GROUPS: u32 = 30;
-/// Contacts nearer than this are kept at any speed: a link at rest can't move farther in a step. Unit: metres.
+/// Contacts nearer than this are kept at any speed: a link at rest can't move farther in a step.
+/// Unit: metres.
 pub(super) const SURE_M: Real = 1.5e-3;
 /// Factor on the present speed, which motors change within the step.
 const OVERSHOOT: Real = 2.0;
 /// A collision group without links: objects are in all groups, and links collide with this one.
 const OTHERS: Group = Group::GROUP_31;
 
-/// Pairs of links, each with the smaller index first. All other links pass through each other: neighbours, whose shapes
-/// overlap at their joint, the links of a gripper's mechanism, and links that overlap or touch in the initial posture, which
-/// is known to be valid.
+/// Pairs of links, each with the smaller index first. All other links pass through each other:
+/// neighbours, whose shapes overlap at their joint, the links of a gripper's mechanism, and links
+/// that overlap or touch in the initial posture, which is known to be valid.
 #[derive(Debug, Default)]
 pub(super) struct LinkPairs {
     pairs: BTreeSet<(usize, usize)>,
-    /// Whether these links pass through each other too, because of a fault that is injected on purpose.
+    /// Whether these links pass through each other too, because of a fault that is injected on
+    /// purpose.
     pub(super) pass: bool,
-    /// The whole that each part of an object belongs to, by their indices: nothing collides within a whole.
+    /// The whole that each part of an object belongs to, by their indices: nothing collides within
+    /// a whole.
     pub(super) wholes: BTreeMap<usize, usize>,
     /// Duration of a step. Unit: seconds.
     pub(super) step_secs: Real,
@@ -44,8 +49,8 @@ impl LinkPairs {
         self.pairs.iter().copied()
     }
 
-    /// Returns the number of the collision group of each link: links that collide with the same ones share it. The last
-    /// group has all links for which there are too few groups.
+    /// Returns the number of the collision group of each link: links that collide with the same
+    /// ones share it. The last group has all links for which there are too few groups.
     fn groups(&self, links: usize) -> Vec<u32> {
         let mut partners = vec![BTreeSet::new(); links];
         for (first, second) in self.iter() {
@@ -54,7 +59,9 @@ impl LinkPairs {
         }
         let mut numbers = BTreeMap::new();
         let number = |partners| {
-            let next = u32::try_from(numbers.len()).unwrap_or(u32::MAX).min(LINK_GROUPS - 1);
+            let next = u32::try_from(numbers.len())
+                .unwrap_or(u32::MAX)
+                .min(LINK_GROUPS - 1);
             *numbers.entry(partners).or_insert(next)
         };
         partners.into_iter().map(number).collect()
@@ -63,9 +70,16 @@ impl LinkPairs {
 
 impl PhysicsHooks for LinkPairs {
     fn filter_contact_pair(&self, context: &PairFilterContext<'_>) -> Option<SolverFlags> {
-        let owner = |handle| context.colliders.get(handle).map(|collider| Owner::from_tag(collider.user_data));
+        let owner = |handle| {
+            context
+                .colliders
+                .get(handle)
+                .map(|collider| Owner::from_tag(collider.user_data))
+        };
         let collide = match (owner(context.collider1), owner(context.collider2)) {
-            (Some(Owner::Link(a)), Some(Owner::Link(b))) => !self.pass && self.pairs.contains(&(a.min(b), a.max(b))),
+            (Some(Owner::Link(a)), Some(Owner::Link(b))) => {
+                !self.pass && self.pairs.contains(&(a.min(b), a.max(b)))
+            }
             (Some(Owner::Object(a)), Some(Owner::Object(b))) => {
                 let whole = |idx| self.wholes.get(&idx).copied().unwrap_or(idx);
                 whole(a) != whole(b)
@@ -75,16 +89,19 @@ impl PhysicsHooks for LinkPairs {
         collide.then_some(SolverFlags::COMPUTE_RIGID_IMPULSES)
     }
 
-    /// Drops the contacts of links that can't close in this step: the engine prepares all within some millimetres, and fingers
-    /// of many pieces have dozens that never close.
+    /// Drops the contacts of links that can't close in this step: the engine prepares all within
+    /// some millimetres, and fingers of many pieces have dozens that never close.
     fn modify_solver_contacts(&self, context: &mut ContactModificationContext<'_>) {
-        let bodies =
-            [context.rigid_body1, context.rigid_body2].map(|handle| handle.and_then(|it| context.bodies.get(it)));
-        let ModifiableContacts::Rigid(found) = &mut context.contacts else { return };
+        let bodies = [context.rigid_body1, context.rigid_body2]
+            .map(|handle| handle.and_then(|it| context.bodies.get(it)));
+        let ModifiableContacts::Rigid(found) = &mut context.contacts else {
+            return;
+        };
         let normal = *found.normal;
         let closes = |points: [Vector; 2]| {
-            let [first, second] =
-                [0, 1].map(|side| bodies[side].map_or(Vector::ZERO, |body| body.velocity_at_point(points[side])));
+            let [first, second] = [0, 1].map(|side| {
+                bodies[side].map_or(Vector::ZERO, |body| body.velocity_at_point(points[side]))
+            });
             (first - second).dot(normal).max(0.0)
         };
         found.solver_contacts.retain(|contact| {
@@ -94,11 +111,11 @@ impl PhysicsHooks for LinkPairs {
     }
 }
 
-/// Distance below which contacts are prepared in a world whose robot has links of many pieces. The default of 2 cm would prepare
-/// hundreds of contacts between its fingers. Unit: metres.
+/// Distance below which contacts are prepared in a world whose robot has links of many pieces. The
+/// default of 2 cm would prepare hundreds of contacts between its fingers. Unit: metres.
 pub(super) const PREDICTION_M: f64 = 0.006;
-/// In a tick that begins with a faster object or link, contacts are prepared at the engine's own distance: it would enter
-/// others before its contact is found. Unit: m/s.
+/// In a tick that begins with a faster object or link, contacts are prepared at the engine's own
+/// distance: it would enter others before its contact is found. Unit: m/s.
 const FAST_M_S: f64 = 1.0;
 
 impl World {
@@ -108,40 +125,66 @@ impl World {
             return;
         }
         let is_fast = |object: &Object| self.speed_of(object).is_some_and(|speed| speed > FAST_M_S);
-        let links = self.robot.bodies.iter().filter_map(|body| self.engine.bodies.get(*body));
-        let is_link_fast = links.map(|body| from_vector(body.linvel()).norm()).any(|speed| speed > FAST_M_S);
+        let links = self
+            .robot
+            .bodies
+            .iter()
+            .filter_map(|body| self.engine.bodies.get(*body));
+        let is_link_fast = links
+            .map(|body| from_vector(body.linvel()).norm())
+            .any(|speed| speed > FAST_M_S);
         let distance = match is_link_fast || self.objects.iter().any(is_fast) {
             true => IntegrationParameters::default().normalized_prediction_distance / LENGTH_UNIT,
             false => to_real(PREDICTION_M) / LENGTH_UNIT,
         };
-        self.engine.integration_parameters.normalized_prediction_distance = distance;
+        self.engine
+            .integration_parameters
+            .normalized_prediction_distance = distance;
     }
 
     /// Returns the pairs of links that are apart now and are not neighbours in the tree.
     pub(super) fn find_link_pairs(&self) -> LinkPairs {
         let links = &self.robot.model.links;
-        let solid: Vec<usize> = (0..links.len()).filter(|idx| !links[*idx].solids.is_empty()).collect();
+        let solid: Vec<usize> = (0..links.len())
+            .filter(|idx| !links[*idx].solids.is_empty())
+            .collect();
         let neighbours: BTreeSet<(usize, usize)> = solid
             .iter()
-            .filter_map(|idx| self.robot.kinematics.solid_parent(*idx).map(|parent| (parent, *idx)))
+            .filter_map(|idx| {
+                self.robot
+                    .kinematics
+                    .solid_parent(*idx)
+                    .map(|parent| (parent, *idx))
+            })
             .collect();
-        let pairs = solid
-            .iter()
-            .flat_map(|first| solid.iter().filter(move |second| *second > first).map(move |second| (*first, *second)));
-        let passes = |pair: &(usize, usize)| neighbours.contains(pair) || self.robot.kinematics.pass(pair.0, pair.1);
+        let pairs = solid.iter().flat_map(|first| {
+            solid
+                .iter()
+                .filter(move |second| *second > first)
+                .map(move |second| (*first, *second))
+        });
+        let passes = |pair: &(usize, usize)| {
+            neighbours.contains(pair) || self.robot.kinematics.pass(pair.0, pair.1)
+        };
         let apart = |pair: &(usize, usize)| !passes(pair) && !self.meet(pair.0, pair.1);
-        LinkPairs { pairs: pairs.filter(apart).collect(), ..LinkPairs::default() }
+        LinkPairs {
+            pairs: pairs.filter(apart).collect(),
+            ..LinkPairs::default()
+        }
     }
 
-    /// Returns whether two links overlap now, or touch each other and are not both of the hand, whose fingers may be closed. With
-    /// links that touch from the beginning, no tick would be free.
+    /// Returns whether two links overlap now, or touch each other and are not both of the hand,
+    /// whose fingers may be closed. With links that touch from the beginning, no tick would be
+    /// free.
     fn meet(&self, first: usize, second: usize) -> bool {
         let in_hand = self.robot.kinematics.are_of_hand(first, second);
-        self.depth_of(first, second) > TOUCH_M || !in_hand && self.gap_of_links(first, second) <= TOUCH_M
+        self.depth_of(first, second) > TOUCH_M
+            || !in_hand && self.gap_of_links(first, second) <= TOUCH_M
     }
 
-    /// Puts links that pass through each other into collision groups that do, as far as there are groups. The engine then
-    /// never looks at their pairs, of which a gripper with many pieces has thousands.
+    /// Puts links that pass through each other into collision groups that do, as far as there are
+    /// groups. The engine then never looks at their pairs, of which a gripper with many pieces has
+    /// thousands.
     pub(super) fn group_links(&mut self) {
         let numbers = self.link_pairs.groups(self.robot.bodies.len());
         let group = |link: usize| Group::from_bits_retain(1 << numbers[link]);
@@ -151,11 +194,19 @@ impl World {
             partners[second] |= group(first);
         }
         for (link, body) in self.robot.bodies.iter().enumerate() {
-            let Some(body) = self.engine.bodies.get(*body) else { continue };
+            let Some(body) = self.engine.bodies.get(*body) else {
+                continue;
+            };
             for handle in body.colliders() {
-                let Some(collider) = self.engine.colliders.get_mut(*handle) else { continue };
+                let Some(collider) = self.engine.colliders.get_mut(*handle) else {
+                    continue;
+                };
                 let floor = collider.collision_groups().filter & FLOOR_GROUP;
-                let groups = InteractionGroups::new(group(link), partners[link] | floor, InteractionTestMode::And);
+                let groups = InteractionGroups::new(
+                    group(link),
+                    partners[link] | floor,
+                    InteractionTestMode::And,
+                );
                 collider.set_collision_groups(groups);
             }
         }
@@ -169,7 +220,8 @@ mod tests {
     use crate::robot::tests::alone;
     use actcheck_base::Source;
 
-    /// The hand is 60 cm above the robot's root: on a block that reaches up to its fingers, or 1 mm below them.
+    /// The hand is 60 cm above the robot's root: on a block that reaches up to its fingers, or 1 mm
+    /// below them.
     #[test]
     fn links_that_touch_in_the_initial_posture_pass_through_each_other() {
         for (gap_m, collide) in [(0.0, false), (0.001, true)] {
@@ -181,33 +233,52 @@ mod tests {
                 top_m / 2.0
             );
             let palm = "<link name=\"palm\"><collision><geometry><sphere radius=\"0.01\"/></geometry></collision>";
-            let text = profile.urdf.text.replace("<link name=\"base\"/>", &block).replace("<link name=\"palm\">", palm);
+            let text = profile
+                .urdf
+                .text
+                .replace("<link name=\"base\"/>", &block)
+                .replace("<link name=\"palm\">", palm);
             profile.urdf = Source::new("hand.urdf", text);
             let mut world = alone(profile);
             let links = world.robot.model.links.iter();
             let names: Vec<&str> = links.map(|link| link.name.as_str()).collect();
             let collides = |one: &str, other: &str| {
-                let mut pairs = world.link_pairs.iter().map(|(one, other)| [names[one], names[other]]);
+                let mut pairs = world
+                    .link_pairs
+                    .iter()
+                    .map(|(one, other)| [names[one], names[other]]);
                 pairs.any(|pair| pair == [one, other] || pair == [other, one])
             };
             assert!(
-                ["left_finger", "right_finger"].iter().all(|finger| collides("base", finger) == collide),
+                ["left_finger", "right_finger"]
+                    .iter()
+                    .all(|finger| collides("base", finger) == collide),
                 "{gap_m}"
             );
-            assert!(collides("left_finger", "right_finger"), "fingers do not pass through each other");
+            assert!(
+                collides("left_finger", "right_finger"),
+                "fingers do not pass through each other"
+            );
             let hold = world.hold();
             (0..30).for_each(|_| world.step(&hold));
-            assert!(world.moved_freely(), "{gap_m}: {:?}", world.ticks_by_reach());
+            assert!(
+                world.moved_freely(),
+                "{gap_m}: {:?}",
+                world.ticks_by_reach()
+            );
         }
     }
 
     #[test]
     fn links_with_the_same_partners_share_a_group_and_no_others_do() {
-        let pairs =
-            |pairs: &[(usize, usize)]| LinkPairs { pairs: pairs.iter().copied().collect(), ..LinkPairs::default() };
+        let pairs = |pairs: &[(usize, usize)]| LinkPairs {
+            pairs: pairs.iter().copied().collect(),
+            ..LinkPairs::default()
+        };
         assert_eq!(pairs(&[(0, 2), (1, 2)]).groups(4), [0, 0, 1, 2]);
-        let all: Vec<(usize, usize)> =
-            (0..40).flat_map(|first| (first + 1..40).map(move |second| (first, second))).collect();
+        let all: Vec<(usize, usize)> = (0..40)
+            .flat_map(|first| (first + 1..40).map(move |second| (first, second)))
+            .collect();
         let groups = pairs(&all).groups(40);
         assert_eq!(groups[..30], (0..30).collect::<Vec<u32>>());
         assert!(groups[30..].iter().all(|group| *group == 29), "{groups:?}");

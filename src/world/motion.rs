@@ -4,8 +4,8 @@ use crate::recorder::grain;
 use crate::{Command, World};
 use actcheck_data::Motion;
 
-/// Positions, velocities and targets are rounded to multiples of this, for compression. Units: metres or radians (per
-/// second).
+/// Positions, velocities and targets are rounded to multiples of this, for compression. Units:
+/// metres or radians (per second).
 const GRAIN: f64 = 1e-4;
 /// As [`GRAIN`], for efforts. Units: newtons or newton metres.
 const EFFORT_GRAIN: f64 = 0.01;
@@ -37,30 +37,57 @@ impl World {
 
     /// Records this moment.
     pub(super) fn record_motion(&mut self) {
-        let Some(told) = &self.recorder.motion.told else { return };
+        let Some(told) = &self.recorder.motion.told else {
+            return;
+        };
         let observed = self.observe();
         let base = self.base_true();
         let secs = self.recorder.secs_since_begin(self.recorder.n_ticks());
         let mut row = vec![grain(secs, GRAIN), grain(observed.gripper_opening_m, GRAIN)];
-        row.extend(observed.finger_efforts_n.map(|effort| grain(effort, EFFORT_GRAIN)));
-        row.extend([grain(told.gripper_opening_m, GRAIN), grain(told.grip_force_n, EFFORT_GRAIN)]);
-        row.extend(base.into_iter().chain(self.believed(base)).map(|value| grain(value, GRAIN)));
+        row.extend(
+            observed
+                .finger_efforts_n
+                .map(|effort| grain(effort, EFFORT_GRAIN)),
+        );
+        row.extend([
+            grain(told.gripper_opening_m, GRAIN),
+            grain(told.grip_force_n, EFFORT_GRAIN),
+        ]);
+        row.extend(
+            base.into_iter()
+                .chain(self.believed(base))
+                .map(|value| grain(value, GRAIN)),
+        );
         let gripper = &self.robot.layout.gripper;
         for (idx, position) in observed.positions.iter().enumerate() {
             let of = |values: &[f64]| values.get(idx).copied().unwrap_or(f64::NAN);
             let velocity = of(&observed.velocities);
             // The gap between the fingers is commanded, not their positions.
-            let target = gripper.target(idx, told.gripper_opening_m).unwrap_or_else(|| of(&told.positions));
+            let target = gripper
+                .target(idx, told.gripper_opening_m)
+                .unwrap_or_else(|| of(&told.positions));
             row.extend([*position, velocity].map(|value| grain(value, GRAIN)));
-            row.extend([grain(of(&observed.loads), EFFORT_GRAIN), grain(target, GRAIN)]);
+            row.extend([
+                grain(of(&observed.loads), EFFORT_GRAIN),
+                grain(target, GRAIN),
+            ]);
         }
         self.recorder.motion.rows.push(row);
     }
 
     /// Returns the motion recorded since the start.
     pub(super) fn end_motion(&mut self) -> Motion {
-        let joints = self.robot.model.joints.iter().map(|joint| joint.name.clone()).collect();
-        Motion { joints, rows: std::mem::take(&mut self.recorder.motion.rows) }
+        let joints = self
+            .robot
+            .model
+            .joints
+            .iter()
+            .map(|joint| joint.name.clone())
+            .collect();
+        Motion {
+            joints,
+            rows: std::mem::take(&mut self.recorder.motion.rows),
+        }
     }
 }
 
@@ -88,11 +115,17 @@ mod tests {
         assert_eq!((first.time_secs, last.time_secs), (0.0, 1.0));
         assert!((f64::from(last.opening_m) - observed.gripper_opening_m).abs() < 1e-4);
         assert!((last.commanded_opening_m - 0.1).abs() < 1e-6);
-        let joint = last.joints().nth(lift).expect("it has as many joints as the robot");
+        let joint = last
+            .joints()
+            .nth(lift)
+            .expect("it has as many joints as the robot");
         assert!((joint.target - 0.2).abs() < 1e-6);
         assert!((f64::from(joint.position) - observed.positions[lift]).abs() < 1e-4);
         assert!((f64::from(joint.velocity) - observed.velocities[lift]).abs() < 1e-4);
-        let began = first.joints().nth(lift).expect("it has as many joints as the robot");
+        let began = first
+            .joints()
+            .nth(lift)
+            .expect("it has as many joints as the robot");
         assert!((began.target - began.position).abs() < 1e-6 && began.position < 0.1);
     }
 }

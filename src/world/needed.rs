@@ -1,4 +1,5 @@
-//! The joints of a URDF that the simulation moves: those with a role in the profile, and those coupled to them.
+//! The joints of a URDF that the simulation moves: those with a role in the profile, and those
+//! coupled to them.
 //!
 //! All others are rigid, so that a humanoid beside a table is as fast as its arm.
 
@@ -17,16 +18,33 @@ pub(super) struct Needed<'a> {
 
 impl<'a> Needed<'a> {
     pub(super) fn of(robot: &'a urdf_rs::Robot, profile: &'a RobotProfile) -> Self {
-        let joints: BTreeMap<&str, &urdf_rs::Joint> =
-            robot.joints.iter().map(|joint| (joint.name.as_str(), joint)).collect();
-        let parked = profile.parked.iter().map(|(name, position)| (name.as_str(), *position)).collect();
+        let joints: BTreeMap<&str, &urdf_rs::Joint> = robot
+            .joints
+            .iter()
+            .map(|joint| (joint.name.as_str(), joint))
+            .collect();
+        let parked = profile
+            .parked
+            .iter()
+            .map(|(name, position)| (name.as_str(), *position))
+            .collect();
         let has_hand = !profile.finger_joints.is_empty() || profile.suction.is_some();
         if profile.arm_joints.is_empty() || !has_hand {
-            return Self { moving: None, joints, parked };
+            return Self {
+                moving: None,
+                joints,
+                parked,
+            };
         }
         let base = profile.base_joints.iter().flatten();
-        let roles = base.chain(&profile.arm_joints).chain(&profile.head_joints).chain(&profile.finger_joints);
-        let mut moving: BTreeSet<&str> = roles.chain(&profile.other_joints).map(String::as_str).collect();
+        let roles = base
+            .chain(&profile.arm_joints)
+            .chain(&profile.head_joints)
+            .chain(&profile.finger_joints);
+        let mut moving: BTreeSet<&str> = roles
+            .chain(&profile.other_joints)
+            .map(String::as_str)
+            .collect();
         // A coupling moves both of its joints.
         loop {
             let n_known = moving.len();
@@ -42,7 +60,11 @@ impl<'a> Needed<'a> {
                 break;
             }
         }
-        Self { moving: Some(moving), joints, parked }
+        Self {
+            moving: Some(moving),
+            joints,
+            parked,
+        }
     }
 
     /// Whether the profile has roles, which select the joints.
@@ -52,20 +74,31 @@ impl<'a> Needed<'a> {
 
     /// Whether the simulation moves a joint. A coupling with the factor 0 holds it where it is.
     pub(super) fn contains(&self, joint: &urdf_rs::Joint) -> bool {
-        let is_held = joint.mimic.as_ref().is_some_and(|mimic| mimic.multiplier == Some(0.0));
+        let is_held = joint
+            .mimic
+            .as_ref()
+            .is_some_and(|mimic| mimic.multiplier == Some(0.0));
         let name = joint.name.as_str();
-        !is_held && self.moving.as_ref().map_or(!self.parked.contains_key(name), |moving| moving.contains(name))
+        !is_held
+            && self
+                .moving
+                .as_ref()
+                .map_or(!self.parked.contains_key(name), |moving| {
+                    moving.contains(name)
+                })
     }
 
-    /// The position of a rigid joint: that of the profile, otherwise 0 or the limit nearest to it; by its coupling if it has
-    /// one.
+    /// The position of a rigid joint: that of the profile, otherwise 0 or the limit nearest to it;
+    /// by its coupling if it has one.
     pub(super) fn rest(&self, joint: &urdf_rs::Joint) -> f64 {
         let mut at = joint;
         let (mut factor, mut offset) = (1.0, 0.0);
         // A chain of couplings that is longer than this is a circle.
         for _ in 0..self.joints.len() {
             let Some(mimic) = &at.mimic else { break };
-            let Some(leader) = self.joints.get(mimic.joint.as_str()) else { break };
+            let Some(leader) = self.joints.get(mimic.joint.as_str()) else {
+                break;
+            };
             offset += factor * mimic.offset.unwrap_or(0.0);
             factor *= mimic.multiplier.unwrap_or(1.0);
             at = leader;
@@ -79,5 +112,9 @@ impl<'a> Needed<'a> {
 fn within(joint: &urdf_rs::Joint, position: f64) -> f64 {
     let unlimited = joint.joint_type == urdf_rs::JointType::Continuous;
     let is_range = joint.limit.lower <= joint.limit.upper;
-    if unlimited || !is_range { position } else { position.clamp(joint.limit.lower, joint.limit.upper) }
+    if unlimited || !is_range {
+        position
+    } else {
+        position.clamp(joint.limit.lower, joint.limit.upper)
+    }
 }

@@ -4,7 +4,8 @@ use std::sync::Arc;
 
 use nalgebra::{Isometry3, Vector3};
 use rapier3d::prelude::{
-    CoefficientCombineRule, ColliderBuilder, MassProperties, PhysicsWorld, RigidBodyBuilder, RigidBodyHandle,
+    CoefficientCombineRule, ColliderBuilder, MassProperties, PhysicsWorld, RigidBodyBuilder,
+    RigidBodyHandle,
 };
 
 use crate::attach::Attachment;
@@ -48,8 +49,15 @@ pub(super) struct Object {
 pub(super) fn insert(engine: &mut PhysicsWorld, idx: usize, object: &SceneObject) -> Object {
     let placed = object.pose.to_isometry();
     let fixed = object.is_fixed();
-    let builder = if fixed { RigidBodyBuilder::fixed() } else { RigidBodyBuilder::dynamic() };
-    let spread = object.model.inertia.map(|inertia| mass_properties(&inertia, object));
+    let builder = if fixed {
+        RigidBodyBuilder::fixed()
+    } else {
+        RigidBodyBuilder::dynamic()
+    };
+    let spread = object
+        .model
+        .inertia
+        .map(|inertia| mass_properties(&inertia, object));
     let builder = match spread {
         Some(properties) => builder.additional_mass_properties(properties),
         None => builder,
@@ -61,16 +69,28 @@ pub(super) fn insert(engine: &mut PhysicsWorld, idx: usize, object: &SceneObject
         activation.time_until_sleep = SLEEP_AFTER_SECS;
     }
     // If the model states its inertia, the shapes have no mass of their own.
-    let density = if spread.is_some() { 0.0 } else { object.mass_kg / object.model.volume().max(1e-9) };
+    let density = if spread.is_some() {
+        0.0
+    } else {
+        object.mass_kg / object.model.volume().max(1e-9)
+    };
     let mut parts = Vec::new();
     for part in &object.model.parts {
-        let colliders = part.solids().iter().filter_map(|solid| of_object(solid, idx, object)).collect::<Vec<_>>();
-        let insert = |collider: ColliderBuilder| engine.insert_collider(collider.density(to_real(density)), Some(body));
+        let colliders = part
+            .solids()
+            .iter()
+            .filter_map(|solid| of_object(solid, idx, object))
+            .collect::<Vec<_>>();
+        let insert = |collider: ColliderBuilder| {
+            engine.insert_collider(collider.density(to_real(density)), Some(body))
+        };
         parts.push(colliders.into_iter().map(insert).collect::<Vec<_>>());
     }
     let hollows = match fixed {
         true => Vec::new(),
-        false => hollows_of(&object.model.parts, &parts, |solid| of_object(solid, idx, object)),
+        false => hollows_of(&object.model.parts, &parts, |solid| {
+            of_object(solid, idx, object)
+        }),
     };
     if !hollows.is_empty() {
         weigh(engine, body);
@@ -92,9 +112,12 @@ pub(super) fn insert(engine: &mut PhysicsWorld, idx: usize, object: &SceneObject
     }
 }
 
-/// Gives the mass of a body's colliders to the body, so that it does not depend on which of them are enabled.
+/// Gives the mass of a body's colliders to the body, so that it does not depend on which of them
+/// are enabled.
 fn weigh(engine: &mut PhysicsWorld, handle: RigidBodyHandle) {
-    let Some(body) = engine.bodies.get_mut(handle) else { return };
+    let Some(body) = engine.bodies.get_mut(handle) else {
+        return;
+    };
     body.recompute_mass_properties_from_colliders(&engine.colliders);
     let whole = body.mass_properties().local_mprops;
     for collider in body.colliders() {
@@ -105,9 +128,15 @@ fn weigh(engine: &mut PhysicsWorld, handle: RigidBodyHandle) {
     body.set_additional_mass_properties(whole, false);
 }
 
-/// Returns the collider of a convex solid of an object in the scene. Returns `None` if it has no volume.
+/// Returns the collider of a convex solid of an object in the scene. Returns `None` if it has no
+/// volume.
 fn of_object(solid: &Part, idx: usize, object: &SceneObject) -> Option<ColliderBuilder> {
-    let collider = collider(solid, Owner::Object(idx), object.friction, object.restitution)?;
+    let collider = collider(
+        solid,
+        Owner::Object(idx),
+        object.friction,
+        object.restitution,
+    )?;
     Some(collider.restitution_combine_rule(CoefficientCombineRule::Average))
 }
 
@@ -115,7 +144,13 @@ fn of_object(solid: &Part, idx: usize, object: &SceneObject) -> Option<ColliderB
 fn mass_properties(inertia: &Inertia, object: &SceneObject) -> MassProperties {
     let scale = object.mass_kg / object.model.mass_kg;
     // The engine takes columns, which equal the rows of a symmetric matrix.
-    let [x, y, z] = inertia.about_com.map(|row| to_vector(&(Vector3::from(row) * scale)));
+    let [x, y, z] = inertia
+        .about_com
+        .map(|row| to_vector(&(Vector3::from(row) * scale)));
     let about_com = rapier3d::math::Matrix::from_cols(x, y, z);
-    MassProperties::with_inertia_matrix(to_vector(&Vector3::from(inertia.com_m)), to_real(object.mass_kg), about_com)
+    MassProperties::with_inertia_matrix(
+        to_vector(&Vector3::from(inertia.com_m)),
+        to_real(object.mass_kg),
+        about_com,
+    )
 }

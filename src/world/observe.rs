@@ -10,7 +10,8 @@ use crate::engine::Owner;
 use crate::object::Object;
 use actcheck_data::{BodyState, LinkState, Pose, RobotState, Snapshot};
 
-/// Share of a body's weight that a contact must carry for the body to rest on it. Low enough for several supports.
+/// Share of a body's weight that a contact must carry for the body to rest on it. Low enough for
+/// several supports.
 const CARRIED_SHARE: f64 = 0.1;
 
 impl World {
@@ -21,15 +22,26 @@ impl World {
         let grasp = Point3::from(robot.gripper.position);
         let bodies = self.objects.iter().enumerate().map(|(idx, object)| {
             let grasp_distance_m = (!object.fixed).then(|| self.distance_to(object, &grasp));
-            BodyState { grasp_distance_m, ..self.body(idx, object, &pairs) }
+            BodyState {
+                grasp_distance_m,
+                ..self.body(idx, object, &pairs)
+            }
         });
-        Snapshot { time_secs: self.time_secs(), bodies: bodies.collect(), robot }
+        Snapshot {
+            time_secs: self.time_secs(),
+            bodies: bodies.collect(),
+            robot,
+        }
     }
 
     fn pairs(&self) -> Vec<Pair> {
         self.touches()
             .into_iter()
-            .map(|((first, second), touch)| Pair { first, second, lift_on_second_n: touch.force_n.z })
+            .map(|((first, second), touch)| Pair {
+                first,
+                second,
+                lift_on_second_n: touch.force_n.z,
+            })
             .collect()
     }
 
@@ -75,13 +87,16 @@ impl World {
             restitution: object.restitution,
             touches: touching.into_iter().collect(),
             rests_on: carriers.into_iter().collect(),
-            asleep: body.is_some_and(rapier3d::prelude::RigidBody::is_sleeping) || self.has_left(idx),
+            asleep: body.is_some_and(rapier3d::prelude::RigidBody::is_sleeping)
+                || self.has_left(idx),
             size_m: Some(object.model.size_m),
             grasp_distance_m: None,
-            part: object
-                .attached
-                .as_ref()
-                .and_then(|attached| Some((self.objects[attached.whole].id.clone(), self.part_position(object)?))),
+            part: object.attached.as_ref().and_then(|attached| {
+                Some((
+                    self.objects[attached.whole].id.clone(),
+                    self.part_position(object)?,
+                ))
+            }),
             left_world: self.has_left(idx),
         }
     }
@@ -90,9 +105,15 @@ impl World {
     pub(super) fn aabb(&self, object: &Object) -> ([f64; 3], [f64; 3]) {
         let mut low = [f64::INFINITY; 3];
         let mut high = [f64::NEG_INFINITY; 3];
-        let colliders = self.engine.bodies.get(object.body).map(rapier3d::prelude::RigidBody::colliders);
+        let colliders = self
+            .engine
+            .bodies
+            .get(object.body)
+            .map(rapier3d::prelude::RigidBody::colliders);
         for handle in colliders.unwrap_or_default() {
-            let Some(collider) = self.engine.colliders.get(*handle) else { continue };
+            let Some(collider) = self.engine.colliders.get(*handle) else {
+                continue;
+            };
             let aabb = collider.compute_aabb();
             let (mins, maxs) = (aabb.mins.to_array(), aabb.maxs.to_array());
             for axis in 0..3 {
@@ -107,10 +128,14 @@ impl World {
         let joints = self.robot.joint_states();
         let positions: Vec<f64> = joints.iter().map(|joint| joint.position).collect();
         let touched_by = |finger: &[usize]| -> Vec<String> {
-            let objects = pairs.iter().filter_map(|pair| match (pair.first, pair.second) {
-                (Owner::Object(idx), Owner::Link(own)) if finger.contains(&own) => Some(self.thing(Owner::Object(idx))),
-                _ => None,
-            });
+            let objects = pairs
+                .iter()
+                .filter_map(|pair| match (pair.first, pair.second) {
+                    (Owner::Object(idx), Owner::Link(own)) if finger.contains(&own) => {
+                        Some(self.thing(Owner::Object(idx)))
+                    }
+                    _ => None,
+                });
             let sorted: BTreeSet<String> = objects.collect();
             sorted.into_iter().collect()
         };
@@ -132,7 +157,12 @@ impl World {
     fn link_states(&self, positions: &[f64]) -> Vec<LinkState> {
         let poses = self.robot.kinematics.links(positions);
         let links = self.robot.model.links.iter().zip(poses);
-        links.map(|(link, pose)| LinkState { name: link.name.clone(), pose: Pose::from_isometry(&pose) }).collect()
+        links
+            .map(|(link, pose)| LinkState {
+                name: link.name.clone(),
+                pose: Pose::from_isometry(&pose),
+            })
+            .collect()
     }
 
     /// Returns the name of an owner in snapshots; all links are `robot`.

@@ -1,18 +1,20 @@
 //! Localisation of the base while it drives: wheel odometry drifts, landmarks correct it.
 //!
-//! The relative wheel errors are constant within a stretch of the path. Each stretch has its own choices,
-//! `sense.odometry.*`. A landmark measures the true pose with noise; its weight depends on the current uncertainty of
-//! the estimate (a Kalman filter with one variance for the position and one for the heading).
+//! The relative wheel errors are constant within a stretch of the path. Each stretch has its own
+//! choices, `sense.odometry.*`. A landmark measures the true pose with noise; its weight depends on
+//! the current uncertainty of the estimate (a Kalman filter with one variance for the position and
+//! one for the heading).
 
 use nalgebra::Vector2;
 
 use crate::World;
 use actcheck_data::{ChoiceName, Choices, Odometry, PlanarAxis, Pose, WheelAxis};
 
-/// Length of a stretch with constant wheel errors: distance plus rotation. Units: metres and radians.
+/// Length of a stretch with constant wheel errors: distance plus rotation. Units: metres and
+/// radians.
 const STRETCH: f64 = 0.5;
-/// Largest rate at which corrections are applied, so that a base that follows its estimate does not jerk. Units: m/s
-/// and rad/s.
+/// Largest rate at which corrections are applied, so that a base that follows its estimate does not
+/// jerk. Units: m/s and rad/s.
 const CORRECTION_SPEED: f64 = 0.05;
 
 /// The state of the base's odometry.
@@ -20,8 +22,8 @@ const CORRECTION_SPEED: f64 = 0.05;
 pub(super) struct Tracker {
     /// True base pose at the previous tick.
     last: Option<[f64; 3]>,
-    /// Errors in this stretch: along and across the path (shares), of the heading per radian turned and per metre
-    /// driven.
+    /// Errors in this stretch: along and across the path (shares), of the heading per radian turned
+    /// and per metre driven.
     off: [f64; 4],
     /// Remaining length of this stretch.
     left: f64,
@@ -43,24 +45,38 @@ struct Step {
 impl World {
     /// Starts with the uncertainty of the initial localisation.
     pub(super) fn begin_tracking(&mut self) {
-        let (place, heading) = (self.sensing.localisation_noise_m, self.sensing.heading_noise_rad);
-        self.tracker = Tracker { variances: [place * place, heading * heading], ..Tracker::default() };
+        let (place, heading) = (
+            self.sensing.localisation_noise_m,
+            self.sensing.heading_noise_rad,
+        );
+        self.tracker = Tracker {
+            variances: [place * place, heading * heading],
+            ..Tracker::default()
+        };
     }
 
-    /// Starts the next step at the current pose, after the base was moved without turning its wheels.
+    /// Starts the next step at the current pose, after the base was moved without turning its
+    /// wheels.
     pub(super) fn forget_way(&mut self) {
         self.tracker.last = None;
     }
 
-    /// Updates the pose estimate with the base's motion since the last call. Call it after every tick.
+    /// Updates the pose estimate with the base's motion since the last call. Call it after every
+    /// tick.
     pub fn track_base(&mut self, choices: &mut Choices) {
         if self.sensing.odometry == Odometry::IDEAL || self.robot.layout.base.is_none() {
             return;
         }
         let now = self.base_true();
-        let Some(last) = self.tracker.last.replace(now) else { return };
+        let Some(last) = self.tracker.last.replace(now) else {
+            return;
+        };
         let along = Vector2::new(now[0] - last[0], now[1] - last[1]);
-        let step = Step { along, way_m: (along.x * along.x + along.y * along.y).sqrt(), turn_rad: now[2] - last[2] };
+        let step = Step {
+            along,
+            way_m: (along.x * along.x + along.y * along.y).sqrt(),
+            turn_rad: now[2] - last[2],
+        };
         let mut believed = self.by_wheels(last, &step, choices);
         let every_m = self.sensing.odometry.landmark_every_m;
         if every_m > 0.0 && self.tracker.since_landmark_m >= every_m {
@@ -74,7 +90,8 @@ impl World {
         }
         let [x, y, heading] = believed;
         let truth = Pose::upright([now[0], now[1], 0.0], now[2]).to_isometry();
-        self.believed_from_true = Pose::upright([x, y, 0.0], heading).to_isometry() * truth.inverse();
+        self.believed_from_true =
+            Pose::upright([x, y, 0.0], heading).to_isometry() * truth.inverse();
     }
 
     /// Returns the believed pose after a step, by wheel odometry.
@@ -85,7 +102,8 @@ impl World {
         let tracker = &mut self.tracker;
         tracker.left -= step.way_m + step.turn_rad.abs();
         if tracker.left <= 0.0 && step.way_m + step.turn_rad.abs() > 0.0 {
-            let mut draw = |axis: WheelAxis, sigma: f64| choices.normal(ChoiceName::Odometry(axis), sigma);
+            let mut draw =
+                |axis: WheelAxis, sigma: f64| choices.normal(ChoiceName::Odometry(axis), sigma);
             tracker.off = [
                 draw(WheelAxis::Along, odometry.drift),
                 draw(WheelAxis::Across, odometry.drift),
@@ -96,7 +114,8 @@ impl World {
         }
         tracker.grow(odometry, step);
         let [along, across, turning, veering] = tracker.off;
-        let measured = step.along * (1.0 + along) + Vector2::new(-step.along.y, step.along.x) * across;
+        let measured =
+            step.along * (1.0 + along) + Vector2::new(-step.along.y, step.along.x) * across;
         let (sin, cos) = (libm::sin(astray), libm::cos(astray));
         [
             x + cos * measured.x - sin * measured.y,
@@ -108,7 +127,11 @@ impl World {
     /// Computes the correction by a landmark, to be applied gradually.
     fn see_landmark(&mut self, truth: [f64; 3], believed: [f64; 3], choices: &mut Choices) {
         let odometry = &self.sensing.odometry;
-        let noise = [odometry.landmark_noise_m, odometry.landmark_noise_m, odometry.landmark_noise_rad];
+        let noise = [
+            odometry.landmark_noise_m,
+            odometry.landmark_noise_m,
+            odometry.landmark_noise_rad,
+        ];
         let tracker = &mut self.tracker;
         tracker.since_landmark_m = 0.0;
         let shares = [
@@ -123,8 +146,8 @@ impl World {
 }
 
 impl Tracker {
-    /// Increases the variances with the distance. Stretches are independent; a heading error displaces the position in
-    /// proportion to the distance.
+    /// Increases the variances with the distance. Stretches are independent; a heading error
+    /// displaces the position in proportion to the distance.
     fn grow(&mut self, odometry: &Odometry, step: &Step) {
         let moved = step.way_m + step.turn_rad.abs();
         self.since_landmark_m += step.way_m;
@@ -161,16 +184,40 @@ mod tests {
 
     #[test]
     fn uncertainty_grows_with_distance_and_turning() {
-        let odometry = Odometry { drift: 0.1, heading_drift: 0.02, ..Odometry::IDEAL };
+        let odometry = Odometry {
+            drift: 0.1,
+            heading_drift: 0.02,
+            ..Odometry::IDEAL
+        };
         let mut tracker = Tracker::default();
         for _ in 0..200 {
-            tracker.grow(&odometry, &Step { along: Vector2::zeros(), way_m: 0.01, turn_rad: 0.0 });
+            tracker.grow(
+                &odometry,
+                &Step {
+                    along: Vector2::zeros(),
+                    way_m: 0.01,
+                    turn_rad: 0.0,
+                },
+            );
         }
         // Two metres: four stretches of half a metre, each with an error of a tenth.
-        assert!((tracker.variances[1].sqrt() - 0.02).abs() < 1e-9, "{}", tracker.variances[1].sqrt());
+        assert!(
+            (tracker.variances[1].sqrt() - 0.02).abs() < 1e-9,
+            "{}",
+            tracker.variances[1].sqrt()
+        );
         let straight = 0.1 * 0.5 * 2.0;
-        assert!(tracker.variances[0].sqrt() > straight && tracker.variances[0].sqrt() < 1.2 * straight);
-        tracker.grow(&odometry, &Step { along: Vector2::zeros(), way_m: 0.0, turn_rad: 1.0 });
+        assert!(
+            tracker.variances[0].sqrt() > straight && tracker.variances[0].sqrt() < 1.2 * straight
+        );
+        tracker.grow(
+            &odometry,
+            &Step {
+                along: Vector2::zeros(),
+                way_m: 0.0,
+                turn_rad: 1.0,
+            },
+        );
         assert!(tracker.variances[1].sqrt() > 0.024);
     }
 }

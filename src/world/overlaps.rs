@@ -13,11 +13,11 @@ use crate::engine::FLOOR_GROUP;
 use crate::object::Object;
 use crate::separation::{Found, Solids};
 
-/// Depth up to which things touch and do not overlap. Unit: metres. Contacts are up to 1.8 mm deep in a firm grasp, and the
-/// colliders of wheels and feet are as much larger than these.
+/// Depth up to which things touch and do not overlap. Unit: metres. Contacts are up to 1.8 mm deep
+/// in a firm grasp, and the colliders of wheels and feet are as much larger than these.
 const TOUCH_M: f64 = 0.002;
-/// The same for a link that never moves and the floor or furniture, of which it is a part: plates, screws and cables of bases reach
-/// below the origin that is put on them. Unit: metres.
+/// The same for a link that never moves and the floor or furniture, of which it is a part: plates,
+/// screws and cables of bases reach below the origin that is put on them. Unit: metres.
 const MOUNT_M: f64 = 0.02;
 
 /// A link of the robot that is inside another thing.
@@ -33,30 +33,58 @@ pub struct Overlap {
 
 impl fmt::Display for Overlap {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { link, thing, depth_m } = self;
-        let thing = if thing == "floor" { "the floor".to_owned() } else { format!("`{thing}`") };
-        write!(f, "the robot's `{link}` is {:.1} cm inside {thing} at the start", depth_m * 100.0)
+        let Self {
+            link,
+            thing,
+            depth_m,
+        } = self;
+        let thing = if thing == "floor" {
+            "the floor".to_owned()
+        } else {
+            format!("`{thing}`")
+        };
+        write!(
+            f,
+            "the robot's `{link}` is {:.1} cm inside {thing} at the start",
+            depth_m * 100.0
+        )
     }
 }
 
 impl World {
-    /// Returns the links of the robot that are inside furniture, objects or the floor, the deepest first. Things that touch
-    /// do not count, nor do those that the engine lets pass through each other, such as wheels and the floor.
+    /// Returns the links of the robot that are inside furniture, objects or the floor, the deepest
+    /// first. Things that touch do not count, nor do those that the engine lets pass through each
+    /// other, such as wheels and the floor.
     pub fn overlaps(&self) -> Vec<Overlap> {
         let mut found = Vec::new();
         for (link, body) in self.robot.bodies.iter().enumerate() {
             let solids: Vec<Boxed<'_>> = self.boxed(*body).collect();
             let is_mount = self.robot.joints_to(link).next().is_none();
             let mut note = |thing: &str, depth_m: f64, is_fixed: bool| {
-                let allowed_m = if is_mount && is_fixed { MOUNT_M } else { TOUCH_M };
+                let allowed_m = if is_mount && is_fixed {
+                    MOUNT_M
+                } else {
+                    TOUCH_M
+                };
                 if depth_m > allowed_m {
                     let link = self.robot.model.links[link].name.clone();
-                    found.push(Overlap { link, thing: thing.to_owned(), depth_m });
+                    found.push(Overlap {
+                        link,
+                        thing: thing.to_owned(),
+                        depth_m,
+                    });
                 }
             };
-            let in_floor = solids.iter().filter(|(solid, _)| meets_floor(solid)).map(|(solid, _)| -lowest_m(solid));
+            let in_floor = solids
+                .iter()
+                .filter(|(solid, _)| meets_floor(solid))
+                .map(|(solid, _)| -lowest_m(solid));
             note("floor", in_floor.fold(0.0, f64::max), true);
-            for object in self.objects.iter().filter(|object| !self.are_balls_apart(link, object, 0.0)) {
+            for object in self
+                .objects
+                .iter()
+                .filter(|object| !self.are_balls_apart(link, object, 0.0))
+            {
                 note(&object.id, self.depth_in(&solids, object), object.fixed);
             }
         }
@@ -69,7 +97,9 @@ impl World {
         let mut deepest: f64 = 0.0;
         for (other, its_box) in self.boxed(object.body) {
             for (solid, own_box) in solids {
-                if gap(own_box, &its_box) <= 0.0 && solid.collision_groups().test(other.collision_groups()) {
+                if gap(own_box, &its_box) <= 0.0
+                    && solid.collision_groups().test(other.collision_groups())
+                {
                     deepest = deepest.max(depth_m(solid, other));
                 }
             }
@@ -94,7 +124,9 @@ fn lowest_m(solid: &Collider) -> f64 {
 /// How deep two solids are in each other; 0 if they are apart. Unit: metres.
 fn depth_m(one: &Collider, other: &Collider) -> f64 {
     let pose = one.position().inv_mul(other.position());
-    if let (Some(first), Some(second)) = (one.shape().as_support_map(), other.shape().as_support_map()) {
+    if let (Some(first), Some(second)) =
+        (one.shape().as_support_map(), other.shape().as_support_map())
+    {
         let towards = from_pose(&pose).translation.vector;
         let start = towards.try_normalize(1e-9).unwrap_or_else(Vector3::x);
         match Solids::new(&pose, first, second).separation(start, TOUCH_M) {
@@ -103,7 +135,15 @@ fn depth_m(one: &Collider, other: &Collider) -> f64 {
             Found::Nothing => {}
         }
     }
-    let met = contact(one.position(), one.shape(), other.position(), other.shape(), 0.0).ok().flatten();
+    let met = contact(
+        one.position(),
+        one.shape(),
+        other.position(),
+        other.shape(),
+        0.0,
+    )
+    .ok()
+    .flatten();
     met.map_or(0.0, |met| -f64::from(met.dist))
 }
 

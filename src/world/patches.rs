@@ -1,15 +1,17 @@
 //! The friction of areas in contact, which the contact points of the engine lack.
 //!
-//! A pad is soft, and touches an area, not a point: it resists an object that turns about the line between two fingers.
-//! Things that roll lose energy where they press each other. Both are torques with a limit: joints without a locked axis,
-//! whose motors stop the relative motion as far as the limit allows. The engine solves them with the contacts, so that they
-//! act on both bodies alike, never turn a motion around, and hold a thing at rest.
+//! A pad is soft, and touches an area, not a point: it resists an object that turns about the line
+//! between two fingers. Things that roll lose energy where they press each other. Both are torques
+//! with a limit: joints without a locked axis, whose motors stop the relative motion as far as the
+//! limit allows. The engine solves them with the contacts, so that they act on both bodies alike,
+//! never turn a motion around, and hold a thing at rest.
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
 use rapier3d::prelude::{
-    ContactPair, GenericJoint, ImpulseJointHandle, JointAxesMask, JointAxis, MotorModel, RigidBody, RigidBodyHandle,
+    ContactPair, GenericJoint, ImpulseJointHandle, JointAxesMask, JointAxis, MotorModel, RigidBody,
+    RigidBodyHandle,
 };
 
 use crate::World;
@@ -18,12 +20,14 @@ use crate::convert::{from_pose, from_vector, to_pose, to_real};
 use crate::engine::Owner;
 use crate::reach::Reach;
 
-/// Mean lever of the friction of a pad about the middle of the area that it touches: a choice of this order. By Hertz, a ball of
-/// soft rubber (1.2 MPa, incompressible) with a radius of 4 cm that is pressed with 7 N touches a circle with a radius of
-/// 5.1 mm, and the mean lever under its pressure is 3π/16 of that. It is the same for all forces and shapes here. Unit: metres.
+/// Mean lever of the friction of a pad about the middle of the area that it touches: a choice of
+/// this order. By Hertz, a ball of soft rubber (1.2 MPa, incompressible) with a radius of 4 cm that
+/// is pressed with 7 N touches a circle with a radius of 5.1 mm, and the mean lever under its
+/// pressure is 3π/16 of that. It is the same for all forces and shapes here. Unit: metres.
 const PAD_LEVER_M: f64 = 3e-3;
-/// Lever of the force against which a thing rolls, one for all materials. Tables for engineers give 0.5 mm for iron or steel on
-/// the same, 1.2 mm to 1.5 mm for wood and 2 mm for plastic on steel. Unit: metres.
+/// Lever of the force against which a thing rolls, one for all materials. Tables for engineers give
+/// 0.5 mm for iron or steel on the same, 1.2 mm to 1.5 mm for wood and 2 mm for plastic on steel.
+/// Unit: metres.
 const ROLLING_LEVER_M: f64 = 5e-4;
 /// A thing that turns faster than this about an axis in the plane of a contact rolls. Unit: rad/s.
 const ROLLS_RAD_S: f64 = 0.1;
@@ -57,11 +61,27 @@ struct Press {
 impl Press {
     fn new(bodies: [RigidBodyHandle; 2], at: Point3<f64>) -> Self {
         let none = Vector3::zeros();
-        Self { bodies, normal: none, pressed: 0.0, grip: 0.0, friction: none, at, first: none, second: 0.0 }
+        Self {
+            bodies,
+            normal: none,
+            pressed: 0.0,
+            grip: 0.0,
+            friction: none,
+            at,
+            first: none,
+            second: 0.0,
+        }
     }
 
     /// Adds a point with its impulse along the normal and its whole impulse on the second thing.
-    fn add(&mut self, at: Point3<f64>, normal: &Vector3<f64>, impulse: f64, whole: &Vector3<f64>, coefficient: f64) {
+    fn add(
+        &mut self,
+        at: Point3<f64>,
+        normal: &Vector3<f64>,
+        impulse: f64,
+        whole: &Vector3<f64>,
+        coefficient: f64,
+    ) {
         let way = at - self.at;
         self.normal += normal * impulse;
         self.pressed += impulse;
@@ -74,13 +94,17 @@ impl Press {
     /// Returns how far the points are from their middle. Unit: metres.
     fn spread_m(&self) -> f64 {
         let middle = self.first / self.pressed;
-        (self.second / self.pressed - middle.norm_squared()).max(0.0).sqrt()
+        (self.second / self.pressed - middle.norm_squared())
+            .max(0.0)
+            .sqrt()
     }
 
-    /// Returns the lever of the friction that the points lack for that of a pad, less the share that carries a load: friction
-    /// has one limit for both, an ellipse of force and torque. Unit: metres.
+    /// Returns the lever of the friction that the points lack for that of a pad, less the share
+    /// that carries a load: friction has one limit for both, an ellipse of force and torque. Unit:
+    /// metres.
     ///
-    /// Source: R. D. Howe and M. R. Cutkosky, "Practical force-motion models for sliding manipulation", 1996.
+    /// Source: R. D. Howe and M. R. Cutkosky, "Practical force-motion models for sliding
+    /// manipulation", 1996.
     fn lacks_m(&self) -> f64 {
         let used = (self.friction.norm() / self.grip).min(1.0);
         (PAD_LEVER_M * (1.0 - used * used).sqrt() - self.spread_m()).max(0.0)
@@ -88,8 +112,8 @@ impl Press {
 }
 
 impl World {
-    /// Sets the friction of all areas in contact for the next tick, by the forces of the last step, and notes whether
-    /// the hand carries much.
+    /// Sets the friction of all areas in contact for the next tick, by the forces of the last step,
+    /// and notes whether the hand carries much.
     pub(super) fn rub(&mut self, reach: Reach) {
         self.robot.is_loaded = false;
         if reach == Reach::Nothing {
@@ -125,12 +149,19 @@ impl World {
         }
     }
 
-    /// Returns the frame of an area, with x along its normal and y along the axis about which the second thing rolls, and its
-    /// largest impulses about x, and about y and z. Returns `None` if nothing is to be added.
-    fn limits(&self, pair: (Owner, Owner), press: &Press, known: bool) -> Option<(Isometry3<f64>, [f64; 2])> {
+    /// Returns the frame of an area, with x along its normal and y along the axis about which the
+    /// second thing rolls, and its largest impulses about x, and about y and z. Returns `None` if
+    /// nothing is to be added.
+    fn limits(
+        &self,
+        pair: (Owner, Owner),
+        press: &Press,
+        known: bool,
+    ) -> Option<(Isometry3<f64>, [f64; 2])> {
         let [one, other] = press.bodies.map(|handle| self.engine.bodies.get(handle));
         let normal = press.normal.try_normalize(1e-12)?;
-        let turn = from_vector(other?.angvel()) - one.map_or_else(Vector3::zeros, |body| from_vector(body.angvel()));
+        let turn = from_vector(other?.angvel())
+            - one.map_or_else(Vector3::zeros, |body| from_vector(body.angvel()));
         let rolls = turn - normal * turn.dot(&normal);
         let limits = match pair.0 {
             Owner::Link(link) if self.robot.is_pad(link) => [press.grip * press.lacks_m(), 0.0],
@@ -141,11 +172,20 @@ impl World {
             return None;
         }
         // At least one of two axes is far from the normal.
-        let any = if normal.x.abs() < 0.8 { Vector3::x() } else { Vector3::y() };
-        let along = rolls.try_normalize(1e-6).or_else(|| (any - normal * any.dot(&normal)).try_normalize(1e-6))?;
+        let any = if normal.x.abs() < 0.8 {
+            Vector3::x()
+        } else {
+            Vector3::y()
+        };
+        let along = rolls
+            .try_normalize(1e-6)
+            .or_else(|| (any - normal * any.dot(&normal)).try_normalize(1e-6))?;
         let axes = Matrix3::from_columns(&[normal, along, normal.cross(&along)]);
         let turned = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(axes));
-        Some((Isometry3::from_parts(Translation3::from(press.at.coords), turned), limits))
+        Some((
+            Isometry3::from_parts(Translation3::from(press.at.coords), turned),
+            limits,
+        ))
     }
 
     /// Sets the largest torques of an area about x, and about y and z of its frame.
@@ -156,11 +196,20 @@ impl World {
         frame: &Isometry3<f64>,
         [twist, rolling]: [f64; 2],
     ) -> Option<Patch> {
-        let [one, other] = bodies.map(|handle| self.engine.bodies.get(handle).map(|body| from_pose(body.position())));
+        let [one, other] = bodies.map(|handle| {
+            self.engine
+                .bodies
+                .get(handle)
+                .map(|body| from_pose(body.position()))
+        });
         let mut data = GenericJoint::new(JointAxesMask::empty());
         data.set_local_frame1(to_pose(&(one?.inverse() * frame)));
         data.set_local_frame2(to_pose(&(other?.inverse() * frame)));
-        for (axis, limit) in [(JointAxis::AngX, twist), (JointAxis::AngY, rolling), (JointAxis::AngZ, rolling)] {
+        for (axis, limit) in [
+            (JointAxis::AngX, twist),
+            (JointAxis::AngY, rolling),
+            (JointAxis::AngZ, rolling),
+        ] {
             if limit > 0.0 {
                 data.set_motor_model(axis, MotorModel::ForceBased);
                 data.set_motor(axis, 0.0, 0.0, 0.0, DAMPING);
@@ -173,53 +222,99 @@ impl World {
             joint.data = data;
             return Some(patch);
         }
-        Some(Patch { joint: self.engine.impulse_joints.insert(bodies[0], bodies[1], data, false) })
+        Some(Patch {
+            joint: self
+                .engine
+                .impulse_joints
+                .insert(bodies[0], bodies[1], data, false),
+        })
     }
 
-    /// Returns the things that press the moving objects, by pairs with such an object at the second place.
+    /// Returns the things that press the moving objects, by pairs with such an object at the second
+    /// place.
     fn presses(&self) -> BTreeMap<(Owner, Owner), Press> {
         let mut found: BTreeMap<(Owner, Owner), Press> = BTreeMap::new();
-        for pair in self.engine.narrow_phase.contact_pairs().filter(|pair| has_solved(pair)) {
-            let Some((owners, bodies, turned)) = self.moving_pair(pair) else { continue };
+        for pair in self
+            .engine
+            .narrow_phase
+            .contact_pairs()
+            .filter(|pair| has_solved(pair))
+        {
+            let Some((owners, bodies, turned)) = self.moving_pair(pair) else {
+                continue;
+            };
             if !self.may_rub(owners, bodies) {
                 continue;
             }
-            let Some(one) = self.engine.colliders.get(pair.collider1) else { continue };
+            let Some(one) = self.engine.colliders.get(pair.collider1) else {
+                continue;
+            };
             let one = from_pose(one.position());
             let sign = if turned { -1.0 } else { 1.0 };
             for manifold in pair.solver_manifolds() {
-                let (normal, coefficient) = (from_vector(manifold.data.normal), f64::from(manifold.data.friction));
+                let (normal, coefficient) = (
+                    from_vector(manifold.data.normal),
+                    f64::from(manifold.data.friction),
+                );
                 for point in solved(manifold).filter(|point| point.data.impulse > 0.0) {
                     let at = one * Point3::from(from_vector(point.local_p1));
                     let whole = impulse_of(point, &normal) * sign;
-                    let press = found.entry(owners).or_insert_with(|| Press::new(bodies, at));
-                    press.add(at, &(normal * sign), f64::from(point.data.impulse), &whole, coefficient);
+                    let press = found
+                        .entry(owners)
+                        .or_insert_with(|| Press::new(bodies, at));
+                    press.add(
+                        at,
+                        &(normal * sign),
+                        f64::from(point.data.impulse),
+                        &whole,
+                        coefficient,
+                    );
                 }
             }
         }
         found
     }
 
-    /// Returns whether two bodies need a look at their contact: links of the robot, and things that may roll.
+    /// Returns whether two bodies need a look at their contact: links of the robot, and things that
+    /// may roll.
     fn may_rub(&self, owners: (Owner, Owner), bodies: [RigidBodyHandle; 2]) -> bool {
-        let [one, other] = bodies.map(|handle| self.engine.bodies.get(handle).map(|body| from_vector(body.angvel())));
+        let [one, other] = bodies.map(|handle| {
+            self.engine
+                .bodies
+                .get(handle)
+                .map(|body| from_vector(body.angvel()))
+        });
         matches!(owners.0, Owner::Link(_))
             || self.patches.contains_key(&owners)
-            || one.zip(other).is_some_and(|(one, other)| (other - one).norm() > ROLLS_RAD_S)
+            || one
+                .zip(other)
+                .is_some_and(|(one, other)| (other - one).norm() > ROLLS_RAD_S)
     }
 
-    /// Returns the owners and bodies of a contact of an object that moves, which comes second, and whether the engine has them
-    /// the other way round.
-    fn moving_pair(&self, pair: &ContactPair) -> Option<((Owner, Owner), [RigidBodyHandle; 2], bool)> {
-        let colliders = [self.engine.colliders.get(pair.collider1)?, self.engine.colliders.get(pair.collider2)?];
+    /// Returns the owners and bodies of a contact of an object that moves, which comes second, and
+    /// whether the engine has them the other way round.
+    fn moving_pair(
+        &self,
+        pair: &ContactPair,
+    ) -> Option<((Owner, Owner), [RigidBodyHandle; 2], bool)> {
+        let colliders = [
+            self.engine.colliders.get(pair.collider1)?,
+            self.engine.colliders.get(pair.collider2)?,
+        ];
         let owners = colliders.map(|collider| Owner::from_tag(collider.user_data));
         let turned = match owners {
-            [Owner::Object(one), Owner::Object(other)] => self.is_fixed(other) || one > other && !self.is_fixed(one),
+            [Owner::Object(one), Owner::Object(other)] => {
+                self.is_fixed(other) || one > other && !self.is_fixed(one)
+            }
             [Owner::Object(_), _] => true,
             [_, Owner::Object(_)] => false,
             _ => return None,
         };
-        let [first, second] = if turned { [owners[1], owners[0]] } else { owners };
+        let [first, second] = if turned {
+            [owners[1], owners[0]]
+        } else {
+            owners
+        };
         if self.both_rest((first, second)) {
             return None;
         }
@@ -242,16 +337,25 @@ impl World {
     }
 
     fn is_fixed(&self, object: usize) -> bool {
-        self.engine.bodies.get(self.objects[object].body).is_none_or(RigidBody::is_fixed)
+        self.engine
+            .bodies
+            .get(self.objects[object].body)
+            .is_none_or(RigidBody::is_fixed)
     }
 
     /// Returns the mass of the objects that the hand touches. Unit: kilograms.
     fn carried_kg<'a>(&self, pairs: impl Iterator<Item = &'a (Owner, Owner)>) -> f64 {
-        let Some(hand) = &self.robot.hand else { return 0.0 };
+        let Some(hand) = &self.robot.hand else {
+            return 0.0;
+        };
         let touched = pairs.filter_map(|pair| match pair {
             (Owner::Link(link), Owner::Object(idx)) if hand.has(*link) => Some(*idx),
             _ => None,
         });
-        touched.collect::<BTreeSet<usize>>().into_iter().map(|idx| self.objects[idx].mass_kg).sum()
+        touched
+            .collect::<BTreeSet<usize>>()
+            .into_iter()
+            .map(|idx| self.objects[idx].mass_kg)
+            .sum()
     }
 }

@@ -1,7 +1,8 @@
 //! Links of many pieces: those whose mesh was split into convex hulls.
 //!
-//! A hand of such links has dozens of pairs of hulls near an object, most of which never touch it. The simulation looks at
-//! them less often. Robots of few pieces gain nothing by that, and keep the bits of their runs.
+//! A hand of such links has dozens of pairs of hulls near an object, most of which never touch it.
+//! The simulation looks at them less often. Robots of few pieces gain nothing by that, and keep the
+//! bits of their runs.
 
 use crate::description::{Link, RobotModel};
 

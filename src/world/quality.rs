@@ -11,7 +11,8 @@ use actcheck_data::Quality;
 #[derive(Debug, Default)]
 pub(super) struct QualityMeter {
     deepest_m: f64,
-    /// Energy of each object after the previous tick; `None` for static objects and those the robot could push.
+    /// Energy of each object after the previous tick; `None` for static objects and those the robot
+    /// could push.
     before: Vec<Option<f64>>,
     /// Sum of all changes since the beginning.
     level_j: f64,
@@ -22,13 +23,21 @@ pub(super) struct QualityMeter {
 impl QualityMeter {
     /// Returns the worst values so far.
     pub(super) fn quality(&self) -> Quality {
-        Quality { deepest_penetration_m: self.deepest_m, energy_gain_j: self.gain_j }
+        Quality {
+            deepest_penetration_m: self.deepest_m,
+            energy_gain_j: self.gain_j,
+        }
     }
 
-    /// Records a tick: the deepest contact, and the energy of each object that the robot could not push.
+    /// Records a tick: the deepest contact, and the energy of each object that the robot could not
+    /// push.
     pub(super) fn tick(&mut self, deepest_m: f64, energies: Vec<Option<f64>>) {
         self.deepest_m = self.deepest_m.max(deepest_m);
-        let changes = self.before.iter().zip(&energies).filter_map(|(before, now)| Some((*now)? - (*before)?));
+        let changes = self
+            .before
+            .iter()
+            .zip(&energies)
+            .filter_map(|(before, now)| Some((*now)? - (*before)?));
         self.level_j += changes.sum::<f64>();
         self.lowest_j = self.lowest_j.min(self.level_j);
         self.gain_j = self.gain_j.max(self.level_j - self.lowest_j);
@@ -42,32 +51,44 @@ impl World {
         self.recorder.quality.quality()
     }
 
-    /// Returns the energy of each object, in scene order; `None` for static objects and those the robot could push.
-    /// Unit: joules.
+    /// Returns the energy of each object, in scene order; `None` for static objects and those the
+    /// robot could push. Unit: joules.
     pub(super) fn free_energies(&self) -> Vec<Option<f64>> {
         let reached = self.reached_by_robot();
         let objects = self.objects.iter().zip(reached);
         objects
             .map(|(object, reached)| {
-                let body = self.engine.bodies.get(object.body).filter(|body| !reached && !body.is_fixed())?;
+                let body = self
+                    .engine
+                    .bodies
+                    .get(object.body)
+                    .filter(|body| !reached && !body.is_fixed())?;
                 let height_m = f64::from(body.center_of_mass().z);
                 Some(f64::from(body.kinetic_energy()) + object.mass_kg * GRAVITY * height_m)
             })
             .collect()
     }
 
-    /// Marks the objects that the robot could have pushed, directly or through others. Compares bounding boxes, so that
-    /// it includes contacts that began and ended within a tick.
+    /// Marks the objects that the robot could have pushed, directly or through others. Compares
+    /// bounding boxes, so that it includes contacts that began and ended within a tick.
     fn reached_by_robot(&self) -> Vec<bool> {
         let mut reached = vec![false; self.objects.len()];
         let mut pairs: Vec<(usize, usize)> = Vec::new();
         for pair in self.engine.narrow_phase.contact_pairs() {
-            let owner = |handle| self.engine.colliders.get(handle).map(|collider| Owner::from_tag(collider.user_data));
+            let owner = |handle| {
+                self.engine
+                    .colliders
+                    .get(handle)
+                    .map(|collider| Owner::from_tag(collider.user_data))
+            };
             match (owner(pair.collider1), owner(pair.collider2)) {
-                (Some(Owner::Link(_)), Some(Owner::Object(idx))) | (Some(Owner::Object(idx)), Some(Owner::Link(_))) => {
+                (Some(Owner::Link(_)), Some(Owner::Object(idx)))
+                | (Some(Owner::Object(idx)), Some(Owner::Link(_))) => {
                     reached[idx] = true;
                 }
-                (Some(Owner::Object(first)), Some(Owner::Object(second))) => pairs.push((first, second)),
+                (Some(Owner::Object(first)), Some(Owner::Object(second))) => {
+                    pairs.push((first, second))
+                }
                 _ => {}
             }
         }
@@ -78,10 +99,18 @@ impl World {
         let fixed: Vec<bool> = self
             .objects
             .iter()
-            .map(|object| self.engine.bodies.get(object.body).is_none_or(rapier3d::prelude::RigidBody::is_fixed))
+            .map(|object| {
+                self.engine
+                    .bodies
+                    .get(object.body)
+                    .is_none_or(rapier3d::prelude::RigidBody::is_fixed)
+            })
             .collect();
         pairs.retain(|(first, second)| !fixed[*first] && !fixed[*second]);
-        while let Some((first, second)) = pairs.iter().find(|(first, second)| reached[*first] != reached[*second]) {
+        while let Some((first, second)) = pairs
+            .iter()
+            .find(|(first, second)| reached[*first] != reached[*second])
+        {
             (reached[*first], reached[*second]) = (true, true);
         }
         reached
@@ -95,9 +124,12 @@ mod tests {
     #[test]
     fn lost_energy_and_work_of_the_robot_are_not_gains() {
         let mut meter = QualityMeter::default();
-        for (first, second) in
-            [(Some(5.0), Some(1.0)), (Some(4.0), Some(1.5)), (Some(3.0), None), (Some(3.0), Some(9.0))]
-        {
+        for (first, second) in [
+            (Some(5.0), Some(1.0)),
+            (Some(4.0), Some(1.5)),
+            (Some(3.0), None),
+            (Some(3.0), Some(9.0)),
+        ] {
             meter.tick(0.0, vec![first, second, None]);
         }
         assert_eq!(meter.quality().energy_gain_j, 0.0);
@@ -109,7 +141,10 @@ mod tests {
         for energy in [3.0, 1.0, 1.2, 1.1, 1.6, 0.5, 0.9] {
             meter.tick(energy * 1e-3, vec![Some(energy)]);
         }
-        let Quality { deepest_penetration_m, energy_gain_j } = meter.quality();
+        let Quality {
+            deepest_penetration_m,
+            energy_gain_j,
+        } = meter.quality();
         assert!((energy_gain_j - 0.6).abs() < 1e-12, "{energy_gain_j}");
         assert_eq!(deepest_penetration_m, 3e-3);
     }

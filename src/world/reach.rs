@@ -1,4 +1,5 @@
-//! The things that the robot can touch in a tick, and the shortcuts that the simulation may take where these are few.
+//! The things that the robot can touch in a tick, and the shortcuts that the simulation may take
+//! where these are few.
 
 use crate::share::Share;
 
@@ -27,18 +28,21 @@ impl Reach {
     }
 }
 
-/// The ticks in which less is simulated than the whole robot in the engine, because the rest has no effect.
+/// The ticks in which less is simulated than the whole robot in the engine, because the rest has no
+/// effect.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Shortcuts {
     /// No engine where the robot touches nothing and everything else is at rest.
     pub free_motion: bool,
     /// No robot in the engine where objects move out of its reach.
     pub robot_apart: bool,
-    /// Only the hand in the engine where only the hand can touch something, and only movable objects.
+    /// Only the hand in the engine where only the hand can touch something, and only movable
+    /// objects.
     pub hand_alone: bool,
     /// A closed surface instead of the staves of a hollow object while nothing is at its mouth.
     pub shells: bool,
-    /// Half of the substeps where the engine moves the hand alone, and where the robot touches nothing.
+    /// Half of the substeps where the engine moves the hand alone, and where the robot touches
+    /// nothing.
     pub few_substeps: bool,
     /// No sweeps of fast shapes where nothing fast can meet something fixed.
     pub few_sweeps: bool,

@@ -17,7 +17,8 @@ use crate::samples::SampleMeter;
 use actcheck_base::Digest;
 use actcheck_data::{Pose, RobotCourse};
 
-/// Time between two frames. Unit: seconds. Enough for images and replays, and it keeps traces small.
+/// Time between two frames. Unit: seconds. Enough for images and replays, and it keeps traces
+/// small.
 const FRAME_SECS: f64 = 0.1;
 /// Shorter gaps between contacts of a pair are ignored. Unit: seconds.
 const SAME_CONTACT_SECS: f64 = 0.05;
@@ -91,7 +92,12 @@ struct Episode {
 
 impl Episode {
     fn begin(tick: u64) -> Self {
-        Self { start: tick, latest: tick, max_force_n: 0.0, point_m: [0.0; 3] }
+        Self {
+            start: tick,
+            latest: tick,
+            max_force_n: 0.0,
+            point_m: [0.0; 3],
+        }
     }
 }
 
@@ -119,7 +125,11 @@ pub struct Recorder {
 impl Recorder {
     /// Creates an empty recorder for `n_objects` objects and the tracked bodies.
     pub fn new(n_objects: usize, tracked: Vec<(String, RigidBodyHandle)>, tick_secs: f64) -> Self {
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a handful of ticks")]
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "a handful of ticks"
+        )]
         let ticks_per_frame = (FRAME_SECS / tick_secs).round().max(1.0) as u64;
         Self {
             digest: Digest::new(),
@@ -156,7 +166,11 @@ impl Recorder {
 impl World {
     /// Begins a record: resets contacts and extremes; frames continue.
     pub fn begin_record(&mut self) {
-        let poses = self.objects.iter().map(|object| self.pose_of(object)).collect();
+        let poses = self
+            .objects
+            .iter()
+            .map(|object| self.pose_of(object))
+            .collect();
         let recorder = &mut self.recorder;
         recorder.began = recorder.n_ticks;
         recorder.begin_poses = poses;
@@ -185,20 +199,37 @@ impl World {
                 pair.sort();
                 // A contact is detected at the end of its tick.
                 let start_secs = secs(episode.start.saturating_sub(1));
-                let Episode { latest, max_force_n, point_m, .. } = *episode;
-                Contact { pair, start_secs, end_secs: secs(latest), max_force_n, point_m }
+                let Episode {
+                    latest,
+                    max_force_n,
+                    point_m,
+                    ..
+                } = *episode;
+                Contact {
+                    pair,
+                    start_secs,
+                    end_secs: secs(latest),
+                    max_force_n,
+                    point_m,
+                }
             })
             .collect();
-        contacts.sort_by(|a, b| a.start_secs.total_cmp(&b.start_secs).then_with(|| a.pair.cmp(&b.pair)));
+        contacts.sort_by(|a, b| {
+            a.start_secs
+                .total_cmp(&b.start_secs)
+                .then_with(|| a.pair.cmp(&b.pair))
+        });
         let courses = self.objects.iter().zip(&self.recorder.extremes);
         let courses = courses
-            .map(|(object, [max_tilt_rad, max_speed, max_rise_m, max_displacement_m])| Course {
-                id: object.id.clone(),
-                max_tilt_rad: *max_tilt_rad,
-                max_speed: *max_speed,
-                max_rise_m: *max_rise_m,
-                max_displacement_m: *max_displacement_m,
-            })
+            .map(
+                |(object, [max_tilt_rad, max_speed, max_rise_m, max_displacement_m])| Course {
+                    id: object.id.clone(),
+                    max_tilt_rad: *max_tilt_rad,
+                    max_speed: *max_speed,
+                    max_rise_m: *max_rise_m,
+                    max_displacement_m: *max_displacement_m,
+                },
+            )
             .collect();
         let samples = self.end_samples();
         Record {
@@ -215,18 +246,31 @@ impl World {
         }
     }
 
-    /// Returns the poses of all moving bodies since the first record began. Furniture is among them if it moved.
+    /// Returns the poses of all moving bodies since the first record began. Furniture is among them
+    /// if it moved.
     pub fn tracks(&self) -> Tracks {
         let Recorder { tracked, rows, .. } = &self.recorder;
-        let poses = |row: &[f32], idx: usize| row.get(7 * idx..7 * idx + 7).unwrap_or_default().to_vec();
-        let stayed = |idx: &usize| rows.windows(2).all(|pair| poses(&pair[0], *idx) == poses(&pair[1], *idx));
-        let is_furniture = |name: &str| self.objects.iter().any(|object| object.slides && object.id == name);
-        let kept: Vec<usize> =
-            (0..tracked.len()).filter(|idx| !(is_furniture(&tracked[*idx].0) && stayed(idx))).collect();
+        let poses =
+            |row: &[f32], idx: usize| row.get(7 * idx..7 * idx + 7).unwrap_or_default().to_vec();
+        let stayed = |idx: &usize| {
+            rows.windows(2)
+                .all(|pair| poses(&pair[0], *idx) == poses(&pair[1], *idx))
+        };
+        let is_furniture = |name: &str| {
+            self.objects
+                .iter()
+                .any(|object| object.slides && object.id == name)
+        };
+        let kept: Vec<usize> = (0..tracked.len())
+            .filter(|idx| !(is_furniture(&tracked[*idx].0) && stayed(idx)))
+            .collect();
         Tracks {
             period_secs: self.recorder.ticks_per_frame as f64 * self.recorder.tick_secs,
             names: kept.iter().map(|idx| tracked[*idx].0.clone()).collect(),
-            rows: rows.iter().map(|row| kept.iter().flat_map(|idx| poses(row, *idx)).collect()).collect(),
+            rows: rows
+                .iter()
+                .map(|row| kept.iter().flat_map(|idx| poses(row, *idx)).collect())
+                .collect(),
         }
     }
 
@@ -239,9 +283,17 @@ impl World {
     pub(super) fn name_of(&self, owner: Owner) -> String {
         match owner {
             Owner::Floor => "floor".to_owned(),
-            Owner::Object(idx) => self.objects.get(idx).map_or_else(String::new, |object| object.id.clone()),
+            Owner::Object(idx) => self
+                .objects
+                .get(idx)
+                .map_or_else(String::new, |object| object.id.clone()),
             Owner::Link(idx) => {
-                let link = self.robot.model.links.get(idx).map_or("", |link| link.name.as_str());
+                let link = self
+                    .robot
+                    .model
+                    .links
+                    .get(idx)
+                    .map_or("", |link| link.name.as_str());
                 format!("robot/{link}")
             }
         }
@@ -262,7 +314,9 @@ impl World {
             self.record_touched(&touches);
             self.record_motions(&touches);
             self.move_furniture(&touches);
-            if (self.recorder.n_ticks - self.recorder.began).is_multiple_of(self.recorder.ticks_per_frame) {
+            if (self.recorder.n_ticks - self.recorder.began)
+                .is_multiple_of(self.recorder.ticks_per_frame)
+            {
                 self.frame();
                 self.record_clearance();
                 self.record_motion();
@@ -271,10 +325,17 @@ impl World {
     }
 
     fn digest_state(&mut self) {
-        let handles = self.objects.iter().map(|object| object.body).chain(self.robot.bodies.iter().copied());
-        let mut bits: Vec<f32> = Vec::with_capacity(13 * (self.objects.len() + self.robot.bodies.len()));
+        let handles = self
+            .objects
+            .iter()
+            .map(|object| object.body)
+            .chain(self.robot.bodies.iter().copied());
+        let mut bits: Vec<f32> =
+            Vec::with_capacity(13 * (self.objects.len() + self.robot.bodies.len()));
         for handle in handles {
-            let Some(body) = self.engine.bodies.get(handle) else { continue };
+            let Some(body) = self.engine.bodies.get(handle) else {
+                continue;
+            };
             bits.extend(body.translation().to_array());
             bits.extend(body.rotation().to_array());
             bits.extend(body.linvel().to_array());
@@ -285,12 +346,15 @@ impl World {
 
     fn record_extremes(&mut self) {
         for (idx, object) in self.objects.iter().enumerate() {
-            let Some(body) = self.engine.bodies.get(object.body) else { continue };
+            let Some(body) = self.engine.bodies.get(object.body) else {
+                continue;
+            };
             if body.is_fixed() {
                 continue;
             }
             let pose = from_pose(body.position());
-            let way: Vector3<f64> = pose.translation.vector - self.recorder.begin_poses[idx].translation.vector;
+            let way: Vector3<f64> =
+                pose.translation.vector - self.recorder.begin_poses[idx].translation.vector;
             let speed = from_vector(body.velocity_at_point(body.translation())).norm();
             let now = [Pose::from_isometry(&pose).tilt(), speed, way.z, way.norm()];
             for (extreme, value) in self.recorder.extremes[idx].iter_mut().zip(now) {
@@ -305,7 +369,10 @@ impl World {
         }
         let [x, y, _] = self.base_true();
         let [low, high] = self.recorder.base.get_or_insert([[x, y], [x, y]]);
-        (*low, *high) = ([low[0].min(x), low[1].min(y)], [high[0].max(x), high[1].max(y)]);
+        (*low, *high) = (
+            [low[0].min(x), low[1].min(y)],
+            [high[0].max(x), high[1].max(y)],
+        );
     }
 
     fn record_contacts(&mut self, touches: &BTreeMap<(Owner, Owner), Touch>) {
@@ -314,7 +381,11 @@ impl World {
         let mut deepest_m = 0.0f64;
         for (pair, touch) in touches {
             deepest_m = deepest_m.max(touch.depth_m);
-            let episode = self.recorder.open.entry(*pair).or_insert(Episode::begin(now));
+            let episode = self
+                .recorder
+                .open
+                .entry(*pair)
+                .or_insert(Episode::begin(now));
             if (now - episode.latest) as f64 > patience {
                 self.recorder.closed.push((*pair, *episode));
                 *episode = Episode::begin(now);
@@ -331,7 +402,9 @@ impl World {
     fn frame(&mut self) {
         let mut row = Vec::with_capacity(7 * self.recorder.tracked.len());
         for (_, handle) in &self.recorder.tracked {
-            let Some(body) = self.engine.bodies.get(*handle) else { continue };
+            let Some(body) = self.engine.bodies.get(*handle) else {
+                continue;
+            };
             let Pose { position, rotation } = Pose::from_isometry(&from_pose(body.position()));
             row.extend(position.map(|value| grain(value, FRAME_GRAIN_M)));
             row.extend(rotation.map(|value| grain(value, FRAME_GRAIN_TURN)));
@@ -340,7 +413,10 @@ impl World {
     }
 }
 
-#[expect(clippy::cast_possible_truncation, reason = "frames are kept in 32 bits")]
+#[expect(
+    clippy::cast_possible_truncation,
+    reason = "frames are kept in 32 bits"
+)]
 pub(super) fn grain(value: f64, grain: f64) -> f32 {
     ((value / grain).round() * grain) as f32
 }

@@ -39,7 +39,12 @@ pub(super) fn resolved(profile: &Arc<RobotProfile>) -> Result<Arc<Resolved>, Wor
     let model = Arc::new(RobotModel::read(profile)?);
     let named = Named::find(profile, &model)?;
     let (passing, hand) = (named.passing(&model), named.links_of_hand(&model));
-    let found = Arc::new(Resolved { model, named, passing, hand });
+    let found = Arc::new(Resolved {
+        model,
+        named,
+        passing,
+        hand,
+    });
     LAST.set(Some((Arc::clone(profile), Arc::clone(&found))));
     Ok(found)
 }
@@ -54,14 +59,19 @@ mod tests {
     #[test]
     fn each_profile_is_resolved_once_in_a_row() {
         let path = Path::new("models/robots/fixed_arm.toml");
-        let profile = actcheck_config::robot::read(&Files::Shipped, path).expect("the shipped robot is valid");
+        let profile = actcheck_config::robot::read(&Files::Shipped, path)
+            .expect("the shipped robot is valid");
         let mut shorter = profile.clone();
         shorter.arm_joints.pop();
         let (first, second) = (Arc::new(profile.clone()), Arc::new(shorter));
-        let of = |profile: &Arc<RobotProfile>| resolved(profile).expect("the shipped robot is valid");
+        let of =
+            |profile: &Arc<RobotProfile>| resolved(profile).expect("the shipped robot is valid");
         let known = of(&first);
         assert!(Arc::ptr_eq(&known, &of(&first)));
-        assert_eq!(of(&second).named.layout.arm.len() + 1, known.named.layout.arm.len());
+        assert_eq!(
+            of(&second).named.layout.arm.len() + 1,
+            known.named.layout.arm.len()
+        );
         assert!(!Arc::ptr_eq(&known, &of(&Arc::new(profile))));
         assert_eq!(of(&first).named.layout, known.named.layout);
     }

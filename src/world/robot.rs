@@ -41,7 +41,8 @@ pub struct Robot {
     pub(super) off_floor: Vec<bool>,
     /// The bounding ball of each link's shapes, in its frame; `None` for links without shapes.
     pub(super) balls: Vec<Option<Ball>>,
-    /// The bounding balls of each link's shapes, one by one, each in the frame of its shape, in the order of its colliders.
+    /// The bounding balls of each link's shapes, one by one, each in the frame of its shape, in the
+    /// order of its colliders.
     pub(super) balls_of_shapes: Vec<Vec<BoundingSphere>>,
     /// Positions of the joints.
     pub(super) positions: Vec<f64>,
@@ -55,14 +56,16 @@ pub struct Robot {
     pub(super) hand: Option<Hand>,
     /// Whether its arm is light: the engine then never moves the hand alone.
     pub(super) is_light: bool,
-    /// Largest mass of the objects at the hand with which the engine moves it alone. Unit: kilograms.
+    /// Largest mass of the objects at the hand with which the engine moves it alone. Unit:
+    /// kilograms.
     pub(super) most_carried_kg: f64,
-    /// Whether the objects at its hand have more than this mass. The engine then solves its motors as those of a light arm: as
-    /// constraints, they let held objects creep.
+    /// Whether the objects at its hand have more than this mass. The engine then solves its motors
+    /// as those of a light arm: as constraints, they let held objects creep.
     pub(super) is_loaded: bool,
     /// Whether the engine solves its motors, except those of the fingers, as springs.
     pub(super) is_springy: bool,
-    /// The force of contacts on the hand in the last step, if the engine moves the hand alone. Frame: world.
+    /// The force of contacts on the hand in the last step, if the engine moves the hand alone.
+    /// Frame: world.
     pub(super) push_on_hand: Twist,
     /// The equations of its free motion in this control tick, once they are known.
     pub(super) equations: Option<Box<Equations>>,
@@ -74,7 +77,12 @@ pub struct Robot {
 /// [`WorldError`] if profile and URDF don't match.
 pub fn geometry(start: &RobotStart) -> Result<(Kinematics, Layout, Vec<f64>), WorldError> {
     let resolved = resolved(&start.profile)?;
-    let Resolved { model, named, passing, hand } = resolved.as_ref();
+    let Resolved {
+        model,
+        named,
+        passing,
+        hand,
+    } = resolved.as_ref();
     let positions = home(&start.profile, model, named, start.base);
     let root = root_of(start, &named.layout);
     let kinematics = Kinematics::new(Arc::clone(model), root, named.grasp, named.camera)
@@ -84,18 +92,31 @@ pub fn geometry(start: &RobotStart) -> Result<(Kinematics, Layout, Vec<f64>), Wo
 }
 
 fn balls_of_shapes(engine: &PhysicsWorld, body: RigidBodyHandle) -> Vec<BoundingSphere> {
-    let handles = engine.bodies.get(body).map(RigidBody::colliders).unwrap_or_default();
-    let colliders = handles.iter().filter_map(|handle| engine.colliders.get(*handle));
-    colliders.map(|collider| collider.shape().compute_local_bounding_sphere()).collect()
+    let handles = engine
+        .bodies
+        .get(body)
+        .map(RigidBody::colliders)
+        .unwrap_or_default();
+    let colliders = handles
+        .iter()
+        .filter_map(|handle| engine.colliders.get(*handle));
+    colliders
+        .map(|collider| collider.shape().compute_local_bounding_sphere())
+        .collect()
 }
 
 /// Pose of the root link. Frame: world.
 fn root_of(start: &RobotStart, layout: &Layout) -> Isometry3<f64> {
     let [x, y, heading] = start.base;
     match layout.base {
-        // The root of a mobile robot is above the world's origin, which is the frame of its odometry.
+        // The root of a mobile robot is above the world's origin, which is the frame of its
+        // odometry.
         Some(_) => Isometry3::translation(0.0, 0.0, start.root_height_m),
-        None => Pose::upright([x, y, start.root_height_m], heading + start.profile.mount_turned_rad).to_isometry(),
+        None => Pose::upright(
+            [x, y, start.root_height_m],
+            heading + start.profile.mount_turned_rad,
+        )
+        .to_isometry(),
     }
 }
 
@@ -109,11 +130,24 @@ impl Robot {
         let resolved = resolved(&profile)?;
         let Resolved { model, named, .. } = resolved.as_ref();
         let (kinematics, _, positions) = geometry(start)?;
-        let bodies = insert_links(engine, model, &kinematics.links(&positions), named, &profile);
+        let bodies = insert_links(
+            engine,
+            model,
+            &kinematics.links(&positions),
+            named,
+            &profile,
+        );
         let motors = insert_joints(engine, model, &bodies, named, &profile)?;
         let off_floor = links_on_floor(model, named, &profile);
-        let balls = model.links.iter().map(|link| Ball::around(&link.solids)).collect();
-        let balls_of_shapes = bodies.iter().map(|body| balls_of_shapes(engine, *body)).collect();
+        let balls = model
+            .links
+            .iter()
+            .map(|link| Ball::around(&link.solids))
+            .collect();
+        let balls_of_shapes = bodies
+            .iter()
+            .map(|body| balls_of_shapes(engine, *body))
+            .collect();
         let hand = Hand::of(model, &named.layout.gripper);
         let mut robot = Self {
             model: Arc::clone(model),
@@ -159,7 +193,11 @@ impl Robot {
 
     /// Returns the state of all joints, with their limits.
     pub fn joint_states(&self) -> Vec<JointState> {
-        let states = self.model.joints.iter().zip(self.positions.iter().zip(&self.velocities));
+        let states = self
+            .model
+            .joints
+            .iter()
+            .zip(self.positions.iter().zip(&self.velocities));
         states
             .map(|(joint, (position, velocity))| JointState {
                 name: joint.name.clone(),
@@ -173,7 +211,8 @@ impl Robot {
             .collect()
     }
 
-    /// Returns the force of each finger's motor by its control law; positive closes; 0 for a suction cup. Unit: newtons.
+    /// Returns the force of each finger's motor by its control law; positive closes; 0 for a
+    /// suction cup. Unit: newtons.
     pub fn finger_efforts(&self) -> [f64; 2] {
         let force_of = |(idx, effort_per_n): (usize, f64)| {
             let (motor, position) = (&self.motors[idx], self.positions[idx]);
@@ -181,11 +220,15 @@ impl Robot {
                 + motor.damping * (self.velocities[idx] - motor.setpoint_velocity);
             effort.clamp(-motor.max_effort, motor.max_effort) / effort_per_n
         };
-        self.layout.gripper.sides().map_or([0.0; 2], |sides| sides.map(force_of))
+        self.layout
+            .gripper
+            .sides()
+            .map_or([0.0; 2], |sides| sides.map(force_of))
     }
 
-    /// Returns the effort that each joint's motor gave in the last control tick, within its limit and without gravity
-    /// compensation: for holding, pushing and braking. Units: newtons or newton metres.
+    /// Returns the effort that each joint's motor gave in the last control tick, within its limit
+    /// and without gravity compensation: for holding, pushing and braking. Units: newtons or newton
+    /// metres.
     pub fn loads(&self) -> Vec<f64> {
         self.motors.iter().map(|motor| motor.effort).collect()
     }
@@ -193,7 +236,15 @@ impl Robot {
     /// Returns the effort of each motor in the last control tick as a share of the joint's limit.
     pub fn effort_shares(&self) -> Vec<f64> {
         let motors = self.motors.iter().zip(&self.model.joints);
-        motors.map(|(motor, joint)| if joint.effort > 0.0 { motor.effort.abs() / joint.effort } else { 0.0 }).collect()
+        motors
+            .map(|(motor, joint)| {
+                if joint.effort > 0.0 {
+                    motor.effort.abs() / joint.effort
+                } else {
+                    0.0
+                }
+            })
+            .collect()
     }
 
     /// Starts a control tick: measures its efforts, and finds its equations of motion anew.
@@ -205,14 +256,18 @@ impl Robot {
     /// Measures the efforts of a step that is this share of its control tick.
     pub fn measure(&mut self, engine: &PhysicsWorld, holding: &[f64], share: f64) {
         let parameters = &engine.integration_parameters;
-        let (dt, n_substeps) = (f64::from(parameters.dt), parameters.num_solver_iterations as f64);
+        let (dt, n_substeps) = (
+            f64::from(parameters.dt),
+            parameters.num_solver_iterations as f64,
+        );
         for (idx, (motor, position)) in self.motors.iter_mut().zip(&self.positions).enumerate() {
             let held = holding.get(idx).copied().unwrap_or(0.0);
             motor.effort += share * motor.effort_of_step(*position, held, dt, n_substeps);
         }
     }
 
-    /// Sets a joint's target position, clamped to its limits. Limits that are not in order, which are a fault, leave it.
+    /// Sets a joint's target position, clamped to its limits. Limits that are not in order, which
+    /// are a fault, leave it.
     pub fn aim(&mut self, joint: usize, target: f64) {
         let Joint { lower, upper, .. } = self.model.joints[joint];
         if target.is_finite() && lower <= upper {
@@ -220,8 +275,8 @@ impl Robot {
         }
     }
 
-    /// Sets the targets of mimic joints outside of the gripper to those of their leaders: their motors must not resist
-    /// the coupling.
+    /// Sets the targets of mimic joints outside of the gripper to those of their leaders: their
+    /// motors must not resist the coupling.
     pub fn aim_followers(&mut self) {
         for idx in 0..self.motors.len() {
             if let Some((leader, factor, offset)) = self.model.joints[idx].mimic
@@ -237,14 +292,17 @@ impl Robot {
         self.motors[joint].target
     }
 
-    /// Sets effort control for the given joints (by index), and position control for all others. Fingers are always
-    /// position-controlled.
+    /// Sets effort control for the given joints (by index), and position control for all others.
+    /// Fingers are always position-controlled.
     pub fn push(&mut self, efforts: &[(usize, f64)]) {
         for (idx, motor) in self.motors.iter_mut().enumerate() {
-            let told = efforts.iter().find(|(joint, effort)| *joint == idx && effort.is_finite());
+            let told = efforts
+                .iter()
+                .find(|(joint, effort)| *joint == idx && effort.is_finite());
             let limit = self.model.joints[idx].effort * motor.strength;
-            motor.push =
-                told.filter(|_| !self.layout.gripper.contains(idx)).map(|(_, effort)| effort.clamp(-limit, limit));
+            motor.push = told
+                .filter(|_| !self.layout.gripper.contains(idx))
+                .map(|(_, effort)| effort.clamp(-limit, limit));
         }
     }
 
@@ -259,36 +317,55 @@ impl Robot {
     pub fn limit_grip(&mut self, force: f64) {
         for (idx, effort_per_n) in self.layout.gripper.motors() {
             if force.is_finite() {
-                self.motors[idx].max_effort = (force * effort_per_n).clamp(0.0, self.model.joints[idx].effort);
+                self.motors[idx].max_effort =
+                    (force * effort_per_n).clamp(0.0, self.model.joints[idx].effort);
             }
         }
     }
 
-    /// Returns the name of a joint whose state, target or limits are not finite or contradict each other. `None` if there is none.
+    /// Returns the name of a joint whose state, target or limits are not finite or contradict each
+    /// other. `None` if there is none.
     pub fn invalid_joint(&self) -> Option<&str> {
         let states = self.positions.iter().zip(&self.velocities);
         let mut joints = self.motors.iter().zip(&self.model.joints).zip(states);
         let is_valid = |motor: &Motor, joint: &Joint, position: f64, velocity: f64| {
-            position.is_finite() && velocity.is_finite() && motor.is_valid() && joint.lower <= joint.upper
+            position.is_finite()
+                && velocity.is_finite()
+                && motor.is_valid()
+                && joint.lower <= joint.upper
         };
-        let found =
-            joints.find(|((motor, joint), (position, velocity))| !is_valid(motor, joint, **position, **velocity));
+        let found = joints.find(|((motor, joint), (position, velocity))| {
+            !is_valid(motor, joint, **position, **velocity)
+        });
         found.map(|((_, joint), _)| joint.name.as_str())
     }
 
-    /// Steps the joint controllers: setpoints approach the targets evenly over the `steps_left` of the tick, within the
-    /// velocity limits. Motors follow the setpoints, with gravity compensation for the robot but not for held objects.
-    pub fn control(&mut self, engine: &mut PhysicsWorld, holding: &[f64], dt: f64, steps_left: u32) {
+    /// Steps the joint controllers: setpoints approach the targets evenly over the `steps_left` of
+    /// the tick, within the velocity limits. Motors follow the setpoints, with gravity compensation
+    /// for the robot but not for held objects.
+    pub fn control(
+        &mut self,
+        engine: &mut PhysicsWorld,
+        holding: &[f64],
+        dt: f64,
+        steps_left: u32,
+    ) {
         let substep_secs = dt / engine.integration_parameters.num_solver_iterations as f64;
         for (idx, motor) in self.motors.iter_mut().enumerate() {
             let held = holding.get(idx).copied().unwrap_or(0.0);
             let largest = motor.fastest * dt;
             let position = self.positions[idx];
             if let Some(effort) = motor.push {
-                motor.give(position, self.velocities[idx], effort + held, self.model.joints[idx].velocity);
+                motor.give(
+                    position,
+                    self.velocities[idx],
+                    effort + held,
+                    self.model.joints[idx].velocity,
+                );
                 continue;
             }
-            let change = ((motor.target - motor.setpoint) / f64::from(steps_left)).clamp(-largest, largest);
+            let change =
+                ((motor.target - motor.setpoint) / f64::from(steps_left)).clamp(-largest, largest);
             motor.setpoint += change;
             motor.setpoint_velocity = change / dt;
             motor.began = position;
@@ -302,11 +379,27 @@ impl Robot {
             };
         }
         let states = self.positions.iter().zip(&self.velocities);
-        let states = states.map(|(position, velocity)| State { position: *position, velocity: *velocity });
-        for (idx, (motor, at)) in self.motors.iter().zip(states).enumerate().filter(|(idx, _)| self.shares(*idx)) {
-            let is_spring = (self.is_springy || self.is_loaded) && !self.layout.gripper.contains(idx);
+        let states = states.map(|(position, velocity)| State {
+            position: *position,
+            velocity: *velocity,
+        });
+        for (idx, (motor, at)) in self
+            .motors
+            .iter()
+            .zip(states)
+            .enumerate()
+            .filter(|(idx, _)| self.shares(*idx))
+        {
+            let is_spring =
+                (self.is_springy || self.is_loaded) && !self.layout.gripper.contains(idx);
             let spring_secs = is_spring.then_some(substep_secs);
-            motor.tell(engine, &self.model.joints[idx], at, motor.fastest * dt, spring_secs);
+            motor.tell(
+                engine,
+                &self.model.joints[idx],
+                at,
+                motor.fastest * dt,
+                spring_secs,
+            );
         }
     }
 
@@ -327,8 +420,8 @@ impl Robot {
         self.joints_to(link).any(|moving| moving == joint)
     }
 
-    /// Moves the base at once, with everything attached to it; the other joints keep their positions. Units: metres,
-    /// metres, radians.
+    /// Moves the base at once, with everything attached to it; the other joints keep their
+    /// positions. Units: metres, metres, radians.
     pub fn shift_base(&mut self, engine: &mut PhysicsWorld, by: [f64; 3]) {
         let Some(base) = self.layout.base else { return };
         for (idx, shift) in base.into_iter().zip(by) {
@@ -355,7 +448,10 @@ pub(super) mod tests {
 
     pub(crate) fn lonely() -> World {
         let path = Path::new("models/robots/mobile_manipulator.toml");
-        alone(actcheck_config::robot::read(&Files::Shipped, path).expect("the shipped robot is valid"))
+        alone(
+            actcheck_config::robot::read(&Files::Shipped, path)
+                .expect("the shipped robot is valid"),
+        )
     }
 
     /// A robot with nothing around it.
@@ -366,7 +462,12 @@ pub(super) mod tests {
             map: actcheck_data::SceneMap::default(),
             world: "empty".to_owned(),
             objects: Vec::new(),
-            robot: RobotStart { profile, base: [-1.0, 0.3, 0.4], root_height_m: 0.0, knows: Arc::new([]) },
+            robot: RobotStart {
+                profile,
+                base: [-1.0, 0.3, 0.4],
+                root_height_m: 0.0,
+                knows: Arc::new([]),
+            },
             designators: BTreeMap::new(),
             steps: Vec::new(),
             sensing: Sensing {
@@ -395,7 +496,9 @@ pub(super) mod tests {
     /// A random posture within the limits.
     fn posture(world: &World, choices: &mut Choices) -> Vec<f64> {
         let joints = world.kinematics().joints().iter();
-        joints.map(|joint| choices.real("q".into(), joint.lower.max(-2.0), joint.upper.min(2.0), 0.0)).collect()
+        joints
+            .map(|joint| choices.real("q".into(), joint.lower.max(-2.0), joint.upper.min(2.0), 0.0))
+            .collect()
     }
 
     #[test]
@@ -430,25 +533,41 @@ pub(super) mod tests {
         for _ in 0..100 {
             let target = kinematics.grasp(&posture(&world, &mut choices));
             let seed = posture(&world, &mut choices);
-            let reach = ik::Reach { target, mobility: mobility.clone() };
-            let Some(found) = ik::solve(kinematics, &seed, &reach) else { continue };
+            let reach = ik::Reach {
+                target,
+                mobility: mobility.clone(),
+            };
+            let Some(found) = ik::solve(kinematics, &seed, &reach) else {
+                continue;
+            };
             n_solved += 1;
             let miss = kinematics.grasp(&found).translation.vector - target.translation.vector;
             assert!(miss.norm() < 1e-3);
             for (position, joint) in found.iter().zip(kinematics.joints()) {
-                assert!((joint.lower..=joint.upper).contains(position), "{} at {position}", joint.name);
+                assert!(
+                    (joint.lower..=joint.upper).contains(position),
+                    "{} at {position}",
+                    joint.name
+                );
             }
             assert!(layout.gripper.joints().all(|idx| found[idx] == seed[idx]));
         }
-        assert!(n_solved >= 60, "solved {n_solved} of 100 from random postures");
+        assert!(
+            n_solved >= 60,
+            "solved {n_solved} of 100 from random postures"
+        );
     }
 
-    /// A constant force on a free joint: acceleration is force over mass, up to the joint's largest speed.
+    /// A constant force on a free joint: acceleration is force over mass, up to the joint's largest
+    /// speed.
     #[test]
     fn commanded_efforts_accelerate_joints_up_to_their_velocity_limit() {
         let mut world = lonely();
         let base = world.layout().base.expect("it drives")[0];
-        let (joint, mass) = (world.kinematics().joints()[base].clone(), world.robot.model.links[base + 1..].iter());
+        let (joint, mass) = (
+            world.kinematics().joints()[base].clone(),
+            world.robot.model.links[base + 1..].iter(),
+        );
         let mass: f64 = mass.map(|link| link.mass).sum();
         let force = 0.25 * mass;
         assert!(force < joint.effort);
@@ -459,12 +578,19 @@ pub(super) mod tests {
         }
         let reached = world.observe().velocities[base];
         let expected = force / mass * 30.0 * world.tick_secs();
-        assert!((reached - expected).abs() < 0.05 * expected, "{reached} m/s instead of {expected} m/s");
+        assert!(
+            (reached - expected).abs() < 0.05 * expected,
+            "{reached} m/s instead of {expected} m/s"
+        );
         assert!((world.observe().loads[base] - force).abs() < 1e-9);
         command.efforts = vec![(base, 1e9)];
         (0..120).for_each(|_| world.step(&command));
         let fastest = world.observe().velocities[base];
-        assert!((fastest / joint.velocity - 1.0).abs() < 0.03, "{fastest} m/s instead of {} m/s", joint.velocity);
+        assert!(
+            (fastest / joint.velocity - 1.0).abs() < 0.03,
+            "{fastest} m/s instead of {} m/s",
+            joint.velocity
+        );
         let still = world.hold();
         (0..120).for_each(|_| world.step(&still));
         assert!(world.observe().velocities[base].abs() < 1e-2);
@@ -476,20 +602,30 @@ pub(super) mod tests {
         let with_friction = |damping: f64| {
             let mut profile = lonely().robot.profile.as_ref().clone();
             let limit = r#"effort="50" velocity="1.5"/>"#;
-            let (before, after) = profile.urdf.text.split_once(limit).expect("the shipped robot has such a joint");
+            let (before, after) = profile
+                .urdf
+                .text
+                .split_once(limit)
+                .expect("the shipped robot has such a joint");
             let after = after.replacen(r#"damping="0.5""#, &format!("damping=\"{damping}\""), 1);
             profile.urdf.text = format!("{before}{limit}{after}").into();
             alone(profile)
         };
         let find = |world: &World| {
             let joints = world.kinematics().joints();
-            let joint = joints.iter().position(|joint| joint.name == "wrist_flex_joint").expect("it is shipped");
+            let joint = joints
+                .iter()
+                .position(|joint| joint.name == "wrist_flex_joint")
+                .expect("it is shipped");
             (joint, joints[joint].velocity)
         };
         for (damping, fastest) in [(0.5, 1.5), (20.0, 1.5), (100.0, 0.75 * 50.0 / 100.0)] {
             let mut world = with_friction(damping);
             let (joint, velocity) = find(&world);
-            assert!((velocity - fastest).abs() < 1e-9, "{velocity} rad/s with {damping} N·m·s");
+            assert!(
+                (velocity - fastest).abs() < 1e-9,
+                "{velocity} rad/s with {damping} N·m·s"
+            );
             let mut command = world.hold();
             for _ in 0..40 {
                 command.positions[joint] += 0.9 * fastest * world.tick_secs();
@@ -528,9 +664,20 @@ pub(super) mod tests {
     fn a_profile_that_names_a_missing_joint_is_refused_with_help() {
         let mut profile = lonely().robot.profile.as_ref().clone();
         profile.arm_joints[1] = "arm_flx_joint".to_owned();
-        let refused = check_robot(&profile).expect_err("the joint is missing").diagnostic();
-        assert_eq!((refused.code, refused.help.as_deref()), ("W021", Some("did you mean `arm_flex_joint`?")));
+        let refused = check_robot(&profile)
+            .expect_err("the joint is missing")
+            .diagnostic();
+        assert_eq!(
+            (refused.code, refused.help.as_deref()),
+            ("W021", Some("did you mean `arm_flex_joint`?"))
+        );
         profile.urdf.text = "<robot".into();
-        assert_eq!(check_robot(&profile).expect_err("it is not a URDF").diagnostic().code, "W020");
+        assert_eq!(
+            check_robot(&profile)
+                .expect_err("it is not a URDF")
+                .diagnostic()
+                .code,
+            "W020"
+        );
     }
 }

@@ -1,7 +1,7 @@
 //! Measures the robot's course: joints at their limits, self-collisions, held objects.
 //!
-//! Self-collisions are measured by the forces between links, and from their shapes and poses: links that pass through each
-//! other because of an injected fault have no forces.
+//! Self-collisions are measured by the forces between links, and from their shapes and poses: links
+//! that pass through each other because of an injected fault have no forces.
 
 use actcheck_data::{HeldCourse, JointCourse, Pose, RobotCourse, SelfCollision, SelfPress};
 use std::collections::BTreeMap;
@@ -17,14 +17,15 @@ use crate::convert::{from_pose, from_vector};
 use crate::engine::{Owner, SHELL};
 use crate::reach::Reach;
 
-/// Control ticks between two self-collision checks. At 60 ticks per second, that is 20 checks per second: a link at 1
-/// m/s moves 5 cm between them.
+/// Control ticks between two self-collision checks. At 60 ticks per second, that is 20 checks per
+/// second: a link at 1 m/s moves 5 cm between them.
 const TICKS_PER_LOOK: u64 = 3;
 /// A motor above this share of its effort limit is overloaded.
 const OVERLOAD_SHARE: f64 = 0.99;
 /// Links that penetrate each other by no more than this only touch. Unit: metres.
 pub(super) const TOUCH_M: f64 = 1e-4;
-/// The depth of links is measured again once they have moved against each other by this much. Units: metres, radians.
+/// The depth of links is measured again once they have moved against each other by this much.
+/// Units: metres, radians.
 const SAME_M: f64 = 5e-4;
 const SAME_RAD: f64 = 2e-3;
 /// Error of positions in 32 bits. Unit: metres.
@@ -53,7 +54,12 @@ struct LinksMet {
 
 impl LinksMet {
     fn at(tick: u64) -> Self {
-        Self { tick, max_depth_m: 0.0, max_force_n: 0.0, measured: None }
+        Self {
+            tick,
+            max_depth_m: 0.0,
+            max_force_n: 0.0,
+            measured: None,
+        }
     }
 
     /// Whether the depth at a pose is about that at the last one.
@@ -75,8 +81,12 @@ struct JointMeter {
 
 impl RobotMeter {
     fn begin(&mut self, n_joints: usize) {
-        let nothing =
-            JointMeter { max_excess: f64::NEG_INFINITY, max_speed_share: 0.0, overloaded: 0, longest_overload: 0 };
+        let nothing = JointMeter {
+            max_excess: f64::NEG_INFINITY,
+            max_speed_share: 0.0,
+            overloaded: 0,
+            longest_overload: 0,
+        };
         self.joints = vec![nothing; n_joints];
         self.self_contacts.clear();
         self.held.clear();
@@ -102,12 +112,18 @@ impl World {
     /// Returns the course since the start.
     pub(super) fn end_robot_course(&self) -> RobotCourse {
         let (meter, tick_secs) = (&self.recorder.robot, self.tick_secs());
-        let joints = self.robot.model.joints.iter().zip(&meter.joints).map(|(joint, course)| JointCourse {
-            name: joint.name.clone(),
-            max_excess: course.max_excess,
-            max_speed_share: course.max_speed_share,
-            overload_secs: course.longest_overload as f64 * tick_secs,
-        });
+        let joints = self
+            .robot
+            .model
+            .joints
+            .iter()
+            .zip(&meter.joints)
+            .map(|(joint, course)| JointCourse {
+                name: joint.name.clone(),
+                max_excess: course.max_excess,
+                max_speed_share: course.max_speed_share,
+                overload_secs: course.longest_overload as f64 * tick_secs,
+            });
         let contacts = meter.self_contacts.iter().map(|((first, second), met)| {
             let mut pair = [*first, *second].map(|link| self.name_of(Owner::Link(link)));
             pair.sort();
@@ -116,7 +132,10 @@ impl World {
                 pair,
                 start_secs: self.recorder.secs_since_begin(met.tick),
                 max_depth_m: met.max_depth_m,
-                press: Some(SelfPress { max_force_n: met.max_force_n, of_hand }),
+                press: Some(SelfPress {
+                    max_force_n: met.max_force_n,
+                    of_hand,
+                }),
             }
         });
         let mut self_contacts: Vec<SelfCollision> = contacts.collect();
@@ -126,21 +145,39 @@ impl World {
             held_secs: *ticks as f64 * tick_secs,
             max_tilt_rad: *tilt,
         });
-        RobotCourse { joints: joints.collect(), self_contacts, held: held.collect(), ..RobotCourse::default() }
+        RobotCourse {
+            joints: joints.collect(),
+            self_contacts,
+            held: held.collect(),
+            ..RobotCourse::default()
+        }
     }
 
     fn record_joints(&mut self) {
         let (positions, velocities) = self.robot.state();
         let efforts = self.robot.effort_shares();
-        let joints = self.robot.model.joints.iter().zip(&mut self.recorder.robot.joints);
+        let joints = self
+            .robot
+            .model
+            .joints
+            .iter()
+            .zip(&mut self.recorder.robot.joints);
         for (idx, (joint, course)) in joints.enumerate() {
-            let (Some(position), Some(velocity)) = (positions.get(idx), velocities.get(idx)) else { continue };
-            course.max_excess = course.max_excess.max((joint.lower - position).max(position - joint.upper));
+            let (Some(position), Some(velocity)) = (positions.get(idx), velocities.get(idx)) else {
+                continue;
+            };
+            course.max_excess = course
+                .max_excess
+                .max((joint.lower - position).max(position - joint.upper));
             if joint.velocity > 0.0 {
-                course.max_speed_share = course.max_speed_share.max(velocity.abs() / joint.velocity);
+                course.max_speed_share =
+                    course.max_speed_share.max(velocity.abs() / joint.velocity);
             }
             let grips = self.robot.layout.gripper.contains(idx) || joint.mimic.is_some();
-            let overloaded = !grips && efforts.get(idx).is_some_and(|share| *share > OVERLOAD_SHARE);
+            let overloaded = !grips
+                && efforts
+                    .get(idx)
+                    .is_some_and(|share| *share > OVERLOAD_SHARE);
             course.overloaded = if overloaded { course.overloaded + 1 } else { 0 };
             course.longest_overload = course.longest_overload.max(course.overloaded);
         }
@@ -151,7 +188,9 @@ impl World {
             if object.fixed || !self.is_held(idx, touches) {
                 continue;
             }
-            let Some(body) = self.engine.bodies.get(object.body) else { continue };
+            let Some(body) = self.engine.bodies.get(object.body) else {
+                continue;
+            };
             let tilt = Pose::from_isometry(&from_pose(body.position())).tilt();
             let (ticks, most) = self.recorder.robot.held.entry(idx).or_insert((0, 0.0));
             (*ticks, *most) = (*ticks + 1, most.max(tilt));
@@ -160,8 +199,12 @@ impl World {
 
     /// Returns whether both fingers touch an object, each with any of its links.
     pub(super) fn is_held(&self, object: usize, touches: &BTreeMap<(Owner, Owner), Touch>) -> bool {
-        let touches = |link: &usize| touches.contains_key(&(Owner::Object(object), Owner::Link(*link)));
-        self.robot.fingers.iter().all(|finger| finger.iter().any(touches))
+        let touches =
+            |link: &usize| touches.contains_key(&(Owner::Object(object), Owner::Link(*link)));
+        self.robot
+            .fingers
+            .iter()
+            .all(|finger| finger.iter().any(touches))
     }
 
     fn record_self_contacts(&mut self) {
@@ -177,7 +220,9 @@ impl World {
             if self.depth_of(first, second) <= TOUCH_M {
                 continue;
             }
-            let Some(between) = self.pose_between(first, second) else { continue };
+            let Some(between) = self.pose_between(first, second) else {
+                continue;
+            };
             if met.get(&pair).is_some_and(|known| known.is_known(&between)) {
                 continue;
             }
@@ -196,7 +241,12 @@ impl World {
         let now = self.recorder.n_ticks();
         for (pair, touch) in touches {
             if let (Owner::Link(first), Owner::Link(second)) = pair {
-                let known = self.recorder.robot.self_contacts.entry((*first, *second)).or_insert(LinksMet::at(now));
+                let known = self
+                    .recorder
+                    .robot
+                    .self_contacts
+                    .entry((*first, *second))
+                    .or_insert(LinksMet::at(now));
                 known.max_force_n = known.max_force_n.max(touch.normal_n);
             }
         }
@@ -206,14 +256,18 @@ impl World {
     pub(super) fn depth_of(&self, first: usize, second: usize) -> f64 {
         let (one, other) = (self.ball_of(first), self.ball_of(second));
         let far = |(middle, radius): (Point3<f64>, f64), around: Option<(Point3<f64>, f64)>| {
-            around.is_some_and(|(other, its_radius)| (middle - other).norm() > radius + its_radius + ROUNDING_M)
+            around.is_some_and(|(other, its_radius)| {
+                (middle - other).norm() > radius + its_radius + ROUNDING_M
+            })
         };
         if one.is_some_and(|one| far(one, other)) {
             return 0.0;
         }
         // Most shapes of a link are far from the other link.
         let near = |idx: usize, around: Option<(Point3<f64>, f64)>| {
-            let solids = self.colliders_of(self.robot.bodies[idx]).zip(&self.robot.balls_of_shapes[idx]);
+            let solids = self
+                .colliders_of(self.robot.bodies[idx])
+                .zip(&self.robot.balls_of_shapes[idx]);
             let balls = solids.map(|(solid, ball)| (placed(ball, solid), solid));
             balls.filter(move |(ball, _)| !far(*ball, around))
         };
@@ -224,14 +278,17 @@ impl World {
                 if (middle - other).norm() > radius + other_radius {
                     continue;
                 }
-                let met = contact(a.position(), a.shape(), b.position(), b.shape(), 0.0).ok().flatten();
+                let met = contact(a.position(), a.shape(), b.position(), b.shape(), 0.0)
+                    .ok()
+                    .flatten();
                 deepest = deepest.max(met.map_or(0.0, |met| -f64::from(met.dist)));
             }
         }
         deepest
     }
 
-    /// Returns the centre and the radius of the ball around a link; `None` without shapes. Frame: world. Unit: metres.
+    /// Returns the centre and the radius of the ball around a link; `None` without shapes. Frame:
+    /// world. Unit: metres.
     fn ball_of(&self, link: usize) -> Option<(Point3<f64>, f64)> {
         let ball = self.robot.balls[link].as_ref()?;
         let body = self.engine.bodies.get(self.robot.bodies[link])?;
@@ -240,23 +297,35 @@ impl World {
 
     /// Returns the colliders of a body, without shells.
     pub(super) fn colliders_of(&self, body: RigidBodyHandle) -> impl Iterator<Item = &Collider> {
-        let handles = self.engine.bodies.get(body).map(rapier3d::prelude::RigidBody::colliders).unwrap_or_default();
-        let colliders = handles.iter().filter_map(|handle| self.engine.colliders.get(*handle));
+        let handles = self
+            .engine
+            .bodies
+            .get(body)
+            .map(rapier3d::prelude::RigidBody::colliders)
+            .unwrap_or_default();
+        let colliders = handles
+            .iter()
+            .filter_map(|handle| self.engine.colliders.get(*handle));
         colliders.filter(|collider| collider.user_data & SHELL == 0)
     }
 }
 
-/// Returns centre and radius of a solid's bounding ball, which is in the solid's frame. Frame: world. Unit: metres.
+/// Returns centre and radius of a solid's bounding ball, which is in the solid's frame. Frame:
+/// world. Unit: metres.
 fn placed(around: &BoundingSphere, solid: &Collider) -> (Point3<f64>, f64) {
     let pose: Isometry3<f64> = from_pose(solid.position());
-    (pose * Point3::from(from_vector(around.center)), f64::from(around.radius))
+    (
+        pose * Point3::from(from_vector(around.center)),
+        f64::from(around.radius),
+    )
 }
 
 #[cfg(test)]
 mod tests {
     use crate::robot::tests::lonely;
 
-    /// A posture with the hand inside the robot's body is detected; the home posture has no self-collision.
+    /// A posture with the hand inside the robot's body is detected; the home posture has no
+    /// self-collision.
     #[test]
     fn self_collisions_and_exceeded_joint_limits_are_detected() {
         let mut world = lonely();
@@ -267,21 +336,39 @@ mod tests {
         }
         let quiet = world.end_record().robot;
         assert!(quiet.self_contacts.is_empty(), "{quiet:?}");
-        assert!(quiet.joints.iter().all(|joint| joint.max_excess < 1e-3 && joint.max_speed_share < 0.5), "{quiet:?}");
-        assert!(quiet.joints.iter().all(|joint| joint.overload_secs < 0.2), "{quiet:?}");
+        assert!(
+            quiet
+                .joints
+                .iter()
+                .all(|joint| joint.max_excess < 1e-3 && joint.max_speed_share < 0.5),
+            "{quiet:?}"
+        );
+        assert!(
+            quiet.joints.iter().all(|joint| joint.overload_secs < 0.2),
+            "{quiet:?}"
+        );
 
         world.begin_record();
         world.let_links_pass(true);
         let mut bent = hold.clone();
         for (slot, idx) in world.layout().arm.clone().into_iter().enumerate() {
             let joint = &world.kinematics().joints()[idx];
-            bent.positions[idx] = if slot % 2 == 0 { joint.lower } else { joint.upper };
+            bent.positions[idx] = if slot % 2 == 0 {
+                joint.lower
+            } else {
+                joint.upper
+            };
         }
         for _ in 0..400 {
             world.step(&bent);
         }
         let folded = world.end_record().robot;
-        let [first, ..] = folded.self_contacts.as_slice() else { panic!("{folded:?}") };
-        assert!(first.max_depth_m > 0.005 && first.start_secs > 0.0, "{folded:?}");
+        let [first, ..] = folded.self_contacts.as_slice() else {
+            panic!("{folded:?}")
+        };
+        assert!(
+            first.max_depth_m > 0.005 && first.start_secs > 0.0,
+            "{folded:?}"
+        );
     }
 }

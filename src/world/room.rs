@@ -1,9 +1,10 @@
 //! Decides which things the robot can touch in the next control tick.
 //!
-//! A tick in which the robot can touch nothing needs no contacts; one in which only its hand can touch objects needs no
-//! contacts of the other links. For each link of the robot, the last measured distance from everything at rest is kept,
-//! with the pose of the link at that time. The way that it has moved since, and the longest way in the next tick, are
-//! subtracted; the distance is measured again only when too little is left. All of this depends on the state of the
+//! A tick in which the robot can touch nothing needs no contacts; one in which only its hand can
+//! touch objects needs no contacts of the other links. For each link of the robot, the last
+//! measured distance from everything at rest is kept, with the pose of the link at that time. The
+//! way that it has moved since, and the longest way in the next tick, are subtracted; the distance
+//! is measured again only when too little is left. All of this depends on the state of the
 //! simulation alone.
 
 use nalgebra::{Isometry3, Point3, Vector3};
@@ -22,11 +23,11 @@ use crate::robot_course::ROUNDING_M;
 
 /// Distances are measured up to this. Unit: metres.
 const RANGE_M: f64 = 0.25;
-/// Distance that remains after a free tick: the engine finds contacts before they close, in spite of the errors of its 32-bit
-/// distances. Unit: metres.
+/// Distance that remains after a free tick: the engine finds contacts before they close, in spite
+/// of the errors of its 32-bit distances. Unit: metres.
 const LEFT_M: f64 = 4e-3;
-/// As [`LEFT_M`], between two links of the robot; the smaller one for links that are hardly further apart from the beginning, as
-/// the base of a thumb and the wrist. Unit: metres.
+/// As [`LEFT_M`], between two links of the robot; the smaller one for links that are hardly further
+/// apart from the beginning, as the base of a thumb and the wrist. Unit: metres.
 const LEFT_OF_LINKS_M: f64 = 1e-3;
 const LEAST_LEFT_OF_LINKS_M: f64 = 1e-4;
 /// Factor on a squared distance that is more than its rounding error in 32 bits.
@@ -56,7 +57,8 @@ pub(super) struct Room {
     kept_m: Vec<f64>,
     /// The things that the robot could touch in the last tick.
     pub(super) reach: Reach,
-    /// Whether something fast can meet something fixed: the engine then sweeps all fast shapes, which takes long.
+    /// Whether something fast can meet something fixed: the engine then sweeps all fast shapes,
+    /// which takes long.
     pub(super) sweeps: bool,
     /// Whether links of many pieces in the hand can touch each other.
     pieces_meet: bool,
@@ -68,7 +70,8 @@ pub(super) struct Room {
     ticks: [u64; 4],
 }
 
-/// A distance, and where the link was when it was measured: in the world, or in the frame of the other link.
+/// A distance, and where the link was when it was measured: in the world, or in the frame of the
+/// other link.
 #[derive(Debug, Clone, Copy)]
 struct Measured {
     gap_m: f64,
@@ -80,7 +83,8 @@ impl Measured {
     fn left(&self, pose: &Isometry3<f64>, ball: &Ball) -> f64 {
         let shift = (pose * ball.middle - self.pose * ball.middle).norm();
         // At least the angle, for all angles up to half a turn.
-        let turn = (self.pose.rotation.inverse() * pose.rotation).imag().norm() * std::f64::consts::PI;
+        let turn =
+            (self.pose.rotation.inverse() * pose.rotation).imag().norm() * std::f64::consts::PI;
         self.gap_m - shift - turn * ball.radius
     }
 }
@@ -107,8 +111,8 @@ impl World {
         self.room.shortcuts = shortcuts;
     }
 
-    /// Leaves all ticks to the engine, with the whole robot, also those in which the robot touches nothing: for
-    /// comparisons.
+    /// Leaves all ticks to the engine, with the whole robot, also those in which the robot touches
+    /// nothing: for comparisons.
     pub fn leave_to_engine(&mut self) {
         self.take_shortcuts(Shortcuts::NONE);
     }
@@ -118,14 +122,16 @@ impl World {
         let substeps = match reach {
             Reach::Nothing if self.room.shortcuts.few_substeps => self.substeps.div_ceil(2),
             // Light fingers whose many pieces press on each other would fly apart.
-            Reach::Hand if self.room.shortcuts.few_substeps && !self.room.pieces_meet => self.substeps.div_ceil(2),
+            Reach::Hand if self.room.shortcuts.few_substeps && !self.room.pieces_meet => {
+                self.substeps.div_ceil(2)
+            }
             _ => self.substeps,
         };
         self.engine.integration_parameters.num_solver_iterations = substeps;
     }
 
-    /// Returns the number of ticks so far in which the robot could touch nothing, with everything else at rest; nothing,
-    /// with moving objects; movable objects with its hand; and everything.
+    /// Returns the number of ticks so far in which the robot could touch nothing, with everything
+    /// else at rest; nothing, with moving objects; movable objects with its hand; and everything.
     pub fn ticks_by_reach(&self) -> [u64; 4] {
         self.room.ticks
     }
@@ -140,7 +146,8 @@ impl World {
         self.room.reach == Reach::Hand
     }
 
-    /// Returns whether the engine swept fast shapes in the last tick, so that they pass through nothing fixed.
+    /// Returns whether the engine swept fast shapes in the last tick, so that they pass through
+    /// nothing fixed.
     pub fn swept(&self) -> bool {
         self.engine.integration_parameters.max_ccd_substeps > 0
     }
@@ -149,8 +156,13 @@ impl World {
     pub(super) fn find_room(&mut self, poses: Vec<Isometry3<f64>>) -> Reach {
         let mut room = std::mem::take(&mut self.room);
         room.sweeps = true;
-        let reach = if room.shortcuts == Shortcuts::NONE { Reach::All } else { self.reach(&mut room, poses) };
-        self.engine.integration_parameters.max_ccd_substeps = usize::from(room.sweeps || !room.shortcuts.few_sweeps);
+        let reach = if room.shortcuts == Shortcuts::NONE {
+            Reach::All
+        } else {
+            self.reach(&mut room, poses)
+        };
+        self.engine.integration_parameters.max_ccd_substeps =
+            usize::from(room.sweeps || !room.shortcuts.few_sweeps);
         let reach = room.shortcuts.limit(reach);
         if reach != Reach::Nothing {
             self.leave_out_idle(reach);
@@ -174,7 +186,11 @@ impl World {
         if !self.sliding.is_empty() || self.sealed().is_some() {
             return Reach::All;
         }
-        let rest: Vec<bool> = self.objects.iter().map(|object| self.rests(object)).collect();
+        let rest: Vec<bool> = self
+            .objects
+            .iter()
+            .map(|object| self.rests(object))
+            .collect();
         let n_links = self.robot.bodies.len();
         if rest != room.rest {
             room.resting.clear();
@@ -183,10 +199,22 @@ impl World {
         room.resting.resize(n_links, None);
         room.pairs.resize(self.link_pairs.iter().count(), None);
         let (positions, velocities) = (&self.robot.positions, &self.robot.velocities);
-        let spans = self.robot.spans(positions, velocities, self.tick_secs(), OVERSHOOT);
-        let axes = self.robot.model.joints.iter().map(|joint| axis_in_world(joint, &poses)).collect();
+        let spans = self
+            .robot
+            .spans(positions, velocities, self.tick_secs(), OVERSHOOT);
+        let axes = self
+            .robot
+            .model
+            .joints
+            .iter()
+            .map(|joint| axis_in_world(joint, &poses))
+            .collect();
         let now = Moment { poses, axes, spans };
-        let mut reach = if rest.iter().all(|rests| *rests) { Reach::Nothing } else { Reach::Apart };
+        let mut reach = if rest.iter().all(|rests| *rests) {
+            Reach::Nothing
+        } else {
+            Reach::Apart
+        };
         room.rest = rest;
         room.sweeps = self.fast_objects_meet_fixed(&room.rest);
         for link in 0..n_links {
@@ -202,7 +230,11 @@ impl World {
             return reach;
         }
         if room.between.is_empty() {
-            room.between = self.link_pairs.iter().map(|(first, second)| self.joints_between(first, second)).collect();
+            room.between = self
+                .link_pairs
+                .iter()
+                .map(|(first, second)| self.joints_between(first, second))
+                .collect();
             room.kept_m = self
                 .link_pairs
                 .iter()
@@ -220,18 +252,28 @@ impl World {
 
     /// Returns whether an object is fixed or asleep.
     pub(super) fn rests(&self, object: &Object) -> bool {
-        self.engine.bodies.get(object.body).is_none_or(|body| body.is_fixed() || body.is_sleeping())
+        self.engine
+            .bodies
+            .get(object.body)
+            .is_none_or(|body| body.is_fixed() || body.is_sleeping())
     }
 
     /// Returns whether a link can't meet the floor or a static object in the tick.
     fn is_clear_of_fixed(&self, room: &mut Room, link: usize, now: &Moment) -> bool {
-        let Some(ball) = self.robot.balls[link] else { return true };
+        let Some(ball) = self.robot.balls[link] else {
+            return true;
+        };
         // A link that never moves may touch other fixed things.
         if self.robot.joints_to(link).next().is_none() {
             return true;
         }
         let measure = || self.gap_of_link(link, &|object| object.fixed, true);
-        has_room(&mut room.fixed[link], measure, &ball, (&now.poses[link], self.ahead(link, &ball, now)))
+        has_room(
+            &mut room.fixed[link],
+            measure,
+            &ball,
+            (&now.poses[link], self.ahead(link, &ball, now)),
+        )
     }
 
     /// Returns whether a link is so fast that it could pass through something thin without a sweep.
@@ -240,8 +282,8 @@ impl World {
         speeds.fold(0.0, f64::max) > self.outruns_m_s()
     }
 
-    /// Returns the speed at which half of the least distance at which the engine prepares contacts is passed in a step: the rest
-    /// is for the change of speed within the tick. Unit: m/s.
+    /// Returns the speed at which half of the least distance at which the engine prepares contacts
+    /// is passed in a step: the rest is for the change of speed within the tick. Unit: m/s.
     fn outruns_m_s(&self) -> f64 {
         PREDICTION_M / 2.0 * f64::from(self.steps_per_tick) / self.tick_secs()
     }
@@ -265,7 +307,9 @@ impl World {
     }
 
     fn reach_of_link(&self, room: &mut Room, link: usize, now: &Moment) -> Reach {
-        let Some(ball) = self.robot.balls[link] else { return Reach::Nothing };
+        let Some(ball) = self.robot.balls[link] else {
+            return Reach::Nothing;
+        };
         // The engine knows a link that never moves in every tick, as it knows a table.
         if self.robot.joints_to(link).next().is_none() {
             return Reach::Nothing;
@@ -274,8 +318,12 @@ impl World {
         let rest = &room.rest;
         let rests = |object: &Object| !object.fixed && self.is_in(object, rest);
         let measure = || self.gap_of_link(link, &rests, false);
-        let clear = has_room(&mut room.resting[link], measure, &ball, (&now.poses[link], ahead))
-            && self.is_clear_of_moving(link, rest, ahead);
+        let clear = has_room(
+            &mut room.resting[link],
+            measure,
+            &ball,
+            (&now.poses[link], ahead),
+        ) && self.is_clear_of_moving(link, rest, ahead);
         match (clear, &self.robot.hand) {
             (true, _) => Reach::Nothing,
             (false, Some(hand)) if hand.has(link) => Reach::Hand,
@@ -285,26 +333,36 @@ impl World {
 
     /// Returns how far a link can move in the tick. Unit: metres.
     fn ahead(&self, link: usize, ball: &Ball, now: &Moment) -> f64 {
-        self.robot.joints_to(link).map(|joint| self.way(joint, link, ball, now)).sum()
+        self.robot
+            .joints_to(link)
+            .map(|joint| self.way(joint, link, ball, now))
+            .sum()
     }
 
-    /// Returns whether an object that is not slow can meet the floor or a static object in the tick.
+    /// Returns whether an object that is not slow can meet the floor or a static object in the
+    /// tick.
     fn fast_objects_meet_fixed(&self, rest: &[bool]) -> bool {
         let moving = self.objects.iter().zip(rest).filter(|(_, rests)| !**rests);
-        // Sweeps of objects bring sweeps of links, which the engine makes for links that outrun half of their thinnest piece: of
-        // many thin pieces, nearly always.
-        let slow_m_s = if self.robot.model.has_many_pieces() { self.outruns_m_s() } else { SLOW_M_S };
-        moving.filter_map(|(object, _)| Some((object, self.speed_of(object)?))).any(|(object, speed)| {
-            let needed = self.way_of_object(speed) + LEFT_M;
-            speed > slow_m_s
-                && self.boxed(object.body).any(|(_, its_box)| {
-                    let fixed = self.objects.iter().filter(|other| other.fixed);
-                    f64::from(its_box.mins.z) < needed
-                        || fixed
-                            .flat_map(|other| self.colliders_of(other.body))
-                            .any(|other| gap(&its_box, &other.compute_aabb()) < needed)
-                })
-        })
+        // Sweeps of objects bring sweeps of links, which the engine makes for links that outrun
+        // half of their thinnest piece: of many thin pieces, nearly always.
+        let slow_m_s = if self.robot.model.has_many_pieces() {
+            self.outruns_m_s()
+        } else {
+            SLOW_M_S
+        };
+        moving
+            .filter_map(|(object, _)| Some((object, self.speed_of(object)?)))
+            .any(|(object, speed)| {
+                let needed = self.way_of_object(speed) + LEFT_M;
+                speed > slow_m_s
+                    && self.boxed(object.body).any(|(_, its_box)| {
+                        let fixed = self.objects.iter().filter(|other| other.fixed);
+                        f64::from(its_box.mins.z) < needed
+                            || fixed
+                                .flat_map(|other| self.colliders_of(other.body))
+                                .any(|other| gap(&its_box, &other.compute_aabb()) < needed)
+                    })
+            })
     }
 
     /// Returns the largest speed of an object's points. Unit: m/s.
@@ -323,21 +381,32 @@ impl World {
     /// Returns whether a link that moves this far can't meet any moving object in the tick.
     fn is_clear_of_moving(&self, link: usize, rest: &[bool], ahead: f64) -> bool {
         let moving = self.objects.iter().zip(rest).filter(|(_, rests)| !**rests);
-        moving.filter_map(|(object, _)| Some((object, self.speed_of(object)?))).all(|(object, speed)| {
-            let needed = ahead + self.way_of_object(speed) + LEFT_M;
-            if self.are_balls_apart(link, object, needed) {
-                return true;
-            }
-            let others = self.boxed(object.body).collect::<Vec<_>>();
-            self.boxed(self.robot.bodies[link])
-                .all(|solid| others.iter().all(|other| apart(&solid, other, needed) >= needed))
-        })
+        moving
+            .filter_map(|(object, _)| Some((object, self.speed_of(object)?)))
+            .all(|(object, speed)| {
+                let needed = ahead + self.way_of_object(speed) + LEFT_M;
+                if self.are_balls_apart(link, object, needed) {
+                    return true;
+                }
+                let others = self.boxed(object.body).collect::<Vec<_>>();
+                self.boxed(self.robot.bodies[link]).all(|solid| {
+                    others
+                        .iter()
+                        .all(|other| apart(&solid, other, needed) >= needed)
+                })
+            })
     }
 
-    /// Returns whether the balls around a link and an object are farther apart than this. Unit: metres.
+    /// Returns whether the balls around a link and an object are farther apart than this. Unit:
+    /// metres.
     pub(super) fn are_balls_apart(&self, link: usize, object: &Object, needed: f64) -> bool {
-        let Some(ball) = &self.robot.balls[link] else { return true };
-        let (Some(around), Some(body)) = (&object.ball, self.engine.bodies.get(self.robot.bodies[link])) else {
+        let Some(ball) = &self.robot.balls[link] else {
+            return true;
+        };
+        let (Some(around), Some(body)) = (
+            &object.ball,
+            self.engine.bodies.get(self.robot.bodies[link]),
+        ) else {
             return false;
         };
         let way = from_pose(body.position()) * ball.middle - self.pose_of(object) * around.middle;
@@ -346,19 +415,32 @@ impl World {
 
     /// Returns whether an object is among those that this list, in scene order, marks.
     fn is_in(&self, object: &Object, marked: &[bool]) -> bool {
-        self.objects.iter().zip(marked).any(|(other, marked)| *marked && std::ptr::eq(other, object))
+        self.objects
+            .iter()
+            .zip(marked)
+            .any(|(other, marked)| *marked && std::ptr::eq(other, object))
     }
 
-    /// Returns the joints that move only the first of two links, and those that move only the second.
+    /// Returns the joints that move only the first of two links, and those that move only the
+    /// second.
     fn joints_between(&self, first: usize, second: usize) -> [Vec<usize>; 2] {
         [(first, second), (second, first)].map(|(one, other)| {
-            let joints = self.robot.joints_to(one).filter(|joint| !self.robot.moves(*joint, other));
+            let joints = self
+                .robot
+                .joints_to(one)
+                .filter(|joint| !self.robot.moves(*joint, other));
             joints.collect()
         })
     }
 
-    /// Returns the distance that has to remain between two links: half of that at the beginning, if they are near. Unit: metres.
-    fn kept_m(&self, (first, second): (usize, usize), known: &mut Option<Measured>, poses: &[Isometry3<f64>]) -> f64 {
+    /// Returns the distance that has to remain between two links: half of that at the beginning, if
+    /// they are near. Unit: metres.
+    fn kept_m(
+        &self,
+        (first, second): (usize, usize),
+        known: &mut Option<Measured>,
+        poses: &[Isometry3<f64>],
+    ) -> f64 {
         let far = |balls_m: f64| balls_m >= 2.0 * LEFT_OF_LINKS_M;
         let pose = poses[first].inverse() * poses[second];
         if self.gap_of_balls(first, second, &pose).is_some_and(far) {
@@ -369,10 +451,13 @@ impl World {
         (gap_m / 2.0).clamp(LEAST_LEFT_OF_LINKS_M, LEFT_OF_LINKS_M)
     }
 
-    /// Returns the distance of the balls around two links, less rounding errors; `None` if one has no shape. `pose` is that of the
-    /// second in the frame of the first. Unit: metres.
+    /// Returns the distance of the balls around two links, less rounding errors; `None` if one has
+    /// no shape. `pose` is that of the second in the frame of the first. Unit: metres.
     fn gap_of_balls(&self, first: usize, second: usize, pose: &Isometry3<f64>) -> Option<f64> {
-        let (one, other) = (self.robot.balls[first].as_ref()?, self.robot.balls[second].as_ref()?);
+        let (one, other) = (
+            self.robot.balls[first].as_ref()?,
+            self.robot.balls[second].as_ref()?,
+        );
         Some((pose * other.middle - one.middle).norm() - one.radius - other.radius - ROUNDING_M)
     }
 
@@ -382,27 +467,50 @@ impl World {
             return Reach::Nothing;
         }
         let mut reach = Reach::Nothing;
-        let pairs = self.link_pairs.iter().zip(&mut room.pairs).zip(&room.between).zip(&room.kept_m);
+        let pairs = self
+            .link_pairs
+            .iter()
+            .zip(&mut room.pairs)
+            .zip(&room.between)
+            .zip(&room.kept_m);
         for ((((first, second), known), joints), kept_m) in pairs {
-            let (Some(one), Some(other)) = (self.robot.balls[first], self.robot.balls[second]) else { continue };
+            let (Some(one), Some(other)) = (self.robot.balls[first], self.robot.balls[second])
+            else {
+                continue;
+            };
             let pose = now.poses[first].inverse() * now.poses[second];
             let mut ahead = 0.0;
             for (link, ball, joints) in [(first, &one, &joints[0]), (second, &other, &joints[1])] {
-                ahead += joints.iter().map(|joint| self.way(*joint, link, ball, now)).sum::<f64>();
+                ahead += joints
+                    .iter()
+                    .map(|joint| self.way(*joint, link, ball, now))
+                    .sum::<f64>();
             }
-            if self.gap_of_balls(first, second, &pose).is_some_and(|balls_m| balls_m - ahead >= *kept_m) {
+            if self
+                .gap_of_balls(first, second, &pose)
+                .is_some_and(|balls_m| balls_m - ahead >= *kept_m)
+            {
                 continue;
             }
             if known.is_none_or(|known| known.left(&pose, &other) - ahead < *kept_m) {
-                *known = Some(Measured { gap_m: self.gap_of_links(first, second), pose });
+                *known = Some(Measured {
+                    gap_m: self.gap_of_links(first, second),
+                    pose,
+                });
             }
             if known.is_some_and(|known| known.left(&pose, &other) - ahead >= *kept_m) {
                 continue;
             }
-            let in_hand = self.robot.hand.as_ref().is_some_and(|hand| hand.has(first) && hand.has(second));
+            let in_hand = self
+                .robot
+                .hand
+                .as_ref()
+                .is_some_and(|hand| hand.has(first) && hand.has(second));
             reach = reach.max(if in_hand { Reach::Hand } else { Reach::All });
-            room.pieces_meet |=
-                in_hand && [first, second].iter().any(|link| self.robot.model.links[*link].has_many_pieces());
+            room.pieces_meet |= in_hand
+                && [first, second]
+                    .iter()
+                    .any(|link| self.robot.model.links[*link].has_many_pieces());
         }
         reach
     }
@@ -429,15 +537,22 @@ impl World {
                 // The distance from the top of so large a slab would be inexact.
                 nearest = nearest.min(f64::from(solid.1.mins.z));
             }
-            nearest = others.iter().fold(nearest, |nearest, other| nearest.min(apart(&solid, other, nearest)));
+            nearest = others.iter().fold(nearest, |nearest, other| {
+                nearest.min(apart(&solid, other, nearest))
+            });
         }
         nearest
     }
 
     /// Returns the distance of two links, or [`RANGE_M`] if it is larger. Unit: metres.
     pub(super) fn gap_of_links(&self, first: usize, second: usize) -> f64 {
-        let [solids, others] = [first, second].map(|link| self.boxed(self.robot.bodies[link]).collect::<Vec<_>>());
-        let Some(around) = others.iter().map(|(_, its_box)| *its_box).reduce(|one, other| one.merged(&other)) else {
+        let [solids, others] =
+            [first, second].map(|link| self.boxed(self.robot.bodies[link]).collect::<Vec<_>>());
+        let Some(around) = others
+            .iter()
+            .map(|(_, its_box)| *its_box)
+            .reduce(|one, other| one.merged(&other))
+        else {
             return RANGE_M;
         };
         // Most others are farther apart than those with the nearest boxes.
@@ -454,7 +569,8 @@ impl World {
             }
         }
         let mut nearest = begin.map_or(RANGE_M, |(solid, other)| apart(solid, other, RANGE_M));
-        let is_far = |squared: Real, nearest: f64| f64::from(squared) > nearest * nearest * ROUNDED_UP;
+        let is_far =
+            |squared: Real, nearest: f64| f64::from(squared) > nearest * nearest * ROUNDED_UP;
         for solid in &solids {
             if is_far(gap_squared(&solid.1, &around), nearest) {
                 continue;
@@ -469,8 +585,8 @@ impl World {
     }
 }
 
-/// Returns whether more of a distance is left than a link at a pose can move in the tick. It is measured again if the known
-/// one does not suffice.
+/// Returns whether more of a distance is left than a link at a pose can move in the tick. It is
+/// measured again if the known one does not suffice.
 fn has_room(
     known: &mut Option<Measured>,
     measure: impl Fn() -> f64,
@@ -479,7 +595,10 @@ fn has_room(
 ) -> bool {
     let suffices = |known: Measured| known.left(pose, ball) - ahead >= LEFT_M;
     if !known.is_some_and(suffices) {
-        *known = Some(Measured { gap_m: measure(), pose: *pose });
+        *known = Some(Measured {
+            gap_m: measure(),
+            pose: *pose,
+        });
     }
     known.is_some_and(suffices)
 }

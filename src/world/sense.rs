@@ -8,7 +8,8 @@ use crate::World;
 use crate::object::Object;
 use actcheck_data::{ChoiceName, Choices, PlanarAxis, Pose, SightingAxis};
 
-/// Tilt beyond which an object counts as lying: it is then seen as its upright bounding box. Unit: radians.
+/// Tilt beyond which an object counts as lying: it is then seen as its upright bounding box. Unit:
+/// radians.
 const LYING_RAD: f64 = 0.3;
 /// Smallest perceived dimension, whatever the noise. Unit: metres.
 const SMALLEST_M: f64 = 0.005;
@@ -24,15 +25,17 @@ pub struct Sighting {
     pub size_m: [f64; 3],
     /// Whether it is furniture, which is static and on the robot's map.
     pub furniture: bool,
-    /// Whether the hand can take it only across its sides, because it is a box whose corners don't fit between the fingers.
+    /// Whether the hand can take it only across its sides, because it is a box whose corners don't
+    /// fit between the fingers.
     pub angular: bool,
 }
 
 impl World {
-    /// Samples the base's initial pose estimate. Its error stays constant while the base moves, unless the odometry
-    /// drifts.
+    /// Samples the base's initial pose estimate. Its error stays constant while the base moves,
+    /// unless the odometry drifts.
     pub fn localise(&mut self, choices: &mut Choices) {
-        let mut draw = |axis: PlanarAxis, sigma: f64| choices.normal(ChoiceName::Localisation(axis), sigma);
+        let mut draw =
+            |axis: PlanarAxis, sigma: f64| choices.normal(ChoiceName::Localisation(axis), sigma);
         let x = draw(PlanarAxis::X, self.sensing.localisation_noise_m);
         let y = draw(PlanarAxis::Y, self.sensing.localisation_noise_m);
         let turn = draw(PlanarAxis::Heading, self.sensing.heading_noise_rad);
@@ -43,7 +46,8 @@ impl World {
         self.begin_tracking();
     }
 
-    /// Returns all objects with the true poses of their own frames, whose origins are at their feet.
+    /// Returns all objects with the true poses of their own frames, whose origins are at their
+    /// feet.
     pub fn truth(&self) -> Vec<Sighting> {
         let objects = self.objects.iter().map(|object| Sighting {
             id: object.id.clone(),
@@ -57,11 +61,14 @@ impl World {
 
     /// Returns the ids of all objects, in scene order.
     pub fn visible(&self) -> Vec<String> {
-        self.objects.iter().map(|object| object.id.clone()).collect()
+        self.objects
+            .iter()
+            .map(|object| object.id.clone())
+            .collect()
     }
 
-    /// Returns the furniture of the floor plan, without noise; it is off only by the error of the robot's pose
-    /// estimate. Static objects that are not on the map must be perceived.
+    /// Returns the furniture of the floor plan, without noise; it is off only by the error of the
+    /// robot's pose estimate. Static objects that are not on the map must be perceived.
     pub fn known_furniture(&self) -> Vec<Sighting> {
         let on_map = self.objects.iter().filter(|object| object.on_map);
         let as_built = on_map.map(|object| {
@@ -87,7 +94,8 @@ impl World {
         let idx = self.objects.iter().position(|object| object.id == id)?;
         let object = &self.objects[idx];
         let (true_pose, true_size) = self.foot(object, &self.shown(idx));
-        let mut draw = |axis: SightingAxis, sigma: f64| choices.normal(ChoiceName::sighting(id, axis), sigma);
+        let mut draw =
+            |axis: SightingAxis, sigma: f64| choices.normal(ChoiceName::sighting(id, axis), sigma);
         let sensing = &self.sensing;
         let shift = Vector3::new(
             draw(SightingAxis::X, sensing.position_noise_m),
@@ -95,7 +103,11 @@ impl World {
             draw(SightingAxis::Z, sensing.height_noise_m),
         );
         let turn = draw(SightingAxis::Yaw, sensing.yaw_noise_rad);
-        let sides = [SightingAxis::Width, SightingAxis::Depth, SightingAxis::Height];
+        let sides = [
+            SightingAxis::Width,
+            SightingAxis::Depth,
+            SightingAxis::Height,
+        ];
         let size_noise = sides.map(|side| draw(side, sensing.size_noise_m));
         let seen = Isometry3::from_parts(
             Translation3::from(true_pose.translation.vector + shift),
@@ -106,22 +118,35 @@ impl World {
             *size = (*size + noise).max(SMALLEST_M);
         }
         let pose = Pose::from_isometry(&(self.believed_from_true * seen));
-        Some(Sighting { id: id.to_owned(), pose, size_m, furniture: object.on_map, angular: false })
+        Some(Sighting {
+            id: id.to_owned(),
+            pose,
+            size_m,
+            furniture: object.on_map,
+            angular: false,
+        })
     }
 
     /// Returns the gap between the fingers, measured with noise. Unit: metres.
     pub fn feel_opening(&self, choices: &mut Choices) -> f64 {
-        self.observe().gripper_opening_m + choices.normal(ChoiceName::Gripper, self.sensing.gripper_noise_m)
+        self.observe().gripper_opening_m
+            + choices.normal(ChoiceName::Gripper, self.sensing.gripper_noise_m)
     }
 
     /// Returns the upright pose of an object's foot, and its size along the axes of that pose.
     fn foot(&self, object: &Object, pose: &Isometry3<f64>) -> (Isometry3<f64>, [f64; 3]) {
         let plain = Pose::from_isometry(pose);
         if plain.tilt() <= LYING_RAD {
-            return (Pose::upright(plain.position, plain.yaw()).to_isometry(), object.model.size_m);
+            return (
+                Pose::upright(plain.position, plain.yaw()).to_isometry(),
+                object.model.size_m,
+            );
         }
         let (low, high) = self.aabb(object);
         let middle = [(low[0] + high[0]) / 2.0, (low[1] + high[1]) / 2.0, low[2]];
-        (Pose::upright(middle, 0.0).to_isometry(), [high[0] - low[0], high[1] - low[1], high[2] - low[2]])
+        (
+            Pose::upright(middle, 0.0).to_isometry(),
+            [high[0] - low[0], high[1] - low[1], high[2] - low[2]],
+        )
     }
 }

@@ -3,7 +3,8 @@
 use crate::World;
 use crate::convert::from_vector;
 
-/// Time limit. Unit: seconds. Objects fall a few millimetres; a rolling object is detected within this time.
+/// Time limit. Unit: seconds. Objects fall a few millimetres; a rolling object is detected within
+/// this time.
 const MOST_SECS: f64 = 3.0;
 /// Speed below which a body is at rest. Unit: m/s. The angular limit in rad/s is ten times this.
 const REST_SPEED: f64 = 0.01;
@@ -26,7 +27,8 @@ pub struct Settling {
 }
 
 impl World {
-    /// Steps the simulation, with the robot holding its posture, until every object is at rest or time is up.
+    /// Steps the simulation, with the robot holding its posture, until every object is at rest or
+    /// time is up.
     pub fn settle(&mut self) -> Settling {
         let start = self.time_secs();
         let mut rests_since = start;
@@ -42,7 +44,12 @@ impl World {
         let unsettled = self.moving();
         let left = self.left();
         let settled = unsettled.is_empty() && left.is_empty() && self.fault().is_none();
-        Settling { settled, secs: self.time_secs() - start, unsettled, left }
+        Settling {
+            settled,
+            secs: self.time_secs() - start,
+            unsettled,
+            left,
+        }
     }
 
     fn moving(&self) -> Vec<String> {
@@ -53,7 +60,12 @@ impl World {
                         || from_vector(body.angvel()).norm() > 10.0 * REST_SPEED)
             })
         };
-        self.objects.iter().filter(|o| !o.fixed).filter(moves).map(|o| o.id.clone()).collect()
+        self.objects
+            .iter()
+            .filter(|o| !o.fixed)
+            .filter(moves)
+            .map(|o| o.id.clone())
+            .collect()
     }
 
     fn left(&self) -> Vec<String> {
@@ -62,9 +74,14 @@ impl World {
             if let Some(off_m) = self.off_its_joint_m(object) {
                 return off_m.is_nan() || off_m > LEFT_M;
             }
-            let way = (self.pose_of(object).translation.vector - object.placed.translation.vector).norm();
+            let way =
+                (self.pose_of(object).translation.vector - object.placed.translation.vector).norm();
             way.is_nan() || way > LEFT_M
         };
-        self.objects.iter().filter(gone).map(|o| o.id.clone()).collect()
+        self.objects
+            .iter()
+            .filter(gone)
+            .map(|o| o.id.clone())
+            .collect()
     }
 }

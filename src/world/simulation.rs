@@ -26,18 +26,20 @@ use crate::{Fault, Kinematics, Layout, Poison, WorldError, fault};
 use actcheck_data::{CONTROL_HZ, Camera, KnownKind, Pose, RobotProfile, Scene, Sensing};
 use actcheck_scenario::FloorPlan;
 
-/// A command to the robot's controllers. Positions are clamped to the joint limits; the controllers limit speeds.
+/// A command to the robot's controllers. Positions are clamped to the joint limits; the controllers
+/// limit speeds.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Command {
-    /// Target position of each joint, in the order of [`Kinematics::joints`]; for the base, by its own belief. Finger
-    /// joints follow `gripper_opening_m` instead. Units: metres or radians.
+    /// Target position of each joint, in the order of [`Kinematics::joints`]; for the base, by its
+    /// own belief. Finger joints follow `gripper_opening_m` instead. Units: metres or radians.
     pub positions: Vec<f64>,
     /// Gap between the fingers; 0 switches the vacuum of a suction cup on. Unit: metres.
     pub gripper_opening_m: f64,
     /// Largest force of one finger, or greatest pull of a suction cup. Unit: newtons.
     pub grip_force_n: f64,
-    /// Effort-controlled joints, by index, each with its effort in addition to gravity compensation. Joints stay within
-    /// their largest speed. Not for fingers. Units: newtons or newton metres.
+    /// Effort-controlled joints, by index, each with its effort in addition to gravity
+    /// compensation. Joints stay within their largest speed. Not for fingers. Units: newtons or
+    /// newton metres.
     pub efforts: Vec<(usize, f64)>,
 }
 
@@ -50,11 +52,11 @@ pub struct Observation {
     pub positions: Vec<f64>,
     /// Joint velocities.
     pub velocities: Vec<f64>,
-    /// Gap between the fingers, measured by their encoders; for a suction cup, 0 while its vacuum is on, otherwise its
-    /// diameter. Unit: metres.
+    /// Gap between the fingers, measured by their encoders; for a suction cup, 0 while its vacuum
+    /// is on, otherwise its diameter. Unit: metres.
     pub gripper_opening_m: f64,
-    /// Force of each finger's motor, left and right; positive closes. For a suction cup, twice the force of its vacuum by
-    /// its pressure sensor, 0 without a seal. Unit: newtons.
+    /// Force of each finger's motor, left and right; positive closes. For a suction cup, twice the
+    /// force of its vacuum by its pressure sensor, 0 without a seal. Unit: newtons.
     pub finger_efforts_n: [f64; 2],
     /// Effort of each joint's motor, without gravity compensation. Units: newtons or newton metres.
     pub loads: Vec<f64>,
@@ -116,8 +118,12 @@ pub fn build(scene: &Scene) -> Result<World, WorldError> {
     let mut engine = engine(&scene.physics)?;
     let floor = add_floor(&mut engine);
     let robot = Robot::insert(&mut engine, &scene.robot)?;
-    let mut objects: Vec<Object> =
-        scene.objects.iter().enumerate().map(|(idx, object)| object::insert(&mut engine, idx, object)).collect();
+    let mut objects: Vec<Object> = scene
+        .objects
+        .iter()
+        .enumerate()
+        .map(|(idx, object)| object::insert(&mut engine, idx, object))
+        .collect();
     attach(&mut engine, &scene.objects, &mut objects);
     let steps_per_second = scene.physics.steps_per_second;
     let steps_per_tick = (steps_per_second / CONTROL_HZ).max(1);
@@ -159,9 +165,20 @@ pub fn build(scene: &Scene) -> Result<World, WorldError> {
 
 /// Returns the bodies that can move with their names in traces: objects, then links with shapes.
 fn tracks(objects: &[Object], robot: &Robot) -> Vec<(String, RigidBodyHandle)> {
-    let objects = objects.iter().filter(|object| !object.fixed || object.slides).map(|o| (o.id.clone(), o.body));
-    let links = robot.model.links.iter().zip(&robot.bodies).skip(1).filter(|(link, _)| !link.solids.is_empty());
-    objects.chain(links.map(|(link, body)| (format!("robot/{}", link.name), *body))).collect()
+    let objects = objects
+        .iter()
+        .filter(|object| !object.fixed || object.slides)
+        .map(|o| (o.id.clone(), o.body));
+    let links = robot
+        .model
+        .links
+        .iter()
+        .zip(&robot.bodies)
+        .skip(1)
+        .filter(|(link, _)| !link.solids.is_empty());
+    objects
+        .chain(links.map(|(link, body)| (format!("robot/{}", link.name), *body)))
+        .collect()
 }
 
 impl World {
@@ -205,14 +222,15 @@ impl World {
         &self.plan
     }
 
-    /// Returns the kind of the object with this id, which is part of the robot's task; it does not reveal the object's
-    /// pose. Returns `None` if there is no such id.
+    /// Returns the kind of the object with this id, which is part of the robot's task; it does not
+    /// reveal the object's pose. Returns `None` if there is no such id.
     pub fn kind_of(&self, id: &str) -> Option<KnownKind> {
         let model = &self.objects.iter().find(|object| object.id == id)?.model;
         Some(KnownKind::of(model))
     }
 
-    /// Performs one control tick: passes the command to the controllers, steps physics, and records the state.
+    /// Performs one control tick: passes the command to the controllers, steps physics, and records
+    /// the state.
     ///
     /// Does not step the simulation after a fault.
     pub fn step(&mut self, command: &Command) {
@@ -252,7 +270,8 @@ impl World {
             }
             self.set_substeps(reach);
             self.robot.hand_over(&mut self.engine, reach.share());
-            self.robot.control(&mut self.engine, holding, dt, self.steps_per_tick - step);
+            self.robot
+                .control(&mut self.engine, holding, dt, self.steps_per_tick - step);
             let ends_tick = step + 1 == self.steps_per_tick;
             self.step_robot(reach, dt, ends_tick);
             let share = 1.0 / f64::from(self.steps_per_tick);
@@ -279,7 +298,8 @@ impl World {
         self.step_all(reach, &holding);
     }
 
-    /// Performs one step of physics; links that the engine does not move follow at the end of the tick.
+    /// Performs one step of physics; links that the engine does not move follow at the end of the
+    /// tick.
     fn step_robot(&mut self, reach: Reach, dt: f64, ends_tick: bool) {
         if reach != Reach::All {
             self.robot.move_freely(&self.engine);
@@ -304,7 +324,9 @@ impl World {
         let start = self.watch.as_ref().map(|watch| (watch.clock_secs)());
         let (engine, link_pairs) = (&mut self.engine, &self.link_pairs);
         // After a panic, the world has a fault and takes no further step.
-        let step = catch_unwind(AssertUnwindSafe(|| engine.step_with_events(link_pairs, &())));
+        let step = catch_unwind(AssertUnwindSafe(|| {
+            engine.step_with_events(link_pairs, &())
+        }));
         if let Err(panic) = step {
             self.panicked = Some(words_of(panic.as_ref()));
         }
@@ -315,17 +337,24 @@ impl World {
 
     /// Starts measuring the wall time of the engine's steps, with a clock in seconds.
     pub fn watch(&mut self, clock_secs: fn() -> f64) {
-        self.watch = Some(Watch { clock_secs, spent_secs: 0.0, camera_secs: Cell::new(0.0) });
+        self.watch = Some(Watch {
+            clock_secs,
+            spent_secs: 0.0,
+            camera_secs: Cell::new(0.0),
+        });
     }
 
-    /// Returns the wall time of the engine's steps since [`World::watch`]; 0 without it. Unit: seconds.
+    /// Returns the wall time of the engine's steps since [`World::watch`]; 0 without it. Unit:
+    /// seconds.
     pub fn engine_secs(&self) -> f64 {
         self.watch.as_ref().map_or(0.0, |watch| watch.spent_secs)
     }
 
     /// Returns the wall time of camera images since [`World::watch`]; 0 without it. Unit: seconds.
     pub fn camera_secs(&self) -> f64 {
-        self.watch.as_ref().map_or(0.0, |watch| watch.camera_secs.get())
+        self.watch
+            .as_ref()
+            .map_or(0.0, |watch| watch.camera_secs.get())
     }
 
     /// Returns the clock's time, or `None` without a clock. Unit: seconds.
@@ -336,7 +365,9 @@ impl World {
     /// Adds the time of an image that was started at this time. Unit: seconds.
     pub(super) fn looked(&self, began_secs: Option<f64>) {
         if let (Some(watch), Some(began)) = (&self.watch, began_secs) {
-            watch.camera_secs.set(watch.camera_secs.get() + (watch.clock_secs)() - began);
+            watch
+                .camera_secs
+                .set(watch.camera_secs.get() + (watch.clock_secs)() - began);
         }
     }
 
@@ -372,8 +403,8 @@ impl World {
         }
     }
 
-    /// Returns the base's target pose in terms of the robot's current belief, which changes with each correction of its
-    /// pose estimate. Returns `None` if the base is fixed.
+    /// Returns the base's target pose in terms of the robot's current belief, which changes with
+    /// each correction of its pose estimate. Returns `None` if the base is fixed.
     pub fn aimed_base(&self) -> Option<[f64; 3]> {
         let base = self.robot.layout.base?;
         Some(self.believed(base.map(|idx| self.robot.target(idx))))
@@ -386,14 +417,22 @@ impl World {
 
     /// Disturbs the state of an object, for tests. Returns `false` if there is no such object.
     pub fn poison(&mut self, id: &str, poison: Poison) -> bool {
-        let Some(idx) = self.objects.iter().position(|object| object.id == id) else { return false };
+        let Some(idx) = self.objects.iter().position(|object| object.id == id) else {
+            return false;
+        };
         let object = &self.objects[idx];
-        let Some(body) = self.engine.bodies.get_mut(object.body) else { return false };
+        let Some(body) = self.engine.bodies.get_mut(object.body) else {
+            return false;
+        };
         match poison {
             Poison::NotFinite => body.set_linvel(to_vector(&Vector3::repeat(f64::NAN)), true),
-            Poison::Velocity(velocity) => body.set_linvel(to_vector(&Vector3::from(velocity)), true),
+            Poison::Velocity(velocity) => {
+                body.set_linvel(to_vector(&Vector3::from(velocity)), true)
+            }
             Poison::Decoy(pose) => _ = self.decoys.insert(idx, pose.to_isometry()),
-            Poison::Teleport(position) => body.set_translation(to_vector(&Vector3::from(position)), true),
+            Poison::Teleport(position) => {
+                body.set_translation(to_vector(&Vector3::from(position)), true)
+            }
         }
         true
     }
@@ -401,13 +440,22 @@ impl World {
     fn take(&mut self, command: &Command) {
         let n_joints = self.robot.model.joints.len();
         for (idx, position) in command.positions.iter().enumerate().take(n_joints) {
-            let of_base = self.robot.layout.base.is_some_and(|base| base.contains(&idx));
+            let of_base = self
+                .robot
+                .layout
+                .base
+                .is_some_and(|base| base.contains(&idx));
             if !of_base && !self.robot.layout.gripper.contains(idx) {
                 self.robot.aim(idx, *position);
             }
         }
         if let Some(base) = self.robot.layout.base
-            && base.iter().all(|idx| command.positions.get(*idx).is_some_and(|value| value.is_finite()))
+            && base.iter().all(|idx| {
+                command
+                    .positions
+                    .get(*idx)
+                    .is_some_and(|value| value.is_finite())
+            })
         {
             let truly = self.truly(base.map(|idx| command.positions[idx]));
             for (idx, value) in base.into_iter().zip(truly) {
@@ -415,7 +463,12 @@ impl World {
             }
         }
         for idx in 0..n_joints {
-            if let Some(target) = self.robot.layout.gripper.target(idx, command.gripper_opening_m) {
+            if let Some(target) = self
+                .robot
+                .layout
+                .gripper
+                .target(idx, command.gripper_opening_m)
+            {
                 self.robot.aim(idx, target);
             }
         }
@@ -455,41 +508,65 @@ impl World {
         }
         // Static bodies may reach far below the floor, as foundations do.
         let objects = self.objects.iter().enumerate();
-        let objects =
-            objects.map(|(idx, object)| (object.id.as_str(), object.body, !object.fixed && !self.has_left(idx)));
+        let objects = objects.map(|(idx, object)| {
+            (
+                object.id.as_str(),
+                object.body,
+                !object.fixed && !self.has_left(idx),
+            )
+        });
         let links = self.robot.model.links.iter().zip(&self.robot.bodies);
         let links = links.map(|(link, body)| (link.name.as_str(), *body, true));
         let quarantined = self.engine.quarantine().bodies();
         for (id, handle, moves) in objects.chain(links) {
-            let Some(body) = self.engine.bodies.get(handle) else { continue };
-            let finite = body.position().is_finite() && body.linvel().is_finite() && body.angvel().is_finite();
+            let Some(body) = self.engine.bodies.get(handle) else {
+                continue;
+            };
+            let finite = body.position().is_finite()
+                && body.linvel().is_finite()
+                && body.angvel().is_finite();
             if !finite || quarantined.contains(&handle) {
                 return Some(Fault::NotFinite(id.to_owned()));
             }
             let position = from_vector(body.translation());
-            let outside = position.xy().norm() > fault::WORLD_RADIUS_M || position.z < -fault::WORLD_DEPTH_M;
+            let outside =
+                position.xy().norm() > fault::WORLD_RADIUS_M || position.z < -fault::WORLD_DEPTH_M;
             if moves && (outside || position.z > fault::WORLD_RADIUS_M) {
-                return Some(Fault::LeftWorld { id: id.to_owned(), position: position.into() });
+                return Some(Fault::LeftWorld {
+                    id: id.to_owned(),
+                    position: position.into(),
+                });
             }
         }
-        self.robot.invalid_joint().map(|joint| Fault::Joint(joint.to_owned()))
+        self.robot
+            .invalid_joint()
+            .map(|joint| Fault::Joint(joint.to_owned()))
     }
 
     /// Returns the pose at which sensors see an object: the true one, unless it has a decoy.
     pub(super) fn shown(&self, idx: usize) -> Isometry3<f64> {
-        self.decoys.get(&idx).copied().unwrap_or_else(|| self.pose_of(&self.objects[idx]))
+        self.decoys
+            .get(&idx)
+            .copied()
+            .unwrap_or_else(|| self.pose_of(&self.objects[idx]))
     }
 
     /// Returns the true pose of an object.
     pub(super) fn pose_of(&self, object: &Object) -> Isometry3<f64> {
-        self.engine.bodies.get(object.body).map_or(object.placed, |body| from_pose(body.position()))
+        self.engine
+            .bodies
+            .get(object.body)
+            .map_or(object.placed, |body| from_pose(body.position()))
     }
 }
 
 /// The words of a panic.
 fn words_of(panic: &(dyn std::any::Any + Send)) -> String {
     let words = panic.downcast_ref::<String>().map(String::as_str);
-    words.or_else(|| panic.downcast_ref::<&str>().copied()).unwrap_or("no reason was given").to_owned()
+    words
+        .or_else(|| panic.downcast_ref::<&str>().copied())
+        .unwrap_or("no reason was given")
+        .to_owned()
 }
 
 fn moved(by: &Isometry3<f64>, [x, y, heading]: [f64; 3]) -> [f64; 3] {

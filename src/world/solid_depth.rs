@@ -1,8 +1,9 @@
 //! The depth of two links in each other where both are solid.
 //!
-//! Convex pieces fill the hollows of the meshes that they represent: a fork that reaches into the mouth of a hand is inside its
-//! hull, and touches nothing. Boxes, cylinders, spheres and capsules are solid. Where a mesh is involved, the depth is the
-//! diameter of the largest ball that fits into the material of both links, and at most the depth of their pieces.
+//! Convex pieces fill the hollows of the meshes that they represent: a fork that reaches into the
+//! mouth of a hand is inside its hull, and touches nothing. Boxes, cylinders, spheres and capsules
+//! are solid. Where a mesh is involved, the depth is the diameter of the largest ball that fits
+//! into the material of both links, and at most the depth of their pieces.
 
 use std::sync::{Arc, OnceLock};
 
@@ -36,13 +37,20 @@ pub(crate) struct Material {
 
 impl Material {
     pub(crate) fn new(mesh: Arc<Mesh>, scale: [f64; 3], pose: Isometry3<f64>) -> Self {
-        Self { mesh, scale, pose, scaled: OnceLock::new() }
+        Self {
+            mesh,
+            scale,
+            pose,
+            scaled: OnceLock::new(),
+        }
     }
 
-    /// Returns the distance of a point in the frame of the link to the surface; negative outside. Unit: metres.
+    /// Returns the distance of a point in the frame of the link to the surface; negative outside.
+    /// Unit: metres.
     ///
-    /// Source: A. Jacobson et al., "Robust inside-outside segmentation using generalized winding numbers" (2013); the solid angle
-    /// of a triangle is that of A. van Oosterom and J. Strackee (1983). Meshes with gaps or overlapping bodies have an inside, too.
+    /// Source: A. Jacobson et al., "Robust inside-outside segmentation using generalized winding
+    /// numbers" (2013); the solid angle of a triangle is that of A. van Oosterom and J. Strackee
+    /// (1983). Meshes with gaps or overlapping bodies have an inside, too.
     fn inside_m(&self, point: &Point3<f64>) -> f64 {
         let mesh = self.scaled.get_or_init(|| self.mesh.scaled(self.scale));
         let at = self.pose.inverse_transform_point(point).coords;
@@ -50,8 +58,10 @@ impl Material {
         for corners in &mesh.triangles {
             let [a, b, c] = corners.map(|idx| Vector3::from(mesh.vertices[idx as usize]) - at);
             let (length_a, length_b, length_c) = (a.norm(), b.norm(), c.norm());
-            let below =
-                length_a * length_b * length_c + a.dot(&b) * length_c + b.dot(&c) * length_a + c.dot(&a) * length_b;
+            let below = length_a * length_b * length_c
+                + a.dot(&b) * length_c
+                + b.dot(&c) * length_a
+                + c.dot(&a) * length_b;
             solid_angle += 2.0 * libm::atan2(a.dot(&b.cross(&c)), below);
             nearest = nearest.min(from_origin_m([a, b, c]));
         }
@@ -63,7 +73,8 @@ impl Material {
 /// Distance of a triangle from the origin. Unit: metres.
 fn from_origin_m([a, b, c]: [Vector3<f64>; 3]) -> f64 {
     let normal = (b - a).cross(&(c - a));
-    let is_over = |from: Vector3<f64>, to: Vector3<f64>| (to - from).cross(&-from).dot(&normal) >= 0.0;
+    let is_over =
+        |from: Vector3<f64>, to: Vector3<f64>| (to - from).cross(&-from).dot(&normal) >= 0.0;
     if normal.norm() > 0.0 && is_over(a, b) && is_over(b, c) && is_over(c, a) {
         return (a.dot(&normal) / normal.norm()).abs();
     }
@@ -89,16 +100,26 @@ impl<'a> Piece<'a> {
     fn of(link: &'a Link, form: &'a crate::self_contact::Form, pose: &Isometry3<f64>) -> Vec<Self> {
         let placed = to_pose(pose);
         let piece = |(part, shape, in_link): (usize, &'a SharedShape, &'a EnginePose)| {
-            let of_part = link.materials.iter().find(|(parts, _)| parts.contains(&part));
+            let of_part = link
+                .materials
+                .iter()
+                .find(|(parts, _)| parts.contains(&part));
             let material = of_part.map(|(_, material)| (material.as_ref(), *pose));
-            Piece { shape, pose: placed * *in_link, material }
+            Piece {
+                shape,
+                pose: placed * *in_link,
+                material,
+            }
         };
         form.parts().map(piece).collect()
     }
 
-    /// Returns how deep a point in the frame of the first link is in the material; negative outside. Unit: metres.
+    /// Returns how deep a point in the frame of the first link is in the material; negative
+    /// outside. Unit: metres.
     fn inside_m(&self, point: &Point3<f64>) -> f64 {
-        let found = self.shape.project_point(&self.pose, to_vector(&point.coords), false);
+        let found = self
+            .shape
+            .project_point(&self.pose, to_vector(&point.coords), false);
         let from_surface = (from_vector(found.point) - point.coords).norm();
         match &self.material {
             _ if !found.is_inside => -from_surface,
@@ -107,11 +128,14 @@ impl<'a> Piece<'a> {
         }
     }
 
-    /// Returns the depth of two pieces, with the middle of the overlap; `None` if they are apart. Unit: metres.
+    /// Returns the depth of two pieces, with the middle of the overlap; `None` if they are apart.
+    /// Unit: metres.
     fn overlap(&self, other: &Self) -> Option<(f64, Point3<f64>)> {
         let (one, two) = (self.shape.as_support_map()?, other.shape.as_support_map()?);
         let b_in_a = self.pose.inv_mul(&other.pose);
-        let towards = from_vector(b_in_a.translation).try_normalize(0.0).unwrap_or_else(Vector3::x);
+        let towards = from_vector(b_in_a.translation)
+            .try_normalize(0.0)
+            .unwrap_or_else(Vector3::x);
         match Solids::new(&b_in_a, one, two).separation(towards, KNOWN_M) {
             Found::Near(found) if found.distance_m < 0.0 => {
                 let middle = Point3::from((found.points[0] + found.points[1]) / 2.0);
@@ -121,8 +145,8 @@ impl<'a> Piece<'a> {
         }
     }
 
-    /// Returns the diameter of the largest ball in the material of both pieces that the search finds from this point and from
-    /// others in the overlap. Unit: metres.
+    /// Returns the diameter of the largest ball in the material of both pieces that the search
+    /// finds from this point and from others in the overlap. Unit: metres.
     fn common_ball_m(&self, other: &Self, middle: Point3<f64>) -> f64 {
         let depth = |point: &Point3<f64>| self.inside_m(point).min(other.inside_m(point));
         let boxes = [self, other].map(|piece| piece.shape.compute_aabb(&piece.pose));
@@ -131,7 +155,11 @@ impl<'a> Piece<'a> {
         let share = |idx: u32| (f64::from(idx) + 0.5) / f64::from(N_SIDE);
         let mut best = (depth(&middle), middle);
         for idx in 0..N_SIDE.pow(3) {
-            let shares = Vector3::new(share(idx % N_SIDE), share(idx / N_SIDE % N_SIDE), share(idx / N_SIDE.pow(2)));
+            let shares = Vector3::new(
+                share(idx % N_SIDE),
+                share(idx / N_SIDE % N_SIDE),
+                share(idx / N_SIDE.pow(2)),
+            );
             let point = Point3::from(low + size.component_mul(&shares));
             let found = depth(&point);
             if found > best.0 {
@@ -146,7 +174,9 @@ impl<'a> Piece<'a> {
                 shift[way / 2] = along * step[way / 2];
                 best.1 + shift
             });
-            let better = ways.map(|point| (depth(&point), point)).max_by(|a, b| a.0.total_cmp(&b.0));
+            let better = ways
+                .map(|point| (depth(&point), point))
+                .max_by(|a, b| a.0.total_cmp(&b.0));
             match better.filter(|better| better.0 > best.0) {
                 Some(better) => best = better,
                 None => step /= 2.0,
@@ -159,26 +189,42 @@ impl<'a> Piece<'a> {
 impl World {
     /// Returns the pose of a link in the frame of another one.
     pub(super) fn pose_between(&self, first: usize, second: usize) -> Option<Isometry3<f64>> {
-        let pose = |link: usize| self.engine.bodies.get(self.robot.bodies[link]).map(|body| from_pose(body.position()));
+        let pose = |link: usize| {
+            self.engine
+                .bodies
+                .get(self.robot.bodies[link])
+                .map(|body| from_pose(body.position()))
+        };
         Some(pose(first)?.inverse() * pose(second)?)
     }
 
-    /// Returns how deep two links are in each other where both are solid; 0 if they are apart. `between`: the pose of the second
-    /// in the frame of the first. Unit: metres.
-    pub(super) fn solid_depth_of(&self, first: usize, second: usize, between: &Isometry3<f64>) -> f64 {
+    /// Returns how deep two links are in each other where both are solid; 0 if they are apart.
+    /// `between`: the pose of the second in the frame of the first. Unit: metres.
+    pub(super) fn solid_depth_of(
+        &self,
+        first: usize,
+        second: usize,
+        between: &Isometry3<f64>,
+    ) -> f64 {
         let links = [first, second].map(|link| &self.robot.model.links[link]);
         let forms = links.map(Link::form);
         let of_first = Piece::of(links[0], &forms[0], &Isometry3::identity());
         let of_second = Piece::of(links[1], &forms[1], between);
         let boxed = |pieces: &[Piece<'_>]| -> Vec<_> {
-            pieces.iter().map(|piece| piece.shape.compute_aabb(&piece.pose)).collect()
+            pieces
+                .iter()
+                .map(|piece| piece.shape.compute_aabb(&piece.pose))
+                .collect()
         };
         let (boxes_first, boxes_second) = (boxed(&of_first), boxed(&of_second));
         let mut deepest = 0.0f64;
         for (one, its_box) in of_first.iter().zip(&boxes_first) {
             for (other, other_box) in of_second.iter().zip(&boxes_second) {
-                let is_near = its_box.mins.cmple(other_box.maxs).all() && other_box.mins.cmple(its_box.maxs).all();
-                let Some((depth, middle)) = is_near.then(|| one.overlap(other)).flatten() else { continue };
+                let is_near = its_box.mins.cmple(other_box.maxs).all()
+                    && other_box.mins.cmple(its_box.maxs).all();
+                let Some((depth, middle)) = is_near.then(|| one.overlap(other)).flatten() else {
+                    continue;
+                };
                 if depth <= deepest {
                     continue;
                 }
@@ -206,24 +252,44 @@ mod tests {
         let mut triangles = Vec::new();
         // The profiles here can be divided into triangles around their first corner.
         for corner in 1..count - 1 {
-            triangles.extend([[0, corner, corner + 1], [count, count + corner + 1, count + corner]]);
+            triangles.extend([
+                [0, corner, corner + 1],
+                [count, count + corner + 1, count + corner],
+            ]);
         }
         for side in 0..count {
             let next = (side + 1) % count;
-            triangles.extend([[side, side + count, next + count], [side, next + count, next]]);
+            triangles.extend([
+                [side, side + count, next + count],
+                [side, next + count, next],
+            ]);
         }
         Mesh::new(vertices, triangles).expect("the mesh is valid")
     }
 
     fn piece(shape: &SharedShape, at: [f64; 3]) -> Piece<'_> {
-        Piece { shape, pose: to_pose(&Isometry3::translation(at[0], at[1], at[2])), material: None }
+        Piece {
+            shape,
+            pose: to_pose(&Isometry3::translation(at[0], at[1], at[2])),
+            material: None,
+        }
     }
 
     #[test]
     fn the_inside_of_a_mesh_is_found_and_its_distance_is_exact() {
-        let angle = [[0.0, 0.0], [0.2, 0.0], [0.2, 0.1], [0.1, 0.1], [0.1, 0.2], [0.0, 0.2]];
-        let material =
-            Material::new(Arc::new(prism(&angle, 0.1)), [1.0, 2.0, 1.0], Isometry3::translation(1.0, 0.0, 0.0));
+        let angle = [
+            [0.0, 0.0],
+            [0.2, 0.0],
+            [0.2, 0.1],
+            [0.1, 0.1],
+            [0.1, 0.2],
+            [0.0, 0.2],
+        ];
+        let material = Material::new(
+            Arc::new(prism(&angle, 0.1)),
+            [1.0, 2.0, 1.0],
+            Isometry3::translation(1.0, 0.0, 0.0),
+        );
         let inside = |x: f64, y: f64, z: f64| material.inside_m(&Point3::new(1.0 + x, y, z));
         for (point, expected) in [
             ([0.05, 0.1, 0.05], 0.05),
@@ -233,29 +299,54 @@ mod tests {
             ([0.3, 0.1, 0.05], -0.1),
         ] {
             let [x, y, z] = point;
-            assert!((inside(x, y, z) - expected).abs() < 1e-9, "{point:?}: {}", inside(x, y, z));
+            assert!(
+                (inside(x, y, z) - expected).abs() < 1e-9,
+                "{point:?}: {}",
+                inside(x, y, z)
+            );
         }
     }
 
-    /// A rod in the notch of an L is inside its hull. In the L itself, it is as deep as the hulls say.
+    /// A rod in the notch of an L is inside its hull. In the L itself, it is as deep as the hulls
+    /// say.
     #[test]
     fn a_hollow_that_a_hull_fills_is_not_solid() {
-        let angle = [[0.0, 0.0], [0.2, 0.0], [0.2, 0.05], [0.05, 0.05], [0.05, 0.2], [0.0, 0.2]];
+        let angle = [
+            [0.0, 0.0],
+            [0.2, 0.0],
+            [0.2, 0.05],
+            [0.05, 0.05],
+            [0.05, 0.2],
+            [0.0, 0.2],
+        ];
         let mesh = Arc::new(prism(&angle, 0.1));
-        let hull =
-            crate::hull::Hull::of(&mesh.vertices.iter().map(|at| to_vector(&Vector3::from(*at))).collect::<Vec<_>>());
+        let hull = crate::hull::Hull::of(
+            &mesh
+                .vertices
+                .iter()
+                .map(|at| to_vector(&Vector3::from(*at)))
+                .collect::<Vec<_>>(),
+        );
         let hull = SharedShape::new(hull.expect("it is not flat"));
         let material = Material::new(mesh, [1.0; 3], Isometry3::identity());
-        let whole = Piece { material: Some((&material, Isometry3::identity())), ..piece(&hull, [0.0; 3]) };
+        let whole = Piece {
+            material: Some((&material, Isometry3::identity())),
+            ..piece(&hull, [0.0; 3])
+        };
         let rod = SharedShape::cuboid(0.01, 0.1, 0.01);
-        for (at, least_m, most_m) in
-            [([0.09, 0.05, 0.09], 0.0, 0.0), ([0.15, 0.05, 0.025], 0.015, 0.021), ([0.15, 0.05, 0.055], 0.0045, 0.0055)]
-        {
+        for (at, least_m, most_m) in [
+            ([0.09, 0.05, 0.09], 0.0, 0.0),
+            ([0.15, 0.05, 0.025], 0.015, 0.021),
+            ([0.15, 0.05, 0.055], 0.0045, 0.0055),
+        ] {
             let rod = piece(&rod, at);
             let (depth, middle) = whole.overlap(&rod).expect("it is in the hull");
             assert!(depth > 0.005, "{at:?}: {depth}");
             let found = whole.common_ball_m(&rod, middle).min(depth);
-            assert!((least_m..=most_m).contains(&found), "{at:?}: {found} of {depth}");
+            assert!(
+                (least_m..=most_m).contains(&found),
+                "{at:?}: {found} of {depth}"
+            );
         }
     }
 }

@@ -5,17 +5,35 @@ use crate::motor::Motor;
 use crate::robot::Robot;
 
 impl Robot {
-    /// Returns how far each joint can move in a control tick: at its speed now or at that of its setpoint, and to its
-    /// setpoint. Units: metres or radians.
+    /// Returns how far each joint can move in a control tick: at its speed now or at that of its
+    /// setpoint, and to its setpoint. Units: metres or radians.
     ///
-    /// Blocked fingers are far behind their setpoints. For a robot of many pieces, whose ticks take long if the engine moves
-    /// more of it than the hand, the bound is closer: joints approach their setpoints only as fast as their damping lets
-    /// them, and those without a motor move with their leaders.
-    pub(super) fn spans(&self, positions: &[f64], velocities: &[f64], tick_secs: f64, overshoot: f64) -> Vec<f64> {
-        self.bounds([positions, velocities], tick_secs, overshoot, self.model.has_many_pieces())
+    /// Blocked fingers are far behind their setpoints. For a robot of many pieces, whose ticks take
+    /// long if the engine moves more of it than the hand, the bound is closer: joints approach
+    /// their setpoints only as fast as their damping lets them, and those without a motor move with
+    /// their leaders.
+    pub(super) fn spans(
+        &self,
+        positions: &[f64],
+        velocities: &[f64],
+        tick_secs: f64,
+        overshoot: f64,
+    ) -> Vec<f64> {
+        self.bounds(
+            [positions, velocities],
+            tick_secs,
+            overshoot,
+            self.model.has_many_pieces(),
+        )
     }
 
-    fn bounds(&self, [positions, velocities]: [&[f64]; 2], tick_secs: f64, overshoot: f64, is_close: bool) -> Vec<f64> {
+    fn bounds(
+        &self,
+        [positions, velocities]: [&[f64]; 2],
+        tick_secs: f64,
+        overshoot: f64,
+        is_close: bool,
+    ) -> Vec<f64> {
         let motors = || self.motors.iter().zip(&self.model.joints).enumerate();
         let of_joint = |(idx, (motor, joint)): (usize, (&Motor, &Joint))| {
             let lag = (motor.setpoint - positions[idx]).abs();
@@ -24,7 +42,14 @@ impl Robot {
                 None if is_close && is_led(motor, joint) => (0.0, 0.0),
                 None => {
                     let told = (motor.target - motor.setpoint).abs() / tick_secs;
-                    (told.min(joint.velocity), if is_close { motor.catches_up(lag, tick_secs) } else { lag })
+                    (
+                        told.min(joint.velocity),
+                        if is_close {
+                            motor.catches_up(lag, tick_secs)
+                        } else {
+                            lag
+                        },
+                    )
                 }
             };
             overshoot * velocities[idx].abs().max(told) * tick_secs + lag
@@ -64,14 +89,27 @@ mod tests {
             world.step(&command);
             for tick in 0..30 {
                 let (before, velocities) = world.robot.state();
-                let bounds = |is_close| world.robot.bounds([&before, &velocities], world.tick_secs(), 1.25, is_close);
+                let bounds = |is_close| {
+                    world
+                        .robot
+                        .bounds([&before, &velocities], world.tick_secs(), 1.25, is_close)
+                };
                 let [closer, wider] = [bounds(true), bounds(false)];
                 world.step(&command);
                 for (idx, after) in world.robot.state().0.into_iter().enumerate() {
                     let moved = (after - before[idx]).abs();
                     let name = &world.kinematics().joints()[idx].name;
-                    assert!(moved <= closer[idx] + 1e-3, "{name}: {moved} instead of {} in tick {tick}", closer[idx]);
-                    assert!(closer[idx] <= wider[idx] + 1e-9, "{name}: {} and {}", closer[idx], wider[idx]);
+                    assert!(
+                        moved <= closer[idx] + 1e-3,
+                        "{name}: {moved} instead of {} in tick {tick}",
+                        closer[idx]
+                    );
+                    assert!(
+                        closer[idx] <= wider[idx] + 1e-9,
+                        "{name}: {} and {}",
+                        closer[idx],
+                        wider[idx]
+                    );
                     (close, wide) = (close + closer[idx], wide + wider[idx]);
                 }
             }

@@ -1,13 +1,14 @@
 //! The suction cup: when its seal forms, the force that it carries, and when it breaks.
 //!
-//! A seal is a joint with the stiffness of a soft lip between the cup's link and the body that it holds, from the moment
-//! at which the whole lip lies on the body. The engine's solver gives the force of the joint; beyond the cup's limits, the
-//! joint is removed.
+//! A seal is a joint with the stiffness of a soft lip between the cup's link and the body that it
+//! holds, from the moment at which the whole lip lies on the body. The engine's solver gives the
+//! force of the joint; beyond the cup's limits, the joint is removed.
 
 use nalgebra::{Isometry3, Point3, Vector3};
 use parry3d::query::Ray;
 use rapier3d::prelude::{
-    Collider, GenericJoint, ImpulseJointHandle, JointAxesMask, JointAxis, MotorModel, SpringCoefficients,
+    Collider, GenericJoint, ImpulseJointHandle, JointAxesMask, JointAxis, MotorModel,
+    SpringCoefficients,
 };
 
 use crate::World;
@@ -16,24 +17,28 @@ use crate::convert::{from_vector, to_pose, to_real, to_vector};
 use crate::engine::{Owner, collider};
 use actcheck_data::{CupState, ObjectModel, Part, Pose, Suction};
 
-/// Distance of a surface from the lip that the soft lip bridges. Unit: metres. A few millimetres for cups of some
-/// centimetres.
+/// Distance of a surface from the lip that the soft lip bridges. Unit: metres. A few millimetres
+/// for cups of some centimetres.
 const LIP_M: f64 = 0.003;
-/// Angle between a surface and the plane of the lip that the lip still follows. Unit: cosine (of 10 degrees). A ball or a
-/// can that is less than six cups wide is too curved.
+/// Angle between a surface and the plane of the lip that the lip still follows. Unit: cosine (of 10
+/// degrees). A ball or a can that is less than six cups wide is too curved.
 const FLAT_COSINE: f64 = 0.985;
-/// Rays along the rim. With the one in the middle, they find edges and holes of more than half a radius.
+/// Rays along the rim. With the one in the middle, they find edges and holes of more than half a
+/// radius.
 const N_RAYS: u32 = 8;
-/// Natural frequency of a body on the soft lip. Unit: hertz. Under its weight, a body sags by 1.1 mm.
+/// Natural frequency of a body on the soft lip. Unit: hertz. Under its weight, a body sags by 1.1
+/// mm.
 const LIP_FREQUENCY_HZ: f32 = 15.0;
-/// Tilt at which the lip resists with the greatest peel moment of the seal. Unit: radians. A stiffer lip would break where
-/// the hand presses a box that is not quite level on a table.
+/// Tilt at which the lip resists with the greatest peel moment of the seal. Unit: radians. A
+/// stiffer lip would break where the hand presses a box that is not quite level on a table.
 const GIVE_RAD: f64 = 0.1;
-/// Ratio of the lip's damping to its stiffness against tilts. Unit: seconds. A box of 1 kg then swings only once.
+/// Ratio of the lip's damping to its stiffness against tilts. Unit: seconds. A box of 1 kg then
+/// swings only once.
 const GIVE_SECS: f64 = 0.1;
 /// Axes about which the lip gives.
 const TILTS: [JointAxis; 3] = [JointAxis::AngX, JointAxis::AngY, JointAxis::AngZ];
-/// Distance behind the lip at which rays start. Unit: metres. The lip may be pressed into a surface by some millimetres.
+/// Distance behind the lip at which rays start. Unit: metres. The lip may be pressed into a surface
+/// by some millimetres.
 const BEHIND_M: f64 = 0.01;
 /// An opening below this switches the vacuum on. Unit: metres.
 const ON_M: f64 = 1e-3;
@@ -72,12 +77,15 @@ pub(super) struct Load {
 }
 
 impl Load {
-    /// Returns whether a seal with this pull limit breaks. A body that pushes presses the lip on it, as the vacuum does.
+    /// Returns whether a seal with this pull limit breaks. A body that pushes presses the lip on
+    /// it, as the vacuum does.
     pub(super) fn breaks(&self, cup: &Suction, limit_n: f64) -> bool {
         let pressed_n = limit_n + (-self.force_n.x).max(0.0);
         let shear_n = self.force_n.yz().norm();
         let peel_nm = self.moment_nm.yz().norm();
-        self.force_n.x > limit_n || shear_n > cup.most_shear_n(pressed_n) || peel_nm > cup.most_peel_nm(pressed_n)
+        self.force_n.x > limit_n
+            || shear_n > cup.most_shear_n(pressed_n)
+            || peel_nm > cup.most_peel_nm(pressed_n)
     }
 }
 
@@ -93,18 +101,31 @@ pub(super) struct Cup {
 impl Cup {
     /// A cup without vacuum.
     pub(super) fn new(suction: Suction) -> Self {
-        Self { suction, vacuum: Vacuum::Off, limit_n: suction.force_n }
+        Self {
+            suction,
+            vacuum: Vacuum::Off,
+            limit_n: suction.force_n,
+        }
     }
 
-    /// Returns the opening of a gripper with the same command: 0 while the vacuum is on, otherwise the cup's diameter.
-    /// Unit: metres.
+    /// Returns the opening of a gripper with the same command: 0 while the vacuum is on, otherwise
+    /// the cup's diameter. Unit: metres.
     fn opening_m(&self) -> f64 {
-        if self.vacuum == Vacuum::Off { 2.0 * self.suction.radius_m } else { 0.0 }
+        if self.vacuum == Vacuum::Off {
+            2.0 * self.suction.radius_m
+        } else {
+            0.0
+        }
     }
 
-    /// Returns the force with which the vacuum presses the lip on a body: 0 without a seal. Unit: newtons.
+    /// Returns the force with which the vacuum presses the lip on a body: 0 without a seal. Unit:
+    /// newtons.
     fn suction_n(&self) -> f64 {
-        if matches!(self.vacuum, Vacuum::Sealed(_)) { self.limit_n } else { 0.0 }
+        if matches!(self.vacuum, Vacuum::Sealed(_)) {
+            self.limit_n
+        } else {
+            0.0
+        }
     }
 
     fn seal(&self) -> Option<&Seal> {
@@ -118,12 +139,21 @@ impl Cup {
 /// Returns the joint of a seal, with its frames at the lip still to be set.
 fn lip_joint(cup: &Suction) -> GenericJoint {
     let mut data = GenericJoint::new(JointAxesMask::LIN_AXES);
-    data.softness = SpringCoefficients { natural_frequency: LIP_FREQUENCY_HZ, damping_ratio: 1.0 };
+    data.softness = SpringCoefficients {
+        natural_frequency: LIP_FREQUENCY_HZ,
+        damping_ratio: 1.0,
+    };
     let stiffness = cup.most_peel_nm(cup.force_n) / GIVE_RAD;
     for axis in TILTS {
         data.set_motor_model(axis, MotorModel::ForceBased);
         // The engine's angle is that of a quaternion: half of the tilt.
-        data.set_motor(axis, 0.0, 0.0, to_real(2.0 * stiffness), to_real(GIVE_SECS * stiffness));
+        data.set_motor(
+            axis,
+            0.0,
+            0.0,
+            to_real(2.0 * stiffness),
+            to_real(GIVE_SECS * stiffness),
+        );
     }
     // The joint carries the push of the lip too: a contact would fight it.
     data.set_contacts_enabled(false);
@@ -134,7 +164,11 @@ fn lip_joint(cup: &Suction) -> GenericJoint {
 fn surface_at(lip: &Isometry3<f64>, radius_m: f64, solids: &[(usize, &Collider)]) -> Option<usize> {
     let rim = (0..N_RAYS).map(|idx| {
         let angle = std::f64::consts::TAU * f64::from(idx) / f64::from(N_RAYS);
-        Vector3::new(0.0, radius_m * libm::cos(angle), radius_m * libm::sin(angle))
+        Vector3::new(
+            0.0,
+            radius_m * libm::cos(angle),
+            radius_m * libm::sin(angle),
+        )
     });
     let mut under = None;
     for offset in rim.chain([Vector3::zeros()]) {
@@ -147,14 +181,23 @@ fn surface_at(lip: &Isometry3<f64>, radius_m: f64, solids: &[(usize, &Collider)]
 }
 
 /// Returns the owner of the surface that is at a point of the lip and parallel to it.
-fn surface_before(lip: &Isometry3<f64>, offset: &Vector3<f64>, solids: &[(usize, &Collider)]) -> Option<usize> {
+fn surface_before(
+    lip: &Isometry3<f64>,
+    offset: &Vector3<f64>,
+    solids: &[(usize, &Collider)],
+) -> Option<usize> {
     let axis = lip.rotation * Vector3::x();
     let from = lip * Point3::from(offset - Vector3::x() * BEHIND_M);
     let ray = Ray::new(to_vector(&from.coords), to_vector(&axis));
     let mut nearest: Option<(f64, Vector3<f64>, usize)> = None;
     for (owner, solid) in solids {
         let most = to_real(BEHIND_M + LIP_M);
-        let Some(hit) = solid.shape().cast_ray_and_get_normal(solid.position(), &ray, most, true) else { continue };
+        let Some(hit) = solid
+            .shape()
+            .cast_ray_and_get_normal(solid.position(), &ray, most, true)
+        else {
+            continue;
+        };
         let along = f64::from(hit.time_of_impact);
         if nearest.is_none_or(|(known, ..)| along < known) {
             nearest = Some((along, from_vector(hit.normal), *owner));
@@ -168,30 +211,38 @@ fn surface_before(lip: &Isometry3<f64>, offset: &Vector3<f64>, solids: &[(usize,
 /// Returns whether a cup seals on a model, with its lip at a pose in the model's frame.
 pub fn would_seal(model: &ObjectModel, lip: &Pose, cup: &Suction) -> bool {
     let parts = model.parts.iter().flat_map(Part::solids);
-    let built: Vec<Collider> =
-        parts.filter_map(|solid| Some(collider(&solid, Owner::Object(0), 0.0, 0.0)?.build())).collect();
+    let built: Vec<Collider> = parts
+        .filter_map(|solid| Some(collider(&solid, Owner::Object(0), 0.0, 0.0)?.build()))
+        .collect();
     let solids: Vec<(usize, &Collider)> = built.iter().map(|solid| (0, solid)).collect();
     surface_at(&lip.to_isometry(), cup.radius_m, &solids).is_some()
 }
 
 impl World {
-    /// Returns the gap between the fingers; for a suction cup, 0 while its vacuum is on, otherwise its diameter. Unit:
-    /// metres.
+    /// Returns the gap between the fingers; for a suction cup, 0 while its vacuum is on, otherwise
+    /// its diameter. Unit: metres.
     pub(super) fn opening_m(&self, positions: &[f64]) -> f64 {
-        self.cup.map_or_else(|| self.robot.layout.gripper.opening_m(positions), |cup| cup.opening_m())
+        self.cup.map_or_else(
+            || self.robot.layout.gripper.opening_m(positions),
+            |cup| cup.opening_m(),
+        )
     }
 
-    /// Returns the force of each finger's motor; for a suction cup, the force of its vacuum, in the place of both fingers.
-    /// Unit: newtons.
+    /// Returns the force of each finger's motor; for a suction cup, the force of its vacuum, in the
+    /// place of both fingers. Unit: newtons.
     pub(super) fn grip_forces_n(&self) -> [f64; 2] {
-        self.cup.map_or_else(|| self.robot.finger_efforts(), |cup| [cup.suction_n(); 2])
+        self.cup
+            .map_or_else(|| self.robot.finger_efforts(), |cup| [cup.suction_n(); 2])
     }
 
     /// Returns the state of the suction cup. Returns `None` if the gripper has fingers.
     pub(super) fn cup_state(&self) -> Option<CupState> {
         let cup = self.cup.as_ref()?;
         let pull_n = cup.seal().map_or(0.0, |seal| seal.load.force_n.x);
-        Some(CupState { force_n: cup.limit_n, pull_n })
+        Some(CupState {
+            force_n: cup.limit_n,
+            pull_n,
+        })
     }
 
     /// Switches the vacuum of a suction cup on or off, by the commanded opening and force.
@@ -216,26 +267,49 @@ impl World {
 
     /// Seals the surface at the lip of an open cup, if there is one.
     pub(super) fn seal_surface(&mut self) {
-        let Some(mut cup) = self.cup.filter(|cup| cup.vacuum == Vacuum::Open) else { return };
+        let Some(mut cup) = self.cup.filter(|cup| cup.vacuum == Vacuum::Open) else {
+            return;
+        };
         let lip = self.robot.kinematics.grasp(&self.robot.positions);
         let bodies = self.objects.iter().enumerate();
-        let solids = bodies.flat_map(|(idx, object)| self.colliders_of(object.body).map(move |solid| (idx, solid)));
+        let solids = bodies.flat_map(|(idx, object)| {
+            self.colliders_of(object.body)
+                .map(move |solid| (idx, solid))
+        });
         let solids: Vec<(usize, &Collider)> = solids.collect();
-        let Some(object) = surface_at(&lip, cup.suction.radius_m, &solids) else { return };
+        let Some(object) = surface_at(&lip, cup.suction.radius_m, &solids) else {
+            return;
+        };
         let (link, body) = (self.robot.finger_links[0], self.objects[object].body);
         let from_link = self.robot.kinematics.links(&self.robot.positions)[link].inverse() * lip;
         let from_body = self.pose_of(&self.objects[object]).inverse() * lip;
         let mut data = lip_joint(&cup.suction);
-        data.set_local_frame1(to_pose(&from_link)).set_local_frame2(to_pose(&from_body));
-        let joint = self.engine.impulse_joints.insert(self.robot.bodies[link], body, data, true);
-        cup.vacuum = Vacuum::Sealed(Seal { joint, object, load: Load::default() });
+        data.set_local_frame1(to_pose(&from_link))
+            .set_local_frame2(to_pose(&from_body));
+        let joint = self
+            .engine
+            .impulse_joints
+            .insert(self.robot.bodies[link], body, data, true);
+        cup.vacuum = Vacuum::Sealed(Seal {
+            joint,
+            object,
+            load: Load::default(),
+        });
         self.cup = Some(cup);
     }
 
     /// Measures the load of the seal in a step that is this share of its control tick.
     pub(super) fn measure_seal(&mut self, share: f64, begins_tick: bool) {
-        let Some(Cup { vacuum: Vacuum::Sealed(seal), .. }) = &mut self.cup else { return };
-        let Some(joint) = self.engine.impulse_joints.get(seal.joint) else { return };
+        let Some(Cup {
+            vacuum: Vacuum::Sealed(seal),
+            ..
+        }) = &mut self.cup
+        else {
+            return;
+        };
+        let Some(joint) = self.engine.impulse_joints.get(seal.joint) else {
+            return;
+        };
         let parameters = &self.engine.integration_parameters;
         // The engine keeps the impulses of the last substep.
         let per_second = parameters.num_solver_iterations as f64 / f64::from(parameters.dt);
@@ -250,11 +324,13 @@ impl World {
         seal.load.moment_nm += moment_nm;
     }
 
-    /// Breaks the seal at the end of a control tick if its mean load in the tick exceeds its limits: air needs some
-    /// milliseconds to come in.
+    /// Breaks the seal at the end of a control tick if its mean load in the tick exceeds its
+    /// limits: air needs some milliseconds to come in.
     pub(super) fn judge_seal(&mut self) {
         let Some(mut cup) = self.cup else { return };
-        let breaks = cup.seal().is_some_and(|seal| seal.load.breaks(&cup.suction, cup.limit_n));
+        let breaks = cup
+            .seal()
+            .is_some_and(|seal| seal.load.breaks(&cup.suction, cup.limit_n));
         if breaks {
             self.cut_seal();
             cup.vacuum = Vacuum::Broken;
@@ -272,8 +348,14 @@ impl World {
         let seal = self.cup.as_ref()?.seal()?;
         let lip = self.robot.kinematics.grasp(&self.robot.positions);
         let force_n = lip.rotation * seal.load.force_n;
-        let pair = (Owner::Object(seal.object), Owner::Link(self.robot.finger_links[0]));
+        let pair = (
+            Owner::Object(seal.object),
+            Owner::Link(self.robot.finger_links[0]),
+        );
         let normal_n = force_n.norm().max(2.0 * CONTACT_FLOOR_NEWTONS);
-        Some((pair, Touch::at(normal_n, force_n, lip.translation.vector.into())))
+        Some((
+            pair,
+            Touch::at(normal_n, force_n, lip.translation.vector.into()),
+        ))
     }
 }

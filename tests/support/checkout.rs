@@ -1,5 +1,5 @@
-//! A folder like a checkout after `make`, in which the commands of documents are run, with physics so coarse and campaigns
-//! so small that a campaign takes a second.
+//! A folder like a checkout after `make`, in which the commands of documents are run, with physics
+//! so coarse and campaigns so small that a campaign takes a second.
 
 use std::path::Path;
 use std::process::{Command, Output};
@@ -21,10 +21,15 @@ impl Checkout {
     pub fn fresh() -> Self {
         let project = project_with(COARSEST);
         let folder = project.path();
-        edit(&folder.join("configs/pick.toml"), "test_count = 15", "test_count = 6");
+        edit(
+            &folder.join("configs/pick.toml"),
+            "test_count = 15",
+            "test_count = 6",
+        );
         std::fs::copy(root().join("Makefile"), folder.join("Makefile")).unwrap();
         copy(&root().join("clients"), &folder.join("clients"));
-        // The program as documents call it. The exit codes of its commands are recorded, and queries without an answer.
+        // The program as documents call it. The exit codes of its commands are recorded, and
+        // queries without an answer.
         let program = env!("CARGO_BIN_EXE_actcheck");
         let wrapper = format!(
             "#!/bin/sh\n\
@@ -44,12 +49,19 @@ impl Checkout {
             "#!/bin/sh\nPATH=${PATH#*:}\nmake -n \"$@\" > /dev/null; code=$?; echo \"$code make $1\" >> codes; exit $code\n",
         );
         std::os::unix::fs::symlink("../actcheck", folder.join("bin/actcheck")).unwrap();
-        let path = format!("{}:{}", folder.join("bin").display(), std::env::var("PATH").unwrap());
-        Self { folder: project, path }
+        let path = format!(
+            "{}:{}",
+            folder.join("bin").display(),
+            std::env::var("PATH").unwrap()
+        );
+        Self {
+            folder: project,
+            path,
+        }
     }
 
-    /// A checkout after README's first command: `configs/.actcheck` has the campaign of `configs/pick.toml`, which was run
-    /// once for all documents.
+    /// A checkout after README's first command: `configs/.actcheck` has the campaign of
+    /// `configs/pick.toml`, which was run once for all documents.
     pub fn after_first_run() -> Self {
         static MADE: OnceLock<Checkout> = OnceLock::new();
         let made = MADE.get_or_init(|| {
@@ -58,7 +70,10 @@ impl Checkout {
             checkout
         });
         let checkout = Self::fresh();
-        copy(&made.path().join("configs/.actcheck"), &checkout.path().join("configs/.actcheck"));
+        copy(
+            &made.path().join("configs/.actcheck"),
+            &checkout.path().join("configs/.actcheck"),
+        );
         checkout
     }
 
@@ -72,7 +87,10 @@ impl Checkout {
         let commands = commands
             .replace("--runs 300", "--runs 12")
             .replace("--trials 40", "--trials 12")
-            .replace("check-oracles configs/pick.toml", "check-oracles configs/pick.toml --runs 2");
+            .replace(
+                "check-oracles configs/pick.toml",
+                "check-oracles configs/pick.toml --runs 2",
+            );
         Command::new("sh")
             .args(["-c", &commands])
             .current_dir(self.path())
@@ -83,14 +101,21 @@ impl Checkout {
             .unwrap()
     }
 
-    /// Runs commands in a shell, and returns their outputs. Panics if the last one fails, one of actcheck has an unexpected
-    /// exit code, or a query has an empty answer.
+    /// Runs commands in a shell, and returns their outputs. Panics if the last one fails, one of
+    /// actcheck has an unexpected exit code, or a query has an empty answer.
     pub fn run(&self, commands: &str, environment: &[(&str, &str)]) -> String {
         let codes = self.path().join("codes");
         let _ = std::fs::remove_file(&codes);
         let output = self.shell(commands, environment);
-        let printed = format!("{}{}", String::from_utf8_lossy(&output.stdout), stderr(&output));
-        assert!(output.status.code().is_some_and(|code| code <= 1), "{commands}\n{printed}");
+        let printed = format!(
+            "{}{}",
+            String::from_utf8_lossy(&output.stdout),
+            stderr(&output)
+        );
+        assert!(
+            output.status.code().is_some_and(|code| code <= 1),
+            "{commands}\n{printed}"
+        );
         let codes = std::fs::read_to_string(codes).unwrap_or_default();
         let is_wrong = |line: &&str| match line.split_once(' ') {
             Some(("0", _)) => false,
@@ -106,5 +131,8 @@ impl Checkout {
 /// The texts of the fenced blocks in a language, from a Markdown text.
 pub fn blocks(text: &str, language: &str) -> Vec<String> {
     let open = format!("```{language}\n");
-    text.split(&open).skip(1).map(|rest| rest.split("\n```").next().unwrap().to_owned()).collect()
+    text.split(&open)
+        .skip(1)
+        .map(|rest| rest.split("\n```").next().unwrap().to_owned())
+        .collect()
 }

@@ -1,4 +1,5 @@
-//! A headless browser, controlled over two pipes (the DevTools protocol), with only Debian's package.
+//! A headless browser, controlled over two pipes (the DevTools protocol), with only Debian's
+//! package.
 
 use std::io::{BufRead, BufReader, Write};
 use std::path::{Path, PathBuf};
@@ -9,8 +10,14 @@ use std::time::{Duration, Instant};
 use serde_json::{Value, json};
 
 /// Names of the browser's program.
-const NAMES: [&str; 6] =
-    ["chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome", "chromium-headless-shell"];
+const NAMES: [&str; 6] = [
+    "chromium",
+    "chromium-browser",
+    "google-chrome",
+    "google-chrome-stable",
+    "chrome",
+    "chromium-headless-shell",
+];
 /// A slow machine renders in software.
 const PATIENCE: Duration = Duration::from_secs(90);
 /// The polling interval.
@@ -35,15 +42,19 @@ fn program() -> PathBuf {
     }
     let path = std::env::var_os("PATH").unwrap_or_default();
     let folders: Vec<PathBuf> = std::env::split_paths(&path).collect();
-    let file = NAMES.iter().flat_map(|name| folders.iter().map(move |folder| folder.join(name)));
+    let file = NAMES
+        .iter()
+        .flat_map(|name| folders.iter().map(move |folder| folder.join(name)));
     file.into_iter().find(|file| file.is_file()).unwrap_or_else(|| {
         panic!("this test needs Chromium: `apt-get install chromium`, or name one in ACTCHECK_CHROMIUM")
     })
 }
 
-/// Whether a warning comes from the software renderer, about its own speed in reading back WebGL's pixels.
+/// Whether a warning comes from the software renderer, about its own speed in reading back WebGL's
+/// pixels.
 fn is_of_the_driver(text: &Value) -> bool {
-    text.as_str().is_some_and(|text| text.contains("GPU stall due to ReadPixels"))
+    text.as_str()
+        .is_some_and(|text| text.contains("GPU stall due to ReadPixels"))
 }
 
 impl Chromium {
@@ -51,7 +62,10 @@ impl Chromium {
         let profile = tempfile::tempdir().unwrap();
         // The browser reads from file descriptor 3 and writes to 4.
         let mut child = Command::new("sh")
-            .args(["-c", "exec \"$0\" \"$@\" 3<&0 4>&1 0</dev/null 1>/dev/null 2>/dev/null"])
+            .args([
+                "-c",
+                "exec \"$0\" \"$@\" 3<&0 4>&1 0</dev/null 1>/dev/null 2>/dev/null",
+            ])
             .arg(program())
             .args([
                 "--headless",
@@ -60,8 +74,14 @@ impl Chromium {
                 "--remote-debugging-pipe",
                 "--hide-scrollbars",
             ])
-            .args(["--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--no-first-run", "about:blank"])
-            // Plain software rendering of pages is faster than an emulated graphics card, which only WebGL needs.
+            .args([
+                "--use-angle=swiftshader",
+                "--enable-unsafe-swiftshader",
+                "--no-first-run",
+                "about:blank",
+            ])
+            // Plain software rendering of pages is faster than an emulated graphics card, which
+            // only WebGL needs.
             .arg("--disable-gpu-compositing")
             .arg(format!("--user-data-dir={}", profile.path().display()))
             .stdin(Stdio::piped())
@@ -72,16 +92,30 @@ impl Chromium {
         let (send, answers) = channel();
         std::thread::spawn(move || {
             for message in BufReader::new(output).split(0).map_while(Result::ok) {
-                let Ok(message) = serde_json::from_slice(&message) else { break };
+                let Ok(message) = serde_json::from_slice(&message) else {
+                    break;
+                };
                 if send.send(message).is_err() {
                     break;
                 }
             }
         });
-        let mut browser =
-            Self { child, input, answers, session: None, number: 0, complaints: Vec::new(), _profile: profile };
-        let target = browser.call("Target.createTarget", json!({ "url": "about:blank" }))["targetId"].clone();
-        let attached = browser.call("Target.attachToTarget", json!({ "targetId": target, "flatten": true }));
+        let mut browser = Self {
+            child,
+            input,
+            answers,
+            session: None,
+            number: 0,
+            complaints: Vec::new(),
+            _profile: profile,
+        };
+        let target =
+            browser.call("Target.createTarget", json!({ "url": "about:blank" }))["targetId"]
+                .clone();
+        let attached = browser.call(
+            "Target.attachToTarget",
+            json!({ "targetId": target, "flatten": true }),
+        );
         browser.session = Some(attached["sessionId"].as_str().unwrap().to_owned());
         for domain in ["Page", "Runtime", "Log"] {
             browser.call(&format!("{domain}.enable"), json!({}));
@@ -91,7 +125,8 @@ impl Chromium {
 
     /// Sends a command to the browser.
     pub fn call(&mut self, method: &str, params: Value) -> Value {
-        self.asked(method, params).unwrap_or_else(|fault| panic!("{method}: {fault}"))
+        self.asked(method, params)
+            .unwrap_or_else(|fault| panic!("{method}: {fault}"))
     }
 
     fn asked(&mut self, method: &str, params: Value) -> Result<Value, String> {
@@ -100,25 +135,38 @@ impl Chromium {
         if let Some(session) = &self.session {
             message["sessionId"] = json!(session);
         }
-        self.input.write_all(format!("{message}\0").as_bytes()).unwrap();
+        self.input
+            .write_all(format!("{message}\0").as_bytes())
+            .unwrap();
         self.input.flush().unwrap();
         loop {
-            let answer = self.answers.recv_timeout(PATIENCE).unwrap_or_else(|_| panic!("no answer to {method}"));
+            let answer = self
+                .answers
+                .recv_timeout(PATIENCE)
+                .unwrap_or_else(|_| panic!("no answer to {method}"));
             if answer["id"] == json!(self.number) {
                 let fault = &answer["error"];
-                return if fault.is_null() { Ok(answer["result"].clone()) } else { Err(fault.to_string()) };
+                return if fault.is_null() {
+                    Ok(answer["result"].clone())
+                } else {
+                    Err(fault.to_string())
+                };
             }
             self.listen(&answer);
         }
     }
 
     fn listen(&mut self, event: &Value) {
-        let bad = |word: &Value| ["error", "warning", "assert"].contains(&word.as_str().unwrap_or_default());
+        let bad = |word: &Value| {
+            ["error", "warning", "assert"].contains(&word.as_str().unwrap_or_default())
+        };
         let params = &event["params"];
         let complaint = match event["method"].as_str().unwrap_or_default() {
             "Runtime.exceptionThrown" => true,
             "Runtime.consoleAPICalled" => bad(&params["type"]),
-            "Log.entryAdded" => bad(&params["entry"]["level"]) && !is_of_the_driver(&params["entry"]["text"]),
+            "Log.entryAdded" => {
+                bad(&params["entry"]["level"]) && !is_of_the_driver(&params["entry"]["text"])
+            }
             _ => false,
         };
         if complaint {
@@ -128,11 +176,13 @@ impl Chromium {
 
     /// The value of an expression in the page, which may be a promise.
     pub fn value(&mut self, expression: &str) -> Value {
-        self.evaluated(expression).unwrap_or_else(|fault| panic!("{expression}: {fault}"))
+        self.evaluated(expression)
+            .unwrap_or_else(|fault| panic!("{expression}: {fault}"))
     }
 
     fn evaluated(&mut self, expression: &str) -> Result<Value, String> {
-        let asked = json!({ "expression": expression, "awaitPromise": true, "returnByValue": true });
+        let asked =
+            json!({ "expression": expression, "awaitPromise": true, "returnByValue": true });
         let answer = self.asked("Runtime.evaluate", asked)?;
         if answer["exceptionDetails"].is_null() {
             Ok(answer["result"]["value"].clone())
@@ -149,7 +199,11 @@ impl Chromium {
             if found == Ok(json!(true)) {
                 return;
             }
-            assert!(start.elapsed() < PATIENCE, "{expression} never became true: {found:?}, {:?}", self.complaints);
+            assert!(
+                start.elapsed() < PATIENCE,
+                "{expression} never became true: {found:?}, {:?}",
+                self.complaints
+            );
             std::thread::sleep(PAUSE);
         }
     }
@@ -175,13 +229,19 @@ impl Chromium {
     /// Sets the system's preferred theme: `light` or `dark`.
     pub fn theme(&mut self, theme: &str) {
         let features = json!([{ "name": "prefers-color-scheme", "value": theme }]);
-        self.call("Emulation.setEmulatedMedia", json!({ "features": features }));
+        self.call(
+            "Emulation.setEmulatedMedia",
+            json!({ "features": features }),
+        );
     }
 
     /// Presses a key such as `ArrowDown`.
     pub fn press(&mut self, key: &str) {
         for kind in ["keyDown", "keyUp"] {
-            self.call("Input.dispatchKeyEvent", json!({ "type": kind, "key": key, "code": key }));
+            self.call(
+                "Input.dispatchKeyEvent",
+                json!({ "type": kind, "key": key, "code": key }),
+            );
         }
     }
 
@@ -199,7 +259,9 @@ impl Chromium {
                 Err(fault) => panic!("Page.captureScreenshot: {fault}"),
             }
         };
-        base64::engine::general_purpose::STANDARD.decode(letters.as_str().unwrap()).unwrap()
+        base64::engine::general_purpose::STANDARD
+            .decode(letters.as_str().unwrap())
+            .unwrap()
     }
 }
 

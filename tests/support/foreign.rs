@@ -1,5 +1,5 @@
-//! External tools, for tests that check our files and our server with them. If one is not available, the test prints
-//! one line, also if it passes, and ends.
+//! External tools, for tests that check our files and our server with them. If one is not
+//! available, the test prints one line, also if it passes, and ends.
 
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
@@ -14,81 +14,124 @@ pub fn left_out(what: &str, why: &str) {
     let _ = writeln!(std::io::stderr(), "LEFT OUT {what}: {why}");
 }
 
-/// Python with the packages of `tests/foreign/requirements.txt`, in an environment cached beside the build output.
-/// Returns `None` if it can't be created.
+/// Python with the packages of `tests/foreign/requirements.txt`, in an environment cached beside
+/// the build output. Returns `None` if it can't be created.
 pub fn python() -> Option<&'static Path> {
     static PYTHON: OnceLock<Option<PathBuf>> = OnceLock::new();
     PYTHON
         .get_or_init(|| {
-            environment("python", "requirements.txt").map_err(|why| left_out("tests of Python's packages", &why)).ok()
+            environment("python", "requirements.txt")
+                .map_err(|why| left_out("tests of Python's packages", &why))
+                .ok()
         })
         .as_deref()
 }
 
-/// Python with our client, installed by pip from its folder into an environment with only its dependencies and those
-/// of its tests. The client is ours: if the environment can't be created, its tests fail with the reason.
+/// Python with our client, installed by pip from its folder into an environment with only its
+/// dependencies and those of its tests. The client is ours: if the environment can't be created,
+/// its tests fail with the reason.
 pub fn client_python() -> &'static Path {
     static PYTHON: OnceLock<Result<PathBuf, String>> = OnceLock::new();
     let made = PYTHON.get_or_init(|| {
         let python = environment("python_client", "python_client.txt")?;
-        // Installs the current state. The build backend is in the environment already, so no network is needed.
-        let install = ["install", "--quiet", "--disable-pip-version-check", "--no-build-isolation", "--no-deps"];
+        // Installs the current state. The build backend is in the environment already, so no
+        // network is needed.
+        let install = [
+            "install",
+            "--quiet",
+            "--disable-pip-version-check",
+            "--no-build-isolation",
+            "--no-deps",
+        ];
         let client = root().join("clients/python");
-        run(Command::new(&python).args(["-m", "pip"]).args(install).arg("--force-reinstall").arg(client))?;
+        run(Command::new(&python)
+            .args(["-m", "pip"])
+            .args(install)
+            .arg("--force-reinstall")
+            .arg(client))?;
         Ok(python)
     });
-    made.as_deref().unwrap_or_else(|why| panic!("clients/python can't be installed for its tests: {why}"))
+    made.as_deref()
+        .unwrap_or_else(|why| panic!("clients/python can't be installed for its tests: {why}"))
 }
 
-/// Python with maturin, and a folder with the package's dependencies from PyPI: later builds and installations of
-/// wheels need no network.
+/// Python with maturin, and a folder with the package's dependencies from PyPI: later builds and
+/// installations of wheels need no network.
 pub fn maturin() -> Result<(PathBuf, PathBuf), String> {
     let python = environment("maturin", "../../clients/wheel/maturin.txt")?;
     let needs = Path::new(env!("CARGO_TARGET_TMPDIR")).join("package-needs");
     let versions = root().join("tests/foreign/python_client.txt");
     kept(&needs, &versions, |needs| {
-        let download =
-            ["-m", "pip", "download", "--quiet", "--disable-pip-version-check", "--only-binary", ":all:", "numpy"];
-        run(Command::new(&python).args(download).arg("--constraint").arg(&versions).arg("--dest").arg(needs))
+        let download = [
+            "-m",
+            "pip",
+            "download",
+            "--quiet",
+            "--disable-pip-version-check",
+            "--only-binary",
+            ":all:",
+            "numpy",
+        ];
+        run(Command::new(&python)
+            .args(download)
+            .arg("--constraint")
+            .arg(&versions)
+            .arg("--dest")
+            .arg(needs))
     })?;
     Ok((python, needs))
 }
 
-/// An environment with the packages listed in a file of `tests/foreign`, cached beside the build output. Returns its
-/// Python.
+/// An environment with the packages listed in a file of `tests/foreign`, cached beside the build
+/// output. Returns its Python.
 fn environment(name: &str, packages: &str) -> Result<PathBuf, String> {
     let wanted = root().join("tests/foreign").join(packages);
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
     kept(&folder, &wanted, |folder| {
-        run(Command::new("python3").args(["-m", "venv", "--clear"]).arg(folder))?;
+        run(Command::new("python3")
+            .args(["-m", "venv", "--clear"])
+            .arg(folder))?;
         let mut pip = Command::new(folder.join("bin/python"));
-        run(pip.args(["-m", "pip", "install", "--quiet", "--disable-pip-version-check", "-r"]).arg(&wanted))
+        run(pip
+            .args([
+                "-m",
+                "pip",
+                "install",
+                "--quiet",
+                "--disable-pip-version-check",
+                "-r",
+            ])
+            .arg(&wanted))
     })?;
     Ok(folder.join("bin/python"))
 }
 
-/// Allure's own generator from npm, as `tests/foreign/package.json` pins it, cached beside the build output. Returns
-/// `None` if it can't be installed.
+/// Allure's own generator from npm, as `tests/foreign/package.json` pins it, cached beside the
+/// build output. Returns `None` if it can't be installed.
 pub fn allure() -> Option<&'static Path> {
     static ALLURE: OnceLock<Option<PathBuf>> = OnceLock::new();
     ALLURE
         .get_or_init(|| {
             let made = from_npm("allure", "package.json");
-            let folder = made.map_err(|why| left_out("tests of Allure's generator from npm", &why)).ok()?;
+            let folder = made
+                .map_err(|why| left_out("tests of Allure's generator from npm", &why))
+                .ok()?;
             Some(folder.join("node_modules/.bin/allure"))
         })
         .as_deref()
 }
 
-/// The script of axe-core from npm, as `tests/foreign/axe/package.json` pins it, cached beside the build output. Returns
-/// `None` if it can't be installed. It is fetched and never copied into this project (MPL-2.0).
+/// The script of axe-core from npm, as `tests/foreign/axe/package.json` pins it, cached beside the
+/// build output. Returns `None` if it can't be installed. It is fetched and never copied into this
+/// project (MPL-2.0).
 pub fn axe() -> Option<&'static str> {
     static AXE: OnceLock<Option<String>> = OnceLock::new();
     AXE.get_or_init(|| {
         from_npm("axe", "axe/package.json")
             .and_then(|folder| {
                 let script = folder.join("node_modules/axe-core/axe.min.js");
-                std::fs::read_to_string(&script).map_err(|error| format!("{}: {error}", script.display()))
+                std::fs::read_to_string(&script)
+                    .map_err(|error| format!("{}: {error}", script.display()))
             })
             .map_err(|why| left_out("axe-core's checks of the report and the query page", &why))
             .ok()
@@ -96,7 +139,8 @@ pub fn axe() -> Option<&'static str> {
     .as_deref()
 }
 
-/// A folder with the packages of a `package.json` in `tests/foreign`, cached beside the build output.
+/// A folder with the packages of a `package.json` in `tests/foreign`, cached beside the build
+/// output.
 fn from_npm(name: &str, packages: &str) -> Result<PathBuf, String> {
     let wanted = root().join("tests/foreign").join(packages);
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
@@ -104,19 +148,31 @@ fn from_npm(name: &str, packages: &str) -> Result<PathBuf, String> {
         std::fs::create_dir_all(folder).map_err(|error| error.to_string())?;
         std::fs::copy(&wanted, folder.join("package.json")).map_err(|error| error.to_string())?;
         let mut npm = Command::new("npm");
-        run(npm.args(["install", "--no-audit", "--no-fund", "--loglevel=error"]).current_dir(folder))
+        run(npm
+            .args(["install", "--no-audit", "--no-fund", "--loglevel=error"])
+            .current_dir(folder))
     })?;
     Ok(folder)
 }
 
 /// Returns `true` if a program of the system is installed.
 pub fn has(program: &str) -> bool {
-    Command::new(program).arg("--version").output().is_ok_and(|output| output.status.success())
+    Command::new(program)
+        .arg("--version")
+        .output()
+        .is_ok_and(|output| output.status.success())
 }
 
 /// A folder that is created once for each version of the `wanted` file.
-fn kept(folder: &Path, wanted: &Path, make: impl FnOnce(&Path) -> Result<(), String>) -> Result<(), String> {
-    let (text, made) = (std::fs::read_to_string(wanted).unwrap(), folder.join("made-of"));
+fn kept(
+    folder: &Path,
+    wanted: &Path,
+    make: impl FnOnce(&Path) -> Result<(), String>,
+) -> Result<(), String> {
+    let (text, made) = (
+        std::fs::read_to_string(wanted).unwrap(),
+        folder.join("made-of"),
+    );
     if std::fs::read_to_string(&made).is_ok_and(|before| before == text) {
         return Ok(());
     }
@@ -127,8 +183,18 @@ fn kept(folder: &Path, wanted: &Path, make: impl FnOnce(&Path) -> Result<(), Str
 /// Runs a command to its end. Returns the last line of its error stream if it fails.
 pub fn run(command: &mut Command) -> Result<(), String> {
     let program = command.get_program().to_string_lossy().into_owned();
-    let output = command.output().map_err(|error| format!("{program} can't be started: {error}"))?;
+    let output = command
+        .output()
+        .map_err(|error| format!("{program} can't be started: {error}"))?;
     let said = String::from_utf8_lossy(&output.stderr).into_owned();
-    let last = said.lines().rfind(|line| !line.trim().is_empty()).unwrap_or_default().to_owned();
-    if output.status.success() { Ok(()) } else { Err(format!("{program}: {last}")) }
+    let last = said
+        .lines()
+        .rfind(|line| !line.trim().is_empty())
+        .unwrap_or_default()
+        .to_owned();
+    if output.status.success() {
+        Ok(())
+    } else {
+        Err(format!("{program}: {last}"))
+    }
 }

@@ -18,7 +18,10 @@ pub fn env_of(text: &str) -> Env {
 
 /// The run with the given choices.
 pub fn run(env: &Env, choices: Choices, disturb: Option<Disturbance>) -> RunRecord {
-    let clock = Clock { now: String::new, secs: || 0.0 };
+    let clock = Clock {
+        now: String::new,
+        secs: || 0.0,
+    };
     run_line(env, "test", 0, choices, &RunContext { clock, disturb }).unwrap()
 }
 
@@ -29,10 +32,16 @@ pub fn nominal(env: &Env, disturb: Option<Disturbance>) -> RunRecord {
 
 /// The report of an action.
 pub fn report(run: &RunRecord, step: usize) -> &ActionReport {
-    run.trace.actions[step].report.as_ref().expect("the action ended with a report")
+    run.trace.actions[step]
+        .report
+        .as_ref()
+        .expect("the action ended with a report")
 }
 
 /// The outcomes of an action, by property name.
 pub fn outcomes(run: &RunRecord, step: usize) -> BTreeMap<&str, Outcome> {
-    run.judgements[step].iter().map(|judgement| (names::local(&judgement.property), judgement.outcome)).collect()
+    run.judgements[step]
+        .iter()
+        .map(|judgement| (names::local(&judgement.property), judgement.outcome))
+        .collect()
 }

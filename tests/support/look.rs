@@ -4,7 +4,8 @@ use tempfile::TempDir;
 
 use crate::support::{edit, project};
 
-/// A robot looks at a table with a coarse camera: in some scenes it merges two things, or misses one.
+/// A robot looks at a table with a coarse camera: in some scenes it merges two things, or misses
+/// one.
 const LOOK: &str = r#"
 tests = [["PerceivePlane"]]
 test_count = 15
@@ -43,6 +44,10 @@ pub fn looking() -> TempDir {
 /// The same with a camera so noisy that no look locates the table correctly: every run fails.
 pub fn blurred() -> TempDir {
     let project = looking();
-    edit(&project.path().join("configs/look.toml"), "range_noise_m = 0.0015", "range_noise_m = 0.1");
+    edit(
+        &project.path().join("configs/look.toml"),
+        "range_noise_m = 0.0015",
+        "range_noise_m = 0.1",
+    );
     project
 }

@@ -11,8 +11,8 @@ use super::planted::Dice;
 /// Classes of objects with their weights.
 pub const CLASSES: [&str; 6] = ["Bottle", "Bowl", "Box", "Can", "Glass", "Mug"];
 
-/// A run of a campaign with one target on a table and up to four objects around it; `judge` gives the outcomes of
-/// each of its actions.
+/// A run of a campaign with one target on a table and up to four objects around it; `judge` gives
+/// the outcomes of each of its actions.
 pub fn run(
     campaign: &str,
     index: u64,
@@ -21,30 +21,54 @@ pub fn run(
     judge: impl Fn(&ObjectDetail, usize, &mut Dice) -> Vec<(&'static str, Outcome)>,
 ) -> RunDetail {
     let id = format!("{campaign}-{}", index + 1);
-    let mut objects = vec![object("table_1", "Table", Role::Platform, [1.0, 0.0, 0.7], dice)];
+    let mut objects = vec![object(
+        "table_1",
+        "Table",
+        Role::Platform,
+        [1.0, 0.0, 0.7],
+        dice,
+    )];
     let class = CLASSES[dice.below(CLASSES.len() as u64) as usize];
     let place = [0.7 + 0.5 * dice.share(), 0.8 * dice.share() - 0.4, 0.75];
-    objects.push(object(&format!("{}_1", class.to_lowercase()), class, Role::Target, place, dice));
+    objects.push(object(
+        &format!("{}_1", class.to_lowercase()),
+        class,
+        Role::Target,
+        place,
+        dice,
+    ));
     for number in 0..dice.below(5) {
         let place = [0.7 + 0.5 * dice.share(), 0.8 * dice.share() - 0.4, 0.75];
-        objects.push(object(&format!("mug_{}", number + 2), "Mug", Role::Other, place, dice));
+        objects.push(object(
+            &format!("mug_{}", number + 2),
+            "Mug",
+            Role::Other,
+            place,
+            dice,
+        ));
     }
     let target = objects[1].clone();
     let robot_base = [0.0, 0.1 * dice.share(), 0.2 * dice.share()];
-    let actions = actions.iter().enumerate().map(|(step, action)| ActionDetail {
-        step: step as u32 + 1,
-        action: format!("http://actions#{action}"),
-        score: 1.0,
-        reported: Some(true),
-        message: Some("done".to_owned()),
-        duration_secs: 5.0 + dice.share(),
-        end: "completed".to_owned(),
-        parameters: BTreeMap::from([
-            ("pickObject".to_owned(), vec![target.id.clone()]),
-            ("objectLocation".to_owned(), vec!["kitchen".to_owned()]),
-        ]),
-        judgements: judge(&target, step, dice).into_iter().map(|(name, outcome)| judgement(name, outcome)).collect(),
-    });
+    let actions = actions
+        .iter()
+        .enumerate()
+        .map(|(step, action)| ActionDetail {
+            step: step as u32 + 1,
+            action: format!("http://actions#{action}"),
+            score: 1.0,
+            reported: Some(true),
+            message: Some("done".to_owned()),
+            duration_secs: 5.0 + dice.share(),
+            end: "completed".to_owned(),
+            parameters: BTreeMap::from([
+                ("pickObject".to_owned(), vec![target.id.clone()]),
+                ("objectLocation".to_owned(), vec!["kitchen".to_owned()]),
+            ]),
+            judgements: judge(&target, step, dice)
+                .into_iter()
+                .map(|(name, outcome)| judgement(name, outcome))
+                .collect(),
+        });
     RunDetail {
         row: RunRow {
             run: id.clone(),

@@ -40,18 +40,34 @@ pub fn actcheck(folder: &Path, arguments: &[&str]) -> Output {
 /// Starts actcheck in a folder, without waiting for its end and without its output.
 pub fn started(folder: &Path, args: &[&str]) -> Child {
     let mut command = Command::new(env!("CARGO_BIN_EXE_actcheck"));
-    command.args(args).current_dir(folder).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap()
+    command
+        .args(args)
+        .current_dir(folder)
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .spawn()
+        .unwrap()
 }
 
-/// Folders in `/proc` of the processes whose working directory is a folder, which must be canonical.
+/// Folders in `/proc` of the processes whose working directory is a folder, which must be
+/// canonical.
 pub fn processes_in(folder: &Path) -> Vec<PathBuf> {
-    let processes = std::fs::read_dir("/proc").unwrap().flatten().map(|entry| entry.path());
-    processes.filter(|process| std::fs::read_link(process.join("cwd")).is_ok_and(|at| at == folder)).collect()
+    let processes = std::fs::read_dir("/proc")
+        .unwrap()
+        .flatten()
+        .map(|entry| entry.path());
+    processes
+        .filter(|process| std::fs::read_link(process.join("cwd")).is_ok_and(|at| at == folder))
+        .collect()
 }
 
-/// Sends a signal, such as `INT`, to a process, with the shell's builtin `kill`: minimal systems have no other.
+/// Sends a signal, such as `INT`, to a process, with the shell's builtin `kill`: minimal systems
+/// have no other.
 pub fn signal(process: u32, name: &str) {
-    let sent = Command::new("sh").args(["-c", &format!("kill -s {name} {process}")]).status().unwrap();
+    let sent = Command::new("sh")
+        .args(["-c", &format!("kill -s {name} {process}")])
+        .status()
+        .unwrap();
     assert!(sent.success(), "process {process} is gone");
 }
 
@@ -65,7 +81,8 @@ pub fn stderr(output: &Output) -> String {
     String::from_utf8(output.stderr.clone()).unwrap()
 }
 
-/// A copy of the shipped project with coarse physics in its configurations, for tests that are about campaigns.
+/// A copy of the shipped project with coarse physics in its configurations, for tests that are
+/// about campaigns.
 pub fn project() -> tempfile::TempDir {
     project_with(COARSE)
 }
@@ -81,7 +98,8 @@ pub fn project_with(physics: &str) -> tempfile::TempDir {
     folder
 }
 
-/// A copy of the shipped project: configurations, ontology, rules and models. For tests of the robot's performance.
+/// A copy of the shipped project: configurations, ontology, rules and models. For tests of the
+/// robot's performance.
 pub fn shipped_project() -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     for name in ["configs", "ontology", "rules", "models"] {
@@ -95,8 +113,8 @@ pub fn copy(from: &Path, to: &Path) {
     try_copy(from, to).unwrap();
 }
 
-/// Copies the folder of a history that is open. Its owner may still write and remove files in the background: then the
-/// copy may be of two times, so the folder is copied once more.
+/// Copies the folder of a history that is open. Its owner may still write and remove files in the
+/// background: then the copy may be of two times, so the folder is copied once more.
 pub fn copy_open(from: &Path, to: &Path) {
     loop {
         let before = sizes(from);
@@ -113,7 +131,9 @@ pub fn copy_open(from: &Path, to: &Path) {
 
 /// All files in a folder with their sizes, in bytes; files removed meanwhile have none.
 fn sizes(folder: &Path) -> BTreeMap<PathBuf, Option<u64>> {
-    let entries = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
+    let entries = std::fs::read_dir(folder)
+        .unwrap()
+        .map(|entry| entry.unwrap().path());
     entries
         .flat_map(|path| match path.metadata() {
             Ok(metadata) if metadata.is_dir() => sizes(&path),
@@ -152,10 +172,12 @@ pub fn edit(file: &Path, from: &str, to: &str) {
     std::fs::write(file, text.replacen(from, to, 1)).unwrap();
 }
 
-/// Physics at a third of the cost, for tests that are not about physics: objects still stay in the hand.
+/// Physics at a third of the cost, for tests that are not about physics: objects still stay in the
+/// hand.
 pub const COARSE: &str = "[physics]\nsteps_per_second = 120\niterations = 2\n";
 
-/// The coarsest physics, for tests that do not need the robot to succeed: a held object slips out of the hand.
+/// The coarsest physics, for tests that do not need the robot to succeed: a held object slips out
+/// of the hand.
 pub const COARSEST: &str = "[physics]\nsteps_per_second = 60\niterations = 1\n";
 
 /// A private copy of a history of four runs: only one process at a time may open a history.
@@ -173,8 +195,24 @@ pub fn copy_made_history(to: &Path) {
         let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("made-history");
         let _ = std::fs::remove_dir_all(&folder);
         let name = folder.display().to_string();
-        let output = actcheck(root(), &["run", "configs/quick.toml", "--runs", "4", "--jobs", "2", "--history", &name]);
-        assert!(output.status.code().is_some_and(|code| code < 2), "{}", stderr(&output));
+        let output = actcheck(
+            root(),
+            &[
+                "run",
+                "configs/quick.toml",
+                "--runs",
+                "4",
+                "--jobs",
+                "2",
+                "--history",
+                &name,
+            ],
+        );
+        assert!(
+            output.status.code().is_some_and(|code| code < 2),
+            "{}",
+            stderr(&output)
+        );
         folder
     });
     copy(made, to);
@@ -201,13 +239,35 @@ impl Shipped {
 /// A shipped campaign, run once for all tests.
 pub fn shipped(name: &'static str) -> &'static Shipped {
     static MADE: Mutex<BTreeMap<&str, &OnceLock<Shipped>>> = Mutex::new(BTreeMap::new());
-    let made = *MADE.lock().unwrap().entry(name).or_insert_with(|| Box::leak(Box::default()));
+    let made = *MADE
+        .lock()
+        .unwrap()
+        .entry(name)
+        .or_insert_with(|| Box::leak(Box::default()));
     made.get_or_init(|| {
         let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("shipped-{name}"));
         let _ = std::fs::remove_dir_all(&folder);
         copy(shipped_project().path(), &folder);
-        let output = actcheck(&folder, &["run", &format!("configs/{name}.toml"), "--jobs", "2", "--history", "h"]);
-        assert!(output.status.code().is_some_and(|code| code < 2), "{}", stderr(&output));
-        Shipped { code: output.status.code(), text: stdout(&output), folder }
+        let output = actcheck(
+            &folder,
+            &[
+                "run",
+                &format!("configs/{name}.toml"),
+                "--jobs",
+                "2",
+                "--history",
+                "h",
+            ],
+        );
+        assert!(
+            output.status.code().is_some_and(|code| code < 2),
+            "{}",
+            stderr(&output)
+        );
+        Shipped {
+            code: output.status.code(),
+            text: stdout(&output),
+            folder,
+        }
     })
 }

@@ -1,7 +1,8 @@
-//! Deterministic mutations of texts, for tests of everything that reads files or messages from others.
+//! Deterministic mutations of texts, for tests of everything that reads files or messages from
+//! others.
 //!
-//! Each test makes a few cases by default. `ACTCHECK_FUZZ_MINUTES=10` makes as many as fit into ten minutes, and checks
-//! the memory that they took. `ACTCHECK_FUZZ_CASE=7` makes only that case.
+//! Each test makes a few cases by default. `ACTCHECK_FUZZ_MINUTES=10` makes as many as fit into ten
+//! minutes, and checks the memory that they took. `ACTCHECK_FUZZ_CASE=7` makes only that case.
 
 use std::ops::Range;
 use std::time::{Duration, Instant};
@@ -32,14 +33,20 @@ const EXTREME: [&str; 16] = [
     "00",
 ];
 /// Marks that break most formats.
-const ODD: [&str; 12] = ["\"", "'", "<", ">", "&", "[", "]", "{", "\n", "\u{0}", "é🦀", "\u{feff}"];
+const ODD: [&str; 12] = [
+    "\"", "'", "<", ">", "&", "[", "]", "{", "\n", "\u{0}", "é🦀", "\u{feff}",
+];
 
 /// Runs a test on many numbered cases, and prints how many.
 ///
 /// # Panics
 /// If a case takes too long, or all together took too much memory.
 pub fn cases(name: &str, default: u64, mut case: impl FnMut(Mutations)) {
-    let number_of = |variable: &str| std::env::var(variable).ok().and_then(|text| text.parse::<f64>().ok());
+    let number_of = |variable: &str| {
+        std::env::var(variable)
+            .ok()
+            .and_then(|text| text.parse::<f64>().ok())
+    };
     if let Some(number) = number_of("ACTCHECK_FUZZ_CASE") {
         return case(Mutations::new(number as u64));
     }
@@ -55,19 +62,32 @@ pub fn cases(name: &str, default: u64, mut case: impl FnMut(Mutations)) {
         let started = Instant::now();
         case(Mutations::new(number));
         slowest = slowest.max((started.elapsed(), number));
-        assert!(slowest.0 < HANG, "{name}: case {number} took {:?}", slowest.0);
+        assert!(
+            slowest.0 < HANG,
+            "{name}: case {number} took {:?}",
+            slowest.0
+        );
         number += 1;
     }
     let memory = peak_memory();
-    println!("{name}: {number} cases; the slowest, {}, took {:?}; at most {} MiB", slowest.1, slowest.0, memory >> 10);
-    assert!(minutes.is_none() || memory < MOST_MEMORY, "{name}: {memory} KiB");
+    println!(
+        "{name}: {number} cases; the slowest, {}, took {:?}; at most {} MiB",
+        slowest.1,
+        slowest.0,
+        memory >> 10
+    );
+    assert!(
+        minutes.is_none() || memory < MOST_MEMORY,
+        "{name}: {memory} KiB"
+    );
 }
 
 /// The most memory that this process has used. Unit: kibibytes.
 fn peak_memory() -> u64 {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"));
-    line.and_then(|line| line.trim().strip_suffix("kB")?.trim().parse().ok()).unwrap_or_default()
+    line.and_then(|line| line.trim().strip_suffix("kB")?.trim().parse().ok())
+        .unwrap_or_default()
 }
 
 /// A random sequence of mutations: the same for the same case.
@@ -96,7 +116,8 @@ impl Mutations {
         &all[self.below(all.len())]
     }
 
-    /// A text with some mutations. `tokens` are words of its format, and `others` texts from which parts are taken.
+    /// A text with some mutations. `tokens` are words of its format, and `others` texts from which
+    /// parts are taken.
     pub fn text(&mut self, text: &[u8], tokens: &[&str], others: &[&[u8]]) -> Vec<u8> {
         let mut bytes = text.to_vec();
         for _ in 0..=self.below(4) {
@@ -126,7 +147,10 @@ impl Mutations {
                 drop(bytes.splice(at..at, token));
             }
             6 => {
-                let token = self.pick(tokens).as_bytes().repeat(*self.pick(&[2, 100, 2_000]));
+                let token = self
+                    .pick(tokens)
+                    .as_bytes()
+                    .repeat(*self.pick(&[2, 100, 2_000]));
                 drop(bytes.splice(at..at, token));
             }
             7 => drop(bytes.splice(at..at, self.pick(&ODD).bytes())),
@@ -151,7 +175,16 @@ impl Mutations {
 /// The place of the first number at or after a position; empty if there is none.
 fn number_after(bytes: &[u8], at: usize) -> Range<usize> {
     let is_part = |byte: &u8| byte.is_ascii_digit() || b"+-.eE".contains(byte);
-    let Some(first) = bytes[at..].iter().position(u8::is_ascii_digit).map(|offset| at + offset) else { return at..at };
-    let length = bytes[first..].iter().position(|byte| !is_part(byte)).unwrap_or(bytes.len() - first);
+    let Some(first) = bytes[at..]
+        .iter()
+        .position(u8::is_ascii_digit)
+        .map(|offset| at + offset)
+    else {
+        return at..at;
+    };
+    let length = bytes[first..]
+        .iter()
+        .position(|byte| !is_part(byte))
+        .unwrap_or(bytes.len() - first);
     first..first + length
 }

@@ -12,12 +12,24 @@ fn is_null(value: &str) -> bool {
 }
 
 fn nulls(facts: &Facts) -> BTreeSet<&str> {
-    facts.iter().flat_map(|(_, row)| row).map(String::as_str).filter(|value| is_null(value)).collect()
+    facts
+        .iter()
+        .flat_map(|(_, row)| row)
+        .map(String::as_str)
+        .filter(|value| is_null(value))
+        .collect()
 }
 
 fn renamed(facts: &Facts, names: &BTreeMap<&str, u64>) -> Facts {
-    let name = |value: &String| names.get(value.as_str()).map_or(value.clone(), |name| format!("_:{name}"));
-    facts.iter().map(|(predicate, row)| (predicate.clone(), row.iter().map(name).collect())).collect()
+    let name = |value: &String| {
+        names
+            .get(value.as_str())
+            .map_or(value.clone(), |name| format!("_:{name}"))
+    };
+    facts
+        .iter()
+        .map(|(predicate, row)| (predicate.clone(), row.iter().map(name).collect()))
+        .collect()
 }
 
 /// Refines colours of nulls by the tuples in which they occur, until there are no more classes.
@@ -46,7 +58,8 @@ fn refined<'f>(facts: &'f Facts, mut colours: BTreeMap<&'f str, u64>) -> BTreeMa
                 (null, hasher.finish())
             })
             .collect();
-        let classes = |colours: &BTreeMap<&str, u64>| colours.values().collect::<BTreeSet<_>>().len();
+        let classes =
+            |colours: &BTreeMap<&str, u64>| colours.values().collect::<BTreeSet<_>>().len();
         if classes(&next) == classes(&colours) {
             return next;
         }
@@ -56,7 +69,12 @@ fn refined<'f>(facts: &'f Facts, mut colours: BTreeMap<&'f str, u64>) -> BTreeMa
 
 /// Whether two sets of tuples are equal up to the labels of their nulls.
 pub fn are_isomorphic(left: &Facts, right: &Facts) -> bool {
-    fn matched(left: &Facts, right: &Facts, of_left: BTreeMap<&str, u64>, of_right: BTreeMap<&str, u64>) -> bool {
+    fn matched(
+        left: &Facts,
+        right: &Facts,
+        of_left: BTreeMap<&str, u64>,
+        of_right: BTreeMap<&str, u64>,
+    ) -> bool {
         let (of_left, of_right) = (refined(left, of_left), refined(right, of_right));
         let sorted = |colours: &BTreeMap<&str, u64>| {
             let mut list: Vec<u64> = colours.values().copied().collect();
@@ -66,13 +84,27 @@ pub fn are_isomorphic(left: &Facts, right: &Facts) -> bool {
         if sorted(&of_left) != sorted(&of_right) {
             return false;
         }
-        let same = sorted(&of_left).windows(2).find(|pair| pair[0] == pair[1]).map(|pair| pair[0]);
-        let Some(colour) = same else { return renamed(left, &of_left) == renamed(right, &of_right) };
-        // One of several alike gets a colour of its own, and each of the other side is tried for it.
+        let same = sorted(&of_left)
+            .windows(2)
+            .find(|pair| pair[0] == pair[1])
+            .map(|pair| pair[0]);
+        let Some(colour) = same else {
+            return renamed(left, &of_left) == renamed(right, &of_right);
+        };
+        // One of several alike gets a colour of its own, and each of the other side is tried for
+        // it.
         let mut chosen = of_left.clone();
-        let first = of_left.iter().find(|(_, of)| **of == colour).map(|(null, _)| *null).unwrap();
+        let first = of_left
+            .iter()
+            .find(|(_, of)| **of == colour)
+            .map(|(null, _)| *null)
+            .unwrap();
         chosen.insert(first, colour ^ 1);
-        let alike: Vec<&str> = of_right.iter().filter(|(_, of)| **of == colour).map(|(null, _)| *null).collect();
+        let alike: Vec<&str> = of_right
+            .iter()
+            .filter(|(_, of)| **of == colour)
+            .map(|(null, _)| *null)
+            .collect();
         alike.into_iter().any(|null| {
             let mut other = of_right.clone();
             other.insert(null, colour ^ 1);
@@ -91,40 +123,71 @@ pub fn maps_into(facts: &Facts, others: &Facts) -> bool {
         images: &mut BTreeMap<&'f str, &'f str>,
     ) -> bool {
         let known = |fact: &(String, Vec<String>), images: &BTreeMap<&str, &str>| {
-            fact.1.iter().filter(|value| is_null(value) && !images.contains_key(value.as_str())).count()
+            fact.1
+                .iter()
+                .filter(|value| is_null(value) && !images.contains_key(value.as_str()))
+                .count()
         };
-        let Some(at) = (0..left.len()).min_by_key(|at| known(left[*at], images)) else { return true };
+        let Some(at) = (0..left.len()).min_by_key(|at| known(left[*at], images)) else {
+            return true;
+        };
         let fact = left[at];
-        let rest: Vec<_> = left.iter().enumerate().filter(|(other, _)| *other != at).map(|(_, fact)| *fact).collect();
-        others.iter().filter(|other| other.0 == fact.0).any(|other| {
-            let before = images.clone();
-            let fits = fact.1.iter().zip(&other.1).all(|(value, image)| match is_null(value) {
-                true => *images.entry(value).or_insert(image) == image.as_str(),
-                false => value == image,
-            });
-            if fits && found(&rest, others, images) {
-                return true;
-            }
-            *images = before;
-            false
-        })
+        let rest: Vec<_> = left
+            .iter()
+            .enumerate()
+            .filter(|(other, _)| *other != at)
+            .map(|(_, fact)| *fact)
+            .collect();
+        others
+            .iter()
+            .filter(|other| other.0 == fact.0)
+            .any(|other| {
+                let before = images.clone();
+                let fits = fact
+                    .1
+                    .iter()
+                    .zip(&other.1)
+                    .all(|(value, image)| match is_null(value) {
+                        true => *images.entry(value).or_insert(image) == image.as_str(),
+                        false => value == image,
+                    });
+                if fits && found(&rest, others, images) {
+                    return true;
+                }
+                *images = before;
+                false
+            })
     }
-    let open: Vec<_> =
-        facts.iter().filter(|fact| !others.contains(fact) || fact.1.iter().any(|v| is_null(v))).collect();
+    let open: Vec<_> = facts
+        .iter()
+        .filter(|fact| !others.contains(fact) || fact.1.iter().any(|v| is_null(v)))
+        .collect();
     found(&open, others, &mut BTreeMap::new())
 }
 
 #[test]
 fn labels_of_nulls_do_not_matter() {
     let facts = |rows: &[&[&str]]| -> Facts {
-        rows.iter().map(|row| ("p".to_owned(), row.iter().map(|value| (*value).to_owned()).collect())).collect()
+        rows.iter()
+            .map(|row| {
+                (
+                    "p".to_owned(),
+                    row.iter().map(|value| (*value).to_owned()).collect(),
+                )
+            })
+            .collect()
     };
     let cycle = facts(&[&["_:0", "_:1"], &["_:1", "_:2"], &["_:2", "_:0"]]);
     let turned = facts(&[&["_:7", "_:5"], &["_:5", "_:6"], &["_:6", "_:7"]]);
     let path = facts(&[&["_:0", "_:1"], &["_:1", "_:2"], &["_:0", "_:2"]]);
     assert!(are_isomorphic(&cycle, &turned));
     assert!(!are_isomorphic(&cycle, &path));
-    let (one, two) = (facts(&[&["a", "_:0"]]), facts(&[&["a", "_:0"], &["a", "b"]]));
+    let (one, two) = (
+        facts(&[&["a", "_:0"]]),
+        facts(&[&["a", "_:0"], &["a", "b"]]),
+    );
     assert!(maps_into(&two, &two) && maps_into(&one, &two) && !maps_into(&two, &one));
-    assert!(!maps_into(&cycle, &facts(&[&["a", "b"]])) && maps_into(&cycle, &facts(&[&["a", "a"]])));
+    assert!(
+        !maps_into(&cycle, &facts(&[&["a", "b"]])) && maps_into(&cycle, &facts(&[&["a", "a"]]))
+    );
 }

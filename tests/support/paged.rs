@@ -4,11 +4,12 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use actcheck::analysis::{
-    Hierarchy, Mirror, OutcomeTable, PatternOptions, TableFilter, TableRun, cascades, collisions, finding_columns,
-    flaky_scenes, judged, property_findings, table_failure_modes, trend, two_way,
+    Hierarchy, Mirror, OutcomeTable, PatternOptions, TableFilter, TableRun, cascades, collisions,
+    finding_columns, flaky_scenes, judged, property_findings, table_failure_modes, trend, two_way,
 };
 use actcheck::report::{
-    FindingsSummary, HTML_COLUMNS, HtmlReport, PackedRuns, PropertyReport, PropertyWords, Replays, html,
+    FindingsSummary, HTML_COLUMNS, HtmlReport, PackedRuns, PropertyReport, PropertyWords, Replays,
+    html,
 };
 use actcheck::verdict::Counts;
 
@@ -22,10 +23,13 @@ pub fn findings(table: &OutcomeTable, history: &str) -> FindingsSummary {
         let findings = property_findings(table, of, &Hierarchy::new(), &PatternOptions::default());
         let (flaky, repeated_scenes) = flaky_scenes(table, of);
         PropertyReport {
-            maps: [["surface_y_m", "surface_x_m"], ["target_category", "target_turned_rad"]]
-                .iter()
-                .filter_map(|by| two_way(&findings.input, by))
-                .collect(),
+            maps: [
+                ["surface_y_m", "surface_x_m"],
+                ["target_category", "target_turned_rad"],
+            ]
+            .iter()
+            .filter_map(|by| two_way(&findings.input, by))
+            .collect(),
             unit: Some("m".to_owned()),
             trend: trend(table, of, LEVEL),
             flaky,
@@ -55,12 +59,21 @@ pub fn findings(table: &OutcomeTable, history: &str) -> FindingsSummary {
 }
 
 /// Writes runs as a mirror into a folder.
-pub fn mirror(folder: &Path, campaign: &str, runs: impl IntoIterator<Item = impl Into<TableRun>>) -> Mirror {
+pub fn mirror(
+    folder: &Path,
+    campaign: &str,
+    runs: impl IntoIterator<Item = impl Into<TableRun>>,
+) -> Mirror {
     Mirror::of_runs(folder, campaign, runs).unwrap()
 }
 
 /// The page of a mirror.
-pub fn page(mirror: &Mirror, history: &str, words: &BTreeMap<String, PropertyWords>, replays: &Replays) -> String {
+pub fn page(
+    mirror: &Mirror,
+    history: &str,
+    words: &BTreeMap<String, PropertyWords>,
+    replays: &Replays,
+) -> String {
     let names: Vec<&str> = finding_columns().into_iter().chain(HTML_COLUMNS).collect();
     let table = OutcomeTable::read(mirror, &TableFilter::default(), &names).unwrap();
     let findings = findings(&table, history);

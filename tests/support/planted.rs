@@ -48,7 +48,10 @@ pub struct Dice(u64);
 
 impl Dice {
     pub fn new(seed: u64) -> Self {
-        Self(seed.wrapping_mul(0x9E37_79B9_7F4A_7C15).wrapping_add(0x1234_5678_9ABC_DEF1))
+        Self(
+            seed.wrapping_mul(0x9E37_79B9_7F4A_7C15)
+                .wrapping_add(0x1234_5678_9ABC_DEF1),
+        )
     }
 
     /// SplitMix64 (Steele, Lea and Flood, 2014).
@@ -74,18 +77,53 @@ impl Dice {
 pub fn input(runs: usize, seed: u64, planted: &[Vec<Condition>]) -> PatternInput {
     let mut dice = Dice::new(seed);
     let mut parameters = vec![
-        kinds("target_category", KINDS.len(), |kind| KINDS[kind], runs, &mut dice),
-        kinds("surface", SURFACES.len(), |kind| (SURFACES[kind], &[]), runs, &mut dice),
-        kinds("world", WORLDS.len(), |kind| (WORLDS[kind], &[]), runs, &mut dice),
-        numbers("others", None, (0..runs).map(|_| dice.below(MOST_OTHERS + 1) as f64).collect()),
+        kinds(
+            "target_category",
+            KINDS.len(),
+            |kind| KINDS[kind],
+            runs,
+            &mut dice,
+        ),
+        kinds(
+            "surface",
+            SURFACES.len(),
+            |kind| (SURFACES[kind], &[]),
+            runs,
+            &mut dice,
+        ),
+        kinds(
+            "world",
+            WORLDS.len(),
+            |kind| (WORLDS[kind], &[]),
+            runs,
+            &mut dice,
+        ),
+        numbers(
+            "others",
+            None,
+            (0..runs)
+                .map(|_| dice.below(MOST_OTHERS + 1) as f64)
+                .collect(),
+        ),
     ];
     for (name, low, high) in NUMBERS {
         let unit = name.rsplit_once('_').map(|(_, unit)| unit.to_owned());
-        parameters.push(numbers(name, unit, (0..runs).map(|_| low + (high - low) * dice.share()).collect()));
+        parameters.push(numbers(
+            name,
+            unit,
+            (0..runs)
+                .map(|_| low + (high - low) * dice.share())
+                .collect(),
+        ));
     }
     // Without surrounding objects there is no nearest distance.
-    if let (Values::Numbers(others), rest) = (parameters[OTHERS].values.clone(), parameters.last_mut().unwrap()) {
-        let Values::Numbers(distances) = &mut rest.values else { unreachable!("they are numbers") };
+    if let (Values::Numbers(others), rest) = (
+        parameters[OTHERS].values.clone(),
+        parameters.last_mut().unwrap(),
+    ) {
+        let Values::Numbers(distances) = &mut rest.values else {
+            unreachable!("they are numbers")
+        };
         distances
             .iter_mut()
             .zip(others)
@@ -93,16 +131,29 @@ pub fn input(runs: usize, seed: u64, planted: &[Vec<Condition>]) -> PatternInput
             .for_each(|(distance, _)| *distance = f64::NAN);
     }
     let held_out = (0..runs).map(|_| dice.below(3) == 0).collect();
-    let mut input = PatternInput { failed: vec![false; runs], held_out, parameters, ..PatternInput::default() };
+    let mut input = PatternInput {
+        failed: vec![false; runs],
+        held_out,
+        parameters,
+        ..PatternInput::default()
+    };
     let mut within = vec![false; runs];
     for conditions in planted {
         let mut all = vec![true; runs];
         for condition in conditions {
-            all.iter_mut().zip(condition.holds(&input)).for_each(|(all, holds)| *all &= holds);
+            all.iter_mut()
+                .zip(condition.holds(&input))
+                .for_each(|(all, holds)| *all &= holds);
         }
-        within.iter_mut().zip(all).for_each(|(within, all)| *within |= all);
+        within
+            .iter_mut()
+            .zip(all)
+            .for_each(|(within, all)| *within |= all);
     }
-    input.failed = within.iter().map(|within| dice.share() < if *within { WITHIN } else { ELSEWHERE }).collect();
+    input.failed = within
+        .iter()
+        .map(|within| dice.share() < if *within { WITHIN } else { ELSEWHERE })
+        .collect();
     input
 }
 
@@ -113,7 +164,10 @@ pub fn shuffled(input: &PatternInput, seed: u64) -> PatternInput {
     for at in (1..failed.len()).rev() {
         failed.swap(at, dice.below(at as u64 + 1) as usize);
     }
-    PatternInput { failed, ..input.clone() }
+    PatternInput {
+        failed,
+        ..input.clone()
+    }
 }
 
 fn kinds(
@@ -124,29 +178,62 @@ fn kinds(
     dice: &mut Dice,
 ) -> Parameter {
     let values = Values::Kinds {
-        of_run: (0..runs).map(|_| Some(dice.below(count as u64) as u32)).collect(),
+        of_run: (0..runs)
+            .map(|_| Some(dice.below(count as u64) as u32))
+            .collect(),
         names: (0..count).map(|place| kind(place).0.to_owned()).collect(),
-        above: (0..count).map(|place| kind(place).1.iter().map(|name| (*name).to_owned()).collect()).collect(),
+        above: (0..count)
+            .map(|place| {
+                kind(place)
+                    .1
+                    .iter()
+                    .map(|name| (*name).to_owned())
+                    .collect()
+            })
+            .collect(),
     };
-    Parameter { name: name.to_owned(), unit: None, values }
+    Parameter {
+        name: name.to_owned(),
+        unit: None,
+        values,
+    }
 }
 
 fn numbers(name: &str, unit: Option<String>, numbers: Vec<f64>) -> Parameter {
     let wraps = name.ends_with("_yaw_rad");
-    let values = if wraps { Values::Angles(numbers) } else { Values::Numbers(numbers) };
-    Parameter { name: name.to_owned(), unit, values }
+    let values = if wraps {
+        Values::Angles(numbers)
+    } else {
+        Values::Numbers(numbers)
+    };
+    Parameter {
+        name: name.to_owned(),
+        unit,
+        values,
+    }
 }
 
 pub fn kind(parameter: usize, kind: &str) -> Condition {
-    Condition::Kind { parameter, kind: kind.to_owned() }
+    Condition::Kind {
+        parameter,
+        kind: kind.to_owned(),
+    }
 }
 
 pub fn range(parameter: usize, low: Option<f64>, high: Option<f64>) -> Condition {
-    Condition::Range { parameter, low, high }
+    Condition::Range {
+        parameter,
+        low,
+        high,
+    }
 }
 
 pub fn arc(parameter: usize, from: f64, to: f64) -> Condition {
-    Condition::Arc { parameter, from, to }
+    Condition::Arc {
+        parameter,
+        from,
+        to,
+    }
 }
 
 /// The planted patterns, by name: each alone, and all at once.
@@ -156,7 +243,11 @@ pub fn plantings() -> Vec<(&'static str, Vec<Vec<Condition>>)> {
     let band = vec![range(YAW, Some(0.5), Some(1.2))];
     let turned_away = vec![arc(YAW, 2.5, -2.5)];
     let higher = vec![kind(CATEGORY, "Cup")];
-    let three = vec![kind(CATEGORY, "Tableware"), range(OTHERS, Some(4.0), None), range(X, None, Some(-0.1))];
+    let three = vec![
+        kind(CATEGORY, "Tableware"),
+        range(OTHERS, Some(4.0), None),
+        range(X, None, Some(-0.1)),
+    ];
     vec![
         ("single", vec![single.clone()]),
         ("conjunction", vec![conjunction.clone()]),
@@ -164,6 +255,9 @@ pub fn plantings() -> Vec<(&'static str, Vec<Vec<Condition>>)> {
         ("arc", vec![turned_away]),
         ("higher kind", vec![higher.clone()]),
         ("three conditions", vec![three.clone()]),
-        ("all at once", vec![single, conjunction, band, higher, three]),
+        (
+            "all at once",
+            vec![single, conjunction, band, higher, three],
+        ),
     ]
 }

@@ -4,7 +4,11 @@
 pub fn link(name: &str, size: [f64; 3], at: [f64; 3], mass: f64) -> String {
     let [x, y, z] = at;
     let moment = |a: f64, b: f64| mass * (a * a + b * b) / 12.0;
-    let (ixx, iyy, izz) = (moment(size[1], size[2]), moment(size[0], size[2]), moment(size[0], size[1]));
+    let (ixx, iyy, izz) = (
+        moment(size[1], size[2]),
+        moment(size[0], size[2]),
+        moment(size[0], size[1]),
+    );
     format!(
         "<link name=\"{name}\"><inertial><origin xyz=\"{x} {y} {z}\"/><mass value=\"{mass}\"/>\
         <inertia ixx=\"{ixx}\" iyy=\"{iyy}\" izz=\"{izz}\" ixy=\"0\" ixz=\"0\" iyz=\"0\"/></inertial>\
@@ -14,7 +18,14 @@ pub fn link(name: &str, size: [f64; 3], at: [f64; 3], mass: f64) -> String {
 }
 
 /// A joint between two links, with strong motors.
-pub fn joint(name: &str, kind: &str, ends: [&str; 2], at: [f64; 3], axis: &str, range: [f64; 2]) -> String {
+pub fn joint(
+    name: &str,
+    kind: &str,
+    ends: [&str; 2],
+    at: [f64; 3],
+    axis: &str,
+    range: [f64; 2],
+) -> String {
     format!(
         "<joint name=\"{name}\" type=\"{kind}\"><parent link=\"{}\"/><child link=\"{}\"/>\
         <origin xyz=\"{} {} {}\"/><axis xyz=\"{axis}\"/>\

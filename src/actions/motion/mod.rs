@@ -1,7 +1,8 @@
-//! Arm paths through the perceived surroundings: straight if that is free, otherwise by sampling postures.
+//! Arm paths through the perceived surroundings: straight if that is free, otherwise by sampling
+//! postures.
 //!
-//! Never: moves the robot, drives its base, or measures its own run time: effort is bounded by the number of samples,
-//! so that the same choices give the same path.
+//! Never: moves the robot, drives its base, or measures its own run time: effort is bounded by the
+//! number of samples, so that the same choices give the same path.
 
 mod connect;
 mod samples;

@@ -1,6 +1,7 @@
 //! Evenly spread sample points in a unit cube, with a limit on their number.
 
-/// Samples of one plan. They are limited in number, so that planning ends after the same work on every machine.
+/// Samples of one plan. They are limited in number, so that planning ends after the same work on
+/// every machine.
 #[derive(Debug, Clone)]
 pub struct Samples {
     /// Start of the sequence, from 0 to 1.
@@ -17,12 +18,17 @@ const GOLDEN: f64 = 0.618_033_988_749_894_9;
 impl Samples {
     /// At most `most` samples of the sequence selected by a number from 0 to 1.
     pub fn new(start: f64, most: u32) -> Self {
-        Self { start, n_drawn: 0, most }
+        Self {
+            start,
+            n_drawn: 0,
+            most,
+        }
     }
 
     /// The next point, with coordinates from 0 to 1. Returns `None` when all samples are used.
     ///
-    /// A Halton sequence with a random shift modulo 1 in each dimension (Cranley and Patterson 1976).
+    /// A Halton sequence with a random shift modulo 1 in each dimension (Cranley and Patterson
+    /// 1976).
     pub fn next(&mut self, n_dimensions: usize) -> Option<Vec<f64>> {
         if self.n_drawn >= self.most {
             return None;
@@ -42,7 +48,10 @@ impl Samples {
 
     /// Takes at most `most` of the remaining samples, for one of several attempts.
     pub fn share(&mut self, most: u32) -> Self {
-        let part = Self { most: (self.n_drawn + most).min(self.most), ..self.clone() };
+        let part = Self {
+            most: (self.n_drawn + most).min(self.most),
+            ..self.clone()
+        };
         self.n_drawn = part.most;
         part
     }
@@ -75,7 +84,10 @@ mod tests {
         assert_eq!(one, draw(0.25));
         for dimension in 0..7 {
             let low = one.iter().filter(|point| point[dimension] < 0.5).count();
-            assert!((180..=220).contains(&low), "{low} of 400 in the lower half of dimension {dimension}");
+            assert!(
+                (180..=220).contains(&low),
+                "{low} of 400 in the lower half of dimension {dimension}"
+            );
         }
         let mut samples = Samples::new(0.25, 10);
         let mut part = samples.share(4);

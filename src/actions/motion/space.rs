@@ -7,7 +7,8 @@ use crate::link_points::LinkPoints;
 use crate::route::{Block, Pillar};
 use actcheck_world::{JointKind, Kinematics, Layout, SelfContact};
 
-/// Spacing of checked points on the arm, and the largest movement of a point between checked postures. Unit: metres.
+/// Spacing of checked points on the arm, and the largest movement of a point between checked
+/// postures. Unit: metres.
 const CHECK_M: f64 = 0.03;
 /// Largest number of postures checked on one straight path.
 const MOST_CHECKS: f64 = 400.0;
@@ -27,7 +28,10 @@ impl Room {
     /// The smaller clearances of both.
     #[must_use]
     pub fn least(self, other: Self) -> Self {
-        Self { furniture_m: self.furniture_m.min(other.furniture_m), things_m: self.things_m.min(other.things_m) }
+        Self {
+            furniture_m: self.furniture_m.min(other.furniture_m),
+            things_m: self.things_m.min(other.things_m),
+        }
     }
 
     /// Whether both clearances are at least these.
@@ -64,11 +68,16 @@ impl<'a> ArmSpace<'a> {
         right: &[Vec<f64>],
     ) -> Self {
         let moved = moved_links(kinematics, &layout.arm);
-        let points: Vec<(usize, Point3<f64>)> =
-            kinematics.surface_points(CHECK_M).into_iter().filter(|(link, _)| moved[*link]).collect();
+        let points: Vec<(usize, Point3<f64>)> = kinematics
+            .surface_points(CHECK_M)
+            .into_iter()
+            .filter(|(link, _)| moved[*link])
+            .collect();
         let levers = layout.arm.iter().map(|joint| {
             let followers = kinematics.followers_of(*joint);
-            let of_followers: f64 = followers.map(|(own, factor)| factor.abs() * lever(kinematics, own, &points)).sum();
+            let of_followers: f64 = followers
+                .map(|(own, factor)| factor.abs() * lever(kinematics, own, &points))
+                .sum();
             lever(kinematics, *joint, &points) + of_followers
         });
         let levers = levers.collect();
@@ -76,17 +85,34 @@ impl<'a> ArmSpace<'a> {
         let is_hand = moved_links(kinematics, layout.arm.last().copied().as_slice());
         let (arm, arm_farther_m) = (layout.arm.as_slice(), 0.0);
         let points = LinkPoints::grouped(&points);
-        Self { kinematics, arm, points, furniture, things, itself, is_hand, arm_farther_m, levers }
+        Self {
+            kinematics,
+            arm,
+            points,
+            furniture,
+            things,
+            itself,
+            is_hand,
+            arm_farther_m,
+            levers,
+        }
     }
 
-    /// The same space for an arm that stays this much farther from furniture than its hand. Unit: metres.
+    /// The same space for an arm that stays this much farther from furniture than its hand. Unit:
+    /// metres.
     pub fn farther(self, arm_farther_m: f64) -> Self {
-        Self { arm_farther_m, ..self }
+        Self {
+            arm_farther_m,
+            ..self
+        }
     }
 
     /// The same space with other objects.
     pub fn among(&self, things: &'a [Pillar]) -> Self {
-        Self { things, ..self.clone() }
+        Self {
+            things,
+            ..self.clone()
+        }
     }
 
     /// The robot and the obstacles, for messages.
@@ -101,7 +127,8 @@ impl<'a> ArmSpace<'a> {
         }
     }
 
-    /// The posture at a point of the unit cube: arm joints within their limits, all others as in `like`.
+    /// The posture at a point of the unit cube: arm joints within their limits, all others as in
+    /// `like`.
     pub(super) fn posture(&self, point: &[f64], like: &[f64]) -> Vec<f64> {
         let mut positions = like.to_vec();
         for (idx, share) in self.arm.iter().zip(point) {
@@ -124,10 +151,14 @@ impl<'a> ArmSpace<'a> {
         self.arm.len()
     }
 
-    /// Upper bound of the distance that any point of the arm moves on the straight path between two postures. Unit:
-    /// metres.
+    /// Upper bound of the distance that any point of the arm moves on the straight path between two
+    /// postures. Unit: metres.
     pub fn span(&self, from: &[f64], to: &[f64]) -> f64 {
-        self.arm.iter().zip(&self.levers).map(|(idx, lever)| (to[*idx] - from[*idx]).abs() * lever).sum()
+        self.arm
+            .iter()
+            .zip(&self.levers)
+            .map(|(idx, lever)| (to[*idx] - from[*idx]).abs() * lever)
+            .sum()
     }
 
     /// The clearances of a posture, and whether it is free of self-collisions.
@@ -143,13 +174,18 @@ impl<'a> ArmSpace<'a> {
 
     /// The clearances at these link poses.
     fn room_of(&self, links: &[Isometry3<f64>]) -> Room {
-        let mut room = Room { furniture_m: f64::INFINITY, things_m: f64::INFINITY };
+        let mut room = Room {
+            furniture_m: f64::INFINITY,
+            things_m: f64::INFINITY,
+        };
         for points in &self.points {
             let pose = &links[points.link];
             let farther_m = self.farther_m(points);
             room.furniture_m = points.nearest(pose, room.furniture_m, |point| point.z);
             for block in self.furniture {
-                room.furniture_m = points.nearest(pose, room.furniture_m, |point| block.distance(point) - farther_m);
+                room.furniture_m = points.nearest(pose, room.furniture_m, |point| {
+                    block.distance(point) - farther_m
+                });
             }
             for pillar in self.things {
                 room.things_m = points.nearest(pose, room.things_m, |point| pillar.distance(point));
@@ -158,21 +194,38 @@ impl<'a> ArmSpace<'a> {
         room
     }
 
-    /// Whether all clearances at these link poses are at least these: less work than [`ArmSpace::room_of`].
-    fn has_room(&self, links: &[Isometry3<f64>], Room { furniture_m, things_m }: Room) -> bool {
+    /// Whether all clearances at these link poses are at least these: less work than
+    /// [`ArmSpace::room_of`].
+    fn has_room(
+        &self,
+        links: &[Isometry3<f64>],
+        Room {
+            furniture_m,
+            things_m,
+        }: Room,
+    ) -> bool {
         self.points.iter().all(|points| {
             let pose = &links[points.link];
             let farther_m = self.farther_m(points);
-            let is_near = |block: &Block| points.is_nearer(pose, furniture_m, |at| block.distance(at) - farther_m);
+            let is_near = |block: &Block| {
+                points.is_nearer(pose, furniture_m, |at| block.distance(at) - farther_m)
+            };
             !points.is_nearer(pose, furniture_m, |at| at.z)
                 && !self.furniture.iter().any(is_near)
-                && !self.things.iter().any(|pillar| points.is_nearer(pose, things_m, |at| pillar.distance(at)))
+                && !self
+                    .things
+                    .iter()
+                    .any(|pillar| points.is_nearer(pose, things_m, |at| pillar.distance(at)))
         })
     }
 
     /// How much farther these points have to be from furniture. Unit: metres.
     fn farther_m(&self, points: &LinkPoints) -> f64 {
-        if self.is_hand[points.link] { 0.0 } else { self.arm_farther_m }
+        if self.is_hand[points.link] {
+            0.0
+        } else {
+            self.arm_farther_m
+        }
     }
 
     /// Whether a posture is free of collisions and keeps these clearances.
@@ -183,16 +236,27 @@ impl<'a> ArmSpace<'a> {
 
     /// Whether the straight path between two postures is free, not counting its first end.
     pub fn is_way_free(&self, from: &[f64], to: &[f64], least: Room) -> bool {
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a few hundred at most")]
-        let n_steps = (self.span(from, to) / CHECK_M).ceil().clamp(1.0, MOST_CHECKS) as usize;
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "a few hundred at most"
+        )]
+        let n_steps = (self.span(from, to) / CHECK_M)
+            .ceil()
+            .clamp(1.0, MOST_CHECKS) as usize;
         // Start at the far end, where most blocked paths are blocked.
-        (1..=n_steps).rev().all(|step| self.is_free(&between(from, to, step as f64 / n_steps as f64), least))
+        (1..=n_steps)
+            .rev()
+            .all(|step| self.is_free(&between(from, to, step as f64 / n_steps as f64), least))
     }
 }
 
 /// The posture at a fraction of the straight path.
 pub(super) fn between(from: &[f64], to: &[f64], share: f64) -> Vec<f64> {
-    from.iter().zip(to).map(|(a, b)| a + (b - a) * share).collect()
+    from.iter()
+        .zip(to)
+        .map(|(a, b)| a + (b - a) * share)
+        .collect()
 }
 
 /// Whether each link is moved by these joints.
@@ -204,8 +268,8 @@ pub fn moved_links(kinematics: &Kinematics, joints: &[usize]) -> Vec<bool> {
     moved
 }
 
-/// Largest possible distance between a joint and the points behind it, with all links in line. A prismatic joint moves
-/// the points by its own displacement.
+/// Largest possible distance between a joint and the points behind it, with all links in line. A
+/// prismatic joint moves the points by its own displacement.
 fn lever(kinematics: &Kinematics, joint: usize, points: &[(usize, Point3<f64>)]) -> f64 {
     let joints = kinematics.joints();
     if joints[joint].kind == JointKind::Prismatic {
@@ -215,7 +279,11 @@ fn lever(kinematics: &Kinematics, joint: usize, points: &[(usize, Point3<f64>)])
         let (mut link, mut length) = (point.0, point.1.coords.norm());
         while link > 0 && link != joint + 1 {
             let inner = &joints[link - 1];
-            let slides = if inner.kind == JointKind::Prismatic { inner.upper.abs().min(1.0) } else { 0.0 };
+            let slides = if inner.kind == JointKind::Prismatic {
+                inner.upper.abs().min(1.0)
+            } else {
+                0.0
+            };
             length += inner.origin.translation.vector.norm() + slides;
             link = inner.parent;
         }

@@ -42,7 +42,13 @@ pub struct Follower {
 impl Follower {
     /// A base at rest.
     pub fn new(at: [f64; 3], way: Vec<[f64; 2]>, heading: f64) -> Self {
-        Self { at, left: way, heading, speed: 0.0, turn_speed: 0.0 }
+        Self {
+            at,
+            left: way,
+            heading,
+            speed: 0.0,
+            turn_speed: 0.0,
+        }
     }
 
     /// Commanded pose of the base at the moment.
@@ -82,13 +88,27 @@ impl Follower {
     /// Advances one tick. With `stop`, the base brakes as fast as its limits allow.
     pub fn advance(&mut self, limits: &Limits, tick_secs: f64, stop: bool) {
         let end = self.left_m();
-        let wanted = if end <= ARRIVAL_M { self.heading } else { self.towards_way() };
+        let wanted = if end <= ARRIVAL_M {
+            self.heading
+        } else {
+            self.towards_way()
+        };
         let aside = wrapped(wanted - self.at[2]);
         self.turn(if stop { 0.0 } else { aside }, limits, tick_secs);
-        let facing = if end <= ARRIVAL_M { 1.0 } else { (1.0 - aside.abs() / ASIDE_RAD).max(0.0) };
-        let goal = if stop { 0.0 } else { (limits.speed * facing).min(self.braking(limits)) };
+        let facing = if end <= ARRIVAL_M {
+            1.0
+        } else {
+            (1.0 - aside.abs() / ASIDE_RAD).max(0.0)
+        };
+        let goal = if stop {
+            0.0
+        } else {
+            (limits.speed * facing).min(self.braking(limits))
+        };
         let change = limits.acceleration * tick_secs;
-        self.speed = goal.clamp(self.speed - change, self.speed + change).max(0.0);
+        self.speed = goal
+            .clamp(self.speed - change, self.speed + change)
+            .max(0.0);
         self.go(self.speed * tick_secs);
         if self.left.is_empty() {
             self.speed = 0.0;
@@ -97,7 +117,9 @@ impl Follower {
 
     fn left_m(&self) -> f64 {
         let ends: Vec<[f64; 2]> = self.left().collect();
-        ends.windows(2).map(|pair| length(pair[1][0] - pair[0][0], pair[1][1] - pair[0][1])).sum()
+        ends.windows(2)
+            .map(|pair| length(pair[1][0] - pair[0][0], pair[1][1] - pair[0][1]))
+            .sum()
     }
 
     fn towards_way(&self) -> f64 {
@@ -108,7 +130,9 @@ impl Follower {
     fn turn(&mut self, aside: f64, limits: &Limits, tick_secs: f64) {
         let change = limits.turn_acceleration * tick_secs;
         // The turning speed from which the base can still stop in time.
-        let fastest = (2.0 * limits.turn_acceleration * aside.abs()).sqrt().min(limits.turn_speed);
+        let fastest = (2.0 * limits.turn_acceleration * aside.abs())
+            .sqrt()
+            .min(limits.turn_speed);
         let fastest = fastest.min(aside.abs() / tick_secs);
         let goal = fastest.copysign(aside);
         self.turn_speed = goal.clamp(self.turn_speed - change, self.turn_speed + change);
@@ -127,7 +151,9 @@ impl Follower {
         let mut way = 0.0;
         for (idx, pair) in ends.windows(2).enumerate() {
             way += length(pair[1][0] - pair[0][0], pair[1][1] - pair[0][1]);
-            let at_corner = ends.get(idx + 2).map_or(0.0, |next| corner_speed(pair[0], pair[1], *next));
+            let at_corner = ends
+                .get(idx + 2)
+                .map_or(0.0, |next| corner_speed(pair[0], pair[1], *next));
             fastest = fastest.min((at_corner * at_corner + 2.0 * limits.acceleration * way).sqrt());
         }
         fastest
@@ -160,7 +186,12 @@ fn corner_speed(a: [f64; 2], b: [f64; 2], c: [f64; 2]) -> f64 {
 mod tests {
     use super::*;
 
-    const LIMITS: Limits = Limits { speed: 0.2, acceleration: 0.3, turn_speed: 0.9, turn_acceleration: 1.5 };
+    const LIMITS: Limits = Limits {
+        speed: 0.2,
+        acceleration: 0.3,
+        turn_speed: 0.9,
+        turn_acceleration: 1.5,
+    };
     const TICK: f64 = 1.0 / 60.0;
 
     /// Poses at each tick until arrival.
@@ -170,7 +201,10 @@ mod tests {
         while !follower.has_arrived() {
             follower.advance(&LIMITS, TICK, false);
             poses.push(follower.at());
-            assert!(poses.len() < 60 * 120, "the base does not arrive: {follower:?}");
+            assert!(
+                poses.len() < 60 * 120,
+                "the base does not arrive: {follower:?}"
+            );
         }
         poses
     }
@@ -179,20 +213,35 @@ mod tests {
     fn the_drive_keeps_its_limits_and_reaches_the_goal() {
         let poses = drive([0.0, 0.0, 2.0], &[[1.0, 0.0], [1.0, 1.0], [0.5, 1.4]], -1.0);
         let [x, y, heading] = poses.last().copied().expect("the drive has poses");
-        assert!((x - 0.5).abs() < 1e-9 && (y - 1.4).abs() < 1e-9 && wrapped(heading + 1.0).abs() < 2.0 * THERE);
-        let velocities: Vec<[f64; 3]> =
-            poses.windows(2).map(|pair| [0, 1, 2].map(|axis| (pair[1][axis] - pair[0][axis]) / TICK)).collect();
+        assert!(
+            (x - 0.5).abs() < 1e-9
+                && (y - 1.4).abs() < 1e-9
+                && wrapped(heading + 1.0).abs() < 2.0 * THERE
+        );
+        let velocities: Vec<[f64; 3]> = poses
+            .windows(2)
+            .map(|pair| [0, 1, 2].map(|axis| (pair[1][axis] - pair[0][axis]) / TICK))
+            .collect();
         for [vx, vy, turning] in &velocities {
-            assert!(length(*vx, *vy) <= LIMITS.speed * 1.01 + THERE / TICK, "{vx} {vy}");
+            assert!(
+                length(*vx, *vy) <= LIMITS.speed * 1.01 + THERE / TICK,
+                "{vx} {vy}"
+            );
             assert!(turning.abs() <= LIMITS.turn_speed * 1.01, "{turning}");
         }
         for pair in velocities.windows(2) {
             let jolt = length(pair[1][0] - pair[0][0], pair[1][1] - pair[0][1]);
             assert!(jolt <= JOLT * 1.2 + 2.0 * THERE / TICK, "{jolt}");
-            assert!((pair[1][2] - pair[0][2]).abs() <= LIMITS.turn_acceleration * TICK * 1.5 + THERE / TICK);
+            assert!(
+                (pair[1][2] - pair[0][2]).abs()
+                    <= LIMITS.turn_acceleration * TICK * 1.5 + THERE / TICK
+            );
         }
         // It turned before it drove.
-        let first = poses.iter().position(|pose| pose[0] > 0.01).expect("it drives");
+        let first = poses
+            .iter()
+            .position(|pose| pose[0] > 0.01)
+            .expect("it drives");
         assert!(poses[first][2].abs() < ASIDE_RAD);
     }
 
@@ -216,6 +265,9 @@ mod tests {
         let poses = drive([0.5, 0.5, 3.0], &[[0.5, 0.5]], -3.0);
         // The short way round.
         assert!(poses.iter().all(|pose| pose[2] >= 3.0 - 1e-9) && poses.len() < 90);
-        assert!((poses.last().expect("the drive has poses")[2] - (std::f64::consts::TAU - 3.0)).abs() < 2.0 * THERE);
+        assert!(
+            (poses.last().expect("the drive has poses")[2] - (std::f64::consts::TAU - 3.0)).abs()
+                < 2.0 * THERE
+        );
     }
 }

@@ -20,7 +20,8 @@ const SEEN_TAKEN: i8 = 3;
 const SEEN_FREE: i8 = -1;
 /// Largest absolute evidence: further pictures don't add to it.
 const SUREST: i8 = 6;
-/// Anything seen this close to something on the map counts as that. Unit: metres. Three times the localisation error.
+/// Anything seen this close to something on the map counts as that. Unit: metres. Three times the
+/// localisation error.
 const MAPPED_M: f64 = 0.12;
 
 /// Square cells of the floor, in rows along x. Frame: world, by the base's belief.
@@ -82,17 +83,39 @@ impl Grid {
             }
         }
         // Furniture may be beyond the end of the floor.
-        (low, high) = (low.map(|end| end.max(-FLOOR_M - AROUND_M)), high.map(|end| end.min(FLOOR_M + AROUND_M)));
+        (low, high) = (
+            low.map(|end| end.max(-FLOOR_M - AROUND_M)),
+            high.map(|end| end.min(FLOOR_M + AROUND_M)),
+        );
         let [columns, rows] = [0, 1].map(|axis| {
-            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a few hundred cells")]
-            let count = ((high[axis] - low[axis]) / CELL_M).ceil().clamp(1.0, MOST_CELLS as f64) as usize;
+            #[expect(
+                clippy::cast_possible_truncation,
+                clippy::cast_sign_loss,
+                reason = "a few hundred cells"
+            )]
+            let count = ((high[axis] - low[axis]) / CELL_M)
+                .ceil()
+                .clamp(1.0, MOST_CELLS as f64) as usize;
             count
         });
         let n_cells = columns * rows;
         let (seen, tops_m) = (vec![0; n_cells], vec![0.0; n_cells]);
-        let mut grid = Self { low, columns, rows, mapped_m: Vec::new(), seen, tops_m };
-        let outlines: Vec<_> = plan.outlines.iter().map(|o| (o.pose.to_isometry().inverse(), o.size_m)).collect();
-        grid.mapped_m = (0..n_cells).map(|cell| mapped(plan, &outlines, grid.middle(cell))).collect();
+        let mut grid = Self {
+            low,
+            columns,
+            rows,
+            mapped_m: Vec::new(),
+            seen,
+            tops_m,
+        };
+        let outlines: Vec<_> = plan
+            .outlines
+            .iter()
+            .map(|o| (o.pose.to_isometry().inverse(), o.size_m))
+            .collect();
+        grid.mapped_m = (0..n_cells)
+            .map(|cell| mapped(plan, &outlines, grid.middle(cell)))
+            .collect();
         grid
     }
 
@@ -109,21 +132,33 @@ impl Grid {
     /// The cell that contains a point, or `None` outside of the grid.
     pub fn cell(&self, [x, y]: [f64; 2]) -> Option<usize> {
         let (column, row) = ((x - self.low[0]) / CELL_M, (y - self.low[1]) / CELL_M);
-        let inside = column >= 0.0 && row >= 0.0 && column < self.columns as f64 && row < self.rows as f64;
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "inside of the grid")]
+        let inside =
+            column >= 0.0 && row >= 0.0 && column < self.columns as f64 && row < self.rows as f64;
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "inside of the grid"
+        )]
         inside.then(|| row as usize * self.columns + column as usize)
     }
 
     /// The centre of a cell.
     pub fn middle(&self, cell: usize) -> [f64; 2] {
         let (column, row) = (cell % self.columns, cell / self.columns);
-        [self.low[0] + (column as f64 + 0.5) * CELL_M, self.low[1] + (row as f64 + 0.5) * CELL_M]
+        [
+            self.low[0] + (column as f64 + 0.5) * CELL_M,
+            self.low[1] + (row as f64 + 0.5) * CELL_M,
+        ]
     }
 
-    /// Adds the evidence of a picture. A cell in which it shows only floor is free, because rays reached the floor.
+    /// Adds the evidence of a picture. A cell in which it shows only floor is free, because rays
+    /// reached the floor.
     pub fn learn(&mut self, evidence: &Evidence) {
         for (cell, shown) in &evidence.counts {
-            let (Some(seen), Some(top)) = (self.seen.get_mut(*cell), self.tops_m.get_mut(*cell)) else { continue };
+            let (Some(seen), Some(top)) = (self.seen.get_mut(*cell), self.tops_m.get_mut(*cell))
+            else {
+                continue;
+            };
             let change = if shown.things >= HITS {
                 *top = top.max(shown.top_m);
                 SEEN_TAKEN
@@ -144,8 +179,14 @@ impl Grid {
 
     /// Perceived obstacles that are not on the map.
     pub fn standing(&self) -> Vec<Standing> {
-        let taken = (0..self.n_cells()).filter(|cell| self.seen[*cell] > 0 && self.mapped_m[*cell] > MAPPED_M);
-        taken.map(|cell| Standing { at_m: self.middle(cell), top_m: self.tops_m[cell] }).collect()
+        let taken = (0..self.n_cells())
+            .filter(|cell| self.seen[*cell] > 0 && self.mapped_m[*cell] > MAPPED_M);
+        taken
+            .map(|cell| Standing {
+                at_m: self.middle(cell),
+                top_m: self.tops_m[cell],
+            })
+            .collect()
     }
 
     /// Adds the obstacles seen on an earlier drive.
@@ -165,15 +206,22 @@ impl Grid {
 
     /// Distances from the cells' centres to perceived obstacles. Unit: metres.
     ///
-    /// Source: the exact distance transform of Felzenszwalb and Huttenlocher (2012), along columns and then along rows.
+    /// Source: the exact distance transform of Felzenszwalb and Huttenlocher (2012), along columns
+    /// and then along rows.
     pub fn seen_m(&self) -> Vec<f64> {
         let far = (self.columns * self.columns + self.rows * self.rows) as f64;
-        let mut squares: Vec<f64> = self.seen.iter().map(|seen| if *seen > 0 { 0.0 } else { far }).collect();
+        let mut squares: Vec<f64> = self
+            .seen
+            .iter()
+            .map(|seen| if *seen > 0 { 0.0 } else { far })
+            .collect();
         if self.seen.iter().all(|seen| *seen <= 0) {
             return vec![f64::INFINITY; squares.len()];
         }
         for column in 0..self.columns {
-            let line: Vec<f64> = (0..self.rows).map(|row| squares[row * self.columns + column]).collect();
+            let line: Vec<f64> = (0..self.rows)
+                .map(|row| squares[row * self.columns + column])
+                .collect();
             for (row, value) in parabolas(&line).into_iter().enumerate() {
                 squares[row * self.columns + column] = value;
             }
@@ -182,7 +230,10 @@ impl Grid {
             row.copy_from_slice(&parabolas(row));
         }
         // To the side of the occupied cell, not to its centre.
-        squares.into_iter().map(|square| (square.sqrt() - 0.5).max(0.0) * CELL_M).collect()
+        squares
+            .into_iter()
+            .map(|square| (square.sqrt() - 0.5).max(0.0) * CELL_M)
+            .collect()
     }
 }
 
@@ -205,7 +256,10 @@ fn parabolas(line: &[f64]) -> Vec<f64> {
     }
     let mut idx = 0;
     let at = |place: usize| {
-        while standing.get(idx + 1).is_some_and(|(_, begins)| *begins < place as f64) {
+        while standing
+            .get(idx + 1)
+            .is_some_and(|(_, begins)| *begins < place as f64)
+        {
             idx += 1;
         }
         let other = standing[idx].0;
@@ -224,16 +278,22 @@ fn corners(outline: &Outline) -> [[f64; 2]; 4] {
     })
 }
 
-/// Distance from a point to everything on the map; 0 outside of all rooms, if there are rooms. Unit: metres.
+/// Distance from a point to everything on the map; 0 outside of all rooms, if there are rooms.
+/// Unit: metres.
 fn mapped(plan: &FloorPlan, outlines: &[(Isometry3<f64>, [f64; 2])], [x, y]: [f64; 2]) -> f64 {
-    let in_room =
-        |room: &Room| (room.low_m[0]..=room.high_m[0]).contains(&x) && (room.low_m[1]..=room.high_m[1]).contains(&y);
+    let in_room = |room: &Room| {
+        (room.low_m[0]..=room.high_m[0]).contains(&x)
+            && (room.low_m[1]..=room.high_m[1]).contains(&y)
+    };
     if !plan.rooms.is_empty() && !plan.rooms.iter().any(in_room) {
         return 0.0;
     }
     let beside = |(from_world, size_m): &(Isometry3<f64>, [f64; 2])| {
         let local = from_world * Point3::new(x, y, 0.0);
-        length((local.x.abs() - size_m[0] / 2.0).max(0.0), (local.y.abs() - size_m[1] / 2.0).max(0.0))
+        length(
+            (local.x.abs() - size_m[0] / 2.0).max(0.0),
+            (local.y.abs() - size_m[1] / 2.0).max(0.0),
+        )
     };
     outlines.iter().map(beside).fold(f64::INFINITY, f64::min)
 }
@@ -244,9 +304,20 @@ mod tests {
     use actcheck_data::Pose;
 
     fn hall() -> Grid {
-        let outline = Outline { pose: Pose::upright([1.0, 0.0, 0.0], 0.3), size_m: [0.4, 0.2] };
-        let room = Room { name: "hall".to_owned(), low_m: [-2.0, -1.0], high_m: [2.0, 1.0] };
-        let plan = FloorPlan { outlines: vec![outline], rooms: vec![room], ..FloorPlan::default() };
+        let outline = Outline {
+            pose: Pose::upright([1.0, 0.0, 0.0], 0.3),
+            size_m: [0.4, 0.2],
+        };
+        let room = Room {
+            name: "hall".to_owned(),
+            low_m: [-2.0, -1.0],
+            high_m: [2.0, 1.0],
+        };
+        let plan = FloorPlan {
+            outlines: vec![outline],
+            rooms: vec![room],
+            ..FloorPlan::default()
+        };
         Grid::new(&plan, &[])
     }
 
@@ -266,14 +337,19 @@ mod tests {
         let mapped = |at: [f64; 2]| grid.mapped_m()[grid.cell(at).expect("it is on the grid")];
         assert_eq!(mapped([1.0, 0.0]), 0.0);
         assert_eq!(mapped([0.0, 1.5]), 0.0);
-        assert!((mapped([-1.0, 0.0]) - 1.77).abs() < 0.06, "{}", mapped([-1.0, 0.0]));
+        assert!(
+            (mapped([-1.0, 0.0]) - 1.77).abs() < 0.06,
+            "{}",
+            mapped([-1.0, 0.0])
+        );
     }
 
     #[test]
     fn distances_to_seen_obstacles_are_exact() {
         let mut grid = hall();
         assert!(grid.seen_m().iter().all(|distance| distance.is_infinite()));
-        let taken = [[0.0, 0.0], [0.6, -0.4], [-1.2, 0.7]].map(|at| grid.cell(at).expect("it is on the grid"));
+        let taken = [[0.0, 0.0], [0.6, -0.4], [-1.2, 0.7]]
+            .map(|at| grid.cell(at).expect("it is on the grid"));
         let mut evidence = Evidence::default();
         for cell in taken {
             (0..3).for_each(|_| evidence.add_thing(cell, 0.3));
@@ -286,7 +362,10 @@ mod tests {
                 length(x - u, y - v)
             });
             let nearest = (nearest.fold(f64::INFINITY, f64::min) - CELL_M / 2.0).max(0.0);
-            assert!((distance - nearest).abs() < 1e-9, "{distance} for {nearest} at ({x}, {y})");
+            assert!(
+                (distance - nearest).abs() < 1e-9,
+                "{distance} for {nearest} at ({x}, {y})"
+            );
         }
     }
 
@@ -323,7 +402,13 @@ mod tests {
         }
         grid.learn(&evidence);
         let standing = grid.standing();
-        assert_eq!(standing, [Standing { at_m: grid.middle(cells[0]), top_m: 0.3 }]);
+        assert_eq!(
+            standing,
+            [Standing {
+                at_m: grid.middle(cells[0]),
+                top_m: 0.3
+            }]
+        );
         let mut next = hall();
         next.recall(&standing);
         assert_eq!(next.standing(), standing);

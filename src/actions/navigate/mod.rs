@@ -1,8 +1,8 @@
-//! Driving to a goal: an occupancy grid from the robot's map and depth camera, a path over it, and the controller that
-//! follows it.
+//! Driving to a goal: an occupancy grid from the robot's map and depth camera, a path over it, and
+//! the controller that follows it.
 //!
-//! Never: knows obstacles other than from the map and its own pictures, or the base's pose other than from its own
-//! belief.
+//! Never: knows obstacles other than from the map and its own pictures, or the base's pose other
+//! than from its own belief.
 
 mod follow;
 mod grid;

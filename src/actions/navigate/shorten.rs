@@ -3,11 +3,12 @@
 use crate::navigate::search::cheapest;
 use crate::navigate::terrain::Terrain;
 
-/// Factor by which a straight leg may cost more than the cells it replaces, which only go in eight directions.
+/// Factor by which a straight leg may cost more than the cells it replaces, which only go in eight
+/// directions.
 const TOLERATED: f64 = 1.001;
 
-/// The path between two places as the ends of its straight legs, without the first place. Returns `None` if there is no
-/// path.
+/// The path between two places as the ends of its straight legs, without the first place. Returns
+/// `None` if there is no path.
 pub fn way(terrain: &Terrain<'_>, from: [f64; 2], to: [f64; 2]) -> Option<Vec<[f64; 2]>> {
     let grid = terrain.grid();
     let cells = cheapest(terrain, grid.cell(from)?, grid.cell(to)?)?;
@@ -53,16 +54,32 @@ mod tests {
 
     /// A room divided by a wall that leaves a door of 90 cm at the upper end.
     fn two_rooms() -> Grid {
-        let across = Outline { pose: Pose::upright([0.0, -0.45, 0.0], 0.0), size_m: [0.1, 3.1] };
-        let upper = Outline { pose: Pose::upright([0.0, 2.05, 0.0], 0.0), size_m: [4.0, 0.1] };
-        let room = Room { name: "hall".to_owned(), low_m: [-2.0, -2.0], high_m: [2.0, 2.0] };
-        let plan = FloorPlan { outlines: vec![across, upper], rooms: vec![room], ..FloorPlan::default() };
+        let across = Outline {
+            pose: Pose::upright([0.0, -0.45, 0.0], 0.0),
+            size_m: [0.1, 3.1],
+        };
+        let upper = Outline {
+            pose: Pose::upright([0.0, 2.05, 0.0], 0.0),
+            size_m: [4.0, 0.1],
+        };
+        let room = Room {
+            name: "hall".to_owned(),
+            low_m: [-2.0, -2.0],
+            high_m: [2.0, 2.0],
+        };
+        let plan = FloorPlan {
+            outlines: vec![across, upper],
+            rooms: vec![room],
+            ..FloorPlan::default()
+        };
         Grid::new(&plan, &[])
     }
 
     fn total(from: [f64; 2], way: &[[f64; 2]]) -> f64 {
         let ends = std::iter::once(&from).chain(way);
-        ends.zip(way).map(|(a, b)| length(b[0] - a[0], b[1] - a[1])).sum()
+        ends.zip(way)
+            .map(|(a, b)| length(b[0] - a[0], b[1] - a[1]))
+            .sum()
     }
 
     #[test]
@@ -76,7 +93,10 @@ mod tests {
         assert_eq!(around.last(), Some(&[1.0, -0.5]));
         // Through the middle of the door it would be 5.1 m; clearance at corners makes it longer.
         assert!((5.1..5.8).contains(&total(from, &around)), "{around:?}");
-        let crossed = around.iter().filter(|at| at[0].abs() < 0.3).all(|at| (1.3..1.8).contains(&at[1]));
+        let crossed = around
+            .iter()
+            .filter(|at| at[0].abs() < 0.3)
+            .all(|at| (1.3..1.8).contains(&at[1]));
         assert!(crossed && around.len() <= 12, "{around:?}");
         assert_eq!(way(&terrain, from, from), Some(vec![from]));
     }

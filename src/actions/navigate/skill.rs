@@ -1,4 +1,5 @@
-//! The drive skill: plans a path by the map, looks ahead while driving, and replans if the path is blocked.
+//! The drive skill: plans a path by the map, looks ahead while driving, and replans if the path is
+//! blocked.
 
 use nalgebra::Point3;
 
@@ -15,11 +16,13 @@ use actcheck_data::ActionReport;
 
 /// Designators of the goal; the first one present is used.
 const PLACES: [&str; 2] = ["objectLocation", "objectSurface"];
-/// Clearance beside the robot on its path. Unit: metres. The combined error of the map, the pictures and localisation.
+/// Clearance beside the robot on its path. Unit: metres. The combined error of the map, the
+/// pictures and localisation.
 const MARGIN_M: f64 = 0.04;
 /// Share of the joints' velocity limits that is used, so that the controller can catch up.
 const SPEED_SHARE: f64 = 0.9;
-/// Speeds that drives don't exceed however fast the base is, among people and furniture. Units: m/s, rad/s.
+/// Speeds that drives don't exceed however fast the base is, among people and furniture. Units:
+/// m/s, rad/s.
 const MOST_SPEED_M_S: f64 = 0.5;
 const MOST_TURN_RAD_S: f64 = 1.0;
 /// Unit: m/s². At full speed the robot stops within 10 cm.
@@ -42,16 +45,17 @@ const MOST_WAYS: usize = 12;
 const HELD_UP_M: f64 = 0.15;
 /// Tolerances within which the goal is reached. Units: metres, radians.
 const REACHED: [f64; 2] = [0.03, 0.03];
-/// Distances from an occupied goal at which substitutes are tried, the nearest first, and the number of directions.
-/// Unit of the distances: metres. From farther away, a table would be out of sight.
+/// Distances from an occupied goal at which substitutes are tried, the nearest first, and the
+/// number of directions. Unit of the distances: metres. From farther away, a table would be out of
+/// sight.
 const ASIDE_M: [f64; 4] = [0.3, 0.45, 0.6, 0.8];
 const N_ASIDE: u32 = 16;
 /// Longest path to a substitute goal, relative to the straight line.
 const DETOUR: f64 = 1.3;
 /// Distance ahead of the goal that the robot faces there. Unit: metres. The middle of a table.
 const FACED_M: f64 = 1.0;
-/// Shortest and longest time for the base to come to rest: it follows the corrections of its pose estimate.
-/// Unit: seconds.
+/// Shortest and longest time for the base to come to rest: it follows the corrections of its pose
+/// estimate. Unit: seconds.
 const ARRIVE_SECS: [f64; 2] = [0.5, 4.0];
 /// Time for which the base has to be at rest. Unit: seconds.
 const AT_REST_SECS: f64 = 0.3;
@@ -63,12 +67,19 @@ const AT_REST: f64 = 2e-3;
 /// # Errors
 /// [`Interrupt`] if simulation broke or time ran out.
 pub fn move_to(call: &ActionCall, robot: &mut Operator<'_>) -> Result<ActionReport, Interrupt> {
-    let named: Vec<&str> = PLACES.iter().filter_map(|designator| call.value(designator)).collect();
-    let Some(first) = named.first() else { return Ok(failed("no place was named to drive to")) };
+    let named: Vec<&str> = PLACES
+        .iter()
+        .filter_map(|designator| call.value(designator))
+        .collect();
+    let Some(first) = named.first() else {
+        return Ok(failed("no place was named to drive to"));
+    };
     let Some(goal) = named.iter().find_map(|name| robot.floor_plan().place(name)) else {
         return Ok(failed(format!("{first} is not on the map")));
     };
-    let Some(base) = robot.layout().base else { return Ok(failed("the robot has no mobile base")) };
+    let Some(base) = robot.layout().base else {
+        return Ok(failed("the robot has no mobile base"));
+    };
     let mut drive = Drive::new(robot, base, goal);
     match drive.go()? {
         Some(reason) => {
@@ -114,10 +125,19 @@ impl<'r, 'o> Drive<'r, 'o> {
         let mut grid = Grid::new(robot.floor_plan(), &[[at[0], at[1]], [goal[0], goal[1]]]);
         grid.recall(&robot.memory().floor);
         let size = Size::of(robot);
-        Self { robot, base, goal, size, limits, grid, follower: Follower::new(at, Vec::new(), at[2]) }
+        Self {
+            robot,
+            base,
+            goal,
+            size,
+            limits,
+            grid,
+            follower: Follower::new(at, Vec::new(), at[2]),
+        }
     }
 
-    /// Drives to the goal and keeps the obstacles seen on the floor. Returns the reason if it did not get there.
+    /// Drives to the goal and keeps the obstacles seen on the floor. Returns the reason if it did
+    /// not get there.
     fn go(&mut self) -> Result<Option<String>, Interrupt> {
         let reason = self.go_on();
         self.robot.remember_floor(self.grid.standing());
@@ -140,18 +160,26 @@ impl<'r, 'o> Drive<'r, 'o> {
             match self.follow()? {
                 Leg::Arrived => return Ok(None),
                 Leg::Blocked => {}
-                Leg::HeldUp => return Ok(Some("the robot is blocked by something it does not see".to_owned())),
+                Leg::HeldUp => {
+                    return Ok(Some(
+                        "the robot is blocked by something it does not see".to_owned(),
+                    ));
+                }
             }
         }
         Ok(Some("no path stayed free".to_owned()))
     }
 
-    /// Drives to the nearest free place near an unreachable goal and faces the same point, because the next action may
-    /// still be possible from there. The goal still counts as not reached.
+    /// Drives to the nearest free place near an unreachable goal and faces the same point, because
+    /// the next action may still be possible from there. The goal still counts as not reached.
     fn go_near(&mut self) -> Result<(), Interrupt> {
         let [x, y, heading] = self.goal;
-        let faced = [x + FACED_M * libm::cos(heading), y + FACED_M * libm::sin(heading)];
-        let turns = || (0..N_ASIDE).map(|idx| std::f64::consts::TAU * f64::from(idx) / f64::from(N_ASIDE));
+        let faced = [
+            x + FACED_M * libm::cos(heading),
+            y + FACED_M * libm::sin(heading),
+        ];
+        let turns =
+            || (0..N_ASIDE).map(|idx| std::f64::consts::TAU * f64::from(idx) / f64::from(N_ASIDE));
         let mut places = ASIDE_M.iter().flat_map(|away| {
             turns().map(move |turn| {
                 let [x, y] = [x + away * libm::cos(turn), y + away * libm::sin(turn)];
@@ -174,7 +202,10 @@ impl<'r, 'o> Drive<'r, 'o> {
     /// Whether the path is nearly straight, and does not lead around a table to its far side.
     fn is_direct(&self) -> bool {
         let ends: Vec<[f64; 2]> = self.follower.left().collect();
-        let way: f64 = ends.windows(2).map(|pair| length(pair[1][0] - pair[0][0], pair[1][1] - pair[0][1])).sum();
+        let way: f64 = ends
+            .windows(2)
+            .map(|pair| length(pair[1][0] - pair[0][0], pair[1][1] - pair[0][1]))
+            .sum();
         let [x, y, _] = self.follower.at();
         way <= length(self.goal[0] - x, self.goal[1] - y) * DETOUR + CELL_M
     }
@@ -183,7 +214,11 @@ impl<'r, 'o> Drive<'r, 'o> {
     fn set_out(&mut self) -> bool {
         let at = self.follower.at();
         let (from, to) = ([at[0], at[1]], [self.goal[0], self.goal[1]]);
-        match way(&Terrain::new(&self.grid, self.size.radius_m + MARGIN_M, from), from, to) {
+        match way(
+            &Terrain::new(&self.grid, self.size.radius_m + MARGIN_M, from),
+            from,
+            to,
+        ) {
             Some(way) => {
                 self.follower = Follower::new(at, way, self.goal[2]);
                 true
@@ -194,8 +229,13 @@ impl<'r, 'o> Drive<'r, 'o> {
 
     fn why_not(&self) -> String {
         let goal = self.grid.cell([self.goal[0], self.goal[1]]);
-        let taken = goal.is_none_or(|cell| self.grid.seen_m()[cell] < self.size.radius_m + MARGIN_M);
-        if taken { "the goal is occupied".to_owned() } else { "there is no free path".to_owned() }
+        let taken =
+            goal.is_none_or(|cell| self.grid.seen_m()[cell] < self.size.radius_m + MARGIN_M);
+        if taken {
+            "the goal is occupied".to_owned()
+        } else {
+            "there is no free path".to_owned()
+        }
     }
 
     /// Follows the path, looking ahead, until it ends or is blocked.
@@ -228,9 +268,11 @@ impl<'r, 'o> Drive<'r, 'o> {
     fn is_free(&self) -> bool {
         let left: Vec<[f64; 2]> = self.follower.left().collect();
         let from = left.first().copied().unwrap_or_default();
-        // Checked without the planning margin, so that a planned path does not fail by the size of a cell.
+        // Checked without the planning margin, so that a planned path does not fail by the size of
+        // a cell.
         let terrain = Terrain::new(&self.grid, self.size.radius_m, from);
-        left.windows(2).all(|pair| terrain.straight(pair[0], pair[1]).is_some())
+        left.windows(2)
+            .all(|pair| terrain.straight(pair[0], pair[1]).is_some())
     }
 
     /// Turns the head to the floor ahead.
@@ -240,7 +282,11 @@ impl<'r, 'o> Drive<'r, 'o> {
         let way = length(x - at_x, y - at_y);
         // Near the end, looks straight ahead at the same distance.
         let point = if way < GAZE_M / 2.0 {
-            Point3::new(at_x + GAZE_M * libm::cos(heading), at_y + GAZE_M * libm::sin(heading), 0.0)
+            Point3::new(
+                at_x + GAZE_M * libm::cos(heading),
+                at_y + GAZE_M * libm::sin(heading),
+                0.0,
+            )
         } else {
             Point3::new(x, y, 0.0)
         };
@@ -261,7 +307,11 @@ impl<'r, 'o> Drive<'r, 'o> {
         let [x, y, heading] = self.follower.at();
         for aside in LOOK_AROUND_RAD {
             let to = heading + aside;
-            self.look_towards(&Point3::new(x + GAZE_M * libm::cos(to), y + GAZE_M * libm::sin(to), 0.0));
+            self.look_towards(&Point3::new(
+                x + GAZE_M * libm::cos(to),
+                y + GAZE_M * libm::sin(to),
+                0.0,
+            ));
             self.robot.wait(REST_SECS)?;
             look(self.robot, self.size, &mut self.grid);
         }
@@ -281,7 +331,10 @@ impl<'r, 'o> Drive<'r, 'o> {
             self.robot.wait(tick / 2.0)?;
             waited += tick;
             let velocities = self.robot.observe().velocities;
-            let moves = self.base.iter().any(|joint| velocities[*joint].abs() > AT_REST);
+            let moves = self
+                .base
+                .iter()
+                .any(|joint| velocities[*joint].abs() > AT_REST);
             still = if moves { 0.0 } else { still + tick };
         }
         Ok(())
@@ -296,9 +349,14 @@ impl<'r, 'o> Drive<'r, 'o> {
         let turned = wrapped(heading - self.goal[2]).abs();
         if off > REACHED[0] || turned > REACHED[1] {
             let (off, turned) = (off * 100.0, turned.to_degrees());
-            return Ok(failed(format!("{place} was missed by {off:.0} cm and {turned:.0} degrees")));
+            return Ok(failed(format!(
+                "{place} was missed by {off:.0} cm and {turned:.0} degrees"
+            )));
         }
-        Ok(ActionReport { succeeded: true, message: format!("stands at {place}") })
+        Ok(ActionReport {
+            succeeded: true,
+            message: format!("stands at {place}"),
+        })
     }
 }
 
@@ -310,5 +368,8 @@ enum Leg {
 }
 
 fn failed(message: impl Into<String>) -> ActionReport {
-    ActionReport { succeeded: false, message: message.into() }
+    ActionReport {
+        succeeded: false,
+        message: message.into(),
+    }
 }

@@ -7,7 +7,8 @@ use crate::route::length;
 const AMPLE_M: f64 = 0.35;
 /// Factor by which a path with ample clearance may be longer than one that just fits.
 const DEAR: f64 = 3.0;
-/// Within this distance, a base that is too close to an obstacle may move away from it. Unit: metres.
+/// Within this distance, a base that is too close to an obstacle may move away from it. Unit:
+/// metres.
 const ESCAPE_M: f64 = 0.6;
 
 /// A grid with the costs for a base that drives on it.
@@ -26,9 +27,20 @@ pub struct Terrain<'a> {
 impl<'a> Terrain<'a> {
     /// The terrain for a base at `from` that has to keep a distance.
     pub fn new(grid: &'a Grid, keep_m: f64, from: [f64; 2]) -> Self {
-        let clear_m: Vec<f64> = grid.seen_m().iter().zip(grid.mapped_m()).map(|(a, b)| a.min(*b)).collect();
+        let clear_m: Vec<f64> = grid
+            .seen_m()
+            .iter()
+            .zip(grid.mapped_m())
+            .map(|(a, b)| a.min(*b))
+            .collect();
         let from_clear_m = grid.cell(from).map_or(0.0, |cell| clear_m[cell]);
-        Self { grid, clear_m, keep_m, from, from_clear_m }
+        Self {
+            grid,
+            clear_m,
+            keep_m,
+            from,
+            from_clear_m,
+        }
     }
 
     /// The grid.
@@ -36,15 +48,16 @@ impl<'a> Terrain<'a> {
         self.grid
     }
 
-    /// Cost of a path at a cell, relative to its length: 1 with ample clearance. Returns `None` if the base can't be
-    /// there.
+    /// Cost of a path at a cell, relative to its length: 1 with ample clearance. Returns `None` if
+    /// the base can't be there.
     pub fn factor(&self, cell: usize) -> Option<f64> {
         let clear = *self.clear_m.get(cell)?;
         let room = clear - self.keep_m;
         if room < 0.0 {
             let [x, y] = self.grid.middle(cell);
             let near = length(x - self.from[0], y - self.from[1]) <= ESCAPE_M;
-            return (near && clear > 0.0 && clear >= self.from_clear_m - CELL_M / 2.0).then_some(2.0 * DEAR);
+            return (near && clear > 0.0 && clear >= self.from_clear_m - CELL_M / 2.0)
+                .then_some(2.0 * DEAR);
         }
         let lack = ((AMPLE_M - room) / AMPLE_M).max(0.0);
         Some(1.0 + (DEAR - 1.0) * lack * lack)
@@ -53,7 +66,11 @@ impl<'a> Terrain<'a> {
     /// Cost of a straight path. Unit: metres. Returns `None` if it is not free.
     pub fn straight(&self, from: [f64; 2], to: [f64; 2]) -> Option<f64> {
         let way = length(to[0] - from[0], to[1] - from[1]);
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a few metres of centimetres")]
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "a few metres of centimetres"
+        )]
         let n_steps = (2.0 * way / CELL_M).ceil().max(1.0) as usize;
         let mut cost = 0.0;
         for step in 0..=n_steps {

@@ -6,7 +6,8 @@ use nalgebra::Point3;
 
 use crate::perceive::cloud::cube_of;
 
-/// Groups in which each point has another at most `reach` away; by index, in the order of their first points.
+/// Groups in which each point has another at most `reach` away; by index, in the order of their
+/// first points.
 pub fn clusters(points: &[Point3<f64>], reach: f64) -> Vec<Vec<usize>> {
     let mut grid: BTreeMap<[i64; 3], Vec<usize>> = BTreeMap::new();
     for (idx, point) in points.iter().enumerate() {
@@ -36,9 +37,15 @@ pub fn clusters(points: &[Point3<f64>], reach: f64) -> Vec<Vec<usize>> {
 }
 
 /// Points of a cube and of its neighbours.
-fn around(grid: &BTreeMap<[i64; 3], Vec<usize>>, [x, y, z]: [i64; 3]) -> impl Iterator<Item = usize> {
+fn around(
+    grid: &BTreeMap<[i64; 3], Vec<usize>>,
+    [x, y, z]: [i64; 3],
+) -> impl Iterator<Item = usize> {
     let columns = (-1..=1).flat_map(move |dx| (-1..=1).map(move |dy| (x + dx, y + dy)));
-    columns.flat_map(move |(x, y)| grid.range([x, y, z - 1]..=[x, y, z + 1]).flat_map(|(_, idxs)| idxs.iter().copied()))
+    columns.flat_map(move |(x, y)| {
+        grid.range([x, y, z - 1]..=[x, y, z + 1])
+            .flat_map(|(_, idxs)| idxs.iter().copied())
+    })
 }
 
 #[cfg(test)]
@@ -48,7 +55,9 @@ mod tests {
     /// Points on a line at a fixed spacing.
     fn line(from: f64, to: f64, step: f64, height: f64) -> Vec<Point3<f64>> {
         let count = ((to - from) / step).round() as usize;
-        (0..=count).map(|idx| Point3::new(from + step * idx as f64, 0.0, height)).collect()
+        (0..=count)
+            .map(|idx| Point3::new(from + step * idx as f64, 0.0, height))
+            .collect()
     }
 
     #[test]
@@ -58,14 +67,28 @@ mod tests {
         let apart = [line(0.0, 0.1, 0.005, 0.0), line(0.121, 0.2, 0.005, 0.0)].concat();
         let found = clusters(&apart, 0.02);
         assert_eq!(found.iter().map(Vec::len).collect::<Vec<_>>(), [21, 17]);
-        assert_eq!(clusters(&[line(0.0, 0.1, 0.005, 0.0), line(0.0, 0.1, 0.005, 0.03)].concat(), 0.02).len(), 2);
+        assert_eq!(
+            clusters(
+                &[line(0.0, 0.1, 0.005, 0.0), line(0.0, 0.1, 0.005, 0.03)].concat(),
+                0.02
+            )
+            .len(),
+            2
+        );
     }
 
     #[test]
     fn every_point_is_in_exactly_one_cluster() {
         let stream = actcheck_data::Stream::new(2);
-        let points: Vec<Point3<f64>> =
-            (0..600).map(|i| Point3::new(stream.unit(3 * i), stream.unit(3 * i + 1), stream.unit(3 * i + 2))).collect();
+        let points: Vec<Point3<f64>> = (0..600)
+            .map(|i| {
+                Point3::new(
+                    stream.unit(3 * i),
+                    stream.unit(3 * i + 1),
+                    stream.unit(3 * i + 2),
+                )
+            })
+            .collect();
         let found = clusters(&points, 0.07);
         let mut all: Vec<usize> = found.iter().flatten().copied().collect();
         all.sort_unstable();

@@ -17,36 +17,55 @@ const SEEN_RAD: f64 = 0.05;
 /// Largest change of a joint per round. Unit: radians.
 const LARGEST_RAD: f64 = 0.5;
 
-/// The posture with the head turned so that a point is at the centre of the picture, or as close to it as the head's
-/// joints allow. Without head joints, the posture is returned unchanged. Frame: world, by the base's belief.
-pub fn towards(kinematics: &Kinematics, layout: &Layout, positions: &[f64], point: &Point3<f64>) -> Vec<f64> {
+/// The posture with the head turned so that a point is at the centre of the picture, or as close to
+/// it as the head's joints allow. Without head joints, the posture is returned unchanged. Frame:
+/// world, by the base's belief.
+pub fn towards(
+    kinematics: &Kinematics,
+    layout: &Layout,
+    positions: &[f64],
+    point: &Point3<f64>,
+) -> Vec<f64> {
     let turned = self::turned(kinematics, layout, positions.to_vec(), point);
     if off(kinematics, &turned, point).norm() < SEEN_RAD {
         return turned;
     }
     // If the short way round hits a joint limit, the long way may not.
-    let other = self::turned(kinematics, layout, ahead(kinematics, layout, positions), point);
+    let other = self::turned(
+        kinematics,
+        layout,
+        ahead(kinematics, layout, positions),
+        point,
+    );
     let miss = |posture: &[f64]| off(kinematics, posture, point).norm();
-    if miss(&other) < miss(&turned) { other } else { turned }
+    if miss(&other) < miss(&turned) {
+        other
+    } else {
+        turned
+    }
 }
 
-/// The posture with the head turned towards a point like [`towards`], but only as far as the head does not collide with
-/// the arm.
+/// The posture with the head turned towards a point like [`towards`], but only as far as the head
+/// does not collide with the arm.
 pub fn safely_towards(robot: &Operator<'_>, point: &Point3<f64>) -> Vec<f64> {
     let (kinematics, start) = (robot.kinematics(), robot.commanded());
     let turned = towards(kinematics, robot.layout(), start, point);
     let itself = SelfContact::new(kinematics, &[start.to_vec()]);
-    let free = legs(start, &turned).take_while(|posture| !itself.touches(&kinematics.links(posture)));
+    let free =
+        legs(start, &turned).take_while(|posture| !itself.touches(&kinematics.links(posture)));
     free.last().unwrap_or_else(|| start.to_vec())
 }
 
-/// Postures that turn the head towards a point. Where the arm is in the way of the straight turn, one joint of the head
-/// turns before the others, or the head looks ahead first; if that does not help, it turns as [`safely_towards`] does.
+/// Postures that turn the head towards a point. Where the arm is in the way of the straight turn,
+/// one joint of the head turns before the others, or the head looks ahead first; if that does not
+/// help, it turns as [`safely_towards`] does.
 pub fn way_towards(robot: &Operator<'_>, point: &Point3<f64>) -> Vec<Vec<f64>> {
     let (kinematics, layout, start) = (robot.kinematics(), robot.layout(), robot.commanded());
     let turned = towards(kinematics, layout, start, point);
     let itself = SelfContact::new(kinematics, &[start.to_vec()]);
-    let is_free = |from: &[f64], to: &[f64]| legs(from, to).all(|posture| !itself.touches(&kinematics.links(&posture)));
+    let is_free = |from: &[f64], to: &[f64]| {
+        legs(from, to).all(|posture| !itself.touches(&kinematics.links(&posture)))
+    };
     if is_free(start, &turned) {
         return vec![turned];
     }
@@ -56,8 +75,13 @@ pub fn way_towards(robot: &Operator<'_>, point: &Point3<f64>) -> Vec<Vec<f64>> {
         first
     });
     let ahead = ahead(kinematics, layout, start);
-    let first = one_first.chain([ahead]).find(|first| is_free(start, first) && is_free(first, &turned));
-    first.map_or_else(|| vec![safely_towards(robot, point)], |first| vec![first, turned])
+    let first = one_first
+        .chain([ahead])
+        .find(|first| is_free(start, first) && is_free(first, &turned));
+    first.map_or_else(
+        || vec![safely_towards(robot, point)],
+        |first| vec![first, turned],
+    )
 }
 
 /// A posture with the head turned ahead, as far as its joints allow.
@@ -74,12 +98,20 @@ fn ahead(kinematics: &Kinematics, layout: &Layout, positions: &[f64]) -> Vec<f64
 fn legs(from: &[f64], to: &[f64]) -> impl Iterator<Item = Vec<f64>> {
     (1..=N_CHECKS).map(move |step| {
         let share = f64::from(step) / f64::from(N_CHECKS);
-        from.iter().zip(to).map(|(from, to)| from + (to - from) * share).collect()
+        from.iter()
+            .zip(to)
+            .map(|(from, to)| from + (to - from) * share)
+            .collect()
     })
 }
 
 /// The result of turning the head towards a point from a given posture.
-fn turned(kinematics: &Kinematics, layout: &Layout, mut positions: Vec<f64>, point: &Point3<f64>) -> Vec<f64> {
+fn turned(
+    kinematics: &Kinematics,
+    layout: &Layout,
+    mut positions: Vec<f64>,
+    point: &Point3<f64>,
+) -> Vec<f64> {
     for _ in 0..N_ROUNDS {
         let miss = off(kinematics, &positions, point);
         let effects: Vec<Vector2<f64>> = layout
@@ -91,9 +123,14 @@ fn turned(kinematics: &Kinematics, layout: &Layout, mut positions: Vec<f64>, poi
                 (off(kinematics, &probed, point) - miss) / PROBE_RAD
             })
             .collect();
-        let squared =
-            effects.iter().fold(Matrix2::identity() * DAMPING, |sum, effect| sum + effect * effect.transpose());
-        let Some(inverse) = squared.try_inverse() else { break };
+        let squared = effects
+            .iter()
+            .fold(Matrix2::identity() * DAMPING, |sum, effect| {
+                sum + effect * effect.transpose()
+            });
+        let Some(inverse) = squared.try_inverse() else {
+            break;
+        };
         for (joint, effect) in layout.head.iter().zip(&effects) {
             let change = -effect.dot(&(inverse * miss));
             let limits = &kinematics.joints()[*joint];
@@ -121,19 +158,29 @@ mod tests {
     use actcheck_data::RobotStart;
     use actcheck_world::geometry;
 
-    /// Regression: a head turned far to the right could not look ahead again, because the short way crosses a joint
-    /// limit of the neck.
+    /// Regression: a head turned far to the right could not look ahead again, because the short way
+    /// crosses a joint limit of the neck.
     #[test]
     fn the_head_can_look_ahead_from_any_posture() {
         let path = Path::new("models/robots/mobile_manipulator.toml");
-        let profile = actcheck_config::robot::read(&Files::Shipped, path).expect("the shipped robot is valid");
-        let start = RobotStart { profile: Arc::new(profile), base: [0.0; 3], root_height_m: 0.0, knows: Arc::new([]) };
-        let (kinematics, layout, mut posture) = geometry(&start).expect("the shipped robot is valid");
+        let profile = actcheck_config::robot::read(&Files::Shipped, path)
+            .expect("the shipped robot is valid");
+        let start = RobotStart {
+            profile: Arc::new(profile),
+            base: [0.0; 3],
+            root_height_m: 0.0,
+            knows: Arc::new([]),
+        };
+        let (kinematics, layout, mut posture) =
+            geometry(&start).expect("the shipped robot is valid");
         for pan in [-3.8, -3.0, -1.0, 0.0, 1.7] {
             posture[layout.head[0]] = pan;
             for point in [[1.0, 0.0, 0.7], [0.8, 0.6, 0.4], [0.3, -1.0, 0.0]].map(Point3::from) {
                 let found = towards(&kinematics, &layout, &posture, &point);
-                assert!(off(&kinematics, &found, &point).norm() < SEEN_RAD, "from {pan} to {point}: {found:?}");
+                assert!(
+                    off(&kinematics, &found, &point).norm() < SEEN_RAD,
+                    "from {pan} to {point}: {found:?}"
+                );
             }
         }
     }

@@ -1,4 +1,5 @@
-//! Finds the largest level plane among points: the guess with the most inliers, then a fit to those inliers.
+//! Finds the largest level plane among points: the guess with the most inliers, then a fit to those
+//! inliers.
 
 use nalgebra::{Point3, Unit, Vector3};
 
@@ -24,8 +25,8 @@ pub struct Plane {
     pub normal: Unit<Vector3<f64>>,
 }
 
-/// Number of guesses. If a third of the points are inliers, one guess in 27 is right, and all are wrong once in 10¹⁶
-/// times.
+/// Number of guesses. If a third of the points are inliers, one guess in 27 is right, and all are
+/// wrong once in 10¹⁶ times.
 const N_GUESSES: u64 = 1000;
 /// Number of points used to score a guess.
 const N_JUDGES: usize = 500;
@@ -52,10 +53,16 @@ impl Plane {
         Unit::try_new(upwards, 1e-6).map(|normal| Self { point: *a, normal })
     }
 
-    /// The plane with the least sum of squared vertical distances. (For a nearly level plane this is as good as
-    /// distances along the normal.)
+    /// The plane with the least sum of squared vertical distances. (For a nearly level plane this
+    /// is as good as distances along the normal.)
     fn fitted(points: &[Point3<f64>]) -> Option<Self> {
-        let middle = Point3::from(points.iter().map(|point| point.coords).sum::<Vector3<f64>>() / points.len() as f64);
+        let middle = Point3::from(
+            points
+                .iter()
+                .map(|point| point.coords)
+                .sum::<Vector3<f64>>()
+                / points.len() as f64,
+        );
         let [mut xx, mut xy, mut yy, mut xz, mut yz] = [0.0; 5];
         for point in points {
             let d = point - middle;
@@ -65,21 +72,30 @@ impl Plane {
         let det = xx * yy - xy * xy;
         let (slope_x, slope_y) = ((xz * yy - yz * xy) / det, (yz * xx - xz * xy) / det);
         let normal = Unit::try_new(Vector3::new(-slope_x, -slope_y, 1.0), 1e-6)?;
-        (det > 1e-12 && slope_x.is_finite() && slope_y.is_finite()).then_some(Self { point: middle, normal })
+        (det > 1e-12 && slope_x.is_finite() && slope_y.is_finite()).then_some(Self {
+            point: middle,
+            normal,
+        })
     }
 }
 
-/// The plane with the most inliers, and their indices. Returns `None` if there are too few points or inliers, or the
-/// plane is tilted too far. The same seed makes the same guesses.
+/// The plane with the most inliers, and their indices. Returns `None` if there are too few points
+/// or inliers, or the plane is tilted too far. The same seed makes the same guesses.
 pub fn find(points: &[Point3<f64>], prior: &Prior, seed: u64) -> Option<(Plane, Vec<usize>)> {
     let (low, high) = prior.heights_m;
-    let within: Vec<usize> = (0..points.len()).filter(|idx| (low..=high).contains(&points[*idx].z)).collect();
+    let within: Vec<usize> = (0..points.len())
+        .filter(|idx| (low..=high).contains(&points[*idx].z))
+        .collect();
     if within.len() < LEAST_POINTS {
         return None;
     }
     let mut plane = guess(points, &within, prior, seed)?;
     let near = |plane: &Plane| -> Vec<usize> {
-        within.iter().copied().filter(|idx| plane.above(&points[*idx]).abs() <= prior.off_m).collect()
+        within
+            .iter()
+            .copied()
+            .filter(|idx| plane.above(&points[*idx]).abs() <= prior.off_m)
+            .collect()
     };
     for _ in 0..N_FITS {
         let some: Vec<Point3<f64>> = near(&plane).into_iter().map(|idx| points[idx]).collect();
@@ -92,17 +108,28 @@ pub fn find(points: &[Point3<f64>], prior: &Prior, seed: u64) -> Option<(Plane, 
 /// The best of many planes through three points each.
 fn guess(points: &[Point3<f64>], within: &[usize], prior: &Prior, seed: u64) -> Option<Plane> {
     let stream = Stream::new(seed);
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "an index below the number of points")]
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "an index below the number of points"
+    )]
     let pick = |number: u64| points[within[(stream.unit(number) * within.len() as f64) as usize]];
-    let judges: Vec<Point3<f64>> = (0..N_JUDGES as u64).map(|number| pick(3 * N_GUESSES + number)).collect();
+    let judges: Vec<Point3<f64>> = (0..N_JUDGES as u64)
+        .map(|number| pick(3 * N_GUESSES + number))
+        .collect();
     let mut best: Option<(usize, Plane)> = None;
     for number in 0..N_GUESSES {
         let corners = [0, 1, 2].map(|corner| pick(3 * number + corner));
-        let Some(plane) = Plane::through(&corners[0], &corners[1], &corners[2]) else { continue };
+        let Some(plane) = Plane::through(&corners[0], &corners[1], &corners[2]) else {
+            continue;
+        };
         if plane.tilt() > prior.tilt_rad {
             continue;
         }
-        let agree = judges.iter().filter(|point| plane.above(point).abs() <= prior.off_m).count();
+        let agree = judges
+            .iter()
+            .filter(|point| plane.above(point).abs() <= prior.off_m)
+            .count();
         if best.as_ref().is_none_or(|(most, _)| agree > *most) {
             best = Some((agree, plane));
         }
@@ -114,9 +141,14 @@ fn guess(points: &[Point3<f64>], within: &[usize], prior: &Prior, seed: u64) -> 
 mod tests {
     use super::*;
 
-    const PRIOR: Prior = Prior { heights_m: (0.2, 1.3), tilt_rad: 0.15, off_m: 0.01 };
+    const PRIOR: Prior = Prior {
+        heights_m: (0.2, 1.3),
+        tilt_rad: 0.15,
+        off_m: 0.01,
+    };
 
-    /// Points on z = 0.7 + 0.05 x − 0.02 y over a square metre with 2 mm of noise, and as many anywhere above.
+    /// Points on z = 0.7 + 0.05 x − 0.02 y over a square metre with 2 mm of noise, and as many
+    /// anywhere above.
     fn scattered(seed: u64) -> (Vec<Point3<f64>>, Plane) {
         let stream = Stream::new(seed);
         let mut points = Vec::new();
@@ -127,7 +159,13 @@ mod tests {
             points.push(Point3::new(x, y, 0.78 + 0.4 * z));
         }
         let normal = Unit::new_normalize(Vector3::new(-0.05, 0.02, 1.0));
-        (points, Plane { point: Point3::new(0.5, 0.5, 0.715), normal })
+        (
+            points,
+            Plane {
+                point: Point3::new(0.5, 0.5, 0.715),
+                normal,
+            },
+        )
     }
 
     #[test]
@@ -135,8 +173,16 @@ mod tests {
         for seed in 0..5 {
             let (points, truth) = scattered(seed);
             let (plane, inliers) = find(&points, &PRIOR, seed).expect("a plane is found");
-            assert!(plane.above(&truth.point).abs() < 3e-4, "{} m off", plane.above(&truth.point));
-            assert!(plane.normal.angle(&truth.normal) < 1e-3, "{} rad off", plane.normal.angle(&truth.normal));
+            assert!(
+                plane.above(&truth.point).abs() < 3e-4,
+                "{} m off",
+                plane.above(&truth.point)
+            );
+            assert!(
+                plane.normal.angle(&truth.normal) < 1e-3,
+                "{} rad off",
+                plane.normal.angle(&truth.normal)
+            );
             assert_eq!(inliers.len(), 2000);
             assert_eq!(find(&points, &PRIOR, seed), Some((plane, inliers)));
         }
@@ -144,7 +190,13 @@ mod tests {
 
     #[test]
     fn three_exact_points_give_the_exact_plane() {
-        let points = [[0.0, 0.0, 1.0], [1.0, 0.0, 1.1], [0.0, 1.0, 0.8], [1.0, 1.0, 0.9]].map(Point3::from);
+        let points = [
+            [0.0, 0.0, 1.0],
+            [1.0, 0.0, 1.1],
+            [0.0, 1.0, 0.8],
+            [1.0, 1.0, 0.9],
+        ]
+        .map(Point3::from);
         let plane = Plane::fitted(&points).expect("the points are not collinear");
         assert!(points.iter().all(|point| plane.above(point).abs() < 1e-12));
         assert!((plane.tilt() - libm::atan(0.05f64.sqrt())).abs() < 1e-12);

@@ -25,7 +25,8 @@ const FOLD_SECS: f64 = 2.0;
 const TUCK_SECS: f64 = 3.0;
 /// Shortest duration of moving down to a few centimetres above the surface. Unit: seconds.
 const DOWN_SECS: f64 = 3.0;
-/// How far the hand continues below the expected height of the surface. Unit: metres. Three times the error of vision.
+/// How far the hand continues below the expected height of the surface. Unit: metres. Three times
+/// the error of vision.
 const DEEPER_M: f64 = 0.03;
 /// Shortest duration of the last part of the descent, at about 2 cm/s. Unit: seconds.
 const SETTLE_SECS: f64 = 3.0;
@@ -50,21 +51,29 @@ impl From<Interrupt> for Halt {
     }
 }
 
-/// Sets the held object down on the designated surface and reports whether the robot believes it is there.
+/// Sets the held object down on the designated surface and reports whether the robot believes it is
+/// there.
 ///
 /// # Errors
 /// [`Interrupt`] if simulation broke or time ran out.
 pub fn place(call: &ActionCall, robot: &mut Operator<'_>) -> Result<ActionReport, Interrupt> {
     match try_to_place(call, robot) {
-        Ok(message) => Ok(ActionReport { succeeded: true, message }),
+        Ok(message) => Ok(ActionReport {
+            succeeded: true,
+            message,
+        }),
         Err(Halt::Failed(reason)) => Ok(failed(reason)),
         Err(Halt::Interrupted(interrupt)) => Err(interrupt),
     }
 }
 
 fn try_to_place(call: &ActionCall, robot: &mut Operator<'_>) -> Result<String, Halt> {
-    let target = call.value(TARGET).ok_or_else(|| Halt::Failed("no object was named to be placed".to_owned()))?;
-    let surface = call.value(SURFACE).ok_or_else(|| Halt::Failed("no surface was named to place it on".to_owned()))?;
+    let target = call
+        .value(TARGET)
+        .ok_or_else(|| Halt::Failed("no object was named to be placed".to_owned()))?;
+    let surface = call
+        .value(SURFACE)
+        .ok_or_else(|| Halt::Failed("no surface was named to place it on".to_owned()))?;
     robot.begin("feel");
     let held = in_hand(target, robot)?;
     robot.watch_grip(held.wall_m);
@@ -86,7 +95,10 @@ fn try_to_place(call: &ActionCall, robot: &mut Operator<'_>) -> Result<String, H
     let survey = look_at(surface, &seen, &others, robot)?;
     still_in_hand(&held, robot)?;
     robot.begin("unfold");
-    robot.follow(&carry::untuck(robot, &tucked, &folded), if tucked.is_empty() { 0.0 } else { TUCK_SECS })?;
+    robot.follow(
+        &carry::untuck(robot, &tucked, &folded),
+        if tucked.is_empty() { 0.0 } else { TUCK_SECS },
+    )?;
     still_in_hand(&held, robot)?;
     let (plan, spot) = choose(surface, &held, &survey, &others, robot)?;
     set_down(surface, &held, &plan, &spot, robot)
@@ -118,44 +130,62 @@ fn still_in_hand(held: &Held, robot: &mut Operator<'_>) -> Result<(), Halt> {
     Err(Halt::Failed(lost))
 }
 
-/// The approximate pose of the surface, and all other objects. If the robot perceived its surroundings earlier, these
-/// are the furniture of its floor plan and the perceived objects. Otherwise mapped furniture comes from the map and
-/// everything else from the abstract detector.
-fn look_out(surface: &str, held: &Held, robot: &mut Operator<'_>) -> Result<(Sighting, Vec<Sighting>), Halt> {
+/// The approximate pose of the surface, and all other objects. If the robot perceived its
+/// surroundings earlier, these are the furniture of its floor plan and the perceived objects.
+/// Otherwise mapped furniture comes from the map and everything else from the abstract detector.
+fn look_out(
+    surface: &str,
+    held: &Held,
+    robot: &mut Operator<'_>,
+) -> Result<(Sighting, Vec<Sighting>), Halt> {
     let mut seen = match robot.memory().perceived.clone() {
         Some(perceived) => {
             let standing = perceived.things.iter().enumerate();
-            let things = standing.map(|(idx, thing)| memory::sighting(format!("thing_{}", idx + 1), thing));
+            let things =
+                standing.map(|(idx, thing)| memory::sighting(format!("thing_{}", idx + 1), thing));
             things.chain(robot.known_furniture()).collect()
         }
         None => {
             let map = robot.map_of_furniture().unwrap_or_default();
-            let mut seen = robot.see_where(|id| id != held.id && map.iter().all(|piece| piece.id != id));
+            let mut seen =
+                robot.see_where(|id| id != held.id && map.iter().all(|piece| piece.id != id));
             seen.extend(map);
             seen
         }
     };
-    let at = seen.iter().position(|thing| thing.id == surface && thing.furniture);
+    let at = seen
+        .iter()
+        .position(|thing| thing.id == surface && thing.furniture);
     let at = at.ok_or_else(|| Halt::Failed(format!("{surface} was not seen")))?;
     let place = seen.remove(at);
     // There may still be a percept of the object at its old position.
     let taken = held.foot.translation.vector;
     seen.retain(|thing| {
-        thing.furniture || (Vector3::from(thing.pose.position) - taken).norm() > spot::radius(held.size_m)
+        thing.furniture
+            || (Vector3::from(thing.pose.position) - taken).norm() > spot::radius(held.size_m)
     });
     Ok((place, seen))
 }
 
-/// The surface seen from in front of it: in pictures if the robot perceived its surroundings earlier, otherwise by the
-/// abstract detector.
-fn look_at(surface: &str, seen: &Sighting, others: &[Sighting], robot: &mut Operator<'_>) -> Result<Survey, Halt> {
+/// The surface seen from in front of it: in pictures if the robot perceived its surroundings
+/// earlier, otherwise by the abstract detector.
+fn look_at(
+    surface: &str,
+    seen: &Sighting,
+    others: &[Sighting],
+    robot: &mut Operator<'_>,
+) -> Result<Survey, Halt> {
     robot.wait(LOOK_SECS)?;
     let missing = || Halt::Failed(format!("{surface} was not found where it should be"));
     if robot.memory().perceived.is_some() {
         return survey(seen, robot)?.ok_or_else(missing);
     }
     let again = robot.see(surface).ok_or_else(missing)?;
-    let things = others.iter().filter(|thing| !thing.furniture).cloned().collect();
+    let things = others
+        .iter()
+        .filter(|thing| !thing.furniture)
+        .cloned()
+        .collect();
     Ok(Survey::of(&again, things))
 }
 
@@ -168,7 +198,12 @@ fn choose(
     robot: &mut Operator<'_>,
 ) -> Result<(Plan, Point3<f64>), Halt> {
     let base = Point3::from(robot.base().translation.vector);
-    let spots = spot::spots(&survey.plane, &survey.things, spot::radius(held.size_m), &base);
+    let spots = spot::spots(
+        &survey.plane,
+        &survey.things,
+        spot::radius(held.size_m),
+        &base,
+    );
     if spots.is_empty() {
         return Err(Halt::Failed(format!("there is no free place on {surface}")));
     }
@@ -178,12 +213,25 @@ fn choose(
     around.extend(memory::obstacles(&robot.memory().floor));
     let ways = spot::ways(held, &spots, robot.profile().max_opening_m);
     // An arm that can't unfold straight moves around obstacles; the held object may tilt meanwhile.
-    let wanted = PlanRequest { grasps: &ways, all: &ways, taken: None };
+    let wanted = PlanRequest {
+        grasps: &ways,
+        all: &ways,
+        taken: None,
+    };
     let plan = plan::plan(robot, wanted, &spot::heightened(&around, held));
     let plan = plan.map_err(|reason| Halt::Failed(format!("{surface}: {reason}")))?;
-    let lowest = plan.approach.last().map(|posture| robot.kinematics().grasp(posture).translation.vector.xy().into());
+    let lowest = plan.approach.last().map(|posture| {
+        robot
+            .kinematics()
+            .grasp(posture)
+            .translation
+            .vector
+            .xy()
+            .into()
+    });
     let spot = lowest.and_then(|at| spot::nearest(&spots, &at));
-    spot.map(|spot| (plan, spot)).ok_or_else(|| Halt::Failed(format!("{surface}: no path down to it was found")))
+    spot.map(|spot| (plan, spot))
+        .ok_or_else(|| Halt::Failed(format!("{surface}: no path down to it was found")))
 }
 
 /// Carries the object over its spot, lowers it, releases it and withdraws.
@@ -211,32 +259,50 @@ fn set_down(
     withdraw(held, plan, robot)?;
     robot.wait(LOOK_SECS)?;
     if robot.has_cup() && feels(robot) {
-        return Err(Halt::Failed("the suction cup did not let go: its vacuum is still felt".to_owned()));
+        return Err(Halt::Failed(
+            "the suction cup did not let go: its vacuum is still felt".to_owned(),
+        ));
     }
     let gap = robot.feel_opening();
     if !robot.has_cup() && gap < held.opening_m + spot::RELEASE_M / 2.0 {
-        return Err(Halt::Failed(format!("the hand did not open: its fingers are {:.1} cm apart", gap * 100.0)));
+        return Err(Halt::Failed(format!(
+            "the hand did not open: its fingers are {:.1} cm apart",
+            gap * 100.0
+        )));
     }
     if !stands {
-        return Err(Halt::Failed(format!("{} was let go, but {surface} was not felt below it", held.id)));
+        return Err(Halt::Failed(format!(
+            "{} was let go, but {surface} was not felt below it",
+            held.id
+        )));
     }
-    Ok(format!("set {} down on {surface} at x = {:.2}, y = {:.2}", held.id, spot.x, spot.y))
+    Ok(format!(
+        "set {} down on {surface} at x = {:.2}, y = {:.2}",
+        held.id, spot.x, spot.y
+    ))
 }
 
 /// Lowers the hand until something else carries the object. Returns `true` if contact was felt.
 fn lower(plan: &Plan, robot: &mut Operator<'_>) -> Result<bool, Halt> {
     robot.wait(LOOK_SECS)?;
-    let Some((lowest, down)) = plan.approach.split_last() else { return Ok(false) };
+    let Some((lowest, down)) = plan.approach.split_last() else {
+        return Ok(false);
+    };
     let mut touch = Touch::new(robot);
     if robot.follow_until(down, DOWN_SECS, |robot| touch.felt(robot))? {
         return Ok(true);
     }
     let mut deeper = vec![lowest.clone()];
-    deeper.extend(carry::straight(robot, lowest, &Vector3::new(0.0, 0.0, -DEEPER_M)));
+    deeper.extend(carry::straight(
+        robot,
+        lowest,
+        &Vector3::new(0.0, 0.0, -DEEPER_M),
+    ));
     Ok(robot.follow_until(&deeper, SETTLE_SECS, |robot| touch.felt(robot))?)
 }
 
-/// Withdraws the open hand: horizontally and backwards from an object held from the side, otherwise upwards first.
+/// Withdraws the open hand: horizontally and backwards from an object held from the side, otherwise
+/// upwards first.
 fn withdraw(held: &Held, plan: &Plan, robot: &mut Operator<'_>) -> Result<(), Halt> {
     if !spot::is_level(held) {
         robot.follow(&plan.lift, LEAVE_SECS)?;

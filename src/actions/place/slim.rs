@@ -1,7 +1,8 @@
 //! A way of the arm to a posture that makes the robot slim, with an upright load all the way.
 //!
-//! A tree of postures grows from the present one towards samples and towards slim postures. Each posture is turned so that
-//! the load is upright (Berenson et al. 2009, "Manipulation planning on constraint manifolds").
+//! A tree of postures grows from the present one towards samples and towards slim postures. Each
+//! posture is turned so that the load is upright (Berenson et al. 2009, "Manipulation planning on
+//! constraint manifolds").
 
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 
@@ -35,8 +36,8 @@ pub(super) struct Load<'a> {
 }
 
 impl Load<'_> {
-    /// The way to one of the slim postures with the hand at one of these poses, without its first posture. `None` if there
-    /// is none, or the samples run out.
+    /// The way to one of the slim postures with the hand at one of these poses, without its first
+    /// posture. `None` if there is none, or the samples run out.
     pub fn way(&self, hands: &[Isometry3<f64>]) -> Option<Vec<Vec<f64>>> {
         let goals = self.goals(hands);
         let mut samples = Samples::new(0.0, MOST_SAMPLES);
@@ -46,7 +47,11 @@ impl Load<'_> {
             count += 1;
             let goal = &goals[(count / GOAL_EVERY) as usize % goals.len()];
             let aims_at_goal = count % GOAL_EVERY == 0;
-            let target = if aims_at_goal { goal.clone() } else { self.sampled(&sample) };
+            let target = if aims_at_goal {
+                goal.clone()
+            } else {
+                self.sampled(&sample)
+            };
             let mut at = nearest(&tree, &target, self.arm)?;
             // Towards a goal, the tree grows as far as it can.
             while let Some(posture) = self.step(&tree[at].0, &target) {
@@ -69,7 +74,9 @@ impl Load<'_> {
         let mut samples = Samples::new(0.5, u32::try_from(hands.len()).unwrap_or(u32::MAX));
         let mut goals = Vec::new();
         for hand in hands {
-            let sampled = samples.next(self.arm.len()).map(|sample| self.sampled(&sample));
+            let sampled = samples
+                .next(self.arm.len())
+                .map(|sample| self.sampled(&sample));
             for seed in sampled.iter().map(Vec::as_slice).chain([self.start]) {
                 if let Some(posture) = self.reached(seed, *hand)
                     && (self.is_slim)(&posture)
@@ -88,7 +95,11 @@ impl Load<'_> {
     /// The next posture of a branch. `None` if something is in the way.
     fn step(&self, from: &[f64], to: &[f64]) -> Option<Vec<f64>> {
         let share = (BRANCH / farthest(from, to, self.arm).max(1e-9)).min(1.0);
-        let between: Vec<f64> = from.iter().zip(to).map(|(a, b)| a + (b - a) * share).collect();
+        let between: Vec<f64> = from
+            .iter()
+            .zip(to)
+            .map(|(a, b)| a + (b - a) * share)
+            .collect();
         let posture = self.reached(&between, self.righted(&between))?;
         let is_near = farthest(from, &posture, self.arm) < JUMP * BRANCH;
         // A branch that turning upright brings back does not grow.
@@ -133,8 +144,10 @@ impl Load<'_> {
         let mut kept = Vec::new();
         let mut at = 0;
         while at + 1 < way.len() {
-            let cut =
-                (at + 2..way.len()).rev().step_by(4).find_map(|end| Some((end, self.branches(&way[at], &way[end])?)));
+            let cut = (at + 2..way.len())
+                .rev()
+                .step_by(4)
+                .find_map(|end| Some((end, self.branches(&way[at], &way[end])?)));
             let (end, branches) = cut.unwrap_or_else(|| (at + 1, vec![way[at + 1].clone()]));
             kept.extend(branches);
             at = end;
@@ -142,7 +155,8 @@ impl Load<'_> {
         kept
     }
 
-    /// Branches straight from one posture to another, ending there. `None` if something is in the way.
+    /// Branches straight from one posture to another, ending there. `None` if something is in the
+    /// way.
     fn branches(&self, from: &[f64], to: &[f64]) -> Option<Vec<Vec<f64>>> {
         let mut way: Vec<Vec<f64>> = Vec::new();
         let mut now = from.to_vec();
@@ -157,13 +171,21 @@ impl Load<'_> {
 
 /// The largest movement of a joint between two postures.
 fn farthest(from: &[f64], to: &[f64], arm: &[usize]) -> f64 {
-    arm.iter().map(|joint| (to[*joint] - from[*joint]).abs()).fold(0.0, f64::max)
+    arm.iter()
+        .map(|joint| (to[*joint] - from[*joint]).abs())
+        .fold(0.0, f64::max)
 }
 
 fn nearest(tree: &[(Vec<f64>, usize)], target: &[f64], arm: &[usize]) -> Option<usize> {
-    let span = |node: &[f64]| arm.iter().map(|joint| (target[*joint] - node[*joint]).powi(2)).sum::<f64>();
+    let span = |node: &[f64]| {
+        arm.iter()
+            .map(|joint| (target[*joint] - node[*joint]).powi(2))
+            .sum::<f64>()
+    };
     let spans = tree.iter().map(|(node, _)| span(node)).enumerate();
-    spans.min_by(|one, other| one.1.total_cmp(&other.1)).map(|(node, _)| node)
+    spans
+        .min_by(|one, other| one.1.total_cmp(&other.1))
+        .map(|(node, _)| node)
 }
 
 /// Postures from the root to a node.
@@ -198,10 +220,20 @@ mod tests {
     #[test]
     fn the_hand_comes_close_without_tilting_its_load() {
         let path = Path::new("models/robots/fixed_arm.toml");
-        let profile = actcheck_config::robot::read(&Files::Shipped, path).expect("the shipped robot is valid");
-        let start = RobotStart { profile: Arc::new(profile), base: [0.0; 3], root_height_m: 0.0, knows: Arc::new([]) };
+        let profile = actcheck_config::robot::read(&Files::Shipped, path)
+            .expect("the shipped robot is valid");
+        let start = RobotStart {
+            profile: Arc::new(profile),
+            base: [0.0; 3],
+            root_height_m: 0.0,
+            knows: Arc::new([]),
+        };
         let (kinematics, layout, mut start) = geometry(&start).expect("the shipped robot is valid");
-        for (idx, value) in layout.arm.iter().zip([-0.9, 0.7, 0.0, 1.59, 0.0, 0.85, 0.0]) {
+        for (idx, value) in layout
+            .arm
+            .iter()
+            .zip([-0.9, 0.7, 0.0, 1.59, 0.0, 0.85, 0.0])
+        {
             start[*idx] = value;
         }
         let itself = SelfContact::new(&kinematics, &[start.clone()]);
@@ -218,13 +250,22 @@ mod tests {
         let hand = kinematics.grasp(&start);
         let hands: Vec<Isometry3<f64>> = (0..8)
             .map(|turn| {
-                let turned = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), f64::from(turn) * 0.7) * hand.rotation;
+                let turned =
+                    UnitQuaternion::from_axis_angle(&Vector3::z_axis(), f64::from(turn) * 0.7)
+                        * hand.rotation;
                 let near = hand.translation.vector.xy().normalize() * (slim_m - 0.02);
-                Isometry3::from_parts(Translation3::new(near.x, near.y, hand.translation.z + 0.05), turned)
+                Isometry3::from_parts(
+                    Translation3::new(near.x, near.y, hand.translation.z + 0.05),
+                    turned,
+                )
             })
             .collect();
         let way = load.way(&hands).expect("the arm can come closer");
-        assert_eq!(load.way(&hands).as_ref(), Some(&way), "the same task gives the same way");
+        assert_eq!(
+            load.way(&hands).as_ref(),
+            Some(&way),
+            "the same task gives the same way"
+        );
         assert!(way.last().is_some_and(|end| distance(end) < slim_m));
         let postures = std::iter::once(&start).chain(&way);
         for (before, after) in postures.zip(&way) {
@@ -232,7 +273,10 @@ mod tests {
             assert!(farthest(before, after, &layout.arm) <= JUMP * BRANCH + 1e-9);
             assert!(!itself.touches(&kinematics.links(after)));
         }
-        let nowhere = Load { is_slim: &|_| false, ..load };
+        let nowhere = Load {
+            is_slim: &|_| false,
+            ..load
+        };
         assert_eq!(nowhere.way(&hands), None);
     }
 }

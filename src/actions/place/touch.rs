@@ -2,15 +2,17 @@
 
 use crate::operator::Operator;
 
-/// Drop of the carried force that counts as contact. Unit: newtons. Ten times the effect of braking and joint damping,
-/// and less than half of the force that makes an object slide between the fingers.
+/// Drop of the carried force that counts as contact. Unit: newtons. Ten times the effect of braking
+/// and joint damping, and less than half of the force that makes an object slide between the
+/// fingers.
 const TOUCH_N: f64 = 2.5;
 /// Weight of the current reading in the smoothed force: about three control ticks.
 const SHARE: f64 = 0.35;
 
 /// Force that holds up the hand's load beyond the hand's own weight. Unit: newtons.
 ///
-/// Source: virtual work of the arm's joints for an upward movement, τ = Jᵀ·F; the least-squares F over all joints.
+/// Source: virtual work of the arm's joints for an upward movement, τ = Jᵀ·F; the least-squares F
+/// over all joints.
 pub fn carried_n(robot: &Operator<'_>) -> f64 {
     let observed = robot.observe();
     let (_, jacobian) = robot.kinematics().grasp_jacobian(&observed.positions);
@@ -35,7 +37,10 @@ impl Touch {
     /// Starts with an object at rest that touches nothing else.
     pub fn new(robot: &Operator<'_>) -> Self {
         let free_n = carried_n(robot);
-        Self { free_n, felt_n: free_n }
+        Self {
+            free_n,
+            felt_n: free_n,
+        }
     }
 
     /// Updates after a control tick. Returns `true` once something else carries the object.

@@ -1,4 +1,5 @@
-//! The tables of a dataset with the course of each action at the control rate, from which properties about time can be judged.
+//! The tables of a dataset with the course of each action at the control rate, from which
+//! properties about time can be judged.
 
 use std::collections::BTreeMap;
 
@@ -7,8 +8,11 @@ use crate::dataset::sheets::Sheets;
 use crate::tables::Cell;
 use actcheck_data::{ActionTrace, Samples, Series, Trace};
 
-const TIME: ColumnSpec =
-    number("time_s", "s", "time since the action began; one sample in each control tick, the first at its start");
+const TIME: ColumnSpec = number(
+    "time_s",
+    "s",
+    "time since the action began; one sample in each control tick, the first at its start",
+);
 
 /// Poses, velocities and holds of the bodies that can move.
 pub(super) const COURSE_BODIES: TableSpec = TableSpec {
@@ -19,7 +23,11 @@ pub(super) const COURSE_BODIES: TableSpec = TableSpec {
         STEP,
         TIME,
         text("body", "id of the object"),
-        number("x_m", "m", "true position in the world, of the centre of the object's base, to 0.02 mm"),
+        number(
+            "x_m",
+            "m",
+            "true position in the world, of the centre of the object's base, to 0.02 mm",
+        ),
         number("y_m", "m", "true position in the world"),
         number("z_m", "m", "true position in the world"),
         number("qx", "1", "true rotation, as a unit quaternion"),
@@ -44,7 +52,11 @@ pub(super) const COURSE_ROBOT: TableSpec = TableSpec {
         RUN,
         STEP,
         TIME,
-        number("gripper_x_m", "m", "true position in the world of the point between the fingertips"),
+        number(
+            "gripper_x_m",
+            "m",
+            "true position in the world of the point between the fingertips",
+        ),
         number("gripper_y_m", "m", "position of that point"),
         number("gripper_z_m", "m", "position of that point"),
         number(
@@ -61,7 +73,11 @@ pub(super) const COURSE_ROBOT: TableSpec = TableSpec {
         number("base_heading_rad", "rad", "true heading of the base"),
         number("believed_x_m", "m", "localised x of the base"),
         number("believed_y_m", "m", "localised y of the base"),
-        number("believed_heading_rad", "rad", "localised heading of the base"),
+        number(
+            "believed_heading_rad",
+            "rad",
+            "localised heading of the base",
+        ),
     ],
 };
 
@@ -88,7 +104,10 @@ pub(super) const COURSE_FORCES: TableSpec = TableSpec {
         RUN,
         STEP,
         TIME,
-        text("first", "one of the two: id of an object, robot/LINK or floor"),
+        text(
+            "first",
+            "one of the two: id of an object, robot/LINK or floor",
+        ),
         text("second", "the other one"),
         number("force_n", "N", "normal force, to 0.02 N"),
     ],
@@ -102,19 +121,37 @@ pub(super) const PHASES: TableSpec = TableSpec {
         RUN,
         STEP,
         text("phase", "name of the phase, such as lift"),
-        number("start_s", "s", "start since the action began; it lasts until the next one"),
+        number(
+            "start_s",
+            "s",
+            "start since the action began; it lasts until the next one",
+        ),
     ],
 };
 
 /// All of these tables.
-pub(super) const COURSE: [&TableSpec; 5] = [&COURSE_BODIES, &COURSE_ROBOT, &COURSE_JOINTS, &COURSE_FORCES, &PHASES];
+pub(super) const COURSE: [&TableSpec; 5] = [
+    &COURSE_BODIES,
+    &COURSE_ROBOT,
+    &COURSE_JOINTS,
+    &COURSE_FORCES,
+    &PHASES,
+];
 
 const POSE: [&str; 7] = ["x", "y", "z", "qx", "qy", "qz", "qw"];
 const VELOCITY: [&str; 6] = ["vx", "vy", "vz", "wx", "wy", "wz"];
-const BASE: [&str; 6] = ["baseX", "baseY", "baseYaw", "believedX", "believedY", "believedYaw"];
+const BASE: [&str; 6] = [
+    "baseX",
+    "baseY",
+    "baseYaw",
+    "believedX",
+    "believedY",
+    "believedYaw",
+];
 const JOINT: [&str; 3] = ["position", "velocity", "effort"];
 
-/// Adds the course of each action of a run. Returns `false` if the trace has none, as in earlier versions.
+/// Adds the course of each action of a run. Returns `false` if the trace has none, as in earlier
+/// versions.
 pub(super) fn add(run: &str, trace: &Trace, sheets: &mut Sheets) -> bool {
     let mut any = false;
     for (step, course) in (1usize..).zip(&trace.robot_courses) {
@@ -130,7 +167,12 @@ pub(super) fn add(run: &str, trace: &Trace, sheets: &mut Sheets) -> bool {
 fn add_phases(run: &str, step: usize, action: &ActionTrace, sheets: &mut Sheets) {
     for phase in &action.phases {
         let place = [Cell::text(run), Cell::count(step)];
-        sheets.push(&PHASES, place.into_iter().chain([Cell::text(&phase.name), Cell::number(phase.start_secs)]));
+        sheets.push(
+            &PHASES,
+            place
+                .into_iter()
+                .chain([Cell::text(&phase.name), Cell::number(phase.start_secs)]),
+        );
     }
 }
 
@@ -139,33 +181,77 @@ fn add_samples(run: &str, step: usize, samples: &Samples, sheets: &mut Sheets) {
         .series
         .iter()
         .filter(|series| series.other.is_empty())
-        .map(|series| ([series.thing.as_str(), series.quantity.as_str()], series.values().collect()))
+        .map(|series| {
+            (
+                [series.thing.as_str(), series.quantity.as_str()],
+                series.values().collect(),
+            )
+        })
         .collect();
     let cell = |thing: &str, quantity: &str, at: usize| {
-        Cell::Number(by_name.get(&[thing, quantity]).and_then(|values| values.get(at)).copied())
+        Cell::Number(
+            by_name
+                .get(&[thing, quantity])
+                .and_then(|values| values.get(at))
+                .copied(),
+        )
     };
-    let with = |quantity: &'static str| samples.series.iter().filter(move |series| series.quantity == quantity);
-    let forces: Vec<(&Series, Vec<f64>)> =
-        with("contactForce").map(|series| (series, series.values().collect())).collect();
+    let with = |quantity: &'static str| {
+        samples
+            .series
+            .iter()
+            .filter(move |series| series.quantity == quantity)
+    };
+    let forces: Vec<(&Series, Vec<f64>)> = with("contactForce")
+        .map(|series| (series, series.values().collect()))
+        .collect();
     for at in 0..samples.count {
-        let place = || [Cell::text(run), Cell::count(step), Cell::number(at as f64 * samples.period_secs)];
+        let place = || {
+            [
+                Cell::text(run),
+                Cell::count(step),
+                Cell::number(at as f64 * samples.period_secs),
+            ]
+        };
         for Series { thing, .. } in with("held") {
-            let motion = POSE.into_iter().chain(VELOCITY).map(|quantity| cell(thing, quantity, at));
-            let held = by_name.get(&[thing.as_str(), "held"]).and_then(|values| values.get(at)).map(|held| *held > 0.5);
-            let row = place().into_iter().chain([Cell::text(thing)]).chain(motion).chain([Cell::Bool(held)]);
+            let motion = POSE
+                .into_iter()
+                .chain(VELOCITY)
+                .map(|quantity| cell(thing, quantity, at));
+            let held = by_name
+                .get(&[thing.as_str(), "held"])
+                .and_then(|values| values.get(at))
+                .map(|held| *held > 0.5);
+            let row = place()
+                .into_iter()
+                .chain([Cell::text(thing)])
+                .chain(motion)
+                .chain([Cell::Bool(held)]);
             sheets.push(&COURSE_BODIES, row);
         }
-        let hand = POSE.into_iter().chain(["opening"]).map(|quantity| cell("gripper", quantity, at));
+        let hand = POSE
+            .into_iter()
+            .chain(["opening"])
+            .map(|quantity| cell("gripper", quantity, at));
         let base = BASE.into_iter().map(|quantity| cell("robot", quantity, at));
         sheets.push(&COURSE_ROBOT, place().into_iter().chain(hand).chain(base));
         for Series { thing, .. } in with("effort") {
             let name = thing.strip_prefix("joint/").unwrap_or(thing);
             let numbers = JOINT.map(|quantity| cell(thing, quantity, at));
-            sheets.push(&COURSE_JOINTS, place().into_iter().chain([Cell::text(name)]).chain(numbers));
+            sheets.push(
+                &COURSE_JOINTS,
+                place().into_iter().chain([Cell::text(name)]).chain(numbers),
+            );
         }
         for (series, values) in &forces {
-            let Some(force) = values.get(at).filter(|force| **force > 0.0) else { continue };
-            let pair = [Cell::text(&series.thing), Cell::text(&series.other), Cell::number(*force)];
+            let Some(force) = values.get(at).filter(|force| **force > 0.0) else {
+                continue;
+            };
+            let pair = [
+                Cell::text(&series.thing),
+                Cell::text(&series.other),
+                Cell::number(*force),
+            ];
             sheets.push(&COURSE_FORCES, place().into_iter().chain(pair));
         }
     }

@@ -31,12 +31,23 @@ impl Sheet {
         let path = folder.join(spec.file);
         let cells: Vec<Vec<Cell>> = spec.columns.iter().map(|_| Vec::new()).collect();
         let open = || -> Result<(NewFile, BatchedWriter<File>), PolarsError> {
-            let (empty, file) = (frame(&spec, cells.clone(), 0)?, Below::new(folder).new_file(&path)?);
+            let (empty, file) = (
+                frame(&spec, cells.clone(), 0)?,
+                Below::new(folder).new_file(&path)?,
+            );
             let writer = ParquetWriter::new(file.writer()?).batched(empty.schema())?;
             Ok((file, writer))
         };
         let (file, writer) = open().map_err(|error| unwritten(&path, &error))?;
-        Ok(Self { spec, path, file, writer, cells, waiting: 0, rows: 0 })
+        Ok(Self {
+            spec,
+            path,
+            file,
+            writer,
+            cells,
+            waiting: 0,
+            rows: 0,
+        })
     }
 
     /// Adds a row. Cells are in the order of the columns.
@@ -49,18 +60,27 @@ impl Sheet {
 
     /// Writes the pending rows if there are many.
     pub(super) fn make_room(&mut self) -> Result<(), Diagnostics> {
-        if self.waiting >= ROWS_AT_ONCE { self.flush() } else { Ok(()) }
+        if self.waiting >= ROWS_AT_ONCE {
+            self.flush()
+        } else {
+            Ok(())
+        }
     }
 
     /// Writes the pending rows and the end of the table, which does not have its name yet.
     pub(super) fn complete(&mut self) -> Result<(), Diagnostics> {
         self.flush()?;
-        self.writer.finish().map(drop).map_err(|error| unwritten(&self.path, &error))
+        self.writer
+            .finish()
+            .map(drop)
+            .map_err(|error| unwritten(&self.path, &error))
     }
 
     /// Gives the complete table its name. Returns its path and number of rows.
     pub(super) fn finish(self) -> Result<(PathBuf, usize), Diagnostics> {
-        self.file.finish().map_err(|error| unwritten(&self.path, &error))?;
+        self.file
+            .finish()
+            .map_err(|error| unwritten(&self.path, &error))?;
         Ok((self.path, self.rows))
     }
 
@@ -70,12 +90,17 @@ impl Sheet {
             return Ok(());
         }
         let cells = self.cells.iter_mut().map(std::mem::take).collect();
-        let written = frame(&self.spec, cells, height).and_then(|frame| self.writer.write_batch(&frame));
+        let written =
+            frame(&self.spec, cells, height).and_then(|frame| self.writer.write_batch(&frame));
         written.map_err(|error| unwritten(&self.path, &error))
     }
 }
 
 fn frame(spec: &TableSpec, cells: Vec<Vec<Cell>>, height: usize) -> Result<DataFrame, PolarsError> {
-    let columns = spec.columns.iter().zip(cells).map(|(column, cells)| series(column.name, column.kind, cells));
+    let columns = spec
+        .columns
+        .iter()
+        .zip(cells)
+        .map(|(column, cells)| series(column.name, column.kind, cells));
     DataFrame::new(height, columns.collect())
 }

@@ -16,7 +16,12 @@ impl Sheets {
     /// Creates empty tables in a folder.
     pub(super) fn begin(tables: &[&TableSpec], folder: &Path) -> Result<Self, Diagnostics> {
         let begin = |table: &&TableSpec| Ok((table.file, Sheet::begin(**table, folder)?));
-        Ok(Self { sheets: tables.iter().map(begin).collect::<Result<_, Diagnostics>>()? })
+        Ok(Self {
+            sheets: tables
+                .iter()
+                .map(begin)
+                .collect::<Result<_, Diagnostics>>()?,
+        })
     }
 
     /// Adds a row to a table, if it is one of these. Cells are in the order of the columns.
@@ -28,16 +33,23 @@ impl Sheets {
 
     /// Writes the pending rows of tables that have many.
     pub(super) fn make_room(&mut self) -> Result<(), Diagnostics> {
-        self.sheets.iter_mut().try_for_each(|(_, sheet)| sheet.make_room())
+        self.sheets
+            .iter_mut()
+            .try_for_each(|(_, sheet)| sheet.make_room())
     }
 
     /// Writes the pending rows and the ends of the tables, which do not have their names yet.
     pub(super) fn complete(&mut self) -> Result<(), Diagnostics> {
-        self.sheets.iter_mut().try_for_each(|(_, sheet)| sheet.complete())
+        self.sheets
+            .iter_mut()
+            .try_for_each(|(_, sheet)| sheet.complete())
     }
 
     /// Gives the complete tables their names. Returns their paths and numbers of rows, in order.
     pub(super) fn finish(self) -> Result<Vec<(PathBuf, usize)>, Diagnostics> {
-        self.sheets.into_iter().map(|(_, sheet)| sheet.finish()).collect()
+        self.sheets
+            .into_iter()
+            .map(|(_, sheet)| sheet.finish())
+            .collect()
     }
 }

@@ -6,7 +6,8 @@ use serde_json::{Value, json};
 
 use crate::dataset::columns::{ACTIONS, JOINTS, OBJECTS, PERCEPTS, ROBOT, TableSpec};
 use crate::dataset::fact_columns::{
-    BODIES, CONTACTS, EXTREMES, INTERVALS, JOINT_EXTREMES, LINKS, PLACES, PLANES, SELF_CONTACTS, SHAPES, STATES,
+    BODIES, CONTACTS, EXTREMES, INTERVALS, JOINT_EXTREMES, LINKS, PLACES, PLANES, SELF_CONTACTS,
+    SHAPES, STATES,
 };
 use crate::dataset::sheets::Sheets;
 use crate::dataset::{course, fact_source, source};
@@ -41,7 +42,8 @@ pub struct Dataset {
     pub runs: usize,
     /// Number of runs whose traces lack the robot's motion, because an earlier version stored them.
     pub without_course: usize,
-    /// Number of runs without motion, because simulating them again would start a program without consent.
+    /// Number of runs without motion, because simulating them again would start a program without
+    /// consent.
     pub withheld: usize,
     /// Paths of the tables with their numbers of rows.
     pub tables: Vec<(PathBuf, usize)>,
@@ -62,12 +64,16 @@ pub struct DatasetRuns<'a> {
     pub hierarchy: &'a Hierarchy,
 }
 
-/// Writes observations, commands, percepts, ground truth and outcomes of runs into a folder, creating it if needed. `with_course`:
-/// also the course of each action at the control rate.
+/// Writes observations, commands, percepts, ground truth and outcomes of runs into a folder,
+/// creating it if needed. `with_course`: also the course of each action at the control rate.
 ///
 /// # Errors
 /// `A001` if it can't be written; errors of reading the history or a trace.
-pub fn export_dataset(runs: &DatasetRuns<'_>, folder: &Path, with_course: bool) -> Result<Dataset, Diagnostics> {
+pub fn export_dataset(
+    runs: &DatasetRuns<'_>,
+    folder: &Path,
+    with_course: bool,
+) -> Result<Dataset, Diagnostics> {
     let further = course::COURSE.into_iter().filter(|_| with_course);
     let tables: Vec<&TableSpec> = FACTS.into_iter().chain(COURSES).chain(further).collect();
     export(runs, &tables, folder, |run, sheets| {
@@ -78,20 +84,31 @@ pub fn export_dataset(runs: &DatasetRuns<'_>, folder: &Path, with_course: bool) 
         fact_source::add(run, &trace, runs.hierarchy, sheets);
         let any = source::add_courses(&run.row.run, &trace, sheets);
         let is_whole = (!with_course || course::add(&run.row.run, &trace, sheets)) && any;
-        Ok(if is_whole { Motion::Written } else { Motion::Unrecorded })
+        Ok(if is_whole {
+            Motion::Written
+        } else {
+            Motion::Unrecorded
+        })
     })
 }
 
-/// Writes the outcomes of runs and the facts from which they follow into a folder, creating it if needed.
+/// Writes the outcomes of runs and the facts from which they follow into a folder, creating it if
+/// needed.
 ///
 /// # Errors
 /// As [`export_dataset`].
 pub fn export_facts(runs: &DatasetRuns<'_>, folder: &Path) -> Result<Dataset, Diagnostics> {
-    export(runs, &FACTS, folder, |run, sheets| add_facts(runs, run, sheets).map(|()| Motion::Written))
+    export(runs, &FACTS, folder, |run, sheets| {
+        add_facts(runs, run, sheets).map(|()| Motion::Written)
+    })
 }
 
 /// Adds the tables of a run that need no motion.
-fn add_facts(runs: &DatasetRuns<'_>, run: &RunDetail, sheets: &mut Sheets) -> Result<(), Diagnostics> {
+fn add_facts(
+    runs: &DatasetRuns<'_>,
+    run: &RunDetail,
+    sheets: &mut Sheets,
+) -> Result<(), Diagnostics> {
     let trace = runs.history.states(&run.row.run)?;
     source::add(run, &trace, sheets);
     fact_source::add(run, &trace, runs.hierarchy, sheets);
@@ -116,12 +133,20 @@ fn export(
     mut add: impl FnMut(&RunDetail, &mut Sheets) -> Result<Motion, Diagnostics>,
 ) -> Result<Dataset, Diagnostics> {
     let outcomes = pending_parquet(runs.mirror, runs.filter, runs.hierarchy, folder)?;
-    let mut dataset = Dataset { schema: folder.join("schema.json"), ..Dataset::default() };
+    let mut dataset = Dataset {
+        schema: folder.join("schema.json"),
+        ..Dataset::default()
+    };
     let mut sheets = Sheets::begin(tables, folder)?;
     for (campaign, ids) in runs.history.run_ids()? {
         for run in ids.iter().filter(|_| runs.filter.takes_campaign(&campaign)) {
             let detail = runs.history.newest_run(run)?;
-            if runs.filter.since.as_ref().is_some_and(|since| detail.row.started < *since) {
+            if runs
+                .filter
+                .since
+                .as_ref()
+                .is_some_and(|since| detail.row.started < *since)
+            {
                 continue;
             }
             dataset.runs += 1;
@@ -134,16 +159,22 @@ fn export(
         }
     }
     sheets.complete()?;
-    let described = new_text(&Below::new(folder), &dataset.schema, &format!("{:#}\n", schema(tables)))?;
+    let described = new_text(
+        &Below::new(folder),
+        &dataset.schema,
+        &format!("{:#}\n", schema(tables)),
+    )?;
     // Everything is on the disk: from here on, files only get their names.
     dataset.tables = sheets.finish()?;
     dataset.tables.push(outcomes.finish_table()?);
-    described.finish().map_err(|error| unwritten(&dataset.schema, &error))?;
+    described
+        .finish()
+        .map_err(|error| unwritten(&dataset.schema, &error))?;
     Ok(dataset)
 }
 
-/// Returns the description of the tables and their columns. `rows` and `columns` describe the table of outcomes, as in
-/// an export of only that table.
+/// Returns the description of the tables and their columns. `rows` and `columns` describe the table
+/// of outcomes, as in an export of only that table.
 fn schema(tables: &[&TableSpec]) -> Value {
     let mut schema = outcomes_schema();
     let mut outcomes = schema.clone();
@@ -151,6 +182,10 @@ fn schema(tables: &[&TableSpec]) -> Value {
     let frames = "positions are in the world frame, Z up; those of percepts, planes, the base's joints, base_* of \
                   robot.parquet and believed_* are the robot's estimates, all others are ground truth";
     schema["frames"] = json!(frames);
-    schema["tables"] = tables.iter().map(|table| json!(table)).chain([outcomes]).collect();
+    schema["tables"] = tables
+        .iter()
+        .map(|table| json!(table))
+        .chain([outcomes])
+        .collect();
     schema
 }

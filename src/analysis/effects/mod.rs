@@ -1,7 +1,8 @@
 //! Additions of a run's trace to its record: realised noise, and the effects of each action.
 //!
-//! Noise is drawn by chance, whatever the robot does, so it belongs to the conditions of a run. An effect is a
-//! consequence of the robot's behaviour: it can explain how an action failed, but not when.
+//! Noise is drawn by chance, whatever the robot does, so it belongs to the conditions of a run. An
+//! effect is a consequence of the robot's behaviour: it can explain how an action failed, but not
+//! when.
 //!
 //! Never: judges, reads a file, or uses the motion of bodies between snapshots.
 

@@ -1,19 +1,24 @@
-//! Realised noise: the errors that a run drew, summarised where one kind of error is drawn many times.
+//! Realised noise: the errors that a run drew, summarised where one kind of error is drawn many
+//! times.
 
 use actcheck_data::{Choice, ChoiceName, PlanarAxis, SightingAxis, WheelAxis};
 
 /// Realised noise as an action's target has it. `None` for errors that the run did not draw.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct RealisedNoise {
-    /// First error of the perceived target, in the order of [`SightingAxis::ALL`]. Units: metres, radians.
+    /// First error of the perceived target, in the order of [`SightingAxis::ALL`]. Units: metres,
+    /// radians.
     pub target: [Option<f64>; SightingAxis::ALL.len()],
     /// Largest horizontal error of any other perceived object. Unit: metres.
     pub others_xy_m: Option<f64>,
-    /// Error of the initial localisation, in the order of [`PlanarAxis::ALL`]. Units: metres, radians.
+    /// Error of the initial localisation, in the order of [`PlanarAxis::ALL`]. Units: metres,
+    /// radians.
     pub localisation: [Option<f64>; PlanarAxis::ALL.len()],
-    /// Mean error of the wheel odometry over the stretches of the path, in the order of [`WheelAxis::ALL`].
+    /// Mean error of the wheel odometry over the stretches of the path, in the order of
+    /// [`WheelAxis::ALL`].
     pub odometry: [Option<f64>; WheelAxis::ALL.len()],
-    /// Largest error of a landmark's measurement by size, in the order of [`PlanarAxis::ALL`]. Units: metres, radians.
+    /// Largest error of a landmark's measurement by size, in the order of [`PlanarAxis::ALL`].
+    /// Units: metres, radians.
     pub landmark: [Option<f64>; PlanarAxis::ALL.len()],
     /// Largest error of the gap between the fingers by size. Unit: metres.
     pub gripper_m: Option<f64>,
@@ -22,7 +27,12 @@ pub struct RealisedNoise {
 impl RealisedNoise {
     /// Summarises the choices of a run for the target with an id.
     pub fn of(choices: &[Choice], target: Option<&str>) -> Self {
-        let values = |name: ChoiceName| choices.iter().filter(move |choice| choice.name == name).map(|it| it.value);
+        let values = |name: ChoiceName| {
+            choices
+                .iter()
+                .filter(move |choice| choice.name == name)
+                .map(|it| it.value)
+        };
         let first = |name| values(name).next();
         let largest = |name| values(name).max_by(|a, b| a.abs().total_cmp(&b.abs()));
         Self {
@@ -48,15 +58,21 @@ impl RealisedNoise {
     }
 }
 
-/// Returns the largest horizontal error of a perceived object other than the target. The draws of one object's x and y
-/// follow each other.
+/// Returns the largest horizontal error of a perceived object other than the target. The draws of
+/// one object's x and y follow each other.
 fn others_xy_m(choices: &[Choice], target: Option<&str>) -> Option<f64> {
     let mut largest: Option<f64> = None;
     let mut along: Option<(&str, f64)> = None;
     for choice in choices {
         match &choice.name {
-            ChoiceName::Sighting { id, axis: SightingAxis::X } => along = Some((id, choice.value)),
-            ChoiceName::Sighting { id, axis: SightingAxis::Y } if target != Some(id) => {
+            ChoiceName::Sighting {
+                id,
+                axis: SightingAxis::X,
+            } => along = Some((id, choice.value)),
+            ChoiceName::Sighting {
+                id,
+                axis: SightingAxis::Y,
+            } if target != Some(id) => {
                 if let Some((_, x)) = along.filter(|(known, _)| known == id) {
                     let off = libm::hypot(x, choice.value);
                     largest = Some(largest.map_or(off, |known| known.max(off)));
@@ -80,7 +96,14 @@ mod tests {
 
     fn draws(named: &[(&str, f64)]) -> Vec<Choice> {
         let kind = ChoiceKind::Normal { sigma: 0.01 };
-        named.iter().map(|(name, value)| Choice { name: (*name).into(), kind: kind.clone(), value: *value }).collect()
+        named
+            .iter()
+            .map(|(name, value)| Choice {
+                name: (*name).into(),
+                kind: kind.clone(),
+                value: *value,
+            })
+            .collect()
     }
 
     #[test]
@@ -101,7 +124,9 @@ mod tests {
             // A second look does not replace the first.
             ("sense.glass_1.x", 9.0),
         ]);
-        let near = |found: Option<f64>, expected: f64| assert!((found.unwrap_or(f64::NAN) - expected).abs() < 1e-12);
+        let near = |found: Option<f64>, expected: f64| {
+            assert!((found.unwrap_or(f64::NAN) - expected).abs() < 1e-12)
+        };
         let noise = RealisedNoise::of(&choices, Some("glass_1"));
         near(noise.target_xy_m(), 0.13);
         near(noise.others_xy_m, 0.02);
@@ -109,6 +134,9 @@ mod tests {
         near(noise.odometry[0], -0.1);
         near(noise.gripper_m, -0.002);
         assert_eq!((noise.target[2], noise.landmark), (None, [None; 3]));
-        assert_eq!(RealisedNoise::of(&[], Some("glass_1")), RealisedNoise::default());
+        assert_eq!(
+            RealisedNoise::of(&[], Some("glass_1")),
+            RealisedNoise::default()
+        );
     }
 }

@@ -11,16 +11,19 @@ use actcheck_history::RunDetail;
 
 /// Tilt beyond which perception sees an object as its upright bounding box. Unit: radians.
 const LYING_RAD: f64 = 0.3;
-/// Smallest error that a sentence mentions. (1 cm: smaller errors hardly matter to a gripper.) Unit: metres.
+/// Smallest error that a sentence mentions. (1 cm: smaller errors hardly matter to a gripper.)
+/// Unit: metres.
 const MENTIONED_M: f64 = 0.01;
-/// A second direction is mentioned if its part is at least this share of the largest. (It then turns the direction by
-/// more than 22°, half of the angle between two directions.)
+/// A second direction is mentioned if its part is at least this share of the largest. (It then
+/// turns the direction by more than 22°, half of the angle between two directions.)
 const SECOND_SHARE: f64 = 0.414;
-/// Largest horizontal distance of a percept without an id from the object that it belongs to. Unit: metres.
+/// Largest horizontal distance of a percept without an id from the object that it belongs to. Unit:
+/// metres.
 const NEAR_M: f64 = 0.1;
 
-/// The perceived position minus the true position, in the frame of the robot's base. The error of the localisation is
-/// removed: each position is relative to the base pose, perceived to the believed one and true to the true one.
+/// The perceived position minus the true position, in the frame of the robot's base. The error of
+/// the localisation is removed: each position is relative to the base pose, perceived to the
+/// believed one and true to the true one.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PerceptionError {
     /// Unit: metres.
@@ -32,41 +35,74 @@ pub struct PerceptionError {
 }
 
 impl PerceptionError {
-    /// Returns the error with which an action perceived its target: that of its last picture if the trace has the pose
-    /// of the base at that time, otherwise that of the first picture, by the base pose before the action. Returns
-    /// `None` if the action did not perceive it.
+    /// Returns the error with which an action perceived its target: that of its last picture if the
+    /// trace has the pose of the base at that time, otherwise that of the first picture, by the
+    /// base pose before the action. Returns `None` if the action did not perceive it.
     pub(super) fn of(trace: &Trace, step: usize, target: &str) -> Option<Self> {
         let (action, before) = (trace.actions.get(step)?, trace.snapshots.get(step)?);
         let body = before.bodies.iter().find(|body| body.id == target)?;
-        let named = || action.percepts.iter().filter(move |percept| percept.id == target);
-        let looked = named().rev().find_map(|percept| Some((percept, percept.look.as_ref()?)));
+        let named = || {
+            action
+                .percepts
+                .iter()
+                .filter(move |percept| percept.id == target)
+        };
+        let looked = named()
+            .rev()
+            .find_map(|percept| Some((percept, percept.look.as_ref()?)));
         match (looked, named().next()) {
-            (Some((percept, look)), _) => Some(Self::between(&percept.pose, bases_at(look), foot(body))),
-            (None, Some(percept)) => Some(Self::between(&percept.pose, bases_of(&before.robot), foot(body))),
+            (Some((percept, look)), _) => {
+                Some(Self::between(&percept.pose, bases_at(look), foot(body)))
+            }
+            (None, Some(percept)) => Some(Self::between(
+                &percept.pose,
+                bases_of(&before.robot),
+                foot(body),
+            )),
             (None, None) => Self::of_unnamed(action, body, &before.bodies, &before.robot),
         }
     }
 
-    /// Returns the error of the percept without an id that is nearest to the target, if no other object is nearer to it.
-    fn of_unnamed(action: &ActionTrace, body: &BodyState, bodies: &[BodyState], robot: &RobotState) -> Option<Self> {
+    /// Returns the error of the percept without an id that is nearest to the target, if no other
+    /// object is nearer to it.
+    fn of_unnamed(
+        action: &ActionTrace,
+        body: &BodyState,
+        bodies: &[BodyState],
+        robot: &RobotState,
+    ) -> Option<Self> {
         let perceived = action.perceived.as_ref()?;
         let things = &perceived.things;
-        let bases = perceived.look.as_ref().map_or_else(|| bases_of(robot), bases_at);
+        let bases = perceived
+            .look
+            .as_ref()
+            .map_or_else(|| bases_of(robot), bases_at);
         let error = |pose: &Pose, body: &BodyState| Self::between(pose, bases, foot(body));
         let nearest = things
             .iter()
             .map(|thing| &thing.pose)
             .min_by(|a, b| error(a, body).off_m().total_cmp(&error(b, body).off_m()))?;
         let found = error(nearest, body);
-        let mut movable = bodies.iter().filter(|other| !other.fixed && other.id != body.id);
+        let mut movable = bodies
+            .iter()
+            .filter(|other| !other.fixed && other.id != body.id);
         let rivalled = movable.any(|other| error(nearest, other).off_m() < found.off_m());
         (found.off_m() <= NEAR_M && !rivalled).then_some(found)
     }
 
-    fn between(perceived: &Pose, Bases { base_true, base_believed }: Bases, truth: [f64; 3]) -> Self {
+    fn between(
+        perceived: &Pose,
+        Bases {
+            base_true,
+            base_believed,
+        }: Bases,
+        truth: [f64; 3],
+    ) -> Self {
         let [x, y, z] = perceived.position;
-        let [perceived, truth_from_base] =
-            [from_base(base_believed, [x, y]), from_base(base_true, [truth[0], truth[1]])];
+        let [perceived, truth_from_base] = [
+            from_base(base_believed, [x, y]),
+            from_base(base_true, [truth[0], truth[1]]),
+        ];
         Self {
             ahead_m: perceived[0] - truth_from_base[0],
             left_m: perceived[1] - truth_from_base[1],
@@ -79,8 +115,9 @@ impl PerceptionError {
         libm::hypot(self.ahead_m, self.left_m)
     }
 
-    /// Describes the error of an object with an id, such as `glass_1 was perceived 5.3 cm left of where it was`, as
-    /// seen from the robot's base: *behind* is farther ahead of it. Returns `None` for an error below 1 cm.
+    /// Describes the error of an object with an id, such as
+    /// `glass_1 was perceived 5.3 cm left of where it was`, as seen from the robot's base: *behind*
+    /// is farther ahead of it. Returns `None` for an error below 1 cm.
     pub fn sentence(&self, id: &str) -> Option<String> {
         let parts = [
             (self.left_m, ["left of", "right of"]),
@@ -113,15 +150,21 @@ struct Bases {
 }
 
 fn bases_of(robot: &RobotState) -> Bases {
-    Bases { base_true: robot.base_true, base_believed: robot.base_believed }
+    Bases {
+        base_true: robot.base_true,
+        base_believed: robot.base_believed,
+    }
 }
 
 fn bases_at(look: &Look) -> Bases {
-    Bases { base_true: look.base_true, base_believed: look.base_believed }
+    Bases {
+        base_true: look.base_true,
+        base_believed: look.base_believed,
+    }
 }
 
-/// The point that perception reports: the origin of a standing object, or the centre of the lower side of a lying
-/// object's bounding box.
+/// The point that perception reports: the origin of a standing object, or the centre of the lower
+/// side of a lying object's bounding box.
 fn foot(body: &BodyState) -> [f64; 3] {
     if body.pose.tilt() <= LYING_RAD {
         return body.pose.position;
@@ -130,13 +173,16 @@ fn foot(body: &BodyState) -> [f64; 3] {
     [middle(0), middle(1), body.aabb_min[2]]
 }
 
-/// Returns, for each action in which a property failed, the sentence about the perception of its target, by the
-/// action's position in the test (from 1). Actions without such an error are left out.
+/// Returns, for each action in which a property failed, the sentence about the perception of its
+/// target, by the action's position in the test (from 1). Actions without such an error are left
+/// out.
 pub fn perceived_sentences(run: &RunDetail, trace: &Trace) -> BTreeMap<u32, String> {
-    let failed = run
-        .actions
-        .iter()
-        .filter(|action| action.judgements.iter().any(|judgement| judgement.outcome == Outcome::Failed));
+    let failed = run.actions.iter().filter(|action| {
+        action
+            .judgements
+            .iter()
+            .any(|judgement| judgement.outcome == Outcome::Failed)
+    });
     failed
         .filter_map(|action| {
             let step = usize::try_from(action.step.checked_sub(1)?).ok()?;
@@ -152,7 +198,12 @@ mod tests {
     use super::*;
 
     fn said(left_m: f64, ahead_m: f64, above_m: f64) -> Option<String> {
-        PerceptionError { ahead_m, left_m, above_m }.sentence("glass_1")
+        PerceptionError {
+            ahead_m,
+            left_m,
+            above_m,
+        }
+        .sentence("glass_1")
     }
 
     #[test]
@@ -163,20 +214,34 @@ mod tests {
         assert_eq!(said(0.0, 0.02, 0.0), expected("2.0 cm behind"));
         assert_eq!(said(0.0, -0.02, 0.0), expected("2.0 cm in front of"));
         assert_eq!(said(0.002, 0.0, -0.03), expected("3.0 cm below"));
-        assert_eq!(said(0.04, -0.03, 0.005), expected("4.0 cm left of and 3.0 cm in front of"));
+        assert_eq!(
+            said(0.04, -0.03, 0.005),
+            expected("4.0 cm left of and 3.0 cm in front of")
+        );
         assert_eq!(said(0.009, -0.009, 0.0), None);
     }
 
     #[test]
     fn the_error_of_the_localisation_is_removed() {
-        // The robot at (1, 2) faces along y and believes to be a quarter metre ahead and turned by 0.1.
+        // The robot at (1, 2) faces along y and believes to be a quarter metre ahead and turned by
+        // 0.1.
         let (base_true, turn) = ([1.0, 2.0, std::f64::consts::FRAC_PI_2], 0.1);
         let believed = [1.0, 2.25, std::f64::consts::FRAC_PI_2 + turn];
         // An object 1 m ahead is perceived 0.05 m to its left, in the believed frame.
         let [x, y] = super::super::base::turned([1.0, 0.05], believed[2]);
         let perceived = Pose::upright([believed[0] + x, believed[1] + y, 0.72], 0.0);
-        let error = PerceptionError::between(&perceived, Bases { base_true, base_believed: believed }, [1.0, 3.0, 0.7]);
-        assert!((error.left_m - 0.05).abs() < 1e-12 && error.ahead_m.abs() < 1e-12, "{error:?}");
+        let error = PerceptionError::between(
+            &perceived,
+            Bases {
+                base_true,
+                base_believed: believed,
+            },
+            [1.0, 3.0, 0.7],
+        );
+        assert!(
+            (error.left_m - 0.05).abs() < 1e-12 && error.ahead_m.abs() < 1e-12,
+            "{error:?}"
+        );
         assert!((error.above_m - 0.02).abs() < 1e-12 && (error.off_m() - 0.05).abs() < 1e-12);
     }
 }

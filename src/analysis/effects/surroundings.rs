@@ -9,16 +9,17 @@ use crate::effects::base::turned;
 use crate::effects::contacts::{Hit, hits};
 use actcheck_data::BodyState;
 
-/// Distance below which a base is at the goal itself, so that it has no direction to it. Unit: metres.
+/// Distance below which a base is at the goal itself, so that it has no direction to it. Unit:
+/// metres.
 const AT_GOAL_M: f64 = 0.05;
 /// Positions and forces are rounded to this step: a tenth of a millimetre, and of a millinewton.
 const STEP: f64 = 1e-4;
 
-/// A thing that an action is not to touch: each movable object other than its target, and each piece of furniture that
-/// was hit.
+/// A thing that an action is not to touch: each movable object other than its target, and each
+/// piece of furniture that was hit.
 ///
-/// Positions are relative to the goal: the target, or the location to reach. *Beyond* is along the approach, the
-/// direction from the robot's base to the goal.
+/// Positions are relative to the goal: the target, or the location to reach. *Beyond* is along the
+/// approach, the direction from the robot's base to the goal.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Surrounding {
     /// Its id.
@@ -27,7 +28,8 @@ pub struct Surrounding {
     pub category: String,
     /// Its role in the scene, such as `other`.
     pub role: String,
-    /// Distance beyond the goal; negative on the robot's side. `None` if the action has no goal. Unit: metres.
+    /// Distance beyond the goal; negative on the robot's side. `None` if the action has no goal.
+    /// Unit: metres.
     pub beyond_m: Option<f64>,
     /// Distance to the left of the goal. Unit: metres.
     pub left_m: Option<f64>,
@@ -56,7 +58,12 @@ pub(super) fn of(view: &ActionView<'_>) -> Vec<Surrounding> {
     let mut blows: BTreeMap<&str, Blow<'_>> = BTreeMap::new();
     for Hit { contact, thing, by } in hits(view) {
         let point = contact.point_m.map(|[x, y, _]| [x, y]);
-        let found = Blow { force_n: contact.max_force_n, by, at_secs: contact.start_secs, point };
+        let found = Blow {
+            force_n: contact.max_force_n,
+            by,
+            at_secs: contact.start_secs,
+            point,
+        };
         let known = blows.entry(thing).or_insert(found);
         let at_secs = known.at_secs.min(found.at_secs);
         if found.force_n > known.force_n {
@@ -66,18 +73,30 @@ pub(super) fn of(view: &ActionView<'_>) -> Vec<Surrounding> {
     }
     let frame = Frame::of(view);
     let around = view.before.bodies.iter().filter(|body| {
-        !view.may_touch(&body.id) && (view.is_movable(&body.id) || blows.contains_key(body.id.as_str()))
+        !view.may_touch(&body.id)
+            && (view.is_movable(&body.id) || blows.contains_key(body.id.as_str()))
     });
-    around.map(|body| surrounding(view, body, blows.get(body.id.as_str()), frame.as_ref())).collect()
+    around
+        .map(|body| surrounding(view, body, blows.get(body.id.as_str()), frame.as_ref()))
+        .collect()
 }
 
-fn surrounding(view: &ActionView<'_>, body: &BodyState, blow: Option<&Blow<'_>>, frame: Option<&Frame>) -> Surrounding {
+fn surrounding(
+    view: &ActionView<'_>,
+    body: &BodyState,
+    blow: Option<&Blow<'_>>,
+    frame: Option<&Frame>,
+) -> Surrounding {
     let middle = [0, 1].map(|axis| (body.aabb_min[axis] + body.aabb_max[axis]) / 2.0);
-    // The middle of a large piece of furniture says little about the place of a contact; without the contact itself, the
-    // point nearest to the base is taken.
+    // The middle of a large piece of furniture says little about the place of a contact; without
+    // the contact itself, the point nearest to the base is taken.
     let point = |frame: &Frame| match blow {
-        Some(Blow { point: Some(point), .. }) if body.fixed => *point,
-        _ if body.fixed => [0, 1].map(|axis| frame.base[axis].clamp(body.aabb_min[axis], body.aabb_max[axis])),
+        Some(Blow {
+            point: Some(point), ..
+        }) if body.fixed => *point,
+        _ if body.fixed => {
+            [0, 1].map(|axis| frame.base[axis].clamp(body.aabb_min[axis], body.aabb_max[axis]))
+        }
         _ => middle,
     };
     let place = frame.map(|frame| frame.place(point(frame)));
@@ -103,20 +122,31 @@ struct Frame {
 }
 
 impl Frame {
-    /// The direction from where the base was after the action to the goal, or from where it was before if it reached
-    /// the goal itself.
+    /// The direction from where the base was after the action to the goal, or from where it was
+    /// before if it reached the goal itself.
     fn of(view: &ActionView<'_>) -> Option<Self> {
         let goal = view.goal?;
-        let bases = view.after.into_iter().chain([view.before]).map(|state| state.robot.base_true);
+        let bases = view
+            .after
+            .into_iter()
+            .chain([view.before])
+            .map(|state| state.robot.base_true);
         bases
             .map(|[x, y, _]| ([x, y], [goal[0] - x, goal[1] - y]))
             .find(|(_, way)| libm::hypot(way[0], way[1]) > AT_GOAL_M)
-            .map(|(base, way)| Self { goal, heading: libm::atan2(way[1], way[0]), base })
+            .map(|(base, way)| Self {
+                goal,
+                heading: libm::atan2(way[1], way[0]),
+                base,
+            })
     }
 
     /// Shape: beyond, to the left.
     fn place(&self, point: [f64; 2]) -> [f64; 2] {
-        turned([point[0] - self.goal[0], point[1] - self.goal[1]], -self.heading)
+        turned(
+            [point[0] - self.goal[0], point[1] - self.goal[1]],
+            -self.heading,
+        )
     }
 }
 

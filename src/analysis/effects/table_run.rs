@@ -22,11 +22,21 @@ impl TableRun {
         let noise = detail
             .actions
             .iter()
-            .map(|action| RealisedNoise::of(choices, target_of(&detail, action).map(|target| target.id.as_str())))
+            .map(|action| {
+                RealisedNoise::of(
+                    choices,
+                    target_of(&detail, action).map(|target| target.id.as_str()),
+                )
+            })
             .collect();
-        let effects =
-            (0..detail.actions.len()).map(|step| ActionEffects::of(&detail, trace, step).unwrap_or_default()).collect();
-        Self { detail, noise, effects }
+        let effects = (0..detail.actions.len())
+            .map(|step| ActionEffects::of(&detail, trace, step).unwrap_or_default())
+            .collect();
+        Self {
+            detail,
+            noise,
+            effects,
+        }
     }
 }
 

@@ -32,10 +32,11 @@ pub struct Cascade {
     pub q: f64,
 }
 
-/// Finds pairs of failures at different steps of a run that are significantly associated, most significant first.
+/// Finds pairs of failures at different steps of a run that are significantly associated, most
+/// significant first.
 ///
-/// A later action that was not reached or could not be judged is not counted. Of bit-identical runs only the newest is
-/// counted, of the runs of one scene only the first.
+/// A later action that was not reached or could not be judged is not counted. Of bit-identical runs
+/// only the newest is counted, of the runs of one scene only the first.
 pub fn cascades(table: &OutcomeTable, level: f64) -> Vec<Cascade> {
     let runs = table.text("run");
     let counted = table.counted_runs();
@@ -57,8 +58,14 @@ pub fn cascades(table: &OutcomeTable, level: f64) -> Vec<Cascade> {
         }
     }
     count(&run, &mut counts);
-    let judged: BTreeMap<usize, Judged> = slots.into_iter().map(|(key, slot)| (slot, name(table, key))).collect();
-    let probabilities: Vec<f64> = counts.values().map(|table| table.fisher().greater).collect();
+    let judged: BTreeMap<usize, Judged> = slots
+        .into_iter()
+        .map(|(key, slot)| (slot, name(table, key)))
+        .collect();
+    let probabilities: Vec<f64> = counts
+        .values()
+        .map(|table| table.fisher().greater)
+        .collect();
     let adjusted = benjamini_hochberg(&probabilities, probabilities.len() as u64);
     let mut found: Vec<Cascade> = counts
         .into_iter()
@@ -72,7 +79,10 @@ pub fn cascades(table: &OutcomeTable, level: f64) -> Vec<Cascade> {
             q,
         })
         .collect();
-    found.sort_by(|a, b| a.p.total_cmp(&b.p).then_with(|| (&a.first, &a.later).cmp(&(&b.first, &b.later))));
+    found.sort_by(|a, b| {
+        a.p.total_cmp(&b.p)
+            .then_with(|| (&a.first, &a.later).cmp(&(&b.first, &b.later)))
+    });
     found
 }
 
@@ -80,17 +90,31 @@ pub fn cascades(table: &OutcomeTable, level: f64) -> Vec<Cascade> {
 fn count(run: &[(u32, usize, bool)], counts: &mut BTreeMap<(usize, usize), TwoByTwo>) {
     for (step, first, first_failed) in run {
         for (_, later, later_failed) in run.iter().filter(|(later, ..)| later > step) {
-            counts.entry((*first, *later)).or_default().add(*first_failed, *later_failed);
+            counts
+                .entry((*first, *later))
+                .or_default()
+                .add(*first_failed, *later_failed);
         }
     }
 }
 
 fn key(table: &OutcomeTable, row: usize) -> Option<(u32, u32, u32)> {
-    let step = table.number("step").get(row).filter(|step| !step.is_nan())?;
-    Some((*step as u32, table.text("action").of_row[row]?, table.text("property").of_row[row]?))
+    let step = table
+        .number("step")
+        .get(row)
+        .filter(|step| !step.is_nan())?;
+    Some((
+        *step as u32,
+        table.text("action").of_row[row]?,
+        table.text("property").of_row[row]?,
+    ))
 }
 
 fn name(table: &OutcomeTable, (step, action, property): (u32, u32, u32)) -> Judged {
     let text = |column: &str, of: u32| table.text(column).texts[of as usize].clone();
-    Judged { step, action: text("action", action), property: text("property", property) }
+    Judged {
+        step,
+        action: text("action", action),
+        property: text("property", property),
+    }
 }

@@ -9,7 +9,12 @@ use crate::{Interval, OutcomeTable, Sampling, Surrounding};
 use actcheck_data::Role;
 
 /// Directions from the goal, by quarter turns to the left: the first is along the approach.
-const DIRECTIONS: [&str; 4] = ["beyond it", "left of it", "on the robot's side", "right of it"];
+const DIRECTIONS: [&str; 4] = [
+    "beyond it",
+    "left of it",
+    "on the robot's side",
+    "right of it",
+];
 /// Upper ends of the distances from the goal. Unit: metres.
 const DISTANCES_M: [f64; 4] = [0.1, 0.2, 0.4, f64::INFINITY];
 
@@ -18,7 +23,8 @@ const DISTANCES_M: [f64; 4] = [0.1, 0.2, 0.4, f64::INFINITY];
 pub struct Collisions {
     /// IRI of the action.
     pub action: String,
-    /// Number of its executions. Of bit-identical runs only the newest counts, of the runs of one scene only the first.
+    /// Number of its executions. Of bit-identical runs only the newest counts, of the runs of one
+    /// scene only the first.
     pub executions: u64,
     /// Number of those in which something was hit.
     pub hit: u64,
@@ -37,7 +43,8 @@ pub struct Collisions {
 pub struct HitKind {
     /// The category: an IRI.
     pub category: String,
-    /// Whether it is furniture. Its share is of all executions, because furniture that was not hit is not recorded.
+    /// Whether it is furniture. Its share is of all executions, because furniture that was not hit
+    /// is not recorded.
     pub furniture: bool,
     /// Number of executions with such a thing; for furniture, of all.
     pub present: u64,
@@ -47,7 +54,8 @@ pub struct HitKind {
     pub rate: Interval,
     /// Largest force of each execution. Unit: newtons.
     pub force_n: Quantiles,
-    /// The parts that hit it hardest, most frequent first: `robot/LINK`, or `object` for the object that the action handles.
+    /// The parts that hit it hardest, most frequent first: `robot/LINK`, or `object` for the object
+    /// that the action handles.
     pub by: Vec<(String, u64)>,
     /// Phases in which it was first hit, most frequent first.
     pub phases: Vec<(String, u64)>,
@@ -62,7 +70,8 @@ pub struct HitKind {
 pub struct Sector {
     /// Direction from the goal, as seen along the approach.
     pub direction: &'static str,
-    /// Distance from the goal: at least, and less than. `None` if it has no upper end. Unit: metres.
+    /// Distance from the goal: at least, and less than. `None` if it has no upper end. Unit:
+    /// metres.
     pub distance_m: (f64, Option<f64>),
     /// Number of things.
     pub present: u64,
@@ -97,7 +106,8 @@ pub fn collisions(table: &OutcomeTable) -> Vec<Collisions> {
     for row in 0..table.len() {
         let is_first = row == 0
             || runs.of_row[row] != runs.of_row[row - 1]
-            || steps.get(row).map(|step| step.to_bits()) != steps.get(row - 1).map(|step| step.to_bits());
+            || steps.get(row).map(|step| step.to_bits())
+                != steps.get(row - 1).map(|step| step.to_bits());
         if let (true, Some(action), Some(_)) = (is_first, actions.get(row), around.get(row)) {
             // A table has far fewer rows than 2^32.
             rows_of.entry(action).or_default().push(row as u32);
@@ -109,16 +119,28 @@ pub fn collisions(table: &OutcomeTable) -> Vec<Collisions> {
         .filter_map(|(action, rows)| {
             let rows = scenes.first_rows(&newest_of_alike(table, &rows));
             let read = |row: &u32| {
-                let things: Vec<Surrounding> = serde_json::from_str(around.get(*row as usize)?).ok()?;
+                let things: Vec<Surrounding> =
+                    serde_json::from_str(around.get(*row as usize)?).ok()?;
                 Some((runs.get(*row as usize)?, things))
             };
-            of_action(action, table.sampling, &rows.iter().filter_map(read).collect::<Vec<_>>())
+            of_action(
+                action,
+                table.sampling,
+                &rows.iter().filter_map(read).collect::<Vec<_>>(),
+            )
         })
         .collect()
 }
 
-fn of_action(action: &str, sampling: Sampling, executions: &[(&str, Vec<Surrounding>)]) -> Option<Collisions> {
-    let hit = executions.iter().filter(|(_, things)| things.iter().any(|thing| thing.force_n.is_some())).count() as u64;
+fn of_action(
+    action: &str,
+    sampling: Sampling,
+    executions: &[(&str, Vec<Surrounding>)],
+) -> Option<Collisions> {
+    let hit = executions
+        .iter()
+        .filter(|(_, things)| things.iter().any(|thing| thing.force_n.is_some()))
+        .count() as u64;
     let mut categories: Vec<&str> = executions
         .iter()
         .flat_map(|(_, things)| things)
@@ -127,8 +149,10 @@ fn of_action(action: &str, sampling: Sampling, executions: &[(&str, Vec<Surround
         .collect();
     categories.sort_unstable();
     categories.dedup();
-    let mut kinds: Vec<HitKind> =
-        categories.into_iter().filter_map(|category| kind(category, sampling, executions)).collect();
+    let mut kinds: Vec<HitKind> = categories
+        .into_iter()
+        .filter_map(|category| kind(category, sampling, executions))
+        .collect();
     kinds.sort_by(|a, b| b.hit.cmp(&a.hit).then_with(|| a.category.cmp(&b.category)));
     let placed = |(run, things): &(&str, Vec<Surrounding>)| -> Vec<PlacedThing> {
         let place = |thing: &Surrounding| {
@@ -158,9 +182,17 @@ fn is_furniture(thing: &Surrounding) -> bool {
     thing.role == Role::Platform.word()
 }
 
-fn kind(category: &str, sampling: Sampling, executions: &[(&str, Vec<Surrounding>)]) -> Option<HitKind> {
+fn kind(
+    category: &str,
+    sampling: Sampling,
+    executions: &[(&str, Vec<Surrounding>)],
+) -> Option<HitKind> {
     let of_kind = |things: &'_ [Surrounding]| -> Vec<Surrounding> {
-        things.iter().filter(|thing| thing.category == category).cloned().collect()
+        things
+            .iter()
+            .filter(|thing| thing.category == category)
+            .cloned()
+            .collect()
     };
     let mut hits: Vec<(&str, Surrounding)> = Vec::new();
     let (mut present, mut furniture) = (0, false);
@@ -169,16 +201,30 @@ fn kind(category: &str, sampling: Sampling, executions: &[(&str, Vec<Surrounding
         present += u64::from(!things.is_empty());
         furniture |= things.iter().any(is_furniture);
         let hit = things.into_iter().filter(|thing| thing.force_n.is_some());
-        let hardest = hit.max_by(|a, b| a.force_n.unwrap_or_default().total_cmp(&b.force_n.unwrap_or_default()));
+        let hardest = hit.max_by(|a, b| {
+            a.force_n
+                .unwrap_or_default()
+                .total_cmp(&b.force_n.unwrap_or_default())
+        });
         hits.extend(hardest.map(|hardest| (*run, hardest)));
     }
     if furniture {
         present = executions.len() as u64;
     }
-    hits.sort_by(|a, b| b.1.force_n.unwrap_or_default().total_cmp(&a.1.force_n.unwrap_or_default()));
+    hits.sort_by(|a, b| {
+        b.1.force_n
+            .unwrap_or_default()
+            .total_cmp(&a.1.force_n.unwrap_or_default())
+    });
     let hit = hits.len() as u64;
     let by = |thing: &Surrounding| {
-        thing.by.as_deref().map(|by| if by.starts_with("robot/") { by.to_owned() } else { "object".to_owned() })
+        thing.by.as_deref().map(|by| {
+            if by.starts_with("robot/") {
+                by.to_owned()
+            } else {
+                "object".to_owned()
+            }
+        })
     };
     Some(HitKind {
         category: category.to_owned(),
@@ -189,7 +235,10 @@ fn kind(category: &str, sampling: Sampling, executions: &[(&str, Vec<Surrounding
         force_n: quantiles(hits.iter().filter_map(|(_, thing)| thing.force_n))?,
         by: tally(hits.iter().filter_map(|(_, thing)| by(thing))),
         phases: tally(hits.iter().filter_map(|(_, thing)| thing.phase.clone())),
-        directions: tally(hits.iter().filter_map(|(_, thing)| Some(DIRECTIONS[direction(thing)?].to_owned()))),
+        directions: tally(
+            hits.iter()
+                .filter_map(|(_, thing)| Some(DIRECTIONS[direction(thing)?].to_owned())),
+        ),
         runs: hits.iter().map(|(run, _)| (*run).to_owned()).collect(),
     })
 }
@@ -207,31 +256,55 @@ fn tally(texts: impl Iterator<Item = String>) -> Vec<(String, u64)> {
 /// Index of a thing's direction from the goal. `None` without a place.
 fn direction(thing: &Surrounding) -> Option<usize> {
     let turn = libm::atan2(thing.left_m?, thing.beyond_m?) / std::f64::consts::FRAC_PI_2;
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "from 0 to 4")]
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "from 0 to 4"
+    )]
     let quarter = libm::floor(turn + 0.5).rem_euclid(4.0) as usize;
     Some(quarter.min(DIRECTIONS.len() - 1))
 }
 
-fn sectors<'a>(sampling: Sampling, things: impl Iterator<Item = &'a Surrounding>) -> Vec<Vec<Sector>> {
+fn sectors<'a>(
+    sampling: Sampling,
+    things: impl Iterator<Item = &'a Surrounding>,
+) -> Vec<Vec<Sector>> {
     let lower = |band: usize| band.checked_sub(1).map_or(0.0, |below| DISTANCES_M[below]);
     let sector = |direction: &'static str, band: usize| Sector {
         direction,
-        distance_m: (lower(band), Some(DISTANCES_M[band]).filter(|end| end.is_finite())),
+        distance_m: (
+            lower(band),
+            Some(DISTANCES_M[band]).filter(|end| end.is_finite()),
+        ),
         present: 0,
         hit: 0,
         rate: None,
     };
-    let row = |direction| (0..DISTANCES_M.len()).map(|band| sector(direction, band)).collect();
+    let row = |direction| {
+        (0..DISTANCES_M.len())
+            .map(|band| sector(direction, band))
+            .collect()
+    };
     let mut found: Vec<Vec<Sector>> = DIRECTIONS.into_iter().map(row).collect();
     for thing in things.filter(|thing| !is_furniture(thing)) {
-        let (Some(beyond), Some(left), Some(direction)) = (thing.beyond_m, thing.left_m, direction(thing)) else {
+        let (Some(beyond), Some(left), Some(direction)) =
+            (thing.beyond_m, thing.left_m, direction(thing))
+        else {
             continue;
         };
         let away = libm::hypot(beyond, left);
-        let band = DISTANCES_M.partition_point(|end| *end <= away).min(DISTANCES_M.len() - 1);
+        let band = DISTANCES_M
+            .partition_point(|end| *end <= away)
+            .min(DISTANCES_M.len() - 1);
         let cell = &mut found[direction][band];
-        (cell.present, cell.hit) = (cell.present + 1, cell.hit + u64::from(thing.force_n.is_some()));
+        (cell.present, cell.hit) = (
+            cell.present + 1,
+            cell.hit + u64::from(thing.force_n.is_some()),
+        );
     }
-    found.iter_mut().flatten().for_each(|cell| cell.rate = sampling.interval(cell.hit, cell.present));
+    found
+        .iter_mut()
+        .flatten()
+        .for_each(|cell| cell.rate = sampling.interval(cell.hit, cell.present));
     found
 }

@@ -18,8 +18,8 @@ pub struct FlakyScene {
     pub of: u64,
 }
 
-/// Returns the scenes that are flaky in a property, in the order of the table, and the number of scenes with several
-/// runs.
+/// Returns the scenes that are flaky in a property, in the order of the table, and the number of
+/// scenes with several runs.
 pub fn flaky_scenes(table: &OutcomeTable, of: &JudgedProperty) -> (Vec<FlakyScene>, u64) {
     let outcomes = outcomes(table);
     let (campaign, scene) = (table.text("campaign"), table.number("scene"));
@@ -28,7 +28,9 @@ pub fn flaky_scenes(table: &OutcomeTable, of: &JudgedProperty) -> (Vec<FlakyScen
     let mut runs = Vec::new();
     for row in of.rows.iter().map(|row| *row as usize) {
         let number = scene.get(row).copied().filter(|scene| !scene.is_nan());
-        let (Some(campaign), Some(number), Some(failed)) = (campaign.of_row[row], number, failed(outcomes[row])) else {
+        let (Some(campaign), Some(number), Some(failed)) =
+            (campaign.of_row[row], number, failed(outcomes[row]))
+        else {
             continue;
         };
         let key = (campaign, number as u64);
@@ -36,13 +38,22 @@ pub fn flaky_scenes(table: &OutcomeTable, of: &JudgedProperty) -> (Vec<FlakyScen
             keys.push(key);
             keys.len() as u64 - 1
         });
-        runs.push(Repeated { scene, passed: !failed, margin: None });
+        runs.push(Repeated {
+            scene,
+            passed: !failed,
+            margin: None,
+        });
     }
     let found = consistency(&runs, table.sampling);
     let repeated = found.always_passed + found.always_failed + found.flaky.len() as u64;
     let named = |flaky: &crate::SceneCounts| {
         let (of, scene) = keys[flaky.scene as usize];
-        FlakyScene { campaign: campaign.texts[of as usize].clone(), scene, passed: flaky.passed, of: flaky.of }
+        FlakyScene {
+            campaign: campaign.texts[of as usize].clone(),
+            scene,
+            passed: flaky.passed,
+            of: flaky.of,
+        }
     };
     (found.flaky.iter().map(named).collect(), repeated)
 }

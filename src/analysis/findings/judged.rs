@@ -29,7 +29,10 @@ pub fn judged(table: &OutcomeTable) -> Vec<JudgedProperty> {
     for row in 0..outcomes.len() {
         if let (Some(action), Some(property)) = (actions.of_row[row], properties.of_row[row]) {
             // A table has far fewer rows than 2^32.
-            found.entry((action, property)).or_default().push(row as u32);
+            found
+                .entry((action, property))
+                .or_default()
+                .push(row as u32);
         }
     }
     let mut judged: Vec<JudgedProperty> = found
@@ -52,9 +55,16 @@ pub fn judged(table: &OutcomeTable) -> Vec<JudgedProperty> {
 /// Returns the outcome of every row. A missing or unknown outcome counts as broken.
 pub(super) fn outcomes(table: &OutcomeTable) -> Vec<Outcome> {
     let column = table.text("outcome");
-    let known: Vec<Outcome> =
-        column.texts.iter().map(|word| Outcome::from_word(word).unwrap_or(Outcome::Broken)).collect();
-    column.of_row.iter().map(|of| of.map_or(Outcome::Broken, |of| known[of as usize])).collect()
+    let known: Vec<Outcome> = column
+        .texts
+        .iter()
+        .map(|word| Outcome::from_word(word).unwrap_or(Outcome::Broken))
+        .collect();
+    column
+        .of_row
+        .iter()
+        .map(|of| of.map_or(Outcome::Broken, |of| known[of as usize]))
+        .collect()
 }
 
 /// Drops rows for which a later row has the same step and a bit-identical run.

@@ -25,10 +25,13 @@ pub struct Quantiles {
 
 /// Returns the quantiles of the finite numbers, or `None` if there are none.
 ///
-/// Interpolates linearly (type 7 of Hyndman and Fan, "Sample quantiles in statistical packages", The American
-/// Statistician 50 (1996) 361–365).
+/// Interpolates linearly (type 7 of Hyndman and Fan, "Sample quantiles in statistical packages",
+/// The American Statistician 50 (1996) 361–365).
 pub fn quantiles(numbers: impl IntoIterator<Item = f64>) -> Option<Quantiles> {
-    let mut sorted: Vec<f64> = numbers.into_iter().filter(|number| number.is_finite()).collect();
+    let mut sorted: Vec<f64> = numbers
+        .into_iter()
+        .filter(|number| number.is_finite())
+        .collect();
     sorted.sort_by(f64::total_cmp);
     let (first, last) = (*sorted.first()?, *sorted.last()?);
     let at = |share: f64| {
@@ -58,9 +61,13 @@ mod tests {
     fn quantiles_equal_numpys() {
         let found = quantiles([4.0, 1.0, f64::NAN, 3.0, 2.0]).expect("the values are not empty");
         assert_eq!((found.count, found.least, found.most), (4, 1.0, 4.0));
-        for (found, wanted) in
-            [(found.p05, 1.15), (found.p25, 1.75), (found.p50, 2.5), (found.p75, 3.25), (found.p95, 3.85)]
-        {
+        for (found, wanted) in [
+            (found.p05, 1.15),
+            (found.p25, 1.75),
+            (found.p50, 2.5),
+            (found.p75, 3.25),
+            (found.p95, 3.85),
+        ] {
             assert!((found - wanted).abs() < 1e-12, "{found} {wanted}");
         }
         assert_eq!(quantiles([f64::NAN]), None);

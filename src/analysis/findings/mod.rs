@@ -1,7 +1,7 @@
 //! Findings from the table of outcomes: when and why actions fail.
 //!
-//! Only passed and failed outcomes are evidence about the robot. All others are counted and reported, but never as
-//! failures.
+//! Only passed and failed outcomes are evidence about the robot. All others are counted and
+//! reported, but never as failures.
 //!
 //! Never: reads a file, or depends on the meaning of a property.
 
@@ -49,11 +49,17 @@ pub const FINDING_COLUMNS: [&str; 14] = [
 
 /// Returns all columns that findings need: [`FINDING_COLUMNS`], conditions and effects.
 pub fn finding_columns() -> Vec<&'static str> {
-    let mined = columns().iter().filter(|column| column.is_condition() || column.is_effect());
-    FINDING_COLUMNS.into_iter().chain(mined.map(|column| column.name)).collect()
+    let mined = columns()
+        .iter()
+        .filter(|column| column.is_condition() || column.is_effect());
+    FINDING_COLUMNS
+        .into_iter()
+        .chain(mined.map(|column| column.name))
+        .collect()
 }
 
-/// Columns from which rates, failure modes and trends are computed: a tenth of the size of [`finding_columns`].
+/// Columns from which rates, failure modes and trends are computed: a tenth of the size of
+/// [`finding_columns`].
 pub const RATE_COLUMNS: [&str; 12] = [
     "run",
     "campaign",

@@ -27,7 +27,8 @@ pub struct PropertyFindings {
     pub failing: Option<Interval>,
     /// Margins of its decided outcomes.
     pub margins: Option<Quantiles>,
-    /// Decided runs from which patterns were mined, with the conditions of their scenes and their realised noise.
+    /// Decided runs from which patterns were mined, with the conditions of their scenes and their
+    /// realised noise.
     pub input: PatternInput,
     /// IDs and rows of these runs.
     pub examples: Vec<Example>,
@@ -47,7 +48,8 @@ impl PropertyFindings {
     /// Returns the runs with both conditions and effects.
     pub fn everything(&self) -> PatternInput {
         let mut all = self.input.clone();
-        all.parameters.extend(self.effects.input.parameters.iter().cloned());
+        all.parameters
+            .extend(self.effects.input.parameters.iter().cloned());
         all
     }
 }
@@ -72,8 +74,9 @@ pub struct Example {
 
 /// Mines patterns in the decided runs of a property.
 ///
-/// Runs must be independent: of bit-identical runs only the newest is used, and of the runs of one scene only the
-/// first. Held-out runs are selected by a hash of their ID (or their scene's), so that the selection is reproducible.
+/// Runs must be independent: of bit-identical runs only the newest is used, and of the runs of one
+/// scene only the first. Held-out runs are selected by a hash of their ID (or their scene's), so
+/// that the selection is reproducible.
 pub fn property_findings(
     table: &OutcomeTable,
     of: &JudgedProperty,
@@ -84,13 +87,25 @@ pub fn property_findings(
     let outcomes = outcomes(table);
     let rows = &rates.scenes;
     let input = PatternInput {
-        failed: rows.iter().map(|row| failed(outcomes[*row as usize]) == Some(true)).collect(),
-        held_out: rows.iter().map(|row| is_held_out(table, *row as usize)).collect(),
+        failed: rows
+            .iter()
+            .map(|row| failed(outcomes[*row as usize]) == Some(true))
+            .collect(),
+        held_out: rows
+            .iter()
+            .map(|row| is_held_out(table, *row as usize))
+            .collect(),
         parameters: conditions(table, rows, hierarchy),
         sampling: table.sampling,
     };
-    let happened = PatternInput { parameters: effects(table, rows, hierarchy), ..input.clone() };
-    let simple = PatternOptions { most_conditions: options.most_conditions.min(MOST_EFFECTS), ..*options };
+    let happened = PatternInput {
+        parameters: effects(table, rows, hierarchy),
+        ..input.clone()
+    };
+    let simple = PatternOptions {
+        most_conditions: options.most_conditions.min(MOST_EFFECTS),
+        ..*options
+    };
     let run = table.text("run");
     PropertyFindings {
         action: of.action.clone(),
@@ -100,24 +115,45 @@ pub fn property_findings(
         margins: rates.margins,
         examples: rows
             .iter()
-            .map(|row| Example { run: run.get(*row as usize).unwrap_or_default().to_owned(), row: *row })
+            .map(|row| Example {
+                run: run.get(*row as usize).unwrap_or_default().to_owned(),
+                row: *row,
+            })
             .collect(),
         twins: rates.twins,
         repeated: rates.repeated,
         weighted_runs: rates.weighted_runs,
         patterns: mine(&input, options),
-        effects: Mined { patterns: mine(&happened, &simple), input: happened },
+        effects: Mined {
+            patterns: mine(&happened, &simple),
+            input: happened,
+        },
         input,
     }
 }
 
 impl PropertyFindings {
-    /// Replaces the counts, rates and margins, which come from a sample, by those of all rows. Patterns remain those of the
-    /// sample.
+    /// Replaces the counts, rates and margins, which come from a sample, by those of all rows.
+    /// Patterns remain those of the sample.
     #[must_use]
     pub fn with_rates_of(self, table: &OutcomeTable, of: &JudgedProperty) -> Self {
-        let Rates { failing, margins, twins, repeated, weighted_runs, .. } = Rates::of(table, of);
-        Self { counts: of.counts, failing, margins, twins, repeated, weighted_runs, ..self }
+        let Rates {
+            failing,
+            margins,
+            twins,
+            repeated,
+            weighted_runs,
+            ..
+        } = Rates::of(table, of);
+        Self {
+            counts: of.counts,
+            failing,
+            margins,
+            twins,
+            repeated,
+            weighted_runs,
+            ..self
+        }
     }
 }
 
@@ -146,14 +182,25 @@ impl Rates {
                     let failed = |at: &usize| outcomes[decided[*at] as usize] == Outcome::Failed;
                     runs.share((0..decided.len()).filter(failed), table.sampling)
                 }
-                None => table.sampling.interval(of.counts.failed, of.counts.decided()),
+                None => table
+                    .sampling
+                    .interval(of.counts.failed, of.counts.decided()),
             },
-            margins: quantiles(decided.iter().filter_map(|row| margin.get(*row as usize).copied())),
-            twins: (of.every_row.iter().filter(|row| is_decided(row)).count() - decided.len()) as u64,
+            margins: quantiles(
+                decided
+                    .iter()
+                    .filter_map(|row| margin.get(*row as usize).copied()),
+            ),
+            twins: (of.every_row.iter().filter(|row| is_decided(row)).count() - decided.len())
+                as u64,
             repeated: (decided.len() - rows.len()) as u64,
             weighted_runs: rows
                 .iter()
-                .filter(|row| weight.get(**row as usize).is_some_and(|weight| !weight.is_nan()))
+                .filter(|row| {
+                    weight
+                        .get(**row as usize)
+                        .is_some_and(|weight| !weight.is_nan())
+                })
                 .count() as u64,
             scenes: rows,
         }
@@ -164,10 +211,15 @@ fn is_held_out(table: &OutcomeTable, row: usize) -> bool {
     let run = table.text("run").get(row).unwrap_or_default();
     let key = match table.number("scene").get(row) {
         Some(scene) if !scene.is_nan() => {
-            format!("{} scene {scene}", table.text("campaign").get(row).unwrap_or_default())
+            format!(
+                "{} scene {scene}",
+                table.text("campaign").get(row).unwrap_or_default()
+            )
         }
         _ => run.to_owned(),
     };
     let digest = digest_of(&key);
-    u64::from_str_radix(&digest[..digest.len().min(12)], 16).unwrap_or_default().is_multiple_of(HELD_OUT_EVERY)
+    u64::from_str_radix(&digest[..digest.len().min(12)], 16)
+        .unwrap_or_default()
+        .is_multiple_of(HELD_OUT_EVERY)
 }

@@ -31,7 +31,9 @@ impl<'a> Scenes<'a> {
 
     fn key(&self, row: usize) -> Key {
         match self.scene.get(row) {
-            Some(scene) if !scene.is_nan() => Key::Repeated(self.campaign.get(row).copied().flatten(), scene.to_bits()),
+            Some(scene) if !scene.is_nan() => {
+                Key::Repeated(self.campaign.get(row).copied().flatten(), scene.to_bits())
+            }
             _ => Key::Alone(self.run.get(row).copied().flatten()),
         }
     }
@@ -40,7 +42,9 @@ impl<'a> Scenes<'a> {
     pub fn first_rows(&self, rows: &[u32]) -> Vec<u32> {
         let mut seen = BTreeSet::new();
         let is_first = |row: &u32| match self.key(*row as usize) {
-            key @ Key::Repeated(..) => seen.insert((key, self.step.get(*row as usize).map(|step| step.to_bits()))),
+            key @ Key::Repeated(..) => {
+                seen.insert((key, self.step.get(*row as usize).map(|step| step.to_bits())))
+            }
             Key::Alone(_) => true,
         };
         rows.iter().copied().filter(is_first).collect()

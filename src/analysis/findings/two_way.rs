@@ -34,7 +34,12 @@ pub struct TwoWayCell {
 ///
 /// Numeric ranges are cut into equal steps, so that positions form an undistorted map.
 pub fn two_way(input: &PatternInput, by: &[&str]) -> Option<TwoWay> {
-    let parameter = |name: &str| input.parameters.iter().find(|parameter| parameter.name == name);
+    let parameter = |name: &str| {
+        input
+            .parameters
+            .iter()
+            .find(|parameter| parameter.name == name)
+    };
     let down = labelled(parameter(by.first()?)?);
     let across = match by.get(1) {
         Some(name) => labelled(parameter(name)?),
@@ -48,9 +53,17 @@ pub fn two_way(input: &PatternInput, by: &[&str]) -> Option<TwoWay> {
             cell.failed += u64::from(input.failed[run]);
         }
     }
-    cells.iter_mut().flatten().for_each(|cell| cell.failing = input.sampling.interval(cell.failed, cell.runs));
+    cells
+        .iter_mut()
+        .flatten()
+        .for_each(|cell| cell.failing = input.sampling.interval(cell.failed, cell.runs));
     let by = by.iter().take(2).map(|name| (*name).to_owned()).collect();
-    Some(TwoWay { by, down: down.0, across: across.0, cells })
+    Some(TwoWay {
+        by,
+        down: down.0,
+        across: across.0,
+        cells,
+    })
 }
 
 /// Returns labels, and the index of each run's label.
@@ -60,13 +73,25 @@ fn labelled(parameter: &Parameter) -> (Vec<String>, Vec<Option<usize>>) {
             let mut order: Vec<usize> = (0..names.len()).collect();
             order.sort_by_key(|place| &names[*place]);
             let mut rank = vec![0; names.len()];
-            order.iter().enumerate().for_each(|(at, place)| rank[*place] = at);
+            order
+                .iter()
+                .enumerate()
+                .for_each(|(at, place)| rank[*place] = at);
             let labels = order.iter().map(|place| names[*place].clone()).collect();
-            (labels, of_run.iter().map(|of| of.map(|of| rank[of as usize])).collect())
+            (
+                labels,
+                of_run
+                    .iter()
+                    .map(|of| of.map(|of| rank[of as usize]))
+                    .collect(),
+            )
         }
         Values::Numbers(numbers) | Values::Angles(numbers) => {
             let bounds = bounds(numbers);
-            let labels = bounds.windows(2).map(|pair| format!("{} – {}", pair[0], pair[1])).collect();
+            let labels = bounds
+                .windows(2)
+                .map(|pair| format!("{} – {}", pair[0], pair[1]))
+                .collect();
             let last = bounds.len().saturating_sub(2);
             let cell = |value: &f64| {
                 let below = bounds.partition_point(|bound| *bound <= *value);
@@ -80,22 +105,34 @@ fn labelled(parameter: &Parameter) -> (Vec<String>, Vec<Option<usize>>) {
 /// Returns the bounds of a few equal, round steps that cover all numbers.
 fn bounds(numbers: &[f64]) -> Vec<f64> {
     let known = || numbers.iter().copied().filter(|number| number.is_finite());
-    let (Some(least), Some(most)) = (known().min_by(f64::total_cmp), known().max_by(f64::total_cmp)) else {
+    let (Some(least), Some(most)) = (
+        known().min_by(f64::total_cmp),
+        known().max_by(f64::total_cmp),
+    ) else {
         return Vec::new();
     };
     if least == most {
         return vec![least, most];
     }
     // Round steps are 1, 2 and 5 times a power of ten. For integers, the step is at least 1.
-    let finest = if known().all(|number| number.fract() == 0.0) { 1.0 } else { 0.0 };
+    let finest = if known().all(|number| number.fract() == 0.0) {
+        1.0
+    } else {
+        0.0
+    };
     let rough = f64::max((most - least) / MOST_CELLS as f64, finest);
     let power = libm::exp10(libm::floor(libm::log10(rough)));
-    let step =
-        [1.0, 2.0, 5.0, 10.0].map(|times| times * power).into_iter().find(|step| *step >= rough).unwrap_or(rough);
+    let step = [1.0, 2.0, 5.0, 10.0]
+        .map(|times| times * power)
+        .into_iter()
+        .find(|step| *step >= rough)
+        .unwrap_or(rough);
     let first = libm::floor(least / step);
     let count = (libm::floor(most / step) - first) as usize + 1;
     let near = |number: f64| simplest_between(number - step * 1e-6, number + step * 1e-6);
-    (0..=count).map(|at| near((first + at as f64) * step)).collect()
+    (0..=count)
+        .map(|at| near((first + at as f64) * step))
+        .collect()
 }
 
 #[cfg(test)]
@@ -107,7 +144,13 @@ mod tests {
         let expected = [-0.6, -0.4, -0.2, 0.0, 0.2, 0.4, 0.6];
         let found = bounds(&[-0.599, 0.598, f64::NAN]);
         assert_eq!(found.len(), expected.len());
-        assert!(found.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-12), "{found:?}");
+        assert!(
+            found
+                .iter()
+                .zip(expected)
+                .all(|(a, b)| (a - b).abs() < 1e-12),
+            "{found:?}"
+        );
         assert_eq!(bounds(&[2.0, 2.0]), [2.0, 2.0]);
         assert!(bounds(&[f64::NAN]).is_empty());
         let counts = bounds(&[0.0, 1.0, 6.0]);

@@ -4,7 +4,8 @@ use crate::patterns::Condition;
 use crate::patterns::cells::{Axis, Conditions};
 use crate::patterns::likelihood::{Count, Likelihood, failures_of, one};
 
-/// Summing the boxes of three parameters costs as much as counting this many runs. (Measured with eight cells each.)
+/// Summing the boxes of three parameters costs as much as counting this many runs. (Measured with
+/// eight cells each.)
 const BOXES_IN_RUNS: u64 = 50_000;
 
 /// The best box with up to some number of conditions, and the extent of the search.
@@ -31,7 +32,12 @@ pub(super) struct Runs<'a> {
 
 impl<'a> Runs<'a> {
     /// Selects the open runs.
-    pub fn new(axes: &'a [Axis], failed: &[bool], open: &[bool], likelihood: &'a Likelihood) -> Self {
+    pub fn new(
+        axes: &'a [Axis],
+        failed: &[bool],
+        open: &[bool],
+        likelihood: &'a Likelihood,
+    ) -> Self {
         let part: Vec<usize> = (0..open.len()).filter(|run| open[*run]).collect();
         let of = |axis: &Axis| part.iter().map(|run| axis.of_run[*run]).collect();
         Self {
@@ -42,11 +48,12 @@ impl<'a> Runs<'a> {
         }
     }
 
-    /// Returns the boxes with the highest scores and at most one, two, … `most_conditions` conditions (at most three).
-    /// Ties go to fewer conditions, then to earlier parameters.
+    /// Returns the boxes with the highest scores and at most one, two, … `most_conditions`
+    /// conditions (at most three). Ties go to fewer conditions, then to earlier parameters.
     ///
-    /// Every box is tried, except those whose upper bound does not exceed the best score. If all triples of parameters
-    /// would take more than `work` steps, only the parameters of the best pairs are combined, as many as `work` allows.
+    /// Every box is tried, except those whose upper bound does not exceed the best score. If all
+    /// triples of parameters would take more than `work` steps, only the parameters of the best
+    /// pairs are combined, as many as `work` allows.
     pub fn best(&self, most_conditions: usize, work: u64) -> Vec<Best> {
         let mut best = Best::default();
         for axis in 0..self.axes.len() {
@@ -89,7 +96,10 @@ impl<'a> Runs<'a> {
         let runs = self.ones.len() as u64;
         let triples = |count: u64| count * count.saturating_sub(1) * count.saturating_sub(2) / 6;
         let cost = |count: u64| triples(count) * (runs + BOXES_IN_RUNS);
-        let affordable = (3..=self.axes.len() as u64).take_while(|count| cost(*count) <= work).last().unwrap_or(3);
+        let affordable = (3..=self.axes.len() as u64)
+            .take_while(|count| cost(*count) <= work)
+            .last()
+            .unwrap_or(3);
         let mut order: Vec<usize> = (0..self.axes.len()).collect();
         order.sort_by(|a, b| promise[*b].total_cmp(&promise[*a]).then(a.cmp(b)));
         order.truncate(usize::try_from(affordable).unwrap_or(usize::MAX));
@@ -126,7 +136,9 @@ impl<'a> Runs<'a> {
             }
             let (score, of_second) = along.highest(row, self.likelihood, fewest);
             highest = highest.max(score);
-            best.take(score, || vec![across.condition(of_first), along.condition(of_second)]);
+            best.take(score, || {
+                vec![across.condition(of_first), along.condition(of_second)]
+            });
         }
         highest
     }
@@ -152,7 +164,13 @@ impl<'a> Runs<'a> {
                     continue;
                 }
                 let (score, of_third) = c.highest(row, self.likelihood, fewest);
-                if best.take(score, || vec![a.condition(of_first), b.condition(of_second), c.condition(of_third)]) {
+                if best.take(score, || {
+                    vec![
+                        a.condition(of_first),
+                        b.condition(of_second),
+                        c.condition(of_third),
+                    ]
+                }) {
                     fewest = self.likelihood.fewest_failures(best.score);
                 }
             }
@@ -163,7 +181,9 @@ impl<'a> Runs<'a> {
     fn places(&self, [first, second]: [usize; 2]) -> Vec<u32> {
         let width = self.axes[second].cells as u32;
         let cells = self.cells[first].iter().zip(&self.cells[second]);
-        cells.map(|(first, second)| u32::from(*first) * width + u32::from(*second)).collect()
+        cells
+            .map(|(first, second)| u32::from(*first) * width + u32::from(*second))
+            .collect()
     }
 }
 
@@ -185,9 +205,14 @@ fn failures(cells: &[Count]) -> u64 {
 }
 
 impl Axis {
-    /// Returns the highest score of the conditions with at least `fewest` failures, and the index of its condition, or
-    /// (0, 0) if no score exceeds 0.
-    pub(super) fn highest(&self, row: &[Count], likelihood: &Likelihood, fewest: u64) -> (f64, usize) {
+    /// Returns the highest score of the conditions with at least `fewest` failures, and the index
+    /// of its condition, or (0, 0) if no score exceeds 0.
+    pub(super) fn highest(
+        &self,
+        row: &[Count],
+        likelihood: &Likelihood,
+        fewest: u64,
+    ) -> (f64, usize) {
         let mut highest = (0.0, 0);
         let mut place = 0;
         let mut look = |count: Count, place: &mut usize| {
@@ -201,7 +226,9 @@ impl Axis {
         };
         match &self.conditions {
             Conditions::Ranges(_) | Conditions::Arcs(_) => {
-                let all = row[1..self.cells].iter().fold(0, |sum: Count, count| sum.wrapping_add(*count));
+                let all = row[1..self.cells]
+                    .iter()
+                    .fold(0, |sum: Count, count| sum.wrapping_add(*count));
                 let mut rest = all;
                 for first in 1..self.cells {
                     // The other ranges have no more failures than those that begin here together.
@@ -221,7 +248,9 @@ impl Axis {
                     for (first, last) in self.gaps() {
                         let from = if begun == first { last } else { first };
                         let before = if begun == first { outside } else { all };
-                        outside = row[from..=last].iter().fold(before, |sum, count| sum.wrapping_sub(*count));
+                        outside = row[from..=last]
+                            .iter()
+                            .fold(before, |sum, count| sum.wrapping_sub(*count));
                         begun = first;
                         look(outside, &mut place);
                     }
@@ -229,7 +258,12 @@ impl Axis {
             }
             Conditions::Kinds(kinds) => {
                 for (_, members) in kinds {
-                    look(members.iter().fold(0, |sum, cell| sum.wrapping_add(row[*cell])), &mut place);
+                    look(
+                        members
+                            .iter()
+                            .fold(0, |sum, cell| sum.wrapping_add(row[*cell])),
+                        &mut place,
+                    );
                 }
             }
         }

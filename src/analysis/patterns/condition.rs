@@ -36,39 +36,72 @@ impl Condition {
     /// Index of the parameter.
     pub fn parameter(&self) -> usize {
         match self {
-            Self::Kind { parameter, .. } | Self::Range { parameter, .. } | Self::Arc { parameter, .. } => *parameter,
+            Self::Kind { parameter, .. }
+            | Self::Range { parameter, .. }
+            | Self::Arc { parameter, .. } => *parameter,
         }
     }
 
-    /// Returns for each run whether the condition holds. A run without a value for the parameter satisfies no condition
-    /// on it.
+    /// Returns for each run whether the condition holds. A run without a value for the parameter
+    /// satisfies no condition on it.
     pub fn holds(&self, input: &PatternInput) -> Vec<bool> {
         match (self, &input.parameters[self.parameter()].values) {
-            (Self::Range { low, high, .. }, Values::Numbers(numbers) | Values::Angles(numbers)) => numbers
+            (Self::Range { low, high, .. }, Values::Numbers(numbers) | Values::Angles(numbers)) => {
+                numbers
+                    .iter()
+                    .map(|value| {
+                        !value.is_nan()
+                            && low.is_none_or(|low| *value >= low)
+                            && high.is_none_or(|high| *value < high)
+                    })
+                    .collect()
+            }
+            (
+                Self::Kind { kind, .. },
+                Values::Kinds {
+                    of_run,
+                    names,
+                    above,
+                },
+            ) => {
+                let belongs: Vec<bool> = names
+                    .iter()
+                    .zip(above)
+                    .map(|(name, above)| name == kind || above.contains(kind))
+                    .collect();
+                of_run
+                    .iter()
+                    .map(|of| of.is_some_and(|of| belongs[of as usize]))
+                    .collect()
+            }
+            (Self::Arc { from, to, .. }, Values::Angles(angles)) => angles
                 .iter()
-                .map(|value| {
-                    !value.is_nan() && low.is_none_or(|low| *value >= low) && high.is_none_or(|high| *value < high)
-                })
+                .map(|angle| angle >= from || angle < to)
                 .collect(),
-            (Self::Kind { kind, .. }, Values::Kinds { of_run, names, above }) => {
-                let belongs: Vec<bool> =
-                    names.iter().zip(above).map(|(name, above)| name == kind || above.contains(kind)).collect();
-                of_run.iter().map(|of| of.is_some_and(|of| belongs[of as usize])).collect()
-            }
-            (Self::Arc { from, to, .. }, Values::Angles(angles)) => {
-                angles.iter().map(|angle| angle >= from || angle < to).collect()
-            }
             // A condition of the wrong type holds for no run.
             _ => vec![false; input.len()],
         }
     }
 
-    /// Returns weaker conditions: without the lower end, without the upper end, or `None` for no condition.
+    /// Returns weaker conditions: without the lower end, without the upper end, or `None` for no
+    /// condition.
     pub(super) fn weaker(&self) -> Vec<Option<Self>> {
         match self {
-            Self::Range { parameter, low: low @ Some(_), high: high @ Some(_) } => vec![
-                Some(Self::Range { parameter: *parameter, low: None, high: *high }),
-                Some(Self::Range { parameter: *parameter, low: *low, high: None }),
+            Self::Range {
+                parameter,
+                low: low @ Some(_),
+                high: high @ Some(_),
+            } => vec![
+                Some(Self::Range {
+                    parameter: *parameter,
+                    low: None,
+                    high: *high,
+                }),
+                Some(Self::Range {
+                    parameter: *parameter,
+                    low: *low,
+                    high: None,
+                }),
             ],
             _ => vec![None],
         }
@@ -86,7 +119,8 @@ pub(super) fn all_hold(conditions: &[Condition], input: &PatternInput) -> Vec<bo
     holds
 }
 
-/// Returns the number with the fewest decimals in (`low`, `high`]: a readable bound between two values.
+/// Returns the number with the fewest decimals in (`low`, `high`]: a readable bound between two
+/// values.
 pub fn simplest_between(low: f64, high: f64) -> f64 {
     for digits in 0..16 {
         let scale = libm::exp10(f64::from(digits));

@@ -35,7 +35,8 @@ pub enum Values {
     Angles(Vec<f64>),
     /// Categories, each of which may have superkinds.
     Kinds {
-        /// Index in `names` of each run's kind, `None` if missing. Names are in the order of first occurrence.
+        /// Index in `names` of each run's kind, `None` if missing. Names are in the order of first
+        /// occurrence.
         of_run: Vec<Option<u32>>,
         /// Names of the kinds.
         names: Vec<String>,

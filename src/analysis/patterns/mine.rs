@@ -1,9 +1,9 @@
-//! Sequential covering: finds the strongest pattern, then the strongest among the runs that it does not explain, and so
-//! on.
+//! Sequential covering: finds the strongest pattern, then the strongest among the runs that it does
+//! not explain, and so on.
 //!
-//! Patterns with one, two and three conditions are three families of tests, and each gets an equal share of the level.
-//! There are thousands of times as many combinations of three conditions as single ones; corrected for all of them, a
-//! simple cause would stay hidden.
+//! Patterns with one, two and three conditions are three families of tests, and each gets an equal
+//! share of the level. There are thousands of times as many combinations of three conditions as
+//! single ones; corrected for all of them, a simple cause would stay hidden.
 
 use crate::patterns::boxes::{Best, Runs};
 use crate::patterns::cells::{Axis, axes};
@@ -36,7 +36,13 @@ pub struct PatternOptions {
 
 impl Default for PatternOptions {
     fn default() -> Self {
-        Self { most_conditions: 3, level: 0.05, cells: 8, most_patterns: 8, work: 40_000_000 }
+        Self {
+            most_conditions: 3,
+            level: 0.05,
+            cells: 8,
+            most_patterns: 8,
+            work: 40_000_000,
+        }
     }
 }
 
@@ -49,8 +55,9 @@ pub struct Pattern {
     pub runs: Vec<usize>,
     /// Counts among all decided runs.
     pub all: TwoByTwo,
-    /// Counts among the training runs (without held-out runs and those of earlier patterns), with bounds at the cuts.
-    /// Refined bounds are not part of the test, because not all of them were tried.
+    /// Counts among the training runs (without held-out runs and those of earlier patterns), with
+    /// bounds at the cuts. Refined bounds are not part of the test, because not all of them were
+    /// tried.
     pub searched: TwoByTwo,
     /// Counts among the held-out runs that no earlier pattern contains.
     pub held_out: TwoByTwo,
@@ -60,18 +67,19 @@ pub struct Pattern {
     pub elsewhere: Option<Interval>,
     /// Failure rate within the pattern divided by the overall failure rate.
     pub lift: f64,
-    /// Weighted relative accuracy: the pattern's share of all runs times the difference between its failure rate and
-    /// the overall rate.
+    /// Weighted relative accuracy: the pattern's share of all runs times the difference between its
+    /// failure rate and the overall rate.
     pub wracc: f64,
     /// One-sided p-value of Fisher's exact test among the training runs.
     pub p: f64,
-    /// `p` adjusted for all boxes tried (Benjamini and Hochberg, weighted so that patterns with one, two and three
-    /// conditions have equal shares), an upper bound.
+    /// `p` adjusted for all boxes tried (Benjamini and Hochberg, weighted so that patterns with
+    /// one, two and three conditions have equal shares), an upper bound.
     ///
-    /// Source of the weights: C. R. Genovese, K. Roeder and L. Wasserman, "False discovery control with p-value
-    /// weighting", Biometrika 93 (2006) 509–524.
+    /// Source of the weights: C. R. Genovese, K. Roeder and L. Wasserman, "False discovery control
+    /// with p-value weighting", Biometrika 93 (2006) 509–524.
     pub q: f64,
-    /// One-sided p-value of Fisher's exact test among the held-out runs, adjusted for the number of patterns (Holm).
+    /// One-sided p-value of Fisher's exact test among the held-out runs, adjusted for the number of
+    /// patterns (Holm).
     pub p_held_out: f64,
     /// Whether the pattern is significant among the held-out runs.
     pub confirmed: bool,
@@ -92,8 +100,8 @@ pub struct Patterns {
     pub tried: u64,
     /// Number of parameters that vary.
     pub parameters: usize,
-    /// Maximum number of conditions tried. It is lower than requested if the correction for more combinations would
-    /// hide every pattern.
+    /// Maximum number of conditions tried. It is lower than requested if the correction for more
+    /// combinations would hide every pattern.
     pub depth: usize,
     /// Number of parameters whose triples were combined.
     pub combined: usize,
@@ -110,8 +118,9 @@ impl Patterns {
 
 /// Finds the conditions under which runs fail more often than elsewhere.
 ///
-/// The score of a pattern is the likelihood ratio of separate failure rates within and outside against one common rate.
-/// Ties go to fewer conditions. The same runs in the same order give the same patterns.
+/// The score of a pattern is the likelihood ratio of separate failure rates within and outside
+/// against one common rate. Ties go to fewer conditions. The same runs in the same order give the
+/// same patterns.
 pub fn mine(input: &PatternInput, options: &PatternOptions) -> Patterns {
     let mut found = Patterns {
         runs: input.len() as u64,
@@ -127,15 +136,26 @@ pub fn mine(input: &PatternInput, options: &PatternOptions) -> Patterns {
     let rounds = search(input, open, &axes, options, &mut found, &mut families);
     found.tried = families.tried.iter().sum();
     let (probabilities, adjusted) = adjusted(&rounds, &families);
-    let conditions: Vec<Vec<Condition>> = rounds.iter().map(|(conditions, _)| conditions.clone()).collect();
+    let conditions: Vec<Vec<Condition>> = rounds
+        .iter()
+        .map(|(conditions, _)| conditions.clone())
+        .collect();
     let confirmed = confirm(&conditions, input);
-    for ((((conditions, searched), p), q), (held_out, p_held_out)) in
-        rounds.into_iter().zip(probabilities).zip(adjusted).zip(confirmed)
+    for ((((conditions, searched), p), q), (held_out, p_held_out)) in rounds
+        .into_iter()
+        .zip(probabilities)
+        .zip(adjusted)
+        .zip(confirmed)
     {
         let within = all_hold(&conditions, input);
         let all = count(input, &within, |_| true);
-        let (inside, outside) = (all.failed_in + all.passed_in, all.failed_out + all.passed_out);
-        let Some(rate) = input.sampling.interval(all.failed_in, inside) else { continue };
+        let (inside, outside) = (
+            all.failed_in + all.passed_in,
+            all.failed_out + all.passed_out,
+        );
+        let Some(rate) = input.sampling.interval(all.failed_in, inside) else {
+            continue;
+        };
         let overall = found.failed as f64 / found.runs as f64;
         found.patterns.push(Pattern {
             conditions,
@@ -162,17 +182,27 @@ pub fn mine(input: &PatternInput, options: &PatternOptions) -> Patterns {
 /// Returns the p-values of patterns, and the adjusted ones.
 fn adjusted(rounds: &[(Vec<Condition>, TwoByTwo)], families: &Families) -> (Vec<f64>, Vec<f64>) {
     let tried = families.tried.iter().sum::<u64>().max(1);
-    let probabilities: Vec<f64> = rounds.iter().map(|(_, table)| table.fisher().greater).collect();
-    let weighted =
-        |((conditions, _), p): (&(Vec<Condition>, TwoByTwo), &f64)| p * families.tests(conditions.len()) / tried as f64;
+    let probabilities: Vec<f64> = rounds
+        .iter()
+        .map(|(_, table)| table.fisher().greater)
+        .collect();
+    let weighted = |((conditions, _), p): (&(Vec<Condition>, TwoByTwo), &f64)| {
+        p * families.tests(conditions.len()) / tried as f64
+    };
     let weighted: Vec<f64> = rounds.iter().zip(&probabilities).map(weighted).collect();
-    let adjusted = benjamini_hochberg(&weighted, tried).into_iter().map(|adjusted| adjusted.min(1.0)).collect();
+    let adjusted = benjamini_hochberg(&weighted, tried)
+        .into_iter()
+        .map(|adjusted| adjusted.min(1.0))
+        .collect();
     (probabilities, adjusted)
 }
 
-/// Returns the number of cells for a number of runs. With few runs, many narrow ranges would only add false positives.
+/// Returns the number of cells for a number of runs. With few runs, many narrow ranges would only
+/// add false positives.
 pub(super) fn cells(runs: usize, most: usize) -> usize {
-    (libm::cbrt(runs as f64) as usize).clamp(4, 64).min(most.max(2))
+    (libm::cbrt(runs as f64) as usize)
+        .clamp(4, 64)
+        .min(most.max(2))
 }
 
 /// The families of tests: patterns with one, two and three conditions.
@@ -184,7 +214,10 @@ struct Families {
 
 impl Families {
     fn add(&mut self, found: &[Best]) {
-        self.tried.iter_mut().zip(found).for_each(|(tried, best)| *tried += best.tried);
+        self.tried
+            .iter_mut()
+            .zip(found)
+            .for_each(|(tried, best)| *tried += best.tried);
     }
 
     /// Number of families with tests.
@@ -192,10 +225,14 @@ impl Families {
         self.tried.iter().filter(|tried| **tried > 0).count()
     }
 
-    /// Number of tests that a pattern with this many conditions is corrected for: those of its family, times the number
-    /// of families.
+    /// Number of tests that a pattern with this many conditions is corrected for: those of its
+    /// family, times the number of families.
     fn tests(&self, conditions: usize) -> f64 {
-        let tried = conditions.checked_sub(1).and_then(|family| self.tried.get(family)).copied().unwrap_or_default();
+        let tried = conditions
+            .checked_sub(1)
+            .and_then(|family| self.tried.get(family))
+            .copied()
+            .unwrap_or_default();
         tried as f64 * self.count() as f64
     }
 }
@@ -217,60 +254,90 @@ fn search(
         }
         let depth = affordable_depth(axes, whole, options);
         found.depth = found.depth.max(depth);
-        let likelihood =
-            Likelihood::new((0..open.len()).filter(|run| open[*run]).map(|run| one(input.failed[run])).sum());
+        let likelihood = Likelihood::new(
+            (0..open.len())
+                .filter(|run| open[*run])
+                .map(|run| one(input.failed[run]))
+                .sum(),
+        );
         let runs = Runs::new(axes, &input.failed, &open, &likelihood);
         let best = runs.best(depth, options.work);
         families.add(&best);
-        found.combined = best.iter().map(|best| best.combined).fold(found.combined, usize::max);
-        let open_runs = OpenRuns { input, open: &open, axes, likelihood: &likelihood };
+        found.combined = best
+            .iter()
+            .map(|best| best.combined)
+            .fold(found.combined, usize::max);
+        let open_runs = OpenRuns {
+            input,
+            open: &open,
+            axes,
+            likelihood: &likelihood,
+        };
         // Later patterns are weaker: if none is significant now, they are not either.
         let rank = rounds.len() as f64 + 1.0;
-        let Some((mut conditions, table)) =
-            significant(best, &open_runs, families, [options.level * rank, options.level])
-        else {
+        let Some((mut conditions, table)) = significant(
+            best,
+            &open_runs,
+            families,
+            [options.level * rank, options.level],
+        ) else {
             break;
         };
-        // Bounds between the cuts describe the pattern better. They are not part of the test, because not all of them
-        // were tried.
+        // Bounds between the cuts describe the pattern better. They are not part of the test,
+        // because not all of them were tried.
         refine(&mut conditions, &open_runs);
         let within = all_hold(&conditions, input);
-        open.iter_mut().zip(&within).for_each(|(open, within)| *open &= !within);
+        open.iter_mut()
+            .zip(&within)
+            .for_each(|(open, within)| *open &= !within);
         rounds.push((conditions, table));
     }
     rounds
 }
 
-/// Returns the significant pattern with the highest score, simplified, with its counts among the open runs. Boxes with
-/// more conditions have higher scores.
+/// Returns the significant pattern with the highest score, simplified, with its counts among the
+/// open runs. Boxes with more conditions have higher scores.
 fn significant(
     best: Vec<Best>,
     open_runs: &OpenRuns<'_>,
     families: &Families,
     [level, simpler_level]: [f64; 2],
 ) -> Option<(Vec<Condition>, TwoByTwo)> {
-    let found = best.into_iter().rev().map(|best| best.conditions).filter(|conditions| !conditions.is_empty());
+    let found = best
+        .into_iter()
+        .rev()
+        .map(|best| best.conditions)
+        .filter(|conditions| !conditions.is_empty());
     found
         .map(|mut conditions| {
             simplify(&mut conditions, open_runs, simpler_level);
             let within = all_hold(&conditions, open_runs.input);
-            (conditions, count(open_runs.input, &within, |run| open_runs.open[run]))
+            (
+                conditions,
+                count(open_runs.input, &within, |run| open_runs.open[run]),
+            )
         })
-        .find(|(conditions, table)| table.fisher().greater * families.tests(conditions.len()) <= level)
+        .find(|(conditions, table)| {
+            table.fisher().greater * families.tests(conditions.len()) <= level
+        })
 }
 
-/// Returns the maximum number of conditions, at least one, with which a pattern of half of all failures and no passes
-/// would still be significant.
+/// Returns the maximum number of conditions, at least one, with which a pattern of half of all
+/// failures and no passes would still be significant.
 ///
-/// It depends only on the numbers of runs and failures, not on which runs failed, so that the choice does not bias the
-/// test.
+/// It depends only on the numbers of runs and failures, not on which runs failed, so that the
+/// choice does not bias the test.
 fn affordable_depth(axes: &[Axis], whole: TwoByTwo, options: &PatternOptions) -> usize {
     let failed_in = whole.failed_in.div_ceil(2);
-    let ideal =
-        TwoByTwo { failed_in, passed_in: 0, failed_out: whole.failed_in - failed_in, passed_out: whole.passed_in };
+    let ideal = TwoByTwo {
+        failed_in,
+        passed_in: 0,
+        failed_out: whole.failed_in - failed_in,
+        passed_out: whole.passed_in,
+    };
     let p = ideal.fisher().greater;
-    // Number of boxes of one, two and three conditions: sums of products of the numbers of conditions on different
-    // parameters.
+    // Number of boxes of one, two and three conditions: sums of products of the numbers of
+    // conditions on different parameters.
     let mut boxes = [1.0, 0.0, 0.0, 0.0];
     for axis in axes {
         for conditions in (1..boxes.len()).rev() {
@@ -278,5 +345,8 @@ fn affordable_depth(axes: &[Axis], whole: TwoByTwo, options: &PatternOptions) ->
         }
     }
     let affordable = |depth: &usize| p * boxes[1..=*depth].iter().sum::<f64>() <= options.level;
-    (2..=options.most_conditions.min(3)).rev().find(affordable).unwrap_or(1)
+    (2..=options.most_conditions.min(3))
+        .rev()
+        .find(affordable)
+        .unwrap_or(1)
 }

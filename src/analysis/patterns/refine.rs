@@ -18,8 +18,8 @@ pub(super) struct OpenRuns<'a> {
     pub likelihood: &'a Likelihood,
 }
 
-/// Moves each bound in turn to the position with the highest score between the adjacent cuts, with all other bounds
-/// fixed.
+/// Moves each bound in turn to the position with the highest score between the adjacent cuts, with
+/// all other bounds fixed.
 pub(super) fn refine(conditions: &mut [Condition], open_runs: &OpenRuns<'_>) {
     for _ in 0..MOST_PASSES {
         let before = conditions.to_vec();
@@ -49,7 +49,10 @@ impl Scale {
             .map(|run| (numbers[run], one(open_runs.input.failed[run])))
             .collect();
         pairs.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let mut scale = Self { values: Vec::new(), below: vec![0] };
+        let mut scale = Self {
+            values: Vec::new(),
+            below: vec![0],
+        };
         let mut sum = 0;
         for (value, one) in pairs {
             sum += one;
@@ -70,11 +73,16 @@ impl Scale {
 
     /// Returns a bound with this many values below it, or `None` if that is all values or none.
     fn bound(&self, place: usize) -> Option<f64> {
-        (place > 0 && place < self.values.len()).then(|| simplest_between(self.values[place - 1], self.values[place]))
+        (place > 0 && place < self.values.len())
+            .then(|| simplest_between(self.values[place - 1], self.values[place]))
     }
 }
 
-fn refined(condition: &Condition, others: &[Condition], open_runs: &OpenRuns<'_>) -> Option<Condition> {
+fn refined(
+    condition: &Condition,
+    others: &[Condition],
+    open_runs: &OpenRuns<'_>,
+) -> Option<Condition> {
     let parameter = condition.parameter();
     // An arc is refined by the range that it leaves out.
     let (low, high, is_arc) = match condition {
@@ -83,8 +91,11 @@ fn refined(condition: &Condition, others: &[Condition], open_runs: &OpenRuns<'_>
         Condition::Kind { .. } => return None,
     };
     let numbers = open_runs.input.parameters[parameter].values.numbers()?;
-    let (Conditions::Ranges(cuts) | Conditions::Arcs(cuts)) =
-        &open_runs.axes.iter().find(|axis| axis.parameter == parameter)?.conditions
+    let (Conditions::Ranges(cuts) | Conditions::Arcs(cuts)) = &open_runs
+        .axes
+        .iter()
+        .find(|axis| axis.parameter == parameter)?
+        .conditions
     else {
         return None;
     };
@@ -92,29 +103,47 @@ fn refined(condition: &Condition, others: &[Condition], open_runs: &OpenRuns<'_>
     let end = scale.values.len();
     let score = |first: usize, last: usize| {
         let between = scale.below[last] - scale.below[first];
-        open_runs.likelihood.gain(if is_arc { scale.below[end] - between } else { between })
+        open_runs.likelihood.gain(if is_arc {
+            scale.below[end] - between
+        } else {
+            between
+        })
     };
     let (low, high) = refined_bounds([low, high], cuts, &scale, score);
     match (is_arc, low, high) {
         (true, Some(to), Some(from)) => Some(even(parameter, from, to, open_runs.input)),
         (true, ..) => None,
-        (false, ..) => Some(Condition::Range { parameter, low, high }),
+        (false, ..) => Some(Condition::Range {
+            parameter,
+            low,
+            high,
+        }),
     }
 }
 
-/// Returns an arc with the same runs whose bounds have the same size, if there is one: it is easier to read.
+/// Returns an arc with the same runs whose bounds have the same size, if there is one: it is easier
+/// to read.
 fn even(parameter: usize, from: f64, to: f64, input: &PatternInput) -> Condition {
-    let arc = Condition::Arc { parameter, from, to };
+    let arc = Condition::Arc {
+        parameter,
+        from,
+        to,
+    };
     let holds = arc.holds(input);
     [from, -to]
         .into_iter()
         .filter(|bound| *bound > 0.0)
-        .map(|bound| Condition::Arc { parameter, from: bound, to: -bound })
+        .map(|bound| Condition::Arc {
+            parameter,
+            from: bound,
+            to: -bound,
+        })
         .find(|even| even.holds(input) == holds)
         .unwrap_or(arc)
 }
 
-/// Moves the bounds of a range of values, one after the other, to the positions with the highest score.
+/// Moves the bounds of a range of values, one after the other, to the positions with the highest
+/// score.
 fn refined_bounds(
     [mut low, mut high]: [Option<f64>; 2],
     cuts: &[Cut],
@@ -122,7 +151,10 @@ fn refined_bounds(
     score: impl Fn(usize, usize) -> f64,
 ) -> (Option<f64>, Option<f64>) {
     let end = scale.values.len();
-    let (mut first, last) = (low.map_or(0, |low| scale.place(low)), high.map_or(end, |high| scale.place(high)));
+    let (mut first, last) = (
+        low.map_or(0, |low| scale.place(low)),
+        high.map_or(end, |high| scale.place(high)),
+    );
     if let Some(bound) = low {
         let window = window(bound, cuts, scale).filter(|place| *place <= last);
         let best = best(first, window, |place| score(place, last));
@@ -154,7 +186,12 @@ fn best(now: usize, places: impl Iterator<Item = usize>, score: impl Fn(usize) -
 
 /// Returns the positions from the cut before a bound to the cut after it.
 fn window(bound: f64, cuts: &[Cut], scale: &Scale) -> RangeInclusive<usize> {
-    let before = cuts.iter().rev().map(|cut| cut.bound).find(|cut| *cut < bound);
+    let before = cuts
+        .iter()
+        .rev()
+        .map(|cut| cut.bound)
+        .find(|cut| *cut < bound);
     let behind = cuts.iter().map(|cut| cut.bound).find(|cut| *cut > bound);
-    before.map_or(0, |cut| scale.place(cut))..=behind.map_or(scale.values.len(), |cut| scale.place(cut))
+    before.map_or(0, |cut| scale.place(cut))
+        ..=behind.map_or(scale.values.len(), |cut| scale.place(cut))
 }

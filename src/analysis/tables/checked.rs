@@ -1,7 +1,9 @@
-//! The runs of each file of a mirror, so that files that have not changed since need not be read to know them.
+//! The runs of each file of a mirror, so that files that have not changed since need not be read to
+//! know them.
 //!
-//! The file `FILES` has a line for each: name, size, time of the last change, number of rows, and the indices of its runs as
-//! `first+step*count`, joined by commas. A line `state` has the state of the history whose runs the files have, and the last one a digest of the list.
+//! The file `FILES` has a line for each: name, size, time of the last change, number of rows, and
+//! the indices of its runs as `first+step*count`, joined by commas. A line `state` has the state of
+//! the history whose runs the files have, and the last one a digest of the list.
 
 use std::collections::{BTreeMap, HashSet};
 use std::fs;
@@ -42,11 +44,22 @@ type Stamp = (u64, u128);
 impl Checked {
     /// Reads the list of a folder. It is empty if it is missing or damaged.
     pub fn read(folder: &Path) -> Self {
-        let text = Below::new(folder).read_text(&folder.join(NAME), LONGEST).unwrap_or_default();
-        let text =
-            text.rsplit_once(SUM).filter(|(text, sum)| digest_of(text) == sum.trim_end()).map_or("", |(text, _)| text);
-        let state = text.lines().find_map(|line| line.strip_prefix(STATE)).map(str::to_owned);
-        Self { files: text.lines().filter_map(line).collect(), state, changed: false }
+        let text = Below::new(folder)
+            .read_text(&folder.join(NAME), LONGEST)
+            .unwrap_or_default();
+        let text = text
+            .rsplit_once(SUM)
+            .filter(|(text, sum)| digest_of(text) == sum.trim_end())
+            .map_or("", |(text, _)| text);
+        let state = text
+            .lines()
+            .find_map(|line| line.strip_prefix(STATE))
+            .map(str::to_owned);
+        Self {
+            files: text.lines().filter_map(line).collect(),
+            state,
+            changed: false,
+        }
     }
 
     /// Whether the files have all runs that a history has in this state.
@@ -90,7 +103,11 @@ impl Checked {
         if !self.changed && self.files.len() == before {
             return Ok(());
         }
-        let mut text: String = self.files.iter().map(|(name, (stamp, runs))| text_of(name, *stamp, runs)).collect();
+        let mut text: String = self
+            .files
+            .iter()
+            .map(|(name, (stamp, runs))| text_of(name, *stamp, runs))
+            .collect();
         if let Some(state) = &self.state {
             text.push_str(&format!("{STATE}{state}\n"));
         }
@@ -106,7 +123,10 @@ fn name_of(file: &Path) -> Option<&str> {
 
 fn stamp_of(file: &Path) -> io::Result<Stamp> {
     let metadata = fs::metadata(file)?;
-    let modified = metadata.modified()?.duration_since(UNIX_EPOCH).map_or(0, |since| since.as_nanos());
+    let modified = metadata
+        .modified()?
+        .duration_since(UNIX_EPOCH)
+        .map_or(0, |since| since.as_nanos());
     Ok((metadata.len(), modified))
 }
 
@@ -114,9 +134,16 @@ fn text_of(name: &str, (size, modified): Stamp, runs: &FileRuns) -> String {
     let mut text = format!("{name} {size} {modified} {} ", runs.rows);
     let mut rest = runs.indices.as_slice();
     while let [first, ..] = rest {
-        let step = rest.get(1).and_then(|second| second.checked_sub(*first)).unwrap_or(0);
+        let step = rest
+            .get(1)
+            .and_then(|second| second.checked_sub(*first))
+            .unwrap_or(0);
         let continues = |pair: &&[u64]| pair[1].checked_sub(pair[0]) == Some(step);
-        let count = if step == 0 { 1 } else { 1 + rest.windows(2).take_while(continues).count() };
+        let count = if step == 0 {
+            1
+        } else {
+            1 + rest.windows(2).take_while(continues).count()
+        };
         if rest.len() < runs.indices.len() {
             text.push(',');
         }
@@ -136,7 +163,8 @@ fn line(line: &str) -> Option<(String, (Stamp, FileRuns))> {
     for part in words.next()?.split(',').filter(|part| !part.is_empty()) {
         let (first, rest) = part.split_once('+')?;
         let (step, count) = rest.split_once('*')?;
-        let (first, step, count): (u64, u64, u64) = (first.parse().ok()?, step.parse().ok()?, count.parse().ok()?);
+        let (first, step, count): (u64, u64, u64) =
+            (first.parse().ok()?, step.parse().ok()?, count.parse().ok()?);
         // A damaged count must not fill the memory: each run has a row at least.
         if count > rows as u64 {
             return None;
@@ -155,20 +183,47 @@ mod tests {
 
     #[test]
     fn lines_are_read_as_they_were_written() {
-        for indices in [vec![], vec![7], vec![0, 1000, 2000, 3000], vec![5, 6, 7, 3, 3, 100, 90], vec![u64::MAX]] {
+        for indices in [
+            vec![],
+            vec![7],
+            vec![0, 1000, 2000, 3000],
+            vec![5, 6, 7, 3, 3, 100, 90],
+            vec![u64::MAX],
+        ] {
             let runs = FileRuns { rows: 35, indices };
             let text = text_of("k.000000.ab.parquet", (12, 34), &runs);
             let read = line(text.trim_end_matches('\n')).expect("it was written");
-            assert_eq!(read, ("k.000000.ab.parquet".to_owned(), ((12, 34), runs)), "{text}");
+            assert_eq!(
+                read,
+                ("k.000000.ab.parquet".to_owned(), ((12, 34), runs)),
+                "{text}"
+            );
         }
-        assert!(text_of("k", (1, 1), &FileRuns { rows: 99, indices: (0..99).collect() }).len() < 30);
+        assert!(
+            text_of(
+                "k",
+                (1, 1),
+                &FileRuns {
+                    rows: 99,
+                    indices: (0..99).collect()
+                }
+            )
+            .len()
+                < 30
+        );
     }
 
     #[test]
     fn damaged_lines_are_ignored() {
-        for text in
-            ["", "k", "k 1 1 1", "k 1 1 5 0+1*6", "k 1 1 5 0+1", "k 1 1 9 18446744073709551615+1*2", "k x 1 1 0+1*1"]
-        {
+        for text in [
+            "",
+            "k",
+            "k 1 1 1",
+            "k 1 1 5 0+1*6",
+            "k 1 1 5 0+1",
+            "k 1 1 9 18446744073709551615+1*2",
+            "k x 1 1 0+1*1",
+        ] {
             assert_eq!(line(text), None, "{text}");
         }
     }
@@ -178,16 +233,27 @@ mod tests {
         let folder = ScratchFolder::create().expect("a temporary folder");
         let file = folder.path().join("k.parquet");
         fs::write(&file, "old").expect("it can be written");
-        let runs = FileRuns { rows: 5, indices: vec![0] };
+        let runs = FileRuns {
+            rows: 5,
+            indices: vec![0],
+        };
         let mut checked = Checked::read(folder.path());
         checked.set(&file, runs.clone());
         checked
-            .write(&Below::new(folder.path()), folder.path(), std::slice::from_ref(&file))
+            .write(
+                &Below::new(folder.path()),
+                folder.path(),
+                std::slice::from_ref(&file),
+            )
             .expect("it can be written");
         assert_eq!(Checked::read(folder.path()).get(&file), Some(&runs));
         checked.set_state(Some("f00".to_owned()));
         checked
-            .write(&Below::new(folder.path()), folder.path(), std::slice::from_ref(&file))
+            .write(
+                &Below::new(folder.path()),
+                folder.path(),
+                std::slice::from_ref(&file),
+            )
             .expect("it can be written");
         let read = Checked::read(folder.path());
         assert!(read.is_of("f00") && !read.is_of("f0"));

@@ -31,10 +31,21 @@ impl Rows {
     pub fn add(&mut self, table_run: &TableRun) {
         self.cells.resize_with(columns().len(), Vec::new);
         let run = &table_run.detail;
-        for (action, (noise, effects)) in run.actions.iter().zip(table_run.noise.iter().zip(&table_run.effects)) {
+        for (action, (noise, effects)) in run
+            .actions
+            .iter()
+            .zip(table_run.noise.iter().zip(&table_run.effects))
+        {
             let scene = ActionScene::of(run, action);
             for judgement in &action.judgements {
-                let source = RowSource { run, action, judgement, scene: &scene, noise, effects };
+                let source = RowSource {
+                    run,
+                    action,
+                    judgement,
+                    scene: &scene,
+                    noise,
+                    effects,
+                };
                 for (cells, column) in self.cells.iter_mut().zip(columns()) {
                     cells.push((column.cell)(&source));
                 }
@@ -54,7 +65,10 @@ impl Rows {
     /// The columns have different lengths.
     pub fn frame(mut self) -> Result<DataFrame, PolarsError> {
         self.cells.resize_with(columns().len(), Vec::new);
-        let series = columns().iter().zip(self.cells).map(|(column, cells)| series(column.name, column.kind, cells));
+        let series = columns()
+            .iter()
+            .zip(self.cells)
+            .map(|(column, cells)| series(column.name, column.kind, cells));
         DataFrame::new(self.height, series.collect())
     }
 }
@@ -65,27 +79,51 @@ pub(crate) fn series(name: &str, kind: ColumnKind, cells: Vec<Cell>) -> Series {
     let cells = cells.into_iter();
     match kind {
         ColumnKind::Text => {
-            let text = |cell| if let Cell::Text(text) = cell { text } else { None };
+            let text = |cell| {
+                if let Cell::Text(text) = cell {
+                    text
+                } else {
+                    None
+                }
+            };
             Values::new(name, cells.map(text).collect::<Vec<Option<String>>>())
         }
         ColumnKind::Number => {
-            let number = |cell| if let Cell::Number(number) = cell { number } else { None };
+            let number = |cell| {
+                if let Cell::Number(number) = cell {
+                    number
+                } else {
+                    None
+                }
+            };
             Values::new(name, cells.map(number).collect::<Vec<Option<f64>>>())
         }
         ColumnKind::Count => {
-            let count = |cell| if let Cell::Count(count) = cell { count } else { None };
+            let count = |cell| {
+                if let Cell::Count(count) = cell {
+                    count
+                } else {
+                    None
+                }
+            };
             Values::new(name, cells.map(count).collect::<Vec<Option<i64>>>())
         }
         ColumnKind::Bool => {
-            let bool = |cell| if let Cell::Bool(bool) = cell { bool } else { None };
+            let bool = |cell| {
+                if let Cell::Bool(bool) = cell {
+                    bool
+                } else {
+                    None
+                }
+            };
             Values::new(name, cells.map(bool).collect::<Vec<Option<bool>>>())
         }
     }
     .into()
 }
 
-/// Adds a column for each category column: local names of the category and its superclasses, nearest first, joined by
-/// spaces.
+/// Adds a column for each category column: local names of the category and its superclasses,
+/// nearest first, joined by spaces.
 pub(super) fn with_kinds(frame: &mut DataFrame, hierarchy: &Hierarchy) -> Result<(), PolarsError> {
     for (from, to) in KINDS {
         let mut known: BTreeMap<&str, String> = BTreeMap::new();
@@ -93,7 +131,12 @@ pub(super) fn with_kinds(frame: &mut DataFrame, hierarchy: &Hierarchy) -> Result
         let kinds: Vec<Option<String>> = categories
             .iter()
             .map(|category| {
-                category.map(|category| known.entry(category).or_insert_with(|| kinds_of(category, hierarchy)).clone())
+                category.map(|category| {
+                    known
+                        .entry(category)
+                        .or_insert_with(|| kinds_of(category, hierarchy))
+                        .clone()
+                })
             })
             .collect();
         frame.with_column(Values::new(to.into(), kinds).into())?;
@@ -101,16 +144,28 @@ pub(super) fn with_kinds(frame: &mut DataFrame, hierarchy: &Hierarchy) -> Result
     Ok(())
 }
 
-/// Returns the names of the columns that [`with_kinds`] adds, the columns that they extend, and their descriptions.
+/// Returns the names of the columns that [`with_kinds`] adds, the columns that they extend, and
+/// their descriptions.
 pub(super) fn kinds_columns() -> impl Iterator<Item = (&'static str, &'static Column, String)> {
     KINDS.into_iter().filter_map(|(from, to)| {
         let column = columns().iter().find(|column| column.name == from)?;
-        Some((to, column, format!("local names of {from} and its superclasses, nearest first")))
+        Some((
+            to,
+            column,
+            format!("local names of {from} and its superclasses, nearest first"),
+        ))
     })
 }
 
 /// Returns the local names of a category and its superclasses, nearest first, joined by spaces.
 pub(crate) fn kinds_of(category: &str, hierarchy: &Hierarchy) -> String {
-    let above = hierarchy.get(category).into_iter().flatten().map(String::as_str);
-    std::iter::once(names::local(category)).chain(above).collect::<Vec<&str>>().join(" ")
+    let above = hierarchy
+        .get(category)
+        .into_iter()
+        .flatten()
+        .map(String::as_str);
+    std::iter::once(names::local(category))
+        .chain(above)
+        .collect::<Vec<&str>>()
+        .join(" ")
 }

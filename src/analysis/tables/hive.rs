@@ -1,5 +1,5 @@
-//! The files of a mirror in the layout of Hive, `campaign=ID/….parquet`. Readers of such folders make a column of the id in the
-//! path, so the files must not have it.
+//! The files of a mirror in the layout of Hive, `campaign=ID/….parquet`. Readers of such folders
+//! make a column of the id in the path, so the files must not have it.
 
 use std::io::Cursor;
 use std::path::Path;

@@ -1,24 +1,30 @@
-//! The table beside a history, stored as several Parquet files. The name of each has its digest, so that damage is noticed.
+//! The table beside a history, stored as several Parquet files. The name of each has its digest, so
+//! that damage is noticed.
 
 use std::collections::{BTreeMap, BTreeSet, HashSet};
 use std::fs::File;
 use std::io::Cursor;
 use std::path::{Path, PathBuf};
 
-use polars::prelude::{DataFrame, ParquetReader, ParquetWriter, PolarsError, SerReader as _, polars_bail};
+use polars::prelude::{
+    DataFrame, ParquetReader, ParquetWriter, PolarsError, SerReader as _, polars_bail,
+};
 
 use crate::TableRun;
 use crate::tables::checked::{Checked, FileRuns};
 use crate::tables::columns::{ColumnKind, columns};
 use crate::tables::frames::Rows;
 use crate::tables::outcomes::TableFilter;
-use crate::tables::table_files::{LONGEST, digest_of_bytes, is_whole, named, present, tables_in, tables_of, whole};
+use crate::tables::table_files::{
+    LONGEST, digest_of_bytes, is_whole, named, present, tables_in, tables_of, whole,
+};
 use actcheck_base::{Below, Diagnostic, Diagnostics, ScratchFolder, digest_of, guarded};
 use actcheck_history::History;
 
 /// Maximum number of runs in a file, and so in memory at once.
 const RUNS_IN_A_FILE: usize = 2_000;
-/// Number of files of a campaign from which they are written anew as one: each look at a running campaign adds a file.
+/// Number of files of a campaign from which they are written anew as one: each look at a running
+/// campaign adds a file.
 const MOST_PARTS: usize = 16;
 /// Maximum number of rows of a file: a run has some dozens.
 const MOST_ROWS: usize = 1_000 * RUNS_IN_A_FILE;
@@ -26,7 +32,8 @@ const MOST_ROWS: usize = 1_000 * RUNS_IN_A_FILE;
 const MISSING_TRACE: &str = "H009";
 /// File with the digest of the columns.
 pub(super) const SCHEMA: &str = "SCHEMA";
-/// File with the number of judgements that `recheck` had added to each campaign when its files were written.
+/// File with the number of judgements that `recheck` had added to each campaign when its files were
+/// written.
 const RECHECKED: &str = "RECHECKED";
 
 /// An up-to-date mirror of a history's store.
@@ -95,14 +102,17 @@ pub struct MirrorChange {
 }
 
 impl Mirror {
-    /// Updates the mirror of a history: writes missing runs, and rewrites files that are damaged, hold runs that the
-    /// store lacks, or are older than a recheck. If the folder of the history is read-only, missing runs are written into a temporary folder,
-    /// which is removed with the returned value.
+    /// Updates the mirror of a history: writes missing runs, and rewrites files that are damaged,
+    /// hold runs that the store lacks, or are older than a recheck. If the folder of the history is
+    /// read-only, missing runs are written into a temporary folder, which is removed with the
+    /// returned value.
     ///
-    /// The campaigns of [`History::selected_campaigns`] are left out, because their scenes were selected to fail.
+    /// The campaigns of [`History::selected_campaigns`] are left out, because their scenes were
+    /// selected to fail.
     ///
     /// # Errors
-    /// `A001` if it can't be written; errors of reading the history. All existing files are complete.
+    /// `A001` if it can't be written; errors of reading the history. All existing files are
+    /// complete.
     pub fn update(history: &History) -> Result<(Self, MirrorChange), Diagnostics> {
         Self::updated(history, &tables_of(history), false)
     }
@@ -115,19 +125,24 @@ impl Mirror {
         Self::updated(history, &tables_of(history), true)
     }
 
-    /// Returns the files of a history's mirror that are damaged or differ from the store and the traces, sorted by name.
-    /// Files of earlier versions, of runs that the store no longer has, and from before a recheck are not compared: an
-    /// update replaces them.
+    /// Returns the files of a history's mirror that are damaged or differ from the store and the
+    /// traces, sorted by name. Files of earlier versions, of runs that the store no longer has, and
+    /// from before a recheck are not compared: an update replaces them.
     ///
     /// # Errors
     /// The history can't be read.
     pub fn damage(history: &History) -> Result<Vec<PathBuf>, Diagnostics> {
-        let known: BTreeSet<String> = history.run_ids()?.into_iter().flat_map(|(_, runs)| runs).collect();
+        let known: BTreeSet<String> = history
+            .run_ids()?
+            .into_iter()
+            .flat_map(|(_, runs)| runs)
+            .collect();
         let (before, later) = (rechecked(&tables_of(history)), history.later_counts()?);
         let is_newest = |campaign: &String| before.get(campaign) == later.get(campaign);
         let mut damaged = Vec::new();
         for file in tables_in(&tables_of(history)) {
-            let is_of_today = named(&file).is_none_or(|name| name.digest.is_some() && is_newest(&name.campaign));
+            let is_of_today =
+                named(&file).is_none_or(|name| name.digest.is_some() && is_newest(&name.campaign));
             if is_of_today && !(is_whole(&file) && is_as_stored(history, &file, &known)?) {
                 damaged.push(file);
             }
@@ -136,14 +151,25 @@ impl Mirror {
         Ok(damaged)
     }
 
-    fn updated(history: &History, tables: &Path, anew: bool) -> Result<(Self, MirrorChange), Diagnostics> {
+    fn updated(
+        history: &History,
+        tables: &Path,
+        anew: bool,
+    ) -> Result<(Self, MirrorChange), Diagnostics> {
         let below = Below::new(history.dir());
         let place = Place::find(&below, tables)?;
         let (folder, below, is_beside) = match &place {
             Place::Scratch(_) if anew => {
-                return Err(unwritten(tables, &"it is read-only, or another process writes it"));
+                return Err(unwritten(
+                    tables,
+                    &"it is read-only, or another process writes it",
+                ));
             }
-            Place::Scratch(scratch) => (scratch.path().to_path_buf(), Below::new(scratch.path()), false),
+            Place::Scratch(scratch) => (
+                scratch.path().to_path_buf(),
+                Below::new(scratch.path()),
+                false,
+            ),
             Place::Beside { .. } | Place::Given => (tables.to_path_buf(), below, true),
         };
         let is_current = is_current(tables);
@@ -152,15 +178,41 @@ impl Mirror {
             let written = below.write_atomic(&tables.join(SCHEMA), schema_digest().as_bytes());
             written.map_err(|error| unwritten(tables, &error))?;
         }
-        let mut mirror = Self { folder, below, files: Vec::new(), checked: Checked::read(tables), _place: place };
+        let mut mirror = Self {
+            folder,
+            below,
+            files: Vec::new(),
+            checked: Checked::read(tables),
+            _place: place,
+        };
         let state = history.state();
-        let is_same = state.as_deref().is_some_and(|state| mirror.checked.is_of(state));
-        if is_same && is_current && !anew && mirror.has_all(tables, &history.unselected_campaigns()?) {
-            let kept = mirror.files.iter().filter_map(|file| Some(mirror.checked.get(&file.path)?.indices.len())).sum();
-            return Ok((mirror, MirrorChange { kept, ..MirrorChange::default() }));
+        let is_same = state
+            .as_deref()
+            .is_some_and(|state| mirror.checked.is_of(state));
+        if is_same
+            && is_current
+            && !anew
+            && mirror.has_all(tables, &history.unselected_campaigns()?)
+        {
+            let kept = mirror
+                .files
+                .iter()
+                .filter_map(|file| Some(mirror.checked.get(&file.path)?.indices.len()))
+                .sum();
+            return Ok((
+                mirror,
+                MirrorChange {
+                    kept,
+                    ..MirrorChange::default()
+                },
+            ));
         }
         let mut change = MirrorChange::default();
-        let mut present = if anew || !is_current { BTreeMap::new() } else { present(tables) };
+        let mut present = if anew || !is_current {
+            BTreeMap::new()
+        } else {
+            present(tables)
+        };
         if is_beside {
             mirror.below.remove_leftovers(tables);
         }
@@ -172,11 +224,20 @@ impl Mirror {
             }
             mirror.update_campaign(history, &campaign, &runs, files, &mut change)?;
         }
-        present.into_values().flatten().try_for_each(|file| mirror.remove(&file))?;
+        present
+            .into_values()
+            .flatten()
+            .try_for_each(|file| mirror.remove(&file))?;
         if is_beside && known != later {
-            let lines: String = later.iter().map(|(campaign, count)| format!("{campaign} {count}\n")).collect();
+            let lines: String = later
+                .iter()
+                .map(|(campaign, count)| format!("{campaign} {count}\n"))
+                .collect();
             let file = tables.join(RECHECKED);
-            mirror.below.write_atomic(&file, lines.as_bytes()).map_err(|error| unwritten(&file, &error))?;
+            mirror
+                .below
+                .write_atomic(&file, lines.as_bytes())
+                .map_err(|error| unwritten(&file, &error))?;
         }
         if is_beside {
             let present: Vec<PathBuf> = mirror.files.iter().map(|file| file.path.clone()).collect();
@@ -187,20 +248,26 @@ impl Mirror {
         Ok((mirror, change))
     }
 
-    /// Adds the files of a folder, unless one has changed since it was checked, was added or removed. `campaigns`: in the
-    /// order of the files.
+    /// Adds the files of a folder, unless one has changed since it was checked, was added or
+    /// removed. `campaigns`: in the order of the files.
     fn has_all(&mut self, tables: &Path, campaigns: &[String]) -> bool {
         let mut there = present(tables);
         let files = campaigns.iter().flat_map(|campaign| {
             let files = there.remove(campaign).unwrap_or_default();
             files.into_iter().map(|path| {
                 let rows = self.checked.get(&path)?.rows;
-                Some(TableFile { campaign: campaign.clone(), path, rows })
+                Some(TableFile {
+                    campaign: campaign.clone(),
+                    path,
+                    rows,
+                })
             })
         });
         let files: Option<Vec<TableFile>> = files.collect();
         let has_all = there.is_empty()
-            && files.as_ref().is_some_and(|files| files.len() == self.checked.len() && are_whole(files));
+            && files
+                .as_ref()
+                .is_some_and(|files| files.len() == self.checked.len() && are_whole(files));
         if has_all {
             self.files = files.unwrap_or_default();
         }
@@ -217,13 +284,23 @@ impl Mirror {
         runs: impl IntoIterator<Item = impl Into<TableRun>>,
     ) -> Result<Self, Diagnostics> {
         let below = Below::new(folder);
-        below.create_folder(folder).map_err(|error| unwritten(folder, &error))?;
+        below
+            .create_folder(folder)
+            .map_err(|error| unwritten(folder, &error))?;
         let (folder, checked) = (folder.to_path_buf(), Checked::default());
-        let mut mirror = Self { folder, below, files: Vec::new(), checked, _place: Place::Given };
+        let mut mirror = Self {
+            folder,
+            below,
+            files: Vec::new(),
+            checked,
+            _place: Place::Given,
+        };
         let mut runs = runs.into_iter().peekable();
         while runs.peek().is_some() {
             let mut rows = Rows::default();
-            runs.by_ref().take(RUNS_IN_A_FILE).for_each(|run| rows.add(&run.into()));
+            runs.by_ref()
+                .take(RUNS_IN_A_FILE)
+                .for_each(|run| rows.add(&run.into()));
             mirror.write(campaign, rows)?;
         }
         Ok(mirror)
@@ -236,12 +313,18 @@ impl Mirror {
 
     /// Number of rows of the campaigns that a filter selects.
     pub fn rows(&self, filter: &TableFilter) -> usize {
-        self.files.iter().filter(|file| filter.takes_campaign(&file.campaign)).map(|file| file.rows).sum()
+        self.files
+            .iter()
+            .filter(|file| filter.takes_campaign(&file.campaign))
+            .map(|file| file.rows)
+            .sum()
     }
 
     /// Iterates over its files with their campaigns.
     pub fn paths(&self) -> impl Iterator<Item = (&str, &Path)> {
-        self.files.iter().map(|file| (file.campaign.as_str(), file.path.as_path()))
+        self.files
+            .iter()
+            .map(|file| (file.campaign.as_str(), file.path.as_path()))
     }
 
     /// Its files, by campaign.
@@ -261,7 +344,11 @@ impl Mirror {
         let (mut there, mut kept, mut outdated) = (HashSet::new(), Vec::new(), Vec::new());
         for path in files {
             let is_known = self.checked.get(&path).is_some();
-            let runs = if is_known && is_whole(&path) { None } else { Some(runs_of(&path)) };
+            let runs = if is_known && is_whole(&path) {
+                None
+            } else {
+                Some(runs_of(&path))
+            };
             match runs {
                 Some(Ok(runs)) => self.checked.set(&path, runs),
                 Some(Err(_)) => {
@@ -271,16 +358,26 @@ impl Mirror {
                 }
                 None => {}
             }
-            let Some(FileRuns { rows, indices }) = self.checked.get(&path) else { continue };
-            if indices.iter().all(|index| known.contains(index) && !there.contains(index)) {
+            let Some(FileRuns { rows, indices }) = self.checked.get(&path) else {
+                continue;
+            };
+            if indices
+                .iter()
+                .all(|index| known.contains(index) && !there.contains(index))
+            {
                 there.extend(indices.iter().copied());
-                kept.push(TableFile { campaign: campaign.to_owned(), rows: *rows, path });
+                kept.push(TableFile {
+                    campaign: campaign.to_owned(),
+                    rows: *rows,
+                    path,
+                });
             } else {
                 // From another history, or duplicate: rewrite it from the store.
                 outdated.push(path);
             }
         }
-        let is_fragmented = kept.len() >= MOST_PARTS && there.len() / kept.len() < RUNS_IN_A_FILE / 4;
+        let is_fragmented =
+            kept.len() >= MOST_PARTS && there.len() / kept.len() < RUNS_IN_A_FILE / 4;
         if is_fragmented && there.len() < known.len() {
             outdated.extend(kept.drain(..).map(|file| file.path));
             there.clear();
@@ -288,7 +385,10 @@ impl Mirror {
         outdated.iter().try_for_each(|file| self.remove(file))?;
         self.files.append(&mut kept);
         change.kept += there.len();
-        let mut missing: Vec<&String> = runs.iter().filter(|run| !there.contains(&index_of(run))).collect();
+        let mut missing: Vec<&String> = runs
+            .iter()
+            .filter(|run| !there.contains(&index_of(run)))
+            .collect();
         history.sort_as_stored(campaign, &mut missing)?;
         for runs in missing.chunks(RUNS_IN_A_FILE) {
             let mut rows = Rows::default();
@@ -298,7 +398,13 @@ impl Mirror {
             let height = rows.height();
             let path = self.write(campaign, rows)?;
             let indices = runs.iter().map(|run| index_of(run)).collect();
-            self.checked.set(&path, FileRuns { rows: height, indices });
+            self.checked.set(
+                &path,
+                FileRuns {
+                    rows: height,
+                    indices,
+                },
+            );
             change.added += runs.len();
         }
         Ok(())
@@ -309,57 +415,90 @@ impl Mirror {
         if file.parent() != Some(self.folder.as_path()) {
             return Ok(());
         }
-        self.below.remove(file).map_err(|error| unwritten(file, &error))
+        self.below
+            .remove(file)
+            .map_err(|error| unwritten(file, &error))
     }
 
     /// Writes the rows of some runs to a new file atomically, and adds it.
     fn write(&mut self, campaign: &str, rows: Rows) -> Result<PathBuf, Diagnostics> {
         let number_of = |file: &TableFile| named(&file.path).map(|name| name.number);
-        let last = self.files.iter().filter(|file| file.campaign == campaign).filter_map(number_of).max();
+        let last = self
+            .files
+            .iter()
+            .filter(|file| file.campaign == campaign)
+            .filter_map(number_of)
+            .max();
         let number = last.map_or(0, |last| last + 1);
         let height = rows.height();
         let written = || -> Result<PathBuf, PolarsError> {
             let (mut frame, mut bytes) = (rows.frame()?, Cursor::new(Vec::new()));
             ParquetWriter::new(&mut bytes).finish(&mut frame)?;
             let bytes = bytes.into_inner();
-            let file = self.folder.join(format!("{campaign}.{number:06}.{}.parquet", digest_of_bytes(&bytes)));
+            let file = self.folder.join(format!(
+                "{campaign}.{number:06}.{}.parquet",
+                digest_of_bytes(&bytes)
+            ));
             self.below.write_atomic(&file, &bytes)?;
             Ok(file)
         };
         let path = written().map_err(|error| unwritten(&self.folder, &error))?;
-        self.files.push(TableFile { campaign: campaign.to_owned(), path: path.clone(), rows: height });
+        self.files.push(TableFile {
+            campaign: campaign.to_owned(),
+            path: path.clone(),
+            rows: height,
+        });
         Ok(path)
     }
 }
 
-/// The position of a run in its campaign, from its id. Ids of another form get a number that no position has.
+/// The position of a run in its campaign, from its id. Ids of another form get a number that no
+/// position has.
 fn index_of(run: &str) -> u64 {
-    let number = run.rsplit_once('-').and_then(|(_, number)| number.parse::<u64>().ok()?.checked_sub(1));
+    let number = run
+        .rsplit_once('-')
+        .and_then(|(_, number)| number.parse::<u64>().ok()?.checked_sub(1));
     number.unwrap_or_else(|| {
         let digest = digest_of(run);
-        u64::from_str_radix(digest.get(..15).unwrap_or_default(), 16).unwrap_or_default() | (1 << 63)
+        u64::from_str_radix(digest.get(..15).unwrap_or_default(), 16).unwrap_or_default()
+            | (1 << 63)
     })
 }
 
 /// Whether a whole file has the rows that its runs have now.
-fn is_as_stored(history: &History, file: &Path, known: &BTreeSet<String>) -> Result<bool, Diagnostics> {
-    let Ok(runs) = ids_of(file) else { return Ok(false) };
+fn is_as_stored(
+    history: &History,
+    file: &Path,
+    known: &BTreeSet<String>,
+) -> Result<bool, Diagnostics> {
+    let Ok(runs) = ids_of(file) else {
+        return Ok(false);
+    };
     if !runs.iter().all(|run| known.contains(run)) {
         return Ok(true);
     }
     let mut rows = Rows::default();
     for run in &runs {
         // Without its trace, a run's noise and effects can't be compared.
-        let Ok((choices, trace)) = history.recorded(run) else { return Ok(true) };
+        let Ok((choices, trace)) = history.recorded(run) else {
+            return Ok(true);
+        };
         rows.add(&TableRun::new(history.newest_run(run)?, &choices, &trace));
     }
-    Ok(rows.frame().is_ok_and(|frame| read(file, None).is_ok_and(|there| there.equals_missing(&frame))))
+    Ok(rows
+        .frame()
+        .is_ok_and(|frame| read(file, None).is_ok_and(|there| there.equals_missing(&frame))))
 }
 
 /// Reads the number of later judgements of each campaign from the time when the files were written.
 fn rechecked(tables: &Path) -> BTreeMap<String, u64> {
-    let text = Below::new(tables).read_text(&tables.join(RECHECKED), LONGEST).unwrap_or_default();
-    let line = |line: &str| line.split_once(' ').and_then(|(id, count)| Some((id.to_owned(), count.parse().ok()?)));
+    let text = Below::new(tables)
+        .read_text(&tables.join(RECHECKED), LONGEST)
+        .unwrap_or_default();
+    let line = |line: &str| {
+        line.split_once(' ')
+            .and_then(|(id, count)| Some((id.to_owned(), count.parse().ok()?)))
+    };
     text.lines().filter_map(line).collect()
 }
 
@@ -368,10 +507,20 @@ fn table_runs(history: &History, runs: &[&String]) -> Vec<Result<TableRun, Diagn
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
     let share = runs.len().div_ceil(cores).max(1);
     std::thread::scope(|scope| {
-        let read = |runs: &'_ [&String]| runs.iter().map(|run| table_run(history, run)).collect::<Vec<_>>();
-        let shares: Vec<_> = runs.chunks(share).map(|runs| scope.spawn(move || read(runs))).collect();
-        let joined =
-            shares.into_iter().map(|share| share.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)));
+        let read = |runs: &'_ [&String]| {
+            runs.iter()
+                .map(|run| table_run(history, run))
+                .collect::<Vec<_>>()
+        };
+        let shares: Vec<_> = runs
+            .chunks(share)
+            .map(|runs| scope.spawn(move || read(runs)))
+            .collect();
+        let joined = shares.into_iter().map(|share| {
+            share
+                .join()
+                .unwrap_or_else(|panic| std::panic::resume_unwind(panic))
+        });
         joined.flatten().collect()
     })
 }
@@ -393,16 +542,22 @@ fn are_whole(files: &[TableFile]) -> bool {
     std::thread::scope(|scope| {
         let check = |files: &'_ [TableFile]| files.iter().all(|file| is_whole(&file.path));
         let shares = files.chunks(files.len().div_ceil(cores).max(1));
-        let shares: Vec<_> = shares.map(|files| scope.spawn(move || check(files))).collect();
+        let shares: Vec<_> = shares
+            .map(|files| scope.spawn(move || check(files)))
+            .collect();
         // All are joined; a thread that panics has found no whole file.
-        let whole: Vec<bool> = shares.into_iter().map(|share| share.join().unwrap_or(false)).collect();
+        let whole: Vec<bool> = shares
+            .into_iter()
+            .map(|share| share.join().unwrap_or(false))
+            .collect();
         whole.into_iter().all(|whole| whole)
     })
 }
 
 /// Reads the wanted columns of a file, or all of them.
 pub(super) fn read(file: &Path, wanted: Option<&[&str]>) -> Result<DataFrame, PolarsError> {
-    let wanted: Option<Vec<String>> = wanted.map(|names| names.iter().map(|name| (*name).to_owned()).collect());
+    let wanted: Option<Vec<String>> =
+        wanted.map(|names| names.iter().map(|name| (*name).to_owned()).collect());
     let bytes = whole(file)?;
     // The digest in the name of a file that another program wrote fits any content.
     let read = guarded(|| {
@@ -417,16 +572,30 @@ pub(super) fn read(file: &Path, wanted: Option<&[&str]>) -> Result<DataFrame, Po
 
 /// Creates the diagnostic for an unreadable file of a mirror.
 pub(super) fn unread(file: &Path, error: &PolarsError) -> Diagnostics {
-    Diagnostic::error("A002", format!("the table `{}` can't be read: {}", file.display(), plain(error)))
-        .help("rebuild it with `actcheck export --rebuild-mirror`")
-        .into()
+    Diagnostic::error(
+        "A002",
+        format!(
+            "the table `{}` can't be read: {}",
+            file.display(),
+            plain(error)
+        ),
+    )
+    .help("rebuild it with `actcheck export --rebuild-mirror`")
+    .into()
 }
 
 /// Creates the diagnostic for a table that can't be written.
 pub(crate) fn unwritten(file: &Path, error: &impl ToString) -> Diagnostics {
-    Diagnostic::error("A001", format!("the table `{}` can't be written: {}", file.display(), plain(error)))
-        .help("check the folder's permissions and the free disk space")
-        .into()
+    Diagnostic::error(
+        "A001",
+        format!(
+            "the table `{}` can't be written: {}",
+            file.display(),
+            plain(error)
+        ),
+    )
+    .help("check the folder's permissions and the free disk space")
+    .into()
 }
 
 fn plain(error: &impl ToString) -> String {
@@ -444,7 +613,10 @@ pub(super) fn runs_of(file: &Path) -> Result<FileRuns, PolarsError> {
             indices.push(index);
         }
     }
-    Ok(FileRuns { rows: frame.height(), indices })
+    Ok(FileRuns {
+        rows: frame.height(),
+        indices,
+    })
 }
 
 /// The ids of the runs of a file, in its order.
@@ -472,14 +644,23 @@ fn kind(kind: ColumnKind) -> &'static str {
 
 /// Whether the files in the folder of a mirror have the columns of this version.
 pub(super) fn is_current(tables: &Path) -> bool {
-    Below::new(tables).read_text(&tables.join(SCHEMA), LONGEST).is_ok_and(|text| text == schema_digest())
+    Below::new(tables)
+        .read_text(&tables.join(SCHEMA), LONGEST)
+        .is_ok_and(|text| text == schema_digest())
 }
 
 /// Digest of the columns, to detect tables written by versions with different columns.
 pub(super) fn schema_digest() -> String {
     let definitions: Vec<String> = columns()
         .iter()
-        .map(|column| format!("{} {} {}", column.name, kind(column.kind), column.description))
+        .map(|column| {
+            format!(
+                "{} {} {}",
+                column.name,
+                kind(column.kind),
+                column.description
+            )
+        })
         .collect();
     digest_of(&definitions.join("\n"))
 }
@@ -487,5 +668,7 @@ pub(super) fn schema_digest() -> String {
 /// Removes all files of a mirror.
 fn clear(below: &Below, folder: &Path) -> Result<(), Diagnostics> {
     below.remove_leftovers(folder);
-    tables_in(folder).iter().try_for_each(|path| below.remove(path).map_err(|error| unwritten(path, &error)))
+    tables_in(folder)
+        .iter()
+        .try_for_each(|path| below.remove(path).map_err(|error| unwritten(path, &error)))
 }

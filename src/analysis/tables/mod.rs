@@ -1,10 +1,12 @@
-//! Runs as a table: one row for each outcome of a property, with the data of the run, the action and the scene.
+//! Runs as a table: one row for each outcome of a property, with the data of the run, the action
+//! and the scene.
 //!
-//! The table is in the history's folder `tables`: a mirror in Parquet that analyses and notebooks read much faster than
-//! the store. Store and traces are authoritative; the mirror can be rebuilt from them at any time.
+//! The table is in the history's folder `tables`: a mirror in Parquet that analyses and notebooks
+//! read much faster than the store. Store and traces are authoritative; the mirror can be rebuilt
+//! from them at any time.
 //!
-//! Never: changes the store, holds data that the store and the traces lack, or reads a mirror that lacks runs of the
-//! store.
+//! Never: changes the store, holds data that the store and the traces lack, or reads a mirror that
+//! lacks runs of the store.
 
 mod adopt;
 mod cell;

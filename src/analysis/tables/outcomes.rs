@@ -28,12 +28,16 @@ pub struct TableFilter {
 
 impl TableFilter {
     pub(crate) fn takes_campaign(&self, campaign: &str) -> bool {
-        self.campaigns.as_ref().is_none_or(|wanted| wanted.iter().any(|wanted| wanted == campaign))
+        self.campaigns
+            .as_ref()
+            .is_none_or(|wanted| wanted.iter().any(|wanted| wanted == campaign))
     }
 
     /// Returns the selected rows.
     pub(super) fn rows_of(&self, frame: DataFrame) -> Result<DataFrame, PolarsError> {
-        let Some(since) = &self.since else { return Ok(frame) };
+        let Some(since) = &self.since else {
+            return Ok(frame);
+        };
         // All times are in UTC with the same number of digits, so that they sort as text.
         let late: Vec<bool> = frame
             .column("started")?
@@ -57,7 +61,12 @@ pub struct TextColumn {
 impl TextColumn {
     /// Returns the text of a row, or `None` if it is missing.
     pub fn get(&self, row: usize) -> Option<&str> {
-        self.of_row.get(row).copied().flatten().and_then(|of| self.texts.get(of as usize)).map(String::as_str)
+        self.of_row
+            .get(row)
+            .copied()
+            .flatten()
+            .and_then(|of| self.texts.get(of as usize))
+            .map(String::as_str)
     }
 }
 
@@ -76,13 +85,21 @@ impl OutcomeTable {
     ///
     /// # Errors
     /// `A002` if a file can't be read.
-    pub fn read(mirror: &Mirror, filter: &TableFilter, wanted: &[&str]) -> Result<Self, Diagnostics> {
-        let files = mirror.files().iter().filter(|file| filter.takes_campaign(&file.campaign));
+    pub fn read(
+        mirror: &Mirror,
+        filter: &TableFilter,
+        wanted: &[&str],
+    ) -> Result<Self, Diagnostics> {
+        let files = mirror
+            .files()
+            .iter()
+            .filter(|file| filter.takes_campaign(&file.campaign));
         Self::read_files(&files.collect::<Vec<_>>(), filter, wanted)
     }
 
-    /// Reads some columns of a sample: of files at equal distances, so that all times and campaigns have their share of the
-    /// rows. The sample has about `most_rows` rows, and is the same each time.
+    /// Reads some columns of a sample: of files at equal distances, so that all times and campaigns
+    /// have their share of the rows. The sample has about `most_rows` rows, and is the same each
+    /// time.
     ///
     /// # Errors
     /// `A002` if a file can't be read.
@@ -94,30 +111,47 @@ impl OutcomeTable {
     ) -> Result<Self, Diagnostics> {
         let all = mirror.rows(filter);
         let mut before = 0;
-        let files = mirror.files().iter().filter(|file| filter.takes_campaign(&file.campaign)).filter(|file| {
-            // Files have different sizes: one is taken whenever the rows before its end reach the next part of all rows.
-            let part = |rows: usize| rows as u128 * most_rows as u128 / (all.max(1) as u128 * file.rows.max(1) as u128);
-            let taken = part(before + file.rows) > part(before);
-            before += file.rows;
-            taken
-        });
+        let files = mirror
+            .files()
+            .iter()
+            .filter(|file| filter.takes_campaign(&file.campaign))
+            .filter(|file| {
+                // Files have different sizes: one is taken whenever the rows before its end reach
+                // the next part of all rows.
+                let part = |rows: usize| {
+                    rows as u128 * most_rows as u128
+                        / (all.max(1) as u128 * file.rows.max(1) as u128)
+                };
+                let taken = part(before + file.rows) > part(before);
+                before += file.rows;
+                taken
+            });
         Self::read_files(&files.collect::<Vec<_>>(), filter, wanted)
     }
 
-    fn read_files(files: &[&TableFile], filter: &TableFilter, wanted: &[&str]) -> Result<Self, Diagnostics> {
+    fn read_files(
+        files: &[&TableFile],
+        filter: &TableFilter,
+        wanted: &[&str],
+    ) -> Result<Self, Diagnostics> {
         let mut table = Self::default();
         let mut names: Vec<&str> = wanted.to_vec();
         if filter.since.is_some() && !names.contains(&"started") {
             names.push("started");
         }
-        for column in columns().iter().filter(|column| names.contains(&column.name)) {
+        for column in columns()
+            .iter()
+            .filter(|column| names.contains(&column.name))
+        {
             match column.kind {
                 ColumnKind::Text => drop(table.texts.insert(column.name, TextColumn::default())),
                 _ => drop(table.numbers.insert(column.name, Vec::new())),
             }
         }
         let mut known: BTreeMap<&'static str, FxHashMap<String, u32>> = BTreeMap::new();
-        let frame = |file: &TableFile| read(&file.path, Some(&names)).and_then(|frame| filter.rows_of(frame));
+        let frame = |file: &TableFile| {
+            read(&file.path, Some(&names)).and_then(|frame| filter.rows_of(frame))
+        };
         let threads = available_parallelism().map_or(1, usize::from);
         if files.len() < MANY || threads == 1 {
             for file in files {
@@ -135,15 +169,20 @@ impl OutcomeTable {
                 scope.spawn(move || {
                     let own = files.iter().skip(thread).step_by(threads);
                     // Without a receiver, no further file is needed.
-                    own.map(|file| frame(file)).try_for_each(|frame| sender.send(frame).map_err(drop))
+                    own.map(|file| frame(file))
+                        .try_for_each(|frame| sender.send(frame).map_err(drop))
                 });
                 receiver
             });
             let frames: Vec<_> = frames.collect();
             for (at, file) in files.iter().enumerate() {
                 // A thread without a further frame has panicked, which the scope reports.
-                let Ok(frame) = frames[at % threads].recv() else { break };
-                frame.and_then(|frame| table.append(&frame, &mut known)).map_err(|error| unread(&file.path, &error))?;
+                let Ok(frame) = frames[at % threads].recv() else {
+                    break;
+                };
+                frame
+                    .and_then(|frame| table.append(&frame, &mut known))
+                    .map_err(|error| unread(&file.path, &error))?;
             }
             Ok(table)
         })
@@ -161,7 +200,10 @@ impl OutcomeTable {
 
     /// Returns a text column, or an empty column if it was not read.
     pub fn text(&self, name: &str) -> &TextColumn {
-        static NONE: TextColumn = TextColumn { of_row: Vec::new(), texts: Vec::new() };
+        static NONE: TextColumn = TextColumn {
+            of_row: Vec::new(),
+            texts: Vec::new(),
+        };
         self.texts.get(name).unwrap_or(&NONE)
     }
 
@@ -170,9 +212,9 @@ impl OutcomeTable {
         self.numbers.get(name).map_or(&[], Vec::as_slice)
     }
 
-    /// Returns, for each run (an index into the texts of the column `run`), whether it counts in rates: of runs with
-    /// bit-identical traces only the newest does, because the others add no evidence. Needs the columns `run` and
-    /// `trace_hash`.
+    /// Returns, for each run (an index into the texts of the column `run`), whether it counts in
+    /// rates: of runs with bit-identical traces only the newest does, because the others add no
+    /// evidence. Needs the columns `run` and `trace_hash`.
     pub fn counted_runs(&self) -> Vec<bool> {
         let (runs, hashes) = (self.text("run"), self.text("trace_hash"));
         let mut newest: Vec<Option<u32>> = vec![None; hashes.texts.len()];
@@ -186,7 +228,8 @@ impl OutcomeTable {
             if let (Some(run), Some(hash)) = (run, hash) {
                 // A run without a hash (broken before its first state) is never a duplicate.
                 let hash = *hash as usize;
-                counted[*run as usize] = hashes.texts[hash].is_empty() || newest[hash] == Some(*run);
+                counted[*run as usize] =
+                    hashes.texts[hash].is_empty() || newest[hash] == Some(*run);
             }
         }
         counted
@@ -215,7 +258,12 @@ impl OutcomeTable {
         }
         for (name, column) in &mut self.numbers {
             let numbers = frame.column(name)?.cast(&DataType::Float64)?;
-            column.extend(numbers.f64()?.iter().map(|number| number.unwrap_or(f64::NAN)));
+            column.extend(
+                numbers
+                    .f64()?
+                    .iter()
+                    .map(|number| number.unwrap_or(f64::NAN)),
+            );
         }
         self.rows += frame.height();
         Ok(())

@@ -23,9 +23,19 @@ pub(super) fn named(file: &Path) -> Option<TableName> {
     let stem = file.file_name()?.to_str()?.strip_suffix(".parquet")?;
     let (rest, last) = stem.rsplit_once('.')?;
     let of_today = rest.rsplit_once('.').and_then(|(campaign, number)| {
-        Some(TableName { campaign: campaign.to_owned(), number: number.parse().ok()?, digest: Some(last.to_owned()) })
+        Some(TableName {
+            campaign: campaign.to_owned(),
+            number: number.parse().ok()?,
+            digest: Some(last.to_owned()),
+        })
     });
-    of_today.or_else(|| Some(TableName { campaign: rest.to_owned(), number: last.parse().ok()?, digest: None }))
+    of_today.or_else(|| {
+        Some(TableName {
+            campaign: rest.to_owned(),
+            number: last.parse().ok()?,
+            digest: None,
+        })
+    })
 }
 
 /// Longest file of a mirror: those of this program have some megabytes. Unit: bytes.
@@ -52,9 +62,14 @@ pub(super) fn digest_of_bytes(bytes: &[u8]) -> String {
     digest.finish()
 }
 
-/// The regular files in the folder of a mirror that have the name of a table. Others are left alone.
+/// The regular files in the folder of a mirror that have the name of a table. Others are left
+/// alone.
 pub(super) fn tables_in(folder: &Path) -> Vec<PathBuf> {
-    Below::new(folder).files(folder).into_iter().filter(|file| named(file).is_some()).collect()
+    Below::new(folder)
+        .files(folder)
+        .into_iter()
+        .filter(|file| named(file).is_some())
+        .collect()
 }
 
 /// Returns the files by campaign, in the order of writing.

@@ -6,7 +6,8 @@ use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
 use polars::prelude::{
-    CsvWriter, DataFrame, NamedFrom as _, ParquetWriter, PolarsError, SerWriter as _, Series as Values,
+    CsvWriter, DataFrame, NamedFrom as _, ParquetWriter, PolarsError, SerWriter as _,
+    Series as Values,
 };
 use serde_json::{Value, json};
 
@@ -19,8 +20,8 @@ use actcheck_base::{Below, Diagnostics, NewFile};
 /// Column that says whether a run counts in rates over the exported rows.
 const COUNTS: &str = "counts";
 
-/// Writes `outcomes.parquet` and `schema.json` into a folder, creating it if needed. Returns the files and the number
-/// of rows.
+/// Writes `outcomes.parquet` and `schema.json` into a folder, creating it if needed. Returns the
+/// files and the number of rows.
 ///
 /// # Errors
 /// `A001` if they can't be written, `A002` if the mirror can't be read.
@@ -33,7 +34,8 @@ pub fn export_parquet(
     written(pending_parquet(mirror, filter, hierarchy, folder)?)
 }
 
-/// Writes `outcomes.parquet` and `schema.json` into a folder, creating it if needed, without giving them their names.
+/// Writes `outcomes.parquet` and `schema.json` into a folder, creating it if needed, without giving
+/// them their names.
 pub(crate) fn pending_parquet(
     mirror: &Mirror,
     filter: &TableFilter,
@@ -42,18 +44,21 @@ pub(crate) fn pending_parquet(
 ) -> Result<Pending, Diagnostics> {
     export(folder, "outcomes.parquet", |file, writer| {
         let schema = empty(hierarchy).map_err(|error| unwritten(file, &error))?;
-        let mut writer =
-            ParquetWriter::new(writer).batched(schema.schema()).map_err(|error| unwritten(file, &error))?;
+        let mut writer = ParquetWriter::new(writer)
+            .batched(schema.schema())
+            .map_err(|error| unwritten(file, &error))?;
         let rows = each(mirror, filter, hierarchy, |frame| {
-            writer.write_batch(frame).map_err(|error| unwritten(file, &error))
+            writer
+                .write_batch(frame)
+                .map_err(|error| unwritten(file, &error))
         })?;
         writer.finish().map_err(|error| unwritten(file, &error))?;
         Ok(rows)
     })
 }
 
-/// Writes `outcomes.csv` and `schema.json` into a folder, creating it if needed. Returns the files and the number of
-/// rows.
+/// Writes `outcomes.csv` and `schema.json` into a folder, creating it if needed. Returns the files
+/// and the number of rows.
 ///
 /// # Errors
 /// As [`export_parquet`].
@@ -65,9 +70,13 @@ pub fn export_csv(
 ) -> Result<(Vec<PathBuf>, usize), Diagnostics> {
     written(export(folder, "outcomes.csv", |file, writer| {
         let schema = empty(hierarchy).map_err(|error| unwritten(file, &error))?;
-        let mut writer = CsvWriter::new(writer).batched(schema.schema()).map_err(|error| unwritten(file, &error))?;
+        let mut writer = CsvWriter::new(writer)
+            .batched(schema.schema())
+            .map_err(|error| unwritten(file, &error))?;
         let rows = each(mirror, filter, hierarchy, |frame| {
-            writer.write_batch(frame).map_err(|error| unwritten(file, &error))
+            writer
+                .write_batch(frame)
+                .map_err(|error| unwritten(file, &error))
         })?;
         writer.finish().map_err(|error| unwritten(file, &error))?;
         Ok(rows)
@@ -105,13 +114,21 @@ fn export(
     write: impl FnOnce(&Path, File) -> Result<usize, Diagnostics>,
 ) -> Result<Pending, Diagnostics> {
     let below = Below::new(folder);
-    below.create_folder(folder).map_err(|error| unwritten(folder, &error))?;
+    below
+        .create_folder(folder)
+        .map_err(|error| unwritten(folder, &error))?;
     let (table, described) = (folder.join(name), folder.join("schema.json"));
-    let file = below.new_file(&table).map_err(|error| unwritten(&table, &error))?;
+    let file = below
+        .new_file(&table)
+        .map_err(|error| unwritten(&table, &error))?;
     let writer = file.writer().map_err(|error| unwritten(&table, &error))?;
     let rows = write(&table, writer)?;
     let text = new_text(&below, &described, &format!("{:#}\n", schema()))?;
-    Ok(Pending { table: (table, file), described: (described, text), rows })
+    Ok(Pending {
+        table: (table, file),
+        described: (described, text),
+        rows,
+    })
 }
 
 /// Writes a text without giving the file its name.
@@ -152,13 +169,19 @@ fn empty(hierarchy: &Hierarchy) -> Result<DataFrame, PolarsError> {
 fn counted_runs(mirror: &Mirror, filter: &TableFilter) -> Result<BTreeSet<String>, Diagnostics> {
     let table = OutcomeTable::read(mirror, filter, &["run", "trace_hash"])?;
     let runs = table.text("run").texts.iter().zip(table.counted_runs());
-    Ok(runs.filter(|(_, counts)| *counts).map(|(run, _)| run.clone()).collect())
+    Ok(runs
+        .filter(|(_, counts)| *counts)
+        .map(|(run, _)| run.clone())
+        .collect())
 }
 
 /// Adds the column [`COUNTS`].
 fn with_counts(frame: &mut DataFrame, counted: &BTreeSet<String>) -> Result<(), PolarsError> {
     let runs = frame.column("run")?.str()?;
-    let counts: Vec<Option<bool>> = runs.iter().map(|run| run.map(|run| counted.contains(run))).collect();
+    let counts: Vec<Option<bool>> = runs
+        .iter()
+        .map(|run| run.map(|run| counted.contains(run)))
+        .collect();
     frame.with_column(Values::new(COUNTS.into(), counts).into())?;
     Ok(())
 }
@@ -172,7 +195,11 @@ fn each(
 ) -> Result<usize, Diagnostics> {
     let mut rows = 0;
     let counted = counted_runs(mirror, filter)?;
-    for file in mirror.files().iter().filter(|file| filter.takes_campaign(&file.campaign)) {
+    for file in mirror
+        .files()
+        .iter()
+        .filter(|file| filter.takes_campaign(&file.campaign))
+    {
         let file = &file.path;
         let read = || -> Result<DataFrame, PolarsError> {
             let mut frame = filter.rows_of(read(file, None)?)?;

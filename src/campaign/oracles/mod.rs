@@ -1,7 +1,7 @@
 //! Tests the oracles: runs with injected faults show which properties detect them.
 //!
-//! Never: stores these runs in a history, where they would count as the robot's, or decides when a fault counts as
-//! detected.
+//! Never: stores these runs in a history, where they would count as the robot's, or decides when a
+//! fault counts as detected.
 
 mod course_faults;
 mod faults;

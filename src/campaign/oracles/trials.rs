@@ -37,8 +37,8 @@ pub struct Trial {
     pub fault: Option<&'static str>,
     /// Whether the fault occurred.
     pub came_about: bool,
-    /// Outcome of each property by IRI; the worst one if several actions have the property. Empty if the run was not
-    /// judged: no scene, a simulation crash, or a spent budget.
+    /// Outcome of each property by IRI; the worst one if several actions have the property. Empty
+    /// if the run was not judged: no scene, a simulation crash, or a spent budget.
     pub outcomes: BTreeMap<String, Outcome>,
 }
 
@@ -48,12 +48,12 @@ struct Scene {
     choices: Vec<Choice>,
 }
 
-/// Runs every planned scene without a fault, and then with each fault that concerns its test, on several workers. Calls
-/// `on_done` after each. If rules read the course of actions, every run without a fault is judged with each fault of the
-/// course, too.
+/// Runs every planned scene without a fault, and then with each fault that concerns its test, on
+/// several workers. Calls `on_done` after each. If rules read the course of actions, every run
+/// without a fault is judged with each fault of the course, too.
 ///
-/// The results are sorted by index, the run without a fault first. They depend neither on the number of workers nor on
-/// the clock. Runs that have not begun when `stop` is set are left out.
+/// The results are sorted by index, the run without a fault first. They depend neither on the
+/// number of workers nor on the clock. Runs that have not begun when `stop` is set are left out.
 ///
 /// # Errors
 /// `X010` if workers can't be started.
@@ -67,7 +67,11 @@ pub fn try_faults(
     let pool = workers(options.jobs)?;
     let going = || !stop.load(Ordering::Relaxed);
     let sound = |index: u64| {
-        let made = if going() { without_fault(env, index, &options.context) } else { None };
+        let made = if going() {
+            without_fault(env, index, &options.context)
+        } else {
+            None
+        };
         on_done();
         made
     };
@@ -76,50 +80,93 @@ pub fn try_faults(
         test.is_some_and(|test| fault.concerns(test, &env.campaign.robot))
     };
     let with_fault = |(scene, fault): &(&Scene, &Fault)| {
-        let made =
-            if going() && concerns(scene, fault) { with_fault(env, scene, fault, &options.context) } else { None };
+        let made = if going() && concerns(scene, fault) {
+            with_fault(env, scene, fault, &options.context)
+        } else {
+            None
+        };
         on_done();
         made
     };
     Ok(pool.install(|| {
-        let sound: Vec<(Scene, Vec<Trial>)> = (0..env.planned_runs()).into_par_iter().filter_map(sound).collect();
-        let pairs: Vec<(&Scene, &Fault)> =
-            sound.iter().flat_map(|(scene, _)| faults.iter().map(move |fault| (scene, fault))).collect();
+        let sound: Vec<(Scene, Vec<Trial>)> = (0..env.planned_runs())
+            .into_par_iter()
+            .filter_map(sound)
+            .collect();
+        let pairs: Vec<(&Scene, &Fault)> = sound
+            .iter()
+            .flat_map(|(scene, _)| faults.iter().map(move |fault| (scene, fault)))
+            .collect();
         let spoilt: Vec<Trial> = pairs.par_iter().filter_map(with_fault).collect();
-        let mut trials: Vec<Trial> = sound.iter().flat_map(|(_, trials)| trials.clone()).chain(spoilt).collect();
+        let mut trials: Vec<Trial> = sound
+            .iter()
+            .flat_map(|(_, trials)| trials.clone())
+            .chain(spoilt)
+            .collect();
         trials.sort_by_key(|trial| trial.index);
         trials
     }))
 }
 
-/// Runs the scene of an index as a campaign would, and judges it without a fault and with each fault of its course.
-/// Returns `None` if no scene can be built.
+/// Runs the scene of an index as a campaign would, and judges it without a fault and with each
+/// fault of its course. Returns `None` if no scene can be built.
 fn without_fault(env: &Env, index: u64, context: &RunContext) -> Option<(Scene, Vec<Trial>)> {
     let repeat = u64::from(env.campaign.repeat);
     let repetition = (repeat > 1).then_some(index % repeat);
-    let planned = Planned { index, scene: index / repeat, repetition, steering: None };
+    let planned = Planned {
+        index,
+        scene: index / repeat,
+        repetition,
+        steering: None,
+    };
     (0..SCENES_PER_RUN).find_map(|attempt| {
         let choices = planned.choices(env.campaign.seed, attempt);
         let record = run(env, index, choices, context, None)?;
-        let sound = Trial { index, fault: None, came_about: true, outcomes: outcomes(&record) };
-        let trials = std::iter::once(sound).chain(with_course_faults(env, &record)).collect();
-        Some((Scene { index, choices: record.choices }, trials))
+        let sound = Trial {
+            index,
+            fault: None,
+            came_about: true,
+            outcomes: outcomes(&record),
+        };
+        let trials = std::iter::once(sound)
+            .chain(with_course_faults(env, &record))
+            .collect();
+        Some((
+            Scene {
+                index,
+                choices: record.choices,
+            },
+            trials,
+        ))
     })
 }
 
 /// Judges a run without a fault again with each fault of its course.
 fn with_course_faults(env: &Env, record: &RunRecord) -> Vec<Trial> {
-    let Some(test) = env.campaign.tests.get(env.test_of(record.index)) else { return Vec::new() };
+    let Some(test) = env.campaign.tests.get(env.test_of(record.index)) else {
+        return Vec::new();
+    };
     let judged = |fault: &CourseFault| {
         let mut trace = record.trace.clone();
         let came_about = fault.put_into(&mut trace);
         let facts = actcheck_facts::extract(&trace);
         let judgements = judge_all(env, &trace, &facts).ok()?;
-        let outcomes = if came_about { worst(&judgements) } else { BTreeMap::new() };
-        Some(Trial { index: record.index, fault: Some(fault.name), came_about, outcomes })
+        let outcomes = if came_about {
+            worst(&judgements)
+        } else {
+            BTreeMap::new()
+        };
+        Some(Trial {
+            index: record.index,
+            fault: Some(fault.name),
+            came_about,
+            outcomes,
+        })
     };
     let is_complete = record.status == RunStatus::Completed;
-    let concerned = COURSE_FAULTS.iter().filter(|fault| is_complete && fault.concerns(test, env));
+    let concerned = COURSE_FAULTS
+        .iter()
+        .filter(|fault| is_complete && fault.concerns(test, env));
     concerned.filter_map(judged).collect()
 }
 
@@ -130,7 +177,12 @@ fn with_fault(env: &Env, scene: &Scene, fault: &Fault, context: &RunContext) -> 
     let mut saboteur = Saboteur::new(fault.sabotage);
     let record = run(env, index, choices, context, Some(&mut saboteur));
     let outcomes = record.as_ref().map(outcomes).unwrap_or_default();
-    Some(Trial { index, fault: Some(fault.name), came_about: saboteur.came_about(), outcomes })
+    Some(Trial {
+        index,
+        fault: Some(fault.name),
+        came_about: saboteur.came_about(),
+        outcomes,
+    })
 }
 
 /// Makes one run. Returns `None` if the scene was discarded or the simulation crashed.
@@ -143,19 +195,35 @@ fn run(
 ) -> Option<RunRecord> {
     let line = || match saboteur {
         None => run_line(env, NO_CAMPAIGN, index, choices, context),
-        Some(saboteur) => run_sabotaged(env, RunInput { campaign: NO_CAMPAIGN, index, choices }, context, saboteur),
+        Some(saboteur) => run_sabotaged(
+            env,
+            RunInput {
+                campaign: NO_CAMPAIGN,
+                index,
+                choices,
+            },
+            context,
+            saboteur,
+        ),
     };
     catch_unwind(AssertUnwindSafe(line)).ok()?.ok()
 }
 
 /// The worst outcome of each property over all actions; empty if the run did not complete.
 fn outcomes(record: &RunRecord) -> BTreeMap<String, Outcome> {
-    if record.status == RunStatus::Completed { worst(&record.judgements) } else { BTreeMap::new() }
+    if record.status == RunStatus::Completed {
+        worst(&record.judgements)
+    } else {
+        BTreeMap::new()
+    }
 }
 
 fn worst(judgements: &[Vec<Judgement>]) -> BTreeMap<String, Outcome> {
     let mut worst: BTreeMap<String, Outcome> = BTreeMap::new();
-    for Judgement { property, outcome, .. } in judgements.iter().flatten() {
+    for Judgement {
+        property, outcome, ..
+    } in judgements.iter().flatten()
+    {
         let known = worst.entry(property.clone()).or_insert(*outcome);
         if severity(*outcome) > severity(*known) {
             *known = *outcome;

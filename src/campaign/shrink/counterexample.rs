@@ -7,11 +7,15 @@ use crate::finished_run::RunPlace;
 use crate::line::simulate;
 use crate::run_cases::end_of;
 use crate::shrink::list::{drop_rejected_tries, has, with_value};
-use crate::shrink::{Explained, Id, Passing, ShrinkPlan, TrialLimits, TrialSearch, Tried, TryResult, explain, reduce};
+use crate::shrink::{
+    Explained, Id, Passing, ShrinkPlan, TrialLimits, TrialSearch, Tried, TryResult, explain, reduce,
+};
 use crate::{Env, RunContext, RunInput, run_line};
 use actcheck_actions::Interference;
 use actcheck_base::{Diagnostic, Diagnostics, Judgement, Outcome, did_you_mean, names};
-use actcheck_data::{Choice, ChoiceGroup, ChoiceKind, ChoiceName, Choices, ObjectAxis, PlacedObject, Role};
+use actcheck_data::{
+    Choice, ChoiceGroup, ChoiceKind, ChoiceName, Choices, ObjectAxis, PlacedObject, Role,
+};
 use actcheck_history::{History, RunRecord, RunStatus};
 use actcheck_scenario as scenario;
 use actcheck_verdict::Counts;
@@ -38,7 +42,8 @@ pub struct ShrinkOptions<'a> {
     pub trials: u64,
     /// Workers; the result does not depend on their number.
     pub jobs: usize,
-    /// Test with fresh noise; `None`: the noise is as recorded, and is shrunk like the other choices.
+    /// Test with fresh noise; `None`: the noise is as recorded, and is shrunk like the other
+    /// choices.
     pub repeat: Option<Repeat>,
     /// How runs are made.
     pub context: RunContext,
@@ -51,7 +56,8 @@ pub struct ShrinkOptions<'a> {
 pub struct Shrunk {
     /// Its choices, including noise.
     pub choices: Vec<Choice>,
-    /// IRIs of the properties that failed in the run. All of them, or the requested one, still fail.
+    /// IRIs of the properties that failed in the run. All of them, or the requested one, still
+    /// fail.
     pub failed: BTreeSet<String>,
     /// Number of other objects in the original run.
     pub others_before: usize,
@@ -65,21 +71,23 @@ pub struct Shrunk {
     pub explaining: u64,
     /// The choices that matter.
     pub explained: Explained,
-    /// Number of failures with fresh noise, and of repetitions; `None` if there is no noise or the time is up.
+    /// Number of failures with fresh noise, and of repetitions; `None` if there is no noise or the
+    /// time is up.
     pub fresh: Option<(u32, u32)>,
-    /// Whether recorded noise was used, because with fresh noise the run does not fail often enough.
+    /// Whether recorded noise was used, because with fresh noise the run does not fail often
+    /// enough.
     pub noise_kept: bool,
 }
 
-/// Finds the smallest scene that fails as a run did. `recorded` are the run's choices, `index` is its position in its
-/// campaign.
+/// Finds the smallest scene that fails as a run did. `recorded` are the run's choices, `index` is
+/// its position in its campaign.
 ///
-/// The result does not depend on the number of workers, but may depend on a time limit. `on_better` is called with each
-/// smaller scene.
+/// The result does not depend on the number of workers, but may depend on a time limit. `on_better`
+/// is called with each smaller scene.
 ///
 /// # Errors
-/// `S050` if nothing fails when the run is repeated, or not the requested property; `S051` if its scene can't be built,
-/// for example because one of its candidates was removed.
+/// `S050` if nothing fails when the run is repeated, or not the requested property; `S051` if its
+/// scene can't be built, for example because one of its candidates was removed.
 pub fn shrink(
     env: &Env,
     index: u64,
@@ -91,28 +99,58 @@ pub fn shrink(
     let recorded = drop_rejected_tries(recorded);
     let first = remake(env, index, &recorded, options)?;
     let may_block = env.campaign.nav_may_block || scenario::is_blocked(&first.scene);
-    let subject = Subject { env, index, failed: signature(&first), may_block, options };
+    let subject = Subject {
+        env,
+        index,
+        failed: signature(&first),
+        may_block,
+        options,
+    };
     subject.check_property()?;
     let removals = removals(&first, &recorded);
     let others_before = removals.len();
     let ends = ends(env, index);
-    let plan = ShrinkPlan { removals, ends, group: &group };
+    let plan = ShrinkPlan {
+        removals,
+        ends,
+        group: &group,
+    };
     let start = drop_rejected_tries(&first.choices);
     let fresh_noise = |list: &[Choice]| subject.with_fresh_noise(list);
     let as_recorded = |list: &[Choice]| subject.as_recorded(list);
-    let noisy = start.iter().any(|choice| choice.name.is_noise() && choice.value != 0.0);
-    let repeated = options.repeat.is_some() && noisy && matches!(fresh_noise(&start).result, TryResult::Fails(_));
-    let test: &(dyn Fn(&[Choice]) -> Tried + Sync) = if repeated { &fresh_noise } else { &as_recorded };
-    let limits = TrialLimits { simulations: options.trials, jobs: options.jobs, stop: options.stop };
+    let noisy = start
+        .iter()
+        .any(|choice| choice.name.is_noise() && choice.value != 0.0);
+    let repeated = options.repeat.is_some()
+        && noisy
+        && matches!(fresh_noise(&start).result, TryResult::Fails(_));
+    let test: &(dyn Fn(&[Choice]) -> Tried + Sync) =
+        if repeated { &fresh_noise } else { &as_recorded };
+    let limits = TrialLimits {
+        simulations: options.trials,
+        jobs: options.jobs,
+        stop: options.stop,
+    };
     let mut search = TrialSearch::new(test, limits);
     let special_before = special(&start);
-    let start = if repeated { start.into_iter().filter(|choice| !choice.name.is_noise()).collect() } else { start };
+    let start = if repeated {
+        start
+            .into_iter()
+            .filter(|choice| !choice.name.is_noise())
+            .collect()
+    } else {
+        start
+    };
     let (choices, minimal) = reduce(&mut search, start, &plan, on_better);
     let simulations = search.simulations();
     let mut explained = explain(&mut search, &choices, &plan);
     let mut explaining = search.simulations() - simulations;
     let fresh = (noisy && !(options.stop)()).then(|| subject.fresh_failures(&choices));
-    let choices = if repeated { subject.with_failing_noise(&choices) } else { choices };
+    let choices = if repeated {
+        subject.with_failing_noise(&choices)
+    } else {
+        choices
+    };
     if repeated {
         // Tried with fresh noise, but replayed with that of the stored run.
         let left = options.trials.saturating_sub(simulations + explaining);
@@ -136,8 +174,9 @@ pub fn shrink(
 /// Name prefix of campaigns that hold a shrunk run.
 pub(crate) const SHRUNK: &str = "shrunk ";
 
-/// Runs the shrunk scene again and stores it in the history, in a campaign of its own. Returns the run, which names the
-/// `original` run, from which it was shrunk. `index` is the original's position in its campaign.
+/// Runs the shrunk scene again and stores it in the history, in a campaign of its own. Returns the
+/// run, which names the `original` run, from which it was shrunk. `index` is the original's
+/// position in its campaign.
 ///
 /// # Errors
 /// Writing failed; or `S051` if the scene can't be built, for example because the program changed.
@@ -149,14 +188,39 @@ pub fn store(
     shrunk: &Shrunk,
     context: &RunContext,
 ) -> Result<RunRecord, Diagnostics> {
-    let id = history.next_campaign_id(&actcheck_base::digest_of(&env.campaign.source.text), env.campaign.seed)?;
-    let mut campaign = env.record(id.clone(), format!("{SHRUNK}{original}"), (context.clock.now)());
+    let id = history.next_campaign_id(
+        &actcheck_base::digest_of(&env.campaign.source.text),
+        env.campaign.seed,
+    )?;
+    let mut campaign = env.record(
+        id.clone(),
+        format!("{SHRUNK}{original}"),
+        (context.clock.now)(),
+    );
     (campaign.planned_runs, campaign.repeat) = (1, 1);
     campaign.shards.clear();
-    let input = RunInput { campaign: &id, index, choices: Choices::recorded(&shrunk.choices) };
-    let run = simulate(env, input, context, context.clock.start(), Interference::default())
-        .map_err(|failure| Diagnostic::error("S051", format!("the shrunk scene can't be built again: {failure}")))?;
-    let record = run.into_record(RunPlace { shrunk_from: Some(original.to_owned()), ..RunPlace::alone(&id) });
+    let input = RunInput {
+        campaign: &id,
+        index,
+        choices: Choices::recorded(&shrunk.choices),
+    };
+    let run = simulate(
+        env,
+        input,
+        context,
+        context.clock.start(),
+        Interference::default(),
+    )
+    .map_err(|failure| {
+        Diagnostic::error(
+            "S051",
+            format!("the shrunk scene can't be built again: {failure}"),
+        )
+    })?;
+    let record = run.into_record(RunPlace {
+        shrunk_from: Some(original.to_owned()),
+        ..RunPlace::alone(&id)
+    });
     history.begin_campaign(&campaign)?;
     history.commit(&record)?;
     history.finish_campaign(&id, &end_of(&record, (context.clock.now)()))?;
@@ -177,11 +241,12 @@ impl Subject<'_> {
     fn check_property(&self) -> Result<(), Diagnostics> {
         let failed = || self.failed.iter().map(|iri| names::local(iri));
         match self.options.property {
-            _ if self.failed.is_empty() => {
-                Err(Diagnostic::error("S050", "no property fails in this run: there is nothing to shrink")
-                    .help("rules or models may have changed since then; `actcheck list` shows scores")
-                    .into())
-            }
+            _ if self.failed.is_empty() => Err(Diagnostic::error(
+                "S050",
+                "no property fails in this run: there is nothing to shrink",
+            )
+            .help("rules or models may have changed since then; `actcheck list` shows scores")
+            .into()),
             Some(property) if !self.failed.iter().any(|iri| is_named(iri, property)) => {
                 let message = format!("the property `{property}` does not fail in this run");
                 let help = format!(
@@ -200,7 +265,16 @@ impl Subject<'_> {
         if !self.may_block && self.is_blocked(choices.clone()) {
             return None;
         }
-        let run = || run_line(self.env, "shrink", self.index, choices, &self.options.context).ok();
+        let run = || {
+            run_line(
+                self.env,
+                "shrink",
+                self.index,
+                choices,
+                &self.options.context,
+            )
+            .ok()
+        };
         let record = catch_unwind(AssertUnwindSafe(run)).ok().flatten()?;
         (record.status == RunStatus::Completed).then_some(record)
     }
@@ -214,26 +288,39 @@ impl Subject<'_> {
         }
     }
 
-    /// Returns the names of the properties that failed in a run that passes: none, unless a single property was asked for
-    /// and passes. Returns `None` if the run does not pass.
+    /// Returns the names of the properties that failed in a run that passes: none, unless a single
+    /// property was asked for and passes. Returns `None` if the run does not pass.
     fn passes(&self, record: &RunRecord) -> Option<Vec<String>> {
-        let asked =
-            |judgement: &&Judgement| self.options.property.is_none_or(|name| is_named(&judgement.property, name));
+        let asked = |judgement: &&Judgement| {
+            self.options
+                .property
+                .is_none_or(|name| is_named(&judgement.property, name))
+        };
         let judgements = record.judgements.iter().flatten().filter(asked);
         let counts = Counts::of(judgements.map(|judgement| judgement.outcome));
         let passes = counts.passed > 0 && counts.passed + counts.inapplicable == counts.total();
-        passes.then(|| signature(record).iter().map(|iri| names::local(iri).to_owned()).collect())
+        passes.then(|| {
+            signature(record)
+                .iter()
+                .map(|iri| names::local(iri).to_owned())
+                .collect()
+        })
     }
 
-    /// Keeps the passing values with which a run of these choices passes when it is replayed, at most `most` of them. Returns
-    /// also the number of replays.
+    /// Keeps the passing values with which a run of these choices passes when it is replayed, at
+    /// most `most` of them. Returns also the number of replays.
     fn confirmed(&self, explained: Explained, choices: &[Choice], most: u64) -> (Explained, u64) {
         let mut replays = 0;
         let mut confirm = |id: &Id, passing: Option<Passing>| {
             let passing = passing.filter(|_| replays < most)?;
             replays += 1;
-            let record = self.complete(Choices::recorded(&with_value(choices.to_vec(), id, passing.value)))?;
-            self.passes(&record).map(|others| Passing { others, ..passing })
+            let record = self.complete(Choices::recorded(&with_value(
+                choices.to_vec(),
+                id,
+                passing.value,
+            )))?;
+            self.passes(&record)
+                .map(|others| Passing { others, ..passing })
         };
         let mut influences = explained.influences;
         for influence in &mut influences {
@@ -243,7 +330,8 @@ impl Subject<'_> {
         (Explained::of(influences), replays)
     }
 
-    /// Whether an obstacle of the scene is in the way of the robot. Such a scene would fail for another reason.
+    /// Whether an obstacle of the scene is in the way of the robot. Such a scene would fail for
+    /// another reason.
     fn is_blocked(&self, mut choices: Choices) -> bool {
         let scene = scenario::draw(&self.env.space, self.env.test_of(self.index), &mut choices);
         scene.is_ok_and(|scene| scenario::is_blocked(&scene))
@@ -251,27 +339,46 @@ impl Subject<'_> {
 
     fn as_recorded(&self, list: &[Choice]) -> Tried {
         let result = match self.complete(Choices::recorded(list)) {
-            Some(record) if self.fails(&record) => TryResult::Fails(drop_rejected_tries(&record.choices)),
-            Some(record) => self.passes(&record).map_or(TryResult::Otherwise, TryResult::Passes),
+            Some(record) if self.fails(&record) => {
+                TryResult::Fails(drop_rejected_tries(&record.choices))
+            }
+            Some(record) => self
+                .passes(&record)
+                .map_or(TryResult::Otherwise, TryResult::Passes),
             None => TryResult::Otherwise,
         };
-        Tried { result, simulations: 1 }
+        Tried {
+            result,
+            simulations: 1,
+        }
     }
 
-    /// Runs the scene of a list with the noise of a repetition. The noise does not depend on the scene.
+    /// Runs the scene of a list with the noise of a repetition. The noise does not depend on the
+    /// scene.
     fn repetition(&self, list: &[Choice], number: u32) -> Option<RunRecord> {
-        self.repeated(list, number).filter(|record| self.fails(record))
+        self.repeated(list, number)
+            .filter(|record| self.fails(record))
     }
 
     /// As [`Self::repetition`], whether the run fails or not.
     fn repeated(&self, list: &[Choice], number: u32) -> Option<RunRecord> {
-        let scene: Vec<Choice> = list.iter().filter(|choice| !choice.name.is_noise()).cloned().collect();
+        let scene: Vec<Choice> = list
+            .iter()
+            .filter(|choice| !choice.name.is_noise())
+            .cloned()
+            .collect();
         // The campaign uses the streams from 0 up; these count down from the maximum.
-        self.complete(Choices::partly_recorded(&scene, self.env.campaign.seed, u64::MAX - u64::from(number)))
+        self.complete(Choices::partly_recorded(
+            &scene,
+            self.env.campaign.seed,
+            u64::MAX - u64::from(number),
+        ))
     }
 
     fn with_fresh_noise(&self, list: &[Choice]) -> Tried {
-        let Some(Repeat { least, of }) = self.options.repeat else { return self.as_recorded(list) };
+        let Some(Repeat { least, of }) = self.options.repeat else {
+            return self.as_recorded(list);
+        };
         let mut made = None;
         let (mut failures, mut simulations) = (0, 0);
         let mut others: Option<BTreeSet<String>> = Some(BTreeSet::new());
@@ -293,27 +400,39 @@ impl Subject<'_> {
             }
         }
         let scene = |made: Vec<Choice>| {
-            drop_rejected_tries(&made).into_iter().filter(|choice| !choice.name.is_noise()).collect::<Vec<_>>()
+            drop_rejected_tries(&made)
+                .into_iter()
+                .filter(|choice| !choice.name.is_noise())
+                .collect::<Vec<_>>()
         };
         let result = match (made.filter(|_| failures >= least), others) {
             (Some(made), _) => TryResult::Fails(scene(made)),
             (None, Some(others)) => TryResult::Passes(others.into_iter().collect()),
             (None, None) => TryResult::Otherwise,
         };
-        Tried { result, simulations }
+        Tried {
+            result,
+            simulations,
+        }
     }
 
     fn fresh_failures(&self, list: &[Choice]) -> (u32, u32) {
         let of = self.options.repeat.map_or(FRESH, |repeat| repeat.of);
-        let failures = (0..of).filter(|number| self.repetition(list, *number).is_some()).count();
+        let failures = (0..of)
+            .filter(|number| self.repetition(list, *number).is_some())
+            .count();
         (u32::try_from(failures).unwrap_or(of), of)
     }
 
-    /// Adds the first noise with which the scene fails to its choices, so that a single run reproduces the failure.
+    /// Adds the first noise with which the scene fails to its choices, so that a single run
+    /// reproduces the failure.
     fn with_failing_noise(&self, list: &[Choice]) -> Vec<Choice> {
         let of = self.options.repeat.map_or(1, |repeat| repeat.of);
         let failing = (0..of).find_map(|number| self.repetition(list, number));
-        failing.map_or_else(|| list.to_vec(), |record| drop_rejected_tries(&record.choices))
+        failing.map_or_else(
+            || list.to_vec(),
+            |record| drop_rejected_tries(&record.choices),
+        )
     }
 }
 
@@ -324,12 +443,21 @@ fn check_candidates(env: &Env, index: u64, recorded: &[Choice]) -> Result<(), Di
     let _ = scenario::draw(&env.space, env.test_of(index), &mut choices);
     let mut faults = Diagnostics::new();
     for made in choices.made() {
-        let was = recorded.iter().find(|choice| choice.name == made.name).and_then(Choice::candidate);
+        let was = recorded
+            .iter()
+            .find(|choice| choice.name == made.name)
+            .and_then(Choice::candidate);
         if let (Some(was), ChoiceKind::Candidate { names }) = (was, &made.kind)
             && made.candidate() != Some(was)
         {
-            let message = format!("the run's scene can no longer be built: `{}` can't be `{was}` now", made.name);
-            let help = format!("add it to the configuration again; candidates there: {}", names.join(", "));
+            let message = format!(
+                "the run's scene can no longer be built: `{}` can't be `{was}` now",
+                made.name
+            );
+            let help = format!(
+                "add it to the configuration again; candidates there: {}",
+                names.join(", ")
+            );
             faults.push(Diagnostic::error("S051", message).help(help));
         }
     }
@@ -337,16 +465,35 @@ fn check_candidates(env: &Env, index: u64, recorded: &[Choice]) -> Result<(), Di
 }
 
 /// Makes the run again.
-fn remake(env: &Env, index: u64, recorded: &[Choice], options: &ShrinkOptions<'_>) -> Result<RunRecord, Diagnostics> {
-    run_line(env, "shrink", index, Choices::recorded(recorded), &options.context).map_err(|failure| {
-        Diagnostic::error("S051", format!("the run's scene can no longer be built: {failure}"))
-            .help("models, robot or program have changed since the run was made")
-            .into()
+fn remake(
+    env: &Env,
+    index: u64,
+    recorded: &[Choice],
+    options: &ShrinkOptions<'_>,
+) -> Result<RunRecord, Diagnostics> {
+    run_line(
+        env,
+        "shrink",
+        index,
+        Choices::recorded(recorded),
+        &options.context,
+    )
+    .map_err(|failure| {
+        Diagnostic::error(
+            "S051",
+            format!("the run's scene can no longer be built: {failure}"),
+        )
+        .help("models, robot or program have changed since the run was made")
+        .into()
     })
 }
 
 fn signature(record: &RunRecord) -> BTreeSet<String> {
-    let failed = record.judgements.iter().flatten().filter(|judgement| judgement.outcome == Outcome::Failed);
+    let failed = record
+        .judgements
+        .iter()
+        .flatten()
+        .filter(|judgement| judgement.outcome == Outcome::Failed);
     failed.map(|judgement| judgement.property.clone()).collect()
 }
 
@@ -356,31 +503,52 @@ fn is_named(iri: &str, name: &str) -> bool {
 
 /// Number of choices that are not nominal, without those that only set the number of objects.
 fn special(list: &[Choice]) -> usize {
-    list.iter().filter(|choice| choice.value != choice.kind.nominal() && group(list, &choice.name).is_some()).count()
+    list.iter()
+        .filter(|choice| {
+            choice.value != choice.kind.nominal() && group(list, &choice.name).is_some()
+        })
+        .count()
 }
 
 fn left_out(object: PlacedObject) -> Choice {
     let name = ChoiceName::Object(object, ObjectAxis::LeftOut);
-    Choice { name, kind: ChoiceKind::Index { of: 2 }, value: 1.0 }
+    Choice {
+        name,
+        kind: ChoiceKind::Index { of: 2 },
+        value: 1.0,
+    }
 }
 
-/// Removals of each object except target and platform: first the objects that moved, farthest first, then those nearest
-/// to the target.
+/// Removals of each object except target and platform: first the objects that moved, farthest
+/// first, then those nearest to the target.
 fn removals(record: &RunRecord, recorded: &[Choice]) -> Vec<Choice> {
-    let models = recorded.iter().filter(|choice| matches!(choice.name, ChoiceName::Object(_, ObjectAxis::Model)));
+    let models = recorded
+        .iter()
+        .filter(|choice| matches!(choice.name, ChoiceName::Object(_, ObjectAxis::Model)));
     let left = models
         .filter_map(|choice| choice.name.numbered_object())
         .map(left_out)
         .filter(|removal| !has(recorded, removal));
     let objects = &record.scene.objects;
-    let target = objects.iter().find(|object| object.role == Role::Target).map(|object| object.pose.position);
+    let target = objects
+        .iter()
+        .find(|object| object.role == Role::Target)
+        .map(|object| object.pose.position);
     let others = objects.iter().filter(|object| object.role.is_bystander());
     let mut ranked: Vec<(f64, f64, Choice)> = left
         .zip(others)
         .map(|(removal, object)| {
-            let courses = record.trace.actions.iter().flat_map(|action| &action.extremes);
-            let moved = courses.filter(|course| course.id == object.id).map(|course| course.max_displacement_m);
-            let moved = Some(moved.fold(0.0, f64::max)).filter(|moved| *moved > MOVED_M).unwrap_or(0.0);
+            let courses = record
+                .trace
+                .actions
+                .iter()
+                .flat_map(|action| &action.extremes);
+            let moved = courses
+                .filter(|course| course.id == object.id)
+                .map(|course| course.max_displacement_m);
+            let moved = Some(moved.fold(0.0, f64::max))
+                .filter(|moved| *moved > MOVED_M)
+                .unwrap_or(0.0);
             let [x, y, _] = object.pose.position;
             let away = target.map_or(0.0, |target| libm::hypot(x - target[0], y - target[1]));
             (moved, away, removal)
@@ -401,9 +569,11 @@ fn ends(env: &Env, index: u64) -> Vec<Choice> {
     (1..of).rev().map(end).collect()
 }
 
-/// Group of choices that become nominal together. Returns `None` for numbers of objects, and for the choices of objects
-/// that are left out.
+/// Group of choices that become nominal together. Returns `None` for numbers of objects, and for
+/// the choices of objects that are left out.
 fn group(list: &[Choice], name: &ChoiceName) -> Option<ChoiceGroup> {
-    let gone = name.numbered_object().is_some_and(|object| has(list, &left_out(object)));
+    let gone = name
+        .numbered_object()
+        .is_some_and(|object| has(list, &left_out(object)));
     if gone { None } else { name.group() }
 }

@@ -16,8 +16,17 @@ pub fn ids(list: &[Choice]) -> Vec<(Id, &Choice)> {
     list.iter()
         .enumerate()
         .map(|(at, choice)| {
-            let nth = list[..at].iter().filter(|before| before.name == choice.name).count();
-            (Id { name: choice.name.clone(), nth }, choice)
+            let nth = list[..at]
+                .iter()
+                .filter(|before| before.name == choice.name)
+                .count();
+            (
+                Id {
+                    name: choice.name.clone(),
+                    nth,
+                },
+                choice,
+            )
         })
         .collect()
 }
@@ -29,12 +38,18 @@ pub(super) fn is_nominal(choice: &Choice) -> bool {
 
 /// Returns the choice with an id. Returns `None` if the list has no such choice.
 pub(super) fn find<'a>(list: &'a [Choice], id: &Id) -> Option<&'a Choice> {
-    list.iter().filter(|choice| choice.name == id.name).nth(id.nth)
+    list.iter()
+        .filter(|choice| choice.name == id.name)
+        .nth(id.nth)
 }
 
 /// Returns the list with another value for one choice.
 pub(super) fn with_value(mut list: Vec<Choice>, id: &Id, value: f64) -> Vec<Choice> {
-    if let Some(choice) = list.iter_mut().filter(|choice| choice.name == id.name).nth(id.nth) {
+    if let Some(choice) = list
+        .iter_mut()
+        .filter(|choice| choice.name == id.name)
+        .nth(id.nth)
+    {
         choice.value = value;
     }
     list
@@ -43,7 +58,11 @@ pub(super) fn with_value(mut list: Vec<Choice>, id: &Id, value: f64) -> Vec<Choi
 /// Returns the list with some choices at their nominal values.
 pub(super) fn with_nominal(mut list: Vec<Choice>, ids: &[Id]) -> Vec<Choice> {
     for id in ids {
-        if let Some(choice) = list.iter_mut().filter(|choice| choice.name == id.name).nth(id.nth) {
+        if let Some(choice) = list
+            .iter_mut()
+            .filter(|choice| choice.name == id.name)
+            .nth(id.nth)
+        {
             choice.value = choice.kind.nominal();
         }
     }
@@ -61,10 +80,12 @@ pub(super) fn with_choice(mut list: Vec<Choice>, set: &Choice) -> Vec<Choice> {
 
 /// Whether the list has a choice with this name and value.
 pub(super) fn has(list: &[Choice], set: &Choice) -> bool {
-    list.iter().any(|choice| choice.name == set.name && choice.value == set.value)
+    list.iter()
+        .any(|choice| choice.name == set.name && choice.value == set.value)
 }
 
-/// The spread of a kind's values, in the unit of the choice: the width of its range, or eight standard deviations.
+/// The spread of a kind's values, in the unit of the choice: the width of its range, or eight
+/// standard deviations.
 pub(super) fn spread(kind: &ChoiceKind) -> f64 {
     match kind {
         ChoiceKind::Index { of } => *of as f64,
@@ -77,9 +98,8 @@ pub(super) fn spread(kind: &ChoiceKind) -> f64 {
 /// Drops the rejected tries of placements: only the last one, which was accepted, stays.
 pub(crate) fn drop_rejected_tries(list: &[Choice]) -> Vec<Choice> {
     // Sensor noise is drawn repeatedly, and every draw counts.
-    let kept = list
-        .iter()
-        .enumerate()
-        .filter(|(at, choice)| choice.name.is_noise() || !list[at + 1..].iter().any(|later| later.name == choice.name));
+    let kept = list.iter().enumerate().filter(|(at, choice)| {
+        choice.name.is_noise() || !list[at + 1..].iter().any(|later| later.name == choice.name)
+    });
     kept.map(|(_, choice)| choice.clone()).collect()
 }

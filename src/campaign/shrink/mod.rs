@@ -1,8 +1,8 @@
 //! Shrinks a failing run and explains which of its choices matter.
 //!
-//! Three layers: `list` edits lists of named choices; `search`, `reduce` and `explain` work on choices and a test
-//! function, independent of robots; `counterexample` supplies the test function, which makes a run, and the meaning of
-//! the choices: placement, physics, noise.
+//! Three layers: `list` edits lists of named choices; `search`, `reduce` and `explain` work on
+//! choices and a test function, independent of robots; `counterexample` supplies the test function,
+//! which makes a run, and the meaning of the choices: placement, physics, noise.
 //!
 //! Never: accepts a run that fails in another way, or depends on the number of workers.
 

@@ -17,8 +17,8 @@ pub struct Tried {
     pub simulations: u64,
 }
 
-/// How a tried list ended. A list that does not fail as required does not pass for that reason alone: it may fail in
-/// another way, or not be a run at all.
+/// How a tried list ended. A list that does not fail as required does not pass for that reason
+/// alone: it may fail in another way, or not be a run at all.
 #[derive(Debug, Clone, PartialEq)]
 pub enum TryResult {
     /// It failed as required; the choices that the run made, without unused ones.
@@ -52,8 +52,8 @@ pub struct TrialLimits<'a> {
 /// Names and value bits of a list.
 type Key = Vec<(ChoiceName, u64)>;
 
-/// Tries lists and caches the results. Results that a single worker would not have computed count only once they are
-/// used.
+/// Tries lists and caches the results. Results that a single worker would not have computed count
+/// only once they are used.
 pub struct TrialSearch<'a> {
     test: &'a (dyn Fn(&[Choice]) -> Tried + Sync),
     limits: TrialLimits<'a>,
@@ -69,7 +69,14 @@ impl<'a> TrialSearch<'a> {
         let several = limits.jobs > 1;
         // Without a thread pool, this thread does the work: slower, but with the same result.
         let pool = several.then(|| workers(limits.jobs).ok()).flatten();
-        Self { test, limits, pool, known: BTreeMap::new(), counted: BTreeSet::new(), simulations: 0 }
+        Self {
+            test,
+            limits,
+            pool,
+            known: BTreeMap::new(),
+            counted: BTreeSet::new(),
+            simulations: 0,
+        }
     }
 
     /// Number of simulations so far.
@@ -82,8 +89,8 @@ impl<'a> TrialSearch<'a> {
         self.simulations >= self.limits.simulations || (self.limits.stop)()
     }
 
-    /// Returns the position of the first failing list and the choices that its run made, or `None` if no list fails or
-    /// a limit is reached.
+    /// Returns the position of the first failing list and the choices that its run made, or `None`
+    /// if no list fails or a limit is reached.
     pub fn first(&mut self, lists: &[Vec<Choice>]) -> Option<(usize, Vec<Choice>)> {
         for (number, batch) in lists.chunks(self.limits.jobs.max(1)).enumerate() {
             if !self.learn(batch) {
@@ -112,8 +119,11 @@ impl<'a> TrialSearch<'a> {
 
     /// Tries the unknown lists of a batch. Returns `false` if a limit is reached.
     fn learn(&mut self, batch: &[Vec<Choice>]) -> bool {
-        let unknown: BTreeMap<Key, &Vec<Choice>> =
-            batch.iter().map(|list| (key(list), list)).filter(|(key, _)| !self.known.contains_key(key)).collect();
+        let unknown: BTreeMap<Key, &Vec<Choice>> = batch
+            .iter()
+            .map(|list| (key(list), list))
+            .filter(|(key, _)| !self.known.contains_key(key))
+            .collect();
         if unknown.is_empty() {
             return true;
         }
@@ -126,11 +136,13 @@ impl<'a> TrialSearch<'a> {
             Some(pool) => pool.install(|| unknown.par_iter().map(|(_, list)| test(list)).collect()),
             None => unknown.iter().map(|(_, list)| test(list)).collect(),
         };
-        self.known.extend(unknown.into_iter().map(|(key, _)| key).zip(tried));
+        self.known
+            .extend(unknown.into_iter().map(|(key, _)| key).zip(tried));
         true
     }
 
-    /// Returns the result of a known list and counts it. Returns `None` if the limit was reached before.
+    /// Returns the result of a known list and counts it. Returns `None` if the limit was reached
+    /// before.
     fn count(&mut self, list: &[Choice]) -> Option<TryResult> {
         let key = key(list);
         let tried = self.known.get(&key)?;
@@ -146,5 +158,7 @@ impl<'a> TrialSearch<'a> {
 }
 
 fn key(list: &[Choice]) -> Key {
-    list.iter().map(|choice| (choice.name.clone(), choice.value.to_bits())).collect()
+    list.iter()
+        .map(|choice| (choice.name.clone(), choice.value.to_bits()))
+        .collect()
 }

@@ -13,13 +13,20 @@ const INTERVAL: Duration = Duration::from_millis(20);
 /// Time in which a program must end after it was asked to.
 const GRACE: Duration = Duration::from_secs(5);
 
-/// Runs a program to its end, with its error stream in a file. Returns `None` if `stop` was set: the program and its
-/// descendants are gone then.
+/// Runs a program to its end, with its error stream in a file. Returns `None` if `stop` was set:
+/// the program and its descendants are gone then.
 ///
 /// # Errors
 /// The program can't be started.
-pub fn run(command: &mut Command, errors: &Path, stop: &AtomicBool) -> io::Result<Option<ExitStatus>> {
-    command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(File::create(errors)?);
+pub fn run(
+    command: &mut Command,
+    errors: &Path,
+    stop: &AtomicBool,
+) -> io::Result<Option<ExitStatus>> {
+    command
+        .stdin(Stdio::null())
+        .stdout(Stdio::null())
+        .stderr(File::create(errors)?);
     // Ctrl-C at the terminal does not reach another group, so that it ends in an orderly way.
     let mut child = command.process_group(0).spawn()?;
     while !stop.load(Ordering::Relaxed) {
@@ -46,9 +53,14 @@ fn end(child: &mut Child) -> io::Result<()> {
     child.wait().map(|_| ())
 }
 
-/// Sends a signal to all processes of the group, with the shell's builtin `kill`: minimal systems have no other.
+/// Sends a signal to all processes of the group, with the shell's builtin `kill`: minimal systems
+/// have no other.
 fn signal(child: &Child, name: &str) {
     let kill = format!("kill -s {name} -- -{}", child.id());
     // A group that has ended needs no signal.
-    let _ = Command::new("sh").args(["-c", &kill]).stdin(Stdio::null()).stderr(Stdio::null()).status();
+    let _ = Command::new("sh")
+        .args(["-c", &kill])
+        .stdin(Stdio::null())
+        .stderr(Stdio::null())
+        .status();
 }

@@ -8,8 +8,8 @@ use super::versions::{Version, Versions};
 use super::{BisectArgs, By, LEVEL, text};
 use crate::output;
 use actcheck_analysis::{
-    Answer, Compared, ComparedRun, Likeness, OutcomeFlip, Sampling, compare, like_by_outcomes, like_by_rates,
-    outcome_flips,
+    Answer, Compared, ComparedRun, Likeness, OutcomeFlip, Sampling, compare, like_by_outcomes,
+    like_by_rates, outcome_flips,
 };
 use actcheck_base::{Diagnostic, Diagnostics, names};
 
@@ -29,16 +29,28 @@ impl<'a> Ends<'a> {
     /// Judges both ends, in more scenes if these are too few, and prints them.
     ///
     /// # Errors
-    /// `X064` the ends don't differ, or the good one is worse than the bad one; `X065` an end can't be judged.
-    pub fn judge(args: &BisectArgs, versions: &'a Versions, judge: &mut Judge<'_>) -> Result<Self, Diagnostics> {
+    /// `X064` the ends don't differ, or the good one is worse than the bad one; `X065` an end can't
+    /// be judged.
+    pub fn judge(
+        args: &BisectArgs,
+        versions: &'a Versions,
+        judge: &mut Judge<'_>,
+    ) -> Result<Self, Diagnostics> {
         let by = args.by.unwrap_or_else(|| judge.usual());
         let mut scenes = args.scenes.min(args.most_scenes);
         loop {
-            let [good, bad] =
-                versions.ends().map(|version| judge.runs(version, scenes).map_err(|why| end_fault(version, why)));
+            let [good, bad] = versions.ends().map(|version| {
+                judge
+                    .runs(version, scenes)
+                    .map_err(|why| end_fault(version, why))
+            });
             let (good, bad) = (good?, bad?);
             check_names(&args.properties, &good, &bad)?;
-            let flips = if versions.finds_fix { outcome_flips(&bad, &good) } else { outcome_flips(&good, &bad) };
+            let flips = if versions.finds_fix {
+                outcome_flips(&bad, &good)
+            } else {
+                outcome_flips(&good, &bad)
+            };
             let answer = match by {
                 By::Outcome => answer_of(&flips, versions.finds_fix),
                 By::Rate => compare(&good, &bad, Sampling::Fixed).answer(LEVEL, args.margin),
@@ -46,13 +58,26 @@ impl<'a> Ends<'a> {
             let more = (scenes * 2).min(args.most_scenes);
             match answer {
                 Answer::Worse => {
-                    let ends = Self { versions, by, scenes, flips };
+                    let ends = Self {
+                        versions,
+                        by,
+                        scenes,
+                        flips,
+                    };
                     output::print(&text::ends(versions, &ends.difference(&good, &bad)));
                     return Ok(ends);
                 }
-                Answer::Underpowered { .. } if judge.has_more_scenes() && more > scenes => scenes = more,
+                Answer::Underpowered { .. } if judge.has_more_scenes() && more > scenes => {
+                    scenes = more
+                }
                 other => {
-                    return Err(text::no_difference(versions, other, scenes_of(&good, &bad), args.most_scenes).into());
+                    return Err(text::no_difference(
+                        versions,
+                        other,
+                        scenes_of(&good, &bad),
+                        args.most_scenes,
+                    )
+                    .into());
                 }
             }
         }
@@ -67,27 +92,52 @@ impl<'a> Ends<'a> {
                 text::count(self.flips.len(), "outcome differs", "outcomes differ"),
                 text::count(good.len(), "run", "runs")
             ),
-            By::Rate => text::rates(&comparison, |line| comparison.answer_of(line, LEVEL, 0.0) == Answer::Worse),
+            By::Rate => text::rates(&comparison, |line| {
+                comparison.answer_of(line, LEVEL, 0.0) == Answer::Worse
+            }),
         }
     }
 
     /// Judges a version, in more scenes if these are too few.
-    pub fn step(&mut self, args: &BisectArgs, version: &Version, judge: &mut Judge<'_>) -> Result<Step, Unjudged> {
-        let [old_word, new_word] = if self.versions.finds_fix { ["bad", "good"] } else { ["good", "bad"] };
+    pub fn step(
+        &mut self,
+        args: &BisectArgs,
+        version: &Version,
+        judge: &mut Judge<'_>,
+    ) -> Result<Step, Unjudged> {
+        let [old_word, new_word] = if self.versions.finds_fix {
+            ["bad", "good"]
+        } else {
+            ["good", "bad"]
+        };
         loop {
             let runs = match judge.runs(version, self.scenes) {
                 Ok(runs) => runs,
                 Err(Unjudged::Skipped(faults)) => {
-                    return Ok(Step { is_new: None, reason: text::first(&faults), word: "skipped" });
+                    return Ok(Step {
+                        is_new: None,
+                        reason: text::first(&faults),
+                        word: "skipped",
+                    });
                 }
                 Err(stopped) => return Err(stopped),
             };
             let (likeness, reason) = self.likeness(args, &runs, judge)?;
-            let step = |is_new, word| Ok(Step { is_new, reason, word });
+            let step = |is_new, word| {
+                Ok(Step {
+                    is_new,
+                    reason,
+                    word,
+                })
+            };
             match (likeness, self.versions.finds_fix && self.by == By::Rate) {
                 // Rates are compared with the good end, outcomes with the old end.
-                (Likeness::First, false) | (Likeness::Second, true) => return step(Some(false), old_word),
-                (Likeness::Second, false) | (Likeness::First, true) => return step(Some(true), new_word),
+                (Likeness::First, false) | (Likeness::Second, true) => {
+                    return step(Some(false), old_word);
+                }
+                (Likeness::Second, false) | (Likeness::First, true) => {
+                    return step(Some(true), new_word);
+                }
                 (Likeness::Undecided, _) => {
                     let more = (self.scenes * 2).min(args.most_scenes);
                     if self.by == By::Outcome || !judge.has_more_scenes() || more <= self.scenes {
@@ -99,7 +149,12 @@ impl<'a> Ends<'a> {
         }
     }
 
-    fn likeness(&self, args: &BisectArgs, runs: &Runs, judge: &mut Judge<'_>) -> Result<(Likeness, String), Unjudged> {
+    fn likeness(
+        &self,
+        args: &BisectArgs,
+        runs: &Runs,
+        judge: &mut Judge<'_>,
+    ) -> Result<(Likeness, String), Unjudged> {
         match self.by {
             By::Outcome => {
                 let likeness = like_by_outcomes(&self.flips, runs);
@@ -110,15 +165,21 @@ impl<'a> Ends<'a> {
                 let (good, bad) = (good?, bad?);
                 let likeness = like_by_rates([&good, &bad], runs, LEVEL, args.margin);
                 let reason = if likeness == Likeness::Undecided {
-                    format!("{} are too few to decide; see --most-scenes", text::count(runs.len(), "scene", "scenes"))
+                    format!(
+                        "{} are too few to decide; see --most-scenes",
+                        text::count(runs.len(), "scene", "scenes")
+                    )
                 } else {
                     let ends = compare(&good, &bad, Sampling::Fixed);
                     let worse = |of: &Compared| {
-                        ends.lines
-                            .iter()
-                            .any(|line| line.of == *of && ends.answer_of(line, LEVEL, args.margin) == Answer::Worse)
+                        ends.lines.iter().any(|line| {
+                            line.of == *of
+                                && ends.answer_of(line, LEVEL, args.margin) == Answer::Worse
+                        })
                     };
-                    text::rates(&compare(&good, runs, Sampling::Fixed), |line| worse(&line.of))
+                    text::rates(&compare(&good, runs, Sampling::Fixed), |line| {
+                        worse(&line.of)
+                    })
                 };
                 Ok((likeness, reason))
             }
@@ -128,11 +189,17 @@ impl<'a> Ends<'a> {
     /// The flips between two neighbouring versions that belong to the difference of the ends.
     pub fn relevant_flips(&self, before: &Runs, after: &Runs) -> Vec<OutcomeFlip> {
         let is_relevant = |flip: &OutcomeFlip| match self.by {
-            By::Outcome => self.flips.iter().any(|end| end.place == flip.place && end.of == flip.of),
+            By::Outcome => self
+                .flips
+                .iter()
+                .any(|end| end.place == flip.place && end.of == flip.of),
             By::Rate if self.versions.finds_fix => flip.is_better(),
             By::Rate => flip.is_worse(),
         };
-        outcome_flips(before, after).into_iter().filter(is_relevant).collect()
+        outcome_flips(before, after)
+            .into_iter()
+            .filter(is_relevant)
+            .collect()
     }
 
     /// Number of scenes in which versions were judged last.
@@ -143,7 +210,13 @@ impl<'a> Ends<'a> {
 
 /// The answer of single outcomes, from the good to the bad end.
 fn answer_of(flips: &[OutcomeFlip], finds_fix: bool) -> Answer {
-    let is_better = |flip: &OutcomeFlip| if finds_fix { flip.is_worse() } else { flip.is_better() };
+    let is_better = |flip: &OutcomeFlip| {
+        if finds_fix {
+            flip.is_worse()
+        } else {
+            flip.is_better()
+        }
+    };
     match flips {
         [] => Answer::NoDifference,
         flips if flips.iter().all(is_better) => Answer::Better,
@@ -157,22 +230,28 @@ fn scenes_of(good: &Runs, bad: &Runs) -> usize {
 
 /// X045: neither end judges a named property.
 fn check_names(named: &[String], good: &Runs, bad: &Runs) -> Result<(), Diagnostics> {
-    let missing =
-        |name: &&String| !judged(good).chain(judged(bad)).any(|iri| iri == *name || names::local(iri) == *name);
+    let missing = |name: &&String| {
+        !judged(good)
+            .chain(judged(bad))
+            .any(|iri| iri == *name || names::local(iri) == *name)
+    };
     let mut faults = Diagnostics::new();
     for name in named.iter().filter(missing) {
         let message = format!("neither end judges a property `{name}`");
-        faults.push(Diagnostic::error("X045", message).help("`actcheck rules` lists all properties"));
+        faults
+            .push(Diagnostic::error("X045", message).help("`actcheck rules` lists all properties"));
     }
     faults.or(())
 }
 
 /// The IRIs of judged properties.
 fn judged(runs: &Runs) -> impl Iterator<Item = &str> {
-    runs.iter().flat_map(|run| run.outcomes().keys()).filter_map(|of| match of {
-        Compared::WholeRun | Compared::Completion => None,
-        Compared::Property { property, .. } => Some(property.as_str()),
-    })
+    runs.iter()
+        .flat_map(|run| run.outcomes().keys())
+        .filter_map(|of| match of {
+            Compared::WholeRun | Compared::Completion => None,
+            Compared::Property { property, .. } => Some(property.as_str()),
+        })
 }
 
 /// X065: an end can't be judged. The faults of its rules follow.

@@ -65,11 +65,21 @@ impl<'a> Judge<'a> {
         stop: &'a Arc<AtomicBool>,
     ) -> Result<Self, Diagnostics> {
         let means = match (&args.config, versions.repository()) {
-            (None, Some(repository)) => Means::Stored(Box::new(Stored::open(args, repository, stop)?)),
-            (None, None) => return Err(crate::configurations::none_given("bisect --programs").into()),
-            (Some(config), _) => Means::Scenes(Scenes::prepare(args, config, versions, scratch, stop)?),
+            (None, Some(repository)) => {
+                Means::Stored(Box::new(Stored::open(args, repository, stop)?))
+            }
+            (None, None) => {
+                return Err(crate::configurations::none_given("bisect --programs").into());
+            }
+            (Some(config), _) => {
+                Means::Scenes(Scenes::prepare(args, config, versions, scratch, stop)?)
+            }
         };
-        Ok(Self { means, properties: &args.properties, known: BTreeMap::new() })
+        Ok(Self {
+            means,
+            properties: &args.properties,
+            known: BTreeMap::new(),
+        })
     }
 
     /// How outcomes decide if no option says so.
@@ -85,8 +95,13 @@ impl<'a> Judge<'a> {
         matches!(&self.means, Means::Scenes(scenes) if !scenes.is_case())
     }
 
-    /// Returns the outcomes of a version in at least a number of scenes; all stored runs are judged in any case.
-    pub fn runs(&mut self, version: &Version, scenes: u64) -> Result<Rc<Vec<ComparedRun>>, Unjudged> {
+    /// Returns the outcomes of a version in at least a number of scenes; all stored runs are judged
+    /// in any case.
+    pub fn runs(
+        &mut self,
+        version: &Version,
+        scenes: u64,
+    ) -> Result<Rc<Vec<ComparedRun>>, Unjudged> {
         if let Some((known, runs)) = self.known.get(&version.id)
             && *known >= scenes
         {
@@ -100,9 +115,18 @@ impl<'a> Judge<'a> {
         shown.finish_and_clear();
         let mut judged = judged?;
         judged.outcomes.retain(|row| self.is_asked(&row.property));
-        let runs = Rc::new(compared_runs(&judged.rows, &judged.scenes, &judged.outcomes));
-        let known = if self.has_more_scenes() { scenes } else { u64::MAX };
-        self.known.insert(version.id.clone(), (known, Rc::clone(&runs)));
+        let runs = Rc::new(compared_runs(
+            &judged.rows,
+            &judged.scenes,
+            &judged.outcomes,
+        ));
+        let known = if self.has_more_scenes() {
+            scenes
+        } else {
+            u64::MAX
+        };
+        self.known
+            .insert(version.id.clone(), (known, Rc::clone(&runs)));
         Ok(runs)
     }
 
@@ -112,7 +136,12 @@ impl<'a> Judge<'a> {
     }
 
     /// Explains an outcome by the rules of a version that was judged.
-    pub fn explain(&self, version: &Version, run: &str, of: &Compared) -> Result<String, Diagnostics> {
+    pub fn explain(
+        &self,
+        version: &Version,
+        run: &str,
+        of: &Compared,
+    ) -> Result<String, Diagnostics> {
         let text = match &self.means {
             Means::Stored(stored) => stored.explain(version, run, of)?,
             Means::Scenes(scenes) => scenes.explain(version, run, of)?,
@@ -141,13 +170,27 @@ pub struct Judged {
     pub outcomes: Vec<OutcomeRow>,
 }
 
-/// The proof of a property in the first execution of an action in a run, or how close it came. Empty if the rules don't have
-/// the property.
-pub(super) fn explain(rules: &RuleBook, history: &History, run: &str, of: &Compared) -> Result<String, Diagnostics> {
-    let Compared::Property { action, property } = of else { return Ok(String::new()) };
+/// The proof of a property in the first execution of an action in a run, or how close it came.
+/// Empty if the rules don't have the property.
+pub(super) fn explain(
+    rules: &RuleBook,
+    history: &History,
+    run: &str,
+    of: &Compared,
+) -> Result<String, Diagnostics> {
+    let Compared::Property { action, property } = of else {
+        return Ok(String::new());
+    };
     let performed = history.run(run)?.actions;
-    let step = performed.iter().position(|performed| performed.action == *action).unwrap_or_default();
+    let step = performed
+        .iter()
+        .position(|performed| performed.action == *action)
+        .unwrap_or_default();
     let facts = history.facts(run, rules.reads_course())?;
-    let explained = facts.action(step).map(|seen| rules.explain(&seen, property, &Budget::default()));
-    Ok(explained.and_then(Result::ok).map_or_else(String::new, |explanation| explanation.to_text()))
+    let explained = facts
+        .action(step)
+        .map(|seen| rules.explain(&seen, property, &Budget::default()));
+    Ok(explained
+        .and_then(Result::ok)
+        .map_or_else(String::new, |explanation| explanation.to_text()))
 }

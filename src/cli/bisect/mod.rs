@@ -28,7 +28,8 @@ use versions::Versions;
 /// `actcheck bisect`
 #[derive(Debug, Args)]
 pub struct BisectArgs {
-    /// A configuration or a case to run at each version [default: none; the runs of the history are judged anew]
+    /// A configuration or a case to run at each version [default: none; the runs of the history are
+    /// judged anew]
     #[arg(value_name = "CONFIG")]
     pub config: Option<PathBuf>,
     /// A revision of this git repository at which all was well
@@ -46,8 +47,8 @@ pub struct BisectArgs {
     /// Only this stored run; may be given several times [default: all]
     #[arg(long = "run", value_name = "RUN", conflicts_with = "config")]
     pub runs: Vec<String>,
-    /// Decide by single outcomes, or by the rates that `actcheck compare` compares [default: outcomes of stored runs and
-    /// cases, rates of campaigns]
+    /// Decide by single outcomes, or by the rates that `actcheck compare` compares [default:
+    /// outcomes of stored runs and cases, rates of campaigns]
     #[arg(long, value_name = "WHAT", value_enum)]
     pub by: Option<By>,
     /// Number of scenes at each version
@@ -66,7 +67,12 @@ pub struct BisectArgs {
     #[arg(long, value_name = "PATH", requires = "config")]
     pub program: Option<PathBuf>,
     /// The ontology with the rules that judge stored runs, in each revision
-    #[arg(long, value_name = "FILE", default_value = "ontology/actions.ttl", conflicts_with = "config")]
+    #[arg(
+        long,
+        value_name = "FILE",
+        default_value = "ontology/actions.ttl",
+        conflicts_with = "config"
+    )]
     pub ontology: PathBuf,
     /// Start the program that a case or a history names; only for those that you trust
     #[arg(long)]
@@ -91,8 +97,8 @@ pub enum By {
 /// Significance level of the comparisons.
 const LEVEL: f64 = 0.05;
 
-/// Finds the first bad version and prints it. Returns the exit code: 0 found, 1 several versions remain because they could
-/// not be judged.
+/// Finds the first bad version and prints it. Returns the exit code: 0 found, 1 several versions
+/// remain because they could not be judged.
 pub fn bisect(args: &BisectArgs) -> Result<u8, Diagnostics> {
     let stop = stop::on_interrupt(|| {});
     match bisect_until(args, &stop) {
@@ -106,8 +112,12 @@ pub fn bisect(args: &BisectArgs) -> Result<u8, Diagnostics> {
 }
 
 fn bisect_until(args: &BisectArgs, stop: &Arc<AtomicBool>) -> Result<u8, Diagnostics> {
-    let scratch = ScratchFolder::create()
-        .map_err(|error| Diagnostic::error("X066", format!("no temporary folder can be created: {error}")))?;
+    let scratch = ScratchFolder::create().map_err(|error| {
+        Diagnostic::error(
+            "X066",
+            format!("no temporary folder can be created: {error}"),
+        )
+    })?;
     // Programs start in other folders.
     let folder = std::path::absolute(scratch.path()).unwrap_or_else(|_| scratch.path().to_owned());
     let versions = Versions::find(args, &folder)?;

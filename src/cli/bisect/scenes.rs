@@ -43,7 +43,14 @@ impl<'a> Scenes<'a> {
         stop: &'a Arc<AtomicBool>,
     ) -> Result<Self, Diagnostics> {
         let is_case = config::load(config, &Overrides::default())?.case.is_some();
-        Ok(Self { args, repository: versions.repository(), scratch, config, is_case, stop })
+        Ok(Self {
+            args,
+            repository: versions.repository(),
+            scratch,
+            config,
+            is_case,
+            stop,
+        })
     }
 
     /// Whether there is a single scene.
@@ -60,7 +67,12 @@ impl<'a> Scenes<'a> {
             std::fs::remove_dir_all(&dir).map_err(|error| unwritable(&dir, &error))?;
         }
         let mut command = Command::new(self.program(version, &folder)?);
-        command.arg("run").arg(&config).arg("--history").arg(&dir).current_dir(&folder);
+        command
+            .arg("run")
+            .arg(&config)
+            .arg("--history")
+            .arg(&dir)
+            .current_dir(&folder);
         match (self.is_case, self.args.trust) {
             (true, true) => command.arg("--trust"),
             (true, false) => &mut command,
@@ -76,9 +88,13 @@ impl<'a> Scenes<'a> {
 
     /// The folder of a version and the configuration in it.
     fn folder(&self, version: &Version) -> Result<(PathBuf, PathBuf), Unjudged> {
-        let Some(repository) = self.repository else { return Ok((PathBuf::from("."), self.config.to_owned())) };
+        let Some(repository) = self.repository else {
+            return Ok((PathBuf::from("."), self.config.to_owned()));
+        };
         let folder = repository.extract(version)?;
-        let Some(inside) = repository.inside(self.config) else { return Ok((folder, self.config.to_owned())) };
+        let Some(inside) = repository.inside(self.config) else {
+            return Ok((folder, self.config.to_owned()));
+        };
         let config = config::resolve_path(&folder, &inside.to_string_lossy());
         // A case is the same at each version. So is a configuration that the version does not have.
         if self.is_case || !config.is_file() {
@@ -93,8 +109,14 @@ impl<'a> Scenes<'a> {
     }
 
     fn build(&self, folder: &Path) -> Result<(), Unjudged> {
-        let Some(build) = &self.args.build else { return Ok(()) };
-        self.start(Command::new("sh").args(["-c", build]).current_dir(folder), "it can't be built", 0)
+        let Some(build) = &self.args.build else {
+            return Ok(());
+        };
+        self.start(
+            Command::new("sh").args(["-c", build]).current_dir(folder),
+            "it can't be built",
+            0,
+        )
     }
 
     fn program(&self, version: &Version, folder: &Path) -> Result<PathBuf, Unjudged> {
@@ -105,28 +127,44 @@ impl<'a> Scenes<'a> {
             Some(program) if program.components().count() > 1 => Ok(folder.join(program)),
             Some(program) => Ok(program.clone()),
             None => std::env::current_exe().map_err(|error| {
-                Unjudged::Stopped(Diagnostic::error("X052", format!("this program has no path: {error}")).into())
+                Unjudged::Stopped(
+                    Diagnostic::error("X052", format!("this program has no path: {error}")).into(),
+                )
             }),
         }
     }
 
-    /// Runs a program of a version. A higher exit code than `highest` skips the version, with the program's message.
+    /// Runs a program of a version. A higher exit code than `highest` skips the version, with the
+    /// program's message.
     fn start(&self, command: &mut Command, what: &str, highest: i32) -> Result<(), Unjudged> {
         let errors = self.scratch.join("errors");
-        let skipped = |reason: String| Unjudged::Skipped(Diagnostic::error("X065", format!("{what}: {reason}")).into());
+        let skipped = |reason: String| {
+            Unjudged::Skipped(Diagnostic::error("X065", format!("{what}: {reason}")).into())
+        };
         match child::run(command, &errors, self.stop) {
             Ok(Some(status)) if status.code().is_some_and(|code| code <= highest) => Ok(()),
             Ok(Some(status)) => {
                 let printed = std::fs::read(&errors).unwrap_or_default();
-                Err(skipped(format!("{status}, {}", self.shown(&message(&printed)))))
+                Err(skipped(format!(
+                    "{status}, {}",
+                    self.shown(&message(&printed))
+                )))
             }
-            Ok(None) => Err(Unjudged::Stopped(Diagnostic::error("X030", "interrupted").into())),
-            Err(error) => Err(skipped(format!("{} can't be started: {error}", command.get_program().display()))),
+            Ok(None) => Err(Unjudged::Stopped(
+                Diagnostic::error("X030", "interrupted").into(),
+            )),
+            Err(error) => Err(skipped(format!(
+                "{} can't be started: {error}",
+                command.get_program().display()
+            ))),
         }
     }
 
     fn shown(&self, text: &str) -> String {
-        self.repository.map_or_else(|| text.to_owned(), |repository| repository.without_folder(text))
+        self.repository.map_or_else(
+            || text.to_owned(),
+            |repository| repository.without_folder(text),
+        )
     }
 
     /// The outcomes of a history with one campaign. Its regressions are left out.
@@ -134,16 +172,32 @@ impl<'a> Scenes<'a> {
         let read = || {
             let history = History::open_to_read(dir)?;
             let newest = history.campaigns()?.pop().map(|campaign| campaign.id);
-            let campaign = if self.is_case { newest } else { Some(compare::newest(&history)?) };
-            let filter = RunFilter { campaign, ..RunFilter::default() };
+            let campaign = if self.is_case {
+                newest
+            } else {
+                Some(compare::newest(&history)?)
+            };
+            let filter = RunFilter {
+                campaign,
+                ..RunFilter::default()
+            };
             let rows = history.runs(&filter)?;
-            Ok(Judged { scenes: history.scenes(&rows)?, outcomes: history.outcomes(&filter)?, rows })
+            Ok(Judged {
+                scenes: history.scenes(&rows)?,
+                outcomes: history.outcomes(&filter)?,
+                rows,
+            })
         };
         read().map_err(Unjudged::Skipped)
     }
 
     /// Explains an outcome by the rules of the version.
-    pub fn explain(&self, version: &Version, run: &str, of: &Compared) -> Result<String, Diagnostics> {
+    pub fn explain(
+        &self,
+        version: &Version,
+        run: &str,
+        of: &Compared,
+    ) -> Result<String, Diagnostics> {
         let (_, config) = self.folder(version).map_err(Unjudged::into_faults)?;
         let (files, path) = config::load(&config, &Overrides::default())?.ontology;
         let rules = RuleBook::prepare(&ontology::load(&files, &path)?)?;
@@ -159,12 +213,20 @@ impl<'a> Scenes<'a> {
 /// The message of a program: actcheck's own first one, or the last line.
 fn message(printed: &[u8]) -> String {
     let text = String::from_utf8_lossy(printed);
-    let own = text.lines().find_map(|line| line.trim_start().strip_prefix("× "));
+    let own = text
+        .lines()
+        .find_map(|line| line.trim_start().strip_prefix("× "));
     own.map_or_else(|| last_line(printed), str::to_owned)
 }
 
 fn unwritable(path: &Path, error: &std::io::Error) -> Unjudged {
-    Unjudged::Stopped(Diagnostic::error("X066", format!("{} can't be written: {error}", path.display())).into())
+    Unjudged::Stopped(
+        Diagnostic::error(
+            "X066",
+            format!("{} can't be written: {error}", path.display()),
+        )
+        .into(),
+    )
 }
 
 #[cfg(test)]
@@ -173,8 +235,14 @@ mod tests {
 
     #[test]
     fn the_message_of_a_program_is_its_first_error_or_last_line() {
-        assert_eq!(message("C003\n\n  × the value is wrong\n  help: x\n".as_bytes()), "the value is wrong");
-        assert_eq!(message(b"make: begin\nmake: *** no rule\n\n"), "make: *** no rule");
+        assert_eq!(
+            message("C003\n\n  × the value is wrong\n  help: x\n".as_bytes()),
+            "the value is wrong"
+        );
+        assert_eq!(
+            message(b"make: begin\nmake: *** no rule\n\n"),
+            "make: *** no rule"
+        );
         assert_eq!(message(b""), "no message");
     }
 }

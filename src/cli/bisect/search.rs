@@ -6,7 +6,8 @@ use super::versions::{Version, Versions};
 /// The answer for one version.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Step {
-    /// Whether the version is like the new end. `None` if it can't be decided: the version is skipped.
+    /// Whether the version is like the new end. `None` if it can't be decided: the version is
+    /// skipped.
     pub is_new: Option<bool>,
     /// The reason.
     pub reason: String,
@@ -28,8 +29,8 @@ pub enum Found {
     OneOf(Vec<Version>),
 }
 
-/// Halves the versions between the ends until one is left. `step` receives a version and the number of versions that can
-/// still be the first new one.
+/// Halves the versions between the ends until one is left. `step` receives a version and the number
+/// of versions that can still be the first new one.
 pub fn search(
     versions: &Versions,
     mut step: impl FnMut(&Version, usize) -> Result<Step, Unjudged>,
@@ -38,13 +39,20 @@ pub fn search(
     let mut skipped: Vec<Version> = Vec::new();
     loop {
         let between = versions.between(&olds, &new)?;
-        let untried = between.iter().find(|version| skipped.iter().all(|skipped| skipped.id != version.id));
+        let untried = between
+            .iter()
+            .find(|version| skipped.iter().all(|skipped| skipped.id != version.id));
         let Some(untried) = untried else {
-            let mut left: Vec<Version> =
-                skipped.into_iter().filter(|skipped| between.iter().any(|version| version.id == skipped.id)).collect();
+            let mut left: Vec<Version> = skipped
+                .into_iter()
+                .filter(|skipped| between.iter().any(|version| version.id == skipped.id))
+                .collect();
             if left.is_empty() {
                 let before = olds.pop().unwrap_or_else(|| versions.old.clone());
-                return Ok(Found::First { version: new, before });
+                return Ok(Found::First {
+                    version: new,
+                    before,
+                });
             }
             left.push(new);
             return Ok(Found::OneOf(left));

@@ -31,53 +31,105 @@ pub struct Stored<'a> {
 
 impl<'a> Stored<'a> {
     /// Reads the runs of a history, or those that the arguments name.
-    pub fn open(args: &BisectArgs, repository: &'a Repository, stop: &'a Arc<AtomicBool>) -> Result<Self, Diagnostics> {
+    pub fn open(
+        args: &BisectArgs,
+        repository: &'a Repository,
+        stop: &'a Arc<AtomicBool>,
+    ) -> Result<Self, Diagnostics> {
         let history = history_dir::open_to_read(&args.history)?;
         restore::allow(&history, args.trust);
-        let named: Vec<String> = args.runs.iter().map(|name| history.resolve(name)).collect::<Result<_, _>>()?;
+        let named: Vec<String> = args
+            .runs
+            .iter()
+            .map(|name| history.resolve(name))
+            .collect::<Result<_, _>>()?;
         let mut rows = history.runs(&RunFilter::default())?;
         rows.retain(|row| named.is_empty() || named.contains(&row.run));
         if rows.is_empty() {
-            let message = format!("the history `{}` has no runs to judge", history.dir().display());
-            return Err(Diagnostic::error("X034", message).help("`actcheck run CONFIG` creates some").into());
+            let message = format!(
+                "the history `{}` has no runs to judge",
+                history.dir().display()
+            );
+            return Err(Diagnostic::error("X034", message)
+                .help("`actcheck run CONFIG` creates some")
+                .into());
         }
         // Runs of several campaigns may have the same number.
-        (0u64..).zip(&mut rows).for_each(|(place, row)| (row.index, row.repetition) = (place, None));
+        (0u64..)
+            .zip(&mut rows)
+            .for_each(|(place, row)| (row.index, row.repetition) = (place, None));
         let Some(ontology) = repository.inside(&args.ontology) else {
-            let message = format!("{} does not belong to the repository", args.ontology.display());
-            return Err(Diagnostic::error("X062", message).help("name the ontology's path in the revisions").into());
+            let message = format!(
+                "{} does not belong to the repository",
+                args.ontology.display()
+            );
+            return Err(Diagnostic::error("X062", message)
+                .help("name the ontology's path in the revisions")
+                .into());
         };
         let scenes = history.scenes(&rows)?;
         let jobs = args.jobs.map_or_else(all_cores, usize::from);
-        Ok(Self { repository, history, rows, scenes, ontology, jobs, stop })
+        Ok(Self {
+            repository,
+            history,
+            rows,
+            scenes,
+            ontology,
+            jobs,
+            stop,
+        })
     }
 
     /// Judges the runs by the rules of a revision.
     pub fn judge(&self, version: &Version) -> Result<Judged, Unjudged> {
         let path = self.ontology_of(version)?;
         let rules = RuleSet::prepare(&Files::Disk, &path).map_err(|faults| self.skip(faults))?;
-        let (rechecks, faults) = judge_stored(&self.history, &self.rows, &rules, self.jobs, self.stop)?;
+        let (rechecks, faults) =
+            judge_stored(&self.history, &self.rows, &rules, self.jobs, self.stop)?;
         if self.stop.load(Ordering::Relaxed) {
-            return Err(Unjudged::Stopped(Diagnostic::error("X030", "interrupted").into()));
+            return Err(Unjudged::Stopped(
+                Diagnostic::error("X030", "interrupted").into(),
+            ));
         }
         if rechecks.is_empty() && !faults.is_empty() {
             return Err(self.skip(faults));
         }
-        let rows: BTreeMap<&str, &RunRow> = self.rows.iter().map(|row| (row.run.as_str(), row)).collect();
-        let outcomes = rechecks.into_iter().filter_map(|judged| Some(outcome(rows.get(judged.run.as_str())?, judged)));
-        Ok(Judged { outcomes: outcomes.collect(), rows: self.rows.clone(), scenes: self.scenes.clone() })
+        let rows: BTreeMap<&str, &RunRow> = self
+            .rows
+            .iter()
+            .map(|row| (row.run.as_str(), row))
+            .collect();
+        let outcomes = rechecks
+            .into_iter()
+            .filter_map(|judged| Some(outcome(rows.get(judged.run.as_str())?, judged)));
+        Ok(Judged {
+            outcomes: outcomes.collect(),
+            rows: self.rows.clone(),
+            scenes: self.scenes.clone(),
+        })
     }
 
     /// Explains an outcome by the rules of a revision.
-    pub fn explain(&self, version: &Version, run: &str, of: &Compared) -> Result<String, Diagnostics> {
+    pub fn explain(
+        &self,
+        version: &Version,
+        run: &str,
+        of: &Compared,
+    ) -> Result<String, Diagnostics> {
         let path = self.ontology_of(version).map_err(Unjudged::into_faults)?;
         let rules = RuleBook::prepare(&ontology::load(&Files::Disk, &path)?)?;
-        Ok(self.repository.without_folder(&explain(&rules, &self.history, run, of)?))
+        Ok(self
+            .repository
+            .without_folder(&explain(&rules, &self.history, run, of)?))
     }
 
     fn ontology_of(&self, version: &Version) -> Result<PathBuf, Unjudged> {
         let path = self.repository.extract(version)?.join(&self.ontology);
-        if path.is_file() { Ok(path) } else { Err(Unjudged::Skipped(lacks(&self.ontology).into())) }
+        if path.is_file() {
+            Ok(path)
+        } else {
+            Err(Unjudged::Skipped(lacks(&self.ontology).into()))
+        }
     }
 
     fn skip(&self, faults: Diagnostics) -> Unjudged {

@@ -6,7 +6,9 @@ use super::ends::Ends;
 use super::judge::{Judge, Unjudged};
 use super::search::{Found, Step};
 use super::versions::{Version, Versions};
-use actcheck_analysis::{Answer, Compared, ComparedLine, ComparedRun, Comparison, Likeness, OutcomeFlip};
+use actcheck_analysis::{
+    Answer, Compared, ComparedLine, ComparedRun, Comparison, Likeness, OutcomeFlip,
+};
 use actcheck_base::{Diagnostic, Diagnostics, Outcome, names};
 
 /// Maximum number of flips that are listed.
@@ -17,20 +19,31 @@ const MOST_RATES: usize = 2;
 /// The two lines of the ends.
 pub fn ends(versions: &Versions, difference: &str) -> String {
     let [good, bad] = versions.ends();
-    format!("good     {}\nbad      {}: {difference}\n", good.name, bad.name)
+    format!(
+        "good     {}\nbad      {}: {difference}\n",
+        good.name, bad.name
+    )
 }
 
 /// The line of a step. `left` is the number of versions that could be the first one before it.
 pub fn step(version: &Version, step: &Step, left: usize) -> String {
-    format!("{:<8} {}: {} ({left} left)\n", step.word, version.name, step.reason)
+    format!(
+        "{:<8} {}: {} ({left} left)\n",
+        step.word, version.name, step.reason
+    )
 }
 
 /// The first message of faults, with its place.
 pub fn first(faults: &Diagnostics) -> String {
-    let Some(fault) = faults.iter().next() else { return "unknown".to_owned() };
+    let Some(fault) = faults.iter().next() else {
+        return "unknown".to_owned();
+    };
     match (&fault.source, &fault.span) {
         (Some(source), Some(span)) => {
-            let line = 1 + source.text.get(..span.start).map_or(0, |text| text.matches('\n').count());
+            let line = 1 + source
+                .text
+                .get(..span.start)
+                .map_or(0, |text| text.matches('\n').count());
             format!("{}:{line}: {}", source.name, fault.message)
         }
         (Some(source), None) => format!("{}: {}", source.name, fault.message),
@@ -49,10 +62,16 @@ pub fn outcomes(likeness: Likeness, flips: &[OutcomeFlip], runs: &[ComparedRun])
         let run = runs.iter().find(|run| run.place == flip.place);
         run.map(|run| run.outcomes().get(&flip.of).copied())
     };
-    let changed = flips.iter().filter(|flip| outcome(flip).is_some_and(|outcome| outcome != flip.outcomes[0])).count();
+    let changed = flips
+        .iter()
+        .filter(|flip| outcome(flip).is_some_and(|outcome| outcome != flip.outcomes[0]))
+        .count();
     match likeness {
         Likeness::First | Likeness::Second => {
-            format!("{changed} of {} changed", count(flips.len(), "outcome", "outcomes"))
+            format!(
+                "{changed} of {} changed",
+                count(flips.len(), "outcome", "outcomes")
+            )
         }
         Likeness::Undecided => "its runs are broken, untested or missing".to_owned(),
     }
@@ -63,19 +82,37 @@ pub fn rates(comparison: &Comparison, is_shown: impl Fn(&ComparedLine) -> bool) 
     let line = |line: &ComparedLine| {
         let [good, this] = line.table.passed();
         let pairs = line.table.pairs();
-        format!("{} passed {this} of {pairs} scenes (good end: {good})", subject(&line.of))
+        format!(
+            "{} passed {this} of {pairs} scenes (good end: {good})",
+            subject(&line.of)
+        )
     };
-    let shown: Vec<String> = comparison.lines.iter().filter(|line| is_shown(line)).map(line).collect();
+    let shown: Vec<String> = comparison
+        .lines
+        .iter()
+        .filter(|line| is_shown(line))
+        .map(line)
+        .collect();
     let more = shown.len().saturating_sub(MOST_RATES);
-    let text = shown.into_iter().take(MOST_RATES).collect::<Vec<_>>().join("; ");
-    if more > 0 { format!("{text}; {more} more") } else { text }
+    let text = shown
+        .into_iter()
+        .take(MOST_RATES)
+        .collect::<Vec<_>>()
+        .join("; ");
+    if more > 0 {
+        format!("{text}; {more} more")
+    } else {
+        text
+    }
 }
 
 fn subject(of: &Compared) -> String {
     match of {
         Compared::WholeRun => "whole runs".to_owned(),
         Compared::Completion => "completion".to_owned(),
-        Compared::Property { action, property } => format!("{} {}", names::local(action), names::local(property)),
+        Compared::Property { action, property } => {
+            format!("{} {}", names::local(action), names::local(property))
+        }
     }
 }
 
@@ -85,20 +122,26 @@ pub fn no_difference(versions: &Versions, answer: Answer, scenes: usize, most: u
     let both = format!("`{}` and `{}`", good.name, bad.name);
     let compared = count(scenes, "scene", "scenes");
     match answer {
-        Answer::Better => Diagnostic::error("X064", format!("`{}` is better than `{}`", bad.name, good.name))
-            .help("swap the ends: `--good` names the version with the better outcomes, older or newer"),
+        Answer::Better => Diagnostic::error(
+            "X064",
+            format!("`{}` is better than `{}`", bad.name, good.name),
+        )
+        .help("swap the ends: `--good` names the version with the better outcomes, older or newer"),
         Answer::Underpowered { scenes: needed } => {
             let needed = needed.map_or("very many".to_owned(), |needed| format!("about {needed}"));
             Diagnostic::error("X064", format!("{both} can't be distinguished in {compared}")).help(format!(
                 "{needed} scenes would decide: raise `--most-scenes` (now {most}); or bisect a single case"
             ))
         }
-        Answer::NoDifference | Answer::Worse => Diagnostic::error("X064", format!("{both} don't differ in {compared}"))
-            .help("name other ends, another property or other runs"),
+        Answer::NoDifference | Answer::Worse => {
+            Diagnostic::error("X064", format!("{both} don't differ in {compared}"))
+                .help("name other ends, another property or other runs")
+        }
     }
 }
 
-/// The result: the first version, its author and date, the outcomes that it changed, and the proof of one.
+/// The result: the first version, its author and date, the outcomes that it changed, and the proof
+/// of one.
 pub fn found(
     versions: &Versions,
     ends: &Ends<'_>,
@@ -123,17 +166,38 @@ pub fn found(
         }
         Found::First { version, before } => (version, before),
     };
-    let _ = writeln!(text, "\nafter {steps}, the first {kind} {} is {}", versions.word(), version.id_or_name());
+    let _ = writeln!(
+        text,
+        "\nafter {steps}, the first {kind} {} is {}",
+        versions.word(),
+        version.id_or_name()
+    );
     if let Some(repository) = versions.repository() {
         let _ = writeln!(text, "  {} ({})", version.name, repository.author(version)?);
     }
-    let runs = |judge: &mut Judge<'_>, version| judge.runs(version, ends.scenes()).map_err(Unjudged::into_faults);
+    let runs = |judge: &mut Judge<'_>, version| {
+        judge
+            .runs(version, ends.scenes())
+            .map_err(Unjudged::into_faults)
+    };
     let (old, new) = (runs(judge, before)?, runs(judge, version)?);
     let flips = ends.relevant_flips(&old, &new);
-    let _ = writeln!(text, "  {} since {}", count(flips.len(), "outcome changed", "outcomes changed"), before.name);
+    let _ = writeln!(
+        text,
+        "  {} since {}",
+        count(flips.len(), "outcome changed", "outcomes changed"),
+        before.name
+    );
     for flip in flips.iter().take(MOST_FLIPS) {
-        let [was, is] = flip.outcomes.map(|outcome| outcome.map_or("not judged", Outcome::word));
-        let _ = writeln!(text, "    {} {}: {was} → {is}", flip.runs[1], subject(&flip.of));
+        let [was, is] = flip
+            .outcomes
+            .map(|outcome| outcome.map_or("not judged", Outcome::word));
+        let _ = writeln!(
+            text,
+            "    {} {}: {was} → {is}",
+            flip.runs[1],
+            subject(&flip.of)
+        );
     }
     if let Some(more @ 1..) = flips.len().checked_sub(MOST_FLIPS) {
         let _ = writeln!(text, "    {more} more");

@@ -3,7 +3,11 @@
 use super::{Area, Code, code};
 
 /// Codes that begin with `X`.
-pub(super) const COMMANDS: Area = Area { letter: 'X', title: "Commands", codes: CODES_X };
+pub(super) const COMMANDS: Area = Area {
+    letter: 'X',
+    title: "Commands",
+    codes: CODES_X,
+};
 
 const CODES_X: &[Code] = &[
     code(
@@ -36,7 +40,12 @@ const CODES_X: &[Code] = &[
         "the path is wrong, or standard input is closed",
         "name an existing file",
     ),
-    code("X006", "a run has no state to draw", "it broke before its first action", "`actcheck show` shows the reason"),
+    code(
+        "X006",
+        "a run has no state to draw",
+        "it broke before its first action",
+        "`actcheck show` shows the reason",
+    ),
     code(
         "X007",
         "a file can't be written",
@@ -67,7 +76,12 @@ const CODES_X: &[Code] = &[
         "`actcheck new` writes only valid, new names",
         "choose a name as the help says",
     ),
-    code("X012", "an unknown picture format", "the extension is neither .png nor .svg", "use one of the two"),
+    code(
+        "X012",
+        "an unknown picture format",
+        "the extension is neither .png nor .svg",
+        "use one of the two",
+    ),
     code(
         "X013",
         "there is nothing to draw",
@@ -86,14 +100,24 @@ const CODES_X: &[Code] = &[
         "`actcheck new` does not overwrite files",
         "choose another name, or omit existing parts from `--with`",
     ),
-    code("X016", "a shipped file can't be copied", "the program is incomplete", "report this bug"),
+    code(
+        "X016",
+        "a shipped file can't be copied",
+        "the program is incomplete",
+        "report this bug",
+    ),
     code(
         "X017",
         "there is no such code",
         "the code is misspelt, or another version prints it",
         "take the suggested code; `actcheck explain` lists all codes",
     ),
-    code("X030", "interrupted", "Ctrl-C", "start the command again; written files and runs are complete"),
+    code(
+        "X030",
+        "interrupted",
+        "Ctrl-C",
+        "start the command again; written files and runs are complete",
+    ),
     code(
         "X031",
         "the ontology lacks an action of a stored run",
@@ -106,8 +130,18 @@ const CODES_X: &[Code] = &[
         "`--as-of-rules` names a folder without `ontology/actions.ttl`",
         "name a folder such as an older checkout of the project",
     ),
-    code("X033", "there is no such campaign to recheck", "the id is misspelt", "take the suggested id"),
-    code("X034", "there are no runs to judge", "the history is empty", "`actcheck run CONFIG` creates some"),
+    code(
+        "X033",
+        "there is no such campaign to recheck",
+        "the id is misspelt",
+        "take the suggested id",
+    ),
+    code(
+        "X034",
+        "there are no runs to judge",
+        "the history is empty",
+        "`actcheck run CONFIG` creates some",
+    ),
     code(
         "X035",
         "more runs could not be judged",
@@ -120,7 +154,12 @@ const CODES_X: &[Code] = &[
         "the campaign has no runs",
         "`actcheck list` shows the runs of all campaigns",
     ),
-    code("X037", "no action has such a success property", "the name is misspelt", "take the suggested name"),
+    code(
+        "X037",
+        "no action has such a success property",
+        "the name is misspelt",
+        "take the suggested name",
+    ),
     code(
         "X038",
         "no campaign of this configuration is stored",
@@ -139,22 +178,42 @@ const CODES_X: &[Code] = &[
         "a case has one scene, and the option is for campaigns",
         "remove the option",
     ),
-    code("X041", "the folder `regressions` can't be listed", "it is not readable", "make it readable, or move it away"),
+    code(
+        "X041",
+        "the folder `regressions` can't be listed",
+        "it is not readable",
+        "make it readable, or move it away",
+    ),
     code(
         "X042",
         "the file of a regression already exists",
         "the run was exported before",
         "move the file away, or name another one with `-o`",
     ),
-    code("X043", "an exported run needs an output file", "neither `-o` nor `--regression` is given", "add one of them"),
-    code("X044", "no run matches", "the named campaigns or times have no runs", "`actcheck list` shows all runs"),
+    code(
+        "X043",
+        "an exported run needs an output file",
+        "neither `-o` nor `--regression` is given",
+        "add one of them",
+    ),
+    code(
+        "X044",
+        "no run matches",
+        "the named campaigns or times have no runs",
+        "`actcheck list` shows all runs",
+    ),
     code(
         "X045",
         "a property was not judged in these runs",
         "its name is misspelt, or the ontology did not have it yet",
         "take the suggested name",
     ),
-    code("X046", "runs have no such parameter", "the name in `--by` is misspelt", "take the suggested name"),
+    code(
+        "X046",
+        "runs have no such parameter",
+        "the name in `--by` is misspelt",
+        "take the suggested name",
+    ),
     code(
         "X047",
         "a named query can't be read",
@@ -197,14 +256,24 @@ const CODES_X: &[Code] = &[
         "the port is taken, or the address is not one of this machine",
         "name another port with `--port`, or 0 for any",
     ),
-    code("X054", "runs have no robot motion", "an earlier version stored them", "run the campaign again to record it"),
+    code(
+        "X054",
+        "runs have no robot motion",
+        "an earlier version stored them",
+        "run the campaign again to record it",
+    ),
     code(
         "X055",
         "this actcheck was built without recordings for Rerun",
         "the feature `rerun` is off by default",
         "build it with `cargo build --release --locked --features rerun`",
     ),
-    code("X056", "a run can't be recorded for Rerun", "a bug in actcheck", "omit `--rrd`, and report this bug"),
+    code(
+        "X056",
+        "a run can't be recorded for Rerun",
+        "a bug in actcheck",
+        "omit `--rrd`, and report this bug",
+    ),
     code(
         "X057",
         "a campaign has no runs to examine",
@@ -223,7 +292,12 @@ const CODES_X: &[Code] = &[
         "it comes from someone else, or the campaign's own program has changed since",
         "read the program, then give the command again with `--trust`; or remove the case",
     ),
-    code("X060", "git can't be started, or failed", "git is not installed", "install git, or use `bisect --programs`"),
+    code(
+        "X060",
+        "git can't be started, or failed",
+        "git is not installed",
+        "install git, or use `bisect --programs`",
+    ),
     code(
         "X061",
         "`actcheck bisect` needs a git repository",

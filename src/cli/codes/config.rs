@@ -3,7 +3,11 @@
 use super::{Area, Code, code};
 
 /// Codes that begin with `C`.
-pub(super) const CONFIG: Area = Area { letter: 'C', title: "Configurations", codes: CODES_C };
+pub(super) const CONFIG: Area = Area {
+    letter: 'C',
+    title: "Configurations",
+    codes: CODES_C,
+};
 
 const CODES_C: &[Code] = &[
     code(
@@ -30,7 +34,12 @@ const CODES_C: &[Code] = &[
         "for instance a string in place of a number, or a list of one number in place of a range",
         "write the value as the help shows",
     ),
-    code("C005", "a required key is missing", "a table lacks a key that has no default", "add the key"),
+    code(
+        "C005",
+        "a required key is missing",
+        "a table lacks a key that has no default",
+        "add the key",
+    ),
     code(
         "C006",
         "a value is not allowed",

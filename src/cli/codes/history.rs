@@ -3,7 +3,11 @@
 use super::{Area, Code, code};
 
 /// Codes that begin with `H`.
-pub(super) const HISTORY: Area = Area { letter: 'H', title: "Histories, queries and merges", codes: CODES_H };
+pub(super) const HISTORY: Area = Area {
+    letter: 'H',
+    title: "Histories, queries and merges",
+    codes: CODES_H,
+};
 
 const CODES_H: &[Code] = &[
     code(
@@ -66,14 +70,24 @@ const CODES_H: &[Code] = &[
         "a word, bracket or prefix is wrong or missing, or it is nested too deeply or too long",
         "correct the marked place",
     ),
-    code("H011", "a query is an update", "histories are read-only", "use `SELECT`, `ASK`, `CONSTRUCT` or `DESCRIBE`"),
+    code(
+        "H011",
+        "a query is an update",
+        "histories are read-only",
+        "use `SELECT`, `ASK`, `CONSTRUCT` or `DESCRIBE`",
+    ),
     code(
         "H012",
         "a query failed",
         "it uses `SERVICE`, or the store could not answer",
         "query only the history; if the help names no way out, report this bug",
     ),
-    code("H013", "a query was stopped", "Ctrl-C, or its time limit", "ask for less, or raise the limit"),
+    code(
+        "H013",
+        "a query was stopped",
+        "Ctrl-C, or its time limit",
+        "ask for less, or raise the limit",
+    ),
     code(
         "H014",
         "there is no such campaign",
@@ -134,7 +148,12 @@ const CODES_H: &[Code] = &[
         "the rules differed",
         "leave one out, and recheck the result",
     ),
-    code("H025", "there is no such campaign to leave out", "the id is misspelt", "take the suggested id"),
+    code(
+        "H025",
+        "there is no such campaign to leave out",
+        "the id is misspelt",
+        "take the suggested id",
+    ),
     code(
         "H026",
         "a campaign or run of a history has an id that is not an id",

@@ -3,7 +3,11 @@
 use super::{Area, Code, code};
 
 /// Codes that begin with `W`.
-pub(super) const MODELS: Area = Area { letter: 'W', title: "Models, robots and worlds", codes: CODES_W };
+pub(super) const MODELS: Area = Area {
+    letter: 'W',
+    title: "Models, robots and worlds",
+    codes: CODES_W,
+};
 
 const CODES_W: &[Code] = &[
     code(
@@ -130,7 +134,12 @@ const CODES_W: &[Code] = &[
         "the file is missing or damaged, or its surface is not closed",
         "export it again as triangles to stl, obj or dae; use a thin box for a sheet",
     ),
-    code("W038", "a model has no solid shape", "none of its links has a `<collision>`", "give a link a `<collision>`"),
+    code(
+        "W038",
+        "a model has no solid shape",
+        "none of its links has a `<collision>`",
+        "give a link a `<collision>`",
+    ),
     code(
         "W039",
         "a model has no category",

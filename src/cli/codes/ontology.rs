@@ -3,7 +3,11 @@
 use super::{Area, Code, code};
 
 /// Codes that begin with `O`.
-pub(super) const ONTOLOGY: Area = Area { letter: 'O', title: "Ontologies", codes: CODES_O };
+pub(super) const ONTOLOGY: Area = Area {
+    letter: 'O',
+    title: "Ontologies",
+    codes: CODES_O,
+};
 
 const CODES_O: &[Code] = &[
     code(
@@ -48,7 +52,12 @@ const CODES_O: &[Code] = &[
         "the action does not declare it",
         "add the parameter to the action, or remove the property",
     ),
-    code("O008", "a parameter is not declared", "its name is misspelt", "take the suggested name, or declare it"),
+    code(
+        "O008",
+        "a parameter is not declared",
+        "its name is misspelt",
+        "take the suggested name, or declare it",
+    ),
     code(
         "O009",
         "a rule file can't be read",

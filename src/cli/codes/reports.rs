@@ -3,7 +3,11 @@
 use super::{Area, Code, code};
 
 /// Codes that begin with `A`.
-pub(super) const TABLES: Area = Area { letter: 'A', title: "Tables", codes: CODES_A };
+pub(super) const TABLES: Area = Area {
+    letter: 'A',
+    title: "Tables",
+    codes: CODES_A,
+};
 
 const CODES_A: &[Code] = &[
     code(
@@ -21,7 +25,11 @@ const CODES_A: &[Code] = &[
 ];
 
 /// Codes that begin with `Q`.
-pub(super) const HEALTH: Area = Area { letter: 'Q', title: "Health of campaigns", codes: CODES_Q };
+pub(super) const HEALTH: Area = Area {
+    letter: 'Q',
+    title: "Health of campaigns",
+    codes: CODES_Q,
+};
 
 const CODES_Q: &[Code] = &[
     code(
@@ -69,8 +77,11 @@ const CODES_Q: &[Code] = &[
 ];
 
 /// Codes that begin with `V`.
-pub(super) const ORACLES: Area =
-    Area { letter: 'V', title: "Tests of properties (`actcheck check-oracles`)", codes: CODES_V };
+pub(super) const ORACLES: Area = Area {
+    letter: 'V',
+    title: "Tests of properties (`actcheck check-oracles`)",
+    codes: CODES_V,
+};
 
 const CODES_V: &[Code] = &[
     code(

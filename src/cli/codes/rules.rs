@@ -3,10 +3,19 @@
 use super::{Area, Code, code};
 
 /// Codes that begin with `R`.
-pub(super) const RULES: Area = Area { letter: 'R', title: "Rules", codes: CODES_R };
+pub(super) const RULES: Area = Area {
+    letter: 'R',
+    title: "Rules",
+    codes: CODES_R,
+};
 
 const CODES_R: &[Code] = &[
-    code("R001", "a comment has no end", "`/*` is never closed", "close it with `*/`"),
+    code(
+        "R001",
+        "a comment has no end",
+        "`/*` is never closed",
+        "close it with `*/`",
+    ),
     code(
         "R002",
         "an unexpected character",
@@ -43,14 +52,24 @@ const CODES_R: &[Code] = &[
         "a word or a symbol is missing or misplaced",
         "correct the marked place; `rules/README.md` describes the language",
     ),
-    code("R011", "an unknown directive", "the word after `@` is misspelt", "take the suggested name"),
+    code(
+        "R011",
+        "an unknown directive",
+        "the word after `@` is misspelt",
+        "take the suggested name",
+    ),
     code(
         "R012",
         "tuples and maps are not supported",
         "the program was written for another engine",
         "use one argument for each part",
     ),
-    code("R013", "a number is out of range", "it has too many digits", "use a smaller number"),
+    code(
+        "R013",
+        "a number is out of range",
+        "it has too many digits",
+        "use a smaller number",
+    ),
     code(
         "R014",
         "an unknown prefix",
@@ -87,7 +106,12 @@ const CODES_R: &[Code] = &[
         "tuples are limited in length",
         "split the tuple over several predicates that share a key",
     ),
-    code("R025", "a file defines both `success` and `violation`", "only one of them may decide", "keep one of them"),
+    code(
+        "R025",
+        "a file defines both `success` and `violation`",
+        "only one of them may decide",
+        "keep one of them",
+    ),
     code(
         "R026",
         "a file defines neither `success` nor `violation`",
@@ -142,7 +166,12 @@ const CODES_R: &[Code] = &[
         "it defines `success`, `violation`, `margin` or `because`, or it is a SPARQL query",
         "define them in the file that `act:verifiedBy` links",
     ),
-    code("R035", "`_` has no value", "it is used in a computation or a head", "use a variable"),
+    code(
+        "R035",
+        "`_` has no value",
+        "it is used in a computation or a head",
+        "use a variable",
+    ),
     code(
         "R036",
         "an unknown parameter, or one without a value",
@@ -173,7 +202,12 @@ const CODES_R: &[Code] = &[
         "no other rule needs it, or its name is misspelt",
         "remove it, or correct the name",
     ),
-    code("R041", "a variable occurs only once", "its name may be misspelt", "write `_` if any value is meant"),
+    code(
+        "R041",
+        "a variable occurs only once",
+        "its name may be misspelt",
+        "write `_` if any value is meant",
+    ),
     code(
         "R042",
         "units don't match",
@@ -342,7 +376,12 @@ const CODES_R: &[Code] = &[
         "a recursive rule computes new values or makes new things without end, there are very many facts, or an import has no end",
         "add a limit such as `?x < 100`; `actcheck datalog` has `--max-tuples`, `--max-new`, `--max-memory` and `--max-time`",
     ),
-    code("R091", "an evaluation of rules was interrupted", "Ctrl-C", "start the command again"),
+    code(
+        "R091",
+        "an evaluation of rules was interrupted",
+        "Ctrl-C",
+        "start the command again",
+    ),
     code(
         "R092",
         "a fact to explain is invalid",

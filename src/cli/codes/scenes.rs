@@ -3,10 +3,19 @@
 use super::{Area, Code, code};
 
 /// Codes that begin with `S`.
-pub(super) const SCENES: Area = Area { letter: 'S', title: "Scenes, runs and cases", codes: CODES_S };
+pub(super) const SCENES: Area = Area {
+    letter: 'S',
+    title: "Scenes, runs and cases",
+    codes: CODES_S,
+};
 
 const CODES_S: &[Code] = &[
-    code("S001", "the ontology has no such action", "an action in `tests` is misspelt", "take the suggested name"),
+    code(
+        "S001",
+        "the ontology has no such action",
+        "an action in `tests` is misspelt",
+        "take the suggested name",
+    ),
     code(
         "S002",
         "an action has no success property",
@@ -19,7 +28,12 @@ const CODES_S: &[Code] = &[
         "the configuration lacks its table",
         "add the table that the help shows",
     ),
-    code("S004", "a table is named after no designator", "its name is misspelt", "take the suggested name"),
+    code(
+        "S004",
+        "a table is named after no designator",
+        "its name is misspelt",
+        "take the suggested name",
+    ),
     code(
         "S005",
         "a model's category is not a class of the ontology",

@@ -41,18 +41,21 @@ pub struct LaunchArgs {
     /// Where the shards run
     #[arg(long, value_name = "WHERE", value_enum, default_value = "local")]
     pub on: On,
-    /// Number of shards; a lost shard loses only its runs in flight, so more shards than processes are fine
+    /// Number of shards; a lost shard loses only its runs in flight, so more shards than processes
+    /// are fine
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=10_000))]
     pub shards: u64,
-    /// The needs of a shard, such as `cpus=2,memory=4G`. Everywhere: `cpus`. With a scheduler also `memory` and `program`
-    /// (the path of actcheck there); `time` (not Ray); Slurm: `partition`, `account`; Kubernetes: `image`, `volume` (the
-    /// claim of the shared volume), `mount`, `namespace`; Ray: `address`, `python`
+    /// The needs of a shard, such as `cpus=2,memory=4G`. Everywhere: `cpus`. With a scheduler also
+    /// `memory` and `program` (the path of actcheck there); `time` (not Ray); Slurm: `partition`,
+    /// `account`; Kubernetes: `image`, `volume` (the claim of the shared volume), `mount`,
+    /// `namespace`; Ray: `address`, `python`
     #[arg(long, value_name = "KEY=VALUE,…", value_delimiter = ',')]
     pub resources: Vec<String>,
     /// Shards that run at once [default: all cores; with a scheduler, as many as it starts]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub parallel: Option<u16>,
-    /// How often a shard is started before it is given up: with a scheduler, in each job, and this many jobs
+    /// How often a shard is started before it is given up: with a scheduler, in each job, and this
+    /// many jobs
     #[arg(long, value_name = "N", default_value_t = 4, value_parser = clap::value_parser!(u32).range(1..=100))]
     pub tries: u32,
     /// Scenes for each test, instead of the configuration's `test_count`
@@ -61,11 +64,12 @@ pub struct LaunchArgs {
     /// Seed of all randomness, instead of the configuration's `seed`
     #[arg(long, value_name = "S")]
     pub seed: Option<u64>,
-    /// Folder of the history [default: `.actcheck` beside the configuration]; the shards are beside it, in DIR.launch,
-    /// until they are merged
+    /// Folder of the history [default: `.actcheck` beside the configuration]; the shards are beside
+    /// it, in DIR.launch, until they are merged
     #[arg(long, value_name = "DIR")]
     pub history: Option<PathBuf>,
-    /// Print the plan and the scheduler's files and commands, or those of the shards, and start nothing
+    /// Print the plan and the scheduler's files and commands, or those of the shards, and start
+    /// nothing
     #[arg(long)]
     pub dry_run: bool,
     /// How results are printed
@@ -79,14 +83,29 @@ pub struct LaunchArgs {
 impl LaunchArgs {
     /// The options that replace values of the configuration.
     pub fn overrides(&self) -> Overrides {
-        let Self { runs, seed, history, .. } = self;
-        Overrides { runs: *runs, seed: *seed, history: history.clone(), ..Overrides::default() }
+        let Self {
+            runs,
+            seed,
+            history,
+            ..
+        } = self;
+        Overrides {
+            runs: *runs,
+            seed: *seed,
+            history: history.clone(),
+            ..Overrides::default()
+        }
     }
 
     /// The options with which `actcheck run` prints the results of the whole campaign.
     pub fn of_whole(&self) -> RunArgs {
         let whole = Self::whole(&self.config, self.runs, self.seed);
-        RunArgs { history: self.history.clone(), format: self.format, quiet: self.quiet, ..whole }
+        RunArgs {
+            history: self.history.clone(),
+            format: self.format,
+            quiet: self.quiet,
+            ..whole
+        }
     }
 
     /// The options of `actcheck run` for a configuration.

@@ -15,8 +15,8 @@ use actcheck_history::History;
 use actcheck_history::merge::{MergeOptions, carry_out, plan as plan_merge};
 use actcheck_rules::Budget;
 
-/// Merges the complete shards into the history, prints the campaign's results and removes the shards. Returns the exit
-/// code.
+/// Merges the complete shards into the history, prints the campaign's results and removes the
+/// shards. Returns the exit code.
 pub(super) fn finish(
     args: &LaunchArgs,
     env: Env,
@@ -35,7 +35,15 @@ pub(super) fn finish(
     record.started = (clock::system().now)();
     let regressions = regressions::run(cases, &history, Some(&record), all_cores())?;
     let kept = session::stored(&history, &env, &id)?;
-    let session = Session { env, history, id, goes_on: true, failed: None, kept, regressions };
+    let session = Session {
+        env,
+        history,
+        id,
+        goes_on: true,
+        failed: None,
+        kept,
+        regressions,
+    };
     let code = run::campaign(&args.of_whole(), session, stop, |_| ())?;
     if code != stop::INTERRUPTED {
         let left = plan.remove().map_err(|error| plan.unwritable(&error))?;
@@ -45,14 +53,22 @@ pub(super) fn finish(
                 left.len(),
                 first.display()
             );
-            output::print_diagnostics(&Diagnostic::warning("X073", message).help("move or remove them").into());
+            output::print_diagnostics(
+                &Diagnostic::warning("X073", message)
+                    .help("move or remove them")
+                    .into(),
+            );
         }
     }
     Ok(code)
 }
 
 /// Merges the shards. Returns the id of the whole campaign, or `None` after an interrupt.
-fn merged(plan: &Plan, history: &History, stop: &AtomicBool) -> Result<Option<String>, Diagnostics> {
+fn merged(
+    plan: &Plan,
+    history: &History,
+    stop: &AtomicBool,
+) -> Result<Option<String>, Diagnostics> {
     let mut sources = Vec::new();
     for number in 1..=plan.shards {
         let source = History::open_to_read(&plan.shard_dir(number))?;
@@ -65,11 +81,27 @@ fn merged(plan: &Plan, history: &History, stop: &AtomicBool) -> Result<Option<St
     }
     // Tables that are missing are made when they are needed.
     let _ = Mirror::adopt(&planned, &sources, history);
-    let first = format!("{}#{}", plan.shard_dir(1).display(), plan.done(1).unwrap_or_default());
-    let whole = planned.campaigns.into_iter().find(|campaign| campaign.from.contains(&first));
+    let first = format!(
+        "{}#{}",
+        plan.shard_dir(1).display(),
+        plan.done(1).unwrap_or_default()
+    );
+    let whole = planned
+        .campaigns
+        .into_iter()
+        .find(|campaign| campaign.from.contains(&first));
     let whole = whole.ok_or_else(|| {
-        Diagnostic::error("X073", format!("the merged history lacks the campaign of shard 1 in `{}`", first))
-            .help(format!("remove the folder `{}`, and launch again", plan.folder.display()))
+        Diagnostic::error(
+            "X073",
+            format!(
+                "the merged history lacks the campaign of shard 1 in `{}`",
+                first
+            ),
+        )
+        .help(format!(
+            "remove the folder `{}`, and launch again",
+            plan.folder.display()
+        ))
     })?;
     Ok(Some(whole.id))
 }

@@ -31,8 +31,8 @@ enum Followed {
     Interrupted,
 }
 
-/// Follows the launch's job, submits one for shards that were lost, up to `tries` jobs, and returns whether all shards
-/// are complete; otherwise Ctrl-C ended it. The job of a scheduler goes on then.
+/// Follows the launch's job, submits one for shards that were lost, up to `tries` jobs, and returns
+/// whether all shards are complete; otherwise Ctrl-C ended it. The job of a scheduler goes on then.
 ///
 /// # Errors
 /// `X074`, `X075`, `X077`, `X078`, `X079`.
@@ -43,8 +43,21 @@ pub(super) fn run_all(
     quiet: bool,
     stop: &AtomicBool,
 ) -> Result<bool, Diagnostics> {
-    let progress = if quiet { Progress::hidden() } else { Progress::new(plan.planned, None) };
-    let done = follow_all(plan, place, scheduler, &View { progress: &progress, quiet }, stop);
+    let progress = if quiet {
+        Progress::hidden()
+    } else {
+        Progress::new(plan.planned, None)
+    };
+    let done = follow_all(
+        plan,
+        place,
+        scheduler,
+        &View {
+            progress: &progress,
+            quiet,
+        },
+        stop,
+    );
     progress.finish();
     scheduler.end();
     done
@@ -64,15 +77,29 @@ impl View<'_> {
     }
 
     fn warn(&self, fault: Diagnostic) {
-        self.progress.bar().suspend(|| output::print_diagnostics(&fault.into()));
+        self.progress
+            .bar()
+            .suspend(|| output::print_diagnostics(&fault.into()));
     }
 
     fn show(&self, plan: &Plan, title: &str, look: &Look) {
         let done = plan.complete();
         let state = match look {
-            Look::Active { running: 0, waiting: 0, .. } | Look::Ended => String::new(),
-            Look::Active { running, waiting, reason, .. } => {
-                let reason = reason.as_ref().map_or_else(String::new, |reason| format!(" ({reason})"));
+            Look::Active {
+                running: 0,
+                waiting: 0,
+                ..
+            }
+            | Look::Ended => String::new(),
+            Look::Active {
+                running,
+                waiting,
+                reason,
+                ..
+            } => {
+                let reason = reason
+                    .as_ref()
+                    .map_or_else(String::new, |reason| format!(" ({reason})"));
                 format!(", {running} running, {waiting} waiting{reason}")
             }
             Look::Unanswered(_) => format!(", {title} doesn't answer"),
@@ -95,8 +122,15 @@ fn follow_all(
     while !plan.missing().is_empty() {
         let current = match record.take().filter(|record| !record.has_ended) {
             // A job that is followed again doesn't count.
-            Some(Record { id: Some(id), round, .. }) => {
-                view.say(&format!("job {id} of {} is followed again", scheduler.title()));
+            Some(Record {
+                id: Some(id),
+                round,
+                ..
+            }) => {
+                view.say(&format!(
+                    "job {id} of {} is followed again",
+                    scheduler.title()
+                ));
                 recorded(scheduler, round, Some(id), false)
             }
             _ if jobs == place.tries => break,
@@ -110,10 +144,16 @@ fn follow_all(
             interrupted(scheduler, &id);
             return Ok(false);
         }
-        Record { has_ended: true, ..current }.write(plan)?;
+        Record {
+            has_ended: true,
+            ..current
+        }
+        .write(plan)?;
         let lost = plan.missing().len();
         if lost > 0 && jobs < place.tries {
-            view.say(&format!("job {id} ended with {lost} incomplete shards, which are submitted again"));
+            view.say(&format!(
+                "job {id} ended with {lost} incomplete shards, which are submitted again"
+            ));
         }
     }
     all_lost(plan, jobs).or(true)
@@ -123,7 +163,13 @@ fn follow_all(
 fn recorded(scheduler: &dyn Scheduler, round: u64, id: Option<String>, has_ended: bool) -> Record {
     let cancel = id.as_deref().and_then(|id| scheduler.cancel(id));
     let has_ended = has_ended || !scheduler.outlives();
-    Record { on: scheduler.on().name().to_owned(), round, id, cancel, has_ended }
+    Record {
+        on: scheduler.on().name().to_owned(),
+        round,
+        id,
+        cancel,
+        has_ended,
+    }
 }
 
 /// Submits a job for shards, or finds it if its submission was interrupted.
@@ -136,15 +182,26 @@ fn submit(
 ) -> Result<Record, Diagnostics> {
     let last = Record::read(plan).map_or(0, |record| record.round);
     let round = unfinished.as_ref().map_or(last + 1, |record| record.round);
-    let job = Job { plan, name: Record::name(plan, round), shards: plan.missing(), place };
+    let job = Job {
+        plan,
+        name: Record::name(plan, round),
+        shards: plan.missing(),
+        place,
+    };
     let number = job.shards.len();
-    let found = if unfinished.is_some() { scheduler.find(&job.name)? } else { None };
+    let found = if unfinished.is_some() {
+        scheduler.find(&job.name)?
+    } else {
+        None
+    };
     let id = match found {
         Some(id) => id,
         None => {
             recorded(scheduler, round, None, false).write(plan)?;
             for (name, text) in scheduler.files(&job) {
-                let written = plan.below().write_atomic(&plan.folder.join(name), text.as_bytes());
+                let written = plan
+                    .below()
+                    .write_atomic(&plan.folder.join(name), text.as_bytes());
                 written.map_err(|error| plan.unwritable(&error))?;
             }
             match scheduler.submit(&job) {
@@ -159,7 +216,10 @@ fn submit(
     let record = recorded(scheduler, round, Some(id), false);
     record.write(plan)?;
     if let Some((id, cancel)) = record.id.as_ref().zip(record.cancel.as_ref()) {
-        view.say(&format!("{number} shards are job {id} of {}; `{cancel}` ends it", scheduler.title()));
+        view.say(&format!(
+            "{number} shards are job {id} of {}; `{cancel}` ends it",
+            scheduler.title()
+        ));
     }
     Ok(record)
 }
@@ -194,7 +254,9 @@ fn follow(
                     warned = Some(trouble);
                 }
             }
-            Look::Unanswered(words) if answered.elapsed() > PATIENCE => return Err(unanswered(scheduler, id, &words)),
+            Look::Unanswered(words) if answered.elapsed() > PATIENCE => {
+                return Err(unanswered(scheduler, id, &words));
+            }
             Look::Unanswered(_) => {}
         }
         let looked = Instant::now();
@@ -232,22 +294,42 @@ fn needs_user(scheduler: &dyn Scheduler, id: &str, trouble: &str) -> Diagnostic 
 
 /// X079: the scheduler doesn't answer.
 fn unanswered(scheduler: &dyn Scheduler, id: &str, words: &str) -> Diagnostics {
-    let message = format!("{} hasn't answered for {} minutes: {words}", scheduler.title(), PATIENCE.as_secs() / 60);
-    Diagnostic::error("X079", message).help(format!("job {id} may go on; the same command follows it again")).into()
+    let message = format!(
+        "{} hasn't answered for {} minutes: {words}",
+        scheduler.title(),
+        PATIENCE.as_secs() / 60
+    );
+    Diagnostic::error("X079", message)
+        .help(format!(
+            "job {id} may go on; the same command follows it again"
+        ))
+        .into()
 }
 
 /// X075 for each shard that isn't complete.
 fn all_lost(plan: &Plan, tries: u32) -> Diagnostics {
     let mut faults = Diagnostics::new();
-    let faulty = plan.faulty().into_iter().map(|number| (number, "could not be completed".to_owned()));
-    let missing = plan.missing().into_iter().map(|number| (number, format!("was lost in {tries} jobs")));
+    let faulty = plan
+        .faulty()
+        .into_iter()
+        .map(|number| (number, "could not be completed".to_owned()));
+    let missing = plan
+        .missing()
+        .into_iter()
+        .map(|number| (number, format!("was lost in {tries} jobs")));
     let all: Vec<(u64, String)> = faulty.chain(missing).collect();
     for (number, how) in all.iter().take(MOST_NAMED) {
         faults.push(lost(plan, *number, how));
     }
     if all.len() > MOST_NAMED {
-        let message = format!("{} more shards could not be completed", all.len() - MOST_NAMED);
-        let help = format!("the same command tries again; their output is in `{}`", plan.folder.join("logs").display());
+        let message = format!(
+            "{} more shards could not be completed",
+            all.len() - MOST_NAMED
+        );
+        let help = format!(
+            "the same command tries again; their output is in `{}`",
+            plan.folder.join("logs").display()
+        );
         faults.push(Diagnostic::error("X075", message).help(help));
     }
     faults
@@ -256,9 +338,17 @@ fn all_lost(plan: &Plan, tries: u32) -> Diagnostics {
 /// The files and the command of the next job.
 pub(super) fn dry_run(plan: &Plan, place: &Place, scheduler: &dyn Scheduler) -> String {
     let round = Record::read(plan).map_or(1, |record| record.round + 1);
-    let job = Job { plan, name: Record::name(plan, round), shards: plan.missing(), place };
+    let job = Job {
+        plan,
+        name: Record::name(plan, round),
+        shards: plan.missing(),
+        place,
+    };
     let files = scheduler.files(&job).into_iter();
     let files = files.map(|(name, text)| format!("# {}\n{text}", plan.folder.join(name).display()));
-    let command = format!("# submitted with\n{}\n", scheduler.command(&job).iter().collect::<ShellLine>());
+    let command = format!(
+        "# submitted with\n{}\n",
+        scheduler.command(&job).iter().collect::<ShellLine>()
+    );
     files.collect::<String>() + &command
 }

@@ -55,10 +55,21 @@ impl Kubernetes {
                 faults.push(Diagnostic::error("X076", message).help(help));
             }
         }
-        let mount = resources.mount.as_ref().map_or_else(|| place.folder.clone(), PathBuf::from);
-        for path in [&place.folder, &place.absolute(&plan.folder), &place.absolute(&plan.config)] {
+        let mount = resources
+            .mount
+            .as_ref()
+            .map_or_else(|| place.folder.clone(), PathBuf::from);
+        for path in [
+            &place.folder,
+            &place.absolute(&plan.folder),
+            &place.absolute(&plan.config),
+        ] {
             if !mount.is_absolute() || !is_inside(path, &mount) {
-                let message = format!("`{}` is not on the volume mounted at `{}`", path.display(), mount.display());
+                let message = format!(
+                    "`{}` is not on the volume mounted at `{}`",
+                    path.display(),
+                    mount.display()
+                );
                 let help = "pods see only the volume: name the folder at which it is mounted here, with `--resources mount=/DIR`";
                 faults.push(Diagnostic::error("X076", message).help(help));
                 break;
@@ -69,7 +80,10 @@ impl Kubernetes {
             volume: resources.volume.clone().unwrap_or_default(),
             mount,
             namespace: resources.namespace.clone(),
-            program: resources.program.clone().unwrap_or_else(|| "actcheck".to_owned()),
+            program: resources
+                .program
+                .clone()
+                .unwrap_or_else(|| "actcheck".to_owned()),
         })
     }
 
@@ -135,26 +149,44 @@ impl Kubernetes {
             true => "n=$((JOB_COMPLETION_INDEX + 1))".to_owned(),
             false => {
                 let shards: Vec<String> = job.shards.iter().map(u64::to_string).collect();
-                format!("set -- {}; shift \"$JOB_COMPLETION_INDEX\"; n=$1", shards.join(" "))
+                format!(
+                    "set -- {}; shift \"$JOB_COMPLETION_INDEX\"; n=$1",
+                    shards.join(" ")
+                )
             }
         };
         let program = ShellLine::default().in_script(&self.program);
-        format!("{number}; exec {program} launch-task {folder} \"$n\" >> {folder}/logs/\"$n\".log 2>&1")
+        format!(
+            "{number}; exec {program} launch-task {folder} \"$n\" >> {folder}/logs/\"$n\".log 2>&1"
+        )
     }
 
     fn kubectl(&self, words: &[&str]) -> Vec<String> {
-        let mut all: Vec<String> = ["kubectl", "--request-timeout=30s"].map(str::to_owned).to_vec();
-        all.extend(self.namespace.iter().map(|namespace| format!("--namespace={namespace}")));
+        let mut all: Vec<String> = ["kubectl", "--request-timeout=30s"]
+            .map(str::to_owned)
+            .to_vec();
+        all.extend(
+            self.namespace
+                .iter()
+                .map(|namespace| format!("--namespace={namespace}")),
+        );
         all.extend(words.iter().map(|word| (*word).to_owned()));
         all
     }
 
-    /// A reason for which pods of a job wait, from their states. Without the right to list pods there is none.
+    /// A reason for which pods of a job wait, from their states. Without the right to list pods
+    /// there is none.
     fn waiting_for(&self, name: &str) -> Result<Option<String>, Diagnostics> {
         let selector = format!("--selector=batch.kubernetes.io/job-name={name}");
         let pending = "--field-selector=status.phase=Pending";
-        let output = ask(self.title(), &self.kubectl(&["get", "pods", &selector, pending, "--output=json"]))?;
-        Ok(serde_json::from_slice(&output.stdout).ok().as_ref().and_then(reason_of))
+        let output = ask(
+            self.title(),
+            &self.kubectl(&["get", "pods", &selector, pending, "--output=json"]),
+        )?;
+        Ok(serde_json::from_slice(&output.stdout)
+            .ok()
+            .as_ref()
+            .and_then(reason_of))
     }
 }
 
@@ -190,7 +222,10 @@ impl Scheduler for Kubernetes {
     }
 
     fn look(&mut self, id: &str) -> Result<Look, Diagnostics> {
-        let output = ask(self.title(), &self.kubectl(&["get", "job", id, "--output=json"]))?;
+        let output = ask(
+            self.title(),
+            &self.kubectl(&["get", "job", id, "--output=json"]),
+        )?;
         if !output.status.success() {
             let words = words_of(&output);
             return Ok(match words.contains("(NotFound)") {
@@ -199,18 +234,31 @@ impl Scheduler for Kubernetes {
             });
         }
         let Ok(job) = serde_json::from_slice::<Value>(&output.stdout) else {
-            return Ok(Look::Unanswered("`kubectl get job` did not print JSON".to_owned()));
+            return Ok(Look::Unanswered(
+                "`kubectl get job` did not print JSON".to_owned(),
+            ));
         };
         let mut look = look_of(&job);
-        if let Look::Active { running: 0, reason, trouble, .. } = &mut look {
+        if let Look::Active {
+            running: 0,
+            reason,
+            trouble,
+            ..
+        } = &mut look
+        {
             *reason = self.waiting_for(id)?;
-            *trouble = reason.clone().filter(|reason| TROUBLES.contains(&reason.as_str()));
+            *trouble = reason
+                .clone()
+                .filter(|reason| TROUBLES.contains(&reason.as_str()));
         }
         Ok(look)
     }
 
     fn cancel(&self, id: &str) -> Option<String> {
-        let namespace = self.namespace.as_ref().map_or_else(String::new, |name| format!(" --namespace={name}"));
+        let namespace = self
+            .namespace
+            .as_ref()
+            .map_or_else(String::new, |name| format!(" --namespace={name}"));
         Some(format!("kubectl{namespace} delete job {id}"))
     }
 }
@@ -220,7 +268,8 @@ fn look_of(job: &Value) -> Look {
     let status = &job["status"];
     let conditions = status["conditions"].as_array().into_iter().flatten();
     let has_ended = |condition: &Value| {
-        matches!(condition["type"].as_str(), Some("Complete" | "Failed")) && condition["status"] == "True"
+        matches!(condition["type"].as_str(), Some("Complete" | "Failed"))
+            && condition["status"] == "True"
     };
     if conditions.into_iter().any(has_ended) {
         return Look::Ended;
@@ -229,21 +278,37 @@ fn look_of(job: &Value) -> Look {
     let (running, finished) = (number("ready"), number("succeeded") + number("failed"));
     let all = job["spec"]["completions"].as_u64().unwrap_or(0);
     let waiting = all.saturating_sub(finished + running);
-    Look::Active { running, waiting, reason: None, trouble: None }
+    Look::Active {
+        running,
+        waiting,
+        reason: None,
+        trouble: None,
+    }
 }
 
 /// The first reason for which pods wait.
 fn reason_of(pods: &Value) -> Option<String> {
     let of_container = |pod: &Value| {
-        let states = pod["status"]["containerStatuses"].as_array().into_iter().flatten();
-        states.filter_map(|state| state["state"]["waiting"]["reason"].as_str()).next().map(str::to_owned)
+        let states = pod["status"]["containerStatuses"]
+            .as_array()
+            .into_iter()
+            .flatten();
+        states
+            .filter_map(|state| state["state"]["waiting"]["reason"].as_str())
+            .next()
+            .map(str::to_owned)
     };
     let of_pod = |pod: &Value| {
         let conditions = pod["status"]["conditions"].as_array().into_iter().flatten();
         let mut unmet = conditions.filter(|condition| condition["status"] == "False");
-        unmet.find_map(|condition| condition["reason"].as_str()).map(str::to_owned)
+        unmet
+            .find_map(|condition| condition["reason"].as_str())
+            .map(str::to_owned)
     };
-    pods["items"].as_array()?.iter().find_map(|pod| of_container(pod).or_else(|| of_pod(pod)))
+    pods["items"]
+        .as_array()?
+        .iter()
+        .find_map(|pod| of_container(pod).or_else(|| of_pod(pod)))
 }
 
 /// Whether an absolute path is in a folder by its name: in the pods, links may lead elsewhere.
@@ -267,23 +332,38 @@ mod tests {
 
     #[test]
     fn the_state_of_a_job_is_read_from_its_description() {
-        let active = |running, waiting| Look::Active { running, waiting, reason: None, trouble: None };
+        let active = |running, waiting| Look::Active {
+            running,
+            waiting,
+            reason: None,
+            trouble: None,
+        };
         let spec = json!({"completions": 4});
         assert_eq!(look_of(&json!({"spec": spec})), active(0, 4));
         let status = json!({"active": 2, "ready": 1, "succeeded": 1});
-        assert_eq!(look_of(&json!({"spec": spec, "status": status})), active(1, 2));
+        assert_eq!(
+            look_of(&json!({"spec": spec, "status": status})),
+            active(1, 2)
+        );
         for end in ["Complete", "Failed"] {
             let status = json!({"conditions": [{"type": end, "status": "True"}]});
-            assert_eq!(look_of(&json!({"spec": spec, "status": status})), Look::Ended);
+            assert_eq!(
+                look_of(&json!({"spec": spec, "status": status})),
+                Look::Ended
+            );
         }
     }
 
     #[test]
     fn reasons_of_waiting_pods_are_found() {
-        let pulling = json!({"containerStatuses": [{"state": {"waiting": {"reason": "ImagePullBackOff"}}}]});
+        let pulling =
+            json!({"containerStatuses": [{"state": {"waiting": {"reason": "ImagePullBackOff"}}}]});
         let unplaced = json!({"conditions": [{"type": "PodScheduled", "status": "False", "reason": "Unschedulable"}]});
         for (status, reason) in [(pulling, "ImagePullBackOff"), (unplaced, "Unschedulable")] {
-            assert_eq!(reason_of(&json!({"items": [{}, {"status": status}]})).as_deref(), Some(reason));
+            assert_eq!(
+                reason_of(&json!({"items": [{}, {"status": status}]})).as_deref(),
+                Some(reason)
+            );
         }
         assert_eq!(reason_of(&json!({"items": []})), None);
     }

@@ -23,7 +23,8 @@ struct Running {
     child: Child,
 }
 
-/// Runs all incomplete shards, lost ones again. Returns whether all are complete; otherwise Ctrl-C ended them.
+/// Runs all incomplete shards, lost ones again. Returns whether all are complete; otherwise Ctrl-C
+/// ended them.
 ///
 /// # Errors
 /// `X052`, `X074`, `X075` a shard was lost `tries` times; the other shards are complete then.
@@ -34,10 +35,16 @@ pub(super) fn run_all(
     quiet: bool,
     stop: &AtomicBool,
 ) -> Result<bool, Diagnostics> {
-    let mut waiting: VecDeque<(u64, u32)> =
-        (1..=plan.shards).filter(|&number| plan.done(number).is_none()).map(|number| (number, 0)).collect();
+    let mut waiting: VecDeque<(u64, u32)> = (1..=plan.shards)
+        .filter(|&number| plan.done(number).is_none())
+        .map(|number| (number, 0))
+        .collect();
     let mut running: Vec<Running> = Vec::new();
-    let progress = if quiet { Progress::hidden() } else { Progress::new(plan.planned, None) };
+    let progress = if quiet {
+        Progress::hidden()
+    } else {
+        Progress::new(plan.planned, None)
+    };
     let mut faults = Diagnostics::new();
     let (mut looks, mut again) = (0_u64, 0_u64);
     while !(waiting.is_empty() && running.is_empty()) {
@@ -49,11 +56,19 @@ pub(super) fn run_all(
         while (running.len() as u64) < at_once
             && let Some((number, tried)) = waiting.pop_front()
         {
-            running.push(Running { number, tries: tried + 1, child: start(plan, number)? });
+            running.push(Running {
+                number,
+                tries: tried + 1,
+                child: start(plan, number)?,
+            });
         }
         let mut left = Vec::new();
         for mut shard in running {
-            match shard.child.try_wait().map_err(|error| plan.unwritable(&error))? {
+            match shard
+                .child
+                .try_wait()
+                .map_err(|error| plan.unwritable(&error))?
+            {
                 None => left.push(shard),
                 Some(_) if plan.done(shard.number).is_some() => {}
                 Some(_) if shard.tries < tries => {
@@ -77,19 +92,33 @@ pub(super) fn run_all(
     faults.or(true)
 }
 
-/// Starts the process of a shard. It ends when this process does, for its standard input is a pipe from here.
+/// Starts the process of a shard. It ends when this process does, for its standard input is a pipe
+/// from here.
 fn start(plan: &Plan, number: u64) -> Result<Child, Diagnostics> {
     let program = std::env::current_exe().map_err(|error| {
-        Diagnostic::error("X052", format!("the path of this program can't be found: {error}"))
-            .help("start actcheck by its full path")
+        Diagnostic::error(
+            "X052",
+            format!("the path of this program can't be found: {error}"),
+        )
+        .help("start actcheck by its full path")
     })?;
-    let log = plan.below().append(&plan.log(number)).and_then(|log| Ok((log.try_clone()?, log)));
+    let log = plan
+        .below()
+        .append(&plan.log(number))
+        .and_then(|log| Ok((log.try_clone()?, log)));
     let (out, errors) = log.map_err(|error| plan.unwritable(&error))?;
     let mut command = Command::new(program);
-    command.arg("launch-task").arg(&plan.folder).arg(number.to_string()).arg("--with-parent");
+    command
+        .arg("launch-task")
+        .arg(&plan.folder)
+        .arg(number.to_string())
+        .arg("--with-parent");
     command.stdin(Stdio::piped()).stdout(out).stderr(errors);
     // Ctrl-C at the terminal reaches only this process, which then ends the others.
-    command.process_group(0).spawn().map_err(|error| plan.unwritable(&error))
+    command
+        .process_group(0)
+        .spawn()
+        .map_err(|error| plan.unwritable(&error))
 }
 
 /// Ends a shard's process by closing its standard input.
@@ -100,7 +129,11 @@ fn end(mut child: Child) {
 }
 
 fn show(progress: &Progress, plan: &Plan, again: u64) {
-    let lost = if again > 0 { format!(", {again} started again") } else { String::new() };
+    let lost = if again > 0 {
+        format!(", {again} started again")
+    } else {
+        String::new()
+    };
     let bar = progress.bar();
     let done = plan.complete();
     bar.set_message(format!("{}/{} shards{lost}", done.len(), plan.shards));

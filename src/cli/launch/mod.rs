@@ -1,5 +1,5 @@
-//! `actcheck launch`: runs the shards of a campaign side by side, here or where a scheduler starts them, and merges them into
-//! one history.
+//! `actcheck launch`: runs the shards of a campaign side by side, here or where a scheduler starts
+//! them, and merges them into one history.
 //!
 //! Never: runs a scene itself. Each shard is `actcheck run --shard` in a process of its own.
 
@@ -43,12 +43,19 @@ pub fn launch(args: &LaunchArgs) -> Result<u8, Diagnostics> {
             stop::end_now();
         }
     });
-    let budget = Budget { stop: Arc::clone(&stop), ..Budget::default() };
+    let budget = Budget {
+        stop: Arc::clone(&stop),
+        ..Budget::default()
+    };
     let resources = Resources::parse(&args.resources, args.on)?;
     let env = Env::prepare_within(&args.config, &args.overrides(), budget.clone())?;
     plan::check(&env, args.shards)?;
     let cores = u64::try_from(all_cores()).unwrap_or(1);
-    let at_once = args.parallel.map_or(cores, u64::from).min(args.shards).max(1);
+    let at_once = args
+        .parallel
+        .map_or(cores, u64::from)
+        .min(args.shards)
+        .max(1);
     let jobs = match args.on {
         On::Local => resources.cpus.unwrap_or((cores / at_once).max(1)),
         On::Slurm | On::Kubernetes | On::Ray => resources.cpus.unwrap_or(1),
@@ -58,7 +65,10 @@ pub fn launch(args: &LaunchArgs) -> Result<u8, Diagnostics> {
     let mut scheduler = scheduler_of(args.on, &plan, &place)?;
     if args.dry_run {
         plan.find()?;
-        let rest = scheduler.as_deref().map_or_else(|| plan.commands(), |one| follow::dry_run(&plan, &place, one));
+        let rest = scheduler.as_deref().map_or_else(
+            || plan.commands(),
+            |one| follow::dry_run(&plan, &place, one),
+        );
         output::print(&(plan.dry_run() + &rest));
         return Ok(0);
     }
@@ -78,14 +88,26 @@ pub fn launch(args: &LaunchArgs) -> Result<u8, Diagnostics> {
 /// Where and how the shards run.
 fn place(args: &LaunchArgs, resources: Resources) -> Result<Place, Diagnostics> {
     let folder = std::env::current_dir().map_err(|error| {
-        Diagnostic::error("X074", format!("the current folder can't be found: {error}"))
-            .help("change to another folder")
+        Diagnostic::error(
+            "X074",
+            format!("the current folder can't be found: {error}"),
+        )
+        .help("change to another folder")
     })?;
-    Ok(Place { folder, resources, parallel: args.parallel.map(u64::from), tries: args.tries })
+    Ok(Place {
+        folder,
+        resources,
+        parallel: args.parallel.map(u64::from),
+        tries: args.tries,
+    })
 }
 
 /// The scheduler; `None` for processes of this machine.
-fn scheduler_of(on: On, plan: &Plan, place: &Place) -> Result<Option<Box<dyn Scheduler>>, Diagnostics> {
+fn scheduler_of(
+    on: On,
+    plan: &Plan,
+    place: &Place,
+) -> Result<Option<Box<dyn Scheduler>>, Diagnostics> {
     Ok(match on {
         On::Local => None,
         On::Slurm => Some(Box::new(slurm::Slurm::new(plan, place)?)),
@@ -95,7 +117,12 @@ fn scheduler_of(on: On, plan: &Plan, place: &Place) -> Result<Option<Box<dyn Sch
 }
 
 /// Runs the shards here. Returns whether all are complete; otherwise Ctrl-C ended them.
-fn local(plan: &Plan, at_once: u64, args: &LaunchArgs, stop: &AtomicBool) -> Result<bool, Diagnostics> {
+fn local(
+    plan: &Plan,
+    at_once: u64,
+    args: &LaunchArgs,
+    stop: &AtomicBool,
+) -> Result<bool, Diagnostics> {
     let are_complete = local::run_all(plan, at_once, args.tries, args.quiet, stop)?;
     if !are_complete {
         let help = "finished runs are kept; the same command continues";

@@ -12,7 +12,8 @@ use crate::launch::plan::Plan;
 use crate::launch::scheduler::{Job, Look, Place, Scheduler, refused, unstarted};
 use actcheck_base::{Diagnostic, Diagnostics, open_regular};
 
-/// The Python program, and its name in the folder of the launch. As `ray.py`, it would import itself.
+/// The Python program, and its name in the folder of the launch. As `ray.py`, it would import
+/// itself.
 pub(super) const SCRIPT: (&str, &str) = ("run_on_ray.py", include_str!("run_on_ray.py"));
 /// Name of the program's settings in the folder of the launch.
 pub(super) const SETTINGS: &str = "ray.json";
@@ -33,9 +34,18 @@ pub(super) struct Ray {
 
 impl Ray {
     pub fn new(plan: &Plan, place: &Place) -> Result<Self, Diagnostics> {
-        let python = place.resources.python.clone().unwrap_or_else(|| "python3".to_owned());
+        let python = place
+            .resources
+            .python
+            .clone()
+            .unwrap_or_else(|| "python3".to_owned());
         let log = plan.folder.join("logs").join("ray.log");
-        Ok(Self { python, program: place.program()?, log, child: None })
+        Ok(Self {
+            python,
+            program: place.program()?,
+            log,
+            child: None,
+        })
     }
 
     fn settings(&self, job: &Job<'_>) -> String {
@@ -63,7 +73,10 @@ impl Ray {
             let _ = log.seek(SeekFrom::Start(length.saturating_sub(MOST_WORDS)));
             let _ = log.read_to_end(&mut text);
         }
-        String::from_utf8_lossy(&text).split_whitespace().collect::<Vec<_>>().join(" ")
+        String::from_utf8_lossy(&text)
+            .split_whitespace()
+            .collect::<Vec<_>>()
+            .join(" ")
     }
 }
 
@@ -77,7 +90,10 @@ impl Scheduler for Ray {
     }
 
     fn files(&self, job: &Job<'_>) -> Vec<(&'static str, String)> {
-        vec![(SETTINGS, self.settings(job)), (SCRIPT.0, SCRIPT.1.to_owned())]
+        vec![
+            (SETTINGS, self.settings(job)),
+            (SCRIPT.0, SCRIPT.1.to_owned()),
+        ]
     }
 
     fn command(&self, job: &Job<'_>) -> Vec<String> {
@@ -87,11 +103,20 @@ impl Scheduler for Ray {
 
     fn submit(&mut self, job: &Job<'_>) -> Result<String, Diagnostics> {
         let log = job.plan.below().emptied(&self.log);
-        let log = log.and_then(|log| Ok((log.try_clone()?, log))).map_err(|error| job.plan.unwritable(&error))?;
+        let log = log
+            .and_then(|log| Ok((log.try_clone()?, log)))
+            .map_err(|error| job.plan.unwritable(&error))?;
         let mut command = Command::new(&self.python);
-        command.args(&self.command(job)[1..]).stdin(Stdio::piped()).stdout(log.0).stderr(log.1);
+        command
+            .args(&self.command(job)[1..])
+            .stdin(Stdio::piped())
+            .stdout(log.0)
+            .stderr(log.1);
         // Ctrl-C at the terminal reaches only this process, which then ends the program.
-        let child = command.process_group(0).spawn().map_err(|error| unstarted("Ray", &self.python, &error))?;
+        let child = command
+            .process_group(0)
+            .spawn()
+            .map_err(|error| unstarted("Ray", &self.python, &error))?;
         self.child = Some(child);
         Ok(job.name.clone())
     }
@@ -102,9 +127,18 @@ impl Scheduler for Ray {
     }
 
     fn look(&mut self, _: &str) -> Result<Look, Diagnostics> {
-        let Some(child) = &mut self.child else { return Ok(Look::Ended) };
+        let Some(child) = &mut self.child else {
+            return Ok(Look::Ended);
+        };
         let ended = match child.try_wait() {
-            Ok(None) => return Ok(Look::Active { running: 0, waiting: 0, reason: None, trouble: None }),
+            Ok(None) => {
+                return Ok(Look::Active {
+                    running: 0,
+                    waiting: 0,
+                    reason: None,
+                    trouble: None,
+                });
+            }
             Ok(Some(status)) => status.code(),
             Err(_) => None,
         };
@@ -112,8 +146,7 @@ impl Scheduler for Ray {
         match ended {
             Some(WITHOUT_PACKAGE) => {
                 let message = format!("`{}` lacks the package ray: {}", self.python, self.words());
-                let help =
-                    "install it (`pip install ray`), or name another Python: `--resources python=/path/of/python3`";
+                let help = "install it (`pip install ray`), or name another Python: `--resources python=/path/of/python3`";
                 Err(Diagnostic::error("X077", message).help(help).into())
             }
             Some(WITHOUT_CLUSTER) => {

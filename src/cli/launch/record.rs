@@ -1,5 +1,5 @@
-//! The record of the last submitted job, `job.json` in the folder of the launch: with it, the same command follows the job
-//! again.
+//! The record of the last submitted job, `job.json` in the folder of the launch: with it, the same
+//! command follows the job again.
 
 use serde_json::{Value, json};
 
@@ -39,9 +39,19 @@ impl Record {
     /// # Errors
     /// `X074` it can't be written.
     pub fn write(&self, plan: &Plan) -> Result<(), Diagnostics> {
-        let Self { on, round, id, cancel, has_ended } = self;
-        let value = json!({"on": on, "round": round, "id": id, "cancel": cancel, "ended": has_ended});
-        let written = plan.below().write_atomic(&plan.folder.join("job.json"), format!("{value:#}\n").as_bytes());
+        let Self {
+            on,
+            round,
+            id,
+            cancel,
+            has_ended,
+        } = self;
+        let value =
+            json!({"on": on, "round": round, "id": id, "cancel": cancel, "ended": has_ended});
+        let written = plan.below().write_atomic(
+            &plan.folder.join("job.json"),
+            format!("{value:#}\n").as_bytes(),
+        );
         written.map_err(|error| plan.unwritable(&error))
     }
 
@@ -56,12 +66,22 @@ impl Record {
 /// # Errors
 /// `X073` one has.
 pub(super) fn check_place(plan: &Plan, on: On) -> Result<(), Diagnostics> {
-    let Some(record) = Record::read(plan).filter(|record| record.on != on.name() && !record.has_ended) else {
+    let Some(record) =
+        Record::read(plan).filter(|record| record.on != on.name() && !record.has_ended)
+    else {
         return Ok(());
     };
-    let id = record.id.unwrap_or_else(|| Record::name(plan, record.round));
-    let message = format!("the shards in `{}` belong to job {id} of {}", plan.folder.display(), record.on);
-    let end = record.cancel.map_or_else(String::new, |command| format!("end the job with `{command}` and "));
+    let id = record
+        .id
+        .unwrap_or_else(|| Record::name(plan, record.round));
+    let message = format!(
+        "the shards in `{}` belong to job {id} of {}",
+        plan.folder.display(),
+        record.on
+    );
+    let end = record.cancel.map_or_else(String::new, |command| {
+        format!("end the job with `{command}` and ")
+    });
     let help = format!(
         "give the command with `--on {}` again; to run the rest elsewhere, {end}remove `{}`",
         record.on,

@@ -8,13 +8,25 @@ use actcheck_config::duration_secs;
 const KEYS: [(&str, &[On], &str); 12] = [
     ("account", &[On::Slurm], "account=robots"),
     ("address", &[On::Ray], "address=10.0.0.1:6379"),
-    ("cpus", &[On::Local, On::Slurm, On::Kubernetes, On::Ray], "cpus=2"),
-    ("image", &[On::Kubernetes], "image=registry.example.org/actcheck:0.1.0"),
+    (
+        "cpus",
+        &[On::Local, On::Slurm, On::Kubernetes, On::Ray],
+        "cpus=2",
+    ),
+    (
+        "image",
+        &[On::Kubernetes],
+        "image=registry.example.org/actcheck:0.1.0",
+    ),
     ("memory", &[On::Slurm, On::Kubernetes, On::Ray], "memory=4G"),
     ("mount", &[On::Kubernetes], "mount=/data"),
     ("namespace", &[On::Kubernetes], "namespace=robots"),
     ("partition", &[On::Slurm], "partition=short"),
-    ("program", &[On::Slurm, On::Kubernetes, On::Ray], "program=/opt/actcheck/bin/actcheck"),
+    (
+        "program",
+        &[On::Slurm, On::Kubernetes, On::Ray],
+        "program=/opt/actcheck/bin/actcheck",
+    ),
     ("python", &[On::Ray], "python=/opt/ray/bin/python3"),
     ("time", &[On::Slurm, On::Kubernetes], "time=2h"),
     ("volume", &[On::Kubernetes], "volume=projects"),
@@ -58,8 +70,9 @@ impl Resources {
         let mut faults = Diagnostics::new();
         let mut seen: Vec<&str> = Vec::new();
         for text in texts {
-            let (key, value) =
-                text.split_once('=').map_or((text.trim(), ""), |(key, value)| (key.trim(), value.trim()));
+            let (key, value) = text
+                .split_once('=')
+                .map_or((text.trim(), ""), |(key, value)| (key.trim(), value.trim()));
             let here = || KEYS.iter().filter(|(_, places, _)| places.contains(&on));
             let Some((_, _, example)) = here().find(|(name, ..)| *name == key) else {
                 faults.push(unknown(key, on, here().map(|(name, ..)| *name)));
@@ -70,7 +83,10 @@ impl Resources {
                 faults.push(Diagnostic::error("X076", message).help("remove one of them"));
             } else if let Err(reason) = resources.set(key, value) {
                 let message = format!("`--resources {key}`: {reason}");
-                faults.push(Diagnostic::error("X076", message).help(format!("write `--resources {example}`")));
+                faults.push(
+                    Diagnostic::error("X076", message)
+                        .help(format!("write `--resources {example}`")),
+                );
             }
             seen.push(key);
         }
@@ -83,8 +99,17 @@ impl Resources {
             return Err("the value is missing, or has a control character".to_owned());
         }
         match key {
-            "cpus" => self.cpus = Some(count(value).filter(|&cpus| cpus <= MOST_CPUS).ok_or("expected 1 to 1024")?),
-            "memory" => self.memory_mib = Some(mebibytes(value).ok_or("expected a size such as 500M or 4G")?),
+            "cpus" => {
+                self.cpus = Some(
+                    count(value)
+                        .filter(|&cpus| cpus <= MOST_CPUS)
+                        .ok_or("expected 1 to 1024")?,
+                )
+            }
+            "memory" => {
+                self.memory_mib =
+                    Some(mebibytes(value).ok_or("expected a size such as 500M or 4G")?)
+            }
             "time" => self.time_secs = Some(duration_secs(value).map(whole_secs)?),
             _ => *self.name(key) = Some(value.to_owned()),
         }
@@ -110,12 +135,18 @@ impl Resources {
 fn unknown<'a>(key: &str, on: On, here: impl Iterator<Item = &'a str> + Clone) -> Diagnostic {
     let elsewhere = KEYS.iter().find(|(name, ..)| *name == key);
     let message = match elsewhere {
-        Some(_) => format!("`--resources {key}` has no meaning with `--on {}`", on.name()),
+        Some(_) => format!(
+            "`--resources {key}` has no meaning with `--on {}`",
+            on.name()
+        ),
         None => format!("`--resources` has no key `{key}`"),
     };
     let help = match elsewhere {
         Some((_, places, _)) => {
-            let places: Vec<String> = places.iter().map(|place| format!("`--on {}`", place.name())).collect();
+            let places: Vec<String> = places
+                .iter()
+                .map(|place| format!("`--on {}`", place.name()))
+                .collect();
             format!("remove it, or use {}", places.join(" or "))
         }
         None => did_you_mean(key, here),
@@ -153,7 +184,16 @@ mod tests {
         for (text, mib) in [("500M", 500), ("4G", 4096), ("4GiB", 4096), ("1t", 1 << 20)] {
             assert_eq!(mebibytes(text), Some(mib), "{text}");
         }
-        for text in ["", "4", "G", "0G", "1.5G", "-1G", "99999999999999999999G", "18446744073709551615T"] {
+        for text in [
+            "",
+            "4",
+            "G",
+            "0G",
+            "1.5G",
+            "-1G",
+            "99999999999999999999G",
+            "18446744073709551615T",
+        ] {
             assert_eq!(mebibytes(text), None, "{text}");
         }
     }

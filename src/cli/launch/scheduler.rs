@@ -97,20 +97,30 @@ impl Place {
         }
         let own = std::env::current_exe().map(|program| program.display().to_string());
         own.map_err(|error| {
-            Diagnostic::error("X052", format!("the path of this program can't be found: {error}"))
-                .help("name it with `--resources program=/path/of/actcheck`")
-                .into()
+            Diagnostic::error(
+                "X052",
+                format!("the path of this program can't be found: {error}"),
+            )
+            .help("name it with `--resources program=/path/of/actcheck`")
+            .into()
         })
     }
 }
 
-/// Runs a command of a scheduler. Ctrl-C at the terminal doesn't reach it: a submission must be complete.
+/// Runs a command of a scheduler. Ctrl-C at the terminal doesn't reach it: a submission must be
+/// complete.
 ///
 /// # Errors
 /// `X077` it can't be started.
 pub(super) fn ask(scheduler: &str, words: &[String]) -> Result<Output, Diagnostics> {
-    let (program, arguments) = words.split_first().map_or(("", words), |(program, rest)| (program.as_str(), rest));
-    let output = Command::new(program).args(arguments).stdin(Stdio::null()).process_group(0).output();
+    let (program, arguments) = words
+        .split_first()
+        .map_or(("", words), |(program, rest)| (program.as_str(), rest));
+    let output = Command::new(program)
+        .args(arguments)
+        .stdin(Stdio::null())
+        .process_group(0)
+        .output();
     output.map_err(|error| unstarted(scheduler, program, &error).into())
 }
 
@@ -120,20 +130,31 @@ pub(super) fn unstarted(scheduler: &str, program: &str, error: &std::io::Error) 
         ErrorKind::NotFound => format!("`{program}` of {scheduler} was not found"),
         _ => format!("`{program}` of {scheduler} can't be started: {error}"),
     };
-    Diagnostic::error("X077", message)
-        .help(format!("give this command on a machine with {scheduler}'s programs, or add their folder to PATH"))
+    Diagnostic::error("X077", message).help(format!(
+        "give this command on a machine with {scheduler}'s programs, or add their folder to PATH"
+    ))
 }
 
 /// X078: the scheduler refused a job.
 pub(super) fn refused(scheduler: &str, words: &str, help: &str) -> Diagnostics {
-    Diagnostic::error("X078", format!("{scheduler} refused the job: {words}")).help(help.to_owned()).into()
+    Diagnostic::error("X078", format!("{scheduler} refused the job: {words}"))
+        .help(help.to_owned())
+        .into()
 }
 
 /// The words that a command printed to its error stream, else to its output, in one line.
 pub(super) fn words_of(output: &Output) -> String {
     let errors = String::from_utf8_lossy(&output.stderr);
-    let text = if errors.trim().is_empty() { String::from_utf8_lossy(&output.stdout) } else { errors };
+    let text = if errors.trim().is_empty() {
+        String::from_utf8_lossy(&output.stdout)
+    } else {
+        errors
+    };
     let words: Vec<&str> = text.split_whitespace().collect();
     let words: String = words.join(" ").chars().take(MOST_WORDS).collect();
-    if words.is_empty() { format!("no message, {}", output.status) } else { words }
+    if words.is_empty() {
+        format!("no message, {}", output.status)
+    } else {
+        words
+    }
 }

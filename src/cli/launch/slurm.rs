@@ -11,9 +11,15 @@ use actcheck_base::{Diagnostic, Diagnostics, ShellLine};
 
 /// Name of the script in the folder of the launch.
 pub(super) const SCRIPT: &str = "slurm.sh";
-/// Parts of reasons that don't go away by themselves, in lower case. An array that asks for more cores than any node has is
-/// accepted, and waits for `PartitionConfig`.
-const TROUBLES: [&str; 5] = ["held", "badconstraints", "timelimit", "partitionconfig", "partitionnodelimit"];
+/// Parts of reasons that don't go away by themselves, in lower case. An array that asks for more
+/// cores than any node has is accepted, and waits for `PartitionConfig`.
+const TROUBLES: [&str; 5] = [
+    "held",
+    "badconstraints",
+    "timelimit",
+    "partitionconfig",
+    "partitionnodelimit",
+];
 
 /// Slurm through its commands.
 pub(super) struct Slurm {
@@ -22,21 +28,39 @@ pub(super) struct Slurm {
 
 impl Slurm {
     /// # Errors
-    /// `X074` a folder's name has a line break, which an `#SBATCH` line can't have; `X052` as [`Place::program`].
+    /// `X074` a folder's name has a line break, which an `#SBATCH` line can't have; `X052` as
+    /// [`Place::program`].
     pub fn new(plan: &Plan, place: &Place) -> Result<Self, Diagnostics> {
         let folder = place.absolute(&plan.folder).display().to_string();
         if folder.contains(['\n', '\r']) {
-            let message = format!("the name of the folder `{folder}` has a line break, which Slurm can't read");
-            return Err(Diagnostic::error("X074", message).help("name another folder with `--history DIR`").into());
+            let message = format!(
+                "the name of the folder `{folder}` has a line break, which Slurm can't read"
+            );
+            return Err(Diagnostic::error("X074", message)
+                .help("name another folder with `--history DIR`")
+                .into());
         }
-        Ok(Self { program: place.program()? })
+        Ok(Self {
+            program: place.program()?,
+        })
     }
 
     fn directives(job: &Job<'_>) -> String {
         let (plan, place) = (job.plan, job.place);
-        let Resources { memory_mib, time_secs, partition, account, .. } = &place.resources;
-        let at_once = place.parallel.map_or_else(String::new, |number| format!("%{number}"));
-        let logs = place.absolute(&plan.folder.join("logs")).display().to_string();
+        let Resources {
+            memory_mib,
+            time_secs,
+            partition,
+            account,
+            ..
+        } = &place.resources;
+        let at_once = place
+            .parallel
+            .map_or_else(String::new, |number| format!("%{number}"));
+        let logs = place
+            .absolute(&plan.folder.join("logs"))
+            .display()
+            .to_string();
         let mut lines = vec![
             ("job-name", job.name.clone()),
             ("array", ranges(&job.shards) + &at_once),
@@ -51,7 +75,8 @@ impl Slurm {
         lines.extend(time_secs.map(|secs| ("time", secs.div_ceil(60).to_string())));
         lines.extend(partition.clone().map(|name| ("partition", name)));
         lines.extend(account.clone().map(|name| ("account", name)));
-        let line = |(key, value): (&str, String)| format!("#SBATCH --{key}={}\n", in_directive(&value));
+        let line =
+            |(key, value): (&str, String)| format!("#SBATCH --{key}={}\n", in_directive(&value));
         lines.into_iter().map(line).collect::<String>() + "#SBATCH --requeue\n"
     }
 }
@@ -66,7 +91,10 @@ impl Scheduler for Slurm {
     }
 
     fn files(&self, job: &Job<'_>) -> Vec<(&'static str, String)> {
-        let task = ShellLine::default().in_script(&self.program).fixed("launch-task").in_script(&job.plan.folder);
+        let task = ShellLine::default()
+            .in_script(&self.program)
+            .fixed("launch-task")
+            .in_script(&job.plan.folder);
         let mut text = format!("#!/bin/sh\n{}", Self::directives(job));
         // A requeue delays a task by two minutes, so it is first tried again here.
         let _ = write!(
@@ -95,7 +123,14 @@ impl Scheduler for Slurm {
         let output = ask(self.title(), &self.command(job))?;
         let text = String::from_utf8_lossy(&output.stdout);
         // `--parsable` prints the id, or the id and the cluster: 1234;north.
-        let id = text.lines().last().unwrap_or_default().split(';').next().unwrap_or_default().trim();
+        let id = text
+            .lines()
+            .last()
+            .unwrap_or_default()
+            .split(';')
+            .next()
+            .unwrap_or_default()
+            .trim();
         if output.status.success() && id.parse::<u64>().is_ok() {
             return Ok(id.to_owned());
         }
@@ -105,15 +140,36 @@ impl Scheduler for Slurm {
     }
 
     fn find(&mut self, name: &str) -> Result<Option<String>, Diagnostics> {
-        let words = ["squeue", "--noheader", "--me", "--name", name, "--format", "%A"].map(str::to_owned);
+        let words = [
+            "squeue",
+            "--noheader",
+            "--me",
+            "--name",
+            name,
+            "--format",
+            "%A",
+        ]
+        .map(str::to_owned);
         let output = ask(self.title(), &words)?;
         let text = String::from_utf8_lossy(&output.stdout);
-        let found = text.lines().map(str::trim).find(|id| id.parse::<u64>().is_ok());
+        let found = text
+            .lines()
+            .map(str::trim)
+            .find(|id| id.parse::<u64>().is_ok());
         Ok(found.map(str::to_owned))
     }
 
     fn look(&mut self, id: &str) -> Result<Look, Diagnostics> {
-        let words = ["squeue", "--noheader", "--array", "--jobs", id, "--format", "%T|%r"].map(str::to_owned);
+        let words = [
+            "squeue",
+            "--noheader",
+            "--array",
+            "--jobs",
+            id,
+            "--format",
+            "%T|%r",
+        ]
+        .map(str::to_owned);
         let output = ask(self.title(), &words)?;
         if !output.status.success() {
             let words = words_of(&output);
@@ -139,7 +195,8 @@ fn look_of(lines: &str) -> Look {
         let (state, reason) = line.trim().split_once('|').unwrap_or((line.trim(), ""));
         match state {
             "" => {}
-            "PENDING" | "REQUEUED" | "REQUEUE_HOLD" | "SPECIAL_EXIT" | "SUSPENDED" | "STOPPED" | "RESV_DEL_HOLD" => {
+            "PENDING" | "REQUEUED" | "REQUEUE_HOLD" | "SPECIAL_EXIT" | "SUSPENDED" | "STOPPED"
+            | "RESV_DEL_HOLD" => {
                 waiting += 1;
                 if !matches!(reason, "" | "None") {
                     *reasons.entry(reason).or_default() += 1;
@@ -155,9 +212,20 @@ fn look_of(lines: &str) -> Look {
         let reason = reason.to_ascii_lowercase();
         TROUBLES.iter().any(|trouble| reason.contains(trouble))
     };
-    let trouble = reasons.keys().find(needs_user).map(|reason| (*reason).to_owned());
-    let reason = reasons.iter().max_by_key(|(_, number)| **number).map(|(reason, _)| (*reason).to_owned());
-    Look::Active { running, waiting, reason, trouble }
+    let trouble = reasons
+        .keys()
+        .find(needs_user)
+        .map(|reason| (*reason).to_owned());
+    let reason = reasons
+        .iter()
+        .max_by_key(|(_, number)| **number)
+        .map(|(reason, _)| (*reason).to_owned());
+    Look::Active {
+        running,
+        waiting,
+        reason,
+        trouble,
+    }
 }
 
 /// Numbers as Slurm's array indices: `1-4,7`.
@@ -169,7 +237,13 @@ fn ranges(numbers: &BTreeSet<u64>) -> String {
             _ => ranges.push((number, number)),
         }
     }
-    let text = |(first, last): (u64, u64)| if first == last { first.to_string() } else { format!("{first}-{last}") };
+    let text = |(first, last): (u64, u64)| {
+        if first == last {
+            first.to_string()
+        } else {
+            format!("{first}-{last}")
+        }
+    };
     ranges.into_iter().map(text).collect::<Vec<_>>().join(",")
 }
 
@@ -204,7 +278,10 @@ mod tests {
         assert_eq!(look_of(lines), active(2, 3, Some("Resources"), None));
         let held = "launch failed requeued held";
         for reason in [held, "PartitionConfig"] {
-            assert_eq!(look_of(&format!("PENDING|{reason}\n")), active(0, 1, Some(reason), Some(reason)));
+            assert_eq!(
+                look_of(&format!("PENDING|{reason}\n")),
+                active(0, 1, Some(reason), Some(reason))
+            );
         }
     }
 

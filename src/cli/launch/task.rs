@@ -37,8 +37,14 @@ pub fn task(args: &LaunchTaskArgs) -> Result<u8, Diagnostics> {
     let plan = Plan::read(&args.folder)?;
     plan.check_plain()?;
     let shard = plan.shard(args.number).ok_or_else(|| {
-        Diagnostic::error("X073", format!("the launch has {} shards, and no shard {}", plan.shards, args.number))
-            .help("name a number from 1 to that")
+        Diagnostic::error(
+            "X073",
+            format!(
+                "the launch has {} shards, and no shard {}",
+                plan.shards, args.number
+            ),
+        )
+        .help("name a number from 1 to that")
     })?;
     match alone(&plan, shard) {
         Err(faults) if is_open_elsewhere(&faults) => {
@@ -46,9 +52,14 @@ pub fn task(args: &LaunchTaskArgs) -> Result<u8, Diagnostics> {
             Ok(BUSY)
         }
         Err(faults) => {
-            let text: String = faults.iter().map(|fault| format!("{}: {}\n", fault.code, fault.message)).collect();
+            let text: String = faults
+                .iter()
+                .map(|fault| format!("{}: {}\n", fault.code, fault.message))
+                .collect();
             // The exit code says it too.
-            let _ = plan.below().write_atomic(&plan.fault_file(args.number), text.as_bytes());
+            let _ = plan
+                .below()
+                .write_atomic(&plan.fault_file(args.number), text.as_bytes());
             Err(faults)
         }
         done => done,
@@ -59,11 +70,14 @@ pub fn task(args: &LaunchTaskArgs) -> Result<u8, Diagnostics> {
 fn alone(plan: &Plan, shard: Shard) -> Result<u8, Diagnostics> {
     if plan.program != program_digest() {
         let message = "this is not the version of actcheck that planned the launch";
-        let help = "use the same program everywhere, or remove the folder of the launch and launch again";
+        let help =
+            "use the same program everywhere, or remove the folder of the launch and launch again";
         return Err(Diagnostic::error("X082", message).help(help).into());
     }
     let number = shard.number();
-    let Some(_held) = plan.hold(number, WAIT)? else { return Ok(BUSY) };
+    let Some(_held) = plan.hold(number, WAIT)? else {
+        return Ok(BUSY);
+    };
     let dir = plan.shard_dir(number);
     let mut options = plan.run_args(&dir);
     match state(&dir)? {
@@ -80,7 +94,8 @@ fn alone(plan: &Plan, shard: Shard) -> Result<u8, Diagnostics> {
     match state(&dir)? {
         State::Done(id) => {
             // The merge takes them over. Tables that are missing are made when they are needed.
-            let _ = History::open_to_read(&dir).and_then(|history| Mirror::update(&history).map(drop));
+            let _ =
+                History::open_to_read(&dir).and_then(|history| Mirror::update(&history).map(drop));
             plan.below()
                 .write_atomic(&plan.done_file(number), id.as_bytes())
                 .map_err(|error| plan.unwritable(&error))?;
@@ -95,7 +110,8 @@ fn ended(code: u8) -> Result<u8, Diagnostics> {
     Ok(if code <= 1 { 0 } else { code })
 }
 
-/// The state of a shard's history. Waits until no other process writes it: one that lost its scheduler may live on.
+/// The state of a shard's history. Waits until no other process writes it: one that lost its
+/// scheduler may live on.
 fn state(dir: &Path) -> Result<State, Diagnostics> {
     if !dir.join("VERSION").exists() {
         return Ok(State::New);
@@ -104,14 +120,20 @@ fn state(dir: &Path) -> Result<State, Diagnostics> {
     let history = loop {
         match History::open_existing(dir) {
             Ok(history) => break history,
-            Err(faults) if asked.elapsed() < WAIT && is_open_elsewhere(&faults) => thread::sleep(INTERVAL),
+            Err(faults) if asked.elapsed() < WAIT && is_open_elsewhere(&faults) => {
+                thread::sleep(INTERVAL)
+            }
             Err(faults) => return Err(faults),
         }
     };
     for row in history.campaigns()? {
         if !history.campaign(&row.id)?.shards.is_empty() {
             let is_done = row.ended.is_some() && !row.interrupted;
-            return Ok(if is_done { State::Done(row.id) } else { State::Begun(row.id) });
+            return Ok(if is_done {
+                State::Done(row.id)
+            } else {
+                State::Begun(row.id)
+            });
         }
     }
     Ok(State::New)
@@ -121,7 +143,8 @@ fn is_open_elsewhere(faults: &Diagnostics) -> bool {
     faults.iter().any(|fault| fault.code == "H002")
 }
 
-/// Ends the process when the parent is gone, and with it the other end of standard input. Stored runs are complete.
+/// Ends the process when the parent is gone, and with it the other end of standard input. Stored
+/// runs are complete.
 fn end_with_parent() {
     let mut rest = Vec::new();
     // An input that can't be read is as good as closed.

@@ -1,5 +1,5 @@
-//! The bodies that the links of an object form: those joined by fixed joints move as one, and all other joints move a
-//! body.
+//! The bodies that the links of an object form: those joined by fixed joints move as one, and all
+//! other joints move a body.
 
 use std::collections::VecDeque;
 
@@ -16,8 +16,8 @@ pub(crate) struct Join<'a> {
     pub(crate) joint: Option<PartJoint>,
 }
 
-/// The body of each link, and the joint that moves each body. Body 0 is the object itself; each of the others comes after
-/// the one that carries it.
+/// The body of each link, and the joint that moves each body. Body 0 is the object itself; each of
+/// the others comes after the one that carries it.
 pub(crate) struct Assembly<'a> {
     bodies: Vec<usize>,
     moved: Vec<Moved<'a>>,
@@ -33,48 +33,89 @@ struct Moved<'a> {
 }
 
 impl<'a> Assembly<'a> {
-    /// Finds the bodies of links. Reports W035 if two joints move one body or joints form a cycle; then all links are one.
+    /// Finds the bodies of links. Reports W035 if two joints move one body or joints form a cycle;
+    /// then all links are one.
     pub(crate) fn of(n_links: usize, joins: &[Join<'a>], reader: &mut Reader) -> Self {
-        let rigid = Self { bodies: vec![0; n_links], moved: Vec::new() };
+        let rigid = Self {
+            bodies: vec![0; n_links],
+            moved: Vec::new(),
+        };
         let mut groups: Vec<usize> = (0..n_links).collect();
         for join in joins.iter().filter(|join| join.joint.is_none()) {
             let (from, to) = (groups[join.child], groups[join.parent]);
-            groups.iter_mut().filter(|group| **group == from).for_each(|group| *group = to);
+            groups
+                .iter_mut()
+                .filter(|group| **group == from)
+                .for_each(|group| *group = to);
         }
-        let moving: Vec<(&Join<'a>, PartJoint)> =
-            joins.iter().filter_map(|join| join.joint.map(|joint| (join, joint))).collect();
-        let movers = |group: usize| moving.iter().filter(|(join, _)| groups[join.child] == group).count();
+        let moving: Vec<(&Join<'a>, PartJoint)> = joins
+            .iter()
+            .filter_map(|join| join.joint.map(|joint| (join, joint)))
+            .collect();
+        let movers = |group: usize| {
+            moving
+                .iter()
+                .filter(|(join, _)| groups[join.child] == group)
+                .count()
+        };
         for (join, _) in &moving {
             if movers(groups[join.child]) > 1 {
                 let message = "two joints move the same links".to_owned();
-                reader.error("W035", join.node, message, "links form one tree: remove one of the joints");
+                reader.error(
+                    "W035",
+                    join.node,
+                    message,
+                    "links form one tree: remove one of the joints",
+                );
                 return rigid;
             }
         }
         // All links that no joint moves are the object itself.
-        let mut bodies: Vec<Option<usize>> = groups.iter().map(|group| (movers(*group) == 0).then_some(0)).collect();
-        let (mut moved, mut left): (Vec<Moved<'a>>, VecDeque<_>) = (Vec::new(), moving.iter().collect());
+        let mut bodies: Vec<Option<usize>> = groups
+            .iter()
+            .map(|group| (movers(*group) == 0).then_some(0))
+            .collect();
+        let (mut moved, mut left): (Vec<Moved<'a>>, VecDeque<_>) =
+            (Vec::new(), moving.iter().collect());
         let mut tries = left.len();
         while let Some(next @ (join, joint)) = left.pop_front() {
             if let Some(carrier) = bodies[join.parent] {
-                moved.push(Moved { node: join.node, carrier, link: join.child, joint: *joint });
+                moved.push(Moved {
+                    node: join.node,
+                    carrier,
+                    link: join.child,
+                    joint: *joint,
+                });
                 let of_child = |link: &usize| groups[*link] == groups[join.child];
-                (0..n_links).filter(of_child).for_each(|link| bodies[link] = Some(moved.len()));
+                (0..n_links)
+                    .filter(of_child)
+                    .for_each(|link| bodies[link] = Some(moved.len()));
                 tries = left.len();
             } else if tries > 0 {
                 tries -= 1;
                 left.push_back(next);
             } else {
-                reader.error("W035", join.node, "the joints form a cycle".to_owned(), "links form one tree");
+                reader.error(
+                    "W035",
+                    join.node,
+                    "the joints form a cycle".to_owned(),
+                    "links form one tree",
+                );
                 return rigid;
             }
         }
-        Self { bodies: bodies.into_iter().map(Option::unwrap_or_default).collect(), moved }
+        Self {
+            bodies: bodies.into_iter().map(Option::unwrap_or_default).collect(),
+            moved,
+        }
     }
 
     /// Returns bodies without shapes, one for each.
     pub(crate) fn empty_bodies(&self, fixed: bool) -> Vec<Body> {
-        let empty = |idx| Body { fixed: fixed && idx == 0, ..Body::default() };
+        let empty = |idx| Body {
+            fixed: fixed && idx == 0,
+            ..Body::default()
+        };
         (0..=self.moved.len()).map(empty).collect()
     }
 
@@ -83,8 +124,8 @@ impl<'a> Assembly<'a> {
         self.bodies[link]
     }
 
-    /// Attaches the bodies that joints move to the first. `names` are those of the links. A body without shapes is left out
-    /// with a warning (W036), or refused if it carries others (W035).
+    /// Attaches the bodies that joints move to the first. `names` are those of the links. A body
+    /// without shapes is left out with a warning (W036), or refused if it carries others (W035).
     pub(crate) fn attach(&self, bodies: Vec<Body>, names: &[&str], reader: &mut Reader) -> Body {
         let mut bodies = bodies.into_iter();
         let mut whole = bodies.next().unwrap_or_default();
@@ -102,14 +143,24 @@ impl<'a> Assembly<'a> {
                         "a link that a joint moves and that carries others needs one",
                     );
                 } else {
-                    reader.warning("W036", moved.node, message, "the model works without the link");
+                    reader.warning(
+                        "W036",
+                        moved.node,
+                        message,
+                        "the model works without the link",
+                    );
                 }
                 parts.push(None);
                 continue;
             }
             let name = free_name(link, &whole.moving);
             parts.push(Some(whole.moving.len()));
-            whole.moving.push(MovingBody { name, body, on: parts[moved.carrier], joint: moved.joint });
+            whole.moving.push(MovingBody {
+                name,
+                body,
+                on: parts[moved.carrier],
+                joint: moved.joint,
+            });
         }
         whole
     }
@@ -117,9 +168,25 @@ impl<'a> Assembly<'a> {
 
 /// Returns a name for a part: letters and digits of that of its link, with a number if it is taken.
 pub(crate) fn free_name(link: &str, taken: &[MovingBody]) -> String {
-    let plain: String = link.chars().map(|letter| if letter.is_ascii_alphanumeric() { letter } else { '_' }).collect();
-    let plain = if plain.is_empty() { "part".to_owned() } else { plain };
+    let plain: String = link
+        .chars()
+        .map(|letter| {
+            if letter.is_ascii_alphanumeric() {
+                letter
+            } else {
+                '_'
+            }
+        })
+        .collect();
+    let plain = if plain.is_empty() {
+        "part".to_owned()
+    } else {
+        plain
+    };
     let is_free = |name: &String| taken.iter().all(|part| part.name != *name);
     let numbered = (2..).map(|number| format!("{plain}_{number}"));
-    std::iter::once(plain.clone()).chain(numbered).find(is_free).unwrap_or_default()
+    std::iter::once(plain.clone())
+        .chain(numbered)
+        .find(is_free)
+        .unwrap_or_default()
 }

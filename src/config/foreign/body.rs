@@ -5,7 +5,9 @@ use std::sync::Arc;
 use nalgebra::{Isometry3, Matrix3, Point3, Translation3, Vector3};
 
 use actcheck_base::names;
-use actcheck_data::{Inertia, MovingPart, ObjectModel, Part, PartJoint, Pose, Shape, Surface, bounds};
+use actcheck_data::{
+    Inertia, MovingPart, ObjectModel, Part, PartJoint, Pose, Shape, Surface, bounds,
+};
 
 /// Density of a body without a mass: that of water, SDF's default. Unit: kg/m³.
 const DENSITY: f64 = 1000.0;
@@ -51,9 +53,14 @@ pub(crate) struct Mass {
 }
 
 impl Body {
-    /// Converts the body to a model: places its origin at `pose`, then moves it so that its middle is above the origin
-    /// and its lowest point at z = 0. The caller sets the category.
-    pub(crate) fn into_model(self, name: &str, digest: String, pose: &Isometry3<f64>) -> ObjectModel {
+    /// Converts the body to a model: places its origin at `pose`, then moves it so that its middle
+    /// is above the origin and its lowest point at z = 0. The caller sets the category.
+    pub(crate) fn into_model(
+        self,
+        name: &str,
+        digest: String,
+        pose: &Isometry3<f64>,
+    ) -> ObjectModel {
         let everything: Vec<Part> = self.all().flat_map(|body| body.placed(pose)).collect();
         let (low, high) = bounds(&everything);
         let foot = Vector3::new((low.x + high.x) / 2.0, (low.y + high.y) / 2.0, low.z);
@@ -72,11 +79,19 @@ impl Body {
             restitution: self.restitution.unwrap_or(0.0),
             origin_m: model_from_file.translation.vector.into(),
             size_m: size.into(),
-            inertia: if is_stated { self.inertia(&model_from_file) } else { None },
+            inertia: if is_stated {
+                self.inertia(&model_from_file)
+            } else {
+                None
+            },
             parts,
             fixed: self.fixed,
             surface,
-            moving: self.moving.into_iter().map(|moving| moving.into_part(&model_from_file)).collect(),
+            moving: self
+                .moving
+                .into_iter()
+                .map(|moving| moving.into_part(&model_from_file))
+                .collect(),
             digest,
         }
     }
@@ -94,14 +109,21 @@ impl Body {
         self.parts.iter().map(moved).collect()
     }
 
-    /// Combines the links' inertia tensors about the common centre of mass, by the parallel axis theorem.
+    /// Combines the links' inertia tensors about the common centre of mass, by the parallel axis
+    /// theorem.
     fn inertia(&self, model_from_file: &Isometry3<f64>) -> Option<Inertia> {
         let total: f64 = self.masses.iter().map(|mass| mass.kg).sum();
-        let com = self.masses.iter().map(|mass| mass.com * mass.kg).sum::<Vector3<f64>>() / total;
+        let com = self
+            .masses
+            .iter()
+            .map(|mass| mass.com * mass.kg)
+            .sum::<Vector3<f64>>()
+            / total;
         let mut sum = Matrix3::zeros();
         for mass in &self.masses {
             let arm = mass.com - com;
-            sum += mass.about_com? + (Matrix3::identity() * arm.norm_squared() - arm * arm.transpose()) * mass.kg;
+            sum += mass.about_com?
+                + (Matrix3::identity() * arm.norm_squared() - arm * arm.transpose()) * mass.kg;
         }
         let turn = model_from_file.rotation.to_rotation_matrix();
         let sum = turn.matrix() * sum * turn.matrix().transpose();
@@ -115,8 +137,11 @@ impl Body {
 
 impl MovingBody {
     fn into_part(self, model_from_file: &Isometry3<f64>) -> MovingPart {
-        let model = self.body.into_model(&self.name, String::new(), model_from_file);
-        let part_from_model = Translation3::from(Vector3::from(model.origin_m) - model_from_file.translation.vector);
+        let model = self
+            .body
+            .into_model(&self.name, String::new(), model_from_file);
+        let part_from_model =
+            Translation3::from(Vector3::from(model.origin_m) - model_from_file.translation.vector);
         let axis = model_from_file.rotation * Vector3::from(self.joint.axis);
         let anchor = model_from_file * Point3::from(self.joint.anchor_m);
         MovingPart {
@@ -124,27 +149,37 @@ impl MovingBody {
             model: Arc::new(model),
             pose: Pose::from_isometry(&part_from_model.inverse().into()),
             on: self.on,
-            joint: PartJoint { axis: axis.into(), anchor_m: anchor.coords.into(), ..self.joint },
+            joint: PartJoint {
+                axis: axis.into(),
+                anchor_m: anchor.coords.into(),
+                ..self.joint
+            },
         }
     }
 }
 
-/// Whether an inertia tensor is physically possible: principal moments are positive, and none exceeds the sum of the
-/// other two.
+/// Whether an inertia tensor is physically possible: principal moments are positive, and none
+/// exceeds the sum of the other two.
 pub(crate) fn is_possible(moments: &Matrix3<f64>) -> bool {
     let principal = moments.symmetric_eigenvalues();
     let (sum, most) = (principal.sum(), principal.max());
-    // The largest moment of a flat body equals the sum of the others; the tolerance allows for rounded numbers.
+    // The largest moment of a flat body equals the sum of the others; the tolerance allows for
+    // rounded numbers.
     principal.min() > 0.0 && most <= 1.02 * (sum - most)
 }
 
-/// Returns the largest level rectangle on top, centred on the origin; `None` if all are too small to hold objects.
+/// Returns the largest level rectangle on top, centred on the origin; `None` if all are too small
+/// to hold objects.
 fn surface(parts: &[Part], top_m: f64) -> Option<Surface> {
     let rectangles = parts.iter().filter_map(|part| top_rectangle(part, top_m));
     let centred = rectangles.map(|(low, high)| [0, 1].map(|axis| 2.0 * high[axis].min(-low[axis])));
-    let wide = centred.filter(|size: &[f64; 2]| size.iter().all(|extent| *extent >= SMALLEST_SURFACE_M));
+    let wide =
+        centred.filter(|size: &[f64; 2]| size.iter().all(|extent| *extent >= SMALLEST_SURFACE_M));
     let largest = wide.max_by(|a, b| (a[0] * a[1]).total_cmp(&(b[0] * b[1])))?;
-    Some(Surface { height_m: top_m, size_m: largest })
+    Some(Surface {
+        height_m: top_m,
+        size_m: largest,
+    })
 }
 
 /// Returns the axis-aligned rectangle of a part's level top: lowest and highest x and y.
@@ -160,7 +195,10 @@ fn top_rectangle(part: &Part, top_m: f64) -> Option<([f64; 2], [f64; 2])> {
         Shape::Box { .. } => {
             // Each of its axes is parallel to one of the model's.
             let is_straight = |axis: Vector3<f64>| (at.rotation * axis).abs().max() > 0.999;
-            [Vector3::x(), Vector3::y(), Vector3::z()].into_iter().all(is_straight).then_some(whole)
+            [Vector3::x(), Vector3::y(), Vector3::z()]
+                .into_iter()
+                .all(is_straight)
+                .then_some(whole)
         }
         Shape::Cylinder { radius, .. } if is_upright(Vector3::z()) => {
             // The largest square inside the disc.
@@ -169,7 +207,9 @@ fn top_rectangle(part: &Part, top_m: f64) -> Option<([f64; 2], [f64; 2])> {
             Some(([x - half, y - half], [x + half, y + half]))
         }
         Shape::Mesh { mesh } => {
-            let top = mesh.top(top_m, TOP_DEPTH_M, |point| (at * Point3::from(*point)).coords);
+            let top = mesh.top(top_m, TOP_DEPTH_M, |point| {
+                (at * Point3::from(*point)).coords
+            });
             let around = (top.high[0] - top.low[0]) * (top.high[1] - top.low[1]);
             (top.area > 0.0 && top.area >= FULL * around).then_some((top.low, top.high))
         }

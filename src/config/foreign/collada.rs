@@ -12,7 +12,8 @@ use crate::foreign::xml::{self, Node};
 use actcheck_base::{Diagnostic, Diagnostics, Source};
 use actcheck_data::Mesh;
 
-/// Limits on the depth and the number of nodes; only nodes that instance each other in a cycle exceed them.
+/// Limits on the depth and the number of nodes; only nodes that instance each other in a cycle
+/// exceed them.
 const DEEPEST: usize = 64;
 const MOST_NODES: usize = 100_000;
 
@@ -31,21 +32,34 @@ pub(crate) fn read(source: &Source, warnings: &mut Diagnostics) -> Result<Mesh, 
     let document = xml::parse(source, &source.text)?;
     let root = document.root_element();
     let fault = |node: Node, reason: String| -> Diagnostics {
-        Diagnostic::error("W037", format!("the mesh {} is unusable: {reason}", source.name))
-            .at(source, xml::span(node))
-            .help("export it again, as triangles, to dae, stl or obj")
-            .into()
+        Diagnostic::error(
+            "W037",
+            format!("the mesh {} is unusable: {reason}", source.name),
+        )
+        .at(source, xml::span(node))
+        .help("export it again, as triangles, to dae, stl or obj")
+        .into()
     };
     if root.tag_name().name() != "COLLADA" {
-        return Err(fault(root, format!("its root is `<{}>` instead of `<COLLADA>`", root.tag_name().name())));
+        return Err(fault(
+            root,
+            format!(
+                "its root is `<{}>` instead of `<COLLADA>`",
+                root.tag_name().name()
+            ),
+        ));
     }
     let mut gathering = Gathering::new(root);
-    gathering.scene().map_err(|(node, reason)| fault(node, reason))?;
+    gathering
+        .scene()
+        .map_err(|(node, reason)| fault(node, reason))?;
     if let Some(up) = xml::child(root, "asset").and_then(|asset| xml::child(asset, "up_axis"))
         && xml::text(up) != "Z_UP"
     {
-        let message =
-            format!("the mesh's up axis, {}, is ignored, as in Gazebo: coordinates are used unchanged", xml::text(up));
+        let message = format!(
+            "the mesh's up axis, {}, is ignored, as in Gazebo: coordinates are used unchanged",
+            xml::text(up)
+        );
         warnings.push(
             Diagnostic::warning("W036", message)
                 .at(source, xml::span(up))
@@ -53,7 +67,11 @@ pub(crate) fn read(source: &Source, warnings: &mut Diagnostics) -> Result<Mesh, 
         );
     }
     let unit = unit(root);
-    let vertices = gathering.vertices.iter().map(|vertex| vertex.map(|x| x * unit)).collect();
+    let vertices = gathering
+        .vertices
+        .iter()
+        .map(|vertex| vertex.map(|x| x * unit))
+        .collect();
     checked(vertices, gathering.triangles).map_err(|reason| fault(root, reason))
 }
 
@@ -61,13 +79,16 @@ pub(crate) fn read(source: &Source, warnings: &mut Diagnostics) -> Result<Mesh, 
 fn unit(root: Node) -> f64 {
     let written = xml::child(root, "asset").and_then(|asset| xml::child(asset, "unit"));
     let metres = written.and_then(|unit| unit.attribute("meter")?.trim().parse().ok());
-    metres.filter(|metres: &f64| metres.is_finite() && *metres > 0.0).unwrap_or(1.0)
+    metres
+        .filter(|metres: &f64| metres.is_finite() && *metres > 0.0)
+        .unwrap_or(1.0)
 }
 
 /// A faulty element and the reason.
 type Fault<'a> = (Node<'a>, String);
 
-/// A geometry in its own frame: its positions, and its triangles as indices of them. Unit: the file's.
+/// A geometry in its own frame: its positions, and its triangles as indices of them. Unit: the
+/// file's.
 struct Geometry {
     positions: Vec<Point3<f64>>,
     triangles: Vec<[usize; 3]>,
@@ -94,22 +115,43 @@ impl<'a> Gathering<'a> {
                 by_id.entry((node.tag_name().name(), id)).or_insert(node);
             }
         }
-        Self { root, by_id, known: BTreeMap::new(), vertices: Vec::new(), triangles: Vec::new(), depth: 0, n_nodes: 0 }
+        Self {
+            root,
+            by_id,
+            known: BTreeMap::new(),
+            vertices: Vec::new(),
+            triangles: Vec::new(),
+            depth: 0,
+            n_nodes: 0,
+        }
     }
 
-    /// Gathers the scene that the file instances, or else its first scene, or else every geometry without transforms.
+    /// Gathers the scene that the file instances, or else its first scene, or else every geometry
+    /// without transforms.
     fn scene(&mut self) -> Result<(), Fault<'a>> {
-        let named = xml::child(self.root, "scene").and_then(|scene| xml::child(scene, "instance_visual_scene"));
+        let named = xml::child(self.root, "scene")
+            .and_then(|scene| xml::child(scene, "instance_visual_scene"));
         let scene = match named {
             Some(instance) => Some(self.target(instance, "visual_scene")?),
-            None => self.root.descendants().find(|node| node.tag_name().name() == "visual_scene"),
+            None => self
+                .root
+                .descendants()
+                .find(|node| node.tag_name().name() == "visual_scene"),
         };
         let identity = Matrix4::identity();
         match scene {
-            Some(scene) => xml::children(scene, "node").try_for_each(|node| self.node(node, &identity)),
+            Some(scene) => {
+                xml::children(scene, "node").try_for_each(|node| self.node(node, &identity))
+            }
             None => {
-                let geometries = self.root.descendants().filter(|node| node.tag_name().name() == "geometry");
-                geometries.collect::<Vec<_>>().into_iter().try_for_each(|node| self.geometry(node, &identity))
+                let geometries = self
+                    .root
+                    .descendants()
+                    .filter(|node| node.tag_name().name() == "geometry");
+                geometries
+                    .collect::<Vec<_>>()
+                    .into_iter()
+                    .try_for_each(|node| self.geometry(node, &identity))
             }
         }
     }
@@ -117,7 +159,10 @@ impl<'a> Gathering<'a> {
     fn node(&mut self, node: Node<'a>, parent: &Matrix4<f64>) -> Result<(), Fault<'a>> {
         self.n_nodes += 1;
         if self.depth >= DEEPEST || self.n_nodes > MOST_NODES {
-            return Err((node, "its nodes are nested too deeply or instance each other".to_owned()));
+            return Err((
+                node,
+                "its nodes are nested too deeply or instance each other".to_owned(),
+            ));
         }
         self.depth += 1;
         let at = parent * transform(node)?;
@@ -133,7 +178,10 @@ impl<'a> Gathering<'a> {
                     self.geometry(geometry, &at)?;
                 }
                 "instance_controller" => {
-                    return Err((inner, "a surface moved by a skeleton is not supported".to_owned()));
+                    return Err((
+                        inner,
+                        "a surface moved by a skeleton is not supported".to_owned(),
+                    ));
                 }
                 _ => {}
             }
@@ -144,9 +192,15 @@ impl<'a> Gathering<'a> {
 
     /// Finds the element that a `url` or `source` refers to.
     fn target(&self, instance: Node<'a>, kind: &'static str) -> Result<Node<'a>, Fault<'a>> {
-        let url = instance.attribute("url").or_else(|| instance.attribute("source")).unwrap_or_default();
+        let url = instance
+            .attribute("url")
+            .or_else(|| instance.attribute("source"))
+            .unwrap_or_default();
         let id = url.trim_start_matches('#');
-        self.by_id.get(&(kind, id)).copied().ok_or_else(|| (instance, format!("there is no `<{kind} id=\"{id}\">`")))
+        self.by_id
+            .get(&(kind, id))
+            .copied()
+            .ok_or_else(|| (instance, format!("there is no `<{kind} id=\"{id}\">`")))
     }
 
     /// Adds a geometry to the scene.
@@ -161,24 +215,40 @@ impl<'a> Gathering<'a> {
         };
         let before = self.vertices.len();
         if before + geometry.positions.len() > MOST_VERTICES {
-            return Err((node, format!("its instances have more than {MOST_VERTICES} vertices")));
+            return Err((
+                node,
+                format!("its instances have more than {MOST_VERTICES} vertices"),
+            ));
         }
         if self.triangles.len() + geometry.triangles.len() > MOST_TRIANGLES {
-            return Err((node, format!("its instances have more than {MOST_TRIANGLES} triangles")));
+            return Err((
+                node,
+                format!("its instances have more than {MOST_TRIANGLES} triangles"),
+            ));
         }
-        let placed = geometry.positions.iter().map(|position| <[f64; 3]>::from(at.transform_point(position).coords));
+        let placed = geometry
+            .positions
+            .iter()
+            .map(|position| <[f64; 3]>::from(at.transform_point(position).coords));
         self.vertices.extend(placed);
         for corners in &geometry.triangles {
             let narrow = corners.map(|corner| u32::try_from(corner + before));
-            let [Ok(a), Ok(b), Ok(c)] = narrow else { return Err((node, "it is too large".to_owned())) };
+            let [Ok(a), Ok(b), Ok(c)] = narrow else {
+                return Err((node, "it is too large".to_owned()));
+            };
             self.triangles.push([a, b, c]);
         }
         Ok(())
     }
 
     fn read_geometry(&self, node: Node<'a>) -> Result<Geometry, Fault<'a>> {
-        let mut geometry = Geometry { positions: Vec::new(), triangles: Vec::new() };
-        let Some(mesh) = xml::child(node, "mesh") else { return Ok(geometry) };
+        let mut geometry = Geometry {
+            positions: Vec::new(),
+            triangles: Vec::new(),
+        };
+        let Some(mesh) = xml::child(node, "mesh") else {
+            return Ok(geometry);
+        };
         for primitive in mesh.children().filter(|child| child.is_element()) {
             // Lines and points have no surface.
             match primitive.tag_name().name() {
@@ -197,24 +267,38 @@ impl<'a> Gathering<'a> {
             return Err((holes, "polygons with holes are not supported".to_owned()));
         }
         let inputs: Vec<Node> = xml::children(primitive, "input").collect();
-        let offsets = inputs.iter().map(|input| offset(*input)).collect::<Result<Vec<usize>, _>>()?;
+        let offsets = inputs
+            .iter()
+            .map(|input| offset(*input))
+            .collect::<Result<Vec<usize>, _>>()?;
         let stride = offsets.iter().max().map_or(1, |last| last + 1);
-        let vertex = inputs.iter().zip(&offsets).find(|(input, _)| input.attribute("semantic") == Some("VERTEX"));
-        let (vertex, offset) = vertex.ok_or_else(|| (primitive, "it has no input VERTEX".to_owned()))?;
+        let vertex = inputs
+            .iter()
+            .zip(&offsets)
+            .find(|(input, _)| input.attribute("semantic") == Some("VERTEX"));
+        let (vertex, offset) =
+            vertex.ok_or_else(|| (primitive, "it has no input VERTEX".to_owned()))?;
         let positions = self.positions(*vertex)?;
         let corners_of = |node: Node<'a>| -> Result<Vec<usize>, Fault<'a>> {
             let indices: Vec<usize> = list(node, "p")?;
-            let corners: Vec<usize> =
-                indices.chunks_exact(stride).filter_map(|all| all.get(*offset).copied()).collect();
+            let corners: Vec<usize> = indices
+                .chunks_exact(stride)
+                .filter_map(|all| all.get(*offset).copied())
+                .collect();
             if corners.iter().any(|corner| *corner >= positions.len()) {
                 return Err((primitive, "it refers to a missing vertex".to_owned()));
             }
             Ok(corners)
         };
-        let lists = xml::children(primitive, "p").map(corners_of).collect::<Result<Vec<_>, _>>()?;
+        let lists = xml::children(primitive, "p")
+            .map(corners_of)
+            .collect::<Result<Vec<_>, _>>()?;
         let before = geometry.positions.len();
         if before + positions.len() > MOST_VERTICES {
-            return Err((primitive, format!("it has more than {MOST_VERTICES} vertices")));
+            return Err((
+                primitive,
+                format!("it has more than {MOST_VERTICES} vertices"),
+            ));
         }
         geometry.positions.extend(positions);
         let pieces = pieces(primitive, &lists)?;
@@ -222,15 +306,21 @@ impl<'a> Gathering<'a> {
         for piece in pieces {
             for (idx, pair) in piece.get(1..).unwrap_or_default().windows(2).enumerate() {
                 if geometry.triangles.len() >= MOST_TRIANGLES {
-                    return Err((primitive, format!("it has more than {MOST_TRIANGLES} triangles")));
+                    return Err((
+                        primitive,
+                        format!("it has more than {MOST_TRIANGLES} triangles"),
+                    ));
                 }
-                // Each triangle of a strip begins with the next corner, and every other one is the other way round.
+                // Each triangle of a strip begins with the next corner, and every other one is the
+                // other way round.
                 let triangle = match is_strip {
                     false => [piece[0], pair[0], pair[1]],
                     true if idx % 2 == 0 => [piece[idx], pair[0], pair[1]],
                     true => [piece[idx], pair[1], pair[0]],
                 };
-                geometry.triangles.push(triangle.map(|corner| corner + before));
+                geometry
+                    .triangles
+                    .push(triangle.map(|corner| corner + before));
             }
         }
         Ok(())
@@ -239,31 +329,46 @@ impl<'a> Gathering<'a> {
     /// Returns the positions of a VERTEX input, from its POSITION source.
     fn positions(&self, input: Node<'a>) -> Result<Vec<Point3<f64>>, Fault<'a>> {
         let vertices = self.target(input, "vertices")?;
-        let position = xml::children(vertices, "input").find(|input| input.attribute("semantic") == Some("POSITION"));
+        let position = xml::children(vertices, "input")
+            .find(|input| input.attribute("semantic") == Some("POSITION"));
         let position = position.ok_or_else(|| (vertices, "it has no input POSITION".to_owned()))?;
         let source = self.target(position, "source")?;
-        let array =
-            xml::child(source, "float_array").ok_or_else(|| (source, "it has no `<float_array>`".to_owned()))?;
-        let accessor = source.descendants().find(|node| node.tag_name().name() == "accessor");
-        let stride = accessor.and_then(|accessor| accessor.attribute("stride")?.parse().ok()).unwrap_or(3_usize);
+        let array = xml::child(source, "float_array")
+            .ok_or_else(|| (source, "it has no `<float_array>`".to_owned()))?;
+        let accessor = source
+            .descendants()
+            .find(|node| node.tag_name().name() == "accessor");
+        let stride = accessor
+            .and_then(|accessor| accessor.attribute("stride")?.parse().ok())
+            .unwrap_or(3_usize);
         let numbers: Vec<f64> = list(array, "float_array")?;
-        let places = numbers.chunks_exact(stride.max(3)).map(|place| Point3::new(place[0], place[1], place[2]));
+        let places = numbers
+            .chunks_exact(stride.max(3))
+            .map(|place| Point3::new(place[0], place[1], place[2]));
         Ok(places.collect())
     }
 }
 
-/// Returns the corners of each polygon, fan or strip of a primitive with these lists `<p>`: one list of all triangles, one of all
-/// polygons with their numbers of corners, or one for each piece.
-fn pieces<'l, 'a>(primitive: Node<'a>, lists: &'l [Vec<usize>]) -> Result<Vec<&'l [usize]>, Fault<'a>> {
+/// Returns the corners of each polygon, fan or strip of a primitive with these lists `<p>`: one
+/// list of all triangles, one of all polygons with their numbers of corners, or one for each piece.
+fn pieces<'l, 'a>(
+    primitive: Node<'a>,
+    lists: &'l [Vec<usize>],
+) -> Result<Vec<&'l [usize]>, Fault<'a>> {
     let kind = primitive.tag_name().name();
     let (true, Some(corners)) = (matches!(kind, "triangles" | "polylist"), lists.first()) else {
         return Ok(lists.iter().map(Vec::as_slice).collect());
     };
-    let Some(counts) = xml::child(primitive, "vcount") else { return Ok(corners.chunks_exact(3).collect()) };
+    let Some(counts) = xml::child(primitive, "vcount") else {
+        return Ok(corners.chunks_exact(3).collect());
+    };
     let (mut pieces, mut rest) = (Vec::new(), corners.as_slice());
     for count in list::<usize>(counts, "vcount")? {
         let Some((piece, behind)) = rest.split_at_checked(count) else {
-            return Err((primitive, "`<vcount>` counts more corners than `<p>` lists".to_owned()));
+            return Err((
+                primitive,
+                "`<vcount>` counts more corners than `<p>` lists".to_owned(),
+            ));
         };
         pieces.push(piece);
         rest = behind;
@@ -273,9 +378,20 @@ fn pieces<'l, 'a>(primitive: Node<'a>, lists: &'l [Vec<usize>]) -> Result<Vec<&'
 
 /// Returns the position of an input among the indices of a corner; 0 if it is not written.
 fn offset(input: Node<'_>) -> Result<usize, Fault<'_>> {
-    let Some(written) = input.attribute("offset") else { return Ok(0) };
-    let offset = written.trim().parse().ok().filter(|offset| *offset <= LARGEST_OFFSET);
-    offset.ok_or_else(|| (input, format!("an `offset` must be a number from 0 to {LARGEST_OFFSET}")))
+    let Some(written) = input.attribute("offset") else {
+        return Ok(0);
+    };
+    let offset = written
+        .trim()
+        .parse()
+        .ok()
+        .filter(|offset| *offset <= LARGEST_OFFSET);
+    offset.ok_or_else(|| {
+        (
+            input,
+            format!("an `offset` must be a number from 0 to {LARGEST_OFFSET}"),
+        )
+    })
 }
 
 /// Returns the product of a node's own transforms, in document order.
@@ -292,7 +408,10 @@ fn transform(node: Node<'_>) -> Result<Matrix4<f64>, Fault<'_>> {
             _ => continue,
         };
         if xml::text(element).len() > LONGEST_TRANSFORM {
-            return Err((element, format!("`<{kind}>` is longer than {LONGEST_TRANSFORM} characters")));
+            return Err((
+                element,
+                format!("`<{kind}>` is longer than {LONGEST_TRANSFORM} characters"),
+            ));
         }
         let numbers: Vec<f64> = list(element, kind)?;
         if numbers.len() != length {
@@ -306,13 +425,20 @@ fn transform(node: Node<'_>) -> Result<Matrix4<f64>, Fault<'_>> {
                 let [eye, target] = [0, 3].map(|at| Point3::from_slice(&numbers[at..at + 3]));
                 let up = Vector3::from_row_slice(&numbers[6..]);
                 if (target - eye).cross(&up).norm() < 1e-9 {
-                    return Err((element, "`<lookat>` must look in a direction other than up".to_owned()));
+                    return Err((
+                        element,
+                        "`<lookat>` must look in a direction other than up".to_owned(),
+                    ));
                 }
                 // A node that looks along its own −z axis.
-                Isometry3::look_at_rh(&eye, &target, &up).inverse().to_homogeneous()
+                Isometry3::look_at_rh(&eye, &target, &up)
+                    .inverse()
+                    .to_homogeneous()
             }
             _ => match Unit::try_new(Vector3::from_row_slice(&numbers[..3]), 1e-9) {
-                Some(axis) => Rotation3::from_axis_angle(&axis, numbers[3].to_radians()).to_homogeneous(),
+                Some(axis) => {
+                    Rotation3::from_axis_angle(&axis, numbers[3].to_radians()).to_homogeneous()
+                }
                 None => Matrix4::identity(),
             },
         };
@@ -324,7 +450,14 @@ fn transform(node: Node<'_>) -> Result<Matrix4<f64>, Fault<'_>> {
 fn list<'a, T: std::str::FromStr>(node: Node<'a>, what: &str) -> Result<Vec<T>, Fault<'a>> {
     let words = xml::text(node).split_whitespace();
     words
-        .map(|word| word.parse().map_err(|_| (node, format!("`<{what}>` contains `{word}`, which is not a number"))))
+        .map(|word| {
+            word.parse().map_err(|_| {
+                (
+                    node,
+                    format!("`<{what}>` contains `{word}`, which is not a number"),
+                )
+            })
+        })
         .collect()
 }
 
@@ -351,7 +484,12 @@ mod tests {
             let source = Source::new("square.dae".to_owned(), text);
             let mesh = read(&source, &mut Diagnostics::new()).map_err(|found| found.to_string())?;
             let corner = |idx: u32| mesh.vertices[idx as usize];
-            Ok::<_, String>(mesh.triangles.iter().map(|triangle| triangle.map(corner)).collect::<Vec<_>>())
+            Ok::<_, String>(
+                mesh.triangles
+                    .iter()
+                    .map(|triangle| triangle.map(corner))
+                    .collect::<Vec<_>>(),
+            )
         };
         let squares = [
             "<triangles>INPUT<p>0 0 1 0 2 0 0 0 2 0 3 0</p></triangles>",
@@ -370,7 +508,10 @@ mod tests {
             }
         }
         let holes = "<polygons>INPUT<ph><p>0 0 1 0 2 0 3 0</p><h>0 0 1 0 2 0</h></ph></polygons>";
-        assert!(read_as(holes).is_err_and(|said| said.contains("polygons with holes are not supported")));
+        assert!(
+            read_as(holes)
+                .is_err_and(|said| said.contains("polygons with holes are not supported"))
+        );
     }
 
     #[test]
@@ -383,10 +524,16 @@ mod tests {
         };
         // From (1, 2, 3) along +y, with +z above.
         let view = "<lookat>1 2 3 1 5 3 0 0 1</lookat>";
-        for (point, expected) in [([0.0, 0.0, -1.0], [1.0, 3.0, 3.0]), ([0.0, 1.0, 0.0], [1.0, 2.0, 4.0])] {
+        for (point, expected) in [
+            ([0.0, 0.0, -1.0], [1.0, 3.0, 3.0]),
+            ([0.0, 1.0, 0.0], [1.0, 2.0, 4.0]),
+        ] {
             let found = moved(view, point).expect("it looks somewhere");
             assert!((found - Vector3::from(expected)).norm() < 1e-9, "{found}");
         }
-        assert!(moved("<lookat>1 2 3 1 2 5 0 0 1</lookat>", [0.0; 3]).is_err(), "it looks up");
+        assert!(
+            moved("<lookat>1 2 3 1 2 5 0 0 1</lookat>", [0.0; 3]).is_err(),
+            "it looks up"
+        );
     }
 }

@@ -18,25 +18,33 @@ use actcheck_data::ObjectModel;
 /// A model found in a folder.
 #[derive(Debug, Clone)]
 pub(crate) struct Found {
-    /// Name in configurations: the folder's, or that of the URDF or MJCF file without its extension.
+    /// Name in configurations: the folder's, or that of the URDF or MJCF file without its
+    /// extension.
     pub(crate) name: String,
     /// Path of its `model.config`, SDF, URDF or MJCF file.
     pub(crate) path: PathBuf,
 }
 
-/// Finds the models of a folder, sorted by name: `NAME/model.config`, `NAME/model.sdf`, `NAME/model.urdf`, `NAME.urdf`, and of
-/// MJCF `NAME/NAME.xml`, `NAME/model.xml`, `NAME.xml`.
+/// Finds the models of a folder, sorted by name: `NAME/model.config`, `NAME/model.sdf`,
+/// `NAME/model.urdf`, `NAME.urdf`, and of MJCF `NAME/NAME.xml`, `NAME/model.xml`, `NAME.xml`.
 pub(crate) fn find(files: &Files, folder: &Path) -> Vec<Found> {
     let mut found: Vec<Found> = Vec::new();
     for model in files.folders(folder) {
         if let (Some(path), Some(name)) = (model_file(files, &model), model.file_name()) {
-            found.push(Found { name: name.to_string_lossy().into_owned(), path });
+            found.push(Found {
+                name: name.to_string_lossy().into_owned(),
+                path,
+            });
         }
     }
     for path in files.list(folder) {
-        let is_model = path.extension().is_some_and(|ending| ending == "urdf") || is_mjcf(files, &path);
+        let is_model =
+            path.extension().is_some_and(|ending| ending == "urdf") || is_mjcf(files, &path);
         if let (true, Some(stem)) = (is_model, path.file_stem()) {
-            found.push(Found { name: stem.to_string_lossy().into_owned(), path: path.clone() });
+            found.push(Found {
+                name: stem.to_string_lossy().into_owned(),
+                path: path.clone(),
+            });
         }
     }
     found.sort_by(|a, b| a.name.cmp(&b.name));
@@ -55,15 +63,24 @@ pub(crate) struct Read {
 /// Reads a model.
 ///
 /// # Errors
-/// All faults of its files: an unreadable file (W030), text that is not XML (W031) or not a model (W032), a missing
-/// element (W033), an invalid value (W034), an element that can't be simulated (W035), an unusable mesh (W037), no
-/// solid shape (W038), or an included model that is missing or has faults (W040).
+/// All faults of its files: an unreadable file (W030), text that is not XML (W031) or not a model
+/// (W032), a missing element (W033), an invalid value (W034), an element that can't be simulated
+/// (W035), an unusable mesh (W037), no solid shape (W038), or an included model that is missing or
+/// has faults (W040).
 pub(crate) fn read(found: &Found, lookup: &Lookup) -> Result<Read, Diagnostics> {
     let (sdf, warnings) = read_sdf_model(found, lookup, Role::Object, 0)?;
     let turn = sdf.body.turn_of_footprint(&sdf.pose);
-    let pose = if turn == 0.0 { sdf.pose } else { turned(turn) * sdf.pose };
+    let pose = if turn == 0.0 {
+        sdf.pose
+    } else {
+        turned(turn) * sdf.pose
+    };
     let has_pose = pose != Isometry3::identity();
-    Ok(Read { model: sdf.body.into_model(&found.name, sdf.digest, &pose), has_pose, warnings })
+    Ok(Read {
+        model: sdf.body.into_model(&found.name, sdf.digest, &pose),
+        has_pose,
+        warnings,
+    })
 }
 
 /// Reads a model that `depth` others include, as a body. Also returns warnings.
@@ -80,35 +97,53 @@ fn read_sdf_model(
         Some("model.config") => sdf_path(&found.path, lookup.files)?,
         _ => found.path.clone(),
     };
-    let source = lookup.files.read(&path).map_err(|reason| unreadable(&path, &reason))?;
+    let source = lookup
+        .files
+        .read(&path)
+        .map_err(|reason| unreadable(&path, &reason))?;
     let (model, said) = match path.extension().and_then(|ending| ending.to_str()) {
         Some("urdf") => urdf::read(&source, &path, lookup, &Materials::default()),
         Some("xml") if is_mjcf(lookup.files, &path) => {
             let (urdf, materials) = mjcf::object(&source, &path, lookup.files)?;
             let (model, said) = urdf::read(&urdf, &path, lookup, &materials);
-            (model, said.into_iter().map(|fault| if fault.code == "W038" { unseen(&source) } else { fault }).collect())
+            (
+                model,
+                said.into_iter()
+                    .map(|fault| {
+                        if fault.code == "W038" {
+                            unseen(&source)
+                        } else {
+                            fault
+                        }
+                    })
+                    .collect(),
+            )
         }
         _ => sdf::read(&source, &path, lookup, role, depth),
     };
     model.map(|model| (model, said.clone())).ok_or(said)
 }
 
-/// Returns the name of the model that a URI means: the path in a model folder, or the last part of a web address.
+/// Returns the name of the model that a URI means: the path in a model folder, or the last part of
+/// a web address.
 pub(crate) fn name_in(uri: &str) -> String {
     let path = uri.trim_end_matches('/');
     match path.split_once("://") {
         Some(("model" | "package", path)) => path.to_owned(),
         Some(("http" | "https", address)) => {
             // Fuel's addresses end in `models/NAME` or `models/NAME/VERSION`.
-            let name = address.split_once("/models/").map_or(address, |(_, name)| name);
+            let name = address
+                .split_once("/models/")
+                .map_or(address, |(_, name)| name);
             name.split('/').next().unwrap_or(name).to_owned()
         }
         _ => path.to_owned(),
     }
 }
 
-/// Reads the model that the `<uri>` of an `<include>` names, which `depth` others include. `known` are the names that the
-/// user may have meant. Reports W040 and returns `None` if the model is missing or has faults.
+/// Reads the model that the `<uri>` of an `<include>` names, which `depth` others include. `known`
+/// are the names that the user may have meant. Reports W040 and returns `None` if the model is
+/// missing or has faults.
 pub(crate) fn included<'a>(
     uri: Node,
     lookup: &Lookup,
@@ -131,35 +166,65 @@ pub(crate) fn included<'a>(
     match read_sdf_model(&found, lookup, role, depth) {
         Ok((model, _)) => Some(model),
         Err(faults) => {
-            let first = faults.iter().find(|fault| fault.severity == Severity::Error);
+            let first = faults
+                .iter()
+                .find(|fault| fault.severity == Severity::Error);
             let reason = first.map_or("", |fault| fault.message.as_str());
             let message = format!("the model `{name}` can't be used: {reason}");
-            reader.error("W040", uri, message, "mend that model, or remove the `<include>`");
+            reader.error(
+                "W040",
+                uri,
+                message,
+                "mend that model, or remove the `<include>`",
+            );
             None
         }
     }
 }
 
-/// Finds a model by its path in the folders. Names of web addresses may differ from folders in case and spaces.
+/// Finds a model by its path in the folders. Names of web addresses may differ from folders in case
+/// and spaces.
 fn named(name: &str, lookup: &Lookup) -> Option<Found> {
     let folder_name = name.to_lowercase().replace(' ', "_");
-    let places = lookup.folders.iter().flat_map(|folder| [folder.join(name), folder.join(&folder_name)]);
-    places.filter_map(|place| Some(Found { name: name.to_owned(), path: model_file(lookup.files, &place)? })).next()
+    let places = lookup
+        .folders
+        .iter()
+        .flat_map(|folder| [folder.join(name), folder.join(&folder_name)]);
+    places
+        .filter_map(|place| {
+            Some(Found {
+                name: name.to_owned(),
+                path: model_file(lookup.files, &place)?,
+            })
+        })
+        .next()
 }
 
 /// Returns the file of a model's folder that names or is the model.
 fn model_file(files: &Files, folder: &Path) -> Option<PathBuf> {
     let inside = files.list(folder);
     let known = ["model.config", "model.sdf", "model.urdf"].map(|file| folder.join(file));
-    let of_name = folder.file_name().map(|name| folder.join(name).with_added_extension("xml"));
-    let in_mjcf = of_name.into_iter().chain([folder.join("model.xml")]).filter(|path| is_mjcf(files, path));
-    known.into_iter().chain(in_mjcf).find(|path| inside.contains(path))
+    let of_name = folder
+        .file_name()
+        .map(|name| folder.join(name).with_added_extension("xml"));
+    let in_mjcf = of_name
+        .into_iter()
+        .chain([folder.join("model.xml")])
+        .filter(|path| is_mjcf(files, path));
+    known
+        .into_iter()
+        .chain(in_mjcf)
+        .find(|path| inside.contains(path))
 }
 
-/// Whether a file is MJCF: XML whose root is `<mujoco>`. A URDF may have such an element, too, but not as its root.
+/// Whether a file is MJCF: XML whose root is `<mujoco>`. A URDF may have such an element, too, but
+/// not as its root.
 fn is_mjcf(files: &Files, path: &Path) -> bool {
     let is_xml = path.extension().is_some_and(|ending| ending == "xml");
-    is_xml && files.read_bytes(path).is_ok_and(|bytes| begins_with_mujoco(&String::from_utf8_lossy(&bytes)))
+    is_xml
+        && files
+            .read_bytes(path)
+            .is_ok_and(|bytes| begins_with_mujoco(&String::from_utf8_lossy(&bytes)))
 }
 
 /// Whether the first element of a text is `<mujoco>`.
@@ -181,38 +246,64 @@ fn begins_with_mujoco(text: &str) -> bool {
 
 /// W038 in terms of MJCF.
 fn unseen(source: &Source) -> Diagnostic {
-    Diagnostic::error("W038", "the object has no solid shape: none of its geoms collides")
-        .at(source, 0..0)
-        .help("set `contype` and `conaffinity` of a geom to 1; a geom for which both are 0 is only seen")
+    Diagnostic::error(
+        "W038",
+        "the object has no solid shape: none of its geoms collides",
+    )
+    .at(source, 0..0)
+    .help(
+        "set `contype` and `conaffinity` of a geom to 1; a geom for which both are 0 is only seen",
+    )
 }
 
 fn unreadable(path: &Path, reason: &str) -> Diagnostic {
-    Diagnostic::error("W030", format!("cannot read the model {}: {reason}", path.display()))
-        .help("a model is a folder with `model.config` and the SDF file that it names, or a URDF file")
+    Diagnostic::error(
+        "W030",
+        format!("cannot read the model {}: {reason}", path.display()),
+    )
+    .help("a model is a folder with `model.config` and the SDF file that it names, or a URDF file")
 }
 
-/// Returns the SDF file named by a `model.config`; if there are several, that of the newest version.
+/// Returns the SDF file named by a `model.config`; if there are several, that of the newest
+/// version.
 fn sdf_path(config: &Path, files: &Files) -> Result<PathBuf, Diagnostics> {
-    let source = files.read(config).map_err(|reason| unreadable(config, &reason))?;
+    let source = files
+        .read(config)
+        .map_err(|reason| unreadable(config, &reason))?;
     let text = repaired(&source.text);
     let document = xml::parse(&source, &text)?;
     let mut reader = Reader::new(&source);
     let root = document.root_element();
     let newest = xml::children(root, "sdf").max_by_key(|sdf| {
-        let minor = sdf.attribute("version").and_then(|version| version.strip_prefix("1.")?.parse::<u32>().ok());
+        let minor = sdf
+            .attribute("version")
+            .and_then(|version| version.strip_prefix("1.")?.parse::<u32>().ok());
         minor.unwrap_or(0)
     });
     let Some(named) = newest.filter(|sdf| !xml::text(*sdf).is_empty()) else {
         let message = format!("`<{}>` names no SDF file", root.tag_name().name());
-        reader.error("W033", root, message, "add `<sdf version=\"1.6\">model.sdf</sdf>`");
+        reader.error(
+            "W033",
+            root,
+            message,
+            "add `<sdf version=\"1.6\">model.sdf</sdf>`",
+        );
         return Err(reader.found);
     };
-    let path = config.parent().unwrap_or(Path::new("")).join(xml::text(named));
+    let path = config
+        .parent()
+        .unwrap_or(Path::new(""))
+        .join(xml::text(named));
     match files.read_bytes(&path) {
         Ok(_) => Ok(path),
         Err(reason) => {
             let message = format!("cannot read the model {}: {reason}", path.display());
-            reader.error("W030", named, message, "the path is relative to the folder of `model.config`");
+            reader.error(
+                "W030",
+                named,
+                message,
+                "the path is relative to the folder of `model.config`",
+            );
             Err(reader.found)
         }
     }

@@ -13,8 +13,9 @@ const N_DIRECTIONS: u32 = 180;
 const SMALLER: f64 = 0.95;
 
 impl Body {
-    /// Returns the turn about the vertical after which the sides of the smallest rectangle around the body at `pose` are
-    /// along the axes: 0 for furniture, for bodies with moving parts, and where a turn gains little. Unit: radians.
+    /// Returns the turn about the vertical after which the sides of the smallest rectangle around
+    /// the body at `pose` are along the axes: 0 for furniture, for bodies with moving parts, and
+    /// where a turn gains little. Unit: radians.
     pub(crate) fn turn_of_footprint(&self, pose: &Isometry3<f64>) -> f64 {
         if self.fixed || !self.moving.is_empty() {
             return 0.0;
@@ -30,7 +31,12 @@ impl Body {
                     continue;
                 }
             };
-            points.extend(of_shape.iter().map(|point| at * Point3::from(*point)).map(|at| [at.x, at.y]));
+            points.extend(
+                of_shape
+                    .iter()
+                    .map(|point| at * Point3::from(*point))
+                    .map(|at| [at.x, at.y]),
+            );
         }
         let outline = outline(points);
         let area = |turn: f64| {
@@ -48,30 +54,49 @@ impl Body {
             }
             for (at, part) in &shapes {
                 let pose = Pose::from_isometry(&(by * at));
-                let (lowest, highest) = Part { pose, shape: part.shape.clone() }.bounds();
+                let (lowest, highest) = Part {
+                    pose,
+                    shape: part.shape.clone(),
+                }
+                .bounds();
                 add([lowest[0], lowest[1]], [highest[0], highest[1]]);
             }
             (high[0] - low[0]) * (high[1] - low[1])
         };
-        let turns = (1..N_DIRECTIONS).map(|step| f64::from(step) / f64::from(N_DIRECTIONS) * FRAC_PI_2);
-        let Some(best) = turns.min_by(|a, b| area(*a).total_cmp(&area(*b))) else { return 0.0 };
+        let turns =
+            (1..N_DIRECTIONS).map(|step| f64::from(step) / f64::from(N_DIRECTIONS) * FRAC_PI_2);
+        let Some(best) = turns.min_by(|a, b| area(*a).total_cmp(&area(*b))) else {
+            return 0.0;
+        };
         // The smaller turn of the two that put the sides along the axes.
-        let best = if best > FRAC_PI_2 / 2.0 { best - FRAC_PI_2 } else { best };
-        if area(best) < SMALLER * area(0.0) { best } else { 0.0 }
+        let best = if best > FRAC_PI_2 / 2.0 {
+            best - FRAC_PI_2
+        } else {
+            best
+        };
+        if area(best) < SMALLER * area(0.0) {
+            best
+        } else {
+            0.0
+        }
     }
 }
 
 /// A rotation about the vertical.
 pub(crate) fn turned(by_rad: f64) -> Isometry3<f64> {
-    Isometry3::from_parts(Translation3::identity(), UnitQuaternion::from_axis_angle(&Vector3::z_axis(), by_rad))
+    Isometry3::from_parts(
+        Translation3::identity(),
+        UnitQuaternion::from_axis_angle(&Vector3::z_axis(), by_rad),
+    )
 }
 
 /// The corners of the convex hull of points in a plane, by Andrew's monotone chain.
 fn outline(mut points: Vec<[f64; 2]>) -> Vec<[f64; 2]> {
     points.sort_by(|a, b| a[0].total_cmp(&b[0]).then(a[1].total_cmp(&b[1])));
     points.dedup();
-    let turns_left =
-        |a: &[f64; 2], b: &[f64; 2], c: &[f64; 2]| (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]) > 0.0;
+    let turns_left = |a: &[f64; 2], b: &[f64; 2], c: &[f64; 2]| {
+        (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]) > 0.0
+    };
     let half = |points: &mut dyn Iterator<Item = &[f64; 2]>| {
         let mut chain: Vec<[f64; 2]> = Vec::new();
         for point in points {
@@ -93,8 +118,14 @@ mod tests {
     use super::*;
 
     fn boxes(yaw_rad: f64, size: [f64; 3]) -> Body {
-        let part = Part { pose: Pose::from_isometry(&turned(yaw_rad)), shape: Shape::Box { size } };
-        Body { parts: vec![part], ..Body::default() }
+        let part = Part {
+            pose: Pose::from_isometry(&turned(yaw_rad)),
+            shape: Shape::Box { size },
+        };
+        Body {
+            parts: vec![part],
+            ..Body::default()
+        }
     }
 
     #[test]
@@ -104,15 +135,30 @@ mod tests {
             let turn = boxes(yaw, [0.112, 0.089, 0.036]).turn_of_footprint(&Isometry3::identity());
             assert!((turn + yaw).abs() < 0.005, "{degrees}: {turn}");
         }
-        assert_eq!(boxes(0.0, [0.112, 0.089, 0.036]).turn_of_footprint(&Isometry3::identity()), 0.0);
+        assert_eq!(
+            boxes(0.0, [0.112, 0.089, 0.036]).turn_of_footprint(&Isometry3::identity()),
+            0.0
+        );
     }
 
     #[test]
     fn round_bodies_and_furniture_stay() {
-        let can = Part { pose: Pose::IDENTITY, shape: Shape::Cylinder { radius: 0.03, height: 0.1 } };
-        let can = Body { parts: vec![can], ..Body::default() };
+        let can = Part {
+            pose: Pose::IDENTITY,
+            shape: Shape::Cylinder {
+                radius: 0.03,
+                height: 0.1,
+            },
+        };
+        let can = Body {
+            parts: vec![can],
+            ..Body::default()
+        };
         assert_eq!(can.turn_of_footprint(&Isometry3::identity()), 0.0);
-        let shelf = Body { fixed: true, ..boxes(0.5, [0.3, 0.2, 0.5]) };
+        let shelf = Body {
+            fixed: true,
+            ..boxes(0.5, [0.3, 0.2, 0.5])
+        };
         assert_eq!(shelf.turn_of_footprint(&Isometry3::identity()), 0.0);
     }
 
@@ -127,10 +173,22 @@ mod tests {
         let hull = |yaw: f64| {
             let points: Vec<[f64; 3]> = [-0.05, 0.05]
                 .into_iter()
-                .flat_map(|x| [-0.02, 0.02].map(|y| (turned(yaw) * Point3::new(x, y, 0.0)).coords.into()))
+                .flat_map(|x| {
+                    [-0.02, 0.02].map(|y| (turned(yaw) * Point3::new(x, y, 0.0)).coords.into())
+                })
                 .collect();
-            let part = Part { pose: Pose::IDENTITY, shape: Shape::Hull { points, volume: 1e-5 } };
-            Body { parts: vec![part], ..Body::default() }.turn_of_footprint(&Isometry3::identity())
+            let part = Part {
+                pose: Pose::IDENTITY,
+                shape: Shape::Hull {
+                    points,
+                    volume: 1e-5,
+                },
+            };
+            Body {
+                parts: vec![part],
+                ..Body::default()
+            }
+            .turn_of_footprint(&Isometry3::identity())
         };
         assert!((hull(0.5) + 0.5).abs() < 0.005, "{}", hull(0.5));
     }

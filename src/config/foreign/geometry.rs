@@ -25,10 +25,16 @@ const KINDS: &str = "use a box, cylinder, sphere, capsule, cone, ellipsoid or me
 
 impl<'a> Shapes<'a> {
     pub(crate) fn new(lookup: &'a Lookup<'a>, path: &'a Path) -> Self {
-        Self { lookup, path, digest: Digest::new(), depth: 0 }
+        Self {
+            lookup,
+            path,
+            digest: Digest::new(),
+            depth: 0,
+        }
     }
 
-    /// Reads the shape of an SDF `<geometry>`. Reports a fault and returns `None` if it is empty or invalid.
+    /// Reads the shape of an SDF `<geometry>`. Reports a fault and returns `None` if it is empty or
+    /// invalid.
     pub(crate) fn sdf(&mut self, geometry: Node, reader: &mut Reader) -> Option<Shape> {
         let kind = kind_of(geometry, reader)?;
         if kind.tag_name().name() == "mesh" {
@@ -41,10 +47,18 @@ impl<'a> Shapes<'a> {
     }
 
     fn sdf_mesh(&mut self, mesh: Node, reader: &mut Reader) -> Option<Shape> {
-        reader.warn_about_unknown_children(mesh, &["uri", "scale", "submesh", "convex_decomposition"]);
+        reader.warn_about_unknown_children(
+            mesh,
+            &["uri", "scale", "submesh", "convex_decomposition"],
+        );
         if let Some(submesh) = xml::child(mesh, "submesh") {
             let message = "`<submesh>` is not supported".to_owned();
-            reader.error("W035", submesh, message, "export that part of the mesh to its own file");
+            reader.error(
+                "W035",
+                submesh,
+                message,
+                "export that part of the mesh to its own file",
+            );
         }
         let uri = reader.required(mesh, "uri")?;
         let scale = match xml::child(mesh, "scale") {
@@ -58,7 +72,9 @@ impl<'a> Shapes<'a> {
     pub(crate) fn urdf(&mut self, geometry: Node, reader: &mut Reader) -> Option<Shape> {
         let kind = kind_of(geometry, reader)?;
         if kind.tag_name().name() != "mesh" {
-            return primitive(kind, reader, |name, reader| Some((kind, reader.attribute(kind, name)?)));
+            return primitive(kind, reader, |name, reader| {
+                Some((kind, reader.attribute(kind, name)?))
+            });
         }
         let uri = reader.attribute(kind, "filename")?;
         let scale = match kind.attribute("scale") {
@@ -68,9 +84,20 @@ impl<'a> Shapes<'a> {
         self.mesh(kind, uri, scale, reader)
     }
 
-    pub(crate) fn mesh(&mut self, node: Node, uri: &str, scale: [f64; 3], reader: &mut Reader) -> Option<Shape> {
+    pub(crate) fn mesh(
+        &mut self,
+        node: Node,
+        uri: &str,
+        scale: [f64; 3],
+        reader: &mut Reader,
+    ) -> Option<Shape> {
         if scale.contains(&0.0) {
-            reader.error("W034", node, "the mesh's scale must not be 0".to_owned(), "write 1 for the file's own size");
+            reader.error(
+                "W034",
+                node,
+                "the mesh's scale must not be 0".to_owned(),
+                "write 1 for the file's own size",
+            );
             return None;
         }
         match self.mesh_file(uri) {
@@ -78,19 +105,35 @@ impl<'a> Shapes<'a> {
                 self.digest.update(&file.bytes);
                 reader.found.extend(file.warnings);
                 let mesh = file.mesh.scaled(scale);
-                let longest = mesh.vertices.iter().flatten().fold(0.0_f64, |most, along| most.max(along.abs()));
+                let longest = mesh
+                    .vertices
+                    .iter()
+                    .flatten()
+                    .fold(0.0_f64, |most, along| most.max(along.abs()));
                 if longest > xml::LONGEST {
-                    let message =
-                        format!("the mesh reaches {longest:.0} m from its origin, which is beyond {} m", xml::LONGEST);
-                    reader.error("W034", node, message, "lengths are in metres: write `scale` 0.001 for millimetres");
+                    let message = format!(
+                        "the mesh reaches {longest:.0} m from its origin, which is beyond {} m",
+                        xml::LONGEST
+                    );
+                    reader.error(
+                        "W034",
+                        node,
+                        message,
+                        "lengths are in metres: write `scale` 0.001 for millimetres",
+                    );
                     return None;
                 }
                 // With the backs of its faces, a mesh has no volume.
-                let mesh = if mesh.volume() > LEAST_VOLUME { mesh } else { mesh.one_sided() };
+                let mesh = if mesh.volume() > LEAST_VOLUME {
+                    mesh
+                } else {
+                    mesh.one_sided()
+                };
                 Some(Shape::Mesh { mesh })
             }
             Err(faults) => {
-                // A fault without a source, as of a binary mesh file, is reported where the file is named.
+                // A fault without a source, as of a binary mesh file, is reported where the file is
+                // named.
                 let placed = |fault: Diagnostic| match fault.source {
                     None => fault.at(reader.source, xml::span(node)),
                     Some(_) => fault,
@@ -104,7 +147,8 @@ impl<'a> Shapes<'a> {
 
     fn mesh_file(&self, uri: &str) -> Result<mesh_file::MeshFile, Diagnostics> {
         let path = self.lookup.resolve(uri, self.path).map_err(|reason| {
-            Diagnostic::error("W037", format!("cannot find the mesh `{uri}`: {reason}")).help(mesh_file::HOW_TO_NAME)
+            Diagnostic::error("W037", format!("cannot find the mesh `{uri}`: {reason}"))
+                .help(mesh_file::HOW_TO_NAME)
         })?;
         mesh_file::read(self.lookup.files, &path)
     }
@@ -119,7 +163,8 @@ fn kind_of<'n>(geometry: Node<'n>, reader: &mut Reader) -> Option<Node<'n>> {
     kind
 }
 
-/// Reads a primitive shape. `written` finds its parameters by name: elements in SDF, attributes in URDF.
+/// Reads a primitive shape. `written` finds its parameters by name: elements in SDF, attributes in
+/// URDF.
 fn primitive<'n>(
     kind: Node<'n>,
     reader: &mut Reader,
@@ -127,32 +172,53 @@ fn primitive<'n>(
 ) -> Option<Shape> {
     let number = |reader: &mut Reader, name: &str| {
         let (node, text) = written(name, reader)?;
-        reader.numbers::<1>(node, text, Bound::Length).map(|[number]| number)
+        reader
+            .numbers::<1>(node, text, Bound::Length)
+            .map(|[number]| number)
     };
     match kind.tag_name().name() {
         "box" => {
             let (node, text) = written("size", reader)?;
-            Some(Shape::Box { size: reader.numbers(node, text, Bound::Length)? })
+            Some(Shape::Box {
+                size: reader.numbers(node, text, Bound::Length)?,
+            })
         }
         "cylinder" => {
             let (radius, length) = (number(reader, "radius"), number(reader, "length"));
-            Some(Shape::Cylinder { radius: radius?, height: length? })
+            Some(Shape::Cylinder {
+                radius: radius?,
+                height: length?,
+            })
         }
         "capsule" => {
             let (radius, length) = (number(reader, "radius"), number(reader, "length"));
-            Some(Shape::Capsule { radius: radius?, height: length? })
+            Some(Shape::Capsule {
+                radius: radius?,
+                height: length?,
+            })
         }
-        "sphere" => Some(Shape::Sphere { radius: number(reader, "radius")? }),
+        "sphere" => Some(Shape::Sphere {
+            radius: number(reader, "radius")?,
+        }),
         "ellipsoid" => {
             let (node, text) = written("radii", reader)?;
-            Some(Shape::Mesh { mesh: ellipsoid(reader.numbers(node, text, Bound::Length)?)? })
+            Some(Shape::Mesh {
+                mesh: ellipsoid(reader.numbers(node, text, Bound::Length)?)?,
+            })
         }
         "cone" => {
             let (radius, length) = (number(reader, "radius"), number(reader, "length"));
-            Some(Shape::Mesh { mesh: cone(radius?, length?)? })
+            Some(Shape::Mesh {
+                mesh: cone(radius?, length?)?,
+            })
         }
         other => {
-            reader.error("W035", kind, format!("the geometry `<{other}>` can't be simulated"), KINDS);
+            reader.error(
+                "W035",
+                kind,
+                format!("the geometry `<{other}>` can't be simulated"),
+                KINDS,
+            );
             None
         }
     }
@@ -169,7 +235,8 @@ fn cone(radius: f64, length: f64) -> Option<Mesh> {
         [radius * x, radius * y, -length / 2.0]
     }));
     let on = |step: u32| 2 + step % AROUND;
-    let triangles = (0..AROUND).flat_map(|step| [[0, on(step), on(step + 1)], [1, on(step + 1), on(step)]]);
+    let triangles =
+        (0..AROUND).flat_map(|step| [[0, on(step), on(step + 1)], [1, on(step + 1), on(step)]]);
     Mesh::new(vertices, triangles.collect()).ok()
 }
 
@@ -179,7 +246,8 @@ fn around(step: u32) -> [f64; 2] {
     [libm::cos(angle), libm::sin(angle)]
 }
 
-/// Returns an ellipsoid as a mesh whose vertices are on it, and which has 97 % of its volume. Unit: metres.
+/// Returns an ellipsoid as a mesh whose vertices are on it, and which has 97 % of its volume. Unit:
+/// metres.
 fn ellipsoid(radii: [f64; 3]) -> Option<Mesh> {
     let rings = AROUND / 2;
     let mut vertices = vec![[0.0, 0.0, 1.0], [0.0, 0.0, -1.0]];
@@ -196,11 +264,18 @@ fn ellipsoid(radii: [f64; 3]) -> Option<Mesh> {
         triangles.push([0, on(1, step), on(1, step + 1)]);
         triangles.push([1, on(rings - 1, step + 1), on(rings - 1, step)]);
         for ring in 1..rings - 1 {
-            let [a, b, c, d] = [on(ring, step), on(ring, step + 1), on(ring + 1, step), on(ring + 1, step + 1)];
+            let [a, b, c, d] = [
+                on(ring, step),
+                on(ring, step + 1),
+                on(ring + 1, step),
+                on(ring + 1, step + 1),
+            ];
             triangles.extend([[a, c, b], [b, c, d]]);
         }
     }
-    Mesh::new(vertices, triangles).ok().map(|mesh| mesh.scaled(radii))
+    Mesh::new(vertices, triangles)
+        .ok()
+        .map(|mesh| mesh.scaled(radii))
 }
 
 /// Smallest volume of a collision mesh: that of a cube of 0.1 mm. Unit: cubic metres.
@@ -213,7 +288,12 @@ pub(crate) fn check_volume(shape: &Shape, collision: Node, reader: &mut Reader) 
         return;
     }
     let message = "the mesh has no volume".to_owned();
-    reader.error("W037", collision, message, "a collision mesh must be a closed surface; use a thin box for a sheet");
+    reader.error(
+        "W037",
+        collision,
+        message,
+        "a collision mesh must be a closed surface; use a thin box for a sheet",
+    );
 }
 
 #[cfg(test)]
@@ -224,7 +304,12 @@ mod tests {
     fn meshes_of_primitives_have_their_extents_and_volumes() {
         let extents = |mesh: &Mesh| {
             let along = |axis: usize| mesh.vertices.iter().map(move |vertex| vertex[axis]);
-            [0, 1, 2].map(|axis| (along(axis).fold(f64::MAX, f64::min), along(axis).fold(f64::MIN, f64::max)))
+            [0, 1, 2].map(|axis| {
+                (
+                    along(axis).fold(f64::MAX, f64::min),
+                    along(axis).fold(f64::MIN, f64::max),
+                )
+            })
         };
         let near = |found: [(f64, f64); 3], expected: [(f64, f64); 3]| {
             let is_near = |(found, expected): (&(f64, f64), &(f64, f64))| {
@@ -233,13 +318,23 @@ mod tests {
             found.iter().zip(&expected).all(is_near)
         };
         let ellipsoid = ellipsoid([0.1, 0.05, 0.2]).expect("it is a mesh");
-        assert!(near(extents(&ellipsoid), [(-0.1, 0.1), (-0.05, 0.05), (-0.2, 0.2)]));
+        assert!(near(
+            extents(&ellipsoid),
+            [(-0.1, 0.1), (-0.05, 0.05), (-0.2, 0.2)]
+        ));
         let share = ellipsoid.volume() / (4.0 / 3.0 * PI * 0.1 * 0.05 * 0.2);
         assert!((0.965..1.0).contains(&share), "{share}");
         let cone = cone(0.1, 0.3).expect("it is a mesh");
-        assert!(near(extents(&cone), [(-0.1, 0.1), (-0.1, 0.1), (-0.15, 0.15)]));
+        assert!(near(
+            extents(&cone),
+            [(-0.1, 0.1), (-0.1, 0.1), (-0.15, 0.15)]
+        ));
         // The area of a regular polygon with 24 corners.
         let base = 12.0 * 0.1 * 0.1 * libm::sin(2.0 * PI / 24.0);
-        assert!((cone.volume() - base * 0.3 / 3.0).abs() < 1e-9, "{}", cone.volume());
+        assert!(
+            (cone.volume() - base * 0.3 / 3.0).abs() < 1e-9,
+            "{}",
+            cone.volume()
+        );
     }
 }

@@ -19,17 +19,29 @@ impl Lookup<'_> {
         let beside = file.parent().unwrap_or(Path::new(""));
         match uri.split_once("://") {
             None => {
-                // PyBullet's models write paths from the folder of the file as if they were absolute.
+                // PyBullet's models write paths from the folder of the file as if they were
+                // absolute.
                 let inside = beside.join(uri.trim_start_matches('/'));
-                let is_elsewhere = uri.starts_with('/') && !self.exists(Path::new(uri)) && self.exists(&inside);
-                Ok(if is_elsewhere { inside } else { self.find_end(uri).unwrap_or_else(|| beside.join(uri)) })
+                let is_elsewhere =
+                    uri.starts_with('/') && !self.exists(Path::new(uri)) && self.exists(&inside);
+                Ok(if is_elsewhere {
+                    inside
+                } else {
+                    self.find_end(uri).unwrap_or_else(|| beside.join(uri))
+                })
             }
             Some(("file", path)) => {
-                let found = self.find_beside(Path::new(path)).or_else(|| self.find_end(path));
+                let found = self
+                    .find_beside(Path::new(path))
+                    .or_else(|| self.find_end(path));
                 Ok(found.unwrap_or_else(|| PathBuf::from(path)))
             }
             Some(("model" | "package", path)) => self.find(path).ok_or_else(|| {
-                let folders: Vec<String> = self.folders.iter().map(|folder| folder.display().to_string()).collect();
+                let folders: Vec<String> = self
+                    .folders
+                    .iter()
+                    .map(|folder| folder.display().to_string())
+                    .collect();
                 format!("there is no `{path}` in {}", folders.join(" or "))
             }),
             Some((scheme, _)) => Err(format!("`{scheme}://` is not supported")),
@@ -41,38 +53,58 @@ impl Lookup<'_> {
         places
             .into_iter()
             .find(|place| self.exists(place))
-            .or_else(|| self.find_in_package(path).filter(|place| self.exists(place)))
+            .or_else(|| {
+                self.find_in_package(path)
+                    .filter(|place| self.exists(place))
+            })
     }
 
-    /// A relative path in a folder of models or beside it: Gazebo has a list of folders for such paths.
+    /// A relative path in a folder of models or beside it: Gazebo has a list of folders for such
+    /// paths.
     fn find_beside(&self, path: &Path) -> Option<PathBuf> {
         if path.is_absolute() || self.exists(path) {
             return None;
         }
-        let around = self.folders.iter().flat_map(|folder| [Some(folder.as_path()), folder.parent()]);
-        around.flatten().map(|folder| folder.join(path)).find(|place| self.exists(place))
+        let around = self
+            .folders
+            .iter()
+            .flat_map(|folder| [Some(folder.as_path()), folder.parent()]);
+        around
+            .flatten()
+            .map(|folder| folder.join(path))
+            .find(|place| self.exists(place))
     }
 
-    /// The file of an absolute path that does not exist here: its end, which begins with the name of a package, is looked up. A
-    /// model that xacro wrote on another machine has the paths of that machine.
+    /// The file of an absolute path that does not exist here: its end, which begins with the name
+    /// of a package, is looked up. A model that xacro wrote on another machine has the paths of
+    /// that machine.
     fn find_end(&self, path: &str) -> Option<PathBuf> {
         if !path.starts_with('/') || self.exists(Path::new(path)) {
             return None;
         }
         let ends = path.match_indices('/').map(|(at, _)| &path[at + 1..]);
-        ends.filter(|end| end.contains('/')).find_map(|end| self.find(end))
+        ends.filter(|end| end.contains('/'))
+            .find_map(|end| self.find(end))
     }
 
     fn exists(&self, place: &Path) -> bool {
-        self.files.list(place.parent().unwrap_or(place)).iter().any(|known| known == place)
+        self.files
+            .list(place.parent().unwrap_or(place))
+            .iter()
+            .any(|known| known == place)
     }
 
     /// The path in a folder that is the package itself, by its name or that in its `package.xml`.
     fn find_in_package(&self, path: &str) -> Option<PathBuf> {
         let (package, inside) = path.split_once('/')?;
         let is_named = |folder: &&PathBuf| folder.file_name().is_some_and(|name| name == package);
-        let is_manifested = |folder: &&PathBuf| self.manifested(folder).is_some_and(|name| name == package);
-        let own = self.folders.iter().find(is_named).or_else(|| self.folders.iter().find(is_manifested))?;
+        let is_manifested =
+            |folder: &&PathBuf| self.manifested(folder).is_some_and(|name| name == package);
+        let own = self
+            .folders
+            .iter()
+            .find(is_named)
+            .or_else(|| self.folders.iter().find(is_manifested))?;
         Some(own.join(inside))
     }
 

@@ -1,4 +1,5 @@
-//! Reads mesh files: stl and obj with the `mesh_loader` crate, dae with [`collada`](super::collada), and MuJoCo's msh.
+//! Reads mesh files: stl and obj with the `mesh_loader` crate, dae with
+//! [`collada`](super::collada), and MuJoCo's msh.
 
 use std::borrow::Cow;
 use std::path::Path;
@@ -7,12 +8,12 @@ use crate::foreign::collada;
 use actcheck_base::{Diagnostic, Diagnostics, Files, Source};
 use actcheck_data::Mesh;
 
-/// Largest number of triangles: more than any collision shape needs, and a larger file could exhaust memory.
+/// Largest number of triangles: more than any collision shape needs, and a larger file could
+/// exhaust memory.
 pub(crate) const MOST_TRIANGLES: usize = 2_000_000;
 
 /// Help text on how models name mesh files.
-pub(crate) const HOW_TO_NAME: &str =
-    "the URI is `model://NAME/meshes/FILE`, `package://NAME/meshes/FILE` or a path relative to the model's file";
+pub(crate) const HOW_TO_NAME: &str = "the URI is `model://NAME/meshes/FILE`, `package://NAME/meshes/FILE` or a path relative to the model's file";
 
 /// The contents of a mesh file.
 pub(crate) struct MeshFile {
@@ -26,13 +27,19 @@ pub(crate) struct MeshFile {
 /// Reads a mesh file; its extension determines the format.
 ///
 /// # Errors
-/// W037 if the file can't be read, has an unsupported or a wrong extension, or contains no triangles.
+/// W037 if the file can't be read, has an unsupported or a wrong extension, or contains no
+/// triangles.
 pub(crate) fn read(files: &Files, path: &Path) -> Result<MeshFile, Diagnostics> {
     let shown = path.display();
     let bytes = files.read_bytes(path).map_err(|reason| -> Diagnostics {
-        Diagnostic::error("W037", format!("cannot read the mesh {shown}: {reason}")).help(HOW_TO_NAME).into()
+        Diagnostic::error("W037", format!("cannot read the mesh {shown}: {reason}"))
+            .help(HOW_TO_NAME)
+            .into()
     })?;
-    let ending = path.extension().map(|ending| ending.to_string_lossy().to_lowercase()).unwrap_or_default();
+    let ending = path
+        .extension()
+        .map(|ending| ending.to_string_lossy().to_lowercase())
+        .unwrap_or_default();
     let mut warnings = Diagnostics::new();
     let unusable = |reason: String| -> Diagnostics {
         Diagnostic::error("W037", format!("the mesh {shown} is unusable: {reason}"))
@@ -42,26 +49,39 @@ pub(crate) fn read(files: &Files, path: &Path) -> Result<MeshFile, Diagnostics> 
     let mesh = match ending.as_str() {
         "stl" => of_scene(mesh_loader::stl::from_slice(&as_binary(&bytes))),
         // Materials do not affect collisions, so their files are not read.
-        "obj" => of_scene(mesh_loader::obj::from_slice(&bytes, Some(path), |_| Ok(Vec::new()))),
+        "obj" => of_scene(mesh_loader::obj::from_slice(&bytes, Some(path), |_| {
+            Ok(Vec::new())
+        })),
         "msh" => of_msh(&bytes),
         "dae" => {
-            let text = std::str::from_utf8(&bytes).map_err(|_| unusable("it is not UTF-8 text".to_owned()))?;
-            return collada::read(&Source::new(shown.to_string(), text), &mut warnings).map(|mesh| MeshFile {
-                mesh,
-                bytes,
-                warnings,
-            });
+            let text = std::str::from_utf8(&bytes)
+                .map_err(|_| unusable("it is not UTF-8 text".to_owned()))?;
+            return collada::read(&Source::new(shown.to_string(), text), &mut warnings).map(
+                |mesh| MeshFile {
+                    mesh,
+                    bytes,
+                    warnings,
+                },
+            );
         }
         _ => Err(format!("`.{ending}` files are not supported")),
     };
     let mesh = mesh.map_err(unusable)?;
-    Ok(MeshFile { mesh, bytes, warnings })
+    Ok(MeshFile {
+        mesh,
+        bytes,
+        warnings,
+    })
 }
 
-/// Returns the bytes of an STL file so that a binary one is recognised as such: many begin with `solid`, the word that
-/// marks files of text. The length of a binary file follows from its number of triangles.
+/// Returns the bytes of an STL file so that a binary one is recognised as such: many begin with
+/// `solid`, the word that marks files of text. The length of a binary file follows from its number
+/// of triangles.
 fn as_binary(bytes: &[u8]) -> Cow<'_, [u8]> {
-    let count = bytes.get(80..84).and_then(|count| count.try_into().ok()).map(u32::from_le_bytes);
+    let count = bytes
+        .get(80..84)
+        .and_then(|count| count.try_into().ok())
+        .map(u32::from_le_bytes);
     let is_binary = count.is_some_and(|count| bytes.len() as u64 == 84 + 50 * u64::from(count));
     if !(is_binary && bytes.starts_with(b"solid")) {
         return Cow::Borrowed(bytes);
@@ -71,13 +91,20 @@ fn as_binary(bytes: &[u8]) -> Cow<'_, [u8]> {
     Cow::Owned(marked)
 }
 
-/// Reads a binary mesh of MuJoCo: the numbers of vertices, normals, texture coordinates and faces, then these.
+/// Reads a binary mesh of MuJoCo: the numbers of vertices, normals, texture coordinates and faces,
+/// then these.
 ///
 /// Source: MuJoCo's documentation, "XML Reference", `asset/mesh`.
 fn of_msh(bytes: &[u8]) -> Result<Mesh, String> {
-    let words: Vec<[u8; 4]> = bytes.chunks_exact(4).filter_map(|word| word.try_into().ok()).collect();
+    let words: Vec<[u8; 4]> = bytes
+        .chunks_exact(4)
+        .filter_map(|word| word.try_into().ok())
+        .collect();
     let ends_early = || "it ends too early".to_owned();
-    let counts = words.first_chunk::<4>().ok_or_else(ends_early)?.map(u32::from_le_bytes);
+    let counts = words
+        .first_chunk::<4>()
+        .ok_or_else(ends_early)?
+        .map(u32::from_le_bytes);
     let [vertices, normals, texture, faces] = counts.map(|count| count as usize);
     let before_faces = 4 + 3 * vertices + 3 * normals + 2 * texture;
     if !bytes.len().is_multiple_of(4) || words.len() != before_faces + 3 * faces {
@@ -86,8 +113,14 @@ fn of_msh(bytes: &[u8]) -> Result<Mesh, String> {
     let (points, _) = words[4..4 + 3 * vertices].as_chunks::<3>();
     let (triangles, _) = words[before_faces..].as_chunks::<3>();
     checked(
-        points.iter().map(|point| point.map(|word| f64::from(f32::from_le_bytes(word)))).collect(),
-        triangles.iter().map(|corners| corners.map(u32::from_le_bytes)).collect(),
+        points
+            .iter()
+            .map(|point| point.map(|word| f64::from(f32::from_le_bytes(word))))
+            .collect(),
+        triangles
+            .iter()
+            .map(|corners| corners.map(u32::from_le_bytes))
+            .collect(),
     )
 }
 
@@ -98,7 +131,10 @@ fn of_scene(scene: std::io::Result<mesh_loader::Scene>) -> Result<Mesh, String> 
     for mesh in scene.meshes {
         let before = u32::try_from(vertices.len()).map_err(|_| "it is too large".to_owned())?;
         vertices.extend(mesh.vertices.iter().map(|vertex| vertex.map(f64::from)));
-        let shifted = mesh.faces.iter().map(|face| face.map(|idx| idx.saturating_add(before)));
+        let shifted = mesh
+            .faces
+            .iter()
+            .map(|face| face.map(|idx| idx.saturating_add(before)));
         triangles.extend(shifted);
     }
     checked(vertices, triangles)
@@ -110,7 +146,10 @@ fn of_scene(scene: std::io::Result<mesh_loader::Scene>) -> Result<Mesh, String> 
 /// A lower-case message if the mesh is invalid or has more than [`MOST_TRIANGLES`] triangles.
 pub(crate) fn checked(vertices: Vec<[f64; 3]>, triangles: Vec<[u32; 3]>) -> Result<Mesh, String> {
     if triangles.len() > MOST_TRIANGLES {
-        return Err(format!("it has {} triangles, more than {MOST_TRIANGLES}", triangles.len()));
+        return Err(format!(
+            "it has {} triangles, more than {MOST_TRIANGLES}",
+            triangles.len()
+        ));
     }
     let welded = Mesh::new(vertices, triangles)?.welded();
     Mesh::new(welded.vertices, welded.triangles)
@@ -122,11 +161,20 @@ mod tests {
 
     #[test]
     fn a_mesh_of_mujoco_is_read_and_a_cut_one_is_refused() {
-        let mut bytes: Vec<u8> = [4_u32, 1, 2, 4].into_iter().flat_map(u32::to_le_bytes).collect();
-        let numbers: [f32; 19] =
-            [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 9.0, 9.0, 9.0, 9.0, 9.0, 9.0, 9.0];
+        let mut bytes: Vec<u8> = [4_u32, 1, 2, 4]
+            .into_iter()
+            .flat_map(u32::to_le_bytes)
+            .collect();
+        let numbers: [f32; 19] = [
+            0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 9.0, 9.0, 9.0, 9.0, 9.0,
+            9.0, 9.0,
+        ];
         bytes.extend(numbers.into_iter().flat_map(f32::to_le_bytes));
-        bytes.extend([0_u32, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3].into_iter().flat_map(u32::to_le_bytes));
+        bytes.extend(
+            [0_u32, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3]
+                .into_iter()
+                .flat_map(u32::to_le_bytes),
+        );
         let mesh = of_msh(&bytes).expect("it is a tetrahedron");
         assert!((mesh.volume() - 1.0 / 6.0).abs() < 1e-9);
         assert!((0..bytes.len()).all(|length| of_msh(&bytes[..length]).is_err()));
@@ -141,11 +189,14 @@ mod tests {
         let mut bytes = b"solid exported".to_vec();
         bytes.resize(80, b' ');
         bytes.extend(1u32.to_le_bytes());
-        for number in [0.0_f32, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0] {
+        for number in [
+            0.0_f32, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0,
+        ] {
             bytes.extend(number.to_le_bytes());
         }
         bytes.extend([0, 0]);
-        let mesh = of_scene(mesh_loader::stl::from_slice(&as_binary(&bytes))).expect("it is an STL file");
+        let mesh =
+            of_scene(mesh_loader::stl::from_slice(&as_binary(&bytes))).expect("it is an STL file");
         assert_eq!(mesh.triangles.len(), 1);
         let text = b"solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\nendsolid a\n";
         assert!(matches!(as_binary(text), Cow::Borrowed(_)));

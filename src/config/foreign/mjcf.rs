@@ -1,6 +1,8 @@
-//! Converts a robot or an object in MJCF, MuJoCo's format, to URDF: bodies, joints, geoms, inertias, equalities of joints.
+//! Converts a robot or an object in MJCF, MuJoCo's format, to URDF: bodies, joints, geoms,
+//! inertias, equalities of joints.
 //!
-//! Sites and cameras become links, so that a profile can name them. Spatial tendons and options are not read.
+//! Sites and cameras become links, so that a profile can name them. Spatial tendons and options are
+//! not read.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
@@ -35,11 +37,16 @@ const SLIDES_M: f64 = 10.0;
 ///
 /// # Errors
 /// Faults of the text: W031 to W036, W055.
-pub(crate) fn to_urdf(source: &Source, path: &Path, files: &actcheck_base::Files) -> Result<Source, Diagnostics> {
+pub(crate) fn to_urdf(
+    source: &Source,
+    path: &Path,
+    files: &actcheck_base::Files,
+) -> Result<Source, Diagnostics> {
     converted(source, path, files, None).map(|(urdf, _)| urdf)
 }
 
-/// Converts the text of an object. Also returns the mass of bodies without `<inertial>`, which URDF can't state.
+/// Converts the text of an object. Also returns the mass of bodies without `<inertial>`, which URDF
+/// can't state.
 ///
 /// # Errors
 /// Faults of the text: W031 to W036, W055.
@@ -63,14 +70,27 @@ fn converted(
         let world = robot.unique("world");
         robot.out.link(&world, None, &[]);
         match xml::child(root, "worldbody") {
-            Some(worldbody) => robot.children(worldbody, &world, &Isometry3::identity(), None, reader),
-            None => reader.error("W033", root, "`<mujoco>` has no `<worldbody>`".to_owned(), "add the bodies"),
+            Some(worldbody) => {
+                robot.children(worldbody, &world, &Isometry3::identity(), None, reader)
+            }
+            None => reader.error(
+                "W033",
+                root,
+                "`<mujoco>` has no `<worldbody>`".to_owned(),
+                "add the bodies",
+            ),
         }
         if robot.materials.is_none() {
             robot.write_passing(root);
         }
         let name = root.attribute("model").unwrap_or("robot").to_owned();
-        (Source::new(format!("{} (as URDF)", source.name), robot.out.finish(&name)), robot.materials)
+        (
+            Source::new(
+                format!("{} (as URDF)", source.name),
+                robot.out.finish(&name),
+            ),
+            robot.materials,
+        )
     })
 }
 
@@ -104,7 +124,11 @@ pub(super) fn with_robot<T>(
 pub(super) fn unique(names: &mut BTreeMap<String, u32>, name: &str) -> String {
     let count = names.entry(name.to_owned()).or_insert(0);
     *count += 1;
-    if *count == 1 { name.to_owned() } else { format!("{name}_{count}") }
+    if *count == 1 {
+        name.to_owned()
+    } else {
+        format!("{name}_{count}")
+    }
 }
 
 pub(super) struct Robot {
@@ -140,50 +164,87 @@ impl Robot {
         }
     }
 
-    /// Writes the pairs of bodies that pass through each other: those that `<exclude>` names, and those whose geoms never
-    /// collide with each other.
+    /// Writes the pairs of bodies that pass through each other: those that `<exclude>` names, and
+    /// those whose geoms never collide with each other.
     fn write_passing(&mut self, root: Node) {
         let mut passing = BTreeSet::new();
         let excludes = elements(root, "contact").filter(|contact| contact.has_tag_name("exclude"));
         for exclude in excludes {
-            if let (Some(first), Some(second)) = (exclude.attribute("body1"), exclude.attribute("body2")) {
+            if let (Some(first), Some(second)) =
+                (exclude.attribute("body1"), exclude.attribute("body2"))
+            {
                 passing.insert([first.min(second), first.max(second)]);
             }
         }
-        let solid: Vec<(&String, &BTreeSet<Mask>)> = self.masks.iter().filter(|(_, masks)| !masks.is_empty()).collect();
+        let solid: Vec<(&String, &BTreeSet<Mask>)> = self
+            .masks
+            .iter()
+            .filter(|(_, masks)| !masks.is_empty())
+            .collect();
         // More links are refused when the text is read.
-        let solid = if solid.len() > MOST_BODIES { Vec::new() } else { solid };
+        let solid = if solid.len() > MOST_BODIES {
+            Vec::new()
+        } else {
+            solid
+        };
         for (idx, (first, of_first)) in solid.iter().enumerate() {
             for (second, of_second) in &solid[idx + 1..] {
-                if !of_first.iter().any(|mask| of_second.iter().any(|other| mask.meets(*other))) {
+                if !of_first
+                    .iter()
+                    .any(|mask| of_second.iter().any(|other| mask.meets(*other)))
+                {
                     passing.insert([first.as_str(), second.as_str()]);
                 }
             }
         }
-        for pair in passing.into_iter().filter(|pair| pair.iter().all(|body| self.names.contains_key(*body))) {
+        for pair in passing
+            .into_iter()
+            .filter(|pair| pair.iter().all(|body| self.names.contains_key(*body)))
+        {
             self.out.passing(pair);
         }
     }
 
-    /// Writes the bodies, sites and cameras in a body. `shift` is the body's frame in the frame of its link.
-    fn children(&mut self, node: Node, link: &str, shift: &Isometry3<f64>, class: Option<&str>, reader: &mut Reader) {
+    /// Writes the bodies, sites and cameras in a body. `shift` is the body's frame in the frame of
+    /// its link.
+    fn children(
+        &mut self,
+        node: Node,
+        link: &str,
+        shift: &Isometry3<f64>,
+        class: Option<&str>,
+        reader: &mut Reader,
+    ) {
         for child in node.children().filter(Node::is_element) {
             match child.tag_name().name() {
                 "body" => self.body(child, link, shift, class, reader),
                 "frame" => {
-                    let pose = self.compiler.pose(&self.compiler.attributes(child, class), child, reader);
+                    let pose =
+                        self.compiler
+                            .pose(&self.compiler.attributes(child, class), child, reader);
                     let class = child.attribute("childclass").or(class);
                     self.children(child, link, &(shift * pose), class, reader);
                 }
                 "site" | "camera" => {
-                    let Some(name) = child.attribute("name") else { continue };
-                    let pose = self.compiler.pose(&self.compiler.attributes(child, class), child, reader);
-                    let turned = if child.tag_name().name() == "camera" { lens() } else { Isometry3::identity() };
+                    let Some(name) = child.attribute("name") else {
+                        continue;
+                    };
+                    let pose =
+                        self.compiler
+                            .pose(&self.compiler.attributes(child, class), child, reader);
+                    let turned = if child.tag_name().name() == "camera" {
+                        lens()
+                    } else {
+                        Isometry3::identity()
+                    };
                     let name = self.unique(name);
                     self.out.frame(&name, link, shift * pose * turned);
                 }
                 "attach" | "replicate" => {
-                    let message = format!("the bodies that `<{}>` adds are not read", child.tag_name().name());
+                    let message = format!(
+                        "the bodies that `<{}>` adds are not read",
+                        child.tag_name().name()
+                    );
                     let help = "let MuJoCo write one file with all of them: \
                                 `mujoco.MjSpec.from_file(FILE)`, then `compile()` and `to_xml()`";
                     reader.error("W035", child, message, help);
@@ -208,35 +269,58 @@ impl Robot {
         let mut at = shift * compiler.pose(&attributes, body, reader);
         // A body that moves freely is the whole robot or object.
         let is_free = |joint: &Node| compiler.attributes(*joint, class).get("type") == Some("free");
-        let joints: Vec<Node> = xml::children(body, "joint").filter(|joint| !is_free(joint)).collect();
+        let joints: Vec<Node> = xml::children(body, "joint")
+            .filter(|joint| !is_free(joint))
+            .collect();
         let mut from = parent.to_owned();
         // Position of the body's origin in the frame of its link.
         let mut own = Isometry3::identity();
         for (idx, joint) in joints.iter().enumerate() {
             let attributes = compiler.attributes(*joint, class);
-            let anchor = attributes.get("pos").and_then(|text| reader.numbers(*joint, text, Bound::Finite));
+            let anchor = attributes
+                .get("pos")
+                .and_then(|text| reader.numbers(*joint, text, Bound::Finite));
             let anchor = Translation3::from(Vector3::from(anchor.unwrap_or([0.0; 3])));
-            let link = if idx + 1 == joints.len() { name.clone() } else { self.unique(&format!("{name}_{}", idx + 1)) };
+            let link = if idx + 1 == joints.len() {
+                name.clone()
+            } else {
+                self.unique(&format!("{name}_{}", idx + 1))
+            };
             if idx + 1 < joints.len() {
                 self.out.link(&link, None, &[]);
             }
-            if self.joint(*joint, &attributes, (&from, &link), at * anchor, reader).is_some() {
-                (from, own) = (link, Isometry3::from_parts(anchor, UnitQuaternion::identity()).inverse());
+            if self
+                .joint(*joint, &attributes, (&from, &link), at * anchor, reader)
+                .is_some()
+            {
+                (from, own) = (
+                    link,
+                    Isometry3::from_parts(anchor, UnitQuaternion::identity()).inverse(),
+                );
                 at = own;
             }
         }
         if joints.is_empty() {
-            let free =
-                xml::child(body, "freejoint").is_some() || xml::children(body, "joint").any(|joint| is_free(&joint));
-            let (kind, ending) =
-                if free && self.materials.is_none() { ("floating", "free") } else { ("fixed", "fixed") };
+            let free = xml::child(body, "freejoint").is_some()
+                || xml::children(body, "joint").any(|joint| is_free(&joint));
+            let (kind, ending) = if free && self.materials.is_none() {
+                ("floating", "free")
+            } else {
+                ("fixed", "fixed")
+            };
             let own = unique(&mut self.joint_names, &format!("{name}_{ending}"));
-            self.out.joint(&UrdfJoint { kind, ..UrdfJoint::fixed(&own, parent, &name, at) });
+            self.out.joint(&UrdfJoint {
+                kind,
+                ..UrdfJoint::fixed(&own, parent, &name, at)
+            });
         }
         let solids = self.solids(body, &own, class, reader);
         if self.materials.is_none() {
             let geoms = xml::children(body, "geom").map(|geom| compiler.attributes(geom, class));
-            self.masks.insert(name.clone(), geoms.filter(collides).map(|geom| Mask::of(&geom)).collect());
+            self.masks.insert(
+                name.clone(),
+                geoms.filter(collides).map(|geom| Mask::of(&geom)).collect(),
+            );
         }
         let inertial = match &mut self.materials {
             Some(materials) if xml::child(body, "inertial").is_none() => {
@@ -245,7 +329,10 @@ impl Robot {
             }
             _ => Some(self.inertial(body, &own, class, &solids, reader)),
         };
-        let solids: Vec<(Isometry3<f64>, String)> = solids.into_iter().map(|(pose, shape, _)| (pose, shape)).collect();
+        let solids: Vec<(Isometry3<f64>, String)> = solids
+            .into_iter()
+            .map(|(pose, shape, _)| (pose, shape))
+            .collect();
         self.out.link(&name, inertial.as_ref(), &solids);
         self.children(body, &name, &own, class, reader);
     }
@@ -273,16 +360,28 @@ impl Robot {
                 return None;
             }
         };
-        let name = joint.attribute("name").map_or_else(|| format!("{child}_joint"), str::to_owned);
-        let axis =
-            attributes.get("axis").map_or(Some([0.0, 0.0, 1.0]), |text| reader.numbers(joint, text, Bound::Finite))?;
+        let name = joint
+            .attribute("name")
+            .map_or_else(|| format!("{child}_joint"), str::to_owned);
+        let axis = attributes
+            .get("axis")
+            .map_or(Some([0.0, 0.0, 1.0]), |text| {
+                reader.numbers(joint, text, Bound::Finite)
+            })?;
         let range = match attributes.get("range") {
             Some(text) => Some(reader.numbers::<2>(joint, text, Bound::Finite)?),
             None => None,
         };
         if let Some([lower, upper]) = range.filter(|[lower, upper]| lower > upper) {
-            let message = format!("the joint `{name}` has a lower limit of {lower} above its upper limit of {upper}");
-            reader.error("W034", joint, message, "write the smaller number of `range` first");
+            let message = format!(
+                "the joint `{name}` has a lower limit of {lower} above its upper limit of {upper}"
+            );
+            reader.error(
+                "W034",
+                joint,
+                message,
+                "write the smaller number of `range` first",
+            );
             return None;
         }
         let limited = match attributes.get("limited") {
@@ -291,7 +390,9 @@ impl Robot {
             _ => range.is_some(),
         };
         let unit = if slides { 1.0 } else { self.compiler.angle };
-        let range = range.filter(|_| limited).map(|range| range.map(|end| end * unit));
+        let range = range
+            .filter(|_| limited)
+            .map(|range| range.map(|end| end * unit));
         let (kind, range) = match (range.or(self.couplings.ranges.get(&name).copied()), slides) {
             (Some(range), _) => (kind, range),
             (None, true) => (kind, [-SLIDES_M, SLIDES_M]),
@@ -303,14 +404,23 @@ impl Robot {
             Some(axis) => origin * UnitQuaternion::from_axis_angle(&axis, -start),
             None => origin,
         };
-        let damping = attributes.get("damping").and_then(|text| text.split_whitespace().next()?.parse().ok());
-        let friction = attributes.get("frictionloss").and_then(|text| text.parse().ok());
-        let own_effort =
-            attributes.get("actuatorfrcrange").and_then(|text| reader.numbers::<2>(joint, text, Bound::Finite));
+        let damping = attributes
+            .get("damping")
+            .and_then(|text| text.split_whitespace().next()?.parse().ok());
+        let friction = attributes
+            .get("frictionloss")
+            .and_then(|text| text.parse().ok());
+        let own_effort = attributes
+            .get("actuatorfrcrange")
+            .and_then(|text| reader.numbers::<2>(joint, text, Bound::Finite));
         let effort = own_effort
             .map(|[lower, upper]| f64::max(-lower, upper))
             .or_else(|| self.couplings.efforts.get(&name).copied());
-        let unstated = if self.couplings.is_passive(&name) { 0.0 } else { EFFORT };
+        let unstated = if self.couplings.is_passive(&name) {
+            0.0
+        } else {
+            EFFORT
+        };
         let unique = unique(&mut self.joint_names, &name);
         self.out.joint(&UrdfJoint {
             name: &unique,
@@ -330,7 +440,8 @@ impl Robot {
         Some(())
     }
 
-    /// The inertia of a body: stated, or that of its geoms as points with the inertia of small cubes.
+    /// The inertia of a body: stated, or that of its geoms as points with the inertia of small
+    /// cubes.
     fn inertial(
         &self,
         body: Node,
@@ -343,17 +454,22 @@ impl Robot {
             let attributes = self.compiler.attributes(node, class);
             let pose = own * self.compiler.pose(&attributes, node, reader);
             let [kg] = reader.numbers::<1>(node, attributes.get("mass")?, Bound::Mass)?;
-            let about_com = match (attributes.get("fullinertia"), attributes.get("diaginertia")) {
-                (Some(text), _) => {
-                    let [xx, yy, zz, xy, xz, yz] = reader.numbers(node, text, Bound::Finite)?;
-                    Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz)
-                }
-                (None, Some(text)) => {
-                    Matrix3::from_diagonal(&Vector3::from(reader.numbers::<3>(node, text, Bound::Finite)?))
-                }
-                (None, None) => cube(kg),
-            };
-            Some(Inertial { pose, kg, about_com })
+            let about_com =
+                match (attributes.get("fullinertia"), attributes.get("diaginertia")) {
+                    (Some(text), _) => {
+                        let [xx, yy, zz, xy, xz, yz] = reader.numbers(node, text, Bound::Finite)?;
+                        Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz)
+                    }
+                    (None, Some(text)) => Matrix3::from_diagonal(&Vector3::from(
+                        reader.numbers::<3>(node, text, Bound::Finite)?,
+                    )),
+                    (None, None) => cube(kg),
+                };
+            Some(Inertial {
+                pose,
+                kg,
+                about_com,
+            })
         });
         if let Some(stated) = stated {
             return stated;
@@ -364,14 +480,22 @@ impl Robot {
             .collect();
         let kg: f64 = parts.iter().map(|(_, kg)| kg).sum();
         if kg <= 0.0 {
-            return Inertial { pose: *own, kg: UNKNOWN_KG, about_com: cube(UNKNOWN_KG) };
+            return Inertial {
+                pose: *own,
+                kg: UNKNOWN_KG,
+                about_com: cube(UNKNOWN_KG),
+            };
         }
         let com = parts.iter().map(|(at, kg)| at * *kg).sum::<Vector3<f64>>() / kg;
         let of_point = |(at, kg): &(Vector3<f64>, f64)| {
             let d = at - com;
             (Matrix3::identity() * d.norm_squared() - d * d.transpose()) * *kg + cube(*kg)
         };
-        Inertial { pose: Isometry3::translation(com.x, com.y, com.z), kg, about_com: parts.iter().map(of_point).sum() }
+        Inertial {
+            pose: Isometry3::translation(com.x, com.y, com.z),
+            kg,
+            about_com: parts.iter().map(of_point).sum(),
+        }
     }
 }
 
@@ -393,29 +517,50 @@ mod tests {
     use actcheck_base::Files;
 
     fn converted(bodies: &str, more: &str) -> Result<String, String> {
-        let text = format!("<mujoco><compiler angle=\"radian\"/><worldbody>{bodies}</worldbody>{more}</mujoco>");
+        let text = format!(
+            "<mujoco><compiler angle=\"radian\"/><worldbody>{bodies}</worldbody>{more}</mujoco>"
+        );
         let path = Path::new("robot.xml");
         let found = to_urdf(&Source::new("robot.xml", text), path, &Files::Shipped);
-        found.map(|urdf| urdf.text.to_string()).map_err(|faults| faults.to_string())
+        found
+            .map(|urdf| urdf.text.to_string())
+            .map_err(|faults| faults.to_string())
     }
 
     const BALL: &str = "<geom size=\"0.1\"/>";
 
-    /// MuJoCo leaves out the contacts of pairs that the file excludes, and of geoms whose masks don't meet.
+    /// MuJoCo leaves out the contacts of pairs that the file excludes, and of geoms whose masks
+    /// don't meet.
     #[test]
     fn bodies_that_never_collide_are_named() {
         let bodies = format!(
             "<body name=\"a\">{BALL}<body name=\"b\">{BALL}</body></body><body name=\"c\">{BALL}</body>\
              <body name=\"d\"><geom size=\"0.1\" contype=\"2\" conaffinity=\"4\"/></body>"
         );
-        let urdf = converted(&bodies, "<contact><exclude body1=\"c\" body2=\"a\"/></contact>").expect("it is valid");
-        let pairs: Vec<&str> = urdf.lines().filter(|line| line.contains("disable_collisions")).map(str::trim).collect();
+        let urdf = converted(
+            &bodies,
+            "<contact><exclude body1=\"c\" body2=\"a\"/></contact>",
+        )
+        .expect("it is valid");
+        let pairs: Vec<&str> = urdf
+            .lines()
+            .filter(|line| line.contains("disable_collisions"))
+            .map(str::trim)
+            .collect();
         let pair = |a: &str, b: &str| format!("<disable_collisions link1=\"{a}\" link2=\"{b}\"/>");
-        assert_eq!(pairs, [pair("a", "c"), pair("a", "d"), pair("b", "d"), pair("c", "d")]);
+        assert_eq!(
+            pairs,
+            [
+                pair("a", "c"),
+                pair("a", "d"),
+                pair("b", "d"),
+                pair("c", "d")
+            ]
+        );
     }
 
-    /// Names of bodies and joints don't exclude each other; only a whole robot may move freely; `ref` is the position at
-    /// which the body is where the file puts it.
+    /// Names of bodies and joints don't exclude each other; only a whole robot may move freely;
+    /// `ref` is the position at which the body is where the file puts it.
     #[test]
     fn joints_keep_their_names_and_positions() {
         let bodies = format!(
@@ -423,18 +568,35 @@ mod tests {
              <joint name=\"jaw\" axis=\"1 0 0\" ref=\"0.5\" range=\"0 1\"/>{BALL}</body></body>"
         );
         let urdf = converted(&bodies, "").expect("it is valid");
-        assert!(urdf.contains("<joint name=\"base_free\" type=\"floating\">"), "{urdf}");
-        let jaw =
-            urdf.lines().find(|line| line.contains("<joint name=\"jaw\" type=\"revolute\">")).expect("it has a jaw");
-        let turned = jaw.split("rpy=\"").nth(1).and_then(|text| text.split(' ').next()?.parse::<f64>().ok());
-        assert!(turned.is_some_and(|roll_rad| (roll_rad + 0.5).abs() < 1e-9), "{jaw}");
+        assert!(
+            urdf.contains("<joint name=\"base_free\" type=\"floating\">"),
+            "{urdf}"
+        );
+        let jaw = urdf
+            .lines()
+            .find(|line| line.contains("<joint name=\"jaw\" type=\"revolute\">"))
+            .expect("it has a jaw");
+        let turned = jaw
+            .split("rpy=\"")
+            .nth(1)
+            .and_then(|text| text.split(' ').next()?.parse::<f64>().ok());
+        assert!(
+            turned.is_some_and(|roll_rad| (roll_rad + 0.5).abs() < 1e-9),
+            "{jaw}"
+        );
     }
 
     /// A part that would be missing without a word.
     #[test]
     fn bodies_that_are_attached_are_refused() {
-        let said = converted("<body name=\"a\"><attach model=\"hand\" body=\"palm\" prefix=\"h_\"/></body>", "");
+        let said = converted(
+            "<body name=\"a\"><attach model=\"hand\" body=\"palm\" prefix=\"h_\"/></body>",
+            "",
+        );
         let said = said.expect_err("a hand is missing");
-        assert!(said.contains("W035") && said.contains("the bodies that `<attach>` adds are not read"), "{said}");
+        assert!(
+            said.contains("W035") && said.contains("the bodies that `<attach>` adds are not read"),
+            "{said}"
+        );
     }
 }

@@ -18,7 +18,8 @@ pub(super) struct Couplings {
     pub(super) efforts: BTreeMap<String, f64>,
     /// Ranges of position servos, for joints that have none of their own. Units: radians or metres.
     pub(super) ranges: BTreeMap<String, [f64; 2]>,
-    /// Positions where the file's bodies are as it places them, of the joints for which these are not 0.
+    /// Positions where the file's bodies are as it places them, of the joints for which these are
+    /// not 0.
     pub(super) starts: BTreeMap<String, f64>,
     /// Joints with an actuator. `None` if the file has no actuators, and none are known.
     pub(super) actuated: Option<BTreeSet<String>>,
@@ -28,7 +29,10 @@ impl Couplings {
     pub(super) fn read(root: Node, compiler: &Compiler, reader: &mut Reader) -> Self {
         let tendons = tendons(root);
         let tree = Tree::read(root, compiler, reader);
-        let mut found = Self { starts: tree.starts(), ..Self::default() };
+        let mut found = Self {
+            starts: tree.starts(),
+            ..Self::default()
+        };
         found.add_actuators(root, compiler, &tendons, reader);
         found.add_equalities_of_joints(root, reader);
         found.add_equalities_of_tendons(root, &tendons, &tree);
@@ -39,7 +43,9 @@ impl Couplings {
 
     /// Returns whether only its links, springs or contacts move a joint.
     pub(super) fn is_passive(&self, joint: &str) -> bool {
-        self.actuated.as_ref().is_some_and(|actuated| !actuated.contains(joint))
+        self.actuated
+            .as_ref()
+            .is_some_and(|actuated| !actuated.contains(joint))
     }
 
     /// Returns the position of a joint where the bodies are as the file places them.
@@ -47,64 +53,124 @@ impl Couplings {
         self.starts.get(joint).copied().unwrap_or(0.0)
     }
 
-    fn add_actuators(&mut self, root: Node, compiler: &Compiler, tendons: &Tendons, reader: &mut Reader) {
+    fn add_actuators(
+        &mut self,
+        root: Node,
+        compiler: &Compiler,
+        tendons: &Tendons,
+        reader: &mut Reader,
+    ) {
         for actuator in elements(root, "actuator") {
             let attributes = compiler.attributes(actuator, None);
-            let direct =
-                attributes.get("joint").or(attributes.get("jointinparent")).map(|joint| (joint.to_owned(), 1.0));
-            let by_tendon =
-                attributes.get("tendon").and_then(|name| tendons.get(name)).map(|tendon| tendon.joints.clone());
-            let moved: Vec<(String, f64)> = direct.into_iter().chain(by_tendon.into_iter().flatten()).collect();
-            self.actuated.get_or_insert_default().extend(moved.iter().map(|(joint, _)| joint.clone()));
+            let direct = attributes
+                .get("joint")
+                .or(attributes.get("jointinparent"))
+                .map(|joint| (joint.to_owned(), 1.0));
+            let by_tendon = attributes
+                .get("tendon")
+                .and_then(|name| tendons.get(name))
+                .map(|tendon| tendon.joints.clone());
+            let moved: Vec<(String, f64)> = direct
+                .into_iter()
+                .chain(by_tendon.into_iter().flatten())
+                .collect();
+            self.actuated
+                .get_or_insert_default()
+                .extend(moved.iter().map(|(joint, _)| joint.clone()));
             if let Some(range) = servo_range(actuator, &attributes, reader) {
                 // A tendon is as long as the sum of its joints, which move alike.
                 let sum: f64 = moved.iter().map(|(_, share)| share.abs()).sum();
                 let ends = range.map(|end| end / sum);
-                let range_of = |share: f64| if share < 0.0 { [-ends[1], -ends[0]] } else { ends };
-                let ranges = moved.iter().filter(|_| sum > 0.0).map(|(joint, share)| (joint.clone(), range_of(*share)));
+                let range_of = |share: f64| {
+                    if share < 0.0 {
+                        [-ends[1], -ends[0]]
+                    } else {
+                        ends
+                    }
+                };
+                let ranges = moved
+                    .iter()
+                    .filter(|_| sum > 0.0)
+                    .map(|(joint, share)| (joint.clone(), range_of(*share)));
                 self.ranges.extend(ranges);
             }
             let is_motor = actuator.tag_name().name() == "motor";
-            let limits = attributes.get("forcerange").or(if is_motor { attributes.get("ctrlrange") } else { None });
-            let Some([lower, upper]) = limits.and_then(|text| reader.numbers(actuator, text, Bound::Finite)) else {
+            let limits = attributes.get("forcerange").or(if is_motor {
+                attributes.get("ctrlrange")
+            } else {
+                None
+            });
+            let Some([lower, upper]) =
+                limits.and_then(|text| reader.numbers(actuator, text, Bound::Finite))
+            else {
                 continue;
             };
-            let gear = attributes.get("gear").and_then(|text| text.split_whitespace().next()?.parse::<f64>().ok());
+            let gear = attributes
+                .get("gear")
+                .and_then(|text| text.split_whitespace().next()?.parse::<f64>().ok());
             let most = f64::max(-lower, upper) * gear.unwrap_or(1.0).abs();
-            self.efforts.extend(moved.into_iter().map(|(joint, share)| (joint, most * share.abs())));
+            self.efforts.extend(
+                moved
+                    .into_iter()
+                    .map(|(joint, share)| (joint, most * share.abs())),
+            );
         }
     }
 
     fn add_equalities_of_joints(&mut self, root: Node, reader: &mut Reader) {
         for joint in elements(root, "equality").filter(|equality| equality.has_tag_name("joint")) {
-            let (Some(follower), Some(leader)) = (joint.attribute("joint1"), joint.attribute("joint2")) else {
+            let (Some(follower), Some(leader)) =
+                (joint.attribute("joint1"), joint.attribute("joint2"))
+            else {
                 continue;
             };
-            let mut known =
-                root.descendants().filter(|node| node.has_tag_name("joint")).filter_map(|node| node.attribute("name"));
+            let mut known = root
+                .descendants()
+                .filter(|node| node.has_tag_name("joint"))
+                .filter_map(|node| node.attribute("name"));
             if !known.any(|name| name == leader) {
                 let message = format!("there is no movable joint `{leader}` to mimic");
-                reader.error("W051", joint, message, "`joint2` names the joint that `joint1` follows");
+                reader.error(
+                    "W051",
+                    joint,
+                    message,
+                    "`joint2` names the joint that `joint1` follows",
+                );
                 continue;
             }
             let written = joint.attribute("polycoef").unwrap_or("0 1 0 0 0");
-            let numbers: Vec<f64> = written.split_whitespace().filter_map(|word| word.parse().ok()).collect();
-            let (offset, factor) = (numbers.first().copied().unwrap_or(0.0), numbers.get(1).copied().unwrap_or(1.0));
+            let numbers: Vec<f64> = written
+                .split_whitespace()
+                .filter_map(|word| word.parse().ok())
+                .collect();
+            let (offset, factor) = (
+                numbers.first().copied().unwrap_or(0.0),
+                numbers.get(1).copied().unwrap_or(1.0),
+            );
             if numbers.iter().skip(2).any(|number| *number != 0.0) {
                 not_linear(joint, follower, leader, reader);
             }
             let offset = offset + self.start(follower) - factor * self.start(leader);
-            self.mimics.insert(follower.to_owned(), (leader.to_owned(), factor, offset));
+            self.mimics
+                .insert(follower.to_owned(), (leader.to_owned(), factor, offset));
         }
     }
 
-    /// Couples the two joints of each fixed tendon whose length an equality fixes: the joint without an actuator follows,
-    /// of two such joints the one that follows no other yet.
+    /// Couples the two joints of each fixed tendon whose length an equality fixes: the joint
+    /// without an actuator follows, of two such joints the one that follows no other yet.
     fn add_equalities_of_tendons(&mut self, root: Node, tendons: &Tendons, tree: &Tree) {
-        for equality in elements(root, "equality").filter(|equality| equality.has_tag_name("tendon")) {
-            let tendon = equality.attribute("tendon1").filter(|_| equality.attribute("tendon2").is_none());
-            let Some(Tendon { joints, spring }) = tendon.and_then(|name| tendons.get(name)) else { continue };
-            let [first, second] = joints.as_slice() else { continue };
+        for equality in
+            elements(root, "equality").filter(|equality| equality.has_tag_name("tendon"))
+        {
+            let tendon = equality
+                .attribute("tendon1")
+                .filter(|_| equality.attribute("tendon2").is_none());
+            let Some(Tendon { joints, spring }) = tendon.and_then(|name| tendons.get(name)) else {
+                continue;
+            };
+            let [first, second] = joints.as_slice() else {
+                continue;
+            };
             let is_free = |joint: &str| self.is_passive(joint) && !self.mimics.contains_key(joint);
             let (leader, follower) = match (is_free(&first.0), is_free(&second.0)) {
                 (true, false) => (second, first),
@@ -113,31 +179,54 @@ impl Couplings {
             if follower.1 == 0.0 || self.mimics.contains_key(&follower.0) {
                 continue;
             }
-            let longer = equality.attribute("polycoef").and_then(|text| text.split_whitespace().next()?.parse().ok());
+            let longer = equality
+                .attribute("polycoef")
+                .and_then(|text| text.split_whitespace().next()?.parse().ok());
             let factor = -leader.1 / follower.1;
             let [of_leader, of_follower] = [leader, follower].map(|(joint, _)| tree.range(joint));
-            let as_placed =
-                longer.unwrap_or(0.0) / follower.1 + self.start(&follower.0) - factor * self.start(&leader.0);
-            // The limits of a joint are as strong as an equality, and the spring of the tendon decides where both disagree.
+            let as_placed = longer.unwrap_or(0.0) / follower.1 + self.start(&follower.0)
+                - factor * self.start(&leader.0);
+            // The limits of a joint are as strong as an equality, and the spring of the tendon
+            // decides where both disagree.
             let offset = match (of_leader, of_follower, spring) {
                 (Some(from), Some([lower, upper]), Some(length)) => {
                     let to = from.map(|end| factor * end + as_placed);
-                    let is_beyond = f64::max(to[0], to[1]) < lower || f64::min(to[0], to[1]) > upper;
-                    if is_beyond { length / follower.1 } else { as_placed }
+                    let is_beyond =
+                        f64::max(to[0], to[1]) < lower || f64::min(to[0], to[1]) > upper;
+                    if is_beyond {
+                        length / follower.1
+                    } else {
+                        as_placed
+                    }
                 }
                 _ => as_placed,
             };
-            self.mimics.insert(follower.0.clone(), (leader.0.clone(), factor, offset));
+            self.mimics
+                .insert(follower.0.clone(), (leader.0.clone(), factor, offset));
         }
     }
 }
 
-/// The range of positions of a position servo, those of its joint or tendon. Returns `None` for other actuators.
-fn servo_range(actuator: Node, attributes: &Attributes<'_>, reader: &mut Reader) -> Option<[f64; 2]> {
-    let first = |name: &str, place: usize| attributes.get(name)?.split_whitespace().nth(place)?.parse::<f64>().ok();
+/// The range of positions of a position servo, those of its joint or tendon. Returns `None` for
+/// other actuators.
+fn servo_range(
+    actuator: Node,
+    attributes: &Attributes<'_>,
+    reader: &mut Reader,
+) -> Option<[f64; 2]> {
+    let first = |name: &str, place: usize| {
+        attributes
+            .get(name)?
+            .split_whitespace()
+            .nth(place)?
+            .parse::<f64>()
+            .ok()
+    };
     let ratio = match actuator.tag_name().name() {
         "position" => 1.0,
-        "general" if attributes.get("biastype") == Some("affine") => first("gainprm", 0)? / -first("biasprm", 1)?,
+        "general" if attributes.get("biastype") == Some("affine") => {
+            first("gainprm", 0)? / -first("biasprm", 1)?
+        }
         _ => return None,
     };
     let ends = reader.numbers::<2>(actuator, attributes.get("ctrlrange")?, Bound::Finite)?;
@@ -147,8 +236,15 @@ fn servo_range(actuator: Node, attributes: &Attributes<'_>, reader: &mut Reader)
 
 /// Warns that a coupling is replaced by a linear one.
 pub(super) fn not_linear(node: Node, follower: &str, leader: &str, reader: &mut Reader) {
-    let message = format!("the coupling of `{follower}` to `{leader}` is not linear: only its linear part is used");
-    reader.warning("W036", node, message, "the joint then deviates from its mechanism");
+    let message = format!(
+        "the coupling of `{follower}` to `{leader}` is not linear: only its linear part is used"
+    );
+    reader.warning(
+        "W036",
+        node,
+        message,
+        "the joint then deviates from its mechanism",
+    );
 }
 
 /// A fixed tendon: a weighted sum of positions of joints.
@@ -163,14 +259,26 @@ type Tendons = BTreeMap<String, Tendon>;
 
 fn tendons(root: Node) -> Tendons {
     let read = |tendon: Node| {
-        let number = |node: Node, name: &str| node.attribute(name)?.split_whitespace().next()?.parse::<f64>().ok();
-        let joint = |joint: Node| Some((joint.attribute("joint")?.to_owned(), number(joint, "coef")?));
+        let number = |node: Node, name: &str| {
+            node.attribute(name)?
+                .split_whitespace()
+                .next()?
+                .parse::<f64>()
+                .ok()
+        };
+        let joint =
+            |joint: Node| Some((joint.attribute("joint")?.to_owned(), number(joint, "coef")?));
         let is_sprung = number(tendon, "stiffness").is_some_and(|stiffness| stiffness > 0.0);
         let spring = number(tendon, "springlength").filter(|length| is_sprung && *length >= 0.0);
-        Tendon { joints: xml::children(tendon, "joint").filter_map(joint).collect(), spring }
+        Tendon {
+            joints: xml::children(tendon, "joint").filter_map(joint).collect(),
+            spring,
+        }
     };
     let fixed = elements(root, "tendon").filter(|tendon| tendon.has_tag_name("fixed"));
-    fixed.filter_map(|tendon| Some((tendon.attribute("name")?.to_owned(), read(tendon)))).collect()
+    fixed
+        .filter_map(|tendon| Some((tendon.attribute("name")?.to_owned(), read(tendon))))
+        .collect()
 }
 
 /// The elements in all sections of this name.
@@ -205,17 +313,23 @@ mod tests {
         )
     }
 
-    /// `<connect>` couples the joints of a parallelogram with factors of exactly 1, on the range of the servo.
+    /// `<connect>` couples the joints of a parallelogram with factors of exactly 1, on the range of
+    /// the servo.
     #[test]
     fn closed_loops_couple_their_joints() {
         let (found, said) = read(&linkage("0 -0.015 0.015", "", ""));
         assert_eq!(found.ranges["driver"], [0.0, 0.8]);
-        assert_eq!(found.mimics["finger"], ("driver".to_owned(), 1.0, 0.0), "{said}");
+        assert_eq!(
+            found.mimics["finger"],
+            ("driver".to_owned(), 1.0, 0.0),
+            "{said}"
+        );
         assert_eq!(found.mimics["bar"], ("driver".to_owned(), 1.0, 0.0));
         assert!(!said.contains("W036"), "{said}");
     }
 
-    /// Bars of other lengths: the angles of Freudenstein's equation, and a warning because these are not on a line.
+    /// Bars of other lengths: the angles of Freudenstein's equation, and a warning because these
+    /// are not on a line.
     #[test]
     fn a_four_bar_linkage_agrees_with_its_equation() {
         // The ground is 0.04 m along y; crank 0.02, coupler 0.05, rocker 0.04 m; all turn about x.
@@ -223,11 +337,16 @@ mod tests {
         let ks = [
             ground / crank,
             ground / rocker,
-            (crank * crank - coupler * coupler + rocker * rocker + ground * ground) / (2.0 * crank * rocker),
+            (crank * crank - coupler * coupler + rocker * rocker + ground * ground)
+                / (2.0 * crank * rocker),
         ];
         let of_rocker = |crank_rad: f64| {
             let (sin, cos) = (libm::sin(crank_rad), libm::cos(crank_rad));
-            let (a, b, c) = (cos - ks[0] - ks[1] * cos + ks[2], -2.0 * sin, ks[0] - (ks[1] + 1.0) * cos + ks[2]);
+            let (a, b, c) = (
+                cos - ks[0] - ks[1] * cos + ks[2],
+                -2.0 * sin,
+                ks[0] - (ks[1] + 1.0) * cos + ks[2],
+            );
             2.0 * libm::atan2(-b - libm::sqrt(b * b - 4.0 * a * c), 2.0 * a)
         };
         let start = 1.2;
@@ -256,7 +375,11 @@ mod tests {
             let worst = off.fold(0.0, f64::max);
             assert_eq!(worst > 0.02, is_bent, "{worst}");
             assert!(worst < 0.06, "{worst}");
-            assert_eq!(said.contains("the coupling of `rocker` to `crank` is not linear"), is_bent, "{said}");
+            assert_eq!(
+                said.contains("the coupling of `rocker` to `crank` is not linear"),
+                is_bent,
+                "{said}"
+            );
         }
     }
 
@@ -271,9 +394,15 @@ mod tests {
             .replace("</body></body><body name=\"bar\"", "</body></body></body><body name=\"bar\"");
         let (found, said) = read(&text);
         let (_, factor, offset) = &found.mimics["coupler"];
-        assert!(factor.abs() < 1e-3 && offset.abs() < 1e-3, "{factor} {offset} {said}");
+        assert!(
+            factor.abs() < 1e-3 && offset.abs() < 1e-3,
+            "{factor} {offset} {said}"
+        );
         let (_, factor, offset) = &found.mimics["finger"];
-        assert!((factor - 1.0).abs() < 1e-2 && offset.abs() < 1e-2, "{factor} {offset}");
+        assert!(
+            (factor - 1.0).abs() < 1e-2 && offset.abs() < 1e-2,
+            "{factor} {offset}"
+        );
     }
 
     /// As robosuite writes the hands of Robotiq and Jaco: an equality fixes the length of a tendon.
@@ -297,6 +426,10 @@ mod tests {
         assert!(found.is_passive("second") && !found.is_passive("first"));
         // The length where the file places the bodies is beyond these limits: the spring decides.
         let (found, _) = read(&text("0 2"));
-        assert!((found.mimics["second"].2 + 0.5).abs() < 1e-9, "{:?}", found.mimics);
+        assert!(
+            (found.mimics["second"].2 + 0.5).abs() < 1e-9,
+            "{:?}",
+            found.mimics
+        );
     }
 }

@@ -17,7 +17,9 @@ impl Robot {
         class: Option<&str>,
         reader: &mut Reader,
     ) -> Vec<(Isometry3<f64>, String, Option<f64>)> {
-        xml::children(body, "geom").filter_map(|geom| self.solid(geom, own, class, reader)).collect()
+        xml::children(body, "geom")
+            .filter_map(|geom| self.solid(geom, own, class, reader))
+            .collect()
     }
 
     /// Returns a geom if it collides, with its mass if its volume is known.
@@ -34,14 +36,22 @@ impl Robot {
         }
         let pose = own * self.compiler.pose(&attributes, geom, reader);
         let (moved, shape, volume) = self.shape(geom, &attributes, reader)?;
-        let density = attributes.get("density").and_then(|text| text.parse().ok()).unwrap_or(DENSITY);
+        let density = attributes
+            .get("density")
+            .and_then(|text| text.parse().ok())
+            .unwrap_or(DENSITY);
         let stated = attributes.get("mass").and_then(|text| text.parse().ok());
         // An end-to-end geom has its pose from its ends.
         let pose = moved.map_or(pose, |moved| own * moved);
-        Some((pose, shape, stated.or(volume.map(|volume| volume * density))))
+        Some((
+            pose,
+            shape,
+            stated.or(volume.map(|volume| volume * density)),
+        ))
     }
 
-    /// The pose of a geom that is given by its ends, its element of a `<geometry>`, and its volume if it is known.
+    /// The pose of a geom that is given by its ends, its element of a `<geometry>`, and its volume
+    /// if it is known.
     fn shape(
         &self,
         geom: Node,
@@ -49,16 +59,31 @@ impl Robot {
         reader: &mut Reader,
     ) -> Option<(Option<Isometry3<f64>>, String, Option<f64>)> {
         use std::f64::consts::PI;
-        let kind = attributes.get("type").unwrap_or(if attributes.get("mesh").is_some() { "mesh" } else { "sphere" });
+        let kind = attributes
+            .get("type")
+            .unwrap_or(if attributes.get("mesh").is_some() {
+                "mesh"
+            } else {
+                "sphere"
+            });
         if kind == "mesh" {
             let name = attributes.get("mesh").unwrap_or_default();
             let Some((file, scale)) = self.compiler.meshes.get(name) else {
                 let message = format!("there is no mesh `{name}` in `<asset>`");
-                reader.error("W035", geom, message, "add `<mesh name=\"…\" file=\"…\"/>` to `<asset>`");
+                reader.error(
+                    "W035",
+                    geom,
+                    message,
+                    "add `<mesh name=\"…\" file=\"…\"/>` to `<asset>`",
+                );
                 return None;
             };
             let file = escaped(file);
-            return Some((None, format!("<mesh filename=\"{file}\" scale=\"{scale}\"/>"), None));
+            return Some((
+                None,
+                format!("<mesh filename=\"{file}\" scale=\"{scale}\"/>"),
+                None,
+            ));
         }
         if !["sphere", "box", "cylinder", "capsule", "ellipsoid"].contains(&kind) {
             // A plane or a height field does not belong to a robot or an object.
@@ -80,7 +105,13 @@ impl Robot {
                 let turned = UnitQuaternion::rotation_between(&Vector3::z(), &(b - a))
                     .unwrap_or_else(|| UnitQuaternion::from_axis_angle(&Vector3::x_axis(), PI));
                 let middle = nalgebra::center(&a, &b);
-                (Some(Isometry3::from_parts(Translation3::from(middle.coords), turned)), Some((b - a).norm() / 2.0))
+                (
+                    Some(Isometry3::from_parts(
+                        Translation3::from(middle.coords),
+                        turned,
+                    )),
+                    Some((b - a).norm() / 2.0),
+                )
             }
             None => (None, size.get(1).copied()),
         };
@@ -89,22 +120,41 @@ impl Robot {
             ("cylinder" | "capsule", None) => 2,
             _ => 3,
         };
-        if size.len() < wanted || size.iter().any(|number| !(number.is_finite() && *number >= 0.0)) {
-            let message = format!("a geom of the type {kind} needs {wanted} positive numbers in `size`");
-            reader.error("W034", geom, message, "sizes are radii and half lengths in metres");
+        if size.len() < wanted
+            || size
+                .iter()
+                .any(|number| !(number.is_finite() && *number >= 0.0))
+        {
+            let message =
+                format!("a geom of the type {kind} needs {wanted} positive numbers in `size`");
+            reader.error(
+                "W034",
+                geom,
+                message,
+                "sizes are radii and half lengths in metres",
+            );
             return None;
         }
         let (r, half) = (size[0], half_length.unwrap_or(0.0));
         let (shape, volume) = match kind {
-            "sphere" => (format!("<sphere radius=\"{r}\"/>"), 4.0 / 3.0 * PI * r.powi(3)),
-            "cylinder" => (format!("<cylinder radius=\"{r}\" length=\"{}\"/>", 2.0 * half), 2.0 * PI * r * r * half),
+            "sphere" => (
+                format!("<sphere radius=\"{r}\"/>"),
+                4.0 / 3.0 * PI * r.powi(3),
+            ),
+            "cylinder" => (
+                format!("<cylinder radius=\"{r}\" length=\"{}\"/>", 2.0 * half),
+                2.0 * PI * r * r * half,
+            ),
             "capsule" => (
                 format!("<capsule radius=\"{r}\" length=\"{}\"/>", 2.0 * half),
                 2.0 * PI * r * r * half + 4.0 / 3.0 * PI * r.powi(3),
             ),
             "ellipsoid" if self.materials.is_some() => {
                 let [x, y, z] = [size[0], size[1], size[2]];
-                (format!("<ellipsoid radii=\"{x} {y} {z}\"/>"), 4.0 / 3.0 * PI * x * y * z)
+                (
+                    format!("<ellipsoid radii=\"{x} {y} {z}\"/>"),
+                    4.0 / 3.0 * PI * x * y * z,
+                )
             }
             _ => {
                 let [x, y, z] = [size[0], size[1], size[2]].map(|extent| 2.0 * extent);

@@ -1,7 +1,9 @@
-//! Closed loops of links in MJCF, such as four-bar linkages: how their joints follow the one with the motor.
+//! Closed loops of links in MJCF, such as four-bar linkages: how their joints follow the one with
+//! the motor.
 //!
-//! A robot is a tree here. Each `<connect>` closes a loop of it, so that some of its joints follow others. Their positions
-//! are found on the range of the motor's joint by Gauss-Newton steps, and a straight line is fitted to them.
+//! A robot is a tree here. Each `<connect>` closes a loop of it, so that some of its joints follow
+//! others. Their positions are found on the range of the motor's joint by Gauss-Newton steps, and a
+//! straight line is fitted to them.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -15,11 +17,12 @@ use crate::foreign::xml::{self, Bound, Node, Reader};
 const SAMPLES: usize = 40;
 /// Most steps of a solution.
 const MOST_STEPS: usize = 30;
-/// Most loops of a file that are closed, and most joints without a motor in one mechanism: a gripper has a tenth of them.
+/// Most loops of a file that are closed, and most joints without a motor in one mechanism: a
+/// gripper has a tenth of them.
 const MOST_LOOPS: usize = 200;
 const MOST_PASSIVE: usize = 12;
-/// Weight of the distance between two points that a loop connects, against 1 for the position of the stiffest spring.
-/// Unit: 1/m.
+/// Weight of the distance between two points that a loop connects, against 1 for the position of
+/// the stiffest spring. Unit: 1/m.
 const CLOSED: f64 = 1e5;
 /// Weight of a joint's own position: a joint that no spring and no loop moves stays where it is.
 const AT_REST: f64 = 1e-3;
@@ -78,32 +81,61 @@ pub(super) fn couplings(
     }
     let follows = |hinge: &usize| known.mimics.contains_key(&tree.hinges[*hinge].name);
     let is_passive = |hinge: &usize| !follows(hinge) && known.is_passive(&tree.hinges[*hinge].name);
-    let closures = elements(root, "equality").filter_map(|node| tree.closure(node, compiler, reader));
-    let closures: Vec<Closure<'_>> = closures.filter(|closure| !closure.hinges.is_empty()).take(MOST_LOOPS).collect();
+    let closures =
+        elements(root, "equality").filter_map(|node| tree.closure(node, compiler, reader));
+    let closures: Vec<Closure<'_>> = closures
+        .filter(|closure| !closure.hinges.is_empty())
+        .take(MOST_LOOPS)
+        .collect();
     for group in together(closures, is_passive) {
-        let hinges: BTreeSet<usize> = group.iter().flat_map(|closure| closure.hinges.iter().copied()).collect();
+        let hinges: BTreeSet<usize> = group
+            .iter()
+            .flat_map(|closure| closure.hinges.iter().copied())
+            .collect();
         let mut passive: Vec<usize> = hinges.iter().copied().filter(is_passive).collect();
-        let mut leaders: Vec<usize> = hinges.iter().copied().filter(|hinge| !is_passive(hinge)).collect();
+        let mut leaders: Vec<usize> = hinges
+            .iter()
+            .copied()
+            .filter(|hinge| !is_passive(hinge))
+            .collect();
         if known.actuated.is_none() {
             // The first joint of the file is then as good as any other.
-            (leaders, passive) = (hinges.iter().copied().take(1).collect(), hinges.iter().copied().skip(1).collect());
+            (leaders, passive) = (
+                hinges.iter().copied().take(1).collect(),
+                hinges.iter().copied().skip(1).collect(),
+            );
         }
-        let Some(node) = group.first().map(|closure| closure.node) else { continue };
+        let Some(node) = group.first().map(|closure| closure.node) else {
+            continue;
+        };
         let ([leader], false) = (leaders.as_slice(), passive.is_empty()) else {
             continue;
         };
         let ways = match passive.len() {
-            0..=MOST_PASSIVE => Loop { tree: &tree, closures: &group, leader: *leader, passive: &passive }.ways(),
+            0..=MOST_PASSIVE => Loop {
+                tree: &tree,
+                closures: &group,
+                leader: *leader,
+                passive: &passive,
+            }
+            .ways(),
             _ => Vec::new(),
         };
         let leads = &tree.hinges[*leader].name;
         if ways.len() < SAMPLES / 2 {
-            let message = format!("the loop of links that `{leads}` moves can't be closed: it is left open");
-            reader.warning("W036", node, message, "its links then stay where the file puts them");
+            let message =
+                format!("the loop of links that `{leads}` moves can't be closed: it is left open");
+            reader.warning(
+                "W036",
+                node,
+                message,
+                "its links then stay where the file puts them",
+            );
             continue;
         }
         for (place, hinge) in passive.iter().enumerate() {
-            let (factor, offset, off) = line(ways.iter().map(|(at, followers)| (*at, followers[place])));
+            let (factor, offset, off) =
+                line(ways.iter().map(|(at, followers)| (*at, followers[place])));
             let follower = &tree.hinges[*hinge].name;
             if off > BENT {
                 not_linear(node, follower, leads, reader);
@@ -115,12 +147,21 @@ pub(super) fn couplings(
 }
 
 /// Groups of closures that move joints without a motor in common.
-fn together<'a>(closures: Vec<Closure<'a>>, is_passive: impl Fn(&usize) -> bool) -> Vec<Vec<Closure<'a>>> {
+fn together<'a>(
+    closures: Vec<Closure<'a>>,
+    is_passive: impl Fn(&usize) -> bool,
+) -> Vec<Vec<Closure<'a>>> {
     let mut groups: Vec<Vec<Closure<'a>>> = Vec::new();
     for closure in closures {
-        let shares =
-            |other: &Closure<'_>| closure.hinges.iter().any(|hinge| is_passive(hinge) && other.hinges.contains(hinge));
-        let (with, without): (Vec<_>, Vec<_>) = groups.into_iter().partition(|group| group.iter().any(shares));
+        let shares = |other: &Closure<'_>| {
+            closure
+                .hinges
+                .iter()
+                .any(|hinge| is_passive(hinge) && other.hinges.contains(hinge))
+        };
+        let (with, without): (Vec<_>, Vec<_>) = groups
+            .into_iter()
+            .partition(|group| group.iter().any(shares));
         groups = without;
         groups.push(with.into_iter().flatten().chain([closure]).collect());
     }
@@ -130,19 +171,37 @@ fn together<'a>(closures: Vec<Closure<'a>>, is_passive: impl Fn(&usize) -> bool)
 /// Factor and offset of the straight line through points, and the largest deviation from it.
 fn line(points: impl Iterator<Item = (f64, f64)> + Clone) -> (f64, f64, f64) {
     let n = points.clone().count().max(1) as f64;
-    let (x, y) = points.clone().fold((0.0, 0.0), |(x, y), point| (x + point.0 / n, y + point.1 / n));
-    let (above, below) =
-        points.clone().fold((0.0, 0.0), |(a, b), (at, to)| (a + (at - x) * (to - y), b + (at - x) * (at - x)));
+    let (x, y) = points.clone().fold((0.0, 0.0), |(x, y), point| {
+        (x + point.0 / n, y + point.1 / n)
+    });
+    let (above, below) = points.clone().fold((0.0, 0.0), |(a, b), (at, to)| {
+        (a + (at - x) * (to - y), b + (at - x) * (at - x))
+    });
     let factor = if below > 0.0 { above / below } else { 0.0 };
     let offset = y - factor * x;
-    // Parallel links have factors of exactly 1 or -1, and no offset; a joint that a spring holds at its limit does not move.
-    let near = |value: f64| if (value - value.round()).abs() < 1e-6 { value.round() } else { value };
-    let least = points.clone().map(|(_, to)| to).fold(f64::INFINITY, f64::min);
-    let most = points.clone().map(|(_, to)| to).fold(f64::NEG_INFINITY, f64::max);
+    // Parallel links have factors of exactly 1 or -1, and no offset; a joint that a spring holds at
+    // its limit does not move.
+    let near = |value: f64| {
+        if (value - value.round()).abs() < 1e-6 {
+            value.round()
+        } else {
+            value
+        }
+    };
+    let least = points
+        .clone()
+        .map(|(_, to)| to)
+        .fold(f64::INFINITY, f64::min);
+    let most = points
+        .clone()
+        .map(|(_, to)| to)
+        .fold(f64::NEG_INFINITY, f64::max);
     if most - least < BENT / 2.0 {
         return (0.0, near(y), most - least);
     }
-    let off = points.map(|(at, to)| (factor * at + offset - to).abs()).fold(0.0, f64::max);
+    let off = points
+        .map(|(at, to)| (factor * at + offset - to).abs())
+        .fold(0.0, f64::max);
     (near(factor), near(offset), off)
 }
 
@@ -152,15 +211,23 @@ impl Tree {
         let mut tree = Self::default();
         let mut unheard = Reader::new(reader.source);
         for worldbody in xml::children(root, "worldbody") {
-            tree.add(worldbody, (None, Isometry3::identity()), None, (compiler, &mut unheard));
+            tree.add(
+                worldbody,
+                (None, Isometry3::identity()),
+                None,
+                (compiler, &mut unheard),
+            );
         }
         tree
     }
 
-    /// Returns the positions of joints where the bodies are as the file places them, if these are not 0.
+    /// Returns the positions of joints where the bodies are as the file places them, if these are
+    /// not 0.
     pub(super) fn starts(&self) -> BTreeMap<String, f64> {
         let moved = self.hinges.iter().filter(|hinge| hinge.start != 0.0);
-        moved.map(|hinge| (hinge.name.clone(), hinge.start)).collect()
+        moved
+            .map(|hinge| (hinge.name.clone(), hinge.start))
+            .collect()
     }
 
     /// Returns the limits of a joint, if it has any.
@@ -189,56 +256,102 @@ impl Tree {
                     self.add(child, (body, shift), own, (compiler, reader));
                 }
                 "site" => {
-                    let Some(name) = child.attribute("name") else { continue };
+                    let Some(name) = child.attribute("name") else {
+                        continue;
+                    };
                     let at = shift * compiler.pose(&attributes, child, reader);
-                    self.sites.insert(name.to_owned(), (body, at * Point3::origin()));
+                    self.sites
+                        .insert(name.to_owned(), (body, at * Point3::origin()));
                 }
                 "body" => {
                     let pose = shift * compiler.pose(&attributes, child, reader);
                     let name = child.attribute("name").unwrap_or("body");
                     let first = self.hinges.len();
                     for joint in xml::children(child, "joint") {
-                        self.hinges.extend(hinge(joint, name, own, (compiler, reader)));
+                        self.hinges
+                            .extend(hinge(joint, name, own, (compiler, reader)));
                     }
-                    self.bodies.push(Body { parent: body, pose, hinges: (first..self.hinges.len()).collect() });
+                    self.bodies.push(Body {
+                        parent: body,
+                        pose,
+                        hinges: (first..self.hinges.len()).collect(),
+                    });
                     let idx = self.bodies.len() - 1;
                     self.names.insert(name.to_owned(), idx);
-                    self.add(child, (Some(idx), Isometry3::identity()), own, (compiler, reader));
+                    self.add(
+                        child,
+                        (Some(idx), Isometry3::identity()),
+                        own,
+                        (compiler, reader),
+                    );
                 }
                 _ => {}
             }
         }
     }
 
-    /// The points that a `<connect>` puts together. Returns `None` for other elements and those that name no known body.
-    fn closure<'a>(&self, node: Node<'a>, compiler: &Compiler, reader: &mut Reader) -> Option<Closure<'a>> {
+    /// The points that a `<connect>` puts together. Returns `None` for other elements and those
+    /// that name no known body.
+    fn closure<'a>(
+        &self,
+        node: Node<'a>,
+        compiler: &Compiler,
+        reader: &mut Reader,
+    ) -> Option<Closure<'a>> {
         if !node.has_tag_name("connect") || node.attribute("active") == Some("false") {
             return None;
         }
         let attributes = compiler.attributes(node, None);
-        let body = |name: &str| if name == "world" { Some(None) } else { self.names.get(name).copied().map(Some) };
-        let ends = if let (Some(one), Some(other)) = (attributes.get("site1"), attributes.get("site2")) {
-            [*self.sites.get(one)?, *self.sites.get(other)?]
-        } else {
-            let anchor = reader.numbers(node, attributes.get("anchor")?, Bound::Finite)?;
-            let (one, other) = (body(attributes.get("body1")?)?, body(attributes.get("body2").unwrap_or("world"))?);
-            let start = self.at_start();
-            let at = Point3::from(anchor);
-            [(one, at), (other, self.pose(other, &start).inverse() * (self.pose(one, &start) * at))]
+        let body = |name: &str| {
+            if name == "world" {
+                Some(None)
+            } else {
+                self.names.get(name).copied().map(Some)
+            }
         };
+        let ends =
+            if let (Some(one), Some(other)) = (attributes.get("site1"), attributes.get("site2")) {
+                [*self.sites.get(one)?, *self.sites.get(other)?]
+            } else {
+                let anchor = reader.numbers(node, attributes.get("anchor")?, Bound::Finite)?;
+                let (one, other) = (
+                    body(attributes.get("body1")?)?,
+                    body(attributes.get("body2").unwrap_or("world"))?,
+                );
+                let start = self.at_start();
+                let at = Point3::from(anchor);
+                [
+                    (one, at),
+                    (
+                        other,
+                        self.pose(other, &start).inverse() * (self.pose(one, &start) * at),
+                    ),
+                ]
+            };
         let [one, other] = ends.map(|(body, _)| self.moving(body));
-        Some(Closure { node, ends, hinges: one.symmetric_difference(&other).copied().collect() })
+        Some(Closure {
+            node,
+            ends,
+            hinges: one.symmetric_difference(&other).copied().collect(),
+        })
     }
 
     /// Joints that move a body.
     fn moving(&self, body: Option<usize>) -> BTreeSet<usize> {
         let bodies = std::iter::successors(body, |idx| self.bodies[*idx].parent);
-        bodies.flat_map(|idx| self.bodies[idx].hinges.iter().copied()).collect()
+        bodies
+            .flat_map(|idx| self.bodies[idx].hinges.iter().copied())
+            .collect()
     }
 
     /// Pose of a body with the joints at these positions. Frame: world.
     fn pose(&self, body: Option<usize>, positions: &[f64]) -> Isometry3<f64> {
-        let Some(Body { parent, pose, hinges }) = body.map(|idx| &self.bodies[idx]) else {
+        let Some(Body {
+            parent,
+            pose,
+            hinges,
+        }) = body.map(|idx| &self.bodies[idx])
+        else {
             return Isometry3::identity();
         };
         let moved = hinges.iter().fold(Isometry3::identity(), |moved, idx| {
@@ -248,7 +361,9 @@ impl Tree {
             moved
                 * match hinge.slides {
                     true => Translation3::from(hinge.axis.scale(position)).into(),
-                    false => at * UnitQuaternion::from_axis_angle(&hinge.axis, position) * at.inverse(),
+                    false => {
+                        at * UnitQuaternion::from_axis_angle(&hinge.axis, position) * at.inverse()
+                    }
                 }
         });
         self.pose(*parent, positions) * pose * moved
@@ -256,25 +371,47 @@ impl Tree {
 }
 
 /// Reads a joint that turns or slides.
-fn hinge(joint: Node, body: &str, class: Option<&str>, (compiler, reader): (&Compiler, &mut Reader)) -> Option<Hinge> {
+fn hinge(
+    joint: Node,
+    body: &str,
+    class: Option<&str>,
+    (compiler, reader): (&Compiler, &mut Reader),
+) -> Option<Hinge> {
     let attributes = compiler.attributes(joint, class);
     let kind = attributes.get("type").unwrap_or("hinge");
     let slides = kind == "slide";
     if !slides && kind != "hinge" {
         return None;
     }
-    let mut numbers =
-        |name: &str| attributes.get(name).and_then(|text| reader.numbers::<3>(joint, text, Bound::Finite));
-    let (axis, at) = (numbers("axis").unwrap_or([0.0, 0.0, 1.0]), numbers("pos").unwrap_or([0.0; 3]));
-    let range = attributes.get("range").and_then(|text| reader.numbers::<2>(joint, text, Bound::Finite));
-    let number = |name: &str| attributes.get(name).and_then(|text| text.parse::<f64>().ok()).unwrap_or(0.0);
+    let mut numbers = |name: &str| {
+        attributes
+            .get(name)
+            .and_then(|text| reader.numbers::<3>(joint, text, Bound::Finite))
+    };
+    let (axis, at) = (
+        numbers("axis").unwrap_or([0.0, 0.0, 1.0]),
+        numbers("pos").unwrap_or([0.0; 3]),
+    );
+    let range = attributes
+        .get("range")
+        .and_then(|text| reader.numbers::<2>(joint, text, Bound::Finite));
+    let number = |name: &str| {
+        attributes
+            .get(name)
+            .and_then(|text| text.parse::<f64>().ok())
+            .unwrap_or(0.0)
+    };
     let unit = if slides { 1.0 } else { compiler.angle };
     Some(Hinge {
-        name: joint.attribute("name").map_or_else(|| format!("{body}_joint"), str::to_owned),
+        name: joint
+            .attribute("name")
+            .map_or_else(|| format!("{body}_joint"), str::to_owned),
         axis: Unit::try_new(Vector3::from(axis), 1e-9)?,
         at: Vector3::from(at),
         slides,
-        range: range.filter(|_| attributes.get("limited") != Some("false")).map(|ends| ends.map(|end| end * unit)),
+        range: range
+            .filter(|_| attributes.get("limited") != Some("false"))
+            .map(|ends| ends.map(|end| end * unit)),
         start: number("ref") * unit,
         stiffness: number("stiffness").max(0.0),
         rest: number("springref") * unit,
@@ -293,7 +430,9 @@ impl Loop<'_> {
     /// Returns positions of the leading joint where the loops close, each with those of the others.
     fn ways(&self) -> Vec<(f64, Vec<f64>)> {
         let [lower, upper] = self.tree.hinges[self.leader].range.unwrap_or([-1.0, 1.0]);
-        let start = self.tree.hinges[self.leader].start.clamp(lower.min(upper), upper.max(lower));
+        let start = self.tree.hinges[self.leader]
+            .start
+            .clamp(lower.min(upper), upper.max(lower));
         let mut found = Vec::new();
         for end in [lower, upper] {
             let mut positions = self.tree.at_start();
@@ -301,7 +440,10 @@ impl Loop<'_> {
                 positions[self.leader] = start + (end - start) * idx as f64 / SAMPLES as f64;
                 self.close(&mut positions);
                 if self.gap_m(&positions) < GAP_M && end != start {
-                    found.push((positions[self.leader], self.passive.iter().map(|idx| positions[*idx]).collect()));
+                    found.push((
+                        positions[self.leader],
+                        self.passive.iter().map(|idx| positions[*idx]).collect(),
+                    ));
                 }
             }
         }
@@ -310,29 +452,45 @@ impl Loop<'_> {
 
     /// Largest distance between connected points. Unit: metres.
     fn gap_m(&self, positions: &[f64]) -> f64 {
-        self.closures.iter().map(|closure| self.gap(closure, positions).norm()).fold(0.0, f64::max)
+        self.closures
+            .iter()
+            .map(|closure| self.gap(closure, positions).norm())
+            .fold(0.0, f64::max)
     }
 
     fn gap(&self, closure: &Closure<'_>, positions: &[f64]) -> Vector3<f64> {
-        let [one, other] = closure.ends.map(|(body, at)| self.tree.pose(body, positions) * at);
+        let [one, other] = closure
+            .ends
+            .map(|(body, at)| self.tree.pose(body, positions) * at);
         one - other
     }
 
-    /// Moves the passive joints to where the loops are closed and springs are relaxed most, within the limits.
+    /// Moves the passive joints to where the loops are closed and springs are relaxed most, within
+    /// the limits.
     fn close(&self, positions: &mut [f64]) {
         let mut held: BTreeSet<usize> = BTreeSet::new();
         for _ in 0..MOST_STEPS {
-            let free: Vec<usize> = self.passive.iter().copied().filter(|hinge| !held.contains(hinge)).collect();
-            let Some(step) = self.step(positions, &free) else { break };
+            let free: Vec<usize> = self
+                .passive
+                .iter()
+                .copied()
+                .filter(|hinge| !held.contains(hinge))
+                .collect();
+            let Some(step) = self.step(positions, &free) else {
+                break;
+            };
             let mut largest = 0.0f64;
             let mut is_held = false;
             for (hinge, change) in free.iter().zip(step.iter()) {
                 let to = positions[*hinge] + change.clamp(-0.3, 0.3);
-                let [lower, upper] = self.tree.hinges[*hinge].range.unwrap_or([f64::NEG_INFINITY, f64::INFINITY]);
+                let [lower, upper] = self.tree.hinges[*hinge]
+                    .range
+                    .unwrap_or([f64::NEG_INFINITY, f64::INFINITY]);
                 let within = to.max(lower).min(upper);
                 largest = largest.max((within - positions[*hinge]).abs());
                 positions[*hinge] = within;
-                // Springs push a joint against its limit, where it stays; loops move others away again.
+                // Springs push a joint against its limit, where it stays; loops move others away
+                // again.
                 if within != to && self.tree.hinges[*hinge].stiffness == 0.0 && self.is_sprung() {
                     is_held |= held.insert(*hinge);
                 }
@@ -344,12 +502,18 @@ impl Loop<'_> {
     }
 
     fn is_sprung(&self) -> bool {
-        self.passive.iter().any(|hinge| self.tree.hinges[*hinge].stiffness > 0.0)
+        self.passive
+            .iter()
+            .any(|hinge| self.tree.hinges[*hinge].stiffness > 0.0)
     }
 
     /// The least squares solution of the linearised closures and springs for the free joints.
     fn step(&self, positions: &[f64], free: &[usize]) -> Option<DVector<f64>> {
-        let stiffest = self.passive.iter().map(|idx| self.tree.hinges[*idx].stiffness).fold(0.0, f64::max);
+        let stiffest = self
+            .passive
+            .iter()
+            .map(|idx| self.tree.hinges[*idx].stiffness)
+            .fold(0.0, f64::max);
         let n_rows = 3 * self.closures.len() + free.len();
         let residual = |positions: &[f64]| {
             let mut rows = Vec::with_capacity(n_rows);
@@ -357,7 +521,12 @@ impl Loop<'_> {
                 rows.extend(self.gap(closure, positions).iter().map(|gap| gap * CLOSED));
             }
             for idx in free {
-                let Hinge { stiffness, rest, start, .. } = &self.tree.hinges[*idx];
+                let Hinge {
+                    stiffness,
+                    rest,
+                    start,
+                    ..
+                } = &self.tree.hinges[*idx];
                 rows.push(match *stiffness > 0.0 {
                     true => (stiffness / stiffest).sqrt() * (positions[*idx] - rest),
                     false => AT_REST * (positions[*idx] - start),
@@ -375,6 +544,8 @@ impl Loop<'_> {
             };
             slopes.set_column(column, &((at(1e-5) - at(-1e-5)) / 2e-5));
         }
-        (slopes.transpose() * &slopes).cholesky().map(|solver| solver.solve(&(slopes.transpose() * -now)))
+        (slopes.transpose() * &slopes)
+            .cholesky()
+            .map(|solver| solver.solve(&(slopes.transpose() * -now)))
     }
 }

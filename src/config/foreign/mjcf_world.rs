@@ -23,10 +23,16 @@ pub(crate) struct Piece {
 ///
 /// # Errors
 /// Faults of the text: W031 to W036, W055.
-pub(crate) fn read(source: &Source, path: &Path, files: &actcheck_base::Files) -> Result<Vec<Piece>, Diagnostics> {
+pub(crate) fn read(
+    source: &Source,
+    path: &Path,
+    files: &actcheck_base::Files,
+) -> Result<Vec<Piece>, Diagnostics> {
     with_robot(source, path, files, |root, robot, reader| {
         let mut pieces = Vec::new();
-        let Some(worldbody) = xml::child(root, "worldbody") else { return pieces };
+        let Some(worldbody) = xml::child(root, "worldbody") else {
+            return pieces;
+        };
         let mut names = BTreeMap::new();
         let mut named = |written: Option<&str>, otherwise: &str| {
             let mut name = unique(&mut names, written.unwrap_or(otherwise));
@@ -35,7 +41,9 @@ pub(crate) fn read(source: &Source, path: &Path, files: &actcheck_base::Files) -
             name
         };
         for body in xml::children(worldbody, "body") {
-            let free = |joint: &Node| joint.has_tag_name("freejoint") || joint.attribute("type") == Some("free");
+            let free = |joint: &Node| {
+                joint.has_tag_name("freejoint") || joint.attribute("type") == Some("free")
+            };
             let moves = body.children().any(|child| free(&child));
             let mut own = robot.alone();
             let world = own.unique("world");
@@ -47,7 +55,11 @@ pub(crate) fn read(source: &Source, path: &Path, files: &actcheck_base::Files) -
             let mut own = robot.alone();
             if let Some((pose, shape, _)) = own.solid(geom, &Isometry3::identity(), None, reader) {
                 own.out.link("solid", None, &[(pose, shape)]);
-                pieces.push(own.piece(named(geom.attribute("name"), "solid"), reader.source, false));
+                pieces.push(own.piece(
+                    named(geom.attribute("name"), "solid"),
+                    reader.source,
+                    false,
+                ));
             }
         }
         pieces
@@ -56,7 +68,15 @@ pub(crate) fn read(source: &Source, path: &Path, files: &actcheck_base::Files) -
 
 impl Robot {
     fn piece(self, name: String, source: &Source, moves: bool) -> Piece {
-        let urdf = Source::new(format!("{} (`{name}` as URDF)", source.name), self.out.finish(&name));
-        Piece { name, urdf, materials: self.materials.unwrap_or_default(), moves }
+        let urdf = Source::new(
+            format!("{} (`{name}` as URDF)", source.name),
+            self.out.finish(&name),
+        );
+        Piece {
+            name,
+            urdf,
+            materials: self.materials.unwrap_or_default(),
+            moves,
+        }
     }
 }

@@ -1,8 +1,8 @@
 //! Third-party models: folders in Gazebo's layout, SDF, URDF, and their mesh files.
 //!
-//! An element that the simulation does not support is an error if it changes the model, and a warning if the model
-//! works without it. The faces of a building become plates. Never: ignores an element silently, decomposes a mesh by its volume, or
-//! guesses a category.
+//! An element that the simulation does not support is an error if it changes the model, and a
+//! warning if the model works without it. The faces of a building become plates. Never: ignores an
+//! element silently, decomposes a mesh by its volume, or guesses a category.
 
 mod assembly;
 mod body;
@@ -54,5 +54,6 @@ pub(crate) fn root_name(text: &str) -> Option<&str> {
         rest = rest[rest.find(end)? + end.len()..].trim_start();
     }
     let name = rest.strip_prefix('<')?;
-    name.split(|c: char| c.is_whitespace() || c == '>' || c == '/').next()
+    name.split(|c: char| c.is_whitespace() || c == '>' || c == '/')
+        .next()
 }

@@ -28,7 +28,12 @@ pub(crate) struct RobotText {
 }
 
 /// Reads the links, joints and collision meshes, and reports every fault with its span.
-pub(crate) fn read(source: &Source, path: &Path, lookup: &Lookup, found: &mut Diagnostics) -> RobotText {
+pub(crate) fn read(
+    source: &Source,
+    path: &Path,
+    lookup: &Lookup,
+    found: &mut Diagnostics,
+) -> RobotText {
     let mut shapes = Shapes::new(lookup, path);
     let mut meshes = BTreeMap::new();
     let document = match xml::parse_model(source, &source.text) {
@@ -49,12 +54,22 @@ pub(crate) fn read(source: &Source, path: &Path, lookup: &Lookup, found: &mut Di
     let tree = if root.tag_name().name() == "robot" {
         Some(robot_tree::read(root, &mut reader)).filter(|tree| !tree.links.is_empty())
     } else {
-        let message = format!("the root is `<{}>` instead of `<robot>`", root.tag_name().name());
-        reader.error("W032", root, message, "a URDF file begins with `<robot name=\"…\">`");
+        let message = format!(
+            "the root is `<{}>` instead of `<robot>`",
+            root.tag_name().name()
+        );
+        reader.error(
+            "W032",
+            root,
+            message,
+            "a URDF file begins with `<robot name=\"…\">`",
+        );
         None
     };
     for link in xml::children(root, "link") {
-        for collision in xml::children(link, "collision").filter(|one| robot_text::placeholder(*one).is_none()) {
+        for collision in
+            xml::children(link, "collision").filter(|one| robot_text::placeholder(*one).is_none())
+        {
             read_collision(collision, &mut shapes, &mut meshes, &mut reader);
         }
     }
@@ -67,7 +82,13 @@ pub(crate) fn read(source: &Source, path: &Path, lookup: &Lookup, found: &mut Di
     }
     let mends = robot_inertia::check(root, &meshes, &mut reader);
     found.extend(reader.found);
-    RobotText { meshes, digest: shapes.digest.finish(), tree, mends, edits }
+    RobotText {
+        meshes,
+        digest: shapes.digest.finish(),
+        tree,
+        mends,
+        edits,
+    }
 }
 
 fn read_collision(
@@ -76,13 +97,17 @@ fn read_collision(
     meshes: &mut BTreeMap<String, Vec<Shape>>,
     reader: &mut Reader,
 ) {
-    let Some(geometry) = reader.required(collision, "geometry") else { return };
+    let Some(geometry) = reader.required(collision, "geometry") else {
+        return;
+    };
     let Some(mesh) = xml::child(geometry, "mesh") else {
         // Primitives are created with the robot; this only validates their numbers.
         shapes.urdf(geometry, reader);
         return;
     };
-    let Some(name) = reader.attribute(mesh, "filename") else { return };
+    let Some(name) = reader.attribute(mesh, "filename") else {
+        return;
+    };
     if !meshes.contains_key(name)
         && let Some(shape) = shapes.mesh(mesh, name, [1.0; 3], reader)
     {

@@ -26,16 +26,25 @@ pub(crate) struct Mend {
     pub(crate) change: String,
 }
 
-/// Reports the moments of inertia of moving links that no body has: a principal moment of 0 or less (W034), with which
-/// the smallest torque would turn the link infinitely fast, or one that exceeds the sum of the others (W036). Links that
-/// are fixed to each other are one body, as in the simulation. Returns the proposed changes. `meshes` are the solids
-/// by mesh file.
-pub(crate) fn check(root: Node, meshes: &BTreeMap<String, Vec<Shape>>, reader: &mut Reader) -> Vec<Mend> {
-    let links: BTreeMap<&str, Node> =
-        xml::children(root, "link").filter_map(|link| Some((link.attribute("name")?, link))).collect();
+/// Reports the moments of inertia of moving links that no body has: a principal moment of 0 or less
+/// (W034), with which the smallest torque would turn the link infinitely fast, or one that exceeds
+/// the sum of the others (W036). Links that are fixed to each other are one body, as in the
+/// simulation. Returns the proposed changes. `meshes` are the solids by mesh file.
+pub(crate) fn check(
+    root: Node,
+    meshes: &BTreeMap<String, Vec<Shape>>,
+    reader: &mut Reader,
+) -> Vec<Mend> {
+    let links: BTreeMap<&str, Node> = xml::children(root, "link")
+        .filter_map(|link| Some((link.attribute("name")?, link)))
+        .collect();
     let mut mends = Vec::new();
-    for joint in xml::children(root, "joint").filter(|joint| joint.attribute("type") != Some("fixed")) {
-        let Some(moved) = end(joint, "child") else { continue };
+    for joint in
+        xml::children(root, "joint").filter(|joint| joint.attribute("type") != Some("fixed"))
+    {
+        let Some(moved) = end(joint, "child") else {
+            continue;
+        };
         let masses = masses_of_body(root, moved, &links, reader);
         if masses.iter().map(|mass| mass.kg).sum::<f64>() < LEAST_LINK_KG {
             continue;
@@ -70,15 +79,25 @@ fn masses_of_body<'n>(
     links: &BTreeMap<&str, Node<'n>>,
     reader: &mut Reader,
 ) -> Vec<LinkMass<'n>> {
-    let fixed: Vec<Node> =
-        xml::children(root, "joint").filter(|joint| joint.attribute("type") == Some("fixed")).collect();
+    let fixed: Vec<Node> = xml::children(root, "joint")
+        .filter(|joint| joint.attribute("type") == Some("fixed"))
+        .collect();
     let mut masses = Vec::new();
     let mut seen = BTreeSet::from([moved]);
     let mut open = vec![(moved, Isometry3::identity())];
     while let Some((name, at)) = open.pop() {
-        masses.extend(links.get(name).and_then(|link| read_mass(*link, &at, reader)));
-        for joint in fixed.iter().filter(|joint| end(**joint, "parent") == Some(name)) {
-            let Some(child) = end(*joint, "child").filter(|child| seen.insert(child)) else { continue };
+        masses.extend(
+            links
+                .get(name)
+                .and_then(|link| read_mass(*link, &at, reader)),
+        );
+        for joint in fixed
+            .iter()
+            .filter(|joint| end(**joint, "parent") == Some(name))
+        {
+            let Some(child) = end(*joint, "child").filter(|child| seen.insert(child)) else {
+                continue;
+            };
             open.extend(origin(*joint, reader).map(|origin| (child, at * origin)));
         }
     }
@@ -92,7 +111,11 @@ fn end<'n>(joint: Node<'n>, which: &str) -> Option<&'n str> {
 /// Reads the mass of a link; `None` if it has none. Moments that are missing are 0.
 fn read_mass<'n>(link: Node<'n>, at: &Isometry3<f64>, reader: &mut Reader) -> Option<LinkMass<'n>> {
     let inertial = xml::child(link, "inertial")?;
-    let kg: f64 = xml::child(inertial, "mass")?.attribute("value")?.trim().parse().ok()?;
+    let kg: f64 = xml::child(inertial, "mass")?
+        .attribute("value")?
+        .trim()
+        .parse()
+        .ok()?;
     if !(kg.is_finite() && kg > 0.0) {
         return None;
     }
@@ -102,20 +125,32 @@ fn read_mass<'n>(link: Node<'n>, at: &Isometry3<f64>, reader: &mut Reader) -> Op
         Some(inertia) => {
             let mut entry = |name: &str| match inertia.attribute(name) {
                 None => Some(0.0),
-                Some(written) => reader.numbers::<1>(inertia, written, Bound::Finite).map(|[number]| number),
+                Some(written) => reader
+                    .numbers::<1>(inertia, written, Bound::Finite)
+                    .map(|[number]| number),
             };
             let (xx, xy, xz) = (entry("ixx")?, entry("ixy")?, entry("ixz")?);
             let (yy, yz, zz) = (entry("iyy")?, entry("iyz")?, entry("izz")?);
             Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz)
         }
     };
-    Some(LinkMass { link, inertial, kg, at, about_com })
+    Some(LinkMass {
+        link,
+        inertial,
+        kg,
+        at,
+        about_com,
+    })
 }
 
 /// The inertia tensor of all masses about their common centre, by the parallel axis theorem.
 fn together(masses: &[LinkMass]) -> Matrix3<f64> {
     let total: f64 = masses.iter().map(|mass| mass.kg).sum();
-    let com = masses.iter().map(|mass| mass.at.translation.vector * mass.kg).sum::<Vector3<f64>>() / total;
+    let com = masses
+        .iter()
+        .map(|mass| mass.at.translation.vector * mass.kg)
+        .sum::<Vector3<f64>>()
+        / total;
     let about = |mass: &LinkMass| {
         let arm = mass.at.translation.vector - com;
         let turned = mass.at.rotation.to_rotation_matrix();
@@ -134,9 +169,18 @@ fn report(
     reader: &mut Reader,
 ) -> Mend {
     let name = mass.link.attribute("name").unwrap_or_default();
-    let mut principal: Vec<f64> = mass.about_com.symmetric_eigenvalues().iter().copied().collect();
+    let mut principal: Vec<f64> = mass
+        .about_com
+        .symmetric_eigenvalues()
+        .iter()
+        .copied()
+        .collect();
     principal.sort_by(|a, b| b.total_cmp(a));
-    let numbers = principal.iter().map(|moment| short(*moment)).collect::<Vec<_>>().join(", ");
+    let numbers = principal
+        .iter()
+        .map(|moment| short(*moment))
+        .collect::<Vec<_>>()
+        .join(", ");
     let moves = match name == moved {
         true => "moves".to_owned(),
         false => format!("moves with `{moved}`"),
@@ -144,7 +188,10 @@ fn report(
     let proposed = Proposal::new(mass, meshes, reader);
     let element = proposed.element();
     let node = xml::child(mass.inertial, "inertia").unwrap_or(mass.inertial);
-    let help = format!("write those of {}: `{element}`; `actcheck check --mend` writes a mended copy", proposed.origin);
+    let help = format!(
+        "write those of {}: `{element}`; `actcheck check --mend` writes a mended copy",
+        proposed.origin
+    );
     let says = format!(
         "the link `{name}` of {} kg {moves}, but its principal moments of inertia are {numbers} kg·m²",
         mass.kg
@@ -152,14 +199,23 @@ fn report(
     if massless {
         reader.error("W034", node, format!("{says}: all must be above 0"), help);
     } else {
-        reader.warning("W036", node, format!("{says}: no body has one above the sum of the others"), help);
+        reader.warning(
+            "W036",
+            node,
+            format!("{says}: no body has one above the sum of the others"),
+            help,
+        );
     }
-    let change = format!("`{name}` has the moments of inertia of {} instead of {numbers} kg·m²", proposed.origin);
+    let change = format!(
+        "`{name}` has the moments of inertia of {} instead of {numbers} kg·m²",
+        proposed.origin
+    );
     let (span, text) = match xml::child(mass.inertial, "inertia") {
         Some(inertia) => (inertia.range(), element),
         // After `<mass …/>`, which exists: it was read.
         None => {
-            let after = xml::child(mass.inertial, "mass").map_or(mass.inertial.range().end, |node| node.range().end);
+            let after = xml::child(mass.inertial, "mass")
+                .map_or(mass.inertial.range().end, |node| node.range().end);
             (after..after, element)
         }
     };
@@ -179,15 +235,27 @@ impl Proposal {
         let (size, origin) = match size_of(mass, meshes, reader) {
             Some(size) => {
                 let [x, y, z] = size.map(|side| short(100.0 * side));
-                (size, format!("a box of {x} x {y} x {z} cm around its collision shape"))
+                (
+                    size,
+                    format!("a box of {x} x {y} x {z} cm around its collision shape"),
+                )
             }
             None => {
                 let side = (mass.kg / DENSITY).cbrt();
-                ([side; 3], format!("a cube of {} cm, the size of this mass of water", short(100.0 * side)))
+                (
+                    [side; 3],
+                    format!(
+                        "a cube of {} cm, the size of this mass of water",
+                        short(100.0 * side)
+                    ),
+                )
             }
         };
         let [x, y, z] = size.map(|side| side.max(LEAST_SIDE_M).powi(2) * mass.kg / 12.0);
-        Self { moments: [y + z, x + z, x + y], origin }
+        Self {
+            moments: [y + z, x + z, x + y],
+            origin,
+        }
     }
 
     fn element(&self) -> String {
@@ -196,14 +264,19 @@ impl Proposal {
     }
 }
 
-/// The sides of the box around a link's collision shapes, along the axes of its `<inertial>`. Faults of these shapes are
-/// reported elsewhere. Unit: metres.
-fn size_of(mass: &LinkMass, meshes: &BTreeMap<String, Vec<Shape>>, reader: &Reader) -> Option<[f64; 3]> {
+/// The sides of the box around a link's collision shapes, along the axes of its `<inertial>`.
+/// Faults of these shapes are reported elsewhere. Unit: metres.
+fn size_of(
+    mass: &LinkMass,
+    meshes: &BTreeMap<String, Vec<Shape>>,
+    reader: &Reader,
+) -> Option<[f64; 3]> {
     let mut silent = Reader::new(reader.source);
     let link_from_inertial = origin(mass.inertial, &mut silent)?;
     let mut parts: Vec<Part> = Vec::new();
     for collision in xml::children(mass.link, "collision") {
-        let pose = Pose::from_isometry(&(link_from_inertial.inverse() * origin(collision, &mut silent)?));
+        let pose =
+            Pose::from_isometry(&(link_from_inertial.inverse() * origin(collision, &mut silent)?));
         let shapes = shapes_of(xml::child(collision, "geometry")?, meshes)?;
         parts.extend(shapes.into_iter().map(|shape| Part { pose, shape }));
     }
@@ -215,17 +288,36 @@ fn size_of(mass: &LinkMass, meshes: &BTreeMap<String, Vec<Shape>>, reader: &Read
 fn shapes_of(geometry: Node, meshes: &BTreeMap<String, Vec<Shape>>) -> Option<Vec<Shape>> {
     let kind = geometry.children().find(Node::is_element)?;
     let numbers = |key: &str| -> Option<Vec<f64>> {
-        kind.attribute(key)?.split_whitespace().map(|number| number.parse().ok()).collect()
+        kind.attribute(key)?
+            .split_whitespace()
+            .map(|number| number.parse().ok())
+            .collect()
     };
     let number = |key: &str| numbers(key)?.first().copied();
     Some(match kind.tag_name().name() {
-        "box" => vec![Shape::Box { size: numbers("size")?.try_into().ok()? }],
-        "cylinder" => vec![Shape::Cylinder { radius: number("radius")?, height: number("length")? }],
-        "capsule" => vec![Shape::Capsule { radius: number("radius")?, height: number("length")? }],
-        "sphere" => vec![Shape::Sphere { radius: number("radius")? }],
+        "box" => vec![Shape::Box {
+            size: numbers("size")?.try_into().ok()?,
+        }],
+        "cylinder" => vec![Shape::Cylinder {
+            radius: number("radius")?,
+            height: number("length")?,
+        }],
+        "capsule" => vec![Shape::Capsule {
+            radius: number("radius")?,
+            height: number("length")?,
+        }],
+        "sphere" => vec![Shape::Sphere {
+            radius: number("radius")?,
+        }],
         "mesh" => {
-            let scale = numbers("scale").and_then(|scale| scale.try_into().ok()).unwrap_or([1.0; 3]);
-            meshes.get(kind.attribute("filename")?)?.iter().map(|shape| shape.scaled(scale)).collect()
+            let scale = numbers("scale")
+                .and_then(|scale| scale.try_into().ok())
+                .unwrap_or([1.0; 3]);
+            meshes
+                .get(kind.attribute("filename")?)?
+                .iter()
+                .map(|shape| shape.scaled(scale))
+                .collect()
         }
         _ => return None,
     })
@@ -246,7 +338,8 @@ mod tests {
     use crate::foreign::xml::parse_model;
     use actcheck_base::Source;
 
-    /// Codes and mends of a robot whose moving link has this content, with a link that is fixed to it.
+    /// Codes and mends of a robot whose moving link has this content, with a link that is fixed to
+    /// it.
     fn checked(moving: &str, fixed: &str) -> (Vec<&'static str>, Vec<Mend>) {
         let text = format!(
             "<robot name=\"r\"><link name=\"base\"/>\
@@ -275,13 +368,25 @@ mod tests {
         for (moving, fixed, codes) in [
             (inertial(1.0, flat), String::new(), vec![]),
             (inertial(1.0, none), String::new(), vec!["W034"]),
-            (inertial(1.0, [1e-3, -1e-3, 1e-3]), String::new(), vec!["W034"]),
+            (
+                inertial(1.0, [1e-3, -1e-3, 1e-3]),
+                String::new(),
+                vec!["W034"],
+            ),
             (inertial(1.0, much), String::new(), vec!["W036"]),
-            ("<inertial><mass value=\"1\"/></inertial>".to_owned(), String::new(), vec!["W034"]),
+            (
+                "<inertial><mass value=\"1\"/></inertial>".to_owned(),
+                String::new(),
+                vec!["W034"],
+            ),
             // The body as a whole is possible.
             (inertial(1.0, none), inertial(1.0, round), vec![]),
             (String::new(), inertial(1.0, none), vec!["W034"]),
-            (inertial(1.0, none), inertial(1.0, none), vec!["W034", "W034"]),
+            (
+                inertial(1.0, none),
+                inertial(1.0, none),
+                vec!["W034", "W034"],
+            ),
             // The simulation gives links as light as this moments of its own.
             (inertial(0.001, none), String::new(), vec![]),
         ] {
@@ -296,7 +401,14 @@ mod tests {
             <collision><geometry><box size=\"0.1 0.2 0.3\"/></geometry></collision>";
         let mends = checked(turned, "").1;
         assert_eq!(mends.len(), 1);
-        assert_eq!(mends[0].text, "<inertia ixx=\"0.1\" ixy=\"0\" ixz=\"0\" iyy=\"0.13\" iyz=\"0\" izz=\"0.05\"/>");
-        assert!(mends[0].change.contains("a box of 20 x 10 x 30 cm"), "{}", mends[0].change);
+        assert_eq!(
+            mends[0].text,
+            "<inertia ixx=\"0.1\" ixy=\"0\" ixz=\"0\" iyy=\"0.13\" iyz=\"0\" izz=\"0.05\"/>"
+        );
+        assert!(
+            mends[0].change.contains("a box of 20 x 10 x 30 cm"),
+            "{}",
+            mends[0].change
+        );
     }
 }

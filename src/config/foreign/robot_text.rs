@@ -13,11 +13,15 @@ pub(crate) struct Edit {
 
 impl Edit {
     fn removal(node: Node) -> Self {
-        Self { span: node.range(), text: String::new() }
+        Self {
+            span: node.range(),
+            text: String::new(),
+        }
     }
 }
 
-/// Returns the text of a URDF with these changes. One inside of another has no effect: both may remove the same element.
+/// Returns the text of a URDF with these changes. One inside of another has no effect: both may
+/// remove the same element.
 pub(crate) fn with(text: &str, mut edits: Vec<Edit>) -> String {
     // A text is inserted before an element that is removed at the same place.
     edits.sort_by_key(|edit| (edit.span.start, edit.span.end));
@@ -47,7 +51,9 @@ pub(crate) fn repairs(root: Node, reader: &mut Reader) -> Vec<Edit> {
 /// Returns the removals of colours that are not four numbers. Reports each (W036).
 fn wrong_colours(root: Node, reader: &mut Reader) -> Vec<Edit> {
     let colours = root.descendants().filter(|node| {
-        let parent = node.parent_element().filter(|parent| parent.has_tag_name("material"));
+        let parent = node
+            .parent_element()
+            .filter(|parent| parent.has_tag_name("material"));
         node.has_tag_name("color") && parent.is_some_and(|material| material.has_attribute("name"))
     });
     let mut edits = Vec::new();
@@ -57,8 +63,16 @@ fn wrong_colours(root: Node, reader: &mut Reader) -> Vec<Edit> {
         if words.clone().count() == 4 && words.clone().all(|word| word.parse::<f64>().is_ok()) {
             continue;
         }
-        let message = format!("`<color>` is ignored: `rgba` must be four numbers, but is `{}`", xml::short(numbers));
-        reader.warning("W036", colour, message, "colours have no effect on the simulation");
+        let message = format!(
+            "`<color>` is ignored: `rgba` must be four numbers, but is `{}`",
+            xml::short(numbers)
+        );
+        reader.warning(
+            "W036",
+            colour,
+            message,
+            "colours have no effect on the simulation",
+        );
         edits.push(Edit::removal(colour));
     }
     edits
@@ -66,7 +80,9 @@ fn wrong_colours(root: Node, reader: &mut Reader) -> Vec<Edit> {
 
 /// Returns the removals of materials without names. They have no effect on the simulation.
 fn nameless_materials(root: Node) -> impl Iterator<Item = Edit> {
-    root.descendants().filter(|node| node.has_tag_name("material") && !node.has_attribute("name")).map(Edit::removal)
+    root.descendants()
+        .filter(|node| node.has_tag_name("material") && !node.has_attribute("name"))
+        .map(Edit::removal)
 }
 
 /// Returns the shape of a `<collision>` if all its sizes are 0: it is only a placeholder.
@@ -80,7 +96,10 @@ pub(crate) fn placeholder<'n>(collision: Node<'n>) -> Option<Node<'n>> {
     };
     let is_zero = |key: &&str| {
         let numbers = shape.attribute(*key).unwrap_or_default();
-        !numbers.is_empty() && numbers.split_whitespace().all(|number| number.parse() == Ok(0.0))
+        !numbers.is_empty()
+            && numbers
+                .split_whitespace()
+                .all(|number| number.parse() == Ok(0.0))
     };
     keys.iter().all(is_zero).then_some(shape)
 }
@@ -90,8 +109,16 @@ fn placeholders(root: Node, reader: &mut Reader) -> Vec<Edit> {
     let mut edits = Vec::new();
     for collision in xml::children(root, "link").flat_map(|link| xml::children(link, "collision")) {
         if let Some(shape) = placeholder(collision) {
-            let message = format!("this `<{}>` has no size: it is left out", shape.tag_name().name());
-            reader.warning("W036", shape, message, "remove its `<collision>`, or write its size in metres");
+            let message = format!(
+                "this `<{}>` has no size: it is left out",
+                shape.tag_name().name()
+            );
+            reader.warning(
+                "W036",
+                shape,
+                message,
+                "remove its `<collision>`, or write its size in metres",
+            );
             edits.push(Edit::removal(collision));
         }
     }
@@ -99,7 +126,16 @@ fn placeholders(root: Node, reader: &mut Reader) -> Vec<Edit> {
 }
 
 /// Elements of a joint of which there is one.
-const SINGLE: [&str; 8] = ["origin", "parent", "child", "axis", "limit", "dynamics", "mimic", "safety_controller"];
+const SINGLE: [&str; 8] = [
+    "origin",
+    "parent",
+    "child",
+    "axis",
+    "limit",
+    "dynamics",
+    "mimic",
+    "safety_controller",
+];
 
 /// Returns the removals of elements that a joint has already. Reports each (W036).
 fn repeated(joint: Node, reader: &mut Reader) -> Vec<Edit> {
@@ -107,7 +143,8 @@ fn repeated(joint: Node, reader: &mut Reader) -> Vec<Edit> {
     let mut edits = Vec::new();
     for key in SINGLE {
         for further in xml::children(joint, key).skip(1) {
-            let message = format!("the joint `{name}` has more than one `<{key}>`: the first counts");
+            let message =
+                format!("the joint `{name}` has more than one `<{key}>`: the first counts");
             reader.warning("W036", further, message, "remove the others");
             edits.push(Edit::removal(further));
         }
@@ -117,9 +154,16 @@ fn repeated(joint: Node, reader: &mut Reader) -> Vec<Edit> {
 
 /// Returns the changes of a joint's limits of -1 to 0, which means here that they are unknown.
 fn unlimited(joint: Node) -> impl Iterator<Item = Edit> {
-    let limits = xml::child(joint, "limit").into_iter().flat_map(|limit| limit.attributes());
-    let unlimited = limits.filter(|limit| matches!(limit.name(), "effort" | "velocity") && is_unlimited(limit.value()));
-    unlimited.map(|limit| Edit { span: limit.range_value(), text: "0".to_owned() })
+    let limits = xml::child(joint, "limit")
+        .into_iter()
+        .flat_map(|limit| limit.attributes());
+    let unlimited = limits.filter(|limit| {
+        matches!(limit.name(), "effort" | "velocity") && is_unlimited(limit.value())
+    });
+    unlimited.map(|limit| Edit {
+        span: limit.range_value(),
+        text: "0".to_owned(),
+    })
 }
 
 /// Whether an effort or a velocity is written as -1, which means no limit, as in SDF.
@@ -133,10 +177,22 @@ mod tests {
 
     #[test]
     fn changes_inside_of_others_have_no_effect() {
-        let edit = |span: Span, text: &str| Edit { span, text: text.to_owned() };
+        let edit = |span: Span, text: &str| Edit {
+            span,
+            text: text.to_owned(),
+        };
         let removed = || edit(2..6, "");
-        assert_eq!(with("ab1234cd", vec![edit(3..5, "x"), removed(), removed(), edit(6..6, "+")]), "ab+cd");
+        assert_eq!(
+            with(
+                "ab1234cd",
+                vec![edit(3..5, "x"), removed(), removed(), edit(6..6, "+")]
+            ),
+            "ab+cd"
+        );
         assert_eq!(with("ab1234cd", vec![removed(), edit(2..2, "-")]), "ab-cd");
-        assert_eq!(with("abcd", vec![edit(4..4, "e"), edit(0..1, "A")]), "Abcde");
+        assert_eq!(
+            with("abcd", vec![edit(4..4, "e"), edit(0..1, "A")]),
+            "Abcde"
+        );
     }
 }

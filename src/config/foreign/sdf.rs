@@ -31,7 +31,8 @@ pub(crate) struct SdfModel {
     pub(crate) digest: String,
 }
 
-/// Reads the model of an SDF file and its faults, included in `depth` others. The model is `None` if there are errors.
+/// Reads the model of an SDF file and its faults, included in `depth` others. The model is `None`
+/// if there are errors.
 pub(crate) fn read(
     source: &Source,
     path: &Path,
@@ -45,20 +46,35 @@ pub(crate) fn read(
         Err(faults) => return (None, faults),
     };
     let mut reader = Reader::new(source);
-    let mut shapes = Shapes { depth, ..Shapes::new(lookup, path) };
+    let mut shapes = Shapes {
+        depth,
+        ..Shapes::new(lookup, path)
+    };
     shapes.digest.update(source.text.as_bytes());
     let model = root_model(document.root_element(), &mut reader);
     let read = model.map(|model| {
         let pose = pose(model, &mut reader).unwrap_or_default();
         let body = read_model(model, role, &mut shapes, &mut reader);
         // Of furniture, every body is fixed.
-        let is_static = if role == Role::Object { body.fixed } else { is_static(model, &mut reader) };
+        let is_static = if role == Role::Object {
+            body.fixed
+        } else {
+            is_static(model, &mut reader)
+        };
         (body, pose, is_static)
     });
     let found = reader.found;
     let complete = read.filter(|_| !found.has_errors());
     let digest = shapes.digest.finish();
-    (complete.map(|(body, pose, is_static)| SdfModel { body, pose, is_static, digest }), found)
+    (
+        complete.map(|(body, pose, is_static)| SdfModel {
+            body,
+            pose,
+            is_static,
+            digest,
+        }),
+        found,
+    )
 }
 
 /// Returns the only model of a document.
@@ -69,12 +85,22 @@ fn root_model<'a>(root: Node<'a>, reader: &mut Reader) -> Option<Node<'a>> {
         [model] => Some(*model),
         [] => {
             let message = "the file contains no `<model>`".to_owned();
-            reader.error("W032", root, message, "a file with a `<world>` belongs in the folder `worlds`");
+            reader.error(
+                "W032",
+                root,
+                message,
+                "a file with a `<world>` belongs in the folder `worlds`",
+            );
             None
         }
         [_, second, ..] => {
             let message = format!("the file contains {} models", models.len());
-            reader.error("W032", *second, message, "give each model a folder of its own");
+            reader.error(
+                "W032",
+                *second,
+                message,
+                "give each model a folder of its own",
+            );
             None
         }
     }
@@ -83,22 +109,47 @@ fn root_model<'a>(root: Node<'a>, reader: &mut Reader) -> Option<Node<'a>> {
 /// Returns `Some` if the root is SDF of a supported version; otherwise reports W032.
 pub(crate) fn check_version(root: Node, reader: &mut Reader) -> Option<()> {
     if root.tag_name().name() != "sdf" {
-        let message = format!("the root is `<{}>` instead of `<sdf>`", root.tag_name().name());
-        reader.error("W032", root, message, "an SDF file begins with `<sdf version=\"1.6\">`");
+        let message = format!(
+            "the root is `<{}>` instead of `<sdf>`",
+            root.tag_name().name()
+        );
+        reader.error(
+            "W032",
+            root,
+            message,
+            "an SDF file begins with `<sdf version=\"1.6\">`",
+        );
         return None;
     }
     let version = reader.attribute(root, "version")?;
-    let minor = version.strip_prefix("1.").and_then(|minor| minor.parse::<u32>().ok());
+    let minor = version
+        .strip_prefix("1.")
+        .and_then(|minor| minor.parse::<u32>().ok());
     if minor.is_some_and(|minor| VERSIONS.contains(&minor)) {
         return Some(());
     }
     let message = format!("SDF {version} is not supported");
-    reader.error("W032", root, message, format!("use a version from 1.{} to 1.{}", VERSIONS.start(), VERSIONS.end()));
+    reader.error(
+        "W032",
+        root,
+        message,
+        format!(
+            "use a version from 1.{} to 1.{}",
+            VERSIONS.start(),
+            VERSIONS.end()
+        ),
+    );
     None
 }
 
-/// Reads a model's links, with those of nested and included models, as one body and those that joints move.
-pub(crate) fn read_model(model: Node, role: Role, shapes: &mut Shapes, reader: &mut Reader) -> Body {
+/// Reads a model's links, with those of nested and included models, as one body and those that
+/// joints move.
+pub(crate) fn read_model(
+    model: Node,
+    role: Role,
+    shapes: &mut Shapes,
+    reader: &mut Reader,
+) -> Body {
     let fixed = role == Role::Furniture || is_static(model, reader);
     let links = Links::of(model, role, reader);
     let assembly = links.assembly(role, fixed, reader);
@@ -106,14 +157,31 @@ pub(crate) fn read_model(model: Node, role: Role, shapes: &mut Shapes, reader: &
     links.check_connected(fixed, reader);
     let mut bodies = assembly.empty_bodies(fixed);
     for (idx, (link, at)) in links.links.iter().enumerate() {
-        read_link(*link, at, role, &mut bodies[assembly.body_of(idx)], shapes, reader);
+        read_link(
+            *link,
+            at,
+            role,
+            &mut bodies[assembly.body_of(idx)],
+            shapes,
+            reader,
+        );
     }
-    let names: Vec<&str> = links.links.iter().map(|(link, _)| link.attribute("name").unwrap_or_default()).collect();
+    let names: Vec<&str> = links
+        .links
+        .iter()
+        .map(|(link, _)| link.attribute("name").unwrap_or_default())
+        .collect();
     let mut body = assembly.attach(bodies, &names, reader);
     links.read_included(role, &mut body, shapes, reader);
     if body.parts.is_empty() && role == Role::Object && !reader.found.has_errors() {
-        let message = "the model has no solid shape: none of its links has a `<collision>`".to_owned();
-        reader.error("W038", model, message, "give a link a `<collision>`; a `<visual>` does not collide");
+        let message =
+            "the model has no solid shape: none of its links has a `<collision>`".to_owned();
+        reader.error(
+            "W038",
+            model,
+            message,
+            "give a link a `<collision>`; a `<visual>` does not collide",
+        );
     }
     body
 }
@@ -144,7 +212,9 @@ fn read_link(
         "must_be_base_link",
     ];
     reader.warn_about_unknown_children(link, &KNOWN);
-    let Some(at) = pose(link, reader).map(|pose| model * pose) else { return };
+    let Some(at) = pose(link, reader).map(|pose| model * pose) else {
+        return;
+    };
     for (name, usual, message) in [
         ("gravity", true, "a link without gravity can't be simulated"),
         ("kinematic", false, "a kinematic link can't be simulated"),
@@ -153,7 +223,12 @@ fn read_link(
             && reader.boolean(node).is_some_and(|value| value != usual)
             && !body.fixed
         {
-            reader.error("W035", node, message.to_owned(), "write `<static>true</static>` if the model never moves");
+            reader.error(
+                "W035",
+                node,
+                message.to_owned(),
+                "write `<static>true</static>` if the model never moves",
+            );
         }
     }
     if let (Some(decay), Role::Object) = (xml::child(link, "velocity_decay"), role) {
@@ -161,8 +236,8 @@ fn read_link(
         reader.warning("W036", decay, message, "the model works without it");
     }
     let before = body.parts.len();
-    for collision in
-        xml::children(link, "collision").filter(|collision| role == Role::Object || plane(*collision).is_none())
+    for collision in xml::children(link, "collision")
+        .filter(|collision| role == Role::Object || plane(*collision).is_none())
     {
         read_collision(collision, &at, body, shapes, reader);
     }
@@ -193,26 +268,55 @@ fn read_plane(plane: Node, reader: &mut Reader) -> Option<Shape> {
         let [x, y, z] = reader.numbers(normal, xml::text(normal), Bound::Finite)?;
         if x != 0.0 || y != 0.0 || z <= 0.0 {
             let message = "a plane that is not level can't be simulated".to_owned();
-            reader.error("W035", normal, message, "turn the `<pose>` of the collision instead");
+            reader.error(
+                "W035",
+                normal,
+                message,
+                "turn the `<pose>` of the collision instead",
+            );
             return None;
         }
     }
-    Some(Shape::Box { size: [x, y, PLANE_M] })
+    Some(Shape::Box {
+        size: [x, y, PLANE_M],
+    })
 }
 
-fn read_collision(collision: Node, link: &Isometry3<f64>, body: &mut Body, shapes: &mut Shapes, reader: &mut Reader) {
-    reader.warn_about_unknown_children(collision, &["pose", "geometry", "surface", "max_contacts", "laser_retro"]);
+fn read_collision(
+    collision: Node,
+    link: &Isometry3<f64>,
+    body: &mut Body,
+    shapes: &mut Shapes,
+    reader: &mut Reader,
+) {
+    reader.warn_about_unknown_children(
+        collision,
+        &["pose", "geometry", "surface", "max_contacts", "laser_retro"],
+    );
     let at = pose(collision, reader);
     let (at, shape) = match plane(collision).filter(|_| body.fixed) {
-        Some(plane) => (at.map(|at| at * Translation3::new(0.0, 0.0, -PLANE_M / 2.0)), read_plane(plane, reader)),
-        None => (at, reader.required(collision, "geometry").and_then(|geometry| shapes.sdf(geometry, reader))),
+        Some(plane) => (
+            at.map(|at| at * Translation3::new(0.0, 0.0, -PLANE_M / 2.0)),
+            read_plane(plane, reader),
+        ),
+        None => (
+            at,
+            reader
+                .required(collision, "geometry")
+                .and_then(|geometry| shapes.sdf(geometry, reader)),
+        ),
     };
     if let Some(surface) = xml::child(collision, "surface") {
         read_surface(surface, body, reader);
     }
-    let (Some(at), Some(shape)) = (at, shape) else { return };
+    let (Some(at), Some(shape)) = (at, shape) else {
+        return;
+    };
     check_volume(&shape, collision, reader);
-    body.parts.push(Part { pose: Pose::from_isometry(&(link * at)), shape });
+    body.parts.push(Part {
+        pose: Pose::from_isometry(&(link * at)),
+        shape,
+    });
 }
 
 fn read_surface(surface: Node, body: &mut Body, reader: &mut Reader) {
@@ -220,15 +324,25 @@ fn read_surface(surface: Node, body: &mut Body, reader: &mut Reader) {
     if let Some(friction) = xml::child(surface, "friction") {
         reader.warn_about_unknown_children(friction, &["ode"]);
     }
-    if let Some(ode) = xml::child(surface, "friction").and_then(|friction| xml::child(friction, "ode")) {
+    if let Some(ode) =
+        xml::child(surface, "friction").and_then(|friction| xml::child(friction, "ode"))
+    {
         reader.warn_about_unknown_children(ode, &["mu", "mu2"]);
-        let mut coefficient = |name| xml::child(ode, name).and_then(|node| reader.number(node, Bound::NotNegative));
+        let mut coefficient =
+            |name| xml::child(ode, name).and_then(|node| reader.number(node, Bound::NotNegative));
         let (along, across) = (coefficient("mu"), coefficient("mu2"));
         if let (Some(along), Some(across)) = (along, across)
             && along != across
         {
-            let message = format!("friction can't depend on the direction: {along} is used and {across} is ignored");
-            reader.warning("W036", ode, message, "give `<mu>` and `<mu2>` the same value");
+            let message = format!(
+                "friction can't depend on the direction: {along} is used and {across} is ignored"
+            );
+            reader.warning(
+                "W036",
+                ode,
+                message,
+                "give `<mu>` and `<mu2>` the same value",
+            );
         }
         set("friction", &mut body.friction, along, ode, reader);
     }
@@ -236,16 +350,24 @@ fn read_surface(surface: Node, body: &mut Body, reader: &mut Reader) {
         reader.warn_about_unknown_children(bounce, &["restitution_coefficient"]);
         let coefficient = xml::child(bounce, "restitution_coefficient");
         let value = coefficient.and_then(|node| reader.number(node, Bound::NotNegative));
-        set("restitution", &mut body.restitution, value.map(|value| value.min(1.0)), bounce, reader);
+        set(
+            "restitution",
+            &mut body.restitution,
+            value.map(|value| value.min(1.0)),
+            bounce,
+            reader,
+        );
     }
 }
 
-/// Sets a material parameter of the body. The first value is used; others are ignored with a warning.
+/// Sets a material parameter of the body. The first value is used; others are ignored with a
+/// warning.
 fn set(what: &str, place: &mut Option<f64>, value: Option<f64>, node: Node, reader: &mut Reader) {
     match (*place, value) {
         (None, Some(_)) => *place = value,
         (Some(known), Some(other)) if known != other => {
-            let message = format!("a body has only one {what}: {known} is used and {other} is ignored");
+            let message =
+                format!("a body has only one {what}: {known} is used and {other} is ignored");
             reader.warning(
                 "W036",
                 node,
@@ -265,7 +387,11 @@ fn read_inertial(inertial: Node, link: &Isometry3<f64>, reader: &mut Reader) -> 
     let moments = xml::child(inertial, "inertia").and_then(|inertia| read_inertia(inertia, reader));
     let turn = at.rotation.to_rotation_matrix();
     let about_com = moments.map(|moments| turn.matrix() * moments * turn.matrix().transpose());
-    Some(Mass { kg, com: at.translation.vector, about_com })
+    Some(Mass {
+        kg,
+        com: at.translation.vector,
+        about_com,
+    })
 }
 
 fn read_inertia(inertia: Node, reader: &mut Reader) -> Option<Matrix3<f64>> {
@@ -279,13 +405,19 @@ fn read_inertia(inertia: Node, reader: &mut Reader) -> Option<Matrix3<f64>> {
     possible(moments, inertia, reader)
 }
 
-/// Returns the moments of inertia if they are possible. Otherwise warns (W036) and returns `None`: they are then
-/// computed from the shapes.
-pub(crate) fn possible(moments: Matrix3<f64>, inertia: Node, reader: &mut Reader) -> Option<Matrix3<f64>> {
+/// Returns the moments of inertia if they are possible. Otherwise warns (W036) and returns `None`:
+/// they are then computed from the shapes.
+pub(crate) fn possible(
+    moments: Matrix3<f64>,
+    inertia: Node,
+    reader: &mut Reader,
+) -> Option<Matrix3<f64>> {
     if is_possible(&moments) {
         return Some(moments);
     }
-    let message = "these moments of inertia are impossible: they are computed from the shapes instead".to_owned();
+    let message =
+        "these moments of inertia are impossible: they are computed from the shapes instead"
+            .to_owned();
     reader.warning(
         "W036",
         inertia,

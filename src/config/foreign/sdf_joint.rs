@@ -8,11 +8,12 @@ use actcheck_data::PartJoint;
 
 /// Limits beyond this are none. Units: metres or radians.
 const UNLIMITED: f64 = 1e6;
-/// The minor version of SDF 1 from which axes are in the frame of their joint, no longer in that of the model.
+/// The minor version of SDF 1 from which axes are in the frame of their joint, no longer in that of
+/// the model.
 const OWN_FRAME: u32 = 5;
 
-/// Reads a joint that moves a link at a pose in a model at a pose. Reports W033 to W035, and returns `None`, if it can't
-/// be simulated.
+/// Reads a joint that moves a link at a pose in a model at a pose. Reports W033 to W035, and
+/// returns `None`, if it can't be simulated.
 pub(crate) fn read(
     joint: Node,
     link: &Isometry3<f64>,
@@ -23,7 +24,12 @@ pub(crate) fn read(
     let kind = joint.attribute("type").unwrap_or("unknown");
     if !["revolute", "continuous", "prismatic"].contains(&kind) {
         let message = format!("the joint `{name}` is of the type {kind}, which can't be simulated");
-        reader.error("W035", joint, message, "use revolute, continuous, prismatic or fixed");
+        reader.error(
+            "W035",
+            joint,
+            message,
+            "use revolute, continuous, prismatic or fixed",
+        );
         return None;
     }
     let at = link * pose(joint, reader)?;
@@ -32,25 +38,41 @@ pub(crate) fn read(
     let direction = direction(joint, axis, own, reader)?;
     let Some(direction) = (model.rotation * direction).try_normalize(1e-9) else {
         let message = format!("the axis of the joint `{name}` must not be zero");
-        reader.error("W034", axis, message, "write, for example, `<xyz>0 0 1</xyz>`");
+        reader.error(
+            "W034",
+            axis,
+            message,
+            "write, for example, `<xyz>0 0 1</xyz>`",
+        );
         return None;
     };
     let limits = xml::child(axis, "limit").filter(|_| kind != "continuous");
-    let mut limit = |name: &str, otherwise: f64| match limits.and_then(|limits| xml::child(limits, name)) {
-        Some(node) => {
-            reader.number(node, Bound::Finite).map(|value| if value.abs() > UNLIMITED { otherwise } else { value })
-        }
-        None => Some(otherwise),
-    };
-    let range = [limit("lower", f64::NEG_INFINITY)?, limit("upper", f64::INFINITY)?];
+    let mut limit =
+        |name: &str, otherwise: f64| match limits.and_then(|limits| xml::child(limits, name)) {
+            Some(node) => reader.number(node, Bound::Finite).map(|value| {
+                if value.abs() > UNLIMITED {
+                    otherwise
+                } else {
+                    value
+                }
+            }),
+            None => Some(otherwise),
+        };
+    let range = [
+        limit("lower", f64::NEG_INFINITY)?,
+        limit("upper", f64::INFINITY)?,
+    ];
     if range[0] > range[1] {
-        let message =
-            format!("the joint `{name}` has a lower limit of {} above its upper limit of {}", range[0], range[1]);
+        let message = format!(
+            "the joint `{name}` has a lower limit of {} above its upper limit of {}",
+            range[0], range[1]
+        );
         reader.error("W034", axis, message, "exchange the limits");
         return None;
     }
     let dynamics = xml::child(axis, "dynamics");
-    let mut resistance = |name: &str| match dynamics.and_then(|dynamics| xml::child(dynamics, name)) {
+    let mut resistance = |name: &str| match dynamics.and_then(|dynamics| xml::child(dynamics, name))
+    {
         Some(node) => reader.number(node, Bound::NotNegative),
         None => Some(0.0),
     };
@@ -62,11 +84,18 @@ pub(crate) fn read(
         reader.warning("W036", spring, message, "the part moves without it");
     }
     let anchor_m = at.translation.vector.into();
-    Some(PartJoint { slides: kind == "prismatic", axis: direction.into(), anchor_m, range, damping, friction })
+    Some(PartJoint {
+        slides: kind == "prismatic",
+        axis: direction.into(),
+        anchor_m,
+        range,
+        damping,
+        friction,
+    })
 }
 
-/// Returns the direction of a joint's axis in the frame of its model. `own`: the orientation of the joint in that frame.
-/// Returns `None` after it has reported a fault.
+/// Returns the direction of a joint's axis in the frame of its model. `own`: the orientation of the
+/// joint in that frame. Returns `None` after it has reported a fault.
 pub(crate) fn direction(
     joint: Node,
     axis: Node,
@@ -78,7 +107,9 @@ pub(crate) fn direction(
         Some(xyz) => Vector3::from(reader.numbers::<3>(xyz, xml::text(xyz), Bound::Finite)?),
         None => Vector3::z(),
     };
-    let named = written.and_then(|xyz| xyz.attribute("expressed_in")).filter(|name| !name.is_empty());
+    let named = written
+        .and_then(|xyz| xyz.attribute("expressed_in"))
+        .filter(|name| !name.is_empty());
     let rotation = match (xml::child(axis, "use_parent_model_frame"), named) {
         (Some(node), _) if reader.boolean(node)? => UnitQuaternion::identity(),
         (None, Some(name)) => frame(joint, name, reader)?.rotation,
@@ -91,9 +122,9 @@ pub(crate) fn direction(
 /// Whether a joint does not move: it is fixed, or its range is a single position.
 pub(crate) fn is_rigid(joint: Node) -> bool {
     let limit = xml::child(joint, "axis").and_then(|axis| xml::child(axis, "limit"));
-    let end = |name| limit.and_then(|limit| xml::text(xml::child(limit, name)?).parse::<f64>().ok());
-    let has_no_range =
-        matches!((end("lower"), end("upper")), (Some(lower), Some(upper)) if lower == 0.0 && upper == 0.0);
+    let end =
+        |name| limit.and_then(|limit| xml::text(xml::child(limit, name)?).parse::<f64>().ok());
+    let has_no_range = matches!((end("lower"), end("upper")), (Some(lower), Some(upper)) if lower == 0.0 && upper == 0.0);
     joint.attribute("type") == Some("fixed") || has_no_range
 }
 

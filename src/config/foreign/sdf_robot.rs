@@ -1,4 +1,5 @@
-//! Converts a robot in SDF, Gazebo's format, to URDF: links, joints, collisions and inertias of one model.
+//! Converts a robot in SDF, Gazebo's format, to URDF: links, joints, collisions and inertias of one
+//! model.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -29,15 +30,25 @@ pub(crate) fn to_urdf(source: &Source) -> Result<Source, Diagnostics> {
     let root = document.root_element();
     let text = convert(root, &mut reader);
     reader.found.or(())?;
-    Ok(Source::new(format!("{} (as URDF)", source.name), text.unwrap_or_default()))
+    Ok(Source::new(
+        format!("{} (as URDF)", source.name),
+        text.unwrap_or_default(),
+    ))
 }
 
 fn convert(root: Node, reader: &mut Reader) -> Option<String> {
     check_version(root, reader)?;
-    let models = root.descendants().filter(|node| node.tag_name().name() == "model");
+    let models = root
+        .descendants()
+        .filter(|node| node.tag_name().name() == "model");
     let robot = models.max_by_key(|model| xml::children(*model, "joint").count());
     let Some(model) = robot else {
-        reader.error("W032", root, "the file contains no `<model>`".to_owned(), "a robot is a `<model>` with joints");
+        reader.error(
+            "W032",
+            root,
+            "the file contains no `<model>`".to_owned(),
+            "a robot is a `<model>` with joints",
+        );
         return None;
     };
     let mut links: BTreeMap<&str, (Node, Isometry3<f64>)> = BTreeMap::new();
@@ -46,11 +57,17 @@ fn convert(root: Node, reader: &mut Reader) -> Option<String> {
         links.insert(name, (link, pose(link, reader)?));
     }
     if links.is_empty() {
-        reader.error("W051", model, "the robot has no links".to_owned(), "add `<link name=\"base_link\"/>`");
+        reader.error(
+            "W051",
+            model,
+            "the robot has no links".to_owned(),
+            "add `<link name=\"base_link\"/>`",
+        );
         return None;
     }
     // The frame of a link in URDF is that of its joint.
-    let mut frames: BTreeMap<&str, Isometry3<f64>> = links.iter().map(|(name, (_, at))| (*name, *at)).collect();
+    let mut frames: BTreeMap<&str, Isometry3<f64>> =
+        links.iter().map(|(name, (_, at))| (*name, *at)).collect();
     let mut joints: Vec<(Node, &str, &str)> = Vec::new();
     for joint in xml::children(model, "joint") {
         let (parent, child) = (end(joint, "parent", reader)?, end(joint, "child", reader)?);
@@ -74,7 +91,13 @@ fn convert(root: Node, reader: &mut Reader) -> Option<String> {
         write_link(*link, name, &shift, &mut out, reader)?;
     }
     for (joint, parent, child) in &joints {
-        write_joint(*joint, (parent, child), (&frames[parent], &frames[child]), &mut out, reader)?;
+        write_joint(
+            *joint,
+            (parent, child),
+            (&frames[parent], &frames[child]),
+            &mut out,
+            reader,
+        )?;
     }
     tie_roots(&links, &joints, &frames, &mut out);
     Some(out.finish(model.attribute("name").unwrap_or("robot")))
@@ -89,12 +112,30 @@ fn tie_roots(
 ) {
     let moved: BTreeSet<&str> = joints.iter().map(|(.., child)| *child).collect();
     // The one with the most joints below it is the robot.
-    let mut roots: Vec<&str> = links.keys().copied().filter(|name| !moved.contains(name)).collect();
-    roots.sort_by_key(|root| std::cmp::Reverse(joints.iter().filter(|(_, parent, _)| parent == root).count()));
-    let Some((root, others)) = roots.split_first() else { return };
+    let mut roots: Vec<&str> = links
+        .keys()
+        .copied()
+        .filter(|name| !moved.contains(name))
+        .collect();
+    roots.sort_by_key(|root| {
+        std::cmp::Reverse(
+            joints
+                .iter()
+                .filter(|(_, parent, _)| parent == root)
+                .count(),
+        )
+    });
+    let Some((root, others)) = roots.split_first() else {
+        return;
+    };
     for other in others {
         let origin = frames[root].inverse() * frames[other];
-        out.joint(&UrdfJoint::fixed(&format!("{other}_fixed"), root, other, origin));
+        out.joint(&UrdfJoint::fixed(
+            &format!("{other}_fixed"),
+            root,
+            other,
+            origin,
+        ));
     }
 }
 
@@ -102,7 +143,13 @@ fn end<'a>(joint: Node<'a>, which: &str, reader: &mut Reader) -> Option<&'a str>
     reader.required(joint, which).map(xml::text)
 }
 
-fn write_link(link: Node, name: &str, shift: &Isometry3<f64>, out: &mut UrdfText, reader: &mut Reader) -> Option<()> {
+fn write_link(
+    link: Node,
+    name: &str,
+    shift: &Isometry3<f64>,
+    out: &mut UrdfText,
+    reader: &mut Reader,
+) -> Option<()> {
     let mut solids = Vec::new();
     for collision in xml::children(link, "collision") {
         let at = shift * pose(collision, reader)?;
@@ -125,22 +172,38 @@ fn inertial(node: Node, shift: &Isometry3<f64>, reader: &mut Reader) -> Option<I
     };
     let mut about_com = Matrix3::identity();
     if let Some(inertia) = xml::child(node, "inertia") {
-        for (row, column, name) in
-            [(0, 0, "ixx"), (0, 1, "ixy"), (0, 2, "ixz"), (1, 1, "iyy"), (1, 2, "iyz"), (2, 2, "izz")]
-        {
-            let Some(written) = xml::child(inertia, name) else { continue };
+        for (row, column, name) in [
+            (0, 0, "ixx"),
+            (0, 1, "ixy"),
+            (0, 2, "ixz"),
+            (1, 1, "iyy"),
+            (1, 2, "iyz"),
+            (2, 2, "izz"),
+        ] {
+            let Some(written) = xml::child(inertia, name) else {
+                continue;
+            };
             let value = reader.number(written, Bound::Finite)?;
             about_com[(row, column)] = value;
             about_com[(column, row)] = value;
         }
     }
-    Some(Inertial { pose: at, kg, about_com })
+    Some(Inertial {
+        pose: at,
+        kg,
+        about_com,
+    })
 }
 
 /// The element of a `<geometry>` in URDF.
 fn shape(geometry: Node, reader: &mut Reader) -> Option<String> {
     let Some(kind) = geometry.children().find(Node::is_element) else {
-        reader.error("W033", geometry, "`<geometry>` is empty".to_owned(), "add a shape, such as `<box>`");
+        reader.error(
+            "W033",
+            geometry,
+            "`<geometry>` is empty".to_owned(),
+            "add a shape, such as `<box>`",
+        );
         return None;
     };
     let mut number = |name: &str| {
@@ -150,7 +213,11 @@ fn shape(geometry: Node, reader: &mut Reader) -> Option<String> {
     Some(match kind.tag_name().name() {
         "sphere" => format!("<sphere radius=\"{}\"/>", number("radius")?),
         round @ ("cylinder" | "capsule") => {
-            format!("<{round} radius=\"{}\" length=\"{}\"/>", number("radius")?, number("length")?)
+            format!(
+                "<{round} radius=\"{}\" length=\"{}\"/>",
+                number("radius")?,
+                number("length")?
+            )
         }
         "box" => {
             let size = reader.required(kind, "size")?;
@@ -159,17 +226,28 @@ fn shape(geometry: Node, reader: &mut Reader) -> Option<String> {
         }
         "ellipsoid" => {
             let radii = reader.required(kind, "radii")?;
-            let [x, y, z] = reader.numbers(radii, xml::text(radii), Bound::Length)?.map(|radius| 2.0 * radius);
+            let [x, y, z] = reader
+                .numbers(radii, xml::text(radii), Bound::Length)?
+                .map(|radius| 2.0 * radius);
             format!("<box size=\"{x} {y} {z}\"/>")
         }
         "mesh" => {
             let uri = reader.required(kind, "uri").map(xml::text)?;
             let scale = xml::child(kind, "scale").map_or("1 1 1", xml::text);
-            format!("<mesh filename=\"{}\" scale=\"{}\"/>", escaped(uri), escaped(scale))
+            format!(
+                "<mesh filename=\"{}\" scale=\"{}\"/>",
+                escaped(uri),
+                escaped(scale)
+            )
         }
         other => {
             let message = format!("the shape {other} can't be part of a robot");
-            reader.error("W035", kind, message, "use a box, cylinder, capsule, ellipsoid, sphere or mesh");
+            reader.error(
+                "W035",
+                kind,
+                message,
+                "use a box, cylinder, capsule, ellipsoid, sphere or mesh",
+            );
             return None;
         }
     })
@@ -193,18 +271,25 @@ fn write_joint(
         "continuous" => "continuous",
         "prismatic" => "prismatic",
         other => {
-            let message = format!("the joint `{name}` is of the type {other}, which can't be simulated");
-            reader.error("W035", joint, message, "use revolute, continuous, prismatic or fixed");
+            let message =
+                format!("the joint `{name}` is of the type {other}, which can't be simulated");
+            reader.error(
+                "W035",
+                joint,
+                message,
+                "use revolute, continuous, prismatic or fixed",
+            );
             return None;
         }
     };
     let axis = reader.required(joint, "axis")?;
     let direction = to.rotation.inverse() * sdf_joint::direction(joint, axis, to.rotation, reader)?;
     let limits = xml::child(axis, "limit");
-    let mut limit = |name: &str, otherwise: f64| match limits.and_then(|limits| xml::child(limits, name)) {
-        Some(node) => reader.number(node, Bound::Finite),
-        None => Some(otherwise),
-    };
+    let mut limit =
+        |name: &str, otherwise: f64| match limits.and_then(|limits| xml::child(limits, name)) {
+            Some(node) => reader.number(node, Bound::Finite),
+            None => Some(otherwise),
+        };
     let range = [limit("lower", -1e16)?, limit("upper", 1e16)?];
     let (effort, velocity) = (limit("effort", EFFORT)?, limit("velocity", VELOCITY)?);
     let damping = xml::child(axis, "dynamics").and_then(|dynamics| xml::child(dynamics, "damping"));

@@ -59,29 +59,50 @@ pub(crate) fn read(
         body = read_robot(root, materials, &mut shapes, &mut reader);
         body.friction = materials.friction;
     } else {
-        let message = format!("the root is `<{}>` instead of `<robot>`", root.tag_name().name());
-        reader.error("W032", root, message, "a URDF file begins with `<robot name=\"…\">`");
+        let message = format!(
+            "the root is `<{}>` instead of `<robot>`",
+            root.tag_name().name()
+        );
+        reader.error(
+            "W032",
+            root,
+            message,
+            "a URDF file begins with `<robot name=\"…\">`",
+        );
     }
     let found = reader.found;
     if found.has_errors() {
         return (None, found);
     }
     let digest = shapes.digest.finish();
-    (Some(SdfModel { body, pose: Isometry3::identity(), is_static: false, digest }), found)
+    (
+        Some(SdfModel {
+            body,
+            pose: Isometry3::identity(),
+            is_static: false,
+            digest,
+        }),
+        found,
+    )
 }
 
 fn read_robot(root: Node, materials: &Materials, shapes: &mut Shapes, reader: &mut Reader) -> Body {
     reader.warn_about_unknown_children(root, &["link", "joint", "material"]);
     let joints: Vec<Node> = xml::children(root, "joint").collect();
     let links: Vec<Node> = xml::children(root, "link").collect();
-    let places: Vec<Option<Isometry3<f64>>> = links.iter().map(|link| place(*link, &joints, reader)).collect();
+    let places: Vec<Option<Isometry3<f64>>> = links
+        .iter()
+        .map(|link| place(*link, &joints, reader))
+        .collect();
     let mut joins = Vec::new();
     for joint in joints {
         let end = |which| {
             let name = xml::child(joint, which).and_then(|end| end.attribute("link"));
             links.iter().position(|link| link.attribute("name") == name)
         };
-        let (Some(parent), Some(child)) = (end("parent"), end("child")) else { continue };
+        let (Some(parent), Some(child)) = (end("parent"), end("child")) else {
+            continue;
+        };
         let moves = match (joint.attribute("type"), &places[child]) {
             (Some("fixed"), _) => None,
             (_, Some(at)) => match read_joint(joint, at, reader) {
@@ -90,85 +111,146 @@ fn read_robot(root: Node, materials: &Materials, shapes: &mut Shapes, reader: &m
             },
             (_, None) => continue,
         };
-        joins.push(Join { node: joint, parent, child, joint: moves });
+        joins.push(Join {
+            node: joint,
+            parent,
+            child,
+            joint: moves,
+        });
     }
     let assembly = Assembly::of(links.len(), &joins, reader);
     let mut bodies = assembly.empty_bodies(false);
     for (idx, (link, at)) in links.iter().zip(&places).enumerate() {
         if let Some(at) = at {
-            read_link((*link, at, materials), &mut bodies[assembly.body_of(idx)], shapes, reader);
+            read_link(
+                (*link, at, materials),
+                &mut bodies[assembly.body_of(idx)],
+                shapes,
+                reader,
+            );
         }
     }
-    let names: Vec<&str> = links.iter().map(|link| link.attribute("name").unwrap_or_default()).collect();
+    let names: Vec<&str> = links
+        .iter()
+        .map(|link| link.attribute("name").unwrap_or_default())
+        .collect();
     let body = assembly.attach(bodies, &names, reader);
     if body.parts.is_empty() && !reader.found.has_errors() {
-        let message = "the object has no solid shape: none of its links has a `<collision>`".to_owned();
-        reader.error("W038", root, message, "give a link a `<collision>`; a `<visual>` does not collide");
+        let message =
+            "the object has no solid shape: none of its links has a `<collision>`".to_owned();
+        reader.error(
+            "W038",
+            root,
+            message,
+            "give a link a `<collision>`; a `<visual>` does not collide",
+        );
     }
     body
 }
 
-/// Reads a joint that moves a link, whose pose is known. Returns `None` after it has reported a fault.
+/// Reads a joint that moves a link, whose pose is known. Returns `None` after it has reported a
+/// fault.
 fn read_joint(joint: Node, at: &Isometry3<f64>, reader: &mut Reader) -> Option<PartJoint> {
     let name = joint.attribute("name").unwrap_or_default();
     let kind = joint.attribute("type").unwrap_or("unknown");
     if !["revolute", "continuous", "prismatic"].contains(&kind) {
         let message = format!("the joint `{name}` is of the type {kind}, which can't be simulated");
-        reader.error("W035", joint, message, "use revolute, continuous, prismatic or fixed");
+        reader.error(
+            "W035",
+            joint,
+            message,
+            "use revolute, continuous, prismatic or fixed",
+        );
         return None;
     }
     let mut numbers = |element: &str, attribute: &str, otherwise: f64| {
-        let written = xml::child(joint, element).and_then(|node| Some((node, node.attribute(attribute)?)));
+        let written =
+            xml::child(joint, element).and_then(|node| Some((node, node.attribute(attribute)?)));
         match written {
-            Some((node, text)) => reader.numbers::<1>(node, text, Bound::Finite).map(|[number]| number),
+            Some((node, text)) => reader
+                .numbers::<1>(node, text, Bound::Finite)
+                .map(|[number]| number),
             None => Some(otherwise),
         }
     };
     let range = match kind {
         "continuous" => [f64::NEG_INFINITY, f64::INFINITY],
-        _ => [numbers("limit", "lower", 0.0)?, numbers("limit", "upper", 0.0)?],
+        _ => [
+            numbers("limit", "lower", 0.0)?,
+            numbers("limit", "upper", 0.0)?,
+        ],
     };
-    let (damping, friction) =
-        (numbers("dynamics", "damping", 0.0)?.max(0.0), numbers("dynamics", "friction", 0.0)?.max(0.0));
-    let axis = match xml::child(joint, "axis").and_then(|axis| Some((axis, axis.attribute("xyz")?))) {
+    let (damping, friction) = (
+        numbers("dynamics", "damping", 0.0)?.max(0.0),
+        numbers("dynamics", "friction", 0.0)?.max(0.0),
+    );
+    let axis = match xml::child(joint, "axis").and_then(|axis| Some((axis, axis.attribute("xyz")?)))
+    {
         Some((axis, text)) => Vector3::from(reader.numbers::<3>(axis, text, Bound::Finite)?),
         None => Vector3::x(),
     };
     let Some(axis) = (at.rotation * axis).try_normalize(1e-9) else {
         let message = format!("the axis of the joint `{name}` must not be zero");
-        reader.error("W034", joint, message, "write, for example, `<axis xyz=\"0 0 1\"/>`");
+        reader.error(
+            "W034",
+            joint,
+            message,
+            "write, for example, `<axis xyz=\"0 0 1\"/>`",
+        );
         return None;
     };
     if range[0] > range[1] {
-        let message =
-            format!("the joint `{name}` has a lower limit of {} above its upper limit of {}", range[0], range[1]);
+        let message = format!(
+            "the joint `{name}` has a lower limit of {} above its upper limit of {}",
+            range[0], range[1]
+        );
         reader.error("W034", joint, message, "exchange the limits");
         return None;
     }
     let anchor_m = at.translation.vector.into();
-    Some(PartJoint { slides: kind == "prismatic", axis: axis.into(), anchor_m, range, damping, friction })
+    Some(PartJoint {
+        slides: kind == "prismatic",
+        axis: axis.into(),
+        anchor_m,
+        range,
+        damping,
+        friction,
+    })
 }
 
 /// Returns the pose of a link relative to the root, through its chain of fixed joints.
 fn place(link: Node, joints: &[Node], reader: &mut Reader) -> Option<Isometry3<f64>> {
-    let named =
-        |joint: &Node, end: &str| xml::child(*joint, end).and_then(|node| node.attribute("link")).map(str::to_owned);
+    let named = |joint: &Node, end: &str| {
+        xml::child(*joint, end)
+            .and_then(|node| node.attribute("link"))
+            .map(str::to_owned)
+    };
     let mut at = Isometry3::identity();
     let mut name = link.attribute("name").unwrap_or_default().to_owned();
     for _ in 0..LONGEST_CHAIN {
-        let Some(joint) = joints.iter().find(|joint| named(joint, "child").as_ref() == Some(&name)) else {
+        let Some(joint) = joints
+            .iter()
+            .find(|joint| named(joint, "child").as_ref() == Some(&name))
+        else {
             return Some(at);
         };
         at = origin(*joint, reader)? * at;
         name = named(joint, "parent").unwrap_or_default();
     }
-    reader.error("W035", link, "the link's joints form a cycle".to_owned(), "links form one tree");
+    reader.error(
+        "W035",
+        link,
+        "the link's joints form a cycle".to_owned(),
+        "links form one tree",
+    );
     None
 }
 
 /// Reads the `<origin>` of an element; the identity if it has none.
 pub(crate) fn origin(node: Node, reader: &mut Reader) -> Option<Isometry3<f64>> {
-    let Some(written) = xml::child(node, "origin") else { return Some(Isometry3::identity()) };
+    let Some(written) = xml::child(node, "origin") else {
+        return Some(Isometry3::identity());
+    };
     let mut three = |name: &str| match written.attribute(name) {
         Some(text) => reader.numbers(written, text, Bound::Finite),
         None => Some([0.0; 3]),
@@ -186,25 +268,43 @@ fn read_link(
     let before = body.parts.len();
     for collision in xml::children(link, "collision") {
         let placed = origin(collision, reader);
-        let shape = reader.required(collision, "geometry").and_then(|geometry| shapes.urdf(geometry, reader));
-        let (Some(placed), Some(shape)) = (placed, shape) else { continue };
+        let shape = reader
+            .required(collision, "geometry")
+            .and_then(|geometry| shapes.urdf(geometry, reader));
+        let (Some(placed), Some(shape)) = (placed, shape) else {
+            continue;
+        };
         check_volume(&shape, collision, reader);
-        body.parts.push(Part { pose: Pose::from_isometry(&(at * placed)), shape });
+        body.parts.push(Part {
+            pose: Pose::from_isometry(&(at * placed)),
+            shape,
+        });
     }
-    if let Some(mass) = xml::child(link, "inertial").and_then(|inertial| read_inertial(inertial, at, reader)) {
+    if let Some(mass) =
+        xml::child(link, "inertial").and_then(|inertial| read_inertial(inertial, at, reader))
+    {
         body.masses.push(mass);
         return;
     }
     let own = &body.parts[before..];
-    let kg = match link.attribute("name").and_then(|name| materials.of_link.get(name)) {
+    let kg = match link
+        .attribute("name")
+        .and_then(|name| materials.of_link.get(name))
+    {
         Some(Matter::Mass(kg)) => Some(*kg),
-        Some(Matter::Density(density)) => Some(density * own.iter().map(|part| part.shape.volume()).sum::<f64>()),
+        Some(Matter::Density(density)) => {
+            Some(density * own.iter().map(|part| part.shape.volume()).sum::<f64>())
+        }
         None => None,
     };
     match kg {
         _ if own.is_empty() => {}
         // Moments without a tensor follow from the shapes.
-        Some(kg) => body.masses.push(Mass { kg, com: at.translation.vector, about_com: None }),
+        Some(kg) => body.masses.push(Mass {
+            kg,
+            com: at.translation.vector,
+            about_com: None,
+        }),
         None => body.has_unknown_mass = true,
     }
 }
@@ -217,13 +317,23 @@ fn read_inertial(inertial: Node, link: &Isometry3<f64>, reader: &mut Reader) -> 
     let moments = xml::child(inertial, "inertia").and_then(|inertia| {
         let mut entry = |name: &str| {
             let written = reader.attribute(inertia, name)?;
-            reader.numbers::<1>(inertia, written, Bound::Finite).map(|[number]| number)
+            reader
+                .numbers::<1>(inertia, written, Bound::Finite)
+                .map(|[number]| number)
         };
         let (xx, xy, xz) = (entry("ixx")?, entry("ixy")?, entry("ixz")?);
         let (yy, yz, zz) = (entry("iyy")?, entry("iyz")?, entry("izz")?);
-        possible(Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz), inertia, reader)
+        possible(
+            Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz),
+            inertia,
+            reader,
+        )
     });
     let turn = at.rotation.to_rotation_matrix();
     let about_com = moments.map(|moments| turn.matrix() * moments * turn.matrix().transpose());
-    Some(Mass { kg, com: at.translation.vector, about_com })
+    Some(Mass {
+        kg,
+        com: at.translation.vector,
+        about_com,
+    })
 }

@@ -40,10 +40,21 @@ pub(crate) struct Inertial {
 }
 
 impl UrdfText {
-    /// Writes a link with its mass and shapes, each an element of a `<geometry>` at a pose in the link's frame.
-    pub(crate) fn link(&mut self, name: &str, inertial: Option<&Inertial>, solids: &[(Isometry3<f64>, String)]) {
+    /// Writes a link with its mass and shapes, each an element of a `<geometry>` at a pose in the
+    /// link's frame.
+    pub(crate) fn link(
+        &mut self,
+        name: &str,
+        inertial: Option<&Inertial>,
+        solids: &[(Isometry3<f64>, String)],
+    ) {
         let _ = writeln!(self.text, "  <link name=\"{}\">", escaped(name));
-        if let Some(Inertial { pose, kg, about_com: i }) = inertial {
+        if let Some(Inertial {
+            pose,
+            kg,
+            about_com: i,
+        }) = inertial
+        {
             let _ = writeln!(
                 self.text,
                 "    <inertial>{}<mass value=\"{kg}\"/><inertia ixx=\"{}\" ixy=\"{}\" ixz=\"{}\" iyy=\"{}\" iyz=\"{}\" \
@@ -58,14 +69,27 @@ impl UrdfText {
             );
         }
         for (pose, shape) in solids {
-            let _ = writeln!(self.text, "    <collision>{}<geometry>{shape}</geometry></collision>", origin(pose));
+            let _ = writeln!(
+                self.text,
+                "    <collision>{}<geometry>{shape}</geometry></collision>",
+                origin(pose)
+            );
         }
         self.text.push_str("  </link>\n");
     }
 
     /// Writes a joint.
     pub(crate) fn joint(&mut self, joint: &UrdfJoint<'_>) {
-        let UrdfJoint { kind, axis, range: [lower, upper], effort, velocity, damping, friction, .. } = joint;
+        let UrdfJoint {
+            kind,
+            axis,
+            range: [lower, upper],
+            effort,
+            velocity,
+            damping,
+            friction,
+            ..
+        } = joint;
         let _ = writeln!(
             self.text,
             "  <joint name=\"{}\" type=\"{kind}\">{}<parent link=\"{}\"/><child link=\"{}\"/>",
@@ -82,7 +106,11 @@ impl UrdfText {
                 axis.x,
                 axis.y,
                 axis.z,
-                if *friction > 0.0 { format!(" friction=\"{friction}\"") } else { String::new() },
+                if *friction > 0.0 {
+                    format!(" friction=\"{friction}\"")
+                } else {
+                    String::new()
+                },
             );
         }
         if let Some((leader, factor, offset)) = &joint.mimic {
@@ -98,23 +126,40 @@ impl UrdfText {
     /// A link without mass and shapes, fixed to another at a pose in its frame.
     pub(crate) fn frame(&mut self, name: &str, parent: &str, pose: Isometry3<f64>) {
         self.link(name, None, &[]);
-        self.joint(&UrdfJoint::fixed(&format!("{name}_fixed"), parent, name, pose));
+        self.joint(&UrdfJoint::fixed(
+            &format!("{name}_fixed"),
+            parent,
+            name,
+            pose,
+        ));
     }
 
     /// Two links that pass through each other: the element of SRDF.
     pub(crate) fn passing(&mut self, links: [&str; 2]) {
         let [first, second] = links.map(escaped);
-        let _ = writeln!(self.text, "  <disable_collisions link1=\"{first}\" link2=\"{second}\"/>");
+        let _ = writeln!(
+            self.text,
+            "  <disable_collisions link1=\"{first}\" link2=\"{second}\"/>"
+        );
     }
 
     /// The whole text.
     pub(crate) fn finish(self, robot: &str) -> String {
-        format!("<robot name=\"{}\">\n{}</robot>\n", escaped(robot), self.text)
+        format!(
+            "<robot name=\"{}\">\n{}</robot>\n",
+            escaped(robot),
+            self.text
+        )
     }
 }
 
 impl<'a> UrdfJoint<'a> {
-    pub(crate) fn fixed(name: &'a str, parent: &'a str, child: &'a str, origin: Isometry3<f64>) -> Self {
+    pub(crate) fn fixed(
+        name: &'a str,
+        parent: &'a str,
+        child: &'a str,
+        origin: Isometry3<f64>,
+    ) -> Self {
         Self {
             name,
             kind: "fixed",
@@ -135,10 +180,15 @@ impl<'a> UrdfJoint<'a> {
 fn origin(pose: &Isometry3<f64>) -> String {
     let at = pose.translation.vector;
     let (roll, pitch, yaw) = pose.rotation.euler_angles();
-    format!("<origin xyz=\"{} {} {}\" rpy=\"{roll} {pitch} {yaw}\"/>", at.x, at.y, at.z)
+    format!(
+        "<origin xyz=\"{} {} {}\" rpy=\"{roll} {pitch} {yaw}\"/>",
+        at.x, at.y, at.z
+    )
 }
 
 /// A value of an attribute.
 pub(crate) fn escaped(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('"', "&quot;")
+    text.replace('&', "&amp;")
+        .replace('<', "&lt;")
+        .replace('"', "&quot;")
 }

@@ -1,4 +1,5 @@
-//! Reads worlds of Gazebo and MuJoCo: their models as static furniture, with a location in front of each surface.
+//! Reads worlds of Gazebo and MuJoCo: their models as static furniture, with a location in front of
+//! each surface.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
@@ -20,7 +21,8 @@ use crate::{Furniture, WorldMap};
 use actcheck_base::{Diagnostics, Severity, Source, Span, digest_of};
 use actcheck_data::{FLOOR_M, ObjectModel, Pose};
 
-/// Elements of a world that are read, or that do not affect its geometry: light, Gazebo's display and time steps.
+/// Elements of a world that are read, or that do not affect its geometry: light, Gazebo's display
+/// and time steps.
 const KNOWN: [&str; 16] = [
     "include",
     "model",
@@ -47,8 +49,8 @@ const UPRIGHT_COSINE: f64 = 0.999;
 /// A world, and its models that only it has.
 pub(crate) struct World {
     pub(crate) map: WorldMap,
-    /// Models that are defined inside the world, and included ones with another pose than the model itself. Their names
-    /// begin with that of the world.
+    /// Models that are defined inside the world, and included ones with another pose than the model
+    /// itself. Their names begin with that of the world.
     pub(crate) models: Vec<ObjectModel>,
 }
 
@@ -72,19 +74,36 @@ pub(super) const FARTHEST_M: f64 = FLOOR_M + 1.0;
 /// Reads a world in SDF or MJCF. It is `None` if there are errors.
 ///
 /// # Errors
-/// All faults of the text: it is not XML (W031) or not SDF of a supported version (W032), lacks an element (W033), has
-/// an invalid value (W034) or an unsupported element (W035), has an unusable mesh (W037), includes a missing or faulty
-/// model (W040), or has a duplicate name (W041).
-pub(crate) fn read(name: &str, source: &Source, path: &Path, included: &Included<'_>) -> (Option<World>, Diagnostics) {
+/// All faults of the text: it is not XML (W031) or not SDF of a supported version (W032), lacks an
+/// element (W033), has an invalid value (W034) or an unsupported element (W035), has an unusable
+/// mesh (W037), includes a missing or faulty model (W040), or has a duplicate name (W041).
+pub(crate) fn read(
+    name: &str,
+    source: &Source,
+    path: &Path,
+    included: &Included<'_>,
+) -> (Option<World>, Diagnostics) {
     let text = repaired(&source.text);
     let document = match xml::parse_model(source, &text) {
         Ok(document) => document,
         Err(faults) => return (None, faults),
     };
-    let map = WorldMap { digest: digest_of(&source.text), ..WorldMap::floor_only(name) };
-    let world = World { map, models: Vec::new() };
-    let mut gathering =
-        Gathering { path, included, world, pieces: Vec::new(), whole: Vec::new(), reader: Reader::new(source) };
+    let map = WorldMap {
+        digest: digest_of(&source.text),
+        ..WorldMap::floor_only(name)
+    };
+    let world = World {
+        map,
+        models: Vec::new(),
+    };
+    let mut gathering = Gathering {
+        path,
+        included,
+        world,
+        pieces: Vec::new(),
+        whole: Vec::new(),
+        reader: Reader::new(source),
+    };
     let root = document.root_element();
     if root.has_tag_name("mujoco") {
         gathering.bodies(root, source);
@@ -98,7 +117,9 @@ pub(crate) fn read(name: &str, source: &Source, path: &Path, included: &Included
                 "include" => gathering.include(child),
                 _ => None,
             };
-            gathering.pieces.extend(piece.map(|piece| (piece, xml::span(child))));
+            gathering
+                .pieces
+                .extend(piece.map(|piece| (piece, xml::span(child))));
         }
     }
     gathering.add_all();
@@ -113,7 +134,8 @@ struct Gathering<'a> {
     path: &'a Path,
     included: &'a Included<'a>,
     world: World,
-    /// All models of the world, before buildings are split and floors are left out, with their elements in the text.
+    /// All models of the world, before buildings are split and floors are left out, with their
+    /// elements in the text.
     pieces: Vec<(Furniture, Span)>,
     /// Furniture other than the solids of buildings: its index, and its element in the text.
     whole: Vec<(usize, Span)>,
@@ -121,17 +143,30 @@ struct Gathering<'a> {
 }
 
 impl Gathering<'_> {
-    /// Adds all models. If slabs are the floor of the world, everything is moved down until their tops are at height 0.
+    /// Adds all models. If slabs are the floor of the world, everything is moved down until their
+    /// tops are at height 0.
     fn add_all(&mut self) {
         let pieces = std::mem::take(&mut self.pieces);
-        let tops: Vec<Option<f64>> = pieces.iter().map(|(piece, _)| self.top_of_slab(piece)).collect();
+        let tops: Vec<Option<f64>> = pieces
+            .iter()
+            .map(|(piece, _)| self.top_of_slab(piece))
+            .collect();
         let floor_m = self.height_of_floor(&pieces, &tops);
         if let Some((top_m, (piece, span))) = floor_m.and_then(|top_m| {
             let slab = tops.iter().position(|top| *top == Some(top_m))?;
             Some((top_m, &pieces[slab]))
         }) {
-            let message = format!("`{}` is the floor: the world is moved down by {:.1} cm", piece.name, 100.0 * top_m);
-            self.reader.warning_at("W036", span.clone(), message, "the floor of every world is at the height 0");
+            let message = format!(
+                "`{}` is the floor: the world is moved down by {:.1} cm",
+                piece.name,
+                100.0 * top_m
+            );
+            self.reader.warning_at(
+                "W036",
+                span.clone(),
+                message,
+                "the floor of every world is at the height 0",
+            );
         }
         for (mut piece, span) in pieces {
             piece.pose.position[2] -= floor_m.unwrap_or(0.0);
@@ -141,30 +176,49 @@ impl Gathering<'_> {
 
     /// The height of a slab that may be a floor; `None` for other models.
     fn top_of_slab(&self, piece: &Furniture) -> Option<f64> {
-        let model = self.model_of(&piece.model).filter(|model| building::is_large(model))?;
+        let model = self
+            .model_of(&piece.model)
+            .filter(|model| building::is_large(model))?;
         let foot_m = piece.pose.position[2];
         let top_m = foot_m + model.size_m[2];
-        (foot_m <= LOW_M && (LOW_M..SLAB_M).contains(&top_m) && building::is_level(model)).then_some(top_m)
+        (foot_m <= LOW_M && (LOW_M..SLAB_M).contains(&top_m) && building::is_level(model))
+            .then_some(top_m)
     }
 
-    /// The height of slabs on which more than half of the models around the origin are, if there are such slabs.
+    /// The height of slabs on which more than half of the models around the origin are, if there
+    /// are such slabs.
     fn height_of_floor(&self, pieces: &[(Furniture, Span)], tops: &[Option<f64>]) -> Option<f64> {
         let is_on = |at: [f64; 3], slab: &Furniture| {
             let local = slab.pose.to_isometry().inverse() * Point3::from(at);
-            let size = self.model_of(&slab.model).map_or([0.0; 3], |model| model.size_m);
+            let size = self
+                .model_of(&slab.model)
+                .map_or([0.0; 3], |model| model.size_m);
             (0..2).all(|axis| local[axis].abs() <= size[axis] / 2.0)
         };
-        let places: Vec<[f64; 3]> = pieces.iter().map(|(piece, _)| piece.pose.position).collect();
-        let near: Vec<&[f64; 3]> = places.iter().filter(|[x, y, _]| libm::hypot(*x, *y) <= FARTHEST_M).collect();
+        let places: Vec<[f64; 3]> = pieces
+            .iter()
+            .map(|(piece, _)| piece.pose.position)
+            .collect();
+        let near: Vec<&[f64; 3]> = places
+            .iter()
+            .filter(|[x, y, _]| libm::hypot(*x, *y) <= FARTHEST_M)
+            .collect();
         let n_on = |top_m: f64| {
-            let slabs =
-                || pieces.iter().zip(tops).filter(|(_, top)| top.is_some_and(|top| (top - top_m).abs() < LOW_M));
-            near.iter().filter(|at| slabs().any(|((slab, _), _)| is_on(***at, slab))).count()
+            let slabs = || {
+                pieces
+                    .iter()
+                    .zip(tops)
+                    .filter(|(_, top)| top.is_some_and(|top| (top - top_m).abs() < LOW_M))
+            };
+            near.iter()
+                .filter(|at| slabs().any(|((slab, _), _)| is_on(***at, slab)))
+                .count()
         };
         let counted = tops.iter().flatten().map(|top_m| (n_on(*top_m), *top_m));
         let best = counted.max_by(|one, other| one.0.cmp(&other.0).then(one.1.total_cmp(&other.1)));
         // The slabs are among those on them.
-        best.filter(|(count, _)| 2 * count > near.len()).map(|(_, top_m)| top_m)
+        best.filter(|(count, _)| 2 * count > near.len())
+            .map(|(_, top_m)| top_m)
     }
 
     fn model_of(&self, name: &str) -> Option<&ObjectModel> {
@@ -173,14 +227,26 @@ impl Gathering<'_> {
     }
 
     fn add(&mut self, piece: Furniture, span: Span) {
-        let own = self.world.models.iter().position(|model| model.name == piece.model);
+        let own = self
+            .world
+            .models
+            .iter()
+            .position(|model| model.name == piece.model);
         let model = match own {
             Some(idx) => Some(&self.world.models[idx]),
             None => self.included.models.get(&piece.model).map(|model| &**model),
         };
         if model.is_some_and(|model| piece.pose.position[2] + model.size_m[2] < LOW_M) {
-            let message = format!("`{}` rises less than 5 mm above the floor, and is left out", piece.name);
-            self.reader.warning_at("W036", span, message, "robots drive over carpets and markings");
+            let message = format!(
+                "`{}` rises less than 5 mm above the floor, and is left out",
+                piece.name
+            );
+            self.reader.warning_at(
+                "W036",
+                span,
+                message,
+                "robots drive over carpets and markings",
+            );
             if let Some(idx) = own {
                 self.world.models.remove(idx);
             }
@@ -192,14 +258,19 @@ impl Gathering<'_> {
         }
         match model.map(|model| building::solids(model, &piece.pose.to_isometry())) {
             Some(Split::Solids(solids)) => {
-                let Some(building) = model.cloned() else { return };
+                let Some(building) = model.cloned() else {
+                    return;
+                };
                 if let Some(idx) = own {
                     self.world.models.remove(idx);
                 }
                 return self.add_solids(&piece, &building, solids, &span);
             }
             Some(Split::TooMany(count)) => {
-                let message = format!("`{}` is one obstacle: no drive leads into the box around it", piece.name);
+                let message = format!(
+                    "`{}` is one obstacle: no drive leads into the box around it",
+                    piece.name
+                );
                 let help = format!(
                     "give it a collision mesh of fewer flat faces; it has {count}, and at most {} become obstacles of their own",
                     building::MOST_SOLIDS
@@ -208,15 +279,19 @@ impl Gathering<'_> {
             }
             Some(Split::Whole) | None => {}
         }
-        self.whole.push((self.world.map.furniture.len(), span.clone()));
+        self.whole
+            .push((self.world.map.furniture.len(), span.clone()));
         self.add_piece(piece, span);
     }
 
     fn leave_out_distant(&mut self, piece: &Furniture, own: Option<usize>, span: Span) {
         let [x, y, z] = piece.pose.position;
-        let message =
-            format!("`{}` at ({x:.1}, {y:.1}, {z:.1}) is beyond the end of the floor, and is left out", piece.name);
-        self.reader.warning_at("W036", span, message, "the floor ends 14 m from the origin");
+        let message = format!(
+            "`{}` at ({x:.1}, {y:.1}, {z:.1}) is beyond the end of the floor, and is left out",
+            piece.name
+        );
+        self.reader
+            .warning_at("W036", span, message, "the floor ends 14 m from the origin");
         if let Some(idx) = own {
             self.world.models.remove(idx);
         }
@@ -226,46 +301,82 @@ impl Gathering<'_> {
     fn add_fronts(&mut self) {
         let pieces = self.whole.iter().map(|(idx, _)| *idx);
         let without = fronts::add_fronts(&mut self.world, self.included.models, pieces);
-        let place = self.whole.iter().find(|(idx, _)| without.contains(idx)).map(|(_, span)| span.clone());
+        let place = self
+            .whole
+            .iter()
+            .find(|(idx, _)| without.contains(idx))
+            .map(|(_, span)| span.clone());
         if let Some(span) = place {
-            let names: Vec<String> =
-                without.iter().map(|idx| format!("`{}`", self.world.map.furniture[*idx].name)).collect();
-            let message = format!("no side with room for a robot, and therefore no location: {}", names.join(", "));
-            let help = "a place 0.69 m from the surface must be 0.4 m away from all other furniture";
+            let names: Vec<String> = without
+                .iter()
+                .map(|idx| format!("`{}`", self.world.map.furniture[*idx].name))
+                .collect();
+            let message = format!(
+                "no side with room for a robot, and therefore no location: {}",
+                names.join(", ")
+            );
+            let help =
+                "a place 0.69 m from the surface must be 0.4 m away from all other furniture";
             self.reader.warning_at("W036", span, message, help);
         }
     }
 
     fn add_piece(&mut self, piece: Furniture, span: Span) {
-        if self.world.map.furniture.iter().any(|other| other.name == piece.name) {
+        if self
+            .world
+            .map
+            .furniture
+            .iter()
+            .any(|other| other.name == piece.name)
+        {
             let message = format!("there are two `{}`", piece.name);
-            self.reader.error_at("W041", span, message, "give one of them another name");
+            self.reader
+                .error_at("W041", span, message, "give one of them another name");
         }
         self.world.map.furniture.push(piece);
     }
 
-    /// Adds each solid of a building as a piece of its own: the robot's map has a box for each piece, and the box of a
-    /// whole building would be around the robot.
-    fn add_solids(&mut self, piece: &Furniture, building: &ObjectModel, solids: Vec<Solid>, span: &Span) {
+    /// Adds each solid of a building as a piece of its own: the robot's map has a box for each
+    /// piece, and the box of a whole building would be around the robot.
+    fn add_solids(
+        &mut self,
+        piece: &Furniture,
+        building: &ObjectModel,
+        solids: Vec<Solid>,
+        span: &Span,
+    ) {
         for (number, solid) in (1..).zip(solids) {
             let (friction, restitution) = (Some(building.friction), Some(building.restitution));
-            let body = Body { parts: vec![solid.part], friction, restitution, fixed: true, ..Body::default() };
+            let body = Body {
+                parts: vec![solid.part],
+                friction,
+                restitution,
+                fixed: true,
+                ..Body::default()
+            };
             let digest = digest_of(&format!("{} {number}", building.digest));
             let placed = self.place(body, digest, &solid.at, &format!("{}_{number}", piece.name));
             self.add_piece(placed, span.clone());
         }
     }
 
-    /// Reads a model that is defined inside the world. A model without solid shapes but planes is left out: every world
-    /// has a floor, and lights and pictures do not collide.
+    /// Reads a model that is defined inside the world. A model without solid shapes but planes is
+    /// left out: every world has a floor, and lights and pictures do not collide.
     fn inline(&mut self, model: Node) -> Option<Furniture> {
         let name = self.reader.attribute(model, "name")?;
         let mut shapes = Shapes::new(self.included.lookup, self.path);
-        shapes.digest.update(self.reader.source.text[model.range()].as_bytes());
+        shapes
+            .digest
+            .update(self.reader.source.text[model.range()].as_bytes());
         let n_faults = self.reader.found.len();
         let body = sdf::read_model(model, Role::Furniture, &mut shapes, &mut self.reader);
         let at = pose(model, &mut self.reader)?;
-        let is_faulty = self.reader.found.iter().skip(n_faults).any(|fault| fault.severity == Severity::Error);
+        let is_faulty = self
+            .reader
+            .found
+            .iter()
+            .skip(n_faults)
+            .any(|fault| fault.severity == Severity::Error);
         if is_faulty || body.parts.is_empty() {
             return None;
         }
@@ -296,10 +407,21 @@ impl Gathering<'_> {
             self.warn_if_movable(is_still || model.fixed, &named, include);
             // A model's origin is below its middle; the file's origin may differ.
             let foot = at * Point3::from(model.origin_m.map(|x| -x));
-            return Some(Furniture { name: name.to_owned(), model: named.clone(), pose: upright(&at, foot) });
+            return Some(Furniture {
+                name: name.to_owned(),
+                model: named.clone(),
+                pose: upright(&at, foot),
+            });
         }
         let known = self.included.models.keys().map(String::as_str);
-        let model = folder::included(uri, self.included.lookup, Role::Furniture, 1, known, &mut self.reader)?;
+        let model = folder::included(
+            uri,
+            self.included.lookup,
+            Role::Furniture,
+            1,
+            known,
+            &mut self.reader,
+        )?;
         if model.body.parts.is_empty() {
             return None;
         }
@@ -315,27 +437,46 @@ impl Gathering<'_> {
             Err(faults) => return self.reader.found.extend(faults),
         };
         for piece in pieces {
-            let (model, said) = urdf::read(&piece.urdf, self.path, self.included.lookup, &piece.materials);
+            let (model, said) = urdf::read(
+                &piece.urdf,
+                self.path,
+                self.included.lookup,
+                &piece.materials,
+            );
             let Some(mut model) = model else {
                 // A body that is only seen has no solids.
-                self.reader.found.extend(said.into_iter().filter(|fault| fault.code != "W038").collect());
+                self.reader.found.extend(
+                    said.into_iter()
+                        .filter(|fault| fault.code != "W038")
+                        .collect(),
+                );
                 continue;
             };
             self.warn_if_movable(!piece.moves, &piece.name, root);
             model.body.fixed = true;
-            let furniture = self.place(model.body, model.digest, &Isometry3::identity(), &piece.name);
+            let furniture = self.place(
+                model.body,
+                model.digest,
+                &Isometry3::identity(),
+                &piece.name,
+            );
             self.pieces.push((furniture, xml::span(root)));
         }
     }
 
     /// Adds a body as a model of its own, and returns the piece of furniture that it is at a pose.
     fn place(&mut self, body: Body, digest: String, at: &Isometry3<f64>, name: &str) -> Furniture {
-        let heading = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), Pose::from_isometry(at).yaw());
+        let heading =
+            UnitQuaternion::from_axis_angle(&Vector3::z_axis(), Pose::from_isometry(at).yaw());
         let tilt = Isometry3::from_parts(Translation3::identity(), heading.inverse() * at.rotation);
         let model = body.into_model(&format!("{}/{name}", self.world.map.name), digest, &tilt);
         let at = Isometry3::from_parts(at.translation, heading);
         let foot = at * Point3::from(model.origin_m.map(|x| -x));
-        let piece = Furniture { name: name.to_owned(), model: model.name.clone(), pose: upright(&at, foot) };
+        let piece = Furniture {
+            name: name.to_owned(),
+            model: model.name.clone(),
+            pose: upright(&at, foot),
+        };
         self.world.models.push(model);
         piece
     }

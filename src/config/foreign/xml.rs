@@ -6,7 +6,8 @@ use actcheck_base::{Diagnostic, Diagnostics, Source, Span, check_xml, did_you_me
 
 /// Longest text of a model, robot or world; meshes have files of their own. Unit: bytes.
 const LONGEST_MODEL: usize = 16 << 20;
-/// Largest number of elements of one of the kinds in [`PARTS`]: each is simulated, or compared with all others.
+/// Largest number of elements of one of the kinds in [`PARTS`]: each is simulated, or compared with
+/// all others.
 const MOST_PARTS: usize = 1_000;
 /// Kinds of elements that models and worlds consist of.
 const PARTS: [&str; 5] = ["link", "joint", "collision", "include", "model"];
@@ -29,8 +30,9 @@ pub(crate) enum Bound {
     Mass,
 }
 
-/// Largest mass of a body and largest side of the ground: no scene of a robot has a thousand tonnes or a thousand kilometres,
-/// and the physics engine can't calculate with much larger numbers. Units: kilograms, metres.
+/// Largest mass of a body and largest side of the ground: no scene of a robot has a thousand tonnes
+/// or a thousand kilometres, and the physics engine can't calculate with much larger numbers.
+/// Units: kilograms, metres.
 const LARGEST: f64 = 1e6;
 /// Largest length of a body: a larger one is most likely in millimetres. Unit: metres.
 pub(crate) const LONGEST: f64 = 1e3;
@@ -56,18 +58,25 @@ impl Bound {
     }
 }
 
-/// Parses the document of a text: that of the source, or its [`repaired`](crate::foreign::lenient::repaired) text.
+/// Parses the document of a text: that of the source, or its
+/// [`repaired`](crate::foreign::lenient::repaired) text.
 ///
 /// # Errors
 /// W031 at the first syntax error; W055 if parsing could exhaust time or memory.
-pub(crate) fn parse<'t>(source: &Source, text: &'t str) -> Result<roxmltree::Document<'t>, Diagnostics> {
+pub(crate) fn parse<'t>(
+    source: &Source,
+    text: &'t str,
+) -> Result<roxmltree::Document<'t>, Diagnostics> {
     check_xml(source, "W055")?;
     roxmltree::Document::parse(text).map_err(|error| {
         let place = error.pos();
         let at = offset(&source.text, place.row as usize, place.col as usize);
-        // The library's message ends with the position, which our diagnostics print before the message.
+        // The library's message ends with the position, which our diagnostics print before the
+        // message.
         let said = error.to_string();
-        let said = said.rsplit_once(" at ").map_or(said.as_str(), |(what, _)| what);
+        let said = said
+            .rsplit_once(" at ")
+            .map_or(said.as_str(), |(what, _)| what);
         Diagnostic::error("W031", format!("this is not XML: {said}"))
             .at(source, at..at)
             .help("check that every element is closed and that every `<` in text is written `&lt;`")
@@ -79,20 +88,33 @@ pub(crate) fn parse<'t>(source: &Source, text: &'t str) -> Result<roxmltree::Doc
 ///
 /// # Errors
 /// As [`parse`]; W055 also if it has more parts than can be simulated.
-pub(crate) fn parse_model<'t>(source: &Source, text: &'t str) -> Result<roxmltree::Document<'t>, Diagnostics> {
+pub(crate) fn parse_model<'t>(
+    source: &Source,
+    text: &'t str,
+) -> Result<roxmltree::Document<'t>, Diagnostics> {
     let refused = |message: String, at: Span| {
         Diagnostic::error("W055", message)
             .at(source, at)
             .help("use fewer and simpler parts; meshes have files of their own")
     };
     if source.text.len() > LONGEST_MODEL {
-        return Err(refused(format!("this model is longer than {} MiB", LONGEST_MODEL >> 20), 0..0).into());
+        return Err(refused(
+            format!("this model is longer than {} MiB", LONGEST_MODEL >> 20),
+            0..0,
+        )
+        .into());
     }
     let document = parse(source, text)?;
     for part in PARTS {
-        let mut all = document.descendants().filter(|node| node.is_element() && node.tag_name().name() == part);
+        let mut all = document
+            .descendants()
+            .filter(|node| node.is_element() && node.tag_name().name() == part);
         if let Some(next) = all.nth(MOST_PARTS) {
-            return Err(refused(format!("this model has more than {MOST_PARTS} `<{part}>`"), span(next)).into());
+            return Err(refused(
+                format!("this model has more than {MOST_PARTS} `<{part}>`"),
+                span(next),
+            )
+            .into());
         }
     }
     Ok(document)
@@ -100,9 +122,17 @@ pub(crate) fn parse_model<'t>(source: &Source, text: &'t str) -> Result<roxmltre
 
 /// Returns the byte offset of a line and a column, both 1-based, the column in characters.
 fn offset(text: &str, row: usize, column: usize) -> usize {
-    let start: usize = text.split_inclusive('\n').take(row.saturating_sub(1)).map(str::len).sum();
+    let start: usize = text
+        .split_inclusive('\n')
+        .take(row.saturating_sub(1))
+        .map(str::len)
+        .sum();
     let line = text.get(start..).unwrap_or_default();
-    start + line.char_indices().nth(column.saturating_sub(1)).map_or(0, |(at, _)| at)
+    start
+        + line
+            .char_indices()
+            .nth(column.saturating_sub(1))
+            .map_or(0, |(at, _)| at)
 }
 
 /// Returns the span of an element's start tag up to the end of its name.
@@ -119,7 +149,8 @@ pub(crate) fn child<'a>(node: Node<'a>, name: &str) -> Option<Node<'a>> {
 /// Returns all child elements with this name.
 pub(crate) fn children<'a>(node: Node<'a>, name: &str) -> impl Iterator<Item = Node<'a>> {
     let name = name.to_owned();
-    node.children().filter(move |child| child.is_element() && child.tag_name().name() == name)
+    node.children()
+        .filter(move |child| child.is_element() && child.tag_name().name() == name)
 }
 
 /// Returns an element's text without surrounding whitespace.
@@ -137,32 +168,69 @@ pub(crate) struct Reader<'a> {
 
 impl<'a> Reader<'a> {
     pub(crate) fn new(source: &'a Source) -> Self {
-        Self { source, found: Diagnostics::new(), n_errors: 0, n_warnings: 0 }
+        Self {
+            source,
+            found: Diagnostics::new(),
+            n_errors: 0,
+            n_warnings: 0,
+        }
     }
 
     /// Records an error of an element. Those after the first 200 are dropped, as are warnings.
-    pub(crate) fn error(&mut self, code: &'static str, node: Node, message: String, help: impl Into<String>) {
+    pub(crate) fn error(
+        &mut self,
+        code: &'static str,
+        node: Node,
+        message: String,
+        help: impl Into<String>,
+    ) {
         self.error_at(code, span(node), message, help);
     }
 
     /// Records an error about a place in the text.
-    pub(crate) fn error_at(&mut self, code: &'static str, span: Span, message: String, help: impl Into<String>) {
+    pub(crate) fn error_at(
+        &mut self,
+        code: &'static str,
+        span: Span,
+        message: String,
+        help: impl Into<String>,
+    ) {
         self.n_errors += 1;
         if self.n_errors <= MOST_FAULTS {
-            self.found.push(Diagnostic::error(code, message).at(self.source, span).help(help));
+            self.found.push(
+                Diagnostic::error(code, message)
+                    .at(self.source, span)
+                    .help(help),
+            );
         }
     }
 
     /// Records a warning about an element, usually that it is ignored.
-    pub(crate) fn warning(&mut self, code: &'static str, node: Node, message: String, help: impl Into<String>) {
+    pub(crate) fn warning(
+        &mut self,
+        code: &'static str,
+        node: Node,
+        message: String,
+        help: impl Into<String>,
+    ) {
         self.warning_at(code, span(node), message, help);
     }
 
     /// Records a warning about a place in the text.
-    pub(crate) fn warning_at(&mut self, code: &'static str, span: Span, message: String, help: impl Into<String>) {
+    pub(crate) fn warning_at(
+        &mut self,
+        code: &'static str,
+        span: Span,
+        message: String,
+        help: impl Into<String>,
+    ) {
         self.n_warnings += 1;
         if self.n_warnings <= MOST_FAULTS {
-            self.found.push(Diagnostic::warning(code, message).at(self.source, span).help(help));
+            self.found.push(
+                Diagnostic::warning(code, message)
+                    .at(self.source, span)
+                    .help(help),
+            );
         }
     }
 
@@ -181,38 +249,83 @@ impl<'a> Reader<'a> {
         let found = node.attribute(name).map(str::trim);
         if found.is_none() {
             let message = format!("`<{}>` has no attribute `{name}`", node.tag_name().name());
-            self.error("W033", node, message, format!("write `<{} {name}=\"…\">`", node.tag_name().name()));
+            self.error(
+                "W033",
+                node,
+                message,
+                format!("write `<{} {name}=\"…\">`", node.tag_name().name()),
+            );
         }
         found
     }
 
-    /// Parses exactly `N` numbers from a text of an element; reports W034 and returns `None` if they are invalid.
-    pub(crate) fn numbers<const N: usize>(&mut self, node: Node, text: &str, bound: Bound) -> Option<[f64; N]> {
-        let numbers: Option<Vec<f64>> = text.split_whitespace().map(|word| word.parse().ok()).collect();
-        let expected = if N == 1 { "a number".to_owned() } else { format!("{N} numbers") };
+    /// Parses exactly `N` numbers from a text of an element; reports W034 and returns `None` if
+    /// they are invalid.
+    pub(crate) fn numbers<const N: usize>(
+        &mut self,
+        node: Node,
+        text: &str,
+        bound: Bound,
+    ) -> Option<[f64; N]> {
+        let numbers: Option<Vec<f64>> = text
+            .split_whitespace()
+            .map(|word| word.parse().ok())
+            .collect();
+        let expected = if N == 1 {
+            "a number".to_owned()
+        } else {
+            format!("{N} numbers")
+        };
         let Some(numbers) = numbers.and_then(|list| <[f64; N]>::try_from(list).ok()) else {
-            let message =
-                format!("`<{}>` must contain {expected}, but this is `{}`", node.tag_name().name(), short(text));
-            self.error("W034", node, message, "separate numbers by spaces, and write them like 0.25");
+            let message = format!(
+                "`<{}>` must contain {expected}, but this is `{}`",
+                node.tag_name().name(),
+                short(text)
+            );
+            self.error(
+                "W034",
+                node,
+                message,
+                "separate numbers by spaces, and write them like 0.25",
+            );
             return None;
         };
         if numbers.iter().all(|number| bound.holds(*number)) {
             if bound == Bound::Length && numbers.iter().any(|number| *number > LONGEST) {
-                let message =
-                    format!("`<{}>` is `{}`, which is beyond {LONGEST} m", node.tag_name().name(), short(text));
-                self.error("W034", node, message, "lengths are in metres, not in millimetres");
+                let message = format!(
+                    "`<{}>` is `{}`, which is beyond {LONGEST} m",
+                    node.tag_name().name(),
+                    short(text)
+                );
+                self.error(
+                    "W034",
+                    node,
+                    message,
+                    "lengths are in metres, not in millimetres",
+                );
                 return None;
             }
             return Some(numbers);
         }
-        let message = format!("`<{}>` is `{}`, but must be {}", node.tag_name().name(), short(text), bound.in_words());
-        self.error("W034", node, message, "units are metres, kilograms and radians");
+        let message = format!(
+            "`<{}>` is `{}`, but must be {}",
+            node.tag_name().name(),
+            short(text),
+            bound.in_words()
+        );
+        self.error(
+            "W034",
+            node,
+            message,
+            "units are metres, kilograms and radians",
+        );
         None
     }
 
     /// Parses one number from an element's text; reports W034 and returns `None` if it is invalid.
     pub(crate) fn number(&mut self, node: Node, bound: Bound) -> Option<f64> {
-        self.numbers::<1>(node, text(node), bound).map(|[number]| number)
+        self.numbers::<1>(node, text(node), bound)
+            .map(|[number]| number)
     }
 
     /// Parses a boolean from an element's text; reports W034 and returns `None` if it is invalid.
@@ -221,8 +334,11 @@ impl<'a> Reader<'a> {
             "true" | "1" => Some(true),
             "false" | "0" => Some(false),
             other => {
-                let message =
-                    format!("`<{}>` must be true or false, but this is `{}`", node.tag_name().name(), short(other));
+                let message = format!(
+                    "`<{}>` must be true or false, but this is `{}`",
+                    node.tag_name().name(),
+                    short(other)
+                );
                 self.error("W034", node, message, "write `true` or `false`");
                 None
             }
@@ -240,23 +356,33 @@ impl<'a> Reader<'a> {
                     "W036",
                     other,
                     message,
-                    format!("the model works without it; {}", did_you_mean(name, known.iter().copied())),
+                    format!(
+                        "the model works without it; {}",
+                        did_you_mean(name, known.iter().copied())
+                    ),
                 );
             }
         }
     }
 }
 
-/// Returns a pose from a translation and a rotation about the fixed axes x, y, z in this order. Units: metres, radians.
+/// Returns a pose from a translation and a rotation about the fixed axes x, y, z in this order.
+/// Units: metres, radians.
 pub(crate) fn placed([x, y, z]: [f64; 3], [roll, pitch, yaw]: [f64; 3]) -> Isometry3<f64> {
-    Isometry3::from_parts(Translation3::new(x, y, z), UnitQuaternion::from_euler_angles(roll, pitch, yaw))
+    Isometry3::from_parts(
+        Translation3::new(x, y, z),
+        UnitQuaternion::from_euler_angles(roll, pitch, yaw),
+    )
 }
 
 /// Returns a pose from a translation and a quaternion x, y, z, w; `None` if the quaternion is zero.
 pub(crate) fn turned([x, y, z]: [f64; 3], [qx, qy, qz, qw]: [f64; 4]) -> Option<Isometry3<f64>> {
     let quaternion = Quaternion::new(qw, qx, qy, qz);
     let rotation = UnitQuaternion::try_new(quaternion, 1e-9)?;
-    Some(Isometry3::from_parts(Translation3::from(Vector3::new(x, y, z)), rotation))
+    Some(Isometry3::from_parts(
+        Translation3::from(Vector3::new(x, y, z)),
+        rotation,
+    ))
 }
 
 /// Returns the beginning of a text, on one line.

@@ -11,7 +11,12 @@ const MAX_LISTED: usize = 8;
 
 /// Lists the run numbers of indices.
 pub(super) fn numbers(indices: &[u64]) -> String {
-    let mut text = indices.iter().take(MAX_LISTED).map(|index| (index + 1).to_string()).collect::<Vec<_>>().join(", ");
+    let mut text = indices
+        .iter()
+        .take(MAX_LISTED)
+        .map(|index| (index + 1).to_string())
+        .collect::<Vec<_>>()
+        .join(", ");
     if indices.len() > MAX_LISTED {
         text.push_str(&format!(" and {} more", indices.len() - MAX_LISTED));
     }
@@ -24,7 +29,11 @@ pub(super) fn other_results(first: &Found, second: &Found, indices: &[u64]) -> D
         "`{}` and `{}` belong to one campaign, but differ in trace or outcomes of {}: {}",
         first.name(),
         second.name(),
-        if indices.len() == 1 { "a run".to_owned() } else { format!("{} runs", indices.len()) },
+        if indices.len() == 1 {
+            "a run".to_owned()
+        } else {
+            format!("{} runs", indices.len())
+        },
         numbers(indices)
     );
     Diagnostic::error("H020", message).help(format!(
@@ -41,16 +50,23 @@ pub(super) fn other_ingredients(first: &Found, second: &Found) -> Diagnostic {
         second.name(),
         differences(&first.record, &second.record).join(", ")
     );
-    Diagnostic::error("H021", message)
-        .help(format!("run the part again, or leave one out: `--leave-out {}`", second.name()))
+    Diagnostic::error("H021", message).help(format!(
+        "run the part again, or leave one out: `--leave-out {}`",
+        second.name()
+    ))
 }
 
 /// Names the program, ontology, models and rules in which two campaigns differ.
 fn differences(first: &CampaignRecord, second: &CampaignRecord) -> Vec<String> {
     let mut found = Vec::new();
-    let program = |record: &CampaignRecord| format!("{} {}", record.program_version, record.program_digest);
+    let program =
+        |record: &CampaignRecord| format!("{} {}", record.program_version, record.program_digest);
     if program(first) != program(second) {
-        found.push(format!("program ({}, {})", program(first).trim(), program(second).trim()));
+        found.push(format!(
+            "program ({}, {})",
+            program(first).trim(),
+            program(second).trim()
+        ));
     }
     if first.ontology_digest != second.ontology_digest {
         found.push("ontology".to_owned());
@@ -60,11 +76,20 @@ fn differences(first: &CampaignRecord, second: &CampaignRecord) -> Vec<String> {
     }
     let models = |record: &CampaignRecord| record.models.iter().cloned().collect::<BTreeSet<_>>();
     let rules = |record: &CampaignRecord| {
-        record.rules.iter().map(|(_, path, of)| (path.clone(), of.clone())).collect::<BTreeSet<_>>()
+        record
+            .rules
+            .iter()
+            .map(|(_, path, of)| (path.clone(), of.clone()))
+            .collect::<BTreeSet<_>>()
     };
-    for (kind, [first, second]) in [("model", [models(first), models(second)]), ("rule", [rules(first), rules(second)])]
-    {
-        let names: BTreeSet<&String> = first.symmetric_difference(&second).map(|(name, _)| name).collect();
+    for (kind, [first, second]) in [
+        ("model", [models(first), models(second)]),
+        ("rule", [rules(first), rules(second)]),
+    ] {
+        let names: BTreeSet<&String> = first
+            .symmetric_difference(&second)
+            .map(|(name, _)| name)
+            .collect();
         found.extend(names.into_iter().map(|name| format!("{kind} `{name}`")));
     }
     found
@@ -87,8 +112,15 @@ pub(super) fn id_taken(first: &Found, second: &Found) -> Diagnostic {
 
 /// H023: the destination holds several parts of one campaign, which can't be merged in place.
 pub(super) fn parts_in_place(members: &[&Found]) -> Diagnostic {
-    let names: Vec<String> = members.iter().map(|found| format!("`{}`", found.record.id)).collect();
-    let message = format!("{} of `{}` are parts of one campaign", names.join(" and "), members[0].dir);
+    let names: Vec<String> = members
+        .iter()
+        .map(|found| format!("`{}`", found.record.id))
+        .collect();
+    let message = format!(
+        "{} of `{}` are parts of one campaign",
+        names.join(" and "),
+        members[0].dir
+    );
     Diagnostic::error("H023", message)
         .help("campaigns in the destination are not changed: name a new folder with `--into`, and add this one to the histories to merge")
 }

@@ -5,10 +5,11 @@ use std::collections::BTreeSet;
 use oxigraph::model::{GraphNameRef, NamedNode, NamedOrBlankNode, Quad, Term, TermRef};
 use oxigraph::store::{StorageError, Store};
 
-/// Returns every quad about a node, about the nodes below its IRI, about blank nodes connected to either, and in the
-/// named graphs below its IRI.
+/// Returns every quad about a node, about the nodes below its IRI, about blank nodes connected to
+/// either, and in the named graphs below its IRI.
 ///
-/// The properties of a run are not listed anywhere, so that data added by later versions is copied too.
+/// The properties of a run are not listed anywhere, so that data added by later versions is copied
+/// too.
 pub(crate) fn about(store: &Store, root: &NamedNode) -> Result<Vec<Quad>, StorageError> {
     let below = format!("{}/", root.as_str());
     let belongs = |node: &NamedOrBlankNode| match node {
@@ -30,7 +31,9 @@ pub(crate) fn about(store: &Store, root: &NamedNode) -> Result<Vec<Quad>, Storag
             next.extend(Some(quad?.subject).filter(belongs));
         }
         if let NamedOrBlankNode::NamedNode(graph) = &node {
-            for quad in store.quads_for_pattern(None, None, None, Some(GraphNameRef::from(graph.as_ref()))) {
+            for quad in
+                store.quads_for_pattern(None, None, None, Some(GraphNameRef::from(graph.as_ref())))
+            {
                 quads.push(quad?);
             }
         }

@@ -1,9 +1,11 @@
-//! Merges several histories into one: parts of a campaign become one campaign, and duplicates are kept once.
+//! Merges several histories into one: parts of a campaign become one campaign, and duplicates are
+//! kept once.
 //!
-//! [`plan`] first reads and checks everything; [`carry_out`] then writes it if there is no conflict. If the program is
-//! ended at any moment, the same command completes the history.
+//! [`plan`] first reads and checks everything; [`carry_out`] then writes it if there is no
+//! conflict. If the program is ended at any moment, the same command completes the history.
 //!
-//! Never: writes before everything is checked, changes a source history, or chooses between two results.
+//! Never: writes before everything is checked, changes a source history, or chooses between two
+//! results.
 
 mod carry_out;
 mod conflict;

@@ -13,7 +13,8 @@ use actcheck_verdict::{Counts, mean};
 /// Options of a merge.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct MergeOptions {
-    /// Whether a campaign gets a new id if another one has its id. If `false`, the duplicate id is a fault.
+    /// Whether a campaign gets a new id if another one has its id. If `false`, the duplicate id is
+    /// a fault.
     pub rename: bool,
     /// Campaigns to leave out: `ID`, or `DIR#ID`.
     pub leave_out: Vec<String>,
@@ -31,7 +32,8 @@ pub struct MergePlan {
 impl MergePlan {
     /// The campaigns of a history, given by its position among the sources, that keep their ids.
     pub fn kept_ids(&self, source: usize) -> impl Iterator<Item = &str> {
-        let is_kept = move |((of, old), new): &(&(usize, String), &String)| *of == source && old == *new;
+        let is_kept =
+            move |((of, old), new): &(&(usize, String), &String)| *of == source && old == *new;
         self.ids.iter().filter(is_kept).map(|(_, new)| new.as_str())
     }
 }
@@ -61,7 +63,8 @@ pub struct PlannedMerge {
 /// The writes for one campaign.
 #[derive(Debug, Clone)]
 pub(super) struct Work {
-    /// Source history and id of the campaign whose statements are copied; `None` if the destination has them.
+    /// Source history and id of the campaign whose statements are copied; `None` if the destination
+    /// has them.
     pub(super) statements: Option<(usize, String)>,
     /// Parts that the destination's campaign does not list yet.
     pub(super) shards: Vec<String>,
@@ -88,16 +91,24 @@ pub(super) enum PlannedEnd {
 /// Reads all histories and plans their merge into another one. Writes nothing.
 ///
 /// # Errors
-/// `H020` results differ, `H021` parts were made differently, `H022` an id is taken, `H023` parts are in the
-/// destination, `H024` later judgements differ, `H025` a campaign to leave out does not exist; all faults at once.
-pub fn plan(sources: &[History], into: Option<&History>, options: &MergeOptions) -> Result<MergePlan, Diagnostics> {
+/// `H020` results differ, `H021` parts were made differently, `H022` an id is taken, `H023` parts
+/// are in the destination, `H024` later judgements differ, `H025` a campaign to leave out does not
+/// exist; all faults at once.
+pub fn plan(
+    sources: &[History],
+    into: Option<&History>,
+    options: &MergeOptions,
+) -> Result<MergePlan, Diagnostics> {
     let mut found = Vec::new();
     for (number, source) in sources.iter().enumerate() {
         found.extend(survey(source, Some(number))?);
         source.rest();
     }
     let found = without(found, &options.leave_out)?;
-    let own = into.map(|history| survey(history, None)).transpose()?.unwrap_or_default();
+    let own = into
+        .map(|history| survey(history, None))
+        .transpose()?
+        .unwrap_or_default();
     let all: Vec<Found> = own.into_iter().chain(found).collect();
     let mut faults = check_parts(&all);
     let groups = groups(&all);
@@ -106,33 +117,52 @@ pub fn plan(sources: &[History], into: Option<&History>, options: &MergeOptions)
     }
     let ids = choose_ids(&groups, options.rename, &mut faults);
     faults.or(())?;
-    let mut campaigns: Vec<(String, PlannedMerge)> =
-        groups.iter().zip(ids).map(|(group, id)| (started(group), planned(group, id))).collect();
+    let mut campaigns: Vec<(String, PlannedMerge)> = groups
+        .iter()
+        .zip(ids)
+        .map(|(group, id)| (started(group), planned(group, id)))
+        .collect();
     campaigns.sort_by(|a, b| (&a.0, &a.1.id).cmp(&(&b.0, &b.1.id)));
-    let campaigns: Vec<PlannedMerge> = campaigns.into_iter().map(|(_, campaign)| campaign).collect();
-    Ok(MergePlan { ids: new_ids(&groups, &campaigns), campaigns })
+    let campaigns: Vec<PlannedMerge> = campaigns
+        .into_iter()
+        .map(|(_, campaign)| campaign)
+        .collect();
+    Ok(MergePlan {
+        ids: new_ids(&groups, &campaigns),
+        campaigns,
+    })
 }
 
 /// Removes the campaigns to leave out.
 fn without(found: Vec<Found>, names: &[String]) -> Result<Vec<Found>, Diagnostics> {
-    let known: Vec<String> = found.iter().flat_map(|found| [found.record.id.clone(), found.name()]).collect();
+    let known: Vec<String> = found
+        .iter()
+        .flat_map(|found| [found.record.id.clone(), found.name()])
+        .collect();
     let mut faults = Diagnostics::new();
     for name in names.iter().filter(|name| !known.contains(name)) {
-        let fault = Diagnostic::error("H025", format!("none of the histories has a campaign `{name}` to leave out"));
+        let fault = Diagnostic::error(
+            "H025",
+            format!("none of the histories has a campaign `{name}` to leave out"),
+        );
         faults.push(fault.help(did_you_mean(name, known.iter().map(String::as_str))));
     }
-    let kept = found.into_iter().filter(|found| !names.contains(&found.record.id) && !names.contains(&found.name()));
+    let kept = found
+        .into_iter()
+        .filter(|found| !names.contains(&found.record.id) && !names.contains(&found.name()));
     faults.or(kept.collect())
 }
 
-/// Checks that parts with the same configuration, seed and number of runs were made with the same program, ontology,
-/// rules and models.
+/// Checks that parts with the same configuration, seed and number of runs were made with the same
+/// program, ontology, rules and models.
 fn check_parts(all: &[Found]) -> Diagnostics {
     let mut first_of: BTreeMap<(&str, u64, u64), &Found> = BTreeMap::new();
     let mut faults = Diagnostics::new();
     for found in all.iter().filter(|found| !found.record.shards.is_empty()) {
         let record = &found.record;
-        let first = first_of.entry((&record.config_digest, record.seed, record.planned_runs)).or_insert(found);
+        let first = first_of
+            .entry((&record.config_digest, record.seed, record.planned_runs))
+            .or_insert(found);
         if first.inputs_digest() != found.inputs_digest() {
             faults.push(conflict::other_ingredients(first, found));
         }
@@ -145,8 +175,13 @@ fn check_parts(all: &[Found]) -> Diagnostics {
 enum Identity {
     /// Part of the campaign with this digest.
     Parts(String),
-    /// A whole campaign, or a regression of a project, which occurs in each of the project's histories.
-    Whole { first_id: String, whole: String, content: Option<String> },
+    /// A whole campaign, or a regression of a project, which occurs in each of the project's
+    /// histories.
+    Whole {
+        first_id: String,
+        whole: String,
+        content: Option<String>,
+    },
 }
 
 fn identity(found: &Found) -> Identity {
@@ -157,7 +192,13 @@ fn identity(found: &Found) -> Identity {
         first_id: found.first_id.clone(),
         whole: found.inputs_digest(),
         // Shrunk runs of several parts can have the same id.
-        content: found.shrunk.then(|| found.runs.values().map(|run| run.content.as_str()).collect()),
+        content: found.shrunk.then(|| {
+            found
+                .runs
+                .values()
+                .map(|run| run.content.as_str())
+                .collect()
+        }),
     }
 }
 
@@ -176,26 +217,45 @@ fn groups(all: &[Found]) -> Vec<Vec<&Found>> {
 }
 
 fn order(found: &Found) -> (bool, &str, &str, &str) {
-    (found.source.is_some(), &found.record.started, &found.record.id, &found.dir)
+    (
+        found.source.is_some(),
+        &found.record.started,
+        &found.record.id,
+        &found.dir,
+    )
 }
 
 fn check_group(group: &[&Found], faults: &mut Diagnostics) {
-    let own: Vec<&Found> = group.iter().copied().filter(|found| found.source.is_none()).collect();
+    let own: Vec<&Found> = group
+        .iter()
+        .copied()
+        .filter(|found| found.source.is_none())
+        .collect();
     if own.len() > 1 {
         faults.push(conflict::parts_in_place(&own));
     }
     for (at, first) in group.iter().enumerate() {
         for second in &group[at + 1..] {
-            let both = || first.runs.iter().filter_map(|(index, run)| Some((*index, run, second.runs.get(index)?)));
-            let differing: Vec<u64> =
-                both().filter(|(_, a, b)| a.content != b.content).map(|(index, ..)| index).collect();
+            let both = || {
+                first
+                    .runs
+                    .iter()
+                    .filter_map(|(index, run)| Some((*index, run, second.runs.get(index)?)))
+            };
+            let differing: Vec<u64> = both()
+                .filter(|(_, a, b)| a.content != b.content)
+                .map(|(index, ..)| index)
+                .collect();
             if !differing.is_empty() {
                 faults.push(conflict::other_results(first, second, &differing));
                 continue;
             }
-            let apart = |a: &BTreeSet<String>, b: &BTreeSet<String>| !a.is_subset(b) && !b.is_subset(a);
-            let judged: Vec<u64> =
-                both().filter(|(_, a, b)| apart(&a.later, &b.later)).map(|(index, ..)| index).collect();
+            let apart =
+                |a: &BTreeSet<String>, b: &BTreeSet<String>| !a.is_subset(b) && !b.is_subset(a);
+            let judged: Vec<u64> = both()
+                .filter(|(_, a, b)| apart(&a.later, &b.later))
+                .map(|(index, ..)| index)
+                .collect();
             if !judged.is_empty() {
                 faults.push(conflict::other_judgements(first, second, &judged));
             }
@@ -205,7 +265,11 @@ fn check_group(group: &[&Found], faults: &mut Diagnostics) {
 
 /// Chooses an id for each group: its own if that is free.
 fn choose_ids(groups: &[Vec<&Found>], rename: bool, faults: &mut Diagnostics) -> Vec<String> {
-    let everywhere: BTreeSet<&str> = groups.iter().flatten().map(|found| found.record.id.as_str()).collect();
+    let everywhere: BTreeSet<&str> = groups
+        .iter()
+        .flatten()
+        .map(|found| found.record.id.as_str())
+        .collect();
     let mut taken: BTreeMap<String, &Found> = BTreeMap::new();
     let mut ids = Vec::new();
     for group in groups {
@@ -213,11 +277,14 @@ fn choose_ids(groups: &[Vec<&Found>], rename: bool, faults: &mut Diagnostics) ->
         let id = match taken.get(&found.record.id) {
             None => found.record.id.clone(),
             Some(first) => {
-                // Shrunk runs may be renamed freely: parts that were shrunk separately get the same ids.
+                // Shrunk runs may be renamed freely: parts that were shrunk separately get the same
+                // ids.
                 if !rename && !found.shrunk && !asked_alike(first, found) {
                     faults.push(conflict::id_taken(first, found));
                 }
-                free_id(found, |id| everywhere.contains(id) || taken.contains_key(id))
+                free_id(found, |id| {
+                    everywhere.contains(id) || taken.contains_key(id)
+                })
             }
         };
         taken.insert(id.clone(), found);
@@ -228,29 +295,48 @@ fn choose_ids(groups: &[Vec<&Found>], rename: bool, faults: &mut Diagnostics) ->
 
 /// Whether two parts should be one campaign. If they are not, H021 has already been reported.
 fn asked_alike(first: &Found, second: &Found) -> bool {
-    let asked = |found: &Found| (found.record.config_digest.clone(), found.record.seed, found.record.planned_runs);
+    let asked = |found: &Found| {
+        (
+            found.record.config_digest.clone(),
+            found.record.seed,
+            found.record.planned_runs,
+        )
+    };
     let parts = |found: &Found| !found.record.shards.is_empty();
     parts(first) && parts(second) && asked(first) == asked(second)
 }
 
 fn free_id(found: &Found, taken: impl Fn(&str) -> bool) -> String {
     let record = &found.record;
-    let mut ids = (0..1_000_000).map(|counter| campaign_id(&record.config_digest, record.seed, counter));
-    ids.find(|id| !taken(id)).unwrap_or_else(|| record.config_digest.clone())
+    let mut ids =
+        (0..1_000_000).map(|counter| campaign_id(&record.config_digest, record.seed, counter));
+    ids.find(|id| !taken(id))
+        .unwrap_or_else(|| record.config_digest.clone())
 }
 
-fn new_ids(groups: &[Vec<&Found>], campaigns: &[PlannedMerge]) -> BTreeMap<(usize, String), String> {
-    let of_name: BTreeMap<&String, &String> =
-        campaigns.iter().flat_map(|campaign| campaign.from.iter().map(|name| (name, &campaign.id))).collect();
-    let ids = groups
+fn new_ids(
+    groups: &[Vec<&Found>],
+    campaigns: &[PlannedMerge],
+) -> BTreeMap<(usize, String), String> {
+    let of_name: BTreeMap<&String, &String> = campaigns
         .iter()
-        .flatten()
-        .filter_map(|found| Some(((found.source?, found.record.id.clone()), (*of_name.get(&found.name())?).clone())));
+        .flat_map(|campaign| campaign.from.iter().map(|name| (name, &campaign.id)))
+        .collect();
+    let ids = groups.iter().flatten().filter_map(|found| {
+        Some((
+            (found.source?, found.record.id.clone()),
+            (*of_name.get(&found.name())?).clone(),
+        ))
+    });
     ids.collect()
 }
 
 fn started(group: &[&Found]) -> String {
-    group.iter().map(|found| found.record.started.clone()).min().unwrap_or_default()
+    group
+        .iter()
+        .map(|found| found.record.started.clone())
+        .min()
+        .unwrap_or_default()
 }
 
 /// A run with its campaign.
@@ -263,14 +349,23 @@ fn planned(group: &[&Found], id: String) -> PlannedMerge {
     let best = best_copies(group);
     let joined = !first.record.shards.is_empty();
     let missing: Vec<u64> = match joined {
-        true => (0..first.record.planned_runs).filter(|index| !best.contains_key(index)).collect(),
+        true => (0..first.record.planned_runs)
+            .filter(|index| !best.contains_key(index))
+            .collect(),
         false => Vec::new(),
     };
-    let runs = copies(&best, |index, _| own.is_none_or(|own| !own.runs.contains_key(&index)));
-    let judgements = copies(&best, |index, run| {
-        own.and_then(|own| own.runs.get(&index)).is_some_and(|known| known.later.len() < run.later.len())
+    let runs = copies(&best, |index, _| {
+        own.is_none_or(|own| !own.runs.contains_key(&index))
     });
-    let end = if joined { end_of_parts(group, &best, &missing, !runs.is_empty()) } else { end_of_copies(group) };
+    let judgements = copies(&best, |index, run| {
+        own.and_then(|own| own.runs.get(&index))
+            .is_some_and(|known| known.later.len() < run.later.len())
+    });
+    let end = if joined {
+        end_of_parts(group, &best, &missing, !runs.is_empty())
+    } else {
+        end_of_copies(group)
+    };
     PlannedMerge {
         id,
         name: first.record.name.clone(),
@@ -291,15 +386,17 @@ fn planned(group: &[&Found], id: String) -> PlannedMerge {
     }
 }
 
-/// Chooses a copy of each run: the one with the most later judgements, then the one that started first. The order of
-/// histories does not matter.
+/// Chooses a copy of each run: the one with the most later judgements, then the one that started
+/// first. The order of histories does not matter.
 fn best_copies<'a>(group: &[&'a Found]) -> BTreeMap<u64, Copy<'a>> {
     let mut best: BTreeMap<u64, Copy<'a>> = BTreeMap::new();
     // The destination's copy comes first, and is kept unless another is better.
     for found in group {
         for (index, run) in &found.runs {
             let rank = |run: &FoundRun| (Reverse(run.later.len()), run.row.started.clone());
-            let better = best.get(index).is_none_or(|(_, known)| rank(run) < rank(known));
+            let better = best
+                .get(index)
+                .is_none_or(|(_, known)| rank(run) < rank(known));
             if better {
                 best.insert(*index, (found, run));
             }
@@ -309,14 +406,26 @@ fn best_copies<'a>(group: &[&'a Found]) -> BTreeMap<u64, Copy<'a>> {
 }
 
 /// Source history and id of each wanted run, by index. Excludes runs of the destination.
-fn copies(best: &BTreeMap<u64, Copy<'_>>, wanted: impl Fn(u64, &FoundRun) -> bool) -> BTreeMap<u64, (usize, String)> {
+fn copies(
+    best: &BTreeMap<u64, Copy<'_>>,
+    wanted: impl Fn(u64, &FoundRun) -> bool,
+) -> BTreeMap<u64, (usize, String)> {
     let wanted = best.iter().filter(|(index, (_, run))| wanted(**index, run));
-    wanted.filter_map(|(index, (found, run))| Some((*index, (found.source?, run.row.run.clone())))).collect()
+    wanted
+        .filter_map(|(index, (found, run))| Some((*index, (found.source?, run.row.run.clone()))))
+        .collect()
 }
 
 /// Parts of the group that the destination's campaign does not list yet.
 fn new_shards(group: &[&Found], own: Option<&Found>) -> Vec<String> {
-    let of = |found: &Found| found.record.shards.iter().copied().collect::<BTreeSet<Shard>>();
+    let of = |found: &Found| {
+        found
+            .record
+            .shards
+            .iter()
+            .copied()
+            .collect::<BTreeSet<Shard>>()
+    };
     let said = own.map(of).unwrap_or_default();
     let all: BTreeSet<Shard> = group.iter().flat_map(|found| of(found)).collect();
     all.difference(&said).map(ToString::to_string).collect()
@@ -324,19 +433,38 @@ fn new_shards(group: &[&Found], own: Option<&Found>) -> Vec<String> {
 
 /// The end of the most complete copy.
 fn end_of_copies(group: &[&Found]) -> PlannedEnd {
-    let rank =
-        |found: &&&Found| (found.runs.len(), found.row.ended.is_some(), !found.row.interrupted, found.source.is_none());
+    let rank = |found: &&&Found| {
+        (
+            found.runs.len(),
+            found.row.ended.is_some(),
+            !found.row.interrupted,
+            found.source.is_none(),
+        )
+    };
     // Among equals, the first wins.
     match group.iter().rev().max_by_key(rank) {
-        Some(found) => found.source.map_or(PlannedEnd::Same, |source| PlannedEnd::Of(source, found.record.id.clone())),
+        Some(found) => found.source.map_or(PlannedEnd::Same, |source| {
+            PlannedEnd::Of(source, found.record.id.clone())
+        }),
         None => PlannedEnd::Same,
     }
 }
 
 /// The end of all parts together, as a run of the whole campaign would have written it.
-fn end_of_parts(group: &[&Found], best: &BTreeMap<u64, Copy<'_>>, missing: &[u64], more: bool) -> PlannedEnd {
+fn end_of_parts(
+    group: &[&Found],
+    best: &BTreeMap<u64, Copy<'_>>,
+    missing: &[u64],
+    more: bool,
+) -> PlannedEnd {
     let own = group.iter().find(|found| found.source.is_none());
-    let Some(ended) = group.iter().filter_map(|found| found.row.ended.clone()).max() else { return PlannedEnd::Same };
+    let Some(ended) = group
+        .iter()
+        .filter_map(|found| found.row.ended.clone())
+        .max()
+    else {
+        return PlannedEnd::Same;
+    };
     if own.is_some_and(|own| own.row.ended.is_some()) && !more {
         return PlannedEnd::Same;
     }
@@ -346,11 +474,21 @@ fn end_of_parts(group: &[&Found], best: &BTreeMap<u64, Copy<'_>>, missing: &[u64
     PlannedEnd::Computed(Box::new(CampaignEnd {
         ended,
         score: mean(runs().map(|run| run.row.score)),
-        score_without_broken: mean(runs().filter(|run| run.row.status != RunStatus::Broken).map(|run| run.row.score)),
-        outcomes: Outcome::ALL.into_iter().map(|outcome| (outcome, counts.get(outcome))).collect(),
+        score_without_broken: mean(
+            runs()
+                .filter(|run| run.row.status != RunStatus::Broken)
+                .map(|run| run.row.score),
+        ),
+        outcomes: Outcome::ALL
+            .into_iter()
+            .map(|outcome| (outcome, counts.get(outcome)))
+            .collect(),
         discards: runs().map(|run| run.discards).sum(),
         // A part that failures ended makes the number of all runs depend on outcomes.
-        ended_by: group.iter().filter_map(|found| found.row.ended_by.clone()).find(|budget| budget == "failures"),
+        ended_by: group
+            .iter()
+            .filter_map(|found| found.row.ended_by.clone())
+            .find(|budget| budget == "failures"),
         interrupted: !missing.is_empty(),
     }))
 }

@@ -19,13 +19,16 @@ pub(super) struct Renames {
 impl Renames {
     /// Creates renames from pairs of an old and a new id.
     pub(super) fn new(pairs: impl IntoIterator<Item = (String, String)>) -> Self {
-        Self { new_ids: pairs.into_iter().filter(|(old, new)| old != new).collect() }
+        Self {
+            new_ids: pairs.into_iter().filter(|(old, new)| old != new).collect(),
+        }
     }
 
     /// Returns the new id of a run.
     pub(super) fn run(&self, id: &str) -> String {
-        let renamed =
-            id.rsplit_once('-').and_then(|(old, number)| Some(format!("{}-{number}", self.new_ids.get(old)?)));
+        let renamed = id
+            .rsplit_once('-')
+            .and_then(|(old, number)| Some(format!("{}-{number}", self.new_ids.get(old)?)));
         renamed.unwrap_or_else(|| id.to_owned())
     }
 
@@ -47,7 +50,10 @@ impl Renames {
             return quads;
         }
         let labels = Labels::read(self, &quads);
-        quads.into_iter().map(|quad| self.quad(&quad, &labels)).collect()
+        quads
+            .into_iter()
+            .map(|quad| self.quad(&quad, &labels))
+            .collect()
     }
 
     fn quad(&self, quad: &Quad, labels: &Labels) -> Quad {
@@ -59,7 +65,9 @@ impl Renames {
         let object = match &quad.object {
             Term::NamedNode(node) => Term::from(named(node)),
             Term::BlankNode(node) => labels.of(node).into(),
-            Term::Literal(literal) if quad.predicate == iri("rdfs:label") => self.label(literal).into(),
+            Term::Literal(literal) if quad.predicate == iri("rdfs:label") => {
+                self.label(literal).into()
+            }
             other => other.clone(),
         };
         let graph = match &quad.graph_name {
@@ -69,10 +77,14 @@ impl Renames {
         Quad::new(subject, quad.predicate.clone(), object, graph)
     }
 
-    /// Renames a campaign's label, which may end in the id of a shrunk run, or of a campaign whose failed runs were run
-    /// again.
+    /// Renames a campaign's label, which may end in the id of a shrunk run, or of a campaign whose
+    /// failed runs were run again.
     fn label(&self, literal: &Literal) -> Literal {
-        if let Some(new) = literal.value().strip_prefix(FAILED_AGAIN).and_then(|old| self.new_ids.get(old)) {
+        if let Some(new) = literal
+            .value()
+            .strip_prefix(FAILED_AGAIN)
+            .and_then(|old| self.new_ids.get(old))
+        {
             return Literal::new_simple_literal(format!("{FAILED_AGAIN}{new}"));
         }
         match literal.value().rsplit_once(' ') {
@@ -82,7 +94,8 @@ impl Renames {
     }
 }
 
-/// New labels of the blank nodes of a run. Labels are digests that include the run's id, so they change with it.
+/// New labels of the blank nodes of a run. Labels are digests that include the run's id, so they
+/// change with it.
 #[derive(Default)]
 struct Labels {
     new: BTreeMap<String, BlankNode>,
@@ -104,7 +117,9 @@ impl Labels {
         let (subject, test, result) = (iri("earl:subject"), iri("earl:test"), iri("earl:result"));
         let (at, supersedes) = (iri("act:recheckedAt"), iri("act:supersedes"));
         for quad in quads {
-            let NamedOrBlankNode::BlankNode(node) = &quad.subject else { continue };
+            let NamedOrBlankNode::BlankNode(node) = &quad.subject else {
+                continue;
+            };
             let assertion = assertions.entry(node.as_str().to_owned()).or_default();
             let text = text_of(&quad.object);
             match &quad.predicate {
@@ -118,16 +133,15 @@ impl Labels {
         }
         assertions.retain(|_, assertion| !assertion.execution.is_empty());
         let mut labels = Self::default();
-        // An assertion's label depends on the one it supersedes, which must come first. Cycles are corrupt and keep
-        // their labels.
+        // An assertion's label depends on the one it supersedes, which must come first. Cycles are
+        // corrupt and keep their labels.
         loop {
             let ready: Vec<String> = assertions
                 .iter()
                 .filter(|(_, assertion)| {
-                    assertion
-                        .supersedes
-                        .as_ref()
-                        .is_none_or(|before| labels.new.contains_key(before) || !assertions.contains_key(before))
+                    assertion.supersedes.as_ref().is_none_or(|before| {
+                        labels.new.contains_key(before) || !assertions.contains_key(before)
+                    })
                 })
                 .map(|(label, _)| label.clone())
                 .collect();
@@ -144,13 +158,21 @@ impl Labels {
 
     /// Computes labels in the same way as the writers of outcomes and later judgements.
     fn add(&mut self, label: String, assertion: Assertion) {
-        let Assertion { execution, property, at, supersedes, result } = assertion;
+        let Assertion {
+            execution,
+            property,
+            at,
+            supersedes,
+            result,
+        } = assertion;
         let [own, of_result] = match &at {
             None => ["assertion", "result"].map(|part| unique(&[&execution, &property, part])),
             Some(at) => {
-                let before = supersedes.map(|before| self.new.get(&before).map_or(before, ToString::to_string));
+                let before = supersedes
+                    .map(|before| self.new.get(&before).map_or(before, ToString::to_string));
                 let before = before.unwrap_or_default();
-                ["recheck", "recheck result"].map(|part| unique(&[&execution, &property, part, at, &before]))
+                ["recheck", "recheck result"]
+                    .map(|part| unique(&[&execution, &property, part, at, &before]))
             }
         };
         self.new.insert(label, own);
@@ -170,16 +192,35 @@ mod tests {
 
     #[test]
     fn only_the_campaign_with_the_id_is_renamed() {
-        let renames = Renames::new([("k".to_owned(), "m".to_owned()), ("a".to_owned(), "a".to_owned())]);
+        let renames = Renames::new([
+            ("k".to_owned(), "m".to_owned()),
+            ("a".to_owned(), "a".to_owned()),
+        ]);
         let run = |rest: &str| format!("{}{rest}", names::RUN);
         assert_eq!(renames.iri(&run("k-1/state/0")), run("m-1/state/0"));
         assert_eq!(renames.iri(&run("k-12")), run("m-12"));
         assert_eq!(renames.iri(&run("kk-1")), run("kk-1"));
-        assert_eq!(renames.iri(&format!("{}k/rule/1", names::CAMPAIGN)), format!("{}m/rule/1", names::CAMPAIGN));
+        assert_eq!(
+            renames.iri(&format!("{}k/rule/1", names::CAMPAIGN)),
+            format!("{}m/rule/1", names::CAMPAIGN)
+        );
         assert_eq!(renames.iri(&names::act("k-1")), names::act("k-1"));
         assert_eq!(renames.run("a-1"), "a-1");
-        assert_eq!(renames.label(&Literal::new_simple_literal("shrunk k-3")).value(), "shrunk m-3");
-        assert_eq!(renames.label(&Literal::new_simple_literal("failed runs of k")).value(), "failed runs of m");
-        assert_eq!(renames.label(&Literal::new_simple_literal("pick")).value(), "pick");
+        assert_eq!(
+            renames
+                .label(&Literal::new_simple_literal("shrunk k-3"))
+                .value(),
+            "shrunk m-3"
+        );
+        assert_eq!(
+            renames
+                .label(&Literal::new_simple_literal("failed runs of k"))
+                .value(),
+            "failed runs of m"
+        );
+        assert_eq!(
+            renames.label(&Literal::new_simple_literal("pick")).value(),
+            "pick"
+        );
     }
 }

@@ -20,7 +20,8 @@ pub(super) struct Found {
     pub(super) row: CampaignRow,
     /// Id that it had when it was run.
     pub(super) first_id: String,
-    /// Whether its scenes were selected because they fail: it holds a shrunk run, or ran failed runs again.
+    /// Whether its scenes were selected because they fail: it holds a shrunk run, or ran failed
+    /// runs again.
     pub(super) shrunk: bool,
     /// Its runs by index.
     pub(super) runs: BTreeMap<u64, FoundRun>,
@@ -49,7 +50,14 @@ impl Found {
         let record = &self.record;
         let mut digest = Digest::new();
         let program = [&record.program_version, &record.program_digest];
-        for text in [&record.config_digest, &record.ontology_digest, &record.strategy].into_iter().chain(program) {
+        for text in [
+            &record.config_digest,
+            &record.ontology_digest,
+            &record.strategy,
+        ]
+        .into_iter()
+        .chain(program)
+        {
             digest.update(text.as_bytes());
         }
         for number in [record.seed, record.planned_runs, u64::from(record.repeat)] {
@@ -60,10 +68,15 @@ impl Found {
             digest.update(skill.digest.as_bytes());
             digest.update(&[u8::from(skill.privileged)]);
         }
-        for (name, of) in record.rules.iter().map(|(property, _, of)| (property, of)).chain(
-            // Both are sorted.
-            record.models.iter().map(|(name, of)| (name, of)),
-        ) {
+        for (name, of) in record
+            .rules
+            .iter()
+            .map(|(property, _, of)| (property, of))
+            .chain(
+                // Both are sorted.
+                record.models.iter().map(|(name, of)| (name, of)),
+            )
+        {
             digest.update(name.as_bytes());
             digest.update(of.as_bytes());
         }
@@ -79,9 +92,12 @@ pub(super) fn survey(history: &History, source: Option<usize>) -> Result<Vec<Fou
     let shrunk = history.selected_campaigns()?;
     let store = history.store_with(lists::of_later_judgements)?;
     let mut later: BTreeMap<String, BTreeSet<String>> = BTreeMap::new();
-    let mut judgements = lists::later_judgements(&store).map_err(|error| history.query_fault(&error))?;
+    let mut judgements =
+        lists::later_judgements(&store).map_err(|error| history.query_fault(&error))?;
     if history.shelf().exists() {
-        judgements.extend(lists::later_judgements_alone(&store).map_err(|error| history.query_fault(&error))?);
+        judgements.extend(
+            lists::later_judgements_alone(&store).map_err(|error| history.query_fault(&error))?,
+        );
     }
     for (run, judgement) in judgements {
         later.entry(run).or_default().insert(judgement);
@@ -109,7 +125,10 @@ fn runs(
     campaign: &str,
     later: &mut BTreeMap<String, BTreeSet<String>>,
 ) -> Result<BTreeMap<u64, FoundRun>, Diagnostics> {
-    let filter = RunFilter { campaign: Some(campaign.to_owned()), ..RunFilter::default() };
+    let filter = RunFilter {
+        campaign: Some(campaign.to_owned()),
+        ..RunFilter::default()
+    };
     let mut outcomes: BTreeMap<String, Vec<OutcomeRow>> = BTreeMap::new();
     for row in history.outcomes(&filter)? {
         outcomes.entry(row.run.clone()).or_default().push(row);

@@ -12,11 +12,18 @@ impl History {
     ///
     /// # Errors
     /// `H007` a file is damaged.
-    pub(crate) fn outline_files(&self, campaign: &str) -> Result<Vec<(PathBuf, Vec<u64>)>, Diagnostics> {
+    pub(crate) fn outline_files(
+        &self,
+        campaign: &str,
+    ) -> Result<Vec<(PathBuf, Vec<u64>)>, Diagnostics> {
         self.of_outlines(&mut |shelf| {
-            let files = shelf.files(Some(campaign)).into_iter().filter(|file| !file.is_single);
+            let files = shelf
+                .files(Some(campaign))
+                .into_iter()
+                .filter(|file| !file.is_single);
             let read = |file: crate::outlines::shelf::OutlineFile| {
-                let bytes = read_parts(&file.path, Needed::Indices).map_err(|error| unread(&file.path, &error))?;
+                let bytes = read_parts(&file.path, Needed::Indices)
+                    .map_err(|error| unread(&file.path, &error))?;
                 let indices = Opened::new(&bytes).and_then(|opened| opened.indices());
                 let indices = indices.map_err(|why| Unread::Damaged(file.path.clone(), why))?;
                 Ok((file.path, indices))
@@ -25,13 +32,15 @@ impl History {
         })
     }
 
-    /// Adds a copy of a file of another history. Returns its path, or `None` if there is a file with its name. It survives a
-    /// power cut after [`History::sync_outlines`].
+    /// Adds a copy of a file of another history. Returns its path, or `None` if there is a file
+    /// with its name. It survives a power cut after [`History::sync_outlines`].
     ///
     /// # Errors
     /// `H007` the file is damaged. Writing failed: `H005`, `H006`.
     pub(crate) fn copy_outlines(&self, file: &Path) -> Result<Option<PathBuf>, Diagnostics> {
-        let Some(name) = file.file_name() else { return Ok(None) };
+        let Some(name) = file.file_name() else {
+            return Ok(None);
+        };
         self.folder.begin_outlines()?;
         let new = self.folder.outlines().join(name);
         if new.exists() {

@@ -1,9 +1,10 @@
-//! A file of outlines: the indices of its runs, their values in lists, their statements, and their states.
+//! A file of outlines: the indices of its runs, their values in lists, their statements, and their
+//! states.
 //!
-//! After the magic bytes, a table has the compressed size and the checksum of each part, and then its own checksum: four
-//! bytes each, the lowest first. Each part is compressed on its own, because most readers need only one. The statements are
-//! stored by property ([`crate::vertical`]), which has parts and checksums of its own. In files of the first format, they are
-//! one compressed part.
+//! After the magic bytes, a table has the compressed size and the checksum of each part, and then
+//! its own checksum: four bytes each, the lowest first. Each part is compressed on its own, because
+//! most readers need only one. The statements are stored by property ([`crate::vertical`]), which
+//! has parts and checksums of its own. In files of the first format, they are one compressed part.
 
 use oxigraph::model::Quad;
 
@@ -48,7 +49,8 @@ impl Outline {
     /// A message, if a part can't be encoded.
     pub(crate) fn of(record: &RunRecord) -> Result<Self, String> {
         let quads = RunQuads::new(write_run::quads_without_facts(record));
-        let scene = scene_digest::read(&quads, &write_run::run_node(&record.id)).map_err(|error| error.to_string())?;
+        let scene = scene_digest::read(&quads, &write_run::run_node(&record.id))
+            .map_err(|error| error.to_string())?;
         Ok(Self {
             rows: Rows::of(record, scene),
             quads: quads.into_quads(),
@@ -66,22 +68,42 @@ pub(super) fn encode(outlines: &[Outline]) -> Result<Vec<u8>, String> {
     let rows = Rows::joined(outlines.iter().map(|outline| &outline.rows));
     let mut indices = Vec::new();
     put_varint(&mut indices, rows.rows.len() as u64);
-    rows.rows.iter().for_each(|row| put_varint(&mut indices, row.index));
-    let quads: Vec<&[Quad]> = outlines.iter().map(|outline| outline.quads.as_slice()).collect();
+    rows.rows
+        .iter()
+        .for_each(|row| put_varint(&mut indices, row.index));
+    let quads: Vec<&[Quad]> = outlines
+        .iter()
+        .map(|outline| outline.quads.as_slice())
+        .collect();
     let by_property = vertical::encode(&quads)?;
     let as_rows = || {
         let statements = journal::numbered(quads.iter().copied().flatten());
         let counts: Vec<u32> = quads.iter().map(|quads| quads.len() as u32).collect();
         postcard::to_stdvec(&(statements, counts)).map_err(fault)
     };
-    let heads: Vec<&[u8]> = outlines.iter().map(|outline| outline.head.as_slice()).collect();
+    let heads: Vec<&[u8]> = outlines
+        .iter()
+        .map(|outline| outline.head.as_slice())
+        .collect();
     let parts = [
         indices,
         postcard::to_stdvec(&rows).map_err(fault)?,
-        if by_property.is_some() { Vec::new() } else { as_rows()? },
+        if by_property.is_some() {
+            Vec::new()
+        } else {
+            as_rows()?
+        },
         postcard::to_stdvec(&heads).map_err(fault)?,
     ];
-    let (mut bytes, mut body) = (if by_property.is_some() { MAGIC } else { AS_ROWS }.to_vec(), Vec::new());
+    let (mut bytes, mut body) = (
+        if by_property.is_some() {
+            MAGIC
+        } else {
+            AS_ROWS
+        }
+        .to_vec(),
+        Vec::new(),
+    );
     for (at, part) in parts.into_iter().enumerate() {
         let part = match &by_property {
             Some(statements) if at == STATEMENTS => statements.clone(),
@@ -116,7 +138,9 @@ impl<'a> Opened<'a> {
         if magic != MAGIC && magic != AS_ROWS {
             return Err("it has no outlines of this format".to_owned());
         }
-        let number = |at: usize| u32::from_le_bytes([table[at], table[at + 1], table[at + 2], table[at + 3]]);
+        let number = |at: usize| {
+            u32::from_le_bytes([table[at], table[at + 1], table[at + 2], table[at + 3]])
+        };
         if journal::sum_of(&header[..HEADER - 4]) != number(8 * PARTS) {
             return Err(CHANGED.to_owned());
         }
@@ -124,10 +148,16 @@ impl<'a> Opened<'a> {
         for at in 0..PARTS {
             sums[at] = number(8 * at + 4);
             let part;
-            (part, rest) = rest.split_at_checked(number(8 * at) as usize).unwrap_or((&[], &[]));
+            (part, rest) = rest
+                .split_at_checked(number(8 * at) as usize)
+                .unwrap_or((&[], &[]));
             parts[at] = part;
         }
-        Ok(Self { parts, sums, as_rows: magic == AS_ROWS })
+        Ok(Self {
+            parts,
+            sums,
+            as_rows: magic == AS_ROWS,
+        })
     }
 
     /// Size of the file up to the end of its first `parts` parts. Unit: bytes.
@@ -155,7 +185,11 @@ impl<'a> Opened<'a> {
     /// A message, if a part differs.
     pub(super) fn check(&self) -> Result<(), String> {
         let is_same = |(part, sum): (&&[u8], &u32)| journal::sum_of(part) == *sum;
-        if self.parts.iter().zip(&self.sums).all(is_same) { Ok(()) } else { Err(CHANGED.to_owned()) }
+        if self.parts.iter().zip(&self.sums).all(is_same) {
+            Ok(())
+        } else {
+            Err(CHANGED.to_owned())
+        }
     }
 
     /// The indices of its runs, in the order of the file.
@@ -180,11 +214,13 @@ impl<'a> Opened<'a> {
         if !self.as_rows {
             let properties = wanted.properties();
             let quads = self.by_property()?.statements(properties.as_deref())?;
-            part.quads.extend(quads.into_iter().flatten().filter(|quad| wanted.has(quad)));
+            part.quads
+                .extend(quads.into_iter().flatten().filter(|quad| wanted.has(quad)));
             return Ok(());
         }
         let bytes = self.part(STATEMENTS)?;
-        let ((terms, rows), _): (Content<'_>, Vec<u32>) = postcard::from_bytes(&bytes).map_err(unread)?;
+        let ((terms, rows), _): (Content<'_>, Vec<u32>) =
+            postcard::from_bytes(&bytes).map_err(unread)?;
         journal::collect(&terms, &rows, wanted, part).ok_or_else(|| CHANGED.to_owned())
     }
 
@@ -194,11 +230,15 @@ impl<'a> Opened<'a> {
             return self.by_property()?.statements(None);
         }
         let bytes = self.part(STATEMENTS)?;
-        let ((terms, rows), counts): (Content<'_>, Vec<u32>) = postcard::from_bytes(&bytes).map_err(unread)?;
+        let ((terms, rows), counts): (Content<'_>, Vec<u32>) =
+            postcard::from_bytes(&bytes).map_err(unread)?;
         let mut part = Part::default();
         journal::collect(&terms, &rows, &Wanted::all(), &mut part).ok_or(CHANGED)?;
         let mut quads = part.quads.into_iter();
-        Ok(counts.into_iter().map(|count| quads.by_ref().take(count as usize).collect()).collect())
+        Ok(counts
+            .into_iter()
+            .map(|count| quads.by_ref().take(count as usize).collect())
+            .collect())
     }
 
     fn by_property(&self) -> Result<Sheet<&'a [u8]>, String> {
@@ -206,7 +246,8 @@ impl<'a> Opened<'a> {
         Sheet::open(bytes, bytes.len())
     }
 
-    /// Whether the statements are stored by property, and where they are in the file. `header`: its first bytes.
+    /// Whether the statements are stored by property, and where they are in the file. `header`: its
+    /// first bytes.
     pub(super) fn statements_at(header: &[u8]) -> Result<(bool, std::ops::Range<usize>), String> {
         let opened = Opened::new(header)?;
         let end = |parts: usize| Self::size_of_start(header, parts).ok_or(CHANGED);
@@ -221,8 +262,18 @@ impl<'a> Opened<'a> {
     /// All of it.
     pub(super) fn outlines(&self) -> Result<Vec<Outline>, String> {
         let (rows, statements) = (self.rows()?, self.statements()?);
-        let of = |(at, (head, quads))| Outline { rows: rows.only(at), quads, head };
-        Ok(self.heads()?.into_iter().zip(statements).enumerate().map(of).collect())
+        let of = |(at, (head, quads))| Outline {
+            rows: rows.only(at),
+            quads,
+            head,
+        };
+        Ok(self
+            .heads()?
+            .into_iter()
+            .zip(statements)
+            .enumerate()
+            .map(of)
+            .collect())
     }
 }
 

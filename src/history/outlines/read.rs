@@ -47,7 +47,12 @@ impl History {
         }
         let campaigns = match &filter.campaign {
             Some(campaign) => BTreeSet::from([campaign.clone()]),
-            None => self.shelf().files(None).into_iter().map(|file| file.campaign).collect(),
+            None => self
+                .shelf()
+                .files(None)
+                .into_iter()
+                .map(|file| file.campaign)
+                .collect(),
         };
         let mut each = |outlined: Outlined<'_>| {
             if outlined.matches(filter) {
@@ -98,7 +103,10 @@ impl History {
         self.of_outlines(&mut |shelf| {
             let mut ids = Vec::new();
             shelf.each_file(campaign, Needed::Indices, &mut |file, opened, there| {
-                let own = opened.indices()?.into_iter().filter(|index| !there.contains(index));
+                let own = opened
+                    .indices()?
+                    .into_iter()
+                    .filter(|index| !there.contains(index));
                 ids.extend(own.map(|index| format!("{}-{}", file.campaign, index + 1)));
                 Ok(())
             })?;
@@ -106,12 +114,17 @@ impl History {
         })
     }
 
-    /// Sorts ids of runs of a campaign by their place in the files of outlines, so that reading them in this order reads each
-    /// file once: files of shards have every n-th run. Runs that are kept whole come last.
+    /// Sorts ids of runs of a campaign by their place in the files of outlines, so that reading
+    /// them in this order reads each file once: files of shards have every n-th run. Runs that are
+    /// kept whole come last.
     ///
     /// # Errors
     /// `H007` a file is damaged.
-    pub fn sort_as_stored<S: AsRef<str>>(&self, campaign: &str, runs: &mut [S]) -> Result<(), Diagnostics> {
+    pub fn sort_as_stored<S: AsRef<str>>(
+        &self,
+        campaign: &str,
+        runs: &mut [S],
+    ) -> Result<(), Diagnostics> {
         if !self.shelf().exists() {
             return Ok(());
         }
@@ -123,17 +136,25 @@ impl History {
         Ok(())
     }
 
-    /// Sorts the runs of each campaign whose files of outlines overlap as [`History::sort_as_stored`] does. The runs of other
-    /// campaigns remain sorted by index. The argument must be sorted by campaign.
+    /// Sorts the runs of each campaign whose files of outlines overlap as
+    /// [`History::sort_as_stored`] does. The runs of other campaigns remain sorted by index. The
+    /// argument must be sorted by campaign.
     ///
     /// # Errors
     /// `H007` a file is damaged.
     pub fn sort_interleaved(&self, runs: &mut [RunRow]) -> Result<(), Diagnostics> {
         for runs in runs.chunk_by_mut(|one, next| one.campaign == next.campaign) {
-            let Some(campaign) = runs.first().map(|run| run.campaign.clone()) else { continue };
+            let Some(campaign) = runs.first().map(|run| run.campaign.clone()) else {
+                continue;
+            };
             if !are_apart(&self.shelf().files(Some(&campaign))) {
                 let places = self.places(&campaign)?;
-                runs.sort_by_key(|run| (places.get(&run.index).copied().unwrap_or(usize::MAX), run.index));
+                runs.sort_by_key(|run| {
+                    (
+                        places.get(&run.index).copied().unwrap_or(usize::MAX),
+                        run.index,
+                    )
+                });
             }
         }
         Ok(())
@@ -154,24 +175,37 @@ impl History {
         })
     }
 
-    /// Reads a part of the outline of a run by `read`, which gets the run's position in the file. Returns `None` if the run
-    /// has no outline.
+    /// Reads a part of the outline of a run by `read`, which gets the run's position in the file.
+    /// Returns `None` if the run has no outline.
     fn of_outline<T>(
         &self,
         run: &str,
         read: impl Fn(&Loaded, usize) -> Result<T, String>,
     ) -> Result<Option<T>, Diagnostics> {
-        let Some((campaign, index)) = place_of(run).filter(|_| self.shelf().exists()) else { return Ok(None) };
+        let Some((campaign, index)) = place_of(run).filter(|_| self.shelf().exists()) else {
+            return Ok(None);
+        };
         self.of_outlines(&mut |shelf| {
             let known = self.loaded.with(campaign, index);
-            for file in known.is_none().then(|| shelf.files_with(campaign, index)).into_iter().flatten() {
+            for file in known
+                .is_none()
+                .then(|| shelf.files_with(campaign, index))
+                .into_iter()
+                .flatten()
+            {
                 let damaged = |why| Unread::Damaged(file.clone(), why);
                 let bytes = folder::read(&file).map_err(|error| unread(&file, &error))?;
-                self.loaded.add(Loaded::new(campaign, file.clone(), bytes).map_err(damaged)?);
+                self.loaded
+                    .add(Loaded::new(campaign, file.clone(), bytes).map_err(damaged)?);
             }
-            let Some(loaded) = known.or_else(|| self.loaded.with(campaign, index)) else { return Ok(None) };
+            let Some(loaded) = known.or_else(|| self.loaded.with(campaign, index)) else {
+                return Ok(None);
+            };
             let damaged = |why| Unread::Damaged(loaded.path.clone(), why);
-            loaded.position(index).map(|at| read(&loaded, at).map_err(damaged)).transpose()
+            loaded
+                .position(index)
+                .map(|at| read(&loaded, at).map_err(damaged))
+                .transpose()
         })
     }
 
@@ -196,11 +230,14 @@ impl History {
 
     /// The statements of a run that has an outline. Returns `None` if it has none.
     pub(crate) fn outlined_quads(&self, run: &str) -> Result<Option<RunQuads>, Diagnostics> {
-        let quads = self.of_outline(run, |loaded, at| loaded.statements(at).map(<[Quad]>::to_vec))?;
+        let quads = self.of_outline(run, |loaded, at| {
+            loaded.statements(at).map(<[Quad]>::to_vec)
+        })?;
         Ok(quads.map(RunQuads::new))
     }
 
-    /// Calls `each` with all statements of every outline, also its facts (`with_facts`), run by run.
+    /// Calls `each` with all statements of every outline, also its facts (`with_facts`), run by
+    /// run.
     ///
     /// # Errors
     /// `H007` a file is damaged; those of `each`.
@@ -225,22 +262,33 @@ impl History {
 
     /// All details of a run that has an outline. Returns `None` if it has none.
     pub(crate) fn outlined_run(&self, run: &str) -> Result<Option<RunDetail>, Diagnostics> {
-        let Some(store) = self.outlined_quads(run)? else { return Ok(None) };
-        detail::read(&store, &write_run::run_node(run)).map(Some).map_err(|error| self.fault("reading a run", &error))
+        let Some(store) = self.outlined_quads(run)? else {
+            return Ok(None);
+        };
+        detail::read(&store, &write_run::run_node(run))
+            .map(Some)
+            .map_err(|error| self.fault("reading a run", &error))
     }
 
     /// Choices and states of a run that has an outline. Returns `None` if it has none.
-    pub(crate) fn outlined_states(&self, run: &str) -> Result<Option<(Vec<Choice>, Trace)>, Diagnostics> {
+    pub(crate) fn outlined_states(
+        &self,
+        run: &str,
+    ) -> Result<Option<(Vec<Choice>, Trace)>, Diagnostics> {
         self.of_outline(run, |loaded, at| trace_file::decode_head(loaded.head(at)?))
     }
 
-    /// Number of runs that have only an outline, and the wall time that they took together. Unit: seconds.
+    /// Number of runs that have only an outline, and the wall time that they took together. Unit:
+    /// seconds.
     ///
     /// # Errors
     /// `H007` a file is damaged.
     pub fn outlined_cost(&self, runs: &[RunRow]) -> Result<(usize, f64), Diagnostics> {
         let (mut count, mut secs) = (0, 0.0);
-        let wanted: HashSet<(&str, u64)> = runs.iter().map(|row| (row.campaign.as_str(), row.index)).collect();
+        let wanted: HashSet<(&str, u64)> = runs
+            .iter()
+            .map(|row| (row.campaign.as_str(), row.index))
+            .collect();
         self.each_outlined(&RunFilter::default(), &mut |outlined| {
             if wanted.contains(&(outlined.campaign, outlined.row.index)) {
                 count += 1;
@@ -274,7 +322,11 @@ impl History {
     }
 
     /// Sends the health data of the outlines of a campaign, file by file.
-    fn send_vitals(&self, campaign: &str, send: &SyncSender<Vec<RunVitals>>) -> Result<(), Diagnostics> {
+    fn send_vitals(
+        &self,
+        campaign: &str,
+        send: &SyncSender<Vec<RunVitals>>,
+    ) -> Result<(), Diagnostics> {
         // If a file was removed meanwhile, the others are read again.
         let mut done = IndexSet::default();
         self.of_outlines(&mut |shelf| {
@@ -294,12 +346,20 @@ impl History {
     }
 
     /// The judgements in the store that were made after a run that has an outline.
-    pub(crate) fn later_about_outline(&self, run: &str, store: &Store) -> Result<Vec<Quad>, Diagnostics> {
-        let Some(memory) = self.outlined_quads(run)? else { return Ok(Vec::new()) };
+    pub(crate) fn later_about_outline(
+        &self,
+        run: &str,
+        store: &Store,
+    ) -> Result<Vec<Quad>, Diagnostics> {
+        let Some(memory) = self.outlined_quads(run)? else {
+            return Ok(Vec::new());
+        };
         let fault = |error| self.fault("reading a run", &error);
         let node = write_run::run_node(run);
         let mut later = Vec::new();
-        for execution in crate::read::subjects(&memory, "act:ofRun", node.as_ref()).map_err(fault)? {
+        for execution in
+            crate::read::subjects(&memory, "act:ofRun", node.as_ref()).map_err(fault)?
+        {
             if let oxigraph::model::NamedOrBlankNode::NamedNode(execution) = execution {
                 later.extend(merge::about(store, &execution).map_err(fault)?);
             }
@@ -307,8 +367,8 @@ impl History {
         Ok(later)
     }
 
-    /// Compares the outlines with their checksums and hashes. Returns the number of runs, and each damaged file with the
-    /// reason.
+    /// Compares the outlines with their checksums and hashes. Returns the number of runs, and each
+    /// damaged file with the reason.
     pub(crate) fn examine_outlines(&self) -> (usize, Vec<(std::path::PathBuf, String)>) {
         let (mut seen, mut damaged) = (BTreeSet::new(), Vec::new());
         for file in self.shelf().files(None) {

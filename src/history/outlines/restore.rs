@@ -4,20 +4,21 @@ use crate::History;
 use actcheck_base::{Diagnostic, Diagnostics};
 use actcheck_data::{Choice, Trace};
 
-/// Simulates a run (by its id) again from its recorded choices, and returns these with its trace. `None`: this would start
-/// a program without consent.
-pub type Restore = dyn Fn(&History, &str) -> Result<Option<(Vec<Choice>, Trace)>, Diagnostics> + Send + Sync;
+/// Simulates a run (by its id) again from its recorded choices, and returns these with its trace.
+/// `None`: this would start a program without consent.
+pub type Restore =
+    dyn Fn(&History, &str) -> Result<Option<(Vec<Choice>, Trace)>, Diagnostics> + Send + Sync;
 
 impl History {
-    /// Sets the function that makes the motion of runs that have only an outline. Without one, such motion can't be
-    /// read. Only the first call has an effect.
+    /// Sets the function that makes the motion of runs that have only an outline. Without one, such
+    /// motion can't be read. Only the first call has an effect.
     pub fn restore_with(&self, restore: Box<Restore>) {
         // A second function would do the same.
         let _ = self.restore.set(restore);
     }
 
-    /// Simulates a run that has only an outline, and returns its choices and its whole trace. `None`: this would start a
-    /// program without consent.
+    /// Simulates a run that has only an outline, and returns its choices and its whole trace.
+    /// `None`: this would start a program without consent.
     ///
     /// # Errors
     /// `H031` it can't be simulated again, or the result differs from the recorded one.
@@ -25,8 +26,13 @@ impl History {
         let Some(restore) = self.restore.get() else {
             return Err(unrestored(run, "this command does not simulate runs"));
         };
-        let Some((choices, trace)) = restore(self, run)? else { return Ok(None) };
-        let recorded = self.outlined_states(run)?.map(|(_, trace)| trace.hash).unwrap_or_default();
+        let Some((choices, trace)) = restore(self, run)? else {
+            return Ok(None);
+        };
+        let recorded = self
+            .outlined_states(run)?
+            .map(|(_, trace)| trace.hash)
+            .unwrap_or_default();
         if trace.hash != recorded {
             let why = format!("its states have the digest {}, not {recorded}", trace.hash);
             return Err(unrestored(run, &why));
@@ -37,9 +43,14 @@ impl History {
 
 /// H031: a program would be started.
 pub(crate) fn withheld(run: &str) -> Diagnostics {
-    Diagnostic::error("H031", format!("the motion of run {run} is not kept, and simulating it again starts a program"))
-        .help("read the program, then give the same command with `--trust`; outcomes and states are kept")
-        .into()
+    Diagnostic::error(
+        "H031",
+        format!("the motion of run {run} is not kept, and simulating it again starts a program"),
+    )
+    .help(
+        "read the program, then give the same command with `--trust`; outcomes and states are kept",
+    )
+    .into()
 }
 
 fn unrestored(run: &str, why: &str) -> Diagnostics {

@@ -9,7 +9,8 @@ use crate::{Repetition, RunFilter, RunRecord, RunRow, RunVitals, SceneDigest};
 use actcheck_base::Outcome;
 use actcheck_data::Choice;
 
-/// The values of one run. Texts that are alike in many runs are given by their numbers in [`Rows::texts`].
+/// The values of one run. Texts that are alike in many runs are given by their numbers in
+/// [`Rows::texts`].
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Row {
     /// Position in the campaign, from 0.
@@ -61,7 +62,8 @@ impl Rows {
     pub(crate) fn of(record: &RunRecord, scene: SceneDigest) -> Self {
         let mut texts = Texts::default();
         let mut outcomes = Vec::new();
-        for (step, (action, judgements)) in (1..).zip(record.actions.iter().zip(&record.judgements)) {
+        for (step, (action, judgements)) in (1..).zip(record.actions.iter().zip(&record.judgements))
+        {
             for judgement in judgements {
                 outcomes.push(Judged {
                     step,
@@ -74,7 +76,9 @@ impl Rows {
         }
         let row = Row {
             index: record.index,
-            repetition: record.repetition.map(|repetition| (repetition.scene, repetition.number)),
+            repetition: record
+                .repetition
+                .map(|repetition| (repetition.scene, repetition.number)),
             weight: record.weight,
             test: texts.number(&record.test),
             status: texts.number(record.status.word()),
@@ -89,7 +93,10 @@ impl Rows {
             scene,
             outcomes,
         };
-        Self { texts: texts.all, rows: vec![row] }
+        Self {
+            texts: texts.all,
+            rows: vec![row],
+        }
     }
 
     /// Joins the values of several files.
@@ -108,22 +115,39 @@ impl Rows {
                 row
             }));
         }
-        Self { texts: texts.all, rows }
+        Self {
+            texts: texts.all,
+            rows,
+        }
     }
 
     /// Only one of the runs.
     pub(crate) fn only(&self, at: usize) -> Self {
-        Self { texts: self.texts.clone(), rows: self.rows.get(at).cloned().into_iter().collect() }
+        Self {
+            texts: self.texts.clone(),
+            rows: self.rows.get(at).cloned().into_iter().collect(),
+        }
     }
 
     /// One of the runs, with its campaign.
     pub(super) fn at<'a>(&'a self, campaign: &'a str, place: usize) -> Outlined<'a> {
-        Outlined { campaign, texts: &self.texts, row: &self.rows[place] }
+        Outlined {
+            campaign,
+            texts: &self.texts,
+            row: &self.rows[place],
+        }
     }
 
     /// The runs with their campaign.
-    pub(crate) fn of_campaign<'a>(&'a self, campaign: &'a str) -> impl Iterator<Item = Outlined<'a>> {
-        self.rows.iter().map(move |row| Outlined { campaign, texts: &self.texts, row })
+    pub(crate) fn of_campaign<'a>(
+        &'a self,
+        campaign: &'a str,
+    ) -> impl Iterator<Item = Outlined<'a>> {
+        self.rows.iter().map(move |row| Outlined {
+            campaign,
+            texts: &self.texts,
+            row,
+        })
     }
 }
 
@@ -139,9 +163,17 @@ impl Outlined<'_> {
 
     /// Whether a filter selects it.
     pub(crate) fn matches(&self, filter: &RunFilter) -> bool {
-        filter.campaign.as_ref().is_none_or(|campaign| campaign == self.campaign)
-            && filter.test.as_ref().is_none_or(|test| test == self.text(self.row.test))
-            && filter.status.is_none_or(|status| status.word() == self.text(self.row.status))
+        filter
+            .campaign
+            .as_ref()
+            .is_none_or(|campaign| campaign == self.campaign)
+            && filter
+                .test
+                .as_ref()
+                .is_none_or(|test| test == self.text(self.row.test))
+            && filter
+                .status
+                .is_none_or(|status| status.word() == self.text(self.row.status))
     }
 
     /// The run as in a list.
@@ -151,7 +183,9 @@ impl Outlined<'_> {
             run: self.run(),
             campaign: self.campaign.to_owned(),
             index: row.index,
-            repetition: row.repetition.map(|(scene, number)| Repetition { scene, number }),
+            repetition: row
+                .repetition
+                .map(|(scene, number)| Repetition { scene, number }),
             weight: row.weight,
             test: self.text(row.test).to_owned(),
             status: status(Some(self.text(row.status))),

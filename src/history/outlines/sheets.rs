@@ -55,15 +55,24 @@ impl SheetFile {
         let damaged = |why| Stop::Damaged(self.path.clone(), why);
         let (by_property, place) = Opened::statements_at(&header).map_err(damaged)?;
         let length = place.len();
-        if file.metadata().is_ok_and(|found| found.len() < place.end as u64) {
+        if file
+            .metadata()
+            .is_ok_and(|found| found.len() < place.end as u64)
+        {
             return Err(damaged("it ends too early".to_owned()));
         }
         if by_property {
-            let source = InFile { file, start: place.start, length };
+            let source = InFile {
+                file,
+                start: place.start,
+                length,
+            };
             return Sheet::open(Box::new(source) as Box<dyn Source>, length).map_err(damaged);
         }
         let bytes = folder::read(&self.path).map_err(|error| stop(unread(&self.path, &error)))?;
-        let runs = Opened::new(&bytes).and_then(|opened| opened.statements()).map_err(damaged)?;
+        let runs = Opened::new(&bytes)
+            .and_then(|opened| opened.statements())
+            .map_err(damaged)?;
         let runs: Vec<&[oxigraph::model::Quad]> = runs.iter().map(Vec::as_slice).collect();
         let Some(bytes) = vertical::encode(&runs).map_err(damaged)? else {
             return Err(Stop::Unfit("outlines of unusual runs".to_owned()));
@@ -88,6 +97,12 @@ impl History {
     /// A file is gone or damaged.
     pub(crate) fn sheet_files(&self) -> Result<Vec<SheetFile>, Stop> {
         let chosen = self.shelf().chosen(None).map_err(stop)?;
-        Ok(chosen.into_iter().map(|(file, there)| SheetFile { path: file.path, there }).collect())
+        Ok(chosen
+            .into_iter()
+            .map(|(file, there)| SheetFile {
+                path: file.path,
+                there,
+            })
+            .collect())
     }
 }

@@ -1,7 +1,8 @@
 //! The files of outlines in the folder of a history.
 //!
-//! `CAMPAIGN-NUMBER.outline` has one run. `CAMPAIGN.FIRST-LAST.outlines` has many, whose indices lie between these. A process
-//! that is killed while it puts single files together leaves runs in both; they count once.
+//! `CAMPAIGN-NUMBER.outline` has one run. `CAMPAIGN.FIRST-LAST.outlines` has many, whose indices
+//! lie between these. A process that is killed while it puts single files together leaves runs in
+//! both; they count once.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::{self, ErrorKind, Read as _};
@@ -12,7 +13,8 @@ use crate::outlines::file::{HEADER, Opened, Outline, encode};
 use crate::{History, fault};
 use actcheck_base::{Below, Diagnostics};
 
-/// Number of times that a reader looks again if the owner has put a file together with others meanwhile.
+/// Number of times that a reader looks again if the owner has put a file together with others
+/// meanwhile.
 pub(super) const TRIES: usize = 100;
 
 /// A file of outlines.
@@ -34,7 +36,8 @@ pub(crate) struct Shelf {
 }
 
 /// Receives a file, its parts, and the indices that earlier files have already.
-pub(super) type EachFile<'e> = dyn FnMut(&OutlineFile, &Opened<'_>, &BTreeSet<u64>) -> Result<(), String> + 'e;
+pub(super) type EachFile<'e> =
+    dyn FnMut(&OutlineFile, &Opened<'_>, &BTreeSet<u64>) -> Result<(), String> + 'e;
 
 /// The parts of a file that a reader needs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -60,7 +63,10 @@ impl Shelf {
 
     /// The outlines in the folder of a history.
     pub(crate) fn new(history: &Path) -> Self {
-        Self { below: Below::new(history), dir: Folder::outlines_in(history) }
+        Self {
+            below: Below::new(history),
+            dir: Folder::outlines_in(history),
+        }
     }
 
     /// Whether there may be outlines.
@@ -68,9 +74,15 @@ impl Shelf {
         self.dir.exists()
     }
 
-    /// The files, sorted by campaign and index; a larger one before the single ones that it may contain.
+    /// The files, sorted by campaign and index; a larger one before the single ones that it may
+    /// contain.
     pub(crate) fn files(&self, campaign: Option<&str>) -> Vec<OutlineFile> {
-        let mut files: Vec<OutlineFile> = self.below.files(&self.dir).into_iter().filter_map(named).collect();
+        let mut files: Vec<OutlineFile> = self
+            .below
+            .files(&self.dir)
+            .into_iter()
+            .filter_map(named)
+            .collect();
         files.retain(|file| campaign.is_none_or(|campaign| campaign == file.campaign));
         files.sort();
         files
@@ -82,23 +94,42 @@ impl Shelf {
     }
 
     /// Writes the outline of a run. `synced`: to the disk at once, so that it survives a power cut.
-    pub(crate) fn add(&self, campaign: &str, index: u64, outline: &Outline, synced: bool) -> io::Result<()> {
+    pub(crate) fn add(
+        &self,
+        campaign: &str,
+        index: u64,
+        outline: &Outline,
+        synced: bool,
+    ) -> io::Result<()> {
         let bytes = encode(std::slice::from_ref(outline)).map_err(io::Error::other)?;
         let path = self.dir.join(format!("{campaign}-{}.outline", index + 1));
-        if synced { self.below.write_atomic(&path, &bytes) } else { self.below.write_quickly(&path, &bytes) }
+        if synced {
+            self.below.write_atomic(&path, &bytes)
+        } else {
+            self.below.write_quickly(&path, &bytes)
+        }
     }
 
     /// Writes outlines, sorted by index, in one file.
     pub(crate) fn add_all(&self, campaign: &str, outlines: &[Outline]) -> io::Result<()> {
-        let (Some(first), Some(last)) = (index_of(outlines.first()), index_of(outlines.last())) else { return Ok(()) };
+        let (Some(first), Some(last)) = (index_of(outlines.first()), index_of(outlines.last()))
+        else {
+            return Ok(());
+        };
         let bytes = encode(outlines).map_err(io::Error::other)?;
-        self.below.write_atomic(&self.dir.join(format!("{campaign}.{first:09}-{last:09}.outlines")), &bytes)
+        self.below.write_atomic(
+            &self
+                .dir
+                .join(format!("{campaign}.{first:09}-{last:09}.outlines")),
+            &bytes,
+        )
     }
 
     /// Puts the single files of a campaign together.
     pub(crate) fn pack(&self, campaign: &str) -> io::Result<()> {
         let files = self.files(Some(campaign));
-        let (singles, larger): (Vec<_>, Vec<_>) = files.into_iter().partition(|file| file.is_single);
+        let (singles, larger): (Vec<_>, Vec<_>) =
+            files.into_iter().partition(|file| file.is_single);
         if singles.is_empty() {
             return Ok(());
         }
@@ -106,11 +137,15 @@ impl Shelf {
             let mut outlines = Vec::new();
             for single in singles {
                 // Left by a killed process in both.
-                if larger.iter().any(|file| file.has(single.first) && indices(&file.path).contains(&single.first)) {
+                if larger.iter().any(|file| {
+                    file.has(single.first) && indices(&file.path).contains(&single.first)
+                }) {
                     continue;
                 }
                 let bytes = folder::read(&single.path)?;
-                let read = Opened::new(&bytes).and_then(|opened| opened.outlines()).map_err(io::Error::other)?;
+                let read = Opened::new(&bytes)
+                    .and_then(|opened| opened.outlines())
+                    .map_err(io::Error::other)?;
                 outlines.extend(read);
             }
             self.add_all(campaign, &outlines)?;
@@ -121,8 +156,8 @@ impl Shelf {
         Ok(())
     }
 
-    /// Calls `each` with every file, of which parts that are not `needed` may be missing. If a file was removed meanwhile,
-    /// begins anew.
+    /// Calls `each` with every file, of which parts that are not `needed` may be missing. If a file
+    /// was removed meanwhile, begins anew.
     pub(super) fn each_file(
         &self,
         campaign: Option<&str>,
@@ -131,19 +166,26 @@ impl Shelf {
     ) -> Result<(), Unread> {
         for file in self.chosen(campaign)? {
             let (file, wanted) = file;
-            let bytes = read_parts(&file.path, needed).map_err(|error| unread(&file.path, &error))?;
+            let bytes =
+                read_parts(&file.path, needed).map_err(|error| unread(&file.path, &error))?;
             let read = Opened::new(&bytes).and_then(|opened| each(&file, &opened, &wanted));
             read.map_err(|why| Unread::Damaged(file.path.clone(), why))?;
         }
         Ok(())
     }
 
-    /// The files that are needed for all runs of a campaign, or of all campaigns, each with the indices that earlier files
-    /// have already. Sorted by campaign, then by the lowest index.
-    pub(super) fn chosen(&self, campaign: Option<&str>) -> Result<Vec<(OutlineFile, BTreeSet<u64>)>, Unread> {
+    /// The files that are needed for all runs of a campaign, or of all campaigns, each with the
+    /// indices that earlier files have already. Sorted by campaign, then by the lowest index.
+    pub(super) fn chosen(
+        &self,
+        campaign: Option<&str>,
+    ) -> Result<Vec<(OutlineFile, BTreeSet<u64>)>, Unread> {
         let mut by_campaign: BTreeMap<String, Vec<OutlineFile>> = BTreeMap::new();
         for file in self.files(campaign) {
-            by_campaign.entry(file.campaign.clone()).or_default().push(file);
+            by_campaign
+                .entry(file.campaign.clone())
+                .or_default()
+                .push(file);
         }
         let mut chosen = Vec::new();
         for files in by_campaign.into_values() {
@@ -151,24 +193,37 @@ impl Shelf {
                 chosen.extend(files.into_iter().map(|file| (file, BTreeSet::new())));
                 continue;
             }
-            // Shards and killed processes leave files whose ranges overlap. Their runs do not, except after a kill.
+            // Shards and killed processes leave files whose ranges overlap. Their runs do not,
+            // except after a kill.
             let mut seen = IndexSet::default();
             let mut duplicates = BTreeMap::new();
             let (singles, larger): (Vec<&OutlineFile>, Vec<&OutlineFile>) =
                 files.iter().partition(|file| file.is_single);
             for file in larger {
-                let bytes = read_parts(&file.path, Needed::Indices).map_err(|error| unread(&file.path, &error))?;
+                let bytes = read_parts(&file.path, Needed::Indices)
+                    .map_err(|error| unread(&file.path, &error))?;
                 let indices = Opened::new(&bytes).and_then(|opened| opened.indices());
                 let indices = indices.map_err(|why| Unread::Damaged(file.path.clone(), why))?;
-                let there: BTreeSet<u64> = indices.into_iter().filter(|index| !seen.insert(*index)).collect();
+                let there: BTreeSet<u64> = indices
+                    .into_iter()
+                    .filter(|index| !seen.insert(*index))
+                    .collect();
                 duplicates.insert(file.path.clone(), there);
             }
-            let in_both: BTreeSet<PathBuf> =
-                singles.into_iter().filter(|file| !seen.insert(file.first)).map(|file| file.path.clone()).collect();
-            chosen.extend(files.into_iter().filter(|file| !in_both.contains(&file.path)).map(|file| {
-                let there = duplicates.remove(&file.path).unwrap_or_default();
-                (file, there)
-            }));
+            let in_both: BTreeSet<PathBuf> = singles
+                .into_iter()
+                .filter(|file| !seen.insert(file.first))
+                .map(|file| file.path.clone())
+                .collect();
+            chosen.extend(
+                files
+                    .into_iter()
+                    .filter(|file| !in_both.contains(&file.path))
+                    .map(|file| {
+                        let there = duplicates.remove(&file.path).unwrap_or_default();
+                        (file, there)
+                    }),
+            );
         }
         Ok(chosen)
     }
@@ -199,12 +254,17 @@ impl IndexSet {
 }
 
 impl History {
-    /// Number of outlines in a folder of a history, which another process may be writing: about, if it is.
+    /// Number of outlines in a folder of a history, which another process may be writing: about, if
+    /// it is.
     pub fn count_outlines(dir: &Path) -> u64 {
         let mut count = 0;
         // A file that can't be read is reported when the history is opened.
         let _ = Shelf::new(dir).each_file(None, Needed::Indices, &mut |_, opened, there| {
-            count += opened.indices()?.iter().filter(|index| !there.contains(index)).count() as u64;
+            count += opened
+                .indices()?
+                .iter()
+                .filter(|index| !there.contains(index))
+                .count() as u64;
             Ok(())
         });
         count
@@ -222,14 +282,20 @@ impl History {
     ///
     /// # Errors
     /// `H007` a file is damaged.
-    pub(super) fn of_outlines<T>(&self, read: &mut dyn FnMut(&Shelf) -> Result<T, Unread>) -> Result<T, Diagnostics> {
+    pub(super) fn of_outlines<T>(
+        &self,
+        read: &mut dyn FnMut(&Shelf) -> Result<T, Unread>,
+    ) -> Result<T, Diagnostics> {
         let shelf = self.shelf();
         for _ in 0..TRIES {
             match read(&shelf) {
                 Ok(found) => return Ok(found),
                 Err(Unread::Gone) => {}
                 Err(Unread::Damaged(file, why)) => {
-                    return Err(fault::damaged(self.dir(), &format!("`{}`: {why}", file.display())));
+                    return Err(fault::damaged(
+                        self.dir(),
+                        &format!("`{}`: {why}", file.display()),
+                    ));
                 }
             }
         }
@@ -254,19 +320,26 @@ pub(super) fn read_parts(path: &Path, needed: Needed) -> io::Result<Vec<u8>> {
     let mut file = folder::open(path)?;
     let mut bytes = vec![0; HEADER];
     file.read_exact(&mut bytes)?;
-    let size = Opened::size_of_start(&bytes, parts).unwrap_or(HEADER).max(HEADER) - HEADER;
+    let size = Opened::size_of_start(&bytes, parts)
+        .unwrap_or(HEADER)
+        .max(HEADER)
+        - HEADER;
     io::Read::take(&mut file, (size as u64).min(LONGEST)).read_to_end(&mut bytes)?;
     Ok(bytes)
 }
 
 fn indices(path: &Path) -> Vec<u64> {
-    let read = read_parts(path, Needed::Indices).ok().and_then(|bytes| Opened::new(&bytes).ok()?.indices().ok());
+    let read = read_parts(path, Needed::Indices)
+        .ok()
+        .and_then(|bytes| Opened::new(&bytes).ok()?.indices().ok());
     read.unwrap_or_default()
 }
 
 /// Whether a file has a run, or is damaged.
 fn may_have(path: &Path, index: u64) -> bool {
-    let read = read_parts(path, Needed::Indices).ok().and_then(|bytes| Opened::new(&bytes).ok()?.indices().ok());
+    let read = read_parts(path, Needed::Indices)
+        .ok()
+        .and_then(|bytes| Opened::new(&bytes).ok()?.indices().ok());
     read.is_none_or(|indices| indices.contains(&index))
 }
 
@@ -280,12 +353,24 @@ fn named(path: PathBuf) -> Option<OutlineFile> {
     if let Some(run) = name.strip_suffix(".outline") {
         let (campaign, number) = run.rsplit_once('-')?;
         let index = number.parse::<u64>().ok()?.checked_sub(1)?;
-        return Some(OutlineFile { campaign: campaign.to_owned(), first: index, last: index, is_single: true, path });
+        return Some(OutlineFile {
+            campaign: campaign.to_owned(),
+            first: index,
+            last: index,
+            is_single: true,
+            path,
+        });
     }
     let (campaign, range) = name.strip_suffix(".outlines")?.rsplit_once('.')?;
     let (first, last) = range.split_once('-')?;
     let (first, last) = (first.parse().ok()?, last.parse().ok()?);
-    Some(OutlineFile { campaign: campaign.to_owned(), first, last, is_single: false, path })
+    Some(OutlineFile {
+        campaign: campaign.to_owned(),
+        first,
+        last,
+        is_single: false,
+        path,
+    })
 }
 
 impl Shelf {
@@ -296,7 +381,13 @@ impl Shelf {
             return vec![single];
         }
         // Ranges of files from shards overlap.
-        let files = self.files(Some(campaign)).into_iter().filter(|file| !file.is_single && file.has(index));
-        files.map(|file| file.path).filter(|path| may_have(path, index)).collect()
+        let files = self
+            .files(Some(campaign))
+            .into_iter()
+            .filter(|file| !file.is_single && file.has(index));
+        files
+            .map(|file| file.path)
+            .filter(|path| may_have(path, index))
+            .collect()
     }
 }

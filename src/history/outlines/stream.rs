@@ -1,5 +1,5 @@
-//! Streams the values of outlines in the order of their indices. Only files whose ranges overlap are in memory at the same
-//! time.
+//! Streams the values of outlines in the order of their indices. Only files whose ranges overlap
+//! are in memory at the same time.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -16,8 +16,8 @@ const AHEAD: usize = 8;
 const MANY: usize = 16;
 
 impl Shelf {
-    /// Calls `each` with the outlines of a campaign whose indices are not in `done`, and adds them. Called again after
-    /// [`Unread::Gone`], it goes on with the others.
+    /// Calls `each` with the outlines of a campaign whose indices are not in `done`, and adds them.
+    /// Called again after [`Unread::Gone`], it goes on with the others.
     pub(super) fn each_row(
         &self,
         campaign: &str,
@@ -32,14 +32,24 @@ impl Shelf {
             let mut lowest: BinaryHeap<Reverse<(u64, usize)>> = BinaryHeap::new();
             loop {
                 while let Some(file) = files.get(open.len())
-                    && lowest.peek().is_none_or(|Reverse((index, _))| file.first <= *index)
+                    && lowest
+                        .peek()
+                        .is_none_or(|Reverse((index, _))| file.first <= *index)
                 {
                     let rows = decoded.next(open.len())?;
-                    lowest.extend(rows.rows.first().map(|row| Reverse((row.index, open.len()))));
+                    lowest.extend(
+                        rows.rows
+                            .first()
+                            .map(|row| Reverse((row.index, open.len()))),
+                    );
                     open.push(Some((rows, 0)));
                 }
-                let Some(Reverse((index, at))) = lowest.pop() else { return Ok(()) };
-                let Some((rows, place)) = &mut open[at] else { continue };
+                let Some(Reverse((index, at))) = lowest.pop() else {
+                    return Ok(());
+                };
+                let Some((rows, place)) = &mut open[at] else {
+                    continue;
+                };
                 if done.insert(index) {
                     each(rows.at(campaign, *place));
                 }
@@ -89,7 +99,9 @@ impl<'f> Decoded<'f> {
         match self {
             Self::Here(files) => rows_of(&files[at]),
             // A thread that ended without its file has panicked, which the scope reports.
-            Self::Threads(receivers) => receivers[at % receivers.len()].recv().unwrap_or(Err(Unread::Gone)),
+            Self::Threads(receivers) => receivers[at % receivers.len()]
+                .recv()
+                .unwrap_or(Err(Unread::Gone)),
         }
     }
 }

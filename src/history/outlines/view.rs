@@ -14,7 +14,8 @@ use crate::{History, fault, pending};
 use actcheck_base::{Diagnostic, Diagnostics};
 use actcheck_facts::extract;
 
-/// Largest number of statements that a query may need from outlines: they take half a minute and two gigabytes of memory.
+/// Largest number of statements that a query may need from outlines: they take half a minute and
+/// two gigabytes of memory.
 pub(crate) const MOST_STATEMENTS: usize = 5_000_000;
 
 /// The store of a reader, with the statements of outlines that queries have asked for so far.
@@ -26,13 +27,19 @@ pub(crate) struct View {
 
 impl History {
     /// Returns a handle of a store with the wanted statements at least, also those of outlines.
-    pub(crate) fn store_for_query(&self, wanted: impl FnOnce() -> Wanted) -> Result<OpenStore, Diagnostics> {
+    pub(crate) fn store_for_query(
+        &self,
+        wanted: impl FnOnce() -> Wanted,
+    ) -> Result<OpenStore, Diagnostics> {
         if !self.shelf().exists() {
             return self.store_with(wanted);
         }
         let wanted = wanted();
         let mut view = self.view.lock().unwrap_or_else(PoisonError::into_inner);
-        if view.as_ref().is_some_and(|view| view.opened.is_stale(&self.folder)) {
+        if view
+            .as_ref()
+            .is_some_and(|view| view.opened.is_stale(&self.folder))
+        {
             *view = None;
         }
         let view = match view.take() {
@@ -41,7 +48,10 @@ impl History {
                 // The owner's statements that are only in its memory so far.
                 self.complete_store()?;
                 let opened = read_with_outlines(&Folder::to_read(self.dir())?)?;
-                view.insert(View { opened, loaded: Mutex::default() })
+                view.insert(View {
+                    opened,
+                    loaded: Mutex::default(),
+                })
             }
         };
         view.opened.load(self.dir(), || wanted.clone())?;
@@ -58,7 +68,11 @@ impl History {
 
     /// The wanted statements of all outlines, with facts, as if the runs were kept whole.
     pub(crate) fn outlined_statements(&self, wanted: &Wanted) -> Result<Part, Diagnostics> {
-        let with_facts = wanted.graphs || wanted.patterns.iter().any(|pattern| pattern.graph != InGraph::Default);
+        let with_facts = wanted.graphs
+            || wanted
+                .patterns
+                .iter()
+                .any(|pattern| pattern.graph != InGraph::Default);
         let found = self.of_outlines(&mut |shelf| {
             let mut part = Part::default();
             shelf.each_file(None, Needed::All, &mut |file, opened, there| {
@@ -80,7 +94,8 @@ impl History {
                             &mut quads,
                         );
                         let (terms, rows) = journal::numbered(&quads);
-                        journal::collect(&terms, &rows, wanted, &mut part).ok_or("its states can't be read")?;
+                        journal::collect(&terms, &rows, wanted, &mut part)
+                            .ok_or("its states can't be read")?;
                     }
                 }
                 Ok(())
@@ -99,7 +114,8 @@ const SECS_A_STATEMENT: f64 = 6e-6;
 /// Memory of a statement in the store. Unit: gigabytes.
 const GIGABYTES_A_STATEMENT: f64 = 4e-7;
 
-/// The error of a query that needs the statements of too many outlines. `part`: the part of it that does.
+/// The error of a query that needs the statements of too many outlines. `part`: the part of it that
+/// does.
 pub(crate) fn too_many(history: &History, part: &str, statements: u64) -> Diagnostics {
     let number = statements as f64;
     let message = format!(

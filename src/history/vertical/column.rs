@@ -1,4 +1,5 @@
-//! The values of one property in a file of outlines: nodes of the run itself, or a list of distinct values with codes.
+//! The values of one property in a file of outlines: nodes of the run itself, or a list of distinct
+//! values with codes.
 
 use std::cmp::Ordering;
 
@@ -35,7 +36,10 @@ impl Value {
         {
             let text = literal.value();
             let value = match literal.datatype() {
-                xsd::DOUBLE => text.parse::<f64>().ok().map(|number| Self::Double(number.to_bits())),
+                xsd::DOUBLE => text
+                    .parse::<f64>()
+                    .ok()
+                    .map(|number| Self::Double(number.to_bits())),
                 xsd::INTEGER => text.parse().ok().map(Self::Integer),
                 xsd::BOOLEAN => text.parse().ok().map(Self::Boolean),
                 _ => None,
@@ -56,9 +60,13 @@ impl Value {
             Self::Boolean(_) | Self::Term(_) => 3,
         };
         match (self, other) {
-            (Self::Term(Term::NamedNode(one)), Self::Term(Term::NamedNode(other))) => one.as_str().cmp(other.as_str()),
+            (Self::Term(Term::NamedNode(one)), Self::Term(Term::NamedNode(other))) => {
+                one.as_str().cmp(other.as_str())
+            }
             (Self::Integer(one), Self::Integer(other)) => one.cmp(other),
-            (Self::Double(one), Self::Double(other)) => f64::from_bits(*one).total_cmp(&f64::from_bits(*other)),
+            (Self::Double(one), Self::Double(other)) => {
+                f64::from_bits(*one).total_cmp(&f64::from_bits(*other))
+            }
             _ => rank(self).cmp(&rank(other)),
         }
     }
@@ -99,7 +107,9 @@ impl Column {
                 let in_order = codes.iter().copied().eq(0..values.len() as u32);
                 out.push(u8::from(in_order));
                 if !in_order {
-                    codes.iter().for_each(|code| put_varint(&mut out, u64::from(*code)));
+                    codes
+                        .iter()
+                        .for_each(|code| put_varint(&mut out, u64::from(*code)));
                 }
             }
         }
@@ -123,7 +133,12 @@ impl Column {
         let codes = match reader.byte()? {
             1 => (count == values.len()).then(|| (0..count as u32).collect())?,
             _ => (0..count)
-                .map(|_| reader.varint().filter(|code| *code < most).map(|code| code as u32))
+                .map(|_| {
+                    reader
+                        .varint()
+                        .filter(|code| *code < most)
+                        .map(|code| code as u32)
+                })
                 .collect::<Option<_>>()?,
         };
         Some(Self::Values { values, codes })
@@ -133,10 +148,24 @@ impl Column {
 fn encode_values(values: &[Value], out: &mut Vec<u8>) -> Result<(), String> {
     let doubles: Option<Vec<[u8; WIDTH]>> = values
         .iter()
-        .map(|value| if let Value::Double(bits) = value { Some(bits.to_be_bytes()) } else { None })
+        .map(|value| {
+            if let Value::Double(bits) = value {
+                Some(bits.to_be_bytes())
+            } else {
+                None
+            }
+        })
         .collect();
-    let integers: Option<Vec<i64>> =
-        values.iter().map(|value| if let Value::Integer(number) = value { Some(*number) } else { None }).collect();
+    let integers: Option<Vec<i64>> = values
+        .iter()
+        .map(|value| {
+            if let Value::Integer(number) = value {
+                Some(*number)
+            } else {
+                None
+            }
+        })
+        .collect();
     if let Some(doubles) = doubles {
         out.push(DOUBLES);
         put_varint(out, doubles.len() as u64);
@@ -166,7 +195,9 @@ fn decode_values(kind: u8, reader: &mut ByteReader<'_>) -> Option<Vec<Value>> {
     match kind {
         DOUBLES => {
             let planes = reader.take(size.checked_mul(WIDTH)?)?;
-            let double = |at: usize| u64::from_be_bytes(std::array::from_fn(|plane| planes[plane * size + at]));
+            let double = |at: usize| {
+                u64::from_be_bytes(std::array::from_fn(|plane| planes[plane * size + at]))
+            };
             Some((0..size).map(|at| Value::Double(double(at))).collect())
         }
         INTEGERS => {
@@ -182,7 +213,12 @@ fn decode_values(kind: u8, reader: &mut ByteReader<'_>) -> Option<Vec<Value>> {
         }
         TERMS => {
             let terms: Vec<Written<'_>> = postcard::from_bytes(reader.take(size)?).ok()?;
-            Some(terms.into_iter().map(|term| Value::of(&read_term(term))).collect())
+            Some(
+                terms
+                    .into_iter()
+                    .map(|term| Value::of(&read_term(term)))
+                    .collect(),
+            )
         }
         _ => None,
     }
@@ -194,14 +230,30 @@ mod tests {
     use oxigraph::model::NamedNode;
 
     fn sample() -> Vec<Column> {
-        let values =
-            |terms: Vec<Term>, codes: Vec<u32>| Column::Values { values: terms.iter().map(Value::of).collect(), codes };
+        let values = |terms: Vec<Term>, codes: Vec<u32>| Column::Values {
+            values: terms.iter().map(Value::of).collect(),
+            codes,
+        };
         let typed = |text: &str, datatype| Term::from(Literal::new_typed_literal(text, datatype));
         vec![
             Column::Nodes(vec![4, 0, 2]),
-            values(vec![Literal::from(0.1).into(), Literal::from(f64::NAN).into()], vec![1, 0, 0]),
-            values((0..3).map(|n| Literal::from(f64::from(n) / 7.0).into()).collect(), vec![0, 1, 2]),
-            values(vec![Literal::from(i64::MIN).into(), Literal::from(i64::MAX).into()], vec![0, 0, 1]),
+            values(
+                vec![Literal::from(0.1).into(), Literal::from(f64::NAN).into()],
+                vec![1, 0, 0],
+            ),
+            values(
+                (0..3)
+                    .map(|n| Literal::from(f64::from(n) / 7.0).into())
+                    .collect(),
+                vec![0, 1, 2],
+            ),
+            values(
+                vec![
+                    Literal::from(i64::MIN).into(),
+                    Literal::from(i64::MAX).into(),
+                ],
+                vec![0, 0, 1],
+            ),
             values(
                 vec![
                     NamedNode::new_unchecked("http://a").into(),
@@ -220,8 +272,12 @@ mod tests {
     #[test]
     fn columns_are_decoded_as_they_were() {
         for column in sample() {
-            let subjects: &[u32] =
-                if matches!(&column, Column::Values { codes, .. } if codes.is_empty()) { &[] } else { &[1, 2, 3] };
+            let subjects: &[u32] = if matches!(&column, Column::Values { codes, .. } if codes.is_empty())
+            {
+                &[]
+            } else {
+                &[1, 2, 3]
+            };
             let bytes = column.encode(subjects).expect("it can be encoded");
             assert_eq!(Column::decode(&bytes, subjects, 5), Some(column));
         }

@@ -19,13 +19,17 @@ pub(crate) struct RunBits(Vec<u64>);
 
 impl RunBits {
     pub(super) fn has(&self, number: u64) -> bool {
-        let word = usize::try_from(number / 64).ok().and_then(|word| self.0.get(word));
+        let word = usize::try_from(number / 64)
+            .ok()
+            .and_then(|word| self.0.get(word));
         word.is_some_and(|word| word >> (number % 64) & 1 == 1)
     }
 
     fn insert(&mut self, number: u64) {
         // Numbers of runs are below the number of runs that a campaign can have.
-        let Ok(word) = usize::try_from(number / 64) else { return };
+        let Ok(word) = usize::try_from(number / 64) else {
+            return;
+        };
         if word >= self.0.len() {
             self.0.resize(word + 1, 0);
         }
@@ -51,7 +55,11 @@ impl Counts {
     pub(crate) fn has(&self, id: &str) -> bool {
         let outlined = || {
             let (campaign, number) = id.rsplit_once('-')?;
-            Some(self.outlines.get(&format!("{}{campaign}-", names::RUN))?.has(number.parse().ok()?))
+            Some(
+                self.outlines
+                    .get(&format!("{}{campaign}-", names::RUN))?
+                    .has(number.parse().ok()?),
+            )
         };
         self.stored.contains(id) || outlined() == Some(true)
     }
@@ -76,19 +84,32 @@ fn hash(text: &str) -> Option<u128> {
     if text.is_empty() {
         return None;
     }
-    u128::from_str_radix(text, 16).ok().filter(|_| text.len() == 32).or_else(|| {
-        let mut digest = Digest::new();
-        digest.update(text.as_bytes());
-        u128::from_str_radix(&digest.finish(), 16).ok()
-    })
+    u128::from_str_radix(text, 16)
+        .ok()
+        .filter(|_| text.len() == 32)
+        .or_else(|| {
+            let mut digest = Digest::new();
+            digest.update(text.as_bytes());
+            u128::from_str_radix(&digest.finish(), 16).ok()
+        })
 }
 
 /// The runs of a file with their traces.
-pub(super) fn traced(file: &FileColumns, is_left_out: impl Fn(u64) -> bool) -> Result<Vec<Traced>, Stop> {
+pub(super) fn traced(
+    file: &FileColumns,
+    is_left_out: impl Fn(u64) -> bool,
+) -> Result<Vec<Traced>, Stop> {
     let [campaign, index, trace] = properties();
     let mut rows: BTreeMap<u32, [Option<Value>; 3]> = BTreeMap::new();
     for (at, property) in [campaign, index, trace].iter().enumerate() {
-        let Some((_, Pairs { subjects, column: Column::Values { values, codes } })) = file.column(property) else {
+        let Some((
+            _,
+            Pairs {
+                subjects,
+                column: Column::Values { values, codes },
+            },
+        )) = file.column(property)
+        else {
             continue;
         };
         for (subject, code) in subjects.iter().zip(codes) {
@@ -102,7 +123,11 @@ pub(super) fn traced(file: &FileColumns, is_left_out: impl Fn(u64) -> bool) -> R
         if file.node_of_run(run) != Some(node) || is_left_out(number) {
             continue;
         }
-        if let [Some(Value::Term(campaign)), Some(Value::Integer(index)), Some(Value::Term(Term::Literal(trace)))] = row
+        if let [
+            Some(Value::Term(campaign)),
+            Some(Value::Integer(index)),
+            Some(Value::Term(Term::Literal(trace))),
+        ] = row
         {
             found.push(Traced {
                 hash: hash(trace.value()).unwrap_or_default(),
@@ -138,7 +163,12 @@ impl<'a> Counter<'a> {
     /// `campaigns`: sorted by their start.
     pub(super) fn new(selected: &'a BTreeSet<String>, campaigns: &'a [String]) -> Self {
         let ranks = campaigns.iter().map(String::as_str).zip(0..).collect();
-        Self { selected, ranks, bases: Vec::new(), entries: Vec::new() }
+        Self {
+            selected,
+            ranks,
+            bases: Vec::new(),
+            entries: Vec::new(),
+        }
     }
 
     pub(super) fn add(&mut self, runs: Vec<Traced>) {
@@ -150,7 +180,10 @@ impl<'a> Counter<'a> {
                 self.bases.push(run.base);
             }
             let rank = self.ranks.get(run.campaign.as_str()).copied().unwrap_or(-1);
-            let which = Which::Outline { base: self.bases.len() as u32 - 1, number: run.number };
+            let which = Which::Outline {
+                base: self.bases.len() as u32 - 1,
+                number: run.number,
+            };
             self.entries.push((run.hash, rank, run.index, which));
         }
     }
@@ -160,20 +193,32 @@ impl<'a> Counter<'a> {
         for (at, run) in (0..).zip(stored) {
             if !self.selected.contains(&run.campaign) {
                 let rank = self.ranks.get(run.campaign.as_str()).copied().unwrap_or(-1);
-                self.entries.push((hash(&run.trace_hash).unwrap_or_default(), rank, run.index, Which::Stored(at)));
+                self.entries.push((
+                    hash(&run.trace_hash).unwrap_or_default(),
+                    rank,
+                    run.index,
+                    Which::Stored(at),
+                ));
             }
         }
         self.entries.sort_unstable();
         let mut counts = Counts::default();
         for (at, (hash, _, _, which)) in self.entries.iter().enumerate() {
-            let is_last = self.entries.get(at + 1).is_none_or(|(next, ..)| next != hash);
+            let is_last = self
+                .entries
+                .get(at + 1)
+                .is_none_or(|(next, ..)| next != hash);
             // A run without a trace is never a duplicate.
             if !is_last && *hash != 0 {
                 continue;
             }
             match which {
                 Which::Outline { base, number } => {
-                    counts.outlines.entry(self.bases[*base as usize].clone()).or_default().insert(*number);
+                    counts
+                        .outlines
+                        .entry(self.bases[*base as usize].clone())
+                        .or_default()
+                        .insert(*number);
                 }
                 Which::Stored(at) => drop(counts.stored.insert(stored[*at as usize].run.clone())),
             }

@@ -1,7 +1,9 @@
-//! Encodes the statements of many outlines property by property, so that a query reads only the properties that it uses.
+//! Encodes the statements of many outlines property by property, so that a query reads only the
+//! properties that it uses.
 //!
-//! The size and the checksum of the directory come first (four bytes each, the lowest first), then the directory, then its
-//! parts: the nodes, and one column for each property. Each part is compressed on its own.
+//! The size and the checksum of the directory come first (four bytes each, the lowest first), then
+//! the directory, then its parts: the nodes, and one column for each property. Each part is
+//! compressed on its own.
 
 use std::collections::HashMap;
 
@@ -37,26 +39,37 @@ pub(super) struct PartSize {
     pub statements: u32,
 }
 
-/// Encodes the statements about each run. Returns `None` if they differ from those of a run too much.
+/// Encodes the statements about each run. Returns `None` if they differ from those of a run too
+/// much.
 ///
 /// # Errors
 /// A message, if a part can't be encoded.
 pub(crate) fn encode(runs: &[&[Quad]]) -> Result<Option<Vec<u8>>, String> {
-    let Some(read) = Read::of(runs) else { return Ok(None) };
+    let Some(read) = Read::of(runs) else {
+        return Ok(None);
+    };
     let (mut body, mut columns) = (Vec::new(), Vec::new());
     let mut add = |part: &[u8], statements: usize| {
         let part = zstd::bulk::compress(part, LEVEL).map_err(|error| error.to_string())?;
         let size = u32::try_from(part.len()).map_err(|_| "it is larger than 4 GB".to_owned())?;
         body.extend_from_slice(&part);
-        Ok::<_, String>(PartSize { size, sum: journal::sum_of(&part), statements: statements as u32 })
+        Ok::<_, String>(PartSize {
+            size,
+            sum: journal::sum_of(&part),
+            statements: statements as u32,
+        })
     };
-    let nodes = add(&postcard::to_stdvec(&read.nodes).map_err(|error| error.to_string())?, 0)?;
+    let nodes = add(
+        &postcard::to_stdvec(&read.nodes).map_err(|error| error.to_string())?,
+        0,
+    )?;
     for (property, objects) in read.properties.all.iter().zip(&read.objects) {
         let subjects: Vec<u32> = objects.iter().map(|(subject, _)| *subject).collect();
         let part = column(objects).encode(&subjects)?;
         columns.push((property.clone(), add(&part, objects.len())?));
     }
-    let directory = postcard::to_stdvec(&Directory { nodes, columns }).map_err(|error| error.to_string())?;
+    let directory =
+        postcard::to_stdvec(&Directory { nodes, columns }).map_err(|error| error.to_string())?;
     let directory = zstd::bulk::compress(&directory, LEVEL).map_err(|error| error.to_string())?;
     let mut bytes = (directory.len() as u32).to_le_bytes().to_vec();
     bytes.extend(journal::sum_of(&directory).to_le_bytes());
@@ -99,14 +112,22 @@ impl<'q> Read<'q> {
             for quad in *quads {
                 known.of(&quad.subject);
             }
-            let of_run: HashMap<TermRef<'_>, u32> =
-                known.all.iter().map(|node| TermRef::from(node.as_ref())).zip(0..).collect();
-            let NamedOrBlankNode::NamedNode(run) = &quads.first()?.subject else { return None };
+            let of_run: HashMap<TermRef<'_>, u32> = known
+                .all
+                .iter()
+                .map(|node| TermRef::from(node.as_ref()))
+                .zip(0..)
+                .collect();
+            let NamedOrBlankNode::NamedNode(run) = &quads.first()?.subject else {
+                return None;
+            };
             let run = run.as_str();
             let derived = derived(quads);
             let name = |node: &NamedOrBlankNode| name(node, run, &derived);
-            let mut profile =
-                Profile { names: known.all.iter().map(|node| names.of(name(node))).collect(), segments: Vec::new() };
+            let mut profile = Profile {
+                names: known.all.iter().map(|node| names.of(name(node))).collect(),
+                segments: Vec::new(),
+            };
             for about in quads.chunk_by(|one, other| one.subject == other.subject) {
                 let subject = known.of(&about[0].subject);
                 let mut shape = Vec::with_capacity(about.len());
@@ -130,14 +151,17 @@ impl<'q> Read<'q> {
             first = first.checked_add(profile.names.len() as u32)?;
             read.nodes.profile_of.push(profiles.of(profile));
         }
-        (read.nodes.shapes, read.nodes.names, read.nodes.profiles) = (shapes.all, names.all, profiles.all);
+        (read.nodes.shapes, read.nodes.names, read.nodes.profiles) =
+            (shapes.all, names.all, profiles.all);
         Some(read)
     }
 }
 
 /// The IRI of a run without its number, and the number.
 fn numbered(quad: &Quad) -> Option<(&str, u64)> {
-    let NamedOrBlankNode::NamedNode(run) = &quad.subject else { return None };
+    let NamedOrBlankNode::NamedNode(run) = &quad.subject else {
+        return None;
+    };
     let (_, digits) = run.as_str().rsplit_once('-')?;
     let number: u64 = digits.parse().ok()?;
     let base = run.as_str().strip_suffix(digits)?;
@@ -149,13 +173,23 @@ fn derived(quads: &[Quad]) -> HashMap<&NamedOrBlankNode, Name> {
     let [subject, test, result] = ["earl:subject", "earl:test", "earl:result"].map(iri);
     let mut assertions: HashMap<&NamedOrBlankNode, [Option<&Term>; 3]> = HashMap::new();
     for quad in quads {
-        if let Some(at) = [&subject, &test, &result].iter().position(|known| **known == quad.predicate) {
+        if let Some(at) = [&subject, &test, &result]
+            .iter()
+            .position(|known| **known == quad.predicate)
+        {
             assertions.entry(&quad.subject).or_default()[at] = Some(&quad.object);
         }
     }
     let mut derived = HashMap::new();
     for (node, parts) in assertions {
-        let [Some(Term::NamedNode(subject)), Some(Term::NamedNode(test)), result] = parts else { continue };
+        let [
+            Some(Term::NamedNode(subject)),
+            Some(Term::NamedNode(test)),
+            result,
+        ] = parts
+        else {
+            continue;
+        };
         let is = |node: &NamedOrBlankNode, part: &str| {
             *node == NamedOrBlankNode::from(unique(&[subject.as_str(), test.as_str(), part]))
         };
@@ -178,14 +212,21 @@ fn name(node: &NamedOrBlankNode, run: &str, derived: &HashMap<&NamedOrBlankNode,
             Some(rest) if rest.is_empty() || rest.starts_with('/') => Name::Below(rest.to_owned()),
             _ => Name::Iri(node.as_str().to_owned()),
         },
-        NamedOrBlankNode::BlankNode(blank) => {
-            derived.get(node).cloned().unwrap_or_else(|| Name::Blank(blank.as_str().to_owned()))
-        }
+        NamedOrBlankNode::BlankNode(blank) => derived
+            .get(node)
+            .cloned()
+            .unwrap_or_else(|| Name::Blank(blank.as_str().to_owned())),
     }
 }
 
 fn column(objects: &[(u32, Object<'_>)]) -> Column {
-    let nodes = objects.iter().map(|(_, object)| if let Object::Node(node, _) = object { Some(*node) } else { None });
+    let nodes = objects.iter().map(|(_, object)| {
+        if let Object::Node(node, _) = object {
+            Some(*node)
+        } else {
+            None
+        }
+    });
     if let Some(nodes) = nodes.collect() {
         return Column::Nodes(nodes);
     }
@@ -193,12 +234,24 @@ fn column(objects: &[(u32, Object<'_>)]) -> Column {
         Object::Node(_, term) | Object::Term(term) => Value::of(term),
     };
     let mut numbers = Numbers::<Value>::default();
-    let codes: Vec<u32> = objects.iter().map(|object| numbers.of(value(object))).collect();
-    let is_double = numbers.all.iter().all(|value| matches!(value, Value::Double(_)));
+    let codes: Vec<u32> = objects
+        .iter()
+        .map(|object| numbers.of(value(object)))
+        .collect();
+    let is_double = numbers
+        .all
+        .iter()
+        .all(|value| matches!(value, Value::Double(_)));
     if is_double && numbers.all.len() > objects.len() / FEW {
         // A code takes more than the bytes that it saves.
         let values = objects.iter().map(value).collect();
-        return Column::Values { values, codes: (0..objects.len() as u32).collect() };
+        return Column::Values {
+            values,
+            codes: (0..objects.len() as u32).collect(),
+        };
     }
-    Column::Values { values: numbers.all, codes }
+    Column::Values {
+        values: numbers.all,
+        codes,
+    }
 }

@@ -1,6 +1,7 @@
 //! Expressions that are evaluated on the rows of one file.
 //!
-//! Only expressions that most queries use, with values of the types that runs have: everything else is left to the evaluator.
+//! Only expressions that most queries use, with values of the types that runs have: everything else
+//! is left to the evaluator.
 
 use std::borrow::Cow;
 
@@ -51,7 +52,10 @@ pub(super) enum Operation {
 
 impl Native {
     /// Returns `None` if the expression is left to the evaluator. `place`: the place of a variable.
-    pub(super) fn of(expression: &Expression, place: &dyn Fn(&Variable) -> Option<usize>) -> Option<Self> {
+    pub(super) fn of(
+        expression: &Expression,
+        place: &dyn Fn(&Variable) -> Option<usize>,
+    ) -> Option<Self> {
         use Expression as E;
         let of = |expression: &Expression| Self::of(expression, place);
         let pair = |one: &Expression, other: &Expression| Some(Box::new([of(one)?, of(other)?]));
@@ -84,23 +88,35 @@ impl Native {
                 [value] => Self::Text(Box::new(of(value)?)),
                 _ => return None,
             },
-            E::FunctionCall(Function::Custom(function), args) if is_replace(function) => match args.as_slice() {
-                [value, E::Literal(pattern), E::Literal(by)]
-                    if [pattern, by].iter().all(|text| text.datatype() == xsd::STRING) && by.value().is_empty() =>
-                {
-                    let pattern = RegexBuilder::new(pattern.value()).size_limit(MOST_PATTERN_BYTES).build().ok()?;
-                    Self::Removed(Box::new(of(value)?), pattern)
+            E::FunctionCall(Function::Custom(function), args) if is_replace(function) => {
+                match args.as_slice() {
+                    [value, E::Literal(pattern), E::Literal(by)]
+                        if [pattern, by]
+                            .iter()
+                            .all(|text| text.datatype() == xsd::STRING)
+                            && by.value().is_empty() =>
+                    {
+                        let pattern = RegexBuilder::new(pattern.value())
+                            .size_limit(MOST_PATTERN_BYTES)
+                            .build()
+                            .ok()?;
+                        Self::Removed(Box::new(of(value)?), pattern)
+                    }
+                    _ => return None,
                 }
-                _ => return None,
-            },
+            }
             // The length of lists is limited where they are made.
-            E::FunctionCall(Function::Custom(function), args) if function.as_str() == COUNTED_TEXT => {
+            E::FunctionCall(Function::Custom(function), args)
+                if function.as_str() == COUNTED_TEXT =>
+            {
                 match args.as_slice() {
                     [text] => of(text)?,
                     _ => return None,
                 }
             }
-            E::FunctionCall(Function::Custom(function), args) if function.as_str() == names::act("counts") => {
+            E::FunctionCall(Function::Custom(function), args)
+                if function.as_str() == names::act("counts") =>
+            {
                 match args.as_slice() {
                     [E::Variable(run)] => Self::Counts(place(run)?),
                     _ => return None,
@@ -128,7 +144,11 @@ impl Native {
     }
 
     /// Its value in a row; `None` if it is an error, or unbound.
-    pub(super) fn value<'a>(&'a self, rows: &Rows<'a>, row: usize) -> Result<Option<Cell<'a>>, Stop> {
+    pub(super) fn value<'a>(
+        &'a self,
+        rows: &Rows<'a>,
+        row: usize,
+    ) -> Result<Option<Cell<'a>>, Stop> {
         let truth = |part: &'a Self| part.truth(rows, row);
         let both = |parts: &'a [Self; 2]| -> Result<Option<[Cell<'a>; 2]>, Stop> {
             let (one, other) = (parts[0].value(rows, row)?, parts[1].value(rows, row)?);
@@ -218,10 +238,16 @@ impl Native {
 }
 
 fn is_replace(function: &NamedNode) -> bool {
-    TEXT_FUNCTIONS.iter().any(|(name, iri, _)| *name == "REPLACE" && *iri == function.as_str())
+    TEXT_FUNCTIONS
+        .iter()
+        .any(|(name, iri, _)| *name == "REPLACE" && *iri == function.as_str())
 }
 
-fn calculated<'a>(operation: Operation, one: &Cell<'a>, other: &Cell<'a>) -> Result<Option<Cell<'a>>, Stop> {
+fn calculated<'a>(
+    operation: Operation,
+    one: &Cell<'a>,
+    other: &Cell<'a>,
+) -> Result<Option<Cell<'a>>, Stop> {
     let doubles = |one: f64, other: f64| {
         Cell::Double(match operation {
             Operation::Add => one + other,
@@ -236,9 +262,8 @@ fn calculated<'a>(operation: Operation, one: &Cell<'a>, other: &Cell<'a>) -> Res
             Operation::Multiply => one.checked_mul(*other),
         }
         .map(Cell::Integer),
-        (Cell::Double(one), Cell::Double(other) | Cell::Decimal(other)) | (Cell::Decimal(one), Cell::Double(other)) => {
-            Some(doubles(*one, *other))
-        }
+        (Cell::Double(one), Cell::Double(other) | Cell::Decimal(other))
+        | (Cell::Decimal(one), Cell::Double(other)) => Some(doubles(*one, *other)),
         (Cell::Double(one), Cell::Integer(other)) => Some(doubles(*one, *other as f64)),
         (Cell::Integer(one), Cell::Double(other)) => Some(doubles(*one as f64, *other)),
         (Cell::Other(_) | Cell::Decimal(_), _) | (_, Cell::Other(_) | Cell::Decimal(_)) => {

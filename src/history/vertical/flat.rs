@@ -27,7 +27,10 @@ impl Flat {
     /// Flattens a pattern of joins, conditions and optional parts.
     pub(super) fn of(pattern: GraphPattern) -> Self {
         match pattern {
-            GraphPattern::Bgp { patterns } => Self { triples: patterns, ..Self::default() },
+            GraphPattern::Bgp { patterns } => Self {
+                triples: patterns,
+                ..Self::default()
+            },
             GraphPattern::Join { left, right } => {
                 let (left, right) = (Self::joinable(*left), Self::joinable(*right));
                 let is_free = |one: &Self, other: &Self| {
@@ -38,51 +41,93 @@ impl Flat {
                     return left.0.joined(right.0);
                 }
                 // An optional part is evaluated before the join.
-                Self { others: vec![left.1, right.1], ..Self::default() }
+                Self {
+                    others: vec![left.1, right.1],
+                    ..Self::default()
+                }
             }
             GraphPattern::Filter { expr, inner } => {
                 let mut all = Vec::new();
                 conjuncts(expr, &mut all);
                 let (mut flat, all) = match *inner {
-                    GraphPattern::Extend { inner, variable, expression } => {
-                        // Conditions that do not use the new value may come first, so that fewer values are needed later.
-                        let (before, after): (Vec<_>, Vec<_>) =
-                            all.into_iter().partition(|condition| !used(condition).contains(&variable));
+                    GraphPattern::Extend {
+                        inner,
+                        variable,
+                        expression,
+                    } => {
+                        // Conditions that do not use the new value may come first, so that fewer
+                        // values are needed later.
+                        let (before, after): (Vec<_>, Vec<_>) = all
+                            .into_iter()
+                            .partition(|condition| !used(condition).contains(&variable));
                         let inner = Box::new(filtered(*inner, before));
-                        let extend = GraphPattern::Extend { inner, variable, expression };
-                        (Self { others: vec![extend], ..Self::default() }, after)
+                        let extend = GraphPattern::Extend {
+                            inner,
+                            variable,
+                            expression,
+                        };
+                        (
+                            Self {
+                                others: vec![extend],
+                                ..Self::default()
+                            },
+                            after,
+                        )
                     }
                     inner => (Self::of(inner), all),
                 };
                 let known = variables(&flat.triples);
                 for condition in all {
                     let is_early = !has_pattern(&condition) && used(&condition).is_subset(&known);
-                    if is_early { &mut flat.conditions } else { &mut flat.late }.push(condition);
+                    if is_early {
+                        &mut flat.conditions
+                    } else {
+                        &mut flat.late
+                    }
+                    .push(condition);
                 }
                 flat
             }
-            GraphPattern::LeftJoin { left, right, expression } => {
+            GraphPattern::LeftJoin {
+                left,
+                right,
+                expression,
+            } => {
                 let mut flat = Self::of(*left);
                 if !flat.late.is_empty() {
                     return Self {
-                        others: vec![GraphPattern::LeftJoin { left: Box::new(flat.pattern()), right, expression }],
+                        others: vec![GraphPattern::LeftJoin {
+                            left: Box::new(flat.pattern()),
+                            right,
+                            expression,
+                        }],
                         ..Self::default()
                     };
                 }
                 flat.optionals.push((*right, expression));
                 flat
             }
-            other => Self { others: vec![other], ..Self::default() },
+            other => Self {
+                others: vec![other],
+                ..Self::default()
+            },
         }
     }
 
-    /// Flattens a side of a join. Its last conditions apply before the join, so they keep it as it is.
+    /// Flattens a side of a join. Its last conditions apply before the join, so they keep it as it
+    /// is.
     fn joinable(pattern: GraphPattern) -> (Self, GraphPattern) {
         let flat = Self::of(pattern.clone());
         if flat.late.is_empty() {
             return (flat, pattern);
         }
-        (Self { others: vec![pattern.clone()], ..Self::default() }, pattern)
+        (
+            Self {
+                others: vec![pattern.clone()],
+                ..Self::default()
+            },
+            pattern,
+        )
     }
 
     fn joined(mut self, other: Self) -> Self {
@@ -95,8 +140,16 @@ impl Flat {
 
     /// The variables that only its optional parts bind.
     fn optional_variables(&self) -> BTreeSet<Variable> {
-        let mut own: BTreeSet<Variable> = self.optionals.iter().flat_map(|(pattern, _)| bound(pattern)).collect();
-        let others = self.others.iter().flat_map(bound).chain(variables(&self.triples));
+        let mut own: BTreeSet<Variable> = self
+            .optionals
+            .iter()
+            .flat_map(|(pattern, _)| bound(pattern))
+            .collect();
+        let others = self
+            .others
+            .iter()
+            .flat_map(bound)
+            .chain(variables(&self.triples));
         for variable in others {
             own.remove(&variable);
         }
@@ -104,19 +157,34 @@ impl Flat {
     }
 
     fn all_variables(&self) -> BTreeSet<Variable> {
-        let patterns = self.others.iter().chain(self.optionals.iter().map(|(pattern, _)| pattern));
-        patterns.flat_map(bound).chain(variables(&self.triples)).collect()
+        let patterns = self
+            .others
+            .iter()
+            .chain(self.optionals.iter().map(|(pattern, _)| pattern));
+        patterns
+            .flat_map(bound)
+            .chain(variables(&self.triples))
+            .collect()
     }
 
     /// The same as one pattern.
     fn pattern(self) -> GraphPattern {
-        let mut pattern = GraphPattern::Bgp { patterns: self.triples };
+        let mut pattern = GraphPattern::Bgp {
+            patterns: self.triples,
+        };
         for other in self.others {
-            pattern = GraphPattern::Join { left: Box::new(pattern), right: Box::new(other) };
+            pattern = GraphPattern::Join {
+                left: Box::new(pattern),
+                right: Box::new(other),
+            };
         }
         pattern = filtered(pattern, self.conditions);
         for (right, expression) in self.optionals {
-            pattern = GraphPattern::LeftJoin { left: Box::new(pattern), right: Box::new(right), expression };
+            pattern = GraphPattern::LeftJoin {
+                left: Box::new(pattern),
+                right: Box::new(right),
+                expression,
+            };
         }
         filtered(pattern, self.late)
     }
@@ -124,9 +192,14 @@ impl Flat {
 
 /// A pattern with conditions.
 pub(super) fn filtered(pattern: GraphPattern, conditions: Vec<Expression>) -> GraphPattern {
-    let all = conditions.into_iter().reduce(|one, other| Expression::And(Box::new(one), Box::new(other)));
+    let all = conditions
+        .into_iter()
+        .reduce(|one, other| Expression::And(Box::new(one), Box::new(other)));
     match all {
-        Some(expr) => GraphPattern::Filter { expr, inner: Box::new(pattern) },
+        Some(expr) => GraphPattern::Filter {
+            expr,
+            inner: Box::new(pattern),
+        },
         None => pattern,
     }
 }

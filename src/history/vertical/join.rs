@@ -49,7 +49,9 @@ struct Index {
 impl Index {
     fn of(nodes: &[u32], count: u32) -> Self {
         let mut starts = vec![0u32; count as usize + 1];
-        nodes.iter().for_each(|node| starts[*node as usize + 1] += 1);
+        nodes
+            .iter()
+            .for_each(|node| starts[*node as usize + 1] += 1);
         (1..starts.len()).for_each(|at| starts[at] += starts[at - 1]);
         let mut next = starts.clone();
         let mut rows = vec![0u32; nodes.len()];
@@ -71,30 +73,54 @@ impl Index {
 }
 
 impl FileColumns {
-    pub(super) fn new(nodes: Nodes, count: u32, properties: Vec<String>, columns: Vec<Option<Pairs>>) -> Self {
+    pub(super) fn new(
+        nodes: Nodes,
+        count: u32,
+        properties: Vec<String>,
+        columns: Vec<Option<Pairs>>,
+    ) -> Self {
         let index = |pairs: Pairs| {
             let by_subject = Index::of(&pairs.subjects, count);
             let by_value = match &pairs.column {
                 Column::Nodes(values) => Some(Index::of(values, count)),
                 Column::Values { .. } => None,
             };
-            Indexed { pairs, by_subject, by_value }
+            Indexed {
+                pairs,
+                by_subject,
+                by_value,
+            }
         };
         let columns = columns.into_iter().map(|pairs| pairs.map(index)).collect();
         let (mut firsts, mut first) = (Vec::with_capacity(nodes.numbers.len()), 0);
         for profile in &nodes.profile_of {
             firsts.push(first);
-            first += nodes.profiles.get(*profile as usize).map_or(0, |profile| profile.names.len() as u32);
+            first += nodes
+                .profiles
+                .get(*profile as usize)
+                .map_or(0, |profile| profile.names.len() as u32);
         }
         let is_run = |name: &u32| matches!(nodes.names.get(*name as usize), Some(Name::Below(rest)) if rest.is_empty());
-        let run_nodes =
-            nodes.profiles.iter().map(|profile| profile.names.iter().position(is_run).map(|at| at as u32)).collect();
-        Self { nodes, count, properties, columns, firsts, run_nodes }
+        let run_nodes = nodes
+            .profiles
+            .iter()
+            .map(|profile| profile.names.iter().position(is_run).map(|at| at as u32))
+            .collect();
+        Self {
+            nodes,
+            count,
+            properties,
+            columns,
+            firsts,
+            run_nodes,
+        }
     }
 
     /// The position of the run that has a node.
     pub(super) fn run_of(&self, node: u32) -> usize {
-        self.firsts.partition_point(|first| *first <= node).saturating_sub(1)
+        self.firsts
+            .partition_point(|first| *first <= node)
+            .saturating_sub(1)
     }
 
     /// The node of a run.
@@ -106,10 +132,16 @@ impl FileColumns {
     /// The IRI of a node; `None` for a blank node.
     fn iri(&self, node: u32) -> Option<String> {
         let run = self.run_of(node);
-        let profile = self.nodes.profiles.get(*self.nodes.profile_of.get(run)? as usize)?;
+        let profile = self
+            .nodes
+            .profiles
+            .get(*self.nodes.profile_of.get(run)? as usize)?;
         let name = profile.names.get((node - self.firsts[run]) as usize)?;
         match self.nodes.names.get(*name as usize)? {
-            Name::Below(rest) => Some(format!("{}{}{rest}", self.nodes.base, self.nodes.numbers[run])),
+            Name::Below(rest) => Some(format!(
+                "{}{}{rest}",
+                self.nodes.base, self.nodes.numbers[run]
+            )),
             Name::Iri(iri) => Some(iri.clone()),
             Name::Assertion | Name::Outcome | Name::Blank(_) => None,
         }
@@ -120,13 +152,19 @@ impl FileColumns {
         let of_campaign = limit.nodes.get(&self.nodes.base);
         for (run, number) in self.nodes.numbers.iter().enumerate() {
             let below = of_campaign.and_then(|runs| runs.get(number));
-            let profile = self.nodes.profile_of.get(run).and_then(|profile| self.nodes.profiles.get(*profile as usize));
-            for (node, name) in (self.firsts[run]..).zip(profile.into_iter().flat_map(|profile| &profile.names)) {
+            let profile = self
+                .nodes
+                .profile_of
+                .get(run)
+                .and_then(|profile| self.nodes.profiles.get(*profile as usize));
+            for (node, name) in
+                (self.firsts[run]..).zip(profile.into_iter().flat_map(|profile| &profile.names))
+            {
                 let is_in = match self.nodes.names.get(*name as usize) {
                     Some(Name::Below(rest)) => below.is_some_and(|below| below.contains(rest)),
-                    Some(Name::Iri(iri)) => {
-                        limit.values.contains(&Value::Term(NamedNode::new_unchecked(iri.as_str()).into()))
-                    }
+                    Some(Name::Iri(iri)) => limit
+                        .values
+                        .contains(&Value::Term(NamedNode::new_unchecked(iri.as_str()).into())),
                     _ => false,
                 };
                 if let Some(allowed) = allowed.get_mut(node as usize) {
@@ -163,7 +201,8 @@ pub(super) struct Rows<'a> {
 }
 
 impl<'a> Rows<'a> {
-    /// The rows of a leaf. `counts`: the runs that count in rates. `without`: numbers of runs to leave out.
+    /// The rows of a leaf. `counts`: the runs that count in rates. `without`: numbers of runs to
+    /// leave out.
     pub(super) fn of(
         leaf: &Leaf,
         file: &'a FileColumns,
@@ -172,8 +211,17 @@ impl<'a> Rows<'a> {
     ) -> Result<Self, Stop> {
         let places = leaf.places.len();
         let kinds = vec![Kind::Unknown; places];
-        let mut rows = Rows { file, counts, kinds, codes: vec![vec![UNBOUND]; places], len: 1 };
-        let all_there = leaf.steps.iter().all(|step| file.column(&step.property).is_some());
+        let mut rows = Rows {
+            file,
+            counts,
+            kinds,
+            codes: vec![vec![UNBOUND]; places],
+            len: 1,
+        };
+        let all_there = leaf
+            .steps
+            .iter()
+            .all(|step| file.column(&step.property).is_some());
         if !all_there || leaf.steps.is_empty() {
             rows.keep(&[]);
             return Ok(rows);
@@ -253,7 +301,11 @@ impl<'a> Rows<'a> {
     fn next(&self, steps: &[&Step], leaf: &Leaf) -> usize {
         let is_fixed = |place: usize| leaf.among.iter().any(|(fixed, _)| *fixed == place);
         let is_bound = |place: usize| self.kinds[place] != Kind::Unknown;
-        let size = |step: &Step| self.file.column(&step.property).map_or(0, |(_, pairs)| pairs.subjects.len());
+        let size = |step: &Step| {
+            self.file
+                .column(&step.property)
+                .map_or(0, |(_, pairs)| pairs.subjects.len())
+        };
         let is_first = self.kinds.iter().all(|kind| *kind == Kind::Unknown);
         let rank = |step: &Step| {
             let fixed = is_fixed(step.subject) || is_fixed(step.value);
@@ -270,11 +322,18 @@ impl<'a> Rows<'a> {
             };
             (rank, size(step))
         };
-        (0..steps.len()).min_by_key(|at| rank(steps[*at])).unwrap_or(0)
+        (0..steps.len())
+            .min_by_key(|at| rank(steps[*at]))
+            .unwrap_or(0)
     }
 
     /// Joins a step. `origins`: for each row, the row that it comes from, which is kept up to date.
-    fn join(&mut self, step: &Step, leaf: &Leaf, origins: Option<&mut Vec<u32>>) -> Result<(), Stop> {
+    fn join(
+        &mut self,
+        step: &Step,
+        leaf: &Leaf,
+        origins: Option<&mut Vec<u32>>,
+    ) -> Result<(), Stop> {
         let Some((at, indexed)) = self
             .file
             .column(&step.property)
@@ -293,9 +352,13 @@ impl<'a> Rows<'a> {
             Column::Nodes(nodes) => nodes,
             Column::Values { codes, .. } => codes,
         };
-        let [subject_known, value_known] = [step.subject, step.value].map(|place| self.kinds[place] != Kind::Unknown);
+        let [subject_known, value_known] =
+            [step.subject, step.value].map(|place| self.kinds[place] != Kind::Unknown);
         if subject_known && self.kinds[step.subject] != Kind::Node {
-            return unfit(format!("`{}` about something else than a run", step.property));
+            return unfit(format!(
+                "`{}` about something else than a run",
+                step.property
+            ));
         }
         if is_within_run(&step.property) && value_kind != Kind::Node {
             return unfit(format!("`{}` that leads out of its run", step.property));
@@ -304,10 +367,18 @@ impl<'a> Rows<'a> {
         let is_subject_allowed = self.allowed(step.subject, Kind::Node, leaf)?;
         let fits = |row: u32| {
             let (subject, value) = (indexed.pairs.subjects[row as usize], codes[row as usize]);
-            is_subject_allowed.as_ref().is_none_or(|allowed| allowed[subject as usize])
-                && is_allowed.as_ref().is_none_or(|allowed| allowed[value as usize])
+            is_subject_allowed
+                .as_ref()
+                .is_none_or(|allowed| allowed[subject as usize])
+                && is_allowed
+                    .as_ref()
+                    .is_none_or(|allowed| allowed[value as usize])
         };
-        let same = if value_known { Some(self.same(step.value, value_kind)?) } else { None };
+        let same = if value_known {
+            Some(self.same(step.value, value_kind)?)
+        } else {
+            None
+        };
         let mut found: Vec<(u32, u32)> = Vec::new();
         for row in 0..self.len {
             let candidates: Cow<'_, [u32]> = if subject_known {
@@ -315,14 +386,21 @@ impl<'a> Rows<'a> {
             } else if value_known {
                 match &indexed.by_value {
                     Some(index) => Cow::Borrowed(index.rows(self.codes[step.value][row])),
-                    None => return unfit(format!("`{}` that joins runs by a value", step.property)),
+                    None => {
+                        return unfit(format!("`{}` that joins runs by a value", step.property));
+                    }
                 }
             } else {
                 Cow::Owned((0..indexed.pairs.subjects.len() as u32).collect())
             };
-            for candidate in candidates.iter().copied().filter(|candidate| fits(*candidate)) {
-                let is_same =
-                    same.as_ref().is_none_or(|same| same.equal(self.codes[step.value][row], codes[candidate as usize]));
+            for candidate in candidates
+                .iter()
+                .copied()
+                .filter(|candidate| fits(*candidate))
+            {
+                let is_same = same.as_ref().is_none_or(|same| {
+                    same.equal(self.codes[step.value][row], codes[candidate as usize])
+                });
                 // A pattern such as `?a act:x ?a`.
                 let is_loop_free = step.subject != step.value
                     || (value_kind == Kind::Node
@@ -341,7 +419,10 @@ impl<'a> Rows<'a> {
             *origins = rows.iter().map(|row| origins[*row as usize]).collect();
         }
         if !subject_known {
-            self.codes[step.subject] = found.iter().map(|(_, at)| indexed.pairs.subjects[*at as usize]).collect();
+            self.codes[step.subject] = found
+                .iter()
+                .map(|(_, at)| indexed.pairs.subjects[*at as usize])
+                .collect();
             self.kinds[step.subject] = Kind::Node;
         }
         if !value_known && step.subject != step.value {
@@ -352,7 +433,12 @@ impl<'a> Rows<'a> {
     }
 
     /// Joins steps that need not match.
-    fn join_optional(&mut self, steps: &[Step], conditions: &[Native], leaf: &Leaf) -> Result<(), Stop> {
+    fn join_optional(
+        &mut self,
+        steps: &[Step],
+        conditions: &[Native],
+        leaf: &Leaf,
+    ) -> Result<(), Stop> {
         let before: Vec<Vec<u32>> = self.codes.clone();
         let (len, kinds) = (self.len, self.kinds.clone());
         let mut origins: Vec<u32> = (0..len as u32).collect();
@@ -370,7 +456,11 @@ impl<'a> Rows<'a> {
         let matched: HashSet<u32> = origins.into_iter().collect();
         for row in (0..len).filter(|row| !matched.contains(&(*row as u32))) {
             for (place, codes) in self.codes.iter_mut().enumerate() {
-                codes.push(if kinds[place] == Kind::Unknown { UNBOUND } else { before[place][row] });
+                codes.push(if kinds[place] == Kind::Unknown {
+                    UNBOUND
+                } else {
+                    before[place][row]
+                });
             }
             self.len += 1;
         }
@@ -379,18 +469,27 @@ impl<'a> Rows<'a> {
 
     /// The codes that a place may have, if they are limited.
     fn allowed(&self, place: usize, kind: Kind, leaf: &Leaf) -> Result<Option<Vec<bool>>, Stop> {
-        let mut limits =
-            leaf.among.iter().filter(|(limited, _)| *limited == place).map(|(_, values)| values).peekable();
+        let mut limits = leaf
+            .among
+            .iter()
+            .filter(|(limited, _)| *limited == place)
+            .map(|(_, values)| values)
+            .peekable();
         if limits.peek().is_none() || self.kinds[place] != Kind::Unknown {
             return Ok(None);
         }
         let limits: Vec<_> = limits.collect();
         Ok(Some(match kind {
-            Kind::Values(column) => match &self.file.columns[column].as_ref().map(|column| &column.pairs.column) {
+            Kind::Values(column) => match &self.file.columns[column]
+                .as_ref()
+                .map(|column| &column.pairs.column)
+            {
                 Some(Column::Values { values, .. }) => {
                     let is_in = |value: &Value| {
                         let value = canonical(value).unwrap_or(Cow::Borrowed(value));
-                        limits.iter().all(|limit| limit.values.contains(value.as_ref()))
+                        limits
+                            .iter()
+                            .all(|limit| limit.values.contains(value.as_ref()))
                     };
                     values.iter().map(is_in).collect()
                 }
@@ -398,7 +497,9 @@ impl<'a> Rows<'a> {
             },
             _ => {
                 let mut allowed = vec![true; self.file.count as usize];
-                limits.iter().for_each(|limit| self.file.limit(limit, &mut allowed));
+                limits
+                    .iter()
+                    .for_each(|limit| self.file.limit(limit, &mut allowed));
                 allowed
             }
         }))
@@ -411,13 +512,18 @@ impl<'a> Rows<'a> {
             (Kind::Values(one), Kind::Values(other)) => {
                 let mut numbers: HashMap<Cow<'_, Value>, u32> = HashMap::new();
                 let mut of = |column: usize| -> Vec<u32> {
-                    let values = match self.file.columns[column].as_ref().map(|column| &column.pairs.column) {
+                    let values = match self.file.columns[column]
+                        .as_ref()
+                        .map(|column| &column.pairs.column)
+                    {
                         Some(Column::Values { values, .. }) => values.as_slice(),
                         _ => &[],
                     };
                     let mut number = |value| {
                         let next = numbers.len() as u32;
-                        *numbers.entry(canonical(value).unwrap_or(Cow::Borrowed(value))).or_insert(next)
+                        *numbers
+                            .entry(canonical(value).unwrap_or(Cow::Borrowed(value)))
+                            .or_insert(next)
                     };
                     values.iter().map(&mut number).collect()
                 };
@@ -428,9 +534,13 @@ impl<'a> Rows<'a> {
     }
 
     fn leave_out(&mut self, place: usize, without: &HashSet<u64>) {
-        let stays = |node: &u32| !without.contains(&self.file.nodes.numbers[self.file.run_of(*node)]);
+        let stays =
+            |node: &u32| !without.contains(&self.file.nodes.numbers[self.file.run_of(*node)]);
         let codes = self.codes[place].iter().enumerate();
-        let kept: Vec<u32> = codes.filter(|(_, node)| stays(node)).map(|(row, _)| row as u32).collect();
+        let kept: Vec<u32> = codes
+            .filter(|(_, node)| stays(node))
+            .map(|(row, _)| row as u32)
+            .collect();
         self.keep(&kept);
     }
 
@@ -440,7 +550,10 @@ impl<'a> Rows<'a> {
         for condition in std::mem::take(conditions) {
             let mut places = Vec::new();
             condition.places(&mut places);
-            if places.iter().all(|place| self.kinds[*place] != Kind::Unknown) {
+            if places
+                .iter()
+                .all(|place| self.kinds[*place] != Kind::Unknown)
+            {
                 self.filter(condition)?;
             } else {
                 waiting.push(condition);

@@ -20,7 +20,9 @@ const OF_CAMPAIGNS: [&str; 3] = ["act:Campaign", "act:UsedRule", "act:RuleFindin
 
 /// Whether the values of a property are nodes of the same run.
 pub(super) fn is_within_run(property: &str) -> bool {
-    WITHIN_RUN.iter().any(|known| iri(known).as_str() == property)
+    WITHIN_RUN
+        .iter()
+        .any(|known| iri(known).as_str() == property)
 }
 
 /// One pattern, with places instead of variables.
@@ -57,7 +59,8 @@ pub(super) struct Leaf {
 #[derive(Debug, Clone, Default)]
 pub(super) struct Limit {
     pub values: HashSet<Value>,
-    /// Those that are nodes of runs: by the IRI of the run without its number, by the number, and the rest of the IRI.
+    /// Those that are nodes of runs: by the IRI of the run without its number, by the number, and
+    /// the rest of the IRI.
     pub nodes: HashMap<String, HashMap<u64, HashSet<String>>>,
 }
 
@@ -65,13 +68,24 @@ impl Limit {
     pub(super) fn of(values: HashSet<Value>) -> Self {
         let mut nodes: HashMap<String, HashMap<u64, HashSet<String>>> = HashMap::new();
         for value in &values {
-            let Value::Term(Term::NamedNode(node)) = value else { continue };
-            let Some(id) = node.as_str().strip_prefix(names::RUN) else { continue };
+            let Value::Term(Term::NamedNode(node)) = value else {
+                continue;
+            };
+            let Some(id) = node.as_str().strip_prefix(names::RUN) else {
+                continue;
+            };
             let (run, rest) = id.split_at(id.find('/').unwrap_or(id.len()));
-            let Some((campaign, number)) = run.rsplit_once('-') else { continue };
+            let Some((campaign, number)) = run.rsplit_once('-') else {
+                continue;
+            };
             if let Ok(number) = number.parse() {
-                let of_campaign = nodes.entry(format!("{}{campaign}-", names::RUN)).or_default();
-                of_campaign.entry(number).or_default().insert(rest.to_owned());
+                let of_campaign = nodes
+                    .entry(format!("{}{campaign}-", names::RUN))
+                    .or_default();
+                of_campaign
+                    .entry(number)
+                    .or_default()
+                    .insert(rest.to_owned());
             }
         }
         Self { values, nodes }
@@ -88,13 +102,18 @@ pub(super) enum Place {
 impl Leaf {
     /// The place of a variable.
     pub(super) fn place(&self, variable: &Variable) -> Option<usize> {
-        self.places.iter().position(|place| matches!(place, Place::Variable(known) if known == variable))
+        self.places
+            .iter()
+            .position(|place| matches!(place, Place::Variable(known) if known == variable))
     }
 
     /// Adds a pattern to the steps, or to those of an optional part.
     pub(super) fn step(&mut self, triple: &TriplePattern) -> Result<Step, Stop> {
         let NamedNodePattern::NamedNode(property) = &triple.predicate else {
-            return unfit(format!("the property `{}`, which may be any", triple.predicate));
+            return unfit(format!(
+                "the property `{}`, which may be any",
+                triple.predicate
+            ));
         };
         let is_node = is_within_run(property.as_str());
         Ok(Step {
@@ -111,12 +130,18 @@ impl Leaf {
             None => Place::Constant(constant(term)?),
         };
         let known = matches!(place, Place::Variable(_)) || is_node;
-        if let Some(at) = self.places.iter().position(|other| *other == place).filter(|_| known) {
+        if let Some(at) = self
+            .places
+            .iter()
+            .position(|other| *other == place)
+            .filter(|_| known)
+        {
             return Ok(at);
         }
         let at = self.places.len();
         if let Place::Constant(term) = &place {
-            self.among.push((at, Arc::new(Limit::of(HashSet::from([fixed(term)?])))));
+            self.among
+                .push((at, Arc::new(Limit::of(HashSet::from([fixed(term)?])))));
         }
         self.places.push(place);
         Ok(at)
@@ -124,7 +149,10 @@ impl Leaf {
 
     /// The properties that it reads, each once.
     pub(super) fn properties(&self) -> Vec<&str> {
-        let steps = self.steps.iter().chain(self.optionals.iter().flat_map(|optional| &optional.steps));
+        let steps = self
+            .steps
+            .iter()
+            .chain(self.optionals.iter().flat_map(|optional| &optional.steps));
         let all: BTreeSet<&str> = steps.map(|step| step.property.as_str()).collect();
         all.into_iter().collect()
     }
@@ -134,7 +162,9 @@ impl Leaf {
 pub(super) fn variable(term: &TermPattern) -> Option<Variable> {
     match term {
         TermPattern::Variable(variable) => Some(variable.clone()),
-        TermPattern::BlankNode(node) => Some(Variable::new_unchecked(format!("blank_{}", node.as_str()))),
+        TermPattern::BlankNode(node) => {
+            Some(Variable::new_unchecked(format!("blank_{}", node.as_str())))
+        }
         _ => None,
     }
 }
@@ -150,11 +180,16 @@ fn constant(term: &TermPattern) -> Result<Term, Stop> {
 /// The value that matches a constant: the store takes numbers with the same value for the same.
 fn fixed(term: &Term) -> Result<Value, Stop> {
     use oxigraph::model::vocab::{rdf, xsd};
-    let Term::Literal(literal) = term else { return Ok(Value::of(term)) };
+    let Term::Literal(literal) = term else {
+        return Ok(Value::of(term));
+    };
     let text = literal.value();
     let value = match literal.datatype() {
         xsd::STRING | rdf::LANG_STRING => Some(Value::of(term)),
-        xsd::DOUBLE => text.parse::<f64>().ok().map(|number| Value::Double(number.to_bits())),
+        xsd::DOUBLE => text
+            .parse::<f64>()
+            .ok()
+            .map(|number| Value::Double(number.to_bits())),
         xsd::INTEGER => text.parse().ok().map(Value::Integer),
         xsd::BOOLEAN => match text {
             "true" | "1" => Some(Value::Boolean(true)),
@@ -169,7 +204,8 @@ fn fixed(term: &Term) -> Result<Value, Stop> {
     }
 }
 
-/// Groups patterns whose matches are in the same run. Returns the positions of each group's patterns.
+/// Groups patterns whose matches are in the same run. Returns the positions of each group's
+/// patterns.
 pub(super) fn components(triples: &[TriplePattern]) -> Vec<Vec<usize>> {
     let nodes = |triple: &TriplePattern| {
         let is_node = matches!(&triple.predicate, NamedNodePattern::NamedNode(node) if is_within_run(node.as_str()));
@@ -178,8 +214,9 @@ pub(super) fn components(triples: &[TriplePattern]) -> Vec<Vec<usize>> {
     let mut groups: Vec<(Vec<TermPattern>, Vec<usize>)> = Vec::new();
     for (at, triple) in triples.iter().enumerate() {
         let own: Vec<TermPattern> = nodes(triple).collect();
-        let (joined, others): (Vec<_>, Vec<_>) =
-            groups.into_iter().partition(|(known, _)| known.iter().any(|node| own.contains(node)));
+        let (joined, others): (Vec<_>, Vec<_>) = groups
+            .into_iter()
+            .partition(|(known, _)| known.iter().any(|node| own.contains(node)));
         groups = others;
         let mut group = (own, vec![at]);
         for (nodes, members) in joined {
@@ -195,10 +232,16 @@ pub(super) fn components(triples: &[TriplePattern]) -> Vec<Vec<usize>> {
 }
 
 /// The variables of patterns.
-pub(super) fn variables<'t>(triples: impl IntoIterator<Item = &'t TriplePattern>) -> BTreeSet<Variable> {
+pub(super) fn variables<'t>(
+    triples: impl IntoIterator<Item = &'t TriplePattern>,
+) -> BTreeSet<Variable> {
     let mut all = BTreeSet::new();
     for triple in triples {
-        all.extend([variable(&triple.subject), variable(&triple.object)].into_iter().flatten());
+        all.extend(
+            [variable(&triple.subject), variable(&triple.object)]
+                .into_iter()
+                .flatten(),
+        );
         if let NamedNodePattern::Variable(variable) = &triple.predicate {
             all.insert(variable.clone());
         }
@@ -208,8 +251,12 @@ pub(super) fn variables<'t>(triples: impl IntoIterator<Item = &'t TriplePattern>
 
 /// Whether a pattern asks for a class of which outlines have no node.
 pub(super) fn is_of_campaigns(triple: &TriplePattern) -> bool {
-    let NamedNodePattern::NamedNode(property) = &triple.predicate else { return false };
-    let TermPattern::NamedNode(class) = &triple.object else { return false };
+    let NamedNodePattern::NamedNode(property) = &triple.predicate else {
+        return false;
+    };
+    let TermPattern::NamedNode(class) = &triple.object else {
+        return false;
+    };
     *property == iri("rdf:type") && OF_CAMPAIGNS.iter().any(|known| *class == iri(known))
 }
 
@@ -232,19 +279,42 @@ mod tests {
     use spargebra::algebra::GraphPattern;
 
     fn groups(text: &str) -> Vec<usize> {
-        let query = parser().parse_query(&format!("SELECT * {{ {text} }}")).expect("it is valid");
-        let Query::Select { pattern: GraphPattern::Project { inner, .. }, .. } = query else { panic!("{text}") };
-        let GraphPattern::Bgp { patterns } = *inner else { panic!("{text}") };
+        let query = parser()
+            .parse_query(&format!("SELECT * {{ {text} }}"))
+            .expect("it is valid");
+        let Query::Select {
+            pattern: GraphPattern::Project { inner, .. },
+            ..
+        } = query
+        else {
+            panic!("{text}")
+        };
+        let GraphPattern::Bgp { patterns } = *inner else {
+            panic!("{text}")
+        };
         components(&patterns).iter().map(Vec::len).collect()
     }
 
     #[test]
     fn patterns_about_one_run_belong_together() {
-        assert_eq!(groups("?a earl:subject/act:ofRun ?run ; earl:result/act:margin ?m . ?run act:index ?i"), [5]);
+        assert_eq!(
+            groups(
+                "?a earl:subject/act:ofRun ?run ; earl:result/act:margin ?m . ?run act:index ?i"
+            ),
+            [5]
+        );
         assert_eq!(groups("?run act:campaign ?c . ?c rdfs:label ?name"), [1, 1]);
-        assert_eq!(groups("?run act:shrunkFrom ?from ; act:objectCount ?n . ?from act:objectCount ?before"), [2, 1]);
+        assert_eq!(
+            groups(
+                "?run act:shrunkFrom ?from ; act:objectCount ?n . ?from act:objectCount ?before"
+            ),
+            [2, 1]
+        );
         assert_eq!(groups("?a act:category ?c . ?b act:category ?c"), [1, 1]);
-        assert_eq!(groups("?a act:category ?c . ?b act:category ?c ; act:ofRun ?run . ?a act:ofRun ?run"), [4]);
+        assert_eq!(
+            groups("?a act:category ?c . ?b act:category ?c ; act:ofRun ?run . ?a act:ofRun ?run"),
+            [4]
+        );
         assert_eq!(groups("?e act:ofRun run:a-1 . ?f act:ofRun run:a-1"), [2]);
     }
 }

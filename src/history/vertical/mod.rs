@@ -1,8 +1,9 @@
 //! Statements about outlines by property, and queries that read them so.
 //!
-//! A store of all statements of a million runs has two hundred million of them, but a query uses a few properties, and joins
-//! nearly always stay within one run. So each file of outlines has its statements by property, a query's patterns are
-//! evaluated file by file, and only the joined rows, equal ones counted, are given to the evaluator.
+//! A store of all statements of a million runs has two hundred million of them, but a query uses a
+//! few properties, and joins nearly always stay within one run. So each file of outlines has its
+//! statements by property, a query's patterns are evaluated file by file, and only the joined rows,
+//! equal ones counted, are given to the evaluator.
 //!
 //! Never: has an answer of its own; queries that do not fit are left to the store.
 

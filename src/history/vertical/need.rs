@@ -47,7 +47,11 @@ pub(super) struct Need {
 
 impl Need {
     pub(super) fn of(exact: BTreeSet<Variable>, mode: Mode) -> Self {
-        Self { exact, mode, ..Self::default() }
+        Self {
+            exact,
+            mode,
+            ..Self::default()
+        }
     }
 
     /// Also these variables. All rows are needed then.
@@ -58,11 +62,13 @@ impl Need {
         need
     }
 
-    /// Keeps only the aggregates for which `may` is true; the values of the others are needed instead.
+    /// Keeps only the aggregates for which `may` is true; the values of the others are needed
+    /// instead.
     pub(super) fn asking(mut self, may: impl Fn(&Asked) -> bool) -> Self {
         let (kept, dropped): (Vec<Asked>, Vec<Asked>) = self.asked.into_iter().partition(may);
         self.asked = kept;
-        self.exact.extend(dropped.iter().flat_map(|asked| used(&asked.expression)));
+        self.exact
+            .extend(dropped.iter().flat_map(|asked| used(&asked.expression)));
         self
     }
 }
@@ -89,17 +95,28 @@ pub(super) struct Taken {
 
 impl Rewritten {
     pub(super) fn plain(pattern: GraphPattern) -> Self {
-        Self { pattern, counts: Vec::new(), taken: BTreeMap::new(), distinct: None }
+        Self {
+            pattern,
+            counts: Vec::new(),
+            taken: BTreeMap::new(),
+            distinct: None,
+        }
     }
 
     /// The variables that were added.
     pub(super) fn added(&self) -> impl Iterator<Item = Variable> {
-        self.counts.iter().cloned().chain(self.taken.values().map(|taken| taken.result.clone()))
+        self.counts
+            .iter()
+            .cloned()
+            .chain(self.taken.values().map(|taken| taken.result.clone()))
     }
 
     /// The same with another pattern.
     pub(super) fn map(self, make: impl FnOnce(Box<GraphPattern>) -> GraphPattern) -> Self {
-        Self { pattern: make(Box::new(self.pattern)), ..self }
+        Self {
+            pattern: make(Box::new(self.pattern)),
+            ..self
+        }
     }
 
     /// Both in one pattern.
@@ -110,6 +127,10 @@ impl Rewritten {
     ) -> Self {
         self.counts.extend(other.counts);
         self.taken.extend(other.taken);
-        Self { pattern: make(Box::new(self.pattern), Box::new(other.pattern)), distinct: None, ..self }
+        Self {
+            pattern: make(Box::new(self.pattern), Box::new(other.pattern)),
+            distinct: None,
+            ..self
+        }
     }
 }

@@ -23,11 +23,12 @@ pub(crate) struct Plan {
     pub counts: Option<Arc<Counts>>,
 }
 
-/// Rewrites a query. `text` is its text. `store` has the statements that it wants, except those of outlines.
+/// Rewrites a query. `text` is its text. `store` has the statements that it wants, except those of
+/// outlines.
 ///
 /// # Errors
-/// The reason why it can't be answered so. The part that does not fit comes with the number of statements of outlines that
-/// the store would need.
+/// The reason why it can't be answered so. The part that does not fit comes with the number of
+/// statements of outlines that the store would need.
 pub(crate) fn plan(
     history: &History,
     store: &OpenStore,
@@ -43,13 +44,24 @@ pub(crate) fn plan(
         while text.contains(&format!("?{prefix}")) {
             prefix.push('_');
         }
-        let mut rewriter =
-            Rewriter { store, files: &files, counts: None, evaluator, cancel, prefix, order: Vec::new(), new: 0 };
+        let mut rewriter = Rewriter {
+            store,
+            files: &files,
+            counts: None,
+            evaluator,
+            cancel,
+            prefix,
+            order: Vec::new(),
+            new: 0,
+        };
         if uses_counts(&query) {
             rewriter.counts = Some(Arc::new(counts(&mut rewriter)?));
         }
         let query = rewriter.query(query.clone())?;
-        Ok(Plan { query, counts: rewriter.counts })
+        Ok(Plan {
+            query,
+            counts: rewriter.counts,
+        })
     };
     planned().map_err(|stop| (stop, needed(&files, &wanted)))
 }
@@ -63,13 +75,18 @@ fn needed(files: &Files, wanted: &Wanted) -> u64 {
             _ => return files.all_statements(),
         }
     }
-    properties.into_iter().map(|property| files.statements(property)).sum()
+    properties
+        .into_iter()
+        .map(|property| files.statements(property))
+        .sum()
 }
 
 /// The runs that count in rates.
 fn counts(rewriter: &mut Rewriter<'_>) -> Result<Counts, Stop> {
     let store = rewriter.store;
-    let parsed = parser().parse_query(lists::SELECTED).map_err(QueryEvaluationError::from);
+    let parsed = parser()
+        .parse_query(lists::SELECTED)
+        .map_err(QueryEvaluationError::from);
     let Query::Select { pattern, .. } = rewriter.query(parsed.map_err(Stop::Failed)?)? else {
         return Ok(Counts::default());
     };

@@ -1,4 +1,5 @@
-//! Groups the rows of a leaf, so that few remain: equal rows are counted, and aggregates of them are computed.
+//! Groups the rows of a leaf, so that few remain: equal rows are counted, and aggregates of them
+//! are computed.
 
 use std::cell::RefCell;
 use std::cmp::Ordering;
@@ -30,7 +31,8 @@ pub(super) struct Output {
     pub aggregates: Vec<(Kind, Native)>,
     /// Whether equal rows become one row with their number.
     pub grouped: bool,
-    /// Keys of the order, each with whether it is descending, and the number of first rows that are needed.
+    /// Keys of the order, each with whether it is descending, and the number of first rows that are
+    /// needed.
     pub first: Option<(Vec<(Native, bool)>, usize)>,
     /// Number of rows of which any are needed.
     pub any: Option<usize>,
@@ -105,7 +107,9 @@ impl Reduced {
             State::Count(count) => i64::try_from(*count).ok().map(Value::Integer),
             State::Sum(sum) => sum.map(Sum::value),
             State::Best(best) => best.clone(),
-            State::Joined(text) => text.as_ref().map(|text| Value::Term(Literal::new_simple_literal(text).into())),
+            State::Joined(text) => text
+                .as_ref()
+                .map(|text| Value::Term(Literal::new_simple_literal(text).into())),
         })
     }
 }
@@ -117,7 +121,9 @@ pub(super) fn reduced(rows: &Rows<'_>, output: &Output) -> Result<Vec<Reduced>, 
     }
     if !output.grouped {
         let most = output.any.unwrap_or(usize::MAX);
-        return (0..rows.len.min(most)).map(|row| single(rows, output, row, Vec::new())).collect();
+        return (0..rows.len.min(most))
+            .map(|row| single(rows, output, row, Vec::new()))
+            .collect();
     }
     let mut groups: HashMap<Vec<u32>, usize> = HashMap::new();
     let mut found: Vec<(usize, u64, Vec<State<Cell<'_>>>)> = Vec::new();
@@ -129,7 +135,15 @@ pub(super) fn reduced(rows: &Rows<'_>, output: &Output) -> Result<Vec<Reduced>, 
             Some(at) => *at,
             None => {
                 groups.insert(key.clone(), found.len());
-                found.push((row, 0, output.aggregates.iter().map(|(kind, _)| empty(kind)).collect()));
+                found.push((
+                    row,
+                    0,
+                    output
+                        .aggregates
+                        .iter()
+                        .map(|(kind, _)| empty(kind))
+                        .collect(),
+                ));
                 found.len() - 1
             }
         };
@@ -150,9 +164,22 @@ pub(super) fn reduced(rows: &Rows<'_>, output: &Output) -> Result<Vec<Reduced>, 
         .collect()
 }
 
-fn single(rows: &Rows<'_>, output: &Output, row: usize, order: Vec<Option<Value>>) -> Result<Reduced, Stop> {
-    let values = output.keys.iter().map(|place| rows.value(*place, rows.codes[*place][row]));
-    Ok(Reduced { values: values.collect::<Result<_, Stop>>()?, count: 1, states: Vec::new(), order })
+fn single(
+    rows: &Rows<'_>,
+    output: &Output,
+    row: usize,
+    order: Vec<Option<Value>>,
+) -> Result<Reduced, Stop> {
+    let values = output
+        .keys
+        .iter()
+        .map(|place| rows.value(*place, rows.codes[*place][row]));
+    Ok(Reduced {
+        values: values.collect::<Result<_, Stop>>()?,
+        count: 1,
+        states: Vec::new(),
+        order,
+    })
 }
 
 fn empty<T>(kind: &Kind) -> State<T> {
@@ -165,7 +192,12 @@ fn empty<T>(kind: &Kind) -> State<T> {
 }
 
 /// Adds a value to an aggregate. `is_first`: whether it is the first one.
-fn add<'a>(kind: &Kind, state: &mut State<Cell<'a>>, value: Option<Cell<'a>>, is_first: bool) -> Result<(), Stop> {
+fn add<'a>(
+    kind: &Kind,
+    state: &mut State<Cell<'a>>,
+    value: Option<Cell<'a>>,
+    is_first: bool,
+) -> Result<(), Stop> {
     match state {
         State::Count(count) => *count += u64::from(value.is_some()),
         State::Sum(sum) => {
@@ -180,7 +212,9 @@ fn add<'a>(kind: &Kind, state: &mut State<Cell<'a>>, value: Option<Cell<'a>>, is
         }
         State::Joined(text) => match (&mut *text, value) {
             (Some(text), Some(Cell::Text(further))) => join(text, kind, is_first, &further)?,
-            (Some(_), Some(Cell::Other(_) | Cell::Decimal(_))) => return unfit("a list of values of a rare type"),
+            (Some(_), Some(Cell::Other(_) | Cell::Decimal(_))) => {
+                return unfit("a list of values of a rare type");
+            }
             // As in the evaluator, the list is an error if a value is not a text.
             _ => *text = None,
         },
@@ -204,11 +238,19 @@ fn join(text: &mut String, kind: &Kind, is_first: bool, further: &str) -> Result
         text.push_str(separator);
     }
     text.push_str(further);
-    if text.len() > LONGEST_TEXT { unfit("a long text") } else { Ok(()) }
+    if text.len() > LONGEST_TEXT {
+        unfit("a long text")
+    } else {
+        Ok(())
+    }
 }
 
 fn wanted(kind: &Kind) -> Ordering {
-    if *kind == Kind::Least { Ordering::Less } else { Ordering::Greater }
+    if *kind == Kind::Least {
+        Ordering::Less
+    } else {
+        Ordering::Greater
+    }
 }
 
 fn owned(state: State<Cell<'_>>) -> Result<State<Value>, Stop> {
@@ -221,16 +263,31 @@ fn owned(state: State<Cell<'_>>) -> Result<State<Value>, Stop> {
 }
 
 /// The rows that can be among the first of all.
-fn first(rows: &Rows<'_>, output: &Output, keys: &[(Native, bool)], most: usize) -> Result<Vec<Reduced>, Stop> {
+fn first(
+    rows: &Rows<'_>,
+    output: &Output,
+    keys: &[(Native, bool)],
+    most: usize,
+) -> Result<Vec<Reduced>, Stop> {
     let mut sorted: Vec<(Vec<Option<Cell<'_>>>, usize)> = Vec::with_capacity(rows.len);
     for row in 0..rows.len {
-        let cells = keys.iter().map(|(key, _)| key.value(rows, row)).collect::<Result<_, Stop>>()?;
+        let cells = keys
+            .iter()
+            .map(|(key, _)| key.value(rows, row))
+            .collect::<Result<_, Stop>>()?;
         sorted.push((cells, row));
     }
-    sort(&mut sorted, keys, |(cells, _)| cells, |one, other| one.order(other))?;
+    sort(
+        &mut sorted,
+        keys,
+        |(cells, _)| cells,
+        |one, other| one.order(other),
+    )?;
     sorted.truncate(most);
     let of = |(cells, row): (Vec<Option<Cell<'_>>>, usize)| {
-        let order = cells.into_iter().map(|cell| cell.map(|cell| cell.value()).transpose());
+        let order = cells
+            .into_iter()
+            .map(|cell| cell.map(|cell| cell.value()).transpose());
         single(rows, output, row, order.collect::<Result<_, Stop>>()?)
     };
     sorted.into_iter().map(of).collect()
@@ -253,7 +310,11 @@ fn sort<T, C>(
                 }),
                 (one, other) => one.is_some().cmp(&other.is_some()),
             };
-            let ordered = if *descending { ordered.reverse() } else { ordered };
+            let ordered = if *descending {
+                ordered.reverse()
+            } else {
+                ordered
+            };
             if ordered.is_ne() {
                 return ordered;
             }
@@ -299,7 +360,10 @@ impl Gathered {
         }
         let each = output.keys.len() + output.aggregates.len() + 1;
         if self.rows.len().saturating_mul(each) > MOST_VALUES {
-            return unfit(format!("over {} different rows of a pattern", self.rows.len() / 1000 * 1000));
+            return unfit(format!(
+                "over {} different rows of a pattern",
+                self.rows.len() / 1000 * 1000
+            ));
         }
         Ok(())
     }
@@ -328,13 +392,23 @@ impl Gathered {
 impl Reduced {
     /// Size of its lists of texts. Unit: bytes.
     fn text(&self) -> usize {
-        let text = |state: &State<Value>| if let State::Joined(Some(text)) = state { text.len() } else { 0 };
+        let text = |state: &State<Value>| {
+            if let State::Joined(Some(text)) = state {
+                text.len()
+            } else {
+                0
+            }
+        };
         self.states.iter().map(text).sum()
     }
 
     fn merge(&mut self, other: Self, output: &Output) -> Result<(), Stop> {
         self.count += other.count;
-        for ((kind, _), (state, other)) in output.aggregates.iter().zip(self.states.iter_mut().zip(other.states)) {
+        for ((kind, _), (state, other)) in output
+            .aggregates
+            .iter()
+            .zip(self.states.iter_mut().zip(other.states))
+        {
             match (state, other) {
                 (State::Count(count), State::Count(other)) => *count += other,
                 (State::Sum(sum), State::Sum(other)) => {

@@ -1,4 +1,5 @@
-//! Rewrites a query so that the evaluator needs no statements of outlines: patterns that match in outlines become tables.
+//! Rewrites a query so that the evaluator needs no statements of outlines: patterns that match in
+//! outlines become tables.
 
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -49,21 +50,52 @@ impl Rewriter<'_> {
     /// The same query without statements of outlines.
     pub(super) fn query(&mut self, query: Query) -> Result<Query, Stop> {
         Ok(match query {
-            Query::Select { dataset: None, pattern, base_iri } => {
+            Query::Select {
+                dataset: None,
+                pattern,
+                base_iri,
+            } => {
                 let need = Need::of(bound(&pattern), Mode::Bag);
-                Query::Select { dataset: None, pattern: self.rewrite(pattern, &need)?.pattern, base_iri }
+                Query::Select {
+                    dataset: None,
+                    pattern: self.rewrite(pattern, &need)?.pattern,
+                    base_iri,
+                }
             }
-            Query::Ask { dataset: None, pattern, base_iri } => {
-                let need = Need { any: Some(1), ..Need::of(BTreeSet::new(), Mode::Bag) };
-                Query::Ask { dataset: None, pattern: self.rewrite(pattern, &need)?.pattern, base_iri }
+            Query::Ask {
+                dataset: None,
+                pattern,
+                base_iri,
+            } => {
+                let need = Need {
+                    any: Some(1),
+                    ..Need::of(BTreeSet::new(), Mode::Bag)
+                };
+                Query::Ask {
+                    dataset: None,
+                    pattern: self.rewrite(pattern, &need)?.pattern,
+                    base_iri,
+                }
             }
-            Query::Construct { dataset: None, pattern, template, base_iri } => {
+            Query::Construct {
+                dataset: None,
+                pattern,
+                template,
+                base_iri,
+            } => {
                 let is_blank = |term: &TermPattern| matches!(term, TermPattern::BlankNode(_));
-                let has_blank = template.iter().any(|triple| is_blank(&triple.subject) || is_blank(&triple.object));
+                let has_blank = template
+                    .iter()
+                    .any(|triple| is_blank(&triple.subject) || is_blank(&triple.object));
                 let mode = if has_blank { Mode::Bag } else { Mode::Set };
                 let need = Need::of(bound(&pattern), mode);
                 let pattern = self.rewrite(pattern, &need)?.pattern;
-                Query::Construct { dataset: None, pattern, template, base_iri }
+                Query::Construct {
+                    dataset: None,
+                    pattern,
+                    template,
+                    base_iri,
+                }
             }
             Query::Describe { .. } => return unfit("`DESCRIBE`"),
             _ => return unfit("`FROM`"),
@@ -76,39 +108,78 @@ impl Rewriter<'_> {
     }
 
     /// A pattern that needs no statements of outlines.
-    pub(super) fn rewrite(&mut self, pattern: GraphPattern, need: &Need) -> Result<Rewritten, Stop> {
+    pub(super) fn rewrite(
+        &mut self,
+        pattern: GraphPattern,
+        need: &Need,
+    ) -> Result<Rewritten, Stop> {
         use GraphPattern as G;
         match pattern {
-            G::Bgp { .. } | G::Join { .. } | G::Filter { .. } | G::LeftJoin { .. } => self.joined(pattern, need),
+            G::Bgp { .. } | G::Join { .. } | G::Filter { .. } | G::LeftJoin { .. } => {
+                self.joined(pattern, need)
+            }
             G::Values { .. } => Ok(Rewritten::plain(pattern)),
-            G::Group { inner, variables, aggregates } => self.group(*inner, variables, aggregates),
+            G::Group {
+                inner,
+                variables,
+                aggregates,
+            } => self.group(*inner, variables, aggregates),
             G::Project { inner, variables } => self.project(*inner, variables, need),
             G::Distinct { inner } | G::Reduced { inner } => {
-                let need = Need { known: need.known.clone(), ..Need::of(bound(&inner), Mode::Set) };
+                let need = Need {
+                    known: need.known.clone(),
+                    ..Need::of(bound(&inner), Mode::Set)
+                };
                 let inner = self.rewrite(*inner, &need)?;
-                Ok(Rewritten::plain(G::Distinct { inner: Box::new(inner.pattern) }))
+                Ok(Rewritten::plain(G::Distinct {
+                    inner: Box::new(inner.pattern),
+                }))
             }
-            G::Slice { inner, start, length } => {
+            G::Slice {
+                inner,
+                start,
+                length,
+            } => {
                 let need = need.clone().asking(|_| false);
                 let any = length.map(|length| start.saturating_add(length));
-                let need = Need { any, ..Need::of(need.exact, Mode::Bag) };
+                let need = Need {
+                    any,
+                    ..Need::of(need.exact, Mode::Bag)
+                };
                 let inner = self.rewrite(*inner, &need)?;
-                Ok(Rewritten::plain(G::Slice { inner: Box::new(inner.pattern), start, length }))
+                Ok(Rewritten::plain(G::Slice {
+                    inner: Box::new(inner.pattern),
+                    start,
+                    length,
+                }))
             }
             G::OrderBy { inner, expression } => {
-                let keys = expression.iter().map(|(OrderExpression::Asc(key) | OrderExpression::Desc(key))| key);
+                let keys = expression
+                    .iter()
+                    .map(|(OrderExpression::Asc(key) | OrderExpression::Desc(key))| key);
                 let mut inner_need = need.and(keys.flat_map(used));
                 inner_need.first = need.any.map(|any| (expression.clone(), any));
                 self.order = expression.iter().map_while(ascending).collect();
-                Ok(self.rewrite(*inner, &inner_need)?.map(|inner| G::OrderBy { inner, expression }))
+                Ok(self
+                    .rewrite(*inner, &inner_need)?
+                    .map(|inner| G::OrderBy { inner, expression }))
             }
-            G::Extend { inner, variable, expression } => {
-                let is_before = |asked: &super::need::Asked| !used(&asked.expression).contains(&variable);
+            G::Extend {
+                inner,
+                variable,
+                expression,
+            } => {
+                let is_before =
+                    |asked: &super::need::Asked| !used(&asked.expression).contains(&variable);
                 let mut inner_need = need.and(used(&expression)).asking(is_before);
                 inner_need.exact.remove(&variable);
                 inner_need.known.retain(|(known, _)| *known != variable);
                 inner_need.any = need.any;
-                Ok(self.rewrite(*inner, &inner_need)?.map(|inner| G::Extend { inner, variable, expression }))
+                Ok(self.rewrite(*inner, &inner_need)?.map(|inner| G::Extend {
+                    inner,
+                    variable,
+                    expression,
+                }))
             }
             G::Union { left, right } => {
                 let need = need.and([]).asking(|_| false);
@@ -117,29 +188,48 @@ impl Rewriter<'_> {
                 Ok(left.with(right, |left, right| G::Union { left, right }))
             }
             G::Minus { left, right } => {
-                let shared: BTreeSet<Variable> = bound(&left).intersection(&bound(&right)).cloned().collect();
+                let shared: BTreeSet<Variable> =
+                    bound(&left).intersection(&bound(&right)).cloned().collect();
                 let left = self.rewrite(*left, &need.and(shared.iter().cloned()))?;
                 let right = self.rewrite(*right, &Need::of(shared, Mode::Set))?;
                 let right = right.pattern;
-                Ok(left.map(|left| G::Minus { left, right: Box::new(right) }))
+                Ok(left.map(|left| G::Minus {
+                    left,
+                    right: Box::new(right),
+                }))
             }
             G::Graph { name, inner } => match &name {
-                NamedNodePattern::NamedNode(node) if !holds_facts(NamedOrBlankNodeRef::from(node.as_ref()).into()) => {
+                NamedNodePattern::NamedNode(node)
+                    if !holds_facts(NamedOrBlankNodeRef::from(node.as_ref()).into()) =>
+                {
                     Ok(Rewritten::plain(G::Graph { name, inner }))
                 }
                 _ => unfit(format!("facts (`GRAPH {name}`)")),
             },
-            G::Path { subject, path, object } => unfit(format!("the path `{subject} {path} {object}`")),
+            G::Path {
+                subject,
+                path,
+                object,
+            } => unfit(format!("the path `{subject} {path} {object}`")),
             G::Service { .. } => unfit("`SERVICE`"),
             _ => unfit("a rare kind of pattern"),
         }
     }
 
-    fn project(&mut self, inner: GraphPattern, variables: Vec<Variable>, need: &Need) -> Result<Rewritten, Stop> {
+    fn project(
+        &mut self,
+        inner: GraphPattern,
+        variables: Vec<Variable>,
+        need: &Need,
+    ) -> Result<Rewritten, Stop> {
         let is_visible = |variable: &Variable| variables.contains(variable);
-        let mut inner_need = need.clone().asking(|asked| used(&asked.expression).iter().all(is_visible));
+        let mut inner_need = need
+            .clone()
+            .asking(|asked| used(&asked.expression).iter().all(is_visible));
         inner_need.exact.retain(is_visible);
-        inner_need.known.retain(|(variable, _)| is_visible(variable));
+        inner_need
+            .known
+            .retain(|(variable, _)| is_visible(variable));
         let inner = self.rewrite(inner, &inner_need)?;
         let variables = variables.into_iter().chain(inner.added()).collect();
         Ok(inner.map(|inner| GraphPattern::Project { inner, variables }))
@@ -156,19 +246,26 @@ impl Rewriter<'_> {
     }
 
     /// Refuses conditions with patterns that may match in outlines.
-    pub(super) fn check_condition(&self, condition: &spargebra::algebra::Expression) -> Result<(), Stop> {
+    pub(super) fn check_condition(
+        &self,
+        condition: &spargebra::algebra::Expression,
+    ) -> Result<(), Stop> {
         let mut fault = None;
         let mut check = |pattern: &GraphPattern| {
             match pattern {
                 GraphPattern::Bgp { patterns } => {
                     for members in components(patterns) {
-                        let triples: Vec<_> = members.iter().map(|at| patterns[*at].clone()).collect();
+                        let triples: Vec<_> =
+                            members.iter().map(|at| patterns[*at].clone()).collect();
                         if !self.is_stored(&triples) {
                             fault = Some(format!("`EXISTS {{ {} }}`", triples[0]));
                         }
                     }
                 }
-                GraphPattern::Graph { name: NamedNodePattern::NamedNode(node), .. } => {
+                GraphPattern::Graph {
+                    name: NamedNodePattern::NamedNode(node),
+                    ..
+                } => {
                     if !holds_facts(NamedOrBlankNodeRef::from(node.as_ref()).into()) {
                         return false;
                     }
@@ -185,12 +282,27 @@ impl Rewriter<'_> {
     }
 
     /// The rows of a pattern that needs no statements of outlines.
-    pub(super) fn select(&self, pattern: GraphPattern, variables: &[Variable]) -> Result<Vec<Vec<Option<Term>>>, Stop> {
+    pub(super) fn select(
+        &self,
+        pattern: GraphPattern,
+        variables: &[Variable],
+    ) -> Result<Vec<Vec<Option<Term>>>, Stop> {
         use crate::evaluation::{Unfinished, evaluate};
         use oxigraph::sparql::QueryResults;
-        let pattern = GraphPattern::Project { inner: Box::new(pattern), variables: variables.to_vec() };
-        let mut query = Query::Select { dataset: None, pattern, base_iri: None };
-        if self.store.size().is_some_and(|size| crate::query::COLUMNS.contains(&size)) {
+        let pattern = GraphPattern::Project {
+            inner: Box::new(pattern),
+            variables: variables.to_vec(),
+        };
+        let mut query = Query::Select {
+            dataset: None,
+            pattern,
+            base_iri: None,
+        };
+        if self
+            .store
+            .size()
+            .is_some_and(|size| crate::query::COLUMNS.contains(&size))
+        {
             query = crate::columns::by_columns(query);
         }
         let prepared = (self.evaluator)(self.counts.clone()).for_query(query);
@@ -215,7 +327,10 @@ impl Rewriter<'_> {
 /// Whether a query uses `act:counts`.
 pub(super) fn uses_counts(query: &Query) -> bool {
     use spargebra::algebra::{Expression, Function};
-    let (Query::Select { pattern, .. } | Query::Ask { pattern, .. } | Query::Construct { pattern, .. }) = query else {
+    let (Query::Select { pattern, .. }
+    | Query::Ask { pattern, .. }
+    | Query::Construct { pattern, .. }) = query
+    else {
         return false;
     };
     let mut found = false;

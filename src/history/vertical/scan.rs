@@ -28,11 +28,18 @@ pub(super) struct Files {
 impl Files {
     /// Reads the directory of each file.
     pub(super) fn of(history: &History, cancel: &Cancel) -> Result<Self, Stop> {
-        let mut all = Self { files: history.sheet_files()?, statements: HashMap::new(), cancel: cancel.clone() };
+        let mut all = Self {
+            files: history.sheet_files()?,
+            statements: HashMap::new(),
+            cancel: cancel.clone(),
+        };
         let mut statements: HashMap<String, u64> = HashMap::new();
         let of_file = |file: &SheetFile| {
             let sheet = file.open()?;
-            Ok(sheet.properties().map(|(property, count)| (property.to_owned(), count)).collect::<Vec<_>>())
+            Ok(sheet
+                .properties()
+                .map(|(property, count)| (property.to_owned(), count))
+                .collect::<Vec<_>>())
         };
         all.each(&of_file, &mut |found: Vec<(String, u64)>| {
             for (property, count) in found {
@@ -58,11 +65,18 @@ impl Files {
     }
 
     /// The reduced rows of a leaf.
-    pub(super) fn rows(&self, leaf: &Leaf, output: &Output, counts: Option<&Counts>) -> Result<Vec<Reduced>, Stop> {
+    pub(super) fn rows(
+        &self,
+        leaf: &Leaf,
+        output: &Output,
+        counts: Option<&Counts>,
+    ) -> Result<Vec<Reduced>, Stop> {
         let mut gathered = Gathered::default();
         let of_file = |file: &SheetFile| {
             let required = |property: &str| leaf.steps.iter().any(|step| step.property == property);
-            let Some(columns) = columns(file, &leaf.properties(), &required)? else { return Ok(Vec::new()) };
+            let Some(columns) = columns(file, &leaf.properties(), &required)? else {
+                return Ok(Vec::new());
+            };
             let counts = counts.map(|counts| counts.of_base(&columns.nodes.base).unwrap_or(&NONE));
             let without: HashSet<u64> = file.there.iter().map(|index| index + 1).collect();
             reduced(&Rows::of(leaf, &columns, counts, &without)?, output)
@@ -79,9 +93,15 @@ impl Files {
         let wanted = properties();
         let wanted: Vec<&str> = wanted.iter().map(String::as_str).collect();
         let of_file = |file: &SheetFile| {
-            let Some(columns) = columns(file, &wanted, &|_| true)? else { return Ok(Vec::new()) };
+            let Some(columns) = columns(file, &wanted, &|_| true)? else {
+                return Ok(Vec::new());
+            };
             let there: &BTreeSet<u64> = &file.there;
-            traced(&columns, |number| number.checked_sub(1).is_some_and(|index| there.contains(&index)))
+            traced(&columns, |number| {
+                number
+                    .checked_sub(1)
+                    .is_some_and(|index| there.contains(&index))
+            })
         };
         self.each(&of_file, &mut |runs| {
             each(runs);
@@ -95,13 +115,16 @@ impl Files {
         of_file: &(dyn Fn(&SheetFile) -> Result<T, Stop> + Sync),
         each: &mut dyn FnMut(T) -> Result<bool, Stop>,
     ) -> Result<(), Stop> {
-        let threads = std::thread::available_parallelism().map_or(1, usize::from).min(MOST_THREADS);
+        let threads = std::thread::available_parallelism()
+            .map_or(1, usize::from)
+            .min(MOST_THREADS);
         for files in self.files.chunks(FILES_AT_ONCE) {
             if self.cancel.is_cancelled() {
                 return Err(Stop::Cancelled);
             }
             let next = AtomicUsize::new(0);
-            let results: Vec<Mutex<Option<Result<T, Stop>>>> = files.iter().map(|_| Mutex::new(None)).collect();
+            let results: Vec<Mutex<Option<Result<T, Stop>>>> =
+                files.iter().map(|_| Mutex::new(None)).collect();
             let work = || {
                 loop {
                     let at = next.fetch_add(1, Ordering::Relaxed);
@@ -122,7 +145,9 @@ impl Files {
                 });
             }
             for result in results {
-                let result = result.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner);
+                let result = result
+                    .into_inner()
+                    .unwrap_or_else(std::sync::PoisonError::into_inner);
                 if !each(result.unwrap_or(Err(Stop::Crashed))?)? {
                     return Ok(());
                 }
@@ -132,7 +157,8 @@ impl Files {
     }
 }
 
-static NONE: std::sync::LazyLock<crate::vertical::counts::RunBits> = std::sync::LazyLock::new(Default::default);
+static NONE: std::sync::LazyLock<crate::vertical::counts::RunBits> =
+    std::sync::LazyLock::new(Default::default);
 
 /// The columns of a file; `None` if it lacks a required property.
 fn columns(
@@ -142,14 +168,22 @@ fn columns(
 ) -> Result<Option<FileColumns>, Stop> {
     let sheet = file.open()?;
     let has = |wanted: &str| sheet.properties().any(|(property, _)| property == wanted);
-    if properties.iter().any(|property| is_required(property) && !has(property)) {
+    if properties
+        .iter()
+        .any(|property| is_required(property) && !has(property))
+    {
         return Ok(None);
     }
     let read = || {
         let (nodes, count) = sheet.nodes()?;
         let columns = sheet.columns(&nodes, count, properties)?;
-        let names = properties.iter().map(|property| (*property).to_owned()).collect();
+        let names = properties
+            .iter()
+            .map(|property| (*property).to_owned())
+            .collect();
         Ok(FileColumns::new(nodes, count, names, columns))
     };
-    read().map(Some).map_err(|why: String| Stop::Damaged(file.path.clone(), why))
+    read()
+        .map(Some)
+        .map_err(|why: String| Stop::Damaged(file.path.clone(), why))
 }

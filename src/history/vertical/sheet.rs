@@ -29,7 +29,9 @@ pub(crate) trait Source {
 
 impl Source for &[u8] {
     fn bytes(&self, from: usize, to: usize) -> Result<Vec<u8>, String> {
-        self.get(from..to).map(<[u8]>::to_vec).ok_or_else(|| "it ends too early".to_owned())
+        self.get(from..to)
+            .map(<[u8]>::to_vec)
+            .ok_or_else(|| "it ends too early".to_owned())
     }
 }
 
@@ -72,7 +74,12 @@ impl<S: Source> Sheet<S> {
     /// A message that names the damage.
     pub(crate) fn open(source: S, length: usize) -> Result<Self, String> {
         let mut bytes = source.bytes(0, FIRST.min(length))?;
-        let number = |at: usize| bytes.get(at..at + 4).and_then(|four| four.try_into().ok()).map(u32::from_le_bytes);
+        let number = |at: usize| {
+            bytes
+                .get(at..at + 4)
+                .and_then(|four| four.try_into().ok())
+                .map(u32::from_le_bytes)
+        };
         let (size, sum) = number(0).zip(number(4)).ok_or(CHANGED)?;
         let start = HEADER + size as usize;
         if start > length {
@@ -85,13 +92,21 @@ impl<S: Source> Sheet<S> {
         if journal::sum_of(directory) != sum {
             return Err(CHANGED.to_owned());
         }
-        let directory: Directory = postcard::from_bytes(&unpacked(directory)?).map_err(|_| CHANGED)?;
-        Ok(Self { source, directory, start })
+        let directory: Directory =
+            postcard::from_bytes(&unpacked(directory)?).map_err(|_| CHANGED)?;
+        Ok(Self {
+            source,
+            directory,
+            start,
+        })
     }
 
     /// Number of its statements with each property.
     pub(crate) fn properties(&self) -> impl Iterator<Item = (&str, u64)> {
-        self.directory.columns.iter().map(|(property, part)| (property.as_str(), u64::from(part.statements)))
+        self.directory
+            .columns
+            .iter()
+            .map(|(property, part)| (property.as_str(), u64::from(part.statements)))
     }
 
     /// Reads its runs and nodes.
@@ -109,7 +124,12 @@ impl<S: Source> Sheet<S> {
     ///
     /// # Errors
     /// A message that names the damage.
-    pub(super) fn columns(&self, nodes: &Nodes, count: u32, wanted: &[&str]) -> Result<Vec<Option<Pairs>>, String> {
+    pub(super) fn columns(
+        &self,
+        nodes: &Nodes,
+        count: u32,
+        wanted: &[&str],
+    ) -> Result<Vec<Option<Pairs>>, String> {
         let place: Vec<Option<usize>> = self
             .directory
             .columns
@@ -139,34 +159,51 @@ impl<S: Source> Sheet<S> {
         unpacked(&bytes)
     }
 
-    /// The statements about each run that have one of the properties, or all (`None`), in their order.
+    /// The statements about each run that have one of the properties, or all (`None`), in their
+    /// order.
     ///
     /// # Errors
     /// A message that names the damage.
     pub(crate) fn statements(&self, wanted: Option<&[&str]>) -> Result<Vec<Vec<Quad>>, String> {
         let (nodes, count) = self.nodes()?;
-        let all: Vec<&str> = self.directory.columns.iter().map(|(property, _)| property.as_str()).collect();
+        let all: Vec<&str> = self
+            .directory
+            .columns
+            .iter()
+            .map(|(property, _)| property.as_str())
+            .collect();
         let labels = ["earl:subject", "earl:test", "earl:result"].map(iri);
         let read: Vec<&str> = match wanted {
             None => all.clone(),
             Some(wanted) => {
                 let is_read = |property: &&str| {
-                    wanted.contains(property) || labels.iter().any(|label| label.as_str() == *property)
+                    wanted.contains(property)
+                        || labels.iter().any(|label| label.as_str() == *property)
                 };
                 all.iter().copied().filter(is_read).collect()
             }
         };
         let columns = self.columns(&nodes, count, &read)?;
-        let terms = Labels::read(&nodes, &read, &columns, &labels).terms(&nodes, count).ok_or(CHANGED)?;
-        let place: Vec<Option<usize>> =
-            all.iter().map(|property| read.iter().position(|read| read == property)).collect();
+        let terms = Labels::read(&nodes, &read, &columns, &labels)
+            .terms(&nodes, count)
+            .ok_or(CHANGED)?;
+        let place: Vec<Option<usize>> = all
+            .iter()
+            .map(|property| read.iter().position(|read| read == property))
+            .collect();
         let mut next = vec![0usize; read.len()];
         let (mut runs, mut first) = (Vec::with_capacity(nodes.numbers.len()), 0u32);
-        for profile in nodes.profile_of.iter().filter_map(|profile| nodes.profiles.get(*profile as usize)) {
+        for profile in nodes
+            .profile_of
+            .iter()
+            .filter_map(|profile| nodes.profiles.get(*profile as usize))
+        {
             let mut quads = Vec::new();
             for (node, shape) in &profile.segments {
                 for property in nodes.shapes.get(*shape as usize).into_iter().flatten() {
-                    let Some(place) = place[*property as usize] else { continue };
+                    let Some(place) = place[*property as usize] else {
+                        continue;
+                    };
                     let row = next[place];
                     next[place] += 1;
                     let property = read[place];
@@ -175,11 +212,18 @@ impl<S: Source> Sheet<S> {
                     }
                     let object = match columns[place].as_ref().map(|pairs| &pairs.column) {
                         Some(Column::Nodes(nodes)) => terms[nodes[row] as usize].clone().into(),
-                        Some(Column::Values { values, codes }) => values[codes[row] as usize].term(),
+                        Some(Column::Values { values, codes }) => {
+                            values[codes[row] as usize].term()
+                        }
                         None => continue,
                     };
                     let subject = terms[(first + node) as usize].clone();
-                    quads.push(Quad::new(subject, NamedNode::new_unchecked(property), object, GraphName::DefaultGraph));
+                    quads.push(Quad::new(
+                        subject,
+                        NamedNode::new_unchecked(property),
+                        object,
+                        GraphName::DefaultGraph,
+                    ));
                 }
             }
             first += profile.names.len() as u32;
@@ -199,28 +243,58 @@ struct Labels {
 }
 
 impl Labels {
-    fn read(nodes: &Nodes, read: &[&str], columns: &[Option<Pairs>], labels: &[NamedNode; 3]) -> Self {
-        let mut found = Self { subject_of: HashMap::new(), test_of: HashMap::new(), assertion_of: HashMap::new() };
-        if !nodes.names.iter().any(|name| matches!(name, Name::Assertion | Name::Outcome)) {
+    fn read(
+        nodes: &Nodes,
+        read: &[&str],
+        columns: &[Option<Pairs>],
+        labels: &[NamedNode; 3],
+    ) -> Self {
+        let mut found = Self {
+            subject_of: HashMap::new(),
+            test_of: HashMap::new(),
+            assertion_of: HashMap::new(),
+        };
+        if !nodes
+            .names
+            .iter()
+            .any(|name| matches!(name, Name::Assertion | Name::Outcome))
+        {
             return found;
         }
         for (property, pairs) in read.iter().zip(columns) {
-            let (Some(at), Some(pairs)) = (labels.iter().position(|label| label.as_str() == *property), pairs) else {
+            let (Some(at), Some(pairs)) = (
+                labels.iter().position(|label| label.as_str() == *property),
+                pairs,
+            ) else {
                 continue;
             };
             match (&pairs.column, at) {
                 (Column::Nodes(objects), 0) => {
-                    found.subject_of = pairs.subjects.iter().copied().zip(objects.iter().copied()).collect();
+                    found.subject_of = pairs
+                        .subjects
+                        .iter()
+                        .copied()
+                        .zip(objects.iter().copied())
+                        .collect();
                 }
                 (Column::Nodes(objects), 2) => {
-                    found.assertion_of = objects.iter().copied().zip(pairs.subjects.iter().copied()).collect();
+                    found.assertion_of = objects
+                        .iter()
+                        .copied()
+                        .zip(pairs.subjects.iter().copied())
+                        .collect();
                 }
                 (Column::Values { values, codes }, 1) => {
                     let text = |code: &u32| match values[*code as usize].term() {
                         Term::NamedNode(node) => node.into_string(),
                         _ => String::new(),
                     };
-                    found.test_of = pairs.subjects.iter().copied().zip(codes.iter().map(text)).collect();
+                    found.test_of = pairs
+                        .subjects
+                        .iter()
+                        .copied()
+                        .zip(codes.iter().map(text))
+                        .collect();
                 }
                 _ => {}
             }
@@ -237,7 +311,9 @@ impl Labels {
             let profile = nodes.profiles.get(*profile as usize)?;
             for (node, name) in (first..).zip(&profile.names) {
                 let term = match nodes.names.get(*name as usize)? {
-                    Name::Below(rest) => NamedNode::new_unchecked(format!("{}{number}{rest}", nodes.base)).into(),
+                    Name::Below(rest) => {
+                        NamedNode::new_unchecked(format!("{}{number}{rest}", nodes.base)).into()
+                    }
                     Name::Iri(iri) => NamedNode::new_unchecked(iri).into(),
                     Name::Blank(label) => BlankNode::new_unchecked(label).into(),
                     Name::Assertion => {
@@ -245,7 +321,11 @@ impl Labels {
                         continue;
                     }
                     Name::Outcome => {
-                        derived.push((node, *self.assertion_of.get(&(node as u32))? as usize, "result"));
+                        derived.push((
+                            node,
+                            *self.assertion_of.get(&(node as u32))? as usize,
+                            "result",
+                        ));
                         continue;
                     }
                 };
@@ -255,8 +335,12 @@ impl Labels {
         }
         for (node, assertion, part) in derived {
             let assertion = assertion as u32;
-            let execution = terms.get(*self.subject_of.get(&assertion)? as usize)?.as_ref()?;
-            let NamedOrBlankNode::NamedNode(execution) = execution else { return None };
+            let execution = terms
+                .get(*self.subject_of.get(&assertion)? as usize)?
+                .as_ref()?;
+            let NamedOrBlankNode::NamedNode(execution) = execution else {
+                return None;
+            };
             let label = unique(&[execution.as_str(), self.test_of.get(&assertion)?, part]);
             *terms.get_mut(node)? = Some(label.into());
         }
@@ -272,7 +356,11 @@ thread_local! {
 fn unpacked(bytes: &[u8]) -> Result<Vec<u8>, String> {
     CONTEXT.with_borrow_mut(|context| {
         let mut unpacked = Vec::with_capacity(bytes.len() * 4);
-        read_expanded(Decoder::with_context(bytes, context), bytes.len(), &mut unpacked)?;
+        read_expanded(
+            Decoder::with_context(bytes, context),
+            bytes.len(),
+            &mut unpacked,
+        )?;
         Ok(unpacked)
     })
 }

@@ -49,7 +49,9 @@ impl<'a> Cell<'a> {
     pub(super) fn value(&self) -> Result<Value, Stop> {
         Ok(match self {
             Self::Iri(iri) => Value::Term(NamedNode::new_unchecked(iri.as_ref()).into()),
-            Self::Text(text) => Value::Term(oxigraph::model::Literal::new_simple_literal(text.as_ref()).into()),
+            Self::Text(text) => {
+                Value::Term(oxigraph::model::Literal::new_simple_literal(text.as_ref()).into())
+            }
             Self::Integer(number) => Value::Integer(*number),
             Self::Double(number) => Value::Double(number.to_bits()),
             Self::Decimal(_) => return unfit("a decimal"),
@@ -85,7 +87,9 @@ impl<'a> Cell<'a> {
             Self::Boolean(value) => Some(*value),
             Self::Text(text) => Some(!text.is_empty()),
             Self::Integer(number) => Some(*number != 0),
-            Self::Double(number) | Self::Decimal(number) => Some(*number != 0.0 && !number.is_nan()),
+            Self::Double(number) | Self::Decimal(number) => {
+                Some(*number != 0.0 && !number.is_nan())
+            }
             Self::Iri(_) => None,
             Self::Other(_) => return unfit("a condition on a value of a rare type"),
         })
@@ -103,7 +107,9 @@ impl<'a> Cell<'a> {
                 (Some(one), Some(other)) => one == other,
                 _ => return unfit("a comparison of values of a rare type"),
             },
-            (Self::Other(_), _) | (_, Self::Other(_)) => return unfit("a comparison of values of a rare type"),
+            (Self::Other(_), _) | (_, Self::Other(_)) => {
+                return unfit("a comparison of values of a rare type");
+            }
             _ => match (self.number(), other.number()) {
                 (Some(one), Some(other)) => one == other,
                 // Of different kinds.
@@ -145,15 +151,21 @@ impl<'a> Cell<'a> {
 
 /// A value in the form in which equal values are the same; `None` if its type is not known here.
 pub(super) fn canonical(value: &Value) -> Option<Cow<'_, Value>> {
-    let Value::Term(Term::Literal(literal)) = value else { return Some(Cow::Borrowed(value)) };
+    let Value::Term(Term::Literal(literal)) = value else {
+        return Some(Cow::Borrowed(value));
+    };
     if literal.language().is_some() || literal.datatype() == xsd::STRING {
         return Some(Cow::Borrowed(value));
     }
-    let Value::Term(term) = value else { return None };
+    let Value::Term(term) = value else {
+        return None;
+    };
     let (seconds, fraction) = moment(term)?;
     let dot = if fraction.is_empty() { "" } else { "." };
     let text = format!("{seconds}{dot}{fraction}Z");
-    Some(Cow::Owned(Value::Term(oxigraph::model::Literal::new_typed_literal(text, xsd::DATE_TIME).into())))
+    Some(Cow::Owned(Value::Term(
+        oxigraph::model::Literal::new_typed_literal(text, xsd::DATE_TIME).into(),
+    )))
 }
 
 /// The double of a decimal with few digits.
@@ -164,7 +176,9 @@ fn decimal(text: &str) -> Option<f64> {
 
 /// A point in time in UTC, for comparison: up to the second, and the digits of its fraction.
 fn moment(term: &Term) -> Option<(&str, &str)> {
-    let Term::Literal(literal) = term else { return None };
+    let Term::Literal(literal) = term else {
+        return None;
+    };
     if literal.datatype() != xsd::DATE_TIME {
         return None;
     }
@@ -176,8 +190,13 @@ fn moment(term: &Term) -> Option<(&str, &str)> {
         _ => byte.is_ascii_digit(),
     };
     let rest = rest.strip_suffix('Z')?;
-    let fraction = if rest.is_empty() { "" } else { rest.strip_prefix('.')?.trim_end_matches('0') };
-    let is_plain = seconds.bytes().enumerate().all(shape) && fraction.bytes().all(|byte| byte.is_ascii_digit());
+    let fraction = if rest.is_empty() {
+        ""
+    } else {
+        rest.strip_prefix('.')?.trim_end_matches('0')
+    };
+    let is_plain = seconds.bytes().enumerate().all(shape)
+        && fraction.bytes().all(|byte| byte.is_ascii_digit());
     is_plain.then_some((seconds, fraction))
 }
 
@@ -191,11 +210,26 @@ mod tests {
         let time = |text: &str| Term::from(Literal::new_typed_literal(text, xsd::DATE_TIME));
         let order = |one: &str, other: &str| {
             let (one, other) = (time(one), time(other));
-            Cell::Other(&one).compare(&Cell::Other(&other)).ok().flatten()
+            Cell::Other(&one)
+                .compare(&Cell::Other(&other))
+                .ok()
+                .flatten()
         };
-        assert_eq!(order("2026-01-01T00:00:00Z", "2026-01-01T00:00:00.5Z"), Some(Ordering::Less));
-        assert_eq!(order("2026-01-01T00:00:00.50Z", "2026-01-01T00:00:00.5Z"), Some(Ordering::Equal));
-        assert_eq!(order("2026-01-01T00:00:00.123Z", "2026-01-01T00:00:00.13Z"), Some(Ordering::Less));
-        assert_eq!(order("2026-01-01T00:00:00+01:00", "2026-01-01T00:00:00Z"), None);
+        assert_eq!(
+            order("2026-01-01T00:00:00Z", "2026-01-01T00:00:00.5Z"),
+            Some(Ordering::Less)
+        );
+        assert_eq!(
+            order("2026-01-01T00:00:00.50Z", "2026-01-01T00:00:00.5Z"),
+            Some(Ordering::Equal)
+        );
+        assert_eq!(
+            order("2026-01-01T00:00:00.123Z", "2026-01-01T00:00:00.13Z"),
+            Some(Ordering::Less)
+        );
+        assert_eq!(
+            order("2026-01-01T00:00:00+01:00", "2026-01-01T00:00:00Z"),
+            None
+        );
     }
 }

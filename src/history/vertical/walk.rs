@@ -8,8 +8,9 @@ use spargebra::term::{NamedNodePattern, TermPattern};
 
 use crate::light::parts;
 
-/// Calls `on_pattern` with a pattern and the patterns in it, also those in its expressions, and `on_expression` with all
-/// expressions. `on_pattern` returns whether to go on with the parts of its pattern.
+/// Calls `on_pattern` with a pattern and the patterns in it, also those in its expressions, and
+/// `on_expression` with all expressions. `on_pattern` returns whether to go on with the parts of
+/// its pattern.
 pub(super) fn walk<'p>(
     pattern: &'p GraphPattern,
     on_pattern: &mut dyn FnMut(&'p GraphPattern) -> bool,
@@ -24,12 +25,23 @@ pub(super) fn walk<'p>(
             walk(left, on_pattern, on_expression);
             walk(right, on_pattern, on_expression);
         }
-        G::LeftJoin { left, right, expression } => {
+        G::LeftJoin {
+            left,
+            right,
+            expression,
+        } => {
             walk(left, on_pattern, on_expression);
             walk(right, on_pattern, on_expression);
-            expression.iter().for_each(|expression| walk_expression(expression, on_pattern, on_expression));
+            expression
+                .iter()
+                .for_each(|expression| walk_expression(expression, on_pattern, on_expression));
         }
-        G::Filter { expr, inner } | G::Extend { inner, expression: expr, .. } => {
+        G::Filter { expr, inner }
+        | G::Extend {
+            inner,
+            expression: expr,
+            ..
+        } => {
             walk(inner, on_pattern, on_expression);
             walk_expression(expr, on_pattern, on_expression);
         }
@@ -39,7 +51,9 @@ pub(super) fn walk<'p>(
                 walk_expression(key, on_pattern, on_expression);
             }
         }
-        G::Group { inner, aggregates, .. } => {
+        G::Group {
+            inner, aggregates, ..
+        } => {
             walk(inner, on_pattern, on_expression);
             for (_, aggregate) in aggregates {
                 if let AggregateExpression::FunctionCall { expr, .. } = aggregate {
@@ -64,7 +78,9 @@ pub(super) fn walk_expression<'p>(
     on_expression: &mut dyn FnMut(&'p Expression),
 ) {
     on_expression(expression);
-    parts(expression).into_iter().for_each(|part| walk_expression(part, on_pattern, on_expression));
+    parts(expression)
+        .into_iter()
+        .for_each(|part| walk_expression(part, on_pattern, on_expression));
     if let Expression::Exists(pattern) = expression {
         walk(pattern, on_pattern, on_expression);
     }
@@ -102,10 +118,18 @@ fn mentioned(pattern: &GraphPattern) -> BTreeSet<Variable> {
     match pattern {
         GraphPattern::Bgp { patterns } => patterns
             .iter()
-            .flat_map(|triple| [of(&triple.subject), named(&triple.predicate), of(&triple.object)])
+            .flat_map(|triple| {
+                [
+                    of(&triple.subject),
+                    named(&triple.predicate),
+                    of(&triple.object),
+                ]
+            })
             .flatten()
             .collect(),
-        GraphPattern::Path { subject, object, .. } => [of(subject), of(object)].into_iter().flatten().collect(),
+        GraphPattern::Path {
+            subject, object, ..
+        } => [of(subject), of(object)].into_iter().flatten().collect(),
         GraphPattern::Graph { name, .. } => named(name).into_iter().collect(),
         GraphPattern::Extend { variable, .. } => BTreeSet::from([variable.clone()]),
         GraphPattern::Values { variables, .. }

@@ -9,8 +9,9 @@ use actcheck_verdict::Counts;
 
 /// One suite for each campaign and test, one case for each property of each action of each run.
 ///
-/// JUnit has four results: passed, failure, error and skipped. Broken and timeout become errors with the outcome as
-/// their type; inapplicable and untested become skipped with the outcome in their text. Times are wall times.
+/// JUnit has four results: passed, failure, error and skipped. Broken and timeout become errors
+/// with the outcome as their type; inapplicable and untested become skipped with the outcome in
+/// their text. Times are wall times.
 #[derive(Debug, Clone, Default)]
 pub struct JunitReport {
     suites: Vec<Suite>,
@@ -39,10 +40,19 @@ impl JunitReport {
     /// Adds a run.
     pub fn add(&mut self, run: &RunDetail) {
         let (campaign, test) = (&run.row.campaign, &run.row.test);
-        let known = self.suites.iter().position(|suite| suite.campaign == *campaign && suite.test == *test);
+        let known = self
+            .suites
+            .iter()
+            .position(|suite| suite.campaign == *campaign && suite.test == *test);
         let at = known.unwrap_or_else(|| {
-            let (campaign, test, started) = (campaign.clone(), test.clone(), run.row.started.clone());
-            self.suites.push(Suite { campaign, test, started, ..Suite::default() });
+            let (campaign, test, started) =
+                (campaign.clone(), test.clone(), run.row.started.clone());
+            self.suites.push(Suite {
+                campaign,
+                test,
+                started,
+                ..Suite::default()
+            });
             self.suites.len() - 1
         });
         self.suites[at].add(run);
@@ -51,7 +61,10 @@ impl JunitReport {
     /// Returns the whole file.
     pub fn text(&self) -> String {
         let mut out = "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<testsuites>\n".to_owned();
-        self.suites.iter().enumerate().for_each(|(idx, suite)| suite.write(idx, &mut out));
+        self.suites
+            .iter()
+            .enumerate()
+            .for_each(|(idx, suite)| suite.write(idx, &mut out));
         out.push_str("</testsuites>\n");
         out
     }
@@ -60,33 +73,60 @@ impl JunitReport {
 impl Suite {
     fn add(&mut self, run: &RunDetail) {
         self.runs += 1;
-        let judged = || run.actions.iter().filter(|action| !action.judgements.is_empty());
-        self.secs += if judged().next().is_some() { run.wall_secs } else { 0.0 };
+        let judged = || {
+            run.actions
+                .iter()
+                .filter(|action| !action.judgements.is_empty())
+        };
+        self.secs += if judged().next().is_some() {
+            run.wall_secs
+        } else {
+            0.0
+        };
         let simulated: f64 = judged().map(|action| action.duration_secs).sum();
         self.simulated_secs += simulated;
         let actions = judged().count() as f64;
         for action in judged() {
-            let share = if simulated > 0.0 { action.duration_secs / simulated } else { 1.0 / actions };
+            let share = if simulated > 0.0 {
+                action.duration_secs / simulated
+            } else {
+                1.0 / actions
+            };
             for judgement in &action.judgements {
                 self.counts.add(judgement.outcome);
-                // Sums over cases are correct: actions share the wall time of the run by their simulated durations, the
-                // properties of an action equally.
+                // Sums over cases are correct: actions share the wall time of the run by their
+                // simulated durations, the properties of an action equally.
                 let secs = run.wall_secs * share / action.judgements.len() as f64;
                 self.case(run, (action, secs), judgement);
             }
         }
     }
 
-    fn case(&mut self, run: &RunDetail, (action, secs): (&ActionDetail, f64), judgement: &Judgement) {
-        let class = format!("{}.{}", run.row.test.replace(' ', "-"), names::local(&action.action));
+    fn case(
+        &mut self,
+        run: &RunDetail,
+        (action, secs): (&ActionDetail, f64),
+        judgement: &Judgement,
+    ) {
+        let class = format!(
+            "{}.{}",
+            run.row.test.replace(' ', "-"),
+            names::local(&action.action)
+        );
         let name = format!("{} ({})", names::local(&judgement.property), run.row.run);
         let (class, name) = (attribute(&class), attribute(&name));
-        let _ = write!(self.cases, "    <testcase classname=\"{class}\" name=\"{name}\" time=\"{secs:.6}\"");
+        let _ = write!(
+            self.cases,
+            "    <testcase classname=\"{class}\" name=\"{name}\" time=\"{secs:.6}\""
+        );
         let _ = match element(judgement.outcome) {
             None => writeln!(self.cases, "/>"),
             Some("skipped") => {
                 let why = text(&format!("{}: {}", judgement.outcome, judgement.witness));
-                writeln!(self.cases, ">\n      <skipped>{why}</skipped>\n    </testcase>")
+                writeln!(
+                    self.cases,
+                    ">\n      <skipped>{why}</skipped>\n    </testcase>"
+                )
             }
             Some(element) => {
                 let (kind, message) = (judgement.outcome.word(), attribute(&judgement.witness));
@@ -116,7 +156,11 @@ impl Suite {
         );
         out.push_str("    <properties>\n");
         let mut property = |name: &str, value: String| {
-            let _ = writeln!(out, "      <property name=\"{name}\" value=\"{}\"/>", attribute(&value));
+            let _ = writeln!(
+                out,
+                "      <property name=\"{name}\" value=\"{}\"/>",
+                attribute(&value)
+            );
         };
         property("campaign", self.campaign.clone());
         property("runs", self.runs.to_string());

@@ -37,11 +37,16 @@ impl MarkdownReport {
         Self::default()
     }
 
-    /// Records which campaigns had a skill program that received ground truth, and whether outcomes ended one.
+    /// Records which campaigns had a skill program that received ground truth, and whether outcomes
+    /// ended one.
     pub fn know(&mut self, campaigns: &[CampaignRow]) {
-        let privileged = campaigns.iter().filter(|row| row.skill.as_ref().is_some_and(|skill| skill.privileged));
+        let privileged = campaigns
+            .iter()
+            .filter(|row| row.skill.as_ref().is_some_and(|skill| skill.privileged));
         self.privileged = privileged.map(|row| row.id.clone()).collect();
-        let of = campaigns.iter().map(|row| Sampling::of(row.ended_by.as_deref(), row.interrupted));
+        let of = campaigns
+            .iter()
+            .map(|row| Sampling::of(row.ended_by.as_deref(), row.interrupted));
         self.sampling = of.fold(Sampling::Fixed, Sampling::and);
     }
 
@@ -66,11 +71,16 @@ impl MarkdownReport {
         for action in &run.actions {
             for judgement in &action.judgements {
                 of_run.add(judgement.outcome);
-                self.property(names::local(&action.action), names::local(&judgement.property)).add(judgement.outcome);
+                self.property(
+                    names::local(&action.action),
+                    names::local(&judgement.property),
+                )
+                .add(judgement.outcome);
             }
         }
         self.counts.add_all(of_run);
-        self.passed_runs += u64::from(of_run.passed > 0 && of_run.passed + of_run.inapplicable == of_run.total());
+        self.passed_runs +=
+            u64::from(of_run.passed > 0 && of_run.passed + of_run.inapplicable == of_run.total());
         if of_run.failed > 0 {
             self.failed_runs += 1;
             if self.failures.len() < MOST_FAILURES {
@@ -80,9 +90,13 @@ impl MarkdownReport {
     }
 
     fn property(&mut self, action: &str, property: &str) -> &mut Counts {
-        let known = self.properties.iter().position(|((a, p), _)| a == action && p == property);
+        let known = self
+            .properties
+            .iter()
+            .position(|((a, p), _)| a == action && p == property);
         let at = known.unwrap_or_else(|| {
-            self.properties.push(((action.to_owned(), property.to_owned()), Counts::default()));
+            self.properties
+                .push(((action.to_owned(), property.to_owned()), Counts::default()));
             self.properties.len() - 1
         });
         &mut self.properties[at].1
@@ -98,12 +112,25 @@ pub fn markdown(report: &MarkdownReport) -> String {
         "{runs} {} of {} {}: {}. Outcomes: {}.",
         plural(runs, "run", "runs"),
         plural(report.campaigns.len() as u64, "campaign", "campaigns"),
-        report.campaigns.iter().map(|id| code(id)).collect::<Vec<String>>().join(", "),
-        listed(report.statuses.iter().map(|(status, count)| (status.word(), *count))),
+        report
+            .campaigns
+            .iter()
+            .map(|id| code(id))
+            .collect::<Vec<String>>()
+            .join(", "),
+        listed(
+            report
+                .statuses
+                .iter()
+                .map(|(status, count)| (status.word(), *count))
+        ),
         listed(Outcome::ALL.map(|outcome| (outcome.word(), report.counts.get(outcome)))),
     );
     if report.twins > 0 {
-        let (more, are) = (plural(report.twins, "more run is a", "more runs are"), plural(report.twins, "", "s"));
+        let (more, are) = (
+            plural(report.twins, "more run is a", "more runs are"),
+            plural(report.twins, "", "s"),
+        );
         let _ = writeln!(
             out,
             "\n{} {more} bit-for-bit duplicate{are} of a later one: each trace counts once.",
@@ -117,10 +144,16 @@ pub fn markdown(report: &MarkdownReport) -> String {
             "\nT = {mean:.4}; runs in which everything passed: {}.",
             rate(report.passed_runs, runs, report.sampling)
         );
-        let lost: u64 =
-            report.statuses.iter().filter(|(status, _)| **status != RunStatus::Completed).map(|(_, n)| *n).sum();
+        let lost: u64 = report
+            .statuses
+            .iter()
+            .filter(|(status, _)| **status != RunStatus::Completed)
+            .map(|(_, n)| *n)
+            .sum();
         let lost = lost.min(runs.saturating_sub(report.passed_runs + report.failed_runs));
-        if let Some(bounds) = RateBounds::new(report.passed_runs, runs - lost, lost, report.sampling) {
+        if let Some(bounds) =
+            RateBounds::new(report.passed_runs, runs - lost, lost, report.sampling)
+        {
             let _ = writeln!(
                 out,
                 "\n{lost} of {runs} runs were lost (broken or timed out): counted as failures, the rate is {}; counted as passes, {}.",
@@ -138,7 +171,9 @@ pub fn markdown(report: &MarkdownReport) -> String {
     }
     if !report.properties.is_empty() {
         out.push_str("\n| action | property | pass rate [95 % interval] |");
-        Outcome::ALL.iter().for_each(|outcome| out.push_str(&format!(" {} |", outcome.word())));
+        Outcome::ALL
+            .iter()
+            .for_each(|outcome| out.push_str(&format!(" {} |", outcome.word())));
         out.push_str("\n| --- | --- | --- |");
         out.push_str(&" ---: |".repeat(Outcome::ALL.len()));
         out.push('\n');
@@ -152,7 +187,9 @@ pub fn markdown(report: &MarkdownReport) -> String {
             plain(property),
             rate(counts.passed, decided, report.sampling)
         );
-        Outcome::ALL.iter().for_each(|outcome| out.push_str(&format!(" {} |", counts.get(*outcome))));
+        Outcome::ALL
+            .iter()
+            .for_each(|outcome| out.push_str(&format!(" {} |", counts.get(*outcome))));
         out.push('\n');
     }
     failures(report, &mut out);
@@ -168,7 +205,11 @@ fn headline(report: &MarkdownReport) -> String {
         (failed, _, _) => {
             let runs = report.scores.len() as u64;
             let failures = plural(failed, "failure", "failures");
-            format!("actcheck: {failed} {failures} in {} of {runs} {}", report.failed_runs, plural(runs, "run", "runs"))
+            format!(
+                "actcheck: {failed} {failures} in {} of {runs} {}",
+                report.failed_runs,
+                plural(runs, "run", "runs")
+            )
         }
     }
 }
@@ -178,7 +219,10 @@ fn failures(report: &MarkdownReport, out: &mut String) {
         return;
     }
     out.push_str("\n<details><summary>What failed</summary>\n\n");
-    report.failures.iter().for_each(|failure| out.push_str(failure));
+    report
+        .failures
+        .iter()
+        .for_each(|failure| out.push_str(failure));
     let left_out = report.failed_runs - report.failures.len() as u64;
     if left_out > 0 {
         let _ = writeln!(out, "- {left_out} more {}", plural(left_out, "run", "runs"));
@@ -189,22 +233,40 @@ fn failures(report: &MarkdownReport, out: &mut String) {
 fn failure(run: &RunDetail) -> String {
     let mut out = format!("- {} ({})\n", code(&run.row.run), plain(&run.row.test));
     for action in &run.actions {
-        for judgement in action.judgements.iter().filter(|judgement| judgement.outcome == Outcome::Failed) {
-            let Judgement { property, witness, .. } = judgement;
+        for judgement in action
+            .judgements
+            .iter()
+            .filter(|judgement| judgement.outcome == Outcome::Failed)
+        {
+            let Judgement {
+                property, witness, ..
+            } = judgement;
             let (action, property) = (names::local(&action.action), names::local(property));
-            let _ = writeln!(out, "  - {} **{}**: {}", plain(action), plain(property), plain(witness));
+            let _ = writeln!(
+                out,
+                "  - {} **{}**: {}",
+                plain(action),
+                plain(property),
+                plain(witness)
+            );
         }
     }
     out
 }
 
 fn rate(passed: u64, of: u64, sampling: Sampling) -> String {
-    Proportion::sampled(passed, of, sampling)
-        .map_or_else(|| "nothing was decided".to_owned(), |share| share.to_string())
+    Proportion::sampled(passed, of, sampling).map_or_else(
+        || "nothing was decided".to_owned(),
+        |share| share.to_string(),
+    )
 }
 
 fn listed<'a>(counts: impl IntoIterator<Item = (&'a str, u64)>) -> String {
-    counts.into_iter().map(|(word, count)| format!("{count} {word}")).collect::<Vec<String>>().join(", ")
+    counts
+        .into_iter()
+        .map(|(word, count)| format!("{count} {word}"))
+        .collect::<Vec<String>>()
+        .join(", ")
 }
 
 fn plural<'a>(count: u64, one: &'a str, several: &'a str) -> &'a str {
@@ -240,7 +302,10 @@ mod tests {
 
     #[test]
     fn witnesses_are_escaped() {
-        assert_eq!(plain("a|b\n<img> @all [x](y) *z*"), "a\\|b &lt;img&gt; &#64;all \\[x\\](y) \\*z\\*");
+        assert_eq!(
+            plain("a|b\n<img> @all [x](y) *z*"),
+            "a\\|b &lt;img&gt; &#64;all \\[x\\](y) \\*z\\*"
+        );
     }
 
     #[test]

@@ -1,7 +1,8 @@
-//! Exports a history to third-party formats, one module for each: Allure, JUnit, EARL, Markdown and JSON Lines.
+//! Exports a history to third-party formats, one module for each: Allure, JUnit, EARL, Markdown and
+//! JSON Lines.
 //!
-//! Never: decides an outcome, reads a history, writes a file, or merges two of the six outcomes if the format can
-//! distinguish them.
+//! Never: decides an outcome, reads a history, writes a file, or merges two of the six outcomes if
+//! the format can distinguish them.
 
 mod allure;
 mod earl;

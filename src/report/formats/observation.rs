@@ -10,23 +10,30 @@ use actcheck_base::{Judgement, Outcome, names};
 use actcheck_history::{RunDetail, RunStatus};
 use actcheck_verdict::Counts;
 
-/// Returns the observation of a run. `campaign_started` is the start of its campaign (RFC 3339), by which viewers group
-/// observations.
+/// Returns the observation of a run. `campaign_started` is the start of its campaign (RFC 3339), by
+/// which viewers group observations.
 ///
-/// The schema has three results: `failed` if a property failed; `gave_up` if the run was broken or timed out, or
-/// nothing could be judged; `passed` otherwise. The features include the counts of all six outcomes.
+/// The schema has three results: `failed` if a property failed; `gave_up` if the run was broken or
+/// timed out, or nothing could be judged; `passed` otherwise. The features include the counts of
+/// all six outcomes.
 pub fn observation(run: &RunDetail, campaign_started: &str) -> Value {
     let judgements = || run.actions.iter().flat_map(|action| &action.judgements);
     let counts = Counts::of(judgements().map(|judgement| judgement.outcome));
     let (status, reason) = result(run, counts);
     let whole = run_json(run, &BTreeMap::new());
-    let mut features: BTreeMap<String, Value> =
-        Outcome::ALL.iter().map(|outcome| (outcome.word().to_owned(), counts.get(*outcome).into())).collect();
+    let mut features: BTreeMap<String, Value> = Outcome::ALL
+        .iter()
+        .map(|outcome| (outcome.word().to_owned(), counts.get(*outcome).into()))
+        .collect();
     features.insert("score".to_owned(), run.row.score.into());
     for action in &run.actions {
         for judgement in &action.judgements {
-            let name =
-                format!("{} {}: {}", action.step, names::local(&action.action), names::local(&judgement.property));
+            let name = format!(
+                "{} {}: {}",
+                action.step,
+                names::local(&action.action),
+                names::local(&judgement.property)
+            );
             features.insert(format!("{name} margin"), judgement.margin.into());
             features.insert(name, judgement.outcome.word().into());
         }
@@ -58,11 +65,16 @@ pub fn observation(run: &RunDetail, campaign_started: &str) -> Value {
 
 fn result(run: &RunDetail, counts: Counts) -> (&'static str, String) {
     if counts.failed > 0 {
-        return ("failed", witnesses(run, |judgement| judgement.outcome == Outcome::Failed));
+        return (
+            "failed",
+            witnesses(run, |judgement| judgement.outcome == Outcome::Failed),
+        );
     }
     if run.row.status != RunStatus::Completed || counts.broken + counts.timeout > 0 {
         let first = run.reason.clone().unwrap_or_else(|| {
-            witnesses(run, |judgement| matches!(judgement.outcome, Outcome::Broken | Outcome::Timeout))
+            witnesses(run, |judgement| {
+                matches!(judgement.outcome, Outcome::Broken | Outcome::Timeout)
+            })
         });
         return ("gave_up", first);
     }
@@ -74,9 +86,15 @@ fn result(run: &RunDetail, counts: Counts) -> (&'static str, String) {
 
 fn witnesses(run: &RunDetail, about: impl Fn(&Judgement) -> bool) -> String {
     let lines = run.actions.iter().flat_map(|action| {
-        let judgements = action.judgements.iter().filter(|judgement| about(judgement));
+        let judgements = action
+            .judgements
+            .iter()
+            .filter(|judgement| about(judgement));
         let line = |judgement: &Judgement| {
-            let (action, property) = (names::local(&action.action), names::local(&judgement.property));
+            let (action, property) = (
+                names::local(&action.action),
+                names::local(&judgement.property),
+            );
             format!("{action}: {property}: {}", judgement.witness)
         };
         judgements.map(line).collect::<Vec<String>>()
@@ -85,10 +103,23 @@ fn witnesses(run: &RunDetail, about: impl Fn(&Judgement) -> bool) -> String {
 }
 
 fn how(run: &RunDetail) -> String {
-    let weighted = if run.row.weight.is_some() { ", chosen by a search" } else { "" };
-    let again = run.row.repetition.filter(|repetition| repetition.number > 0);
-    let again = again.map_or_else(String::new, |it| format!(", repetition {} of its scene", it.number + 1));
-    format!("seed {}, run {}{weighted}{again}", run.seed, run.row.index + 1)
+    let weighted = if run.row.weight.is_some() {
+        ", chosen by a search"
+    } else {
+        ""
+    };
+    let again = run
+        .row
+        .repetition
+        .filter(|repetition| repetition.number > 0);
+    let again = again.map_or_else(String::new, |it| {
+        format!(", repetition {} of its scene", it.number + 1)
+    });
+    format!(
+        "seed {}, run {}{weighted}{again}",
+        run.seed,
+        run.row.index + 1
+    )
 }
 
 /// Wall-clock time, divided among the actions in proportion to their simulated time.

@@ -47,9 +47,18 @@ impl Slots {
         let shown: BTreeSet<(&str, &str)> = findings
             .properties
             .iter()
-            .map(|report| (report.findings.action.as_str(), report.findings.property.as_str()))
+            .map(|report| {
+                (
+                    report.findings.action.as_str(),
+                    report.findings.property.as_str(),
+                )
+            })
             .collect();
-        let (actions, properties, steps) = (table.text("action"), table.text("property"), table.number("step"));
+        let (actions, properties, steps) = (
+            table.text("action"),
+            table.text("property"),
+            table.number("step"),
+        );
         let key = |row: usize| -> Option<(u32, u32, u32)> {
             let step = steps.get(row).filter(|step| !step.is_nan())?;
             Some((*step as u32, actions.of_row[row]?, properties.of_row[row]?))
@@ -58,15 +67,32 @@ impl Slots {
         keys.extend((0..table.len()).filter_map(key).map(|key| (key, None)));
         let mut slots: Vec<(Slot, (u32, u32, u32))> = Vec::new();
         for key @ (step, action, property) in keys.keys().copied() {
-            let (action, property) = (&actions.texts[action as usize], &properties.texts[property as usize]);
+            let (action, property) = (
+                &actions.texts[action as usize],
+                &properties.texts[property as usize],
+            );
             if shown.contains(&(action.as_str(), property.as_str())) {
-                slots.push((Slot { step, action: action.clone(), property: property.clone() }, key));
+                slots.push((
+                    Slot {
+                        step,
+                        action: action.clone(),
+                        property: property.clone(),
+                    },
+                    key,
+                ));
             }
         }
         slots.sort();
-        keys.extend(slots.iter().enumerate().map(|(place, (_, key))| (*key, Some(place))));
+        keys.extend(
+            slots
+                .iter()
+                .enumerate()
+                .map(|(place, (_, key))| (*key, Some(place))),
+        );
         Self {
-            of_row: (0..table.len()).map(|row| keys.get(&key(row)?).copied().flatten()).collect(),
+            of_row: (0..table.len())
+                .map(|row| keys.get(&key(row)?).copied().flatten())
+                .collect(),
             slots: slots.into_iter().map(|(slot, _)| slot).collect(),
         }
     }
@@ -80,16 +106,26 @@ pub struct PackedRuns {
 }
 
 impl PackedRuns {
-    /// Packs the runs in `table`: their outcomes, and the parameters, messages and explanations of all or of a sample.
-    /// `table` has [`HTML_COLUMNS`] and the columns of the findings; if there is a sample, only the columns of rates.
-    pub fn of(findings: &FindingsSummary, table: &OutcomeTable, sample: Option<&OutcomeTable>) -> Self {
+    /// Packs the runs in `table`: their outcomes, and the parameters, messages and explanations of
+    /// all or of a sample. `table` has [`HTML_COLUMNS`] and the columns of the findings; if there
+    /// is a sample, only the columns of rates.
+    pub fn of(
+        findings: &FindingsSummary,
+        table: &OutcomeTable,
+        sample: Option<&OutcomeTable>,
+    ) -> Self {
         let slots = Slots::of(table, findings);
         let packed = runs(findings, table, sample, &slots);
         Self { slots, packed }
     }
 }
 
-fn runs(findings: &FindingsSummary, table: &OutcomeTable, sample: Option<&OutcomeTable>, slots: &Slots) -> String {
+fn runs(
+    findings: &FindingsSummary,
+    table: &OutcomeTable,
+    sample: Option<&OutcomeTable>,
+    slots: &Slots,
+) -> String {
     let mut pack = Pack::default();
     let rows = first_rows(table);
     ids(table, &rows, &mut pack);
@@ -140,11 +176,16 @@ fn runs(findings: &FindingsSummary, table: &OutcomeTable, sample: Option<&Outcom
 
 /// Packs the ids of runs, unless each consists of its campaign and its number.
 fn ids(table: &OutcomeTable, rows: &[usize], pack: &mut Pack) {
-    let (runs, campaigns, index) = (table.text("run"), table.text("campaign"), table.number("index"));
+    let (runs, campaigns, index) = (
+        table.text("run"),
+        table.text("campaign"),
+        table.number("index"),
+    );
     let is_numbered = |(run, row): (&String, &usize)| {
         let number = index.get(*row).map(|index| index + 1.0);
         run.rsplit_once('-').is_some_and(|(campaign, of_run)| {
-            campaigns.get(*row) == Some(campaign) && number.is_some_and(|number| of_run == number.to_string())
+            campaigns.get(*row) == Some(campaign)
+                && number.is_some_and(|number| of_run == number.to_string())
         })
     };
     pack.set("count", runs.texts.len());
@@ -156,9 +197,14 @@ fn ids(table: &OutcomeTable, rows: &[usize], pack: &mut Pack) {
 /// Packs the failure mode of each run: its number from 1, or 0.
 fn modes(findings: &FindingsSummary, table: &OutcomeTable, pack: &mut Pack) {
     let runs = &table.text("run").texts;
-    let place_of: FxHashMap<&str, u32> =
-        (1..).zip(&findings.modes).flat_map(|(mode, of)| of.runs.iter().map(move |run| (run.as_str(), mode))).collect();
-    let modes: Vec<u32> = runs.iter().map(|run| place_of.get(run.as_str()).copied().unwrap_or(0)).collect();
+    let place_of: FxHashMap<&str, u32> = (1..)
+        .zip(&findings.modes)
+        .flat_map(|(mode, of)| of.runs.iter().map(move |run| (run.as_str(), mode)))
+        .collect();
+    let modes: Vec<u32> = runs
+        .iter()
+        .map(|run| place_of.get(run.as_str()).copied().unwrap_or(0))
+        .collect();
     let modes = pack.places(&modes);
     pack.set("mode", modes);
 }
@@ -172,11 +218,14 @@ fn places_in(table: &OutcomeTable, sample: &OutcomeTable) -> Vec<u32> {
             *of = place;
         }
     }
-    wanted.iter().map(|run| places.get(run.as_str()).copied().unwrap_or(0)).collect()
+    wanted
+        .iter()
+        .map(|run| places.get(run.as_str()).copied().unwrap_or(0))
+        .collect()
 }
 
-/// For each run, the row that describes its scene and effects: the one whose surface is nearest to the target. Actions at another
-/// place refer to another surface.
+/// For each run, the row that describes its scene and effects: the one whose surface is nearest to
+/// the target. Actions at another place refer to another surface.
 fn first_rows(table: &OutcomeTable) -> Vec<usize> {
     let runs = table.text("run");
     let (x, y) = (table.number("surface_x_m"), table.number("surface_y_m"));
@@ -192,15 +241,20 @@ fn first_rows(table: &OutcomeTable) -> Vec<usize> {
             *known = Some((row, away(row)));
         }
     }
-    rows.into_iter().map(|row| row.map_or(0, |(row, _)| row)).collect()
+    rows.into_iter()
+        .map(|row| row.map_or(0, |(row, _)| row))
+        .collect()
 }
 
 fn of_rows(table: &OutcomeTable, name: &str, rows: &[usize]) -> Vec<f64> {
     let column = table.number(name);
-    rows.iter().map(|row| column.get(*row).copied().unwrap_or(f64::NAN)).collect()
+    rows.iter()
+        .map(|row| column.get(*row).copied().unwrap_or(f64::NAN))
+        .collect()
 }
 
-/// Packs a text column: the distinct texts, then an index for each row (0: no text). IRIs are shortened to local names.
+/// Packs a text column: the distinct texts, then an index for each row (0: no text). IRIs are
+/// shortened to local names.
 fn kinds(table: &OutcomeTable, name: &str, rows: &[usize], pack: &mut Pack) -> Value {
     let column = table.text(name);
     let mut known = BTreeMap::new();
@@ -211,7 +265,11 @@ fn kinds(table: &OutcomeTable, name: &str, rows: &[usize], pack: &mut Pack) -> V
             None => 0,
             Some(of) => *known.entry(of).or_insert_with(|| {
                 let text = &column.texts[of as usize];
-                texts.push(if name.ends_with("_category") { names::local(text) } else { text });
+                texts.push(if name.ends_with("_category") {
+                    names::local(text)
+                } else {
+                    text
+                });
                 // A page has far fewer than 2³² texts.
                 texts.len() as u32
             }),
@@ -231,28 +289,42 @@ fn outcomes(table: &OutcomeTable, slots: &Slots, pack: &mut Pack) {
     let mut outcomes = vec![NO_OUTCOME; count * slots.slots.len()];
     let mut margins = vec![vec![f64::NAN; count]; slots.slots.len()];
     for row in 0..table.len() {
-        let (Some(run), Some(slot)) = (runs.of_row[row], slots.of_row[row]) else { continue };
-        outcomes[slot * count + run as usize] = words.of_row[row].map_or(NO_OUTCOME, |of| codes[of as usize]);
+        let (Some(run), Some(slot)) = (runs.of_row[row], slots.of_row[row]) else {
+            continue;
+        };
+        outcomes[slot * count + run as usize] =
+            words.of_row[row].map_or(NO_OUTCOME, |of| codes[of as usize]);
         margins[slot][run as usize] = margin.get(row).copied().unwrap_or(f64::NAN);
     }
     let outcomes = pack.bytes(&outcomes);
     pack.set("outcomes", outcomes);
-    let margins: Vec<Value> = margins.iter().map(|margins| pack.numbers(margins).into()).collect();
+    let margins: Vec<Value> = margins
+        .iter()
+        .map(|margins| pack.numbers(margins).into())
+        .collect();
     pack.set("margins", margins);
 }
 
 /// The code of each text of the column of outcomes.
 fn codes(table: &OutcomeTable) -> Vec<u8> {
     let code = |word: &String| {
-        let place = Outcome::ALL.iter().position(|outcome| outcome.word() == word);
+        let place = Outcome::ALL
+            .iter()
+            .position(|outcome| outcome.word() == word);
         place.map_or(NO_OUTCOME, |at| at as u8)
     };
     table.text("outcome").texts.iter().map(code).collect()
 }
 
-/// Packs the explanations of outcomes that did not pass, of the rows in `detailed`. `places`: the places of its runs among all
-/// runs, if it is a sample.
-fn witnesses(table: &OutcomeTable, slots: &Slots, detailed: &OutcomeTable, places: Option<&[u32]>, pack: &mut Pack) {
+/// Packs the explanations of outcomes that did not pass, of the rows in `detailed`. `places`: the
+/// places of its runs among all runs, if it is a sample.
+fn witnesses(
+    table: &OutcomeTable,
+    slots: &Slots,
+    detailed: &OutcomeTable,
+    places: Option<&[u32]>,
+    pack: &mut Pack,
+) {
     let count = table.text("run").texts.len();
     let place_of: BTreeMap<&Slot, usize> = slots.slots.iter().zip(0..).collect();
     let (runs, words) = (detailed.text("run"), detailed.text("outcome"));
@@ -260,7 +332,11 @@ fn witnesses(table: &OutcomeTable, slots: &Slots, detailed: &OutcomeTable, place
     let mut shown_by: BTreeMap<usize, &str> = BTreeMap::new();
     for row in 0..detailed.len() {
         let code = words.of_row[row].map_or(NO_OUTCOME, |of| codes[of as usize]);
-        let Some(witness) = detailed.text("witness").get(row).filter(|text| code != 0 && !text.is_empty()) else {
+        let Some(witness) = detailed
+            .text("witness")
+            .get(row)
+            .filter(|text| code != 0 && !text.is_empty())
+        else {
             continue;
         };
         let slot = match places {
@@ -274,20 +350,37 @@ fn witnesses(table: &OutcomeTable, slots: &Slots, detailed: &OutcomeTable, place
     }
     let places: Vec<u32> = shown_by.keys().map(|at| *at as u32).collect();
     let places = pack.places(&places);
-    pack.set("witnesses", json!({ "at": places, "texts": shown_by.values().collect::<Vec<_>>() }));
+    pack.set(
+        "witnesses",
+        json!({ "at": places, "texts": shown_by.values().collect::<Vec<_>>() }),
+    );
 }
 
 fn slot_of(table: &OutcomeTable, row: usize) -> Option<Slot> {
-    let step = table.number("step").get(row).filter(|step| !step.is_nan())?;
-    let (action, property) = (table.text("action").get(row)?, table.text("property").get(row)?);
-    Some(Slot { step: *step as u32, action: action.to_owned(), property: property.to_owned() })
+    let step = table
+        .number("step")
+        .get(row)
+        .filter(|step| !step.is_nan())?;
+    let (action, property) = (
+        table.text("action").get(row)?,
+        table.text("property").get(row)?,
+    );
+    Some(Slot {
+        step: *step as u32,
+        action: action.to_owned(),
+        property: property.to_owned(),
+    })
 }
 
 /// Packs the message and duration of each action, step by step.
 fn steps(table: &OutcomeTable, pack: &mut Pack) {
     let runs = table.text("run");
     let steps = table.number("step");
-    let most = steps.iter().copied().filter(|step| step.is_finite()).fold(0.0, f64::max) as usize;
+    let most = steps
+        .iter()
+        .copied()
+        .filter(|step| step.is_finite())
+        .fold(0.0, f64::max) as usize;
     let mut rows: Vec<Vec<Option<usize>>> = vec![vec![None; runs.texts.len()]; most];
     for (row, step) in steps.iter().enumerate().filter(|(_, step)| **step >= 1.0) {
         if let Some(run) = runs.of_row[row] {

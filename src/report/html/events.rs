@@ -13,7 +13,12 @@ use actcheck_data::{Look, Pose, Trace};
 use actcheck_history::RunDetail;
 
 /// Describes an action, given its index in the run.
-pub(super) fn action(run: &RunDetail, trace: Option<&Trace>, idx: usize, explained: &[Explained]) -> Value {
+pub(super) fn action(
+    run: &RunDetail,
+    trace: Option<&Trace>,
+    idx: usize,
+    explained: &[Explained],
+) -> Value {
     let action = &run.actions[idx];
     let judged = action.judgements.iter().map(|judgement| {
         let why = explained.iter().find(|why| why.step == action.step && why.property == judgement.property);
@@ -50,34 +55,70 @@ pub(super) fn action(run: &RunDetail, trace: Option<&Trace>, idx: usize, explain
 /// When an action began. Unit: seconds since the run began.
 fn began(trace: &Trace, idx: usize) -> f64 {
     let begin = trace.snapshots.first().map_or(0.0, |state| state.time_secs);
-    trace.snapshots.get(idx).or(trace.snapshots.last()).map_or(0.0, |state| state.time_secs - begin)
+    trace
+        .snapshots
+        .get(idx)
+        .or(trace.snapshots.last())
+        .map_or(0.0, |state| state.time_secs - begin)
 }
 
 /// Adds the events of an action from the trace: start, phases, contacts, percepts.
 fn events(packed: &mut Value, trace: &Trace, idx: usize) {
-    let Some(action) = trace.actions.get(idx) else { return };
+    let Some(action) = trace.actions.get(idx) else {
+        return;
+    };
     let begin = trace.snapshots.first().map_or(0.0, |state| state.time_secs);
     packed["start"] = json!(began(trace, idx));
-    packed["phases"] = action.phases.iter().map(|phase| json!([phase.name, phase.start_secs])).collect();
+    packed["phases"] = action
+        .phases
+        .iter()
+        .map(|phase| json!([phase.name, phase.start_secs]))
+        .collect();
     let contacts = strongest(&action.contacts).into_iter().map(|contact| {
         let [a, b] = &contact.pair;
-        json!([a, b, contact.start_secs, contact.end_secs, contact.max_force_n])
+        json!([
+            a,
+            b,
+            contact.start_secs,
+            contact.end_secs,
+            contact.max_force_n
+        ])
     });
     packed["contacts"] = contacts.collect();
     let since = |look: Option<Look>| look.map(|look| look.time_secs - begin);
-    let asked = action.percepts.iter().map(|seen| percept(&seen.id, &seen.pose, seen.size_m, since(seen.look)));
-    let looks = action.perceived.iter().map(|perceived| (since(perceived.look), &perceived.things));
+    let asked = action
+        .percepts
+        .iter()
+        .map(|seen| percept(&seen.id, &seen.pose, seen.size_m, since(seen.look)));
+    let looks = action
+        .perceived
+        .iter()
+        .map(|perceived| (since(perceived.look), &perceived.things));
     let things = looks.flat_map(|(secs, things)| things.iter().map(move |thing| (secs, thing)));
     let things = things.map(|(secs, thing)| {
-        percept(thing.category.as_deref().map_or("?", names::local), &thing.pose, thing.size_m, secs)
+        percept(
+            thing.category.as_deref().map_or("?", names::local),
+            &thing.pose,
+            thing.size_m,
+            secs,
+        )
     });
     packed["seen"] = asked.chain(things).collect();
     packed["hand"] = hand(trace, idx);
-    packed["grip"] = trace.robot_courses.get(idx).map_or(Value::Null, |course| grip(&course.motion));
+    packed["grip"] = trace
+        .robot_courses
+        .get(idx)
+        .map_or(Value::Null, |course| grip(&course.motion));
 }
 
-/// A perceived object: the pose of its bottom centre, its size, and when it was perceived, since the run began.
+/// A perceived object: the pose of its bottom centre, its size, and when it was perceived, since
+/// the run began.
 fn percept(name: &str, pose: &Pose, size_m: [f64; 3], secs: Option<f64>) -> Value {
-    let at: Vec<f64> = pose.position.iter().chain(&pose.rotation).copied().collect();
+    let at: Vec<f64> = pose
+        .position
+        .iter()
+        .chain(&pose.rotation)
+        .copied()
+        .collect();
     json!({ "name": name, "at": at, "size": size_m, "secs": secs })
 }

@@ -1,10 +1,12 @@
 //! Generates an HTML report of a history: one self-contained page that works offline.
 //!
-//! Data are packed as columns and quantised trajectories ([`pack`]), so that 10,000 runs fit. Scripts and styles are in
-//! `web/`, the 3D library and its licence in `vendor/`. All text from models, rules and messages is in the packed data,
-//! and the scripts only insert it as text nodes; the page's content security policy forbids all other scripts.
+//! Data are packed as columns and quantised trajectories ([`pack`]), so that 10,000 runs fit.
+//! Scripts and styles are in `web/`, the 3D library and its licence in `vendor/`. All text from
+//! models, rules and messages is in the packed data, and the scripts only insert it as text nodes;
+//! the page's content security policy forbids all other scripts.
 //!
-//! Never: reads a history or a file, chooses the judged properties, or writes user text into markup.
+//! Never: reads a history or a file, chooses the judged properties, or writes user text into
+//! markup.
 
 mod columns;
 mod events;

@@ -1,5 +1,5 @@
-//! Packs columns and trajectories as bytes that a browser can unpack without a library: a JSON header followed by plain
-//! arrays.
+//! Packs columns and trajectories as bytes that a browser can unpack without a library: a JSON
+//! header followed by plain arrays.
 
 use std::io::Write as _;
 
@@ -13,7 +13,8 @@ use serde_json::{Map, Value, json};
 const NONE: u16 = u16::MAX;
 /// Code for a missing whole number.
 const NO_COUNT: u32 = u32::MAX;
-/// Size from which data are compressed faster: a tenth larger in a quarter of the time. Unit: bytes.
+/// Size from which data are compressed faster: a tenth larger in a quarter of the time. Unit:
+/// bytes.
 const LARGE: usize = 16 << 20;
 /// Number of quantisation steps between the smallest and the largest value of a column.
 const STEPS: f64 = 65_534.0;
@@ -41,33 +42,59 @@ impl Pack {
     /// Adds an array of indices and returns its descriptor.
     pub fn places(&mut self, values: &[u32]) -> Value {
         let bytes: Vec<u8> = match values.iter().all(|value| *value <= u32::from(u16::MAX)) {
-            true => values.iter().flat_map(|value| value.to_le_bytes().into_iter().take(2)).collect(),
-            false => values.iter().flat_map(|value| value.to_le_bytes()).collect(),
+            true => values
+                .iter()
+                .flat_map(|value| value.to_le_bytes().into_iter().take(2))
+                .collect(),
+            false => values
+                .iter()
+                .flat_map(|value| value.to_le_bytes())
+                .collect(),
         };
-        let kind = if bytes.len() == 2 * values.len() { "u16" } else { "u32" };
+        let kind = if bytes.len() == 2 * values.len() {
+            "u16"
+        } else {
+            "u32"
+        };
         self.array(kind, values.len(), &bytes)
     }
 
-    /// Adds a column of whole numbers and returns its descriptor. Returns `None` if it has no numbers.
+    /// Adds a column of whole numbers and returns its descriptor. Returns `None` if it has no
+    /// numbers.
     pub fn counts(&mut self, values: &[f64]) -> Option<Value> {
         values.iter().find(|value| value.is_finite())?;
-        let code = |value: &f64| if value.is_finite() { value.round() as u32 } else { NO_COUNT };
-        let bytes: Vec<u8> = values.iter().flat_map(|value| code(value).to_le_bytes()).collect();
+        let code = |value: &f64| {
+            if value.is_finite() {
+                value.round() as u32
+            } else {
+                NO_COUNT
+            }
+        };
+        let bytes: Vec<u8> = values
+            .iter()
+            .flat_map(|value| code(value).to_le_bytes())
+            .collect();
         Some(self.array("count", values.len(), &bytes))
     }
 
-    /// Adds a column of numbers, quantised to 1/65534 of their range, and returns its descriptor. Returns `None` if it
-    /// has no numbers.
+    /// Adds a column of numbers, quantised to 1/65534 of their range, and returns its descriptor.
+    /// Returns `None` if it has no numbers.
     pub fn numbers(&mut self, values: &[f64]) -> Option<Value> {
         let known = || values.iter().copied().filter(|value| value.is_finite());
-        let (low, high) = (known().min_by(f64::total_cmp)?, known().max_by(f64::total_cmp)?);
+        let (low, high) = (
+            known().min_by(f64::total_cmp)?,
+            known().max_by(f64::total_cmp)?,
+        );
         let step = (high - low) / STEPS;
         let code = |value: &f64| match value.is_finite() {
             true if step > 0.0 => ((value - low) / step).round() as u16,
             true => 0,
             false => NONE,
         };
-        let bytes: Vec<u8> = values.iter().flat_map(|value| code(value).to_le_bytes()).collect();
+        let bytes: Vec<u8> = values
+            .iter()
+            .flat_map(|value| code(value).to_le_bytes())
+            .collect();
         let whole = known().all(|value| value.fract() == 0.0);
         let mut placed = self.array("number", values.len(), &bytes);
         placed["low"] = json!(low);
@@ -76,8 +103,9 @@ impl Pack {
         Some(placed)
     }
 
-    /// Adds columns of integers as second differences, which are small because bodies move smoothly. All low bytes
-    /// precede all high bytes, which are nearly always equal and so compress well.
+    /// Adds columns of integers as second differences, which are small because bodies move
+    /// smoothly. All low bytes precede all high bytes, which are nearly always equal and so
+    /// compress well.
     pub fn trajectories(&mut self, columns: &[Vec<i16>]) -> Value {
         let length = columns.first().map_or(0, Vec::len);
         let mut lower = Vec::with_capacity(columns.len() * length);
@@ -98,7 +126,8 @@ impl Pack {
     fn array(&mut self, kind: &str, length: usize, bytes: &[u8]) -> Value {
         let at = self.body.len();
         self.body.extend(bytes);
-        self.body.resize(self.body.len().next_multiple_of(ALIGNMENT), 0);
+        self.body
+            .resize(self.body.len().next_multiple_of(ALIGNMENT), 0);
         json!({ "kind": kind, "at": at, "length": length })
     }
 
@@ -114,9 +143,14 @@ impl Pack {
 /// Compresses bytes and encodes them in Base64, which is safe inside markup.
 pub(super) fn packed(bytes: &[u8]) -> String {
     let level = if bytes.len() < LARGE { 4 } else { 2 };
-    let mut encoder = ZlibEncoder::new(Vec::with_capacity(bytes.len() / 3), Compression::new(level));
-    // Writing to memory does not fail. If it did, the page would report that it can't read this part.
-    let deflated = encoder.write_all(bytes).and_then(|()| encoder.finish()).unwrap_or_default();
+    let mut encoder =
+        ZlibEncoder::new(Vec::with_capacity(bytes.len() / 3), Compression::new(level));
+    // Writing to memory does not fail. If it did, the page would report that it can't read this
+    // part.
+    let deflated = encoder
+        .write_all(bytes)
+        .and_then(|()| encoder.finish())
+        .unwrap_or_default();
     STANDARD.encode(deflated)
 }
 
@@ -129,16 +163,25 @@ mod tests {
         let mut pack = Pack::default();
         let values = [0.5, -1.5, f64::NAN, 3.25];
         let column = pack.numbers(&values).expect("the values are not empty");
-        let (low, step) = (column["low"].as_f64().unwrap_or_default(), column["step"].as_f64().unwrap_or_default());
+        let (low, step) = (
+            column["low"].as_f64().unwrap_or_default(),
+            column["step"].as_f64().unwrap_or_default(),
+        );
         for (value, code) in values.iter().zip(pack.body.chunks(2)) {
             let code = u16::from_le_bytes([code[0], code[1]]);
             match value.is_nan() {
                 true => assert_eq!(code, NONE),
-                false => assert!((low + f64::from(code) * step - value).abs() <= step / 2.0 + 1e-15),
+                false => {
+                    assert!((low + f64::from(code) * step - value).abs() <= step / 2.0 + 1e-15)
+                }
             }
         }
         assert_eq!(pack.numbers(&[f64::NAN, f64::INFINITY]), None);
-        assert_eq!(pack.numbers(&[2.0, 2.0]).map(|column| column["whole"].clone()), Some(json!(true)));
+        assert_eq!(
+            pack.numbers(&[2.0, 2.0])
+                .map(|column| column["whole"].clone()),
+            Some(json!(true))
+        );
     }
 
     #[test]
@@ -146,6 +189,10 @@ mod tests {
         let mut pack = Pack::default();
         pack.set("name", "</script><img src=x onerror=alert(1)>");
         let text = pack.finish();
-        assert!(text.bytes().all(|byte| byte.is_ascii_alphanumeric() || b"+/=".contains(&byte)), "{text}");
+        assert!(
+            text.bytes()
+                .all(|byte| byte.is_ascii_alphanumeric() || b"+/=".contains(&byte)),
+            "{text}"
+        );
     }
 }

@@ -14,7 +14,8 @@ use crate::html::summary::summary;
 /// The same report gives the same page. Its markup has no user text: see the module.
 pub fn html(report: &HtmlReport<'_>) -> String {
     let script = format!("\"use strict\";\n{}", SCRIPT.join("\n"));
-    let before = data("summary", &summary(report, &report.runs.slots)) + &data("runs", &report.runs.packed);
+    let before =
+        data("summary", &summary(report, &report.runs.slots)) + &data("runs", &report.runs.packed);
     let mut behind = data("forms", &report.replays.forms());
     for (name, text) in THREE {
         behind.push_str(&data(name, &packed(text.as_bytes())));
@@ -45,7 +46,8 @@ fn data(id: &str, packed: &str) -> String {
     format!("<script type=\"text/plain\" id=\"data-{id}\">{packed}</script>\n")
 }
 
-/// The content security policy: only this script and the library that it unpacks may run. Nothing may be loaded.
+/// The content security policy: only this script and the library that it unpacks may run. Nothing
+/// may be loaded.
 fn policy(script: &str) -> String {
     let digest = STANDARD.encode(Sha256::digest(script.as_bytes()));
     format!(

@@ -15,8 +15,8 @@ use actcheck_base::{Outcome, names};
 use actcheck_data::{BodyState, Form, Role, Trace};
 use actcheck_history::RunDetail;
 
-/// Smallest quantisation step of positions, which is the resolution of traces. The step is larger if a run spans more
-/// than 6.5 m. Unit: metres.
+/// Smallest quantisation step of positions, which is the resolution of traces. The step is larger
+/// if a run spans more than 6.5 m. Unit: metres.
 const GRAIN_M: f64 = 1e-4;
 /// Quantisation step of quaternion components, as in traces.
 const GRAIN_TURN: f64 = 2e-4;
@@ -39,22 +39,36 @@ impl Replays {
         self.insert(run, packed);
     }
 
-    /// Adds runs as [`Replays::add`] does, until `room` is full. All cores share the work. Unit of `room`: bytes.
+    /// Adds runs as [`Replays::add`] does, until `room` is full. All cores share the work. Unit of
+    /// `room`: bytes.
     pub fn add_all(&mut self, runs: &[ReplayedRun], room: f64) {
-        // Shapes are numbered in the order of the runs, so that the page does not depend on the number of cores.
-        let (mut numbered, mut shapes) = (Vec::with_capacity(runs.len()), Vec::with_capacity(runs.len()));
+        // Shapes are numbered in the order of the runs, so that the page does not depend on the
+        // number of cores.
+        let (mut numbered, mut shapes) = (
+            Vec::with_capacity(runs.len()),
+            Vec::with_capacity(runs.len()),
+        );
         for run in runs {
             numbered.push((run, self.bodies(&run.0, run.1.as_ref())));
             shapes.push(self.shapes.all().len());
         }
-        let of_a_worker = runs.len().div_ceil(available_parallelism().map_or(1, NonZero::get)).max(1);
+        let of_a_worker = runs
+            .len()
+            .div_ceil(available_parallelism().map_or(1, NonZero::get))
+            .max(1);
         let shares: Vec<Vec<String>> = std::thread::scope(|scope| {
-            let started: Vec<_> =
-                numbered.chunks(of_a_worker).map(|share| scope.spawn(move || packed_runs(share))).collect();
+            let started: Vec<_> = numbered
+                .chunks(of_a_worker)
+                .map(|share| scope.spawn(move || packed_runs(share)))
+                .collect();
             let ended = started.into_iter().map(|share| share.join());
-            ended.map(|share| share.unwrap_or_else(|panic| std::panic::resume_unwind(panic))).collect()
+            ended
+                .map(|share| share.unwrap_or_else(|panic| std::panic::resume_unwind(panic)))
+                .collect()
         });
-        for (((run, ..), packed), shapes) in runs.iter().zip(shares.into_iter().flatten()).zip(shapes) {
+        for (((run, ..), packed), shapes) in
+            runs.iter().zip(shares.into_iter().flatten()).zip(shapes)
+        {
             self.insert(run, packed);
             if self.bytes as f64 >= room {
                 self.shapes.truncate(shapes);
@@ -75,7 +89,9 @@ impl Replays {
 
     /// Ids of the runs, with their packed data.
     pub(super) fn runs(&self) -> impl Iterator<Item = (&str, &str)> {
-        self.runs.iter().map(|(run, packed)| (run.as_str(), packed.as_str()))
+        self.runs
+            .iter()
+            .map(|(run, packed)| (run.as_str(), packed.as_str()))
     }
 
     /// Returns all shapes, packed.
@@ -85,12 +101,26 @@ impl Replays {
 
     /// The bodies of a run, with the numbers of their shapes.
     fn bodies(&mut self, run: &RunDetail, trace: Option<&Trace>) -> Bodies {
-        let Some(trace) = trace.filter(|trace| !trace.snapshots.is_empty()) else { return Bodies::default() };
-        let forms: BTreeMap<&str, &Form> = trace.forms.iter().map(|form| (form.name.as_str(), form)).collect();
-        let first = trace.snapshots.iter().take(1).flat_map(|state| &state.bodies);
-        let bodies: BTreeMap<&str, &BodyState> = first.map(|body| (body.id.as_str(), body)).collect();
-        let roles: BTreeMap<&str, &str> =
-            run.objects.iter().map(|object| (object.id.as_str(), role_name(object.role))).collect();
+        let Some(trace) = trace.filter(|trace| !trace.snapshots.is_empty()) else {
+            return Bodies::default();
+        };
+        let forms: BTreeMap<&str, &Form> = trace
+            .forms
+            .iter()
+            .map(|form| (form.name.as_str(), form))
+            .collect();
+        let first = trace
+            .snapshots
+            .iter()
+            .take(1)
+            .flat_map(|state| &state.bodies);
+        let bodies: BTreeMap<&str, &BodyState> =
+            first.map(|body| (body.id.as_str(), body)).collect();
+        let roles: BTreeMap<&str, &str> = run
+            .objects
+            .iter()
+            .map(|object| (object.id.as_str(), role_name(object.role)))
+            .collect();
         let mut form = |name: &str| match (forms.get(name), bodies.get(name)) {
             (Some(form), _) => Some(self.shapes.of(form)),
             (None, Some(body)) => Some(self.shapes.around(body)),
@@ -102,7 +132,8 @@ impl Replays {
         for (slot, name) in frames.names.iter().enumerate() {
             if let Some(form) = form(name) {
                 slots.push(slot);
-                tracks.push(json!({ "name": name, "form": form, "role": roles.get(name.as_str()) }));
+                tracks
+                    .push(json!({ "name": name, "form": form, "role": roles.get(name.as_str()) }));
             }
         }
         let still = bodies.values().filter(|body| !frames.names.contains(&body.id)).filter_map(|body| {
@@ -110,7 +141,11 @@ impl Replays {
             let (kind, role) = (names::local(&body.category), roles.get(body.id.as_str()));
             Some(json!({ "name": body.id, "form": form(&body.id)?, "at": at, "kind": kind, "role": role }))
         });
-        Bodies { still: still.collect(), tracks, slots }
+        Bodies {
+            still: still.collect(),
+            tracks,
+            slots,
+        }
     }
 }
 
@@ -124,8 +159,9 @@ struct Bodies {
 }
 
 fn packed_runs(runs: &[(&ReplayedRun, Bodies)]) -> Vec<String> {
-    let packed =
-        |((run, trace, explained), bodies): &(&ReplayedRun, Bodies)| bodies.packed(run, trace.as_ref(), explained);
+    let packed = |((run, trace, explained), bodies): &(&ReplayedRun, Bodies)| {
+        bodies.packed(run, trace.as_ref(), explained)
+    };
     runs.iter().map(packed).collect()
 }
 
@@ -133,8 +169,12 @@ impl Bodies {
     fn packed(&self, run: &RunDetail, trace: Option<&Trace>, explained: &[Explained]) -> String {
         let mut pack = Pack::default();
         details(&mut pack, run);
-        let actions: Vec<Value> =
-            run.actions.iter().enumerate().map(|(idx, _)| action(run, trace, idx, explained)).collect();
+        let actions: Vec<Value> = run
+            .actions
+            .iter()
+            .enumerate()
+            .map(|(idx, _)| action(run, trace, idx, explained))
+            .collect();
         pack.set("actions", actions);
         if let Some(trace) = trace.filter(|trace| !trace.snapshots.is_empty()) {
             pack.set("still", self.still.clone());
@@ -157,10 +197,14 @@ fn set_trajectories(pack: &mut Pack, trace: &Trace, slots: &[usize]) {
     pack.set("courses", trajectories);
 }
 
-/// The hardest contact of the robot with something that it is not to touch, if its position is known.
+/// The hardest contact of the robot with something that it is not to touch, if its position is
+/// known.
 fn pressed(run: &RunDetail, trace: &Trace) -> Value {
     let judged = run.actions.iter().enumerate().flat_map(|(idx, action)| {
-        let failed = action.judgements.iter().filter(|judgement| judgement.outcome == Outcome::Failed);
+        let failed = action
+            .judgements
+            .iter()
+            .filter(|judgement| judgement.outcome == Outcome::Failed);
         failed.map(move |judgement| (idx, judgement.witness.as_str()))
     });
     let found = hardest_of_run(trace, judged).and_then(|pressed| Some((pressed.point_m?, pressed)));
@@ -196,26 +240,41 @@ fn details(pack: &mut Pack, run: &RunDetail) {
 
 /// Name of a role. Objects on the surface for placing are drawn like other objects.
 fn role_name(role: Role) -> &'static str {
-    if role == Role::PlaceOther { Role::Other.word() } else { role.word() }
+    if role == Role::PlaceOther {
+        Role::Other.word()
+    } else {
+        role.word()
+    }
 }
 
-/// Quantises seven columns for each track (position, quaternion). Returns the columns, the lowest corner and the
-/// position step. Values that are not finite repeat the previous one.
+/// Quantises seven columns for each track (position, quaternion). Returns the columns, the lowest
+/// corner and the position step. Values that are not finite repeat the previous one.
 fn columns(rows: &[Vec<f32>], slots: &[usize]) -> (Vec<Vec<i16>>, [f64; 3], f64) {
     let (low, grain) = corner(rows, slots);
-    let mut columns: Vec<Vec<i16>> = (0..7 * slots.len()).map(|_| Vec::with_capacity(rows.len())).collect();
+    let mut columns: Vec<Vec<i16>> = (0..7 * slots.len())
+        .map(|_| Vec::with_capacity(rows.len()))
+        .collect();
     let mut last = vec![0i16; columns.len()];
     // Row by row, as they lie in memory.
     for row in rows {
-        for ((slot, columns), last) in slots.iter().zip(columns.chunks_mut(7)).zip(last.chunks_mut(7)) {
+        for ((slot, columns), last) in slots
+            .iter()
+            .zip(columns.chunks_mut(7))
+            .zip(last.chunks_mut(7))
+        {
             let values = row.get(7 * slot..7 * slot + 7).unwrap_or_default();
-            for (part, value) in values.iter().enumerate().filter(|(_, value)| value.is_finite()) {
+            for (part, value) in values
+                .iter()
+                .enumerate()
+                .filter(|(_, value)| value.is_finite())
+            {
                 // Positions are relative to the lowest corner; quaternion components are absolute.
                 let steps = match low.get(part) {
                     Some(low) => (f64::from(*value) - low) / grain,
                     None => f64::from(*value) / GRAIN_TURN,
                 };
-                // Positions use all 16 bits as unsigned integers; quaternion components are within ±5000.
+                // Positions use all 16 bits as unsigned integers; quaternion components are within
+                // ±5000.
                 last[part] = (steps.round().clamp(-32_768.0, 65_535.0) as i32) as i16;
             }
             for (column, last) in columns.iter_mut().zip(last) {
@@ -229,15 +288,26 @@ fn columns(rows: &[Vec<f32>], slots: &[usize]) -> (Vec<Vec<i16>>, [f64; 3], f64)
 /// Returns the lowest corner of all positions of some tracks, and the position step.
 fn corner(rows: &[Vec<f32>], slots: &[usize]) -> ([f64; 3], f64) {
     let (mut low, mut high) = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
-    for (row, slot) in rows.iter().flat_map(|row| slots.iter().map(move |slot| (row, slot))) {
+    for (row, slot) in rows
+        .iter()
+        .flat_map(|row| slots.iter().map(move |slot| (row, slot)))
+    {
         let position = row.get(7 * slot..7 * slot + 3).unwrap_or_default();
-        for (axis, value) in position.iter().enumerate().filter(|(_, value)| value.is_finite()) {
+        for (axis, value) in position
+            .iter()
+            .enumerate()
+            .filter(|(_, value)| value.is_finite())
+        {
             low[axis] = low[axis].min(*value);
             high[axis] = high[axis].max(*value);
         }
     }
     let low = low.map(|low| if low.is_finite() { f64::from(low) } else { 0.0 });
-    let extent = low.iter().zip(high).map(|(low, high)| f64::from(high) - low).fold(0.0, f64::max);
+    let extent = low
+        .iter()
+        .zip(high)
+        .map(|(low, high)| f64::from(high) - low)
+        .fold(0.0, f64::max);
     (low, GRAIN_M.max(extent / f64::from(u16::MAX)))
 }
 
@@ -253,10 +323,16 @@ mod tests {
                 pose: actcheck_data::Pose::IDENTITY,
                 shape: actcheck_data::Shape::Sphere { radius: size },
             };
-            Form { name: "a".to_owned(), parts: vec![part] }
+            Form {
+                name: "a".to_owned(),
+                parts: vec![part],
+            }
         };
         let mut shapes = Shapes::default();
-        assert_eq!([0.1, 0.2, 0.3].map(|size| shapes.of(&form(size))), [0, 1, 2]);
+        assert_eq!(
+            [0.1, 0.2, 0.3].map(|size| shapes.of(&form(size))),
+            [0, 1, 2]
+        );
         shapes.truncate(1);
         assert_eq!([0.1, 0.3].map(|size| shapes.of(&form(size))), [0, 1]);
         assert_eq!(shapes.all().len(), 2);
@@ -264,8 +340,9 @@ mod tests {
 
     #[test]
     fn trajectories_are_exact_to_a_tenth_of_a_millimetre() {
-        let rows: Vec<Vec<f32>> =
-            (0..50).map(|at| vec![at as f32 * 0.02 - 3.0, 1.5, f32::NAN, 0.0, 0.0, -0.6, 0.8]).collect();
+        let rows: Vec<Vec<f32>> = (0..50)
+            .map(|at| vec![at as f32 * 0.02 - 3.0, 1.5, f32::NAN, 0.0, 0.0, -0.6, 0.8])
+            .collect();
         let (columns, low, grain) = columns(&rows, &[0]);
         assert_eq!((columns.len(), grain), (7, GRAIN_M));
         for (row, code) in rows.iter().zip(&columns[0]) {

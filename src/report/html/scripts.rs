@@ -46,10 +46,14 @@ pub(super) const SCRIPT: [&str; 31] = [
 /// Template of the page, with placeholders.
 pub(super) const SHELL: &str = include_str!("web/page.html");
 
-/// The two modules of three.js, which draws in 3D. (MIT; the licence is in their folder and header.)
+/// The two modules of three.js, which draws in 3D. (MIT; the licence is in their folder and
+/// header.)
 pub(super) const THREE: [(&str, &str); 2] = [
     ("three-core", include_str!("vendor/three/three.core.min.js")),
-    ("three-module", include_str!("vendor/three/three.module.min.js")),
+    (
+        "three-module",
+        include_str!("vendor/three/three.module.min.js"),
+    ),
 ];
 
 #[cfg(test)]
@@ -74,7 +78,11 @@ mod tests {
     fn scripts_never_parse_text_as_markup() {
         for script in SCRIPT {
             for parser in PARSERS {
-                assert!(!script.contains(parser), "{parser} in {}", script.lines().next().unwrap_or_default());
+                assert!(
+                    !script.contains(parser),
+                    "{parser} in {}",
+                    script.lines().next().unwrap_or_default()
+                );
             }
             // It would end the script element.
             assert!(!script.to_lowercase().contains("</script"));
@@ -84,8 +92,11 @@ mod tests {
     #[test]
     fn the_page_has_no_external_addresses() {
         for text in SCRIPT.iter().chain(&STYLE).chain([&SHELL]) {
-            let hosts: Vec<&str> =
-                text.split("://").skip(1).map(|rest| rest.split(['/', '"']).next().unwrap_or_default()).collect();
+            let hosts: Vec<&str> = text
+                .split("://")
+                .skip(1)
+                .map(|rest| rest.split(['/', '"']).next().unwrap_or_default())
+                .collect();
             // The SVG namespace is a name, not an address.
             assert!(hosts.iter().all(|host| *host == "www.w3.org"), "{hosts:?}");
         }
@@ -95,6 +106,10 @@ mod tests {
     fn the_library_has_its_licence() {
         let licence = include_str!("vendor/three/LICENSE");
         assert!(licence.contains("MIT License") && licence.contains("three.js authors"));
-        assert!(THREE.iter().all(|(_, text)| text.contains("SPDX-License-Identifier: MIT")));
+        assert!(
+            THREE
+                .iter()
+                .all(|(_, text)| text.contains("SPDX-License-Identifier: MIT"))
+        );
     }
 }

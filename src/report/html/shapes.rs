@@ -19,12 +19,15 @@ impl Shapes {
         self.number(form.parts.iter().map(part).collect())
     }
 
-    /// Returns the index of the bounding box of a body without a shape. Frame: world axes, relative to the body's
-    /// origin.
+    /// Returns the index of the bounding box of a body without a shape. Frame: world axes, relative
+    /// to the body's origin.
     pub fn around(&mut self, body: &BodyState) -> usize {
         let size = [0, 1, 2].map(|axis| round(body.aabb_max[axis] - body.aabb_min[axis]));
-        let middle = [0, 1, 2]
-            .map(|axis| round(f64::midpoint(body.aabb_max[axis], body.aabb_min[axis]) - body.pose.position[axis]));
+        let middle = [0, 1, 2].map(|axis| {
+            round(
+                f64::midpoint(body.aabb_max[axis], body.aabb_min[axis]) - body.pose.position[axis],
+            )
+        });
         let [x, y, z] = middle;
         self.number(json!([{ "at": [x, y, z, 0, 0, 0, 1], "kind": "box", "size": size }]))
     }
@@ -63,7 +66,13 @@ fn part(part: &Part) -> Value {
         Shape::Capsule { radius, height } => {
             json!({ "at": at, "kind": "capsule", "radius": round(*radius), "height": round(*height) })
         }
-        Shape::Tube { radius_low, radius_high, wall, height, .. } => json!({
+        Shape::Tube {
+            radius_low,
+            radius_high,
+            wall,
+            height,
+            ..
+        } => json!({
             "at": at, "kind": "tube", "low": round(*radius_low), "high": round(*radius_high), "wall": round(*wall),
             "height": round(*height),
         }),

@@ -1,4 +1,5 @@
-//! Measurements of the gripper over time. The page derives all other signals from the bodies' trajectories.
+//! Measurements of the gripper over time. The page derives all other signals from the bodies'
+//! trajectories.
 
 use serde_json::{Value, json};
 
@@ -10,22 +11,29 @@ const OPENING_STEP_M: f64 = 1e-4;
 /// Steps of the force. Unit: newtons.
 const FORCE_STEP_N: f64 = 0.5;
 
-/// Positions of the grasp point before and after an action, from which the page finds the link that carries it. Unit:
-/// metres. Frame: world.
+/// Positions of the grasp point before and after an action, from which the page finds the link that
+/// carries it. Unit: metres. Frame: world.
 pub(super) fn hand(trace: &Trace, action_idx: usize) -> Value {
-    let around = [action_idx, action_idx + 1].map(|idx| trace.snapshots.get(idx).or(trace.snapshots.last()));
+    let around =
+        [action_idx, action_idx + 1].map(|idx| trace.snapshots.get(idx).or(trace.snapshots.last()));
     json!(around.map(|state| state.map(|state| state.robot.gripper.position)))
 }
 
-/// Gap between the fingers and their mean force, at equal intervals: start and interval in seconds since the action
-/// began, then whole steps as differences, which are mostly zero. `null` if the trace has none.
+/// Gap between the fingers and their mean force, at equal intervals: start and interval in seconds
+/// since the action began, then whole steps as differences, which are mostly zero. `null` if the
+/// trace has none.
 pub(super) fn grip(motion: &Motion) -> Value {
     let moments: Vec<_> = motion.moments().collect();
-    let (Some(first), Some(last)) = (moments.first(), moments.last()) else { return Value::Null };
+    let (Some(first), Some(last)) = (moments.first(), moments.last()) else {
+        return Value::Null;
+    };
     let intervals = moments.len().saturating_sub(1).max(1) as f64;
-    let opening = moments.iter().map(|moment| f64::from(moment.opening_m) / OPENING_STEP_M);
-    let force =
-        moments.iter().map(|moment| f64::from(moment.finger_efforts_n.iter().sum::<f32>()) / 2.0 / FORCE_STEP_N);
+    let opening = moments
+        .iter()
+        .map(|moment| f64::from(moment.opening_m) / OPENING_STEP_M);
+    let force = moments
+        .iter()
+        .map(|moment| f64::from(moment.finger_efforts_n.iter().sum::<f32>()) / 2.0 / FORCE_STEP_N);
     json!({
         "start": first.time_secs, "period": f64::from(last.time_secs - first.time_secs) / intervals,
         "opening": differences(opening), "opening_step": OPENING_STEP_M,
@@ -36,12 +44,15 @@ pub(super) fn grip(motion: &Motion) -> Value {
 /// Number of steps between the smallest and the largest value of a deciding signal.
 const DECIDING_STEPS: f64 = 2000.0;
 
-/// A signal that decided a property: its name, the moment, and its values and limits, packed as those of a grip.
+/// A signal that decided a property: its name, the moment, and its values and limits, packed as
+/// those of a grip.
 pub(super) fn deciding(signal: &DecidingSignal) -> Value {
     let [low, high] = signal.range();
     let step = ((high - low) / DECIDING_STEPS).max(1e-9);
     let packed = |values: &[f64]| differences(values.iter().map(|value| value / step));
-    let limit = signal.constant_limit().map_or_else(|| json!(packed(&signal.limit)), |limit| json!(limit));
+    let limit = signal
+        .constant_limit()
+        .map_or_else(|| json!(packed(&signal.limit)), |limit| json!(limit));
     json!({
         "name": signal.quantity, "unit": signal.unit, "symbol": signal.symbol, "period": signal.period_secs,
         "at": signal.at_secs(), "during": signal.interval_secs(), "step": step, "values": packed(&signal.values),
@@ -49,13 +60,17 @@ pub(super) fn deciding(signal: &DecidingSignal) -> Value {
     })
 }
 
-/// Rounds values to integers and returns the first, then the differences. Values that are not finite repeat the
-/// previous one.
+/// Rounds values to integers and returns the first, then the differences. Values that are not
+/// finite repeat the previous one.
 fn differences(values: impl Iterator<Item = f64>) -> Vec<i64> {
     let mut last = 0i64;
     values
         .map(|value| {
-            let now = if value.is_finite() { value.round() as i64 } else { last };
+            let now = if value.is_finite() {
+                value.round() as i64
+            } else {
+                last
+            };
             now - std::mem::replace(&mut last, now)
         })
         .collect()
@@ -89,7 +104,10 @@ mod tests {
             (&json!(0.5), &json!(1.0), &json!([0.5, 1.0]))
         );
         assert_eq!(packed["values"], json!([0, 1000, 1000]));
-        let growing = DecidingSignal { limit: vec![0.0, 0.5, 1.0], ..signal };
+        let growing = DecidingSignal {
+            limit: vec![0.0, 0.5, 1.0],
+            ..signal
+        };
         assert_eq!(deciding(&growing)["limit"], json!([0, 500, 500]));
     }
 
@@ -100,8 +118,14 @@ mod tests {
             (row[0], row[1], row[2], row[3]) = (secs, opening, force, force);
             row
         };
-        let motion =
-            Motion { joints: Vec::new(), rows: vec![row(0.0, 0.08, 0.0), row(0.05, 0.08, 0.0), row(0.1, 0.06, 12.0)] };
+        let motion = Motion {
+            joints: Vec::new(),
+            rows: vec![
+                row(0.0, 0.08, 0.0),
+                row(0.05, 0.08, 0.0),
+                row(0.1, 0.06, 12.0),
+            ],
+        };
         let packed = grip(&motion);
         assert_eq!(packed["opening"], json!([800, 0, -200]));
         assert_eq!(packed["force"], json!([0, 0, 24]));

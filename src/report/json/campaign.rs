@@ -57,7 +57,11 @@ fn failure_mode(summary: &CampaignSummary, mode: &FailureMode) -> Value {
 }
 
 fn remark(summary: &CampaignSummary, remark: &Remark) -> Value {
-    let properties: Vec<&str> = remark.properties.iter().map(|(iri, _)| iri.as_str()).collect();
+    let properties: Vec<&str> = remark
+        .properties
+        .iter()
+        .map(|(iri, _)| iri.as_str())
+        .collect();
     json!({
         "severity": if remark.warning { "warning" } else { "note" }, "oddity": remark.oddity.word(),
         "properties": properties, "count": remark.count, "of": remark.of, "run": remark.run,

@@ -21,7 +21,13 @@ pub fn compare_json(summary: &CompareSummary) -> Value {
         .map(|change| json!({"kind": change.kind, "name": change.name, "a": change.first, "b": change.second}))
         .collect();
     let [only_a, only_b] = summary.config_lines();
-    let worse = summary.level.map(|level| found.worse_at(level).into_iter().map(of).collect::<Vec<Value>>());
+    let worse = summary.level.map(|level| {
+        found
+            .worse_at(level)
+            .into_iter()
+            .map(of)
+            .collect::<Vec<Value>>()
+    });
     json!({
         "a": first,
         "b": second,
@@ -46,8 +52,14 @@ pub fn compare_json(summary: &CompareSummary) -> Value {
 
 fn line(line: &ComparedLine, summary: &CompareSummary) -> Value {
     let (action, property) = compared_parts(&line.of);
-    let answer = summary.comparison.answer_of(line, summary.answer_level(), summary.margin);
-    let scenes = if let Answer::Underpowered { scenes } = answer { scenes } else { None };
+    let answer = summary
+        .comparison
+        .answer_of(line, summary.answer_level(), summary.margin);
+    let scenes = if let Answer::Underpowered { scenes } = answer {
+        scenes
+    } else {
+        None
+    };
     json!({
         "action": action,
         "property": property,

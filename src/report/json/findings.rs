@@ -4,8 +4,8 @@ use serde_json::{Value, json};
 
 use crate::{Causes, FindingsSummary, PropertyReport};
 use actcheck_analysis::{
-    Cascade, Collisions, Condition, FailureMode, HitKind, Judged, Parameter, Pattern, PropertyFindings, Sampling,
-    Sector, Strongest, TwoByTwo, TwoWay,
+    Cascade, Collisions, Condition, FailureMode, HitKind, Judged, Parameter, Pattern,
+    PropertyFindings, Sampling, Sector, Strongest, TwoByTwo, TwoWay,
 };
 
 /// Returns all findings as JSON.
@@ -14,7 +14,8 @@ pub fn findings_json(summary: &FindingsSummary) -> Value {
     findings_with(summary, summary.modes.iter().map(mode).collect())
 }
 
-/// Returns all findings as JSON, with these failure modes: of a million runs, the ids in them are most of the text.
+/// Returns all findings as JSON, with these failure modes: of a million runs, the ids in them are
+/// most of the text.
 pub(crate) fn findings_with(summary: &FindingsSummary, modes: Vec<Value>) -> Value {
     json!({
         "campaigns": summary.campaigns,
@@ -30,7 +31,8 @@ pub(crate) fn findings_with(summary: &FindingsSummary, modes: Vec<Value>) -> Val
 }
 
 fn cascade(cascade: &Cascade) -> Value {
-    let judged = |of: &Judged| json!({ "step": of.step, "action": of.action, "property": of.property });
+    let judged =
+        |of: &Judged| json!({ "step": of.step, "action": of.action, "property": of.property });
     json!({
         "first": judged(&cascade.first), "later": judged(&cascade.later), "table": table(cascade.table),
         "p": cascade.p, "q": cascade.q,
@@ -100,8 +102,11 @@ fn strongest(causes: &Causes<'_>, strongest: &Strongest) -> Value {
 
 fn pattern(causes: &Causes<'_>, pattern: &Pattern) -> Value {
     let parameters = &causes.input.parameters;
-    let conditions: Vec<Value> =
-        pattern.conditions.iter().map(|one| condition(one, &parameters[one.parameter()])).collect();
+    let conditions: Vec<Value> = pattern
+        .conditions
+        .iter()
+        .map(|one| condition(one, &parameters[one.parameter()]))
+        .collect();
     json!({
         "sentence": causes.sentence(pattern),
         "conditions": conditions,
@@ -127,7 +132,10 @@ fn condition(condition: &Condition, parameter: &Parameter) -> Value {
 
 fn collisions(of: &Collisions) -> Value {
     let counted = |counts: &[(String, u64)]| -> Vec<Value> {
-        counts.iter().map(|(name, count)| json!({ "name": name, "count": count })).collect()
+        counts
+            .iter()
+            .map(|(name, count)| json!({ "name": name, "count": count }))
+            .collect()
     };
     let kind = |kind: &HitKind| {
         json!({
@@ -159,6 +167,10 @@ fn collisions(of: &Collisions) -> Value {
 
 fn map(map: &TwoWay) -> Value {
     let cell = |cell: &actcheck_analysis::TwoWayCell| json!({ "runs": cell.runs, "failed": cell.failed, "failing": cell.failing });
-    let rows: Vec<Vec<Value>> = map.cells.iter().map(|row| row.iter().map(cell).collect()).collect();
+    let rows: Vec<Vec<Value>> = map
+        .cells
+        .iter()
+        .map(|row| row.iter().map(cell).collect())
+        .collect();
     json!({ "by": map.by, "down": map.down, "across": map.across, "cells": rows })
 }

@@ -19,8 +19,11 @@ pub fn health_json(summary: &HealthSummary) -> Value {
             "expected_hit": pair.expected_hits,
         })
     });
-    let worst =
-        |worst: &Option<(f64, String)>| worst.as_ref().map(|(value, run)| json!({ "value": value, "run": run }));
+    let worst = |worst: &Option<(f64, String)>| {
+        worst
+            .as_ref()
+            .map(|(value, run)| json!({ "value": value, "run": run }))
+    };
     let warnings = health.problems.iter().map(|problem| {
         let warning = summary.warning(problem);
         json!({ "code": warning.code, "text": warning.message, "help": warning.help })

@@ -1,4 +1,5 @@
-//! Whole reports as one JSON object each, one file for each summary. Their keys are an interface for other programs.
+//! Whole reports as one JSON object each, one file for each summary. Their keys are an interface
+//! for other programs.
 //!
 //! Never: computes the printed values (see `summary`), or writes to a stream.
 

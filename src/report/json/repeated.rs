@@ -11,9 +11,16 @@ pub(super) fn repeated_json(summary: &CampaignSummary) -> Value {
     if repeated.is_empty() {
         return Value::Null;
     }
-    let property = |RepeatedProperty { property, label, found }: &RepeatedProperty| {
+    let property = |RepeatedProperty {
+                        property,
+                        label,
+                        found,
+                    }: &RepeatedProperty| {
         let flaky = |SceneCounts { scene, passed, of }: &SceneCounts| {
-            let runs: Vec<&str> = summary.runs_of_scene(*scene).map(|run| run.id.as_str()).collect();
+            let runs: Vec<&str> = summary
+                .runs_of_scene(*scene)
+                .map(|run| run.id.as_str())
+                .collect();
             json!({ "scene": scene, "passed": passed, "of": of, "runs": runs })
         };
         let power = |power: &PassPower| {

@@ -8,7 +8,8 @@ use actcheck_history::RunDetail;
 
 /// Returns the run as JSON.
 ///
-/// `perceived` are sentences about the perceived target, by the action's position in the test (from 1).
+/// `perceived` are sentences about the perceived target, by the action's position in the test (from
+/// 1).
 pub fn run_json(run: &RunDetail, perceived: &BTreeMap<u32, String>) -> Value {
     let row = &run.row;
     let objects: Vec<Value> = run

@@ -6,7 +6,9 @@ use crate::{CampaignSummary, GuidedSearch, WeightedLine};
 
 /// Returns the weighted rates as JSON, or `null` if scenes were sampled at random.
 pub(super) fn weighted_json(summary: &CampaignSummary) -> Value {
-    let Some(GuidedSearch { strategy, lines }) = &summary.search else { return Value::Null };
+    let Some(GuidedSearch { strategy, lines }) = &summary.search else {
+        return Value::Null;
+    };
     let line = |line: &WeightedLine| {
         json!({
             "test": line.test, "property": line.property, "label": line.label,

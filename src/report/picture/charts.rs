@@ -34,9 +34,19 @@ impl Chart {
     pub fn all_of(explained: &[Explained]) -> Vec<Self> {
         let of_one = |why: &Explained| {
             let title = format!("{}. {}", why.step, names::local(&why.property));
-            why.deciding.iter().map(move |signal| Self { title: title.clone(), signal: signal.clone() }).collect()
+            why.deciding
+                .iter()
+                .map(move |signal| Self {
+                    title: title.clone(),
+                    signal: signal.clone(),
+                })
+                .collect()
         };
-        explained.iter().flat_map(|why| -> Vec<Self> { of_one(why) }).take(MOST).collect()
+        explained
+            .iter()
+            .flat_map(|why| -> Vec<Self> { of_one(why) })
+            .take(MOST)
+            .collect()
     }
 }
 
@@ -48,7 +58,12 @@ pub(super) fn draw(drawing: &mut Drawing, charts: &[Chart], area: Rect, gap: f64
         let (row, column) = (idx / 2, idx % 2);
         let left = area.left + column as f64 * (width + gap);
         let top = area.top + row as f64 * each;
-        let plot = Rect { left: left + VALUES_PX, top: top + LINE_PX, width: width - VALUES_PX, height: HEIGHT_PX };
+        let plot = Rect {
+            left: left + VALUES_PX,
+            top: top + LINE_PX,
+            width: width - VALUES_PX,
+            height: HEIGHT_PX,
+        };
         one(drawing, chart, plot, left);
     }
     area.top + charts.len().div_ceil(2) as f64 * each
@@ -57,16 +72,28 @@ pub(super) fn draw(drawing: &mut Drawing, charts: &[Chart], area: Rect, gap: f64
 fn one(drawing: &mut Drawing, chart: &Chart, plot: Rect, left: f64) {
     let signal = &chart.signal;
     let [low, high] = signal.range();
-    let (low, high) = if high > low { (low.min(0.0), high) } else { (low - 0.5, high + 0.5) };
+    let (low, high) = if high > low {
+        (low.min(0.0), high)
+    } else {
+        (low - 0.5, high + 0.5)
+    };
     let duration = signal.values.len().saturating_sub(1).max(1) as f64 * signal.period_secs;
     let x = |secs: f64| plot.left + secs / duration * plot.width;
     let y = |value: f64| plot.bottom() - 4.0 - (value - low) / (high - low) * (plot.height - 8.0);
     drawing.polygon(plot.corners(), paint::BACKGROUND);
     let [from, to] = signal.interval_secs().map(x);
-    let shade = Rect { left: from, width: (to - from).max(2.0), ..plot };
+    let shade = Rect {
+        left: from,
+        width: (to - from).max(2.0),
+        ..plot
+    };
     drawing.polygon(shade.corners(), VIOLATED);
     let points = |values: &[f64]| -> Vec<[f64; 2]> {
-        values.iter().enumerate().map(|(idx, value)| [x(idx as f64 * signal.period_secs), y(*value)]).collect()
+        values
+            .iter()
+            .enumerate()
+            .map(|(idx, value)| [x(idx as f64 * signal.period_secs), y(*value)])
+            .collect()
     };
     drawing.line(points(&signal.limit), LIMIT);
     drawing.line(points(&signal.values), CURVE);
@@ -80,12 +107,25 @@ fn one(drawing: &mut Drawing, chart: &Chart, plot: Rect, left: f64) {
     let text = format!("{} s", rounded(at));
     let wide = font::width(&text, SIZE_PX, true);
     let start = (x(at) - wide / 2.0).clamp(plot.left, plot.right() - wide);
-    write(drawing, text, [start, plot.bottom() + 13.0], (paint::FAILED, true));
-    for (secs, text) in [(0.0, "0 s".to_owned()), (duration, format!("{} s", rounded(duration)))] {
+    write(
+        drawing,
+        text,
+        [start, plot.bottom() + 13.0],
+        (paint::FAILED, true),
+    );
+    for (secs, text) in [
+        (0.0, "0 s".to_owned()),
+        (duration, format!("{} s", rounded(duration))),
+    ] {
         let own = font::width(&text, SIZE_PX, false);
         let place = (x(secs) - own / 2.0).clamp(plot.left, plot.right() - own);
         if place + own + 6.0 < start || start + wide + 6.0 < place {
-            write(drawing, text, [place, plot.bottom() + 13.0], (paint::GREY, false));
+            write(
+                drawing,
+                text,
+                [place, plot.bottom() + 13.0],
+                (paint::GREY, false),
+            );
         }
     }
 }
@@ -93,7 +133,11 @@ fn one(drawing: &mut Drawing, chart: &Chart, plot: Rect, left: f64) {
 /// The title with the comparison, and the smallest and the largest value.
 fn labels(drawing: &mut Drawing, chart: &Chart, plot: Rect, left: f64, [low, high]: [f64; 2]) {
     let signal = &chart.signal;
-    let unit = if signal.unit.is_empty() { String::new() } else { format!(" {}", signal.unit) };
+    let unit = if signal.unit.is_empty() {
+        String::new()
+    } else {
+        format!(" {}", signal.unit)
+    };
     let limit = match (signal.constant_limit(), signal.limit.is_empty()) {
         (_, true) => String::new(),
         (Some(limit), _) => format!(" {} {}{unit}", signal.symbol, rounded(limit)),
@@ -106,7 +150,11 @@ fn labels(drawing: &mut Drawing, chart: &Chart, plot: Rect, left: f64, [low, hig
     write(drawing, line, [left, plot.top - 6.0], (paint::INK, true));
     for (value, y) in [(high, plot.top + 10.0), (low, plot.bottom() - 2.0)] {
         // A value that is as good as 0 in the chart is 0.
-        let value = if value.abs() < 1e-3 * (high - low) { 0.0 } else { value };
+        let value = if value.abs() < 1e-3 * (high - low) {
+            0.0
+        } else {
+            value
+        };
         let text = format!("{}{unit}", rounded(value));
         let start = plot.left - 6.0 - font::width(&text, SIZE_PX, false);
         write(drawing, text, [start.max(left), y], (paint::GREY, false));
@@ -114,15 +162,34 @@ fn labels(drawing: &mut Drawing, chart: &Chart, plot: Rect, left: f64, [low, hig
 }
 
 fn write(drawing: &mut Drawing, text: String, at: [f64; 2], (rgb, bold): (u32, bool)) {
-    drawing.words(Words { text, at, size: SIZE_PX, bold, paint: Paint::solid(rgb), rim: false });
+    drawing.words(Words {
+        text,
+        at,
+        size: SIZE_PX,
+        bold,
+        paint: Paint::solid(rgb),
+        rim: false,
+    });
 }
 
 /// Formats a number with three significant digits.
 fn rounded(value: f64) -> String {
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "from 0 to 6")]
-    let digits = if value == 0.0 { 0 } else { (2.0 - value.abs().log10().floor()).clamp(0.0, 6.0) as usize };
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "from 0 to 6"
+    )]
+    let digits = if value == 0.0 {
+        0
+    } else {
+        (2.0 - value.abs().log10().floor()).clamp(0.0, 6.0) as usize
+    };
     let text = format!("{value:.digits$}");
-    if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
+    if text.contains('.') {
+        text.trim_end_matches('0').trim_end_matches('.').to_owned()
+    } else {
+        text
+    }
 }
 
 #[cfg(test)]
@@ -140,36 +207,66 @@ mod tests {
             interval: [at, 20],
             at,
         };
-        Chart { title: "1. KeptUpright".to_owned(), signal }
+        Chart {
+            title: "1. KeptUpright".to_owned(),
+            signal,
+        }
     }
 
     fn words(chart: Chart) -> Vec<(String, f64, f64)> {
         let mut drawing = Drawing::new(1200.0);
-        let area = Rect { left: 10.0, top: 10.0, width: 1180.0, height: 0.0 };
+        let area = Rect {
+            left: 10.0,
+            top: 10.0,
+            width: 1180.0,
+            height: 0.0,
+        };
         assert!(draw(&mut drawing, &[chart], area, 18.0) > 100.0);
         let texts = drawing.marks.iter().filter_map(|(_, mark)| match mark {
             crate::picture::drawing::Mark::Words(words) => Some(words),
             crate::picture::drawing::Mark::Shape { .. } => None,
         });
         let place = |words: &Words| {
-            (words.text.clone(), words.at[0], words.at[0] + font::width(&words.text, SIZE_PX, words.bold))
+            (
+                words.text.clone(),
+                words.at[0],
+                words.at[0] + font::width(&words.text, SIZE_PX, words.bold),
+            )
         };
         texts.map(place).collect()
     }
 
     #[test]
     fn a_chart_names_quantity_limit_unit_and_moment() {
-        let texts: Vec<String> = words(chart(10, vec![0.5; 21])).into_iter().map(|(text, ..)| text).collect();
-        assert_eq!(texts, ["1. KeptUpright: tilt(cup) < 0.5 rad", "1 rad", "0 rad", "1 s", "0 s", "2 s"]);
+        let texts: Vec<String> = words(chart(10, vec![0.5; 21]))
+            .into_iter()
+            .map(|(text, ..)| text)
+            .collect();
+        assert_eq!(
+            texts,
+            [
+                "1. KeptUpright: tilt(cup) < 0.5 rad",
+                "1 rad",
+                "0 rad",
+                "1 s",
+                "0 s",
+                "2 s"
+            ]
+        );
     }
 
     #[test]
     fn the_times_below_a_chart_never_overlap() {
         for at in 0..=20 {
-            let mut times: Vec<_> =
-                words(chart(at, vec![])).into_iter().filter(|(text, ..)| text.ends_with(" s")).collect();
+            let mut times: Vec<_> = words(chart(at, vec![]))
+                .into_iter()
+                .filter(|(text, ..)| text.ends_with(" s"))
+                .collect();
             times.sort_by(|a, b| a.1.total_cmp(&b.1));
-            assert!(times.windows(2).all(|pair| pair[0].2 < pair[1].1), "{times:?}");
+            assert!(
+                times.windows(2).all(|pair| pair[0].2 < pair[1].1),
+                "{times:?}"
+            );
         }
     }
 }

@@ -24,17 +24,32 @@ impl Rect {
 
     /// Corners in order around the rectangle.
     pub(super) fn corners(&self) -> Vec<[f64; 2]> {
-        vec![[self.left, self.top], [self.right(), self.top], [self.right(), self.bottom()], [self.left, self.bottom()]]
+        vec![
+            [self.left, self.top],
+            [self.right(), self.top],
+            [self.right(), self.bottom()],
+            [self.left, self.bottom()],
+        ]
     }
 
     pub(super) fn grown(&self, by: f64) -> Self {
-        Self { left: self.left - by, top: self.top - by, width: self.width + 2.0 * by, height: self.height + 2.0 * by }
+        Self {
+            left: self.left - by,
+            top: self.top - by,
+            width: self.width + 2.0 * by,
+            height: self.height + 2.0 * by,
+        }
     }
 
     /// The smallest rectangle around this one and a point.
     pub(super) fn with(&self, [x, y]: [f64; 2]) -> Self {
         let (left, top) = (self.left.min(x), self.top.min(y));
-        Self { left, top, width: self.right().max(x) - left, height: self.bottom().max(y) - top }
+        Self {
+            left,
+            top,
+            width: self.right().max(x) - left,
+            height: self.bottom().max(y) - top,
+        }
     }
 
     /// Area of the intersection of two rectangles.
@@ -80,11 +95,19 @@ pub(super) struct Line {
 
 impl Line {
     pub(super) const fn new(paint: Paint, width: f64) -> Self {
-        Self { paint, width, dash: None }
+        Self {
+            paint,
+            width,
+            dash: None,
+        }
     }
 
     pub(super) const fn dashed(paint: Paint, width: f64, dash: [f64; 2]) -> Self {
-        Self { paint, width, dash: Some(dash) }
+        Self {
+            paint,
+            width,
+            dash: Some(dash),
+        }
     }
 }
 
@@ -97,15 +120,24 @@ pub(super) struct Style {
 
 impl Style {
     pub(super) const fn line(line: Line) -> Self {
-        Self { fill: None, line: Some(line) }
+        Self {
+            fill: None,
+            line: Some(line),
+        }
     }
 
     pub(super) const fn fill(paint: Paint) -> Self {
-        Self { fill: Some(paint), line: None }
+        Self {
+            fill: Some(paint),
+            line: None,
+        }
     }
 
     pub(super) const fn both(fill: Paint, line: Line) -> Self {
-        Self { fill: Some(fill), line: Some(line) }
+        Self {
+            fill: Some(fill),
+            line: Some(line),
+        }
     }
 }
 
@@ -144,12 +176,18 @@ pub struct Drawing {
     clip: Option<Rect>,
 }
 
-/// Coordinates are limited to this distance, because unstable simulations can place bodies anywhere. Unit: pixels.
+/// Coordinates are limited to this distance, because unstable simulations can place bodies
+/// anywhere. Unit: pixels.
 const FAR_PX: f64 = 20_000.0;
 
 impl Drawing {
     pub(super) fn new(width: f64) -> Self {
-        Self { width, height: 0.0, marks: Vec::new(), clip: None }
+        Self {
+            width,
+            height: 0.0,
+            marks: Vec::new(),
+            clip: None,
+        }
     }
 
     /// Sets the clipping rectangle of later marks; `None` removes it.
@@ -168,16 +206,31 @@ impl Drawing {
     pub(super) fn circle(&mut self, [x, y]: [f64; 2], radius: f64, style: Style) {
         let turn = std::f64::consts::TAU / 28.0;
         let points = (0..28).map(|idx| turn * f64::from(idx));
-        self.polygon(points.map(|a| [x + radius * libm::cos(a), y + radius * libm::sin(a)]).collect(), style);
+        self.polygon(
+            points
+                .map(|a| [x + radius * libm::cos(a), y + radius * libm::sin(a)])
+                .collect(),
+            style,
+        );
     }
 
-    /// Draws polygons or lines as one shape, so that translucent fills do not add up where they overlap.
+    /// Draws polygons or lines as one shape, so that translucent fills do not add up where they
+    /// overlap.
     pub(super) fn shape(&mut self, lines: Vec<Vec<[f64; 2]>>, closed: bool, style: Style) {
         let near = |point: &[f64; 2]| point.iter().all(|value| value.abs() < FAR_PX);
-        let lines: Vec<Vec<[f64; 2]>> =
-            lines.into_iter().filter(|line| line.len() > 1 && line.iter().all(near)).collect();
+        let lines: Vec<Vec<[f64; 2]>> = lines
+            .into_iter()
+            .filter(|line| line.len() > 1 && line.iter().all(near))
+            .collect();
         if !lines.is_empty() {
-            self.marks.push((self.clip, Mark::Shape { lines, closed, style }));
+            self.marks.push((
+                self.clip,
+                Mark::Shape {
+                    lines,
+                    closed,
+                    style,
+                },
+            ));
         }
     }
 

@@ -42,25 +42,47 @@ impl Caption {
     /// The caption of a stored run.
     pub fn of(run: &RunDetail) -> Self {
         let row = &run.row;
-        let reason = run.reason.iter().map(|reason| format!("{}: {reason}", row.status.word()));
+        let reason = run
+            .reason
+            .iter()
+            .map(|reason| format!("{}: {reason}", row.status.word()));
         let failed = run.actions.iter().flat_map(|action| {
-            let judged = action.judgements.iter().filter(|judgement| judgement.outcome == Outcome::Failed);
+            let judged = action
+                .judgements
+                .iter()
+                .filter(|judgement| judgement.outcome == Outcome::Failed);
             judged.map(|judgement| {
-                let (action, property) = (names::local(&action.action), names::local(&judgement.property));
+                let (action, property) = (
+                    names::local(&action.action),
+                    names::local(&judgement.property),
+                );
                 format!("{action}: {property}: {}", judgement.witness)
             })
         });
         let witnesses = run.actions.iter().enumerate().flat_map(|(idx, action)| {
-            let judged = action.judgements.iter().filter(|judgement| judgement.outcome == Outcome::Failed);
+            let judged = action
+                .judgements
+                .iter()
+                .filter(|judgement| judgement.outcome == Outcome::Failed);
             judged.map(move |judgement| (idx, judgement.witness.clone()))
         });
         Self {
-            title: format!("{} · {} · {} · S = {:.2}", row.run, row.test, row.status.word(), row.score),
+            title: format!(
+                "{} · {} · {} · S = {:.2}",
+                row.run,
+                row.test,
+                row.status.word(),
+                row.score
+            ),
             actions: run.actions.iter().map(what_was_done).collect(),
             failures: reason.chain(failed).collect(),
             witnesses: witnesses.collect(),
             charts: Vec::new(),
-            roles: run.objects.iter().map(|object| (object.id.clone(), object.role)).collect(),
+            roles: run
+                .objects
+                .iter()
+                .map(|object| (object.id.clone(), object.role))
+                .collect(),
         }
     }
 }
@@ -70,16 +92,32 @@ fn what_was_done(action: &ActionDetail) -> String {
         (Some(true), _) => "reported success".to_owned(),
         (Some(false), Some(message)) => format!("reported failure: {message}"),
         (Some(false), None) => "reported failure".to_owned(),
-        (None, Some(reason)) if action.end == Outcome::Inapplicable.word() => format!("not performed: {reason}"),
+        (None, Some(reason)) if action.end == Outcome::Inapplicable.word() => {
+            format!("not performed: {reason}")
+        }
         (None, _) => action.end.clone(),
     };
     let name = names::local(&action.action);
-    format!("{}. {name}: A = {:.2}, {:.1} s, {report}", action.step, action.score, action.duration_secs)
+    format!(
+        "{}. {name}: A = {:.2}, {:.1} s, {report}",
+        action.step, action.score, action.duration_secs
+    )
 }
 
-/// Draws the header into an area, from its upper end on, with the hardest contact if it is shown. Returns its lower end.
-pub(super) fn draw(drawing: &mut Drawing, caption: &Caption, pressed: Option<&Pressed>, area: Rect) -> f64 {
-    let mut writer = Writer { drawing, left: area.left, width: area.width, y: area.top };
+/// Draws the header into an area, from its upper end on, with the hardest contact if it is shown.
+/// Returns its lower end.
+pub(super) fn draw(
+    drawing: &mut Drawing,
+    caption: &Caption,
+    pressed: Option<&Pressed>,
+    area: Rect,
+) -> f64 {
+    let mut writer = Writer {
+        drawing,
+        left: area.left,
+        width: area.width,
+        y: area.top,
+    };
     writer.title(&caption.title);
     for (idx, action) in caption.actions.iter().enumerate() {
         writer.swatch(paint::action(idx));
@@ -89,13 +127,21 @@ pub(super) fn draw(drawing: &mut Drawing, caption: &Caption, pressed: Option<&Pr
         writer.lines(&format!("✗ {text}"), 18.0, paint::FAILED);
     }
     if caption.failures.len() > MOST_FAILURES {
-        writer.lines(&format!("✗ and {} more", caption.failures.len() - MOST_FAILURES), 18.0, paint::FAILED);
+        writer.lines(
+            &format!("✗ and {} more", caption.failures.len() - MOST_FAILURES),
+            18.0,
+            paint::FAILED,
+        );
     }
     if caption.failures.is_empty() && !caption.actions.is_empty() {
         writer.lines("nothing failed", 18.0, paint::GREY);
     }
     if let Some(pressed) = pressed {
-        writer.lines(&format!("hardest contact: {}", pressed.sentence()), 18.0, paint::FAILED);
+        writer.lines(
+            &format!("hardest contact: {}", pressed.sentence()),
+            18.0,
+            paint::FAILED,
+        );
     }
     writer.y
 }
@@ -112,7 +158,14 @@ impl Writer<'_> {
         self.y += 18.0;
         let at = [self.left, self.y];
         let paint = Paint::solid(paint::INK);
-        self.drawing.words(Words { text: text.to_owned(), at, size: 17.0, bold: true, paint, rim: false });
+        self.drawing.words(Words {
+            text: text.to_owned(),
+            at,
+            size: 17.0,
+            bold: true,
+            paint,
+            rim: false,
+        });
         self.y += 6.0;
     }
 
@@ -126,13 +179,26 @@ impl Writer<'_> {
             self.y += LINE_PX;
             let at = [self.left + indent, self.y];
             let paint = Paint::solid(rgb);
-            self.drawing.words(Words { text: line, at, size: SIZE_PX, bold: false, paint, rim: false });
+            self.drawing.words(Words {
+                text: line,
+                at,
+                size: SIZE_PX,
+                bold: false,
+                paint,
+                rim: false,
+            });
         }
     }
 
     /// Draws a square in the colour of an action's paths, before the next line.
     fn swatch(&mut self, rgb: u32) {
-        let square = Rect { left: self.left + 1.0, top: self.y + LINE_PX - 9.5, width: 10.0, height: 10.0 };
-        self.drawing.polygon(square.corners(), Style::fill(Paint::solid(rgb)));
+        let square = Rect {
+            left: self.left + 1.0,
+            top: self.y + LINE_PX - 9.5,
+            width: 10.0,
+            height: 10.0,
+        };
+        self.drawing
+            .polygon(square.corners(), Style::fill(Paint::solid(rgb)));
     }
 }

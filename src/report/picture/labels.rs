@@ -29,7 +29,11 @@ pub(super) struct Label<'a> {
 
 impl Labels {
     pub(super) fn new(panel: Rect, things: Vec<Rect>) -> Self {
-        Self { panel: panel.grown(-3.0), taken: Vec::new(), things }
+        Self {
+            panel: panel.grown(-3.0),
+            taken: Vec::new(),
+            things,
+        }
     }
 
     /// Keeps labels out of a rectangle.
@@ -37,7 +41,8 @@ impl Labels {
         self.taken.push(rect);
     }
 
-    /// Writes a label at the best free position. Skips it if the panel is full or does not show the object.
+    /// Writes a label at the best free position. Skips it if the panel is full or does not show the
+    /// object.
     pub(super) fn write(&mut self, drawing: &mut Drawing, label: &Label<'_>) {
         // Objects outside of the panel get no label.
         if self.panel.shared(&label.at.grown(1.0)) == 0.0 {
@@ -45,19 +50,35 @@ impl Labels {
         }
         let width = font::width(label.text, label.size, label.bold);
         let height = label.size * 1.15;
-        let places = candidates(&label.at, width, height).into_iter().filter(|place| {
-            self.panel.holds(place) && self.taken.iter().all(|other| other.shared(&place.grown(GAP_PX)) == 0.0)
-        });
+        let places = candidates(&label.at, width, height)
+            .into_iter()
+            .filter(|place| {
+                self.panel.holds(place)
+                    && self
+                        .taken
+                        .iter()
+                        .all(|other| other.shared(&place.grown(GAP_PX)) == 0.0)
+            });
         let rated = places.map(|place| (self.cost(&place, &label.at), place));
-        let Some((_, place)) = rated.min_by(|a, b| a.0.total_cmp(&b.0)) else { return };
+        let Some((_, place)) = rated.min_by(|a, b| a.0.total_cmp(&b.0)) else {
+            return;
+        };
         self.taken.push(place);
         leader(drawing, &label.at, &place);
         let at = [place.left, place.top + label.size * 0.92];
         let (size, bold) = (label.size, label.bold);
-        drawing.words(Words { text: label.text.to_owned(), at, size, bold, paint: Paint::solid(label.rgb), rim: true });
+        drawing.words(Words {
+            text: label.text.to_owned(),
+            at,
+            size,
+            bold,
+            paint: Paint::solid(label.rgb),
+            rim: true,
+        });
     }
 
-    /// Cost of a position: the distance from the object, and the hidden area of objects relative to the label's area.
+    /// Cost of a position: the distance from the object, and the hidden area of objects relative to
+    /// the label's area.
     fn cost(&self, place: &Rect, at: &Rect) -> f64 {
         let hidden: f64 = self.things.iter().map(|thing| thing.shared(place)).sum();
         let area = place.width * place.height;
@@ -75,17 +96,28 @@ fn gap(a: &Rect, b: &Rect) -> f64 {
 /// Candidate positions for a label: on its object, and around it at increasing distances.
 fn candidates(at: &Rect, width: f64, height: f64) -> Vec<Rect> {
     let [x, y] = at.middle();
-    let centred = |x: f64, y: f64| Rect { left: x - width / 2.0, top: y - height / 2.0, width, height };
+    let centred = |x: f64, y: f64| Rect {
+        left: x - width / 2.0,
+        top: y - height / 2.0,
+        width,
+        height,
+    };
     let mut places = vec![centred(x, y)];
     for ring in 0..14 {
         let away = 4.0 + 13.0 * f64::from(ring);
-        let (half_width, half_height) = (at.width / 2.0 + away + width / 2.0, at.height / 2.0 + away + height / 2.0);
+        let (half_width, half_height) = (
+            at.width / 2.0 + away + width / 2.0,
+            at.height / 2.0 + away + height / 2.0,
+        );
         for step in 0..20 {
             let angle = std::f64::consts::TAU * f64::from(step) / 20.0;
             let (cos, sin) = (libm::cos(angle), libm::sin(angle));
             // Rings are rectangles rather than ellipses, so that labels are close at corners too.
             let stretch = 1.0 / cos.abs().max(sin.abs());
-            places.push(centred(x + half_width * cos * stretch, y + half_height * sin * stretch));
+            places.push(centred(
+                x + half_width * cos * stretch,
+                y + half_height * sin * stretch,
+            ));
         }
     }
     places
@@ -96,7 +128,15 @@ fn leader(drawing: &mut Drawing, at: &Rect, place: &Rect) {
     if gap(place, at) < LEADER_PX {
         return;
     }
-    let nearest = |rect: &Rect, [x, y]: [f64; 2]| [x.clamp(rect.left, rect.right()), y.clamp(rect.top, rect.bottom())];
+    let nearest = |rect: &Rect, [x, y]: [f64; 2]| {
+        [
+            x.clamp(rect.left, rect.right()),
+            y.clamp(rect.top, rect.bottom()),
+        ]
+    };
     let from = nearest(place, at.middle());
-    drawing.line(vec![from, nearest(at, from)], Line::new(Paint::new(paint::INK, 0.55), 0.7));
+    drawing.line(
+        vec![from, nearest(at, from)],
+        Line::new(Paint::new(paint::INK, 0.55), 0.7),
+    );
 }

@@ -20,15 +20,36 @@ pub(super) const OBSTACLE: u32 = 0xb8_6b14;
 pub(super) const OTHER: u32 = 0x6b_7582;
 
 /// One colour for each action, repeated if there are more actions. (After the Okabe-Ito palette.)
-const ACTIONS: [u32; 6] = [0xd5_5e00, 0x00_8a66, 0x7a_3fb0, 0xc4_8a00, 0x2a_8fc9, 0x84_3c39];
+const ACTIONS: [u32; 6] = [
+    0xd5_5e00, 0x00_8a66, 0x7a_3fb0, 0xc4_8a00, 0x2a_8fc9, 0x84_3c39,
+];
 
-pub(super) const FURNITURE: Style = Style::both(Paint::new(0xe6_d5b5, 0.9), Line::new(Paint::new(0xb0_9564, 1.0), 0.8));
-pub(super) const WALL: Style = Style::both(Paint::new(0x9a_a1ab, 0.9), Line::new(Paint::new(0x6f_7783, 1.0), 0.6));
-pub(super) const ROBOT: Style = Style::both(Paint::new(0x5a_7a99, 0.22), Line::new(Paint::new(0x3f_5a75, 0.55), 0.6));
-pub(super) const PRESSED: Style = Style::both(Paint::solid(FAILED), Line::new(Paint::solid(0xff_ffff), 1.6));
-pub(super) const GLIMPSE: Style = Style::line(Line::dashed(Paint::solid(PERCEIVED), 1.4, [4.0, 3.0]));
-pub(super) const BACKGROUND: Style = Style::both(Paint::solid(0xf5_f6f8), Line::new(Paint::solid(0xd4_d8de), 1.0));
-pub(super) const ROOM: Style = Style::both(Paint::solid(0xfb_fbf7), Line::new(Paint::solid(0xd9_dad2), 1.0));
+pub(super) const FURNITURE: Style = Style::both(
+    Paint::new(0xe6_d5b5, 0.9),
+    Line::new(Paint::new(0xb0_9564, 1.0), 0.8),
+);
+pub(super) const WALL: Style = Style::both(
+    Paint::new(0x9a_a1ab, 0.9),
+    Line::new(Paint::new(0x6f_7783, 1.0), 0.6),
+);
+pub(super) const ROBOT: Style = Style::both(
+    Paint::new(0x5a_7a99, 0.22),
+    Line::new(Paint::new(0x3f_5a75, 0.55), 0.6),
+);
+pub(super) const PRESSED: Style = Style::both(
+    Paint::solid(FAILED),
+    Line::new(Paint::solid(0xff_ffff), 1.6),
+);
+pub(super) const GLIMPSE: Style =
+    Style::line(Line::dashed(Paint::solid(PERCEIVED), 1.4, [4.0, 3.0]));
+pub(super) const BACKGROUND: Style = Style::both(
+    Paint::solid(0xf5_f6f8),
+    Line::new(Paint::solid(0xd4_d8de), 1.0),
+);
+pub(super) const ROOM: Style = Style::both(
+    Paint::solid(0xfb_fbf7),
+    Line::new(Paint::solid(0xd9_dad2), 1.0),
+);
 
 pub(super) fn action(idx: usize) -> u32 {
     ACTIONS[idx % ACTIONS.len()]

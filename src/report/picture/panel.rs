@@ -12,8 +12,8 @@ use crate::pressed::Pressed;
 use actcheck_base::names;
 use actcheck_data::{BodyState, Form, Part, Role, Shape, Snapshot, Trace};
 
-/// Upper bound of a link's extent from its origin. Links farther than this outside of the window are omitted. Unit:
-/// metres.
+/// Upper bound of a link's extent from its origin. Links farther than this outside of the window
+/// are omitted. Unit: metres.
 const LINK_REACH_M: f64 = 0.8;
 
 /// Radius of the star at the hardest contact. Unit: pixels.
@@ -47,24 +47,44 @@ impl PanelData<'_> {
 
     fn role(&self, body: &BodyState) -> Role {
         let role = self.roles.get(&body.id).copied();
-        role.unwrap_or(if body.fixed { Role::Platform } else { Role::Other })
+        role.unwrap_or(if body.fixed {
+            Role::Platform
+        } else {
+            Role::Other
+        })
     }
 }
 
 /// Draws a panel. Maps show places and label furniture; close-ups label movable objects.
-pub(super) fn draw(drawing: &mut Drawing, data: &PanelData<'_>, moment: Moment, window: &Window, is_map: bool) {
-    let Some(snapshot) = data.snapshot(moment) else { return };
+pub(super) fn draw(
+    drawing: &mut Drawing,
+    data: &PanelData<'_>,
+    moment: Moment,
+    window: &Window,
+    is_map: bool,
+) {
+    let Some(snapshot) = data.snapshot(moment) else {
+        return;
+    };
     drawing.polygon(window.panel.corners(), paint::BACKGROUND);
     drawing.clip(Some(window.panel));
     if is_map {
         rooms(drawing, data.trace, window);
     }
-    let shown: Vec<&BodyState> = snapshot.bodies.iter().filter(|body| window.overlaps(&Bounds::of(body))).collect();
+    let shown: Vec<&BodyState> = snapshot
+        .bodies
+        .iter()
+        .filter(|body| window.overlaps(&Bounds::of(body)))
+        .collect();
     for body in shown.iter().filter(|body| body.fixed) {
         drawing.shape(form(data, body, window), true, fixed_style(body));
     }
     for body in shown.iter().filter(|body| !body.fixed) {
-        drawing.shape(form(data, body, window), true, paint::movable(data.role(body)));
+        drawing.shape(
+            form(data, body, window),
+            true,
+            paint::movable(data.role(body)),
+        );
     }
     robot(drawing, data, moment, window);
     heading(drawing, snapshot.robot.base_true, window);
@@ -92,7 +112,11 @@ fn is_wall(body: &BodyState) -> bool {
 }
 
 fn fixed_style(body: &BodyState) -> Style {
-    if is_wall(body) { paint::WALL } else { paint::FURNITURE }
+    if is_wall(body) {
+        paint::WALL
+    } else {
+        paint::FURNITURE
+    }
 }
 
 /// Outline of a body's shape, or of its bounding box if the trace has no shape.
@@ -106,14 +130,24 @@ fn form(data: &PanelData<'_>, body: &BodyState, window: &Window) -> Vec<Vec<[f64
 /// Draws the robot's links as in the first or last frame.
 fn robot(drawing: &mut Drawing, data: &PanelData<'_>, moment: Moment, window: &Window) {
     let frames = &data.trace.frames;
-    let row = if moment == Moment::Before { 0 } else { frames.rows.len().saturating_sub(1) };
+    let row = if moment == Moment::Before {
+        0
+    } else {
+        frames.rows.len().saturating_sub(1)
+    };
     // Objects have tracks too.
-    let links = frames.names.iter().enumerate().filter(|(_, name)| name.starts_with("robot/"));
+    let links = frames
+        .names
+        .iter()
+        .enumerate()
+        .filter(|(_, name)| name.starts_with("robot/"));
     let links = links.filter_map(|(slot, name)| {
         let form = data.forms.get(name.as_str())?;
         let pose = pose_at(data.trace, row, slot)?;
         let around = Bounds::point(pose.translation.vector.into()).grown(LINK_REACH_M);
-        window.overlaps(&around).then(|| silhouette(&form.parts, &pose, window))
+        window
+            .overlaps(&around)
+            .then(|| silhouette(&form.parts, &pose, window))
     });
     drawing.shape(links.flatten().collect(), true, paint::ROBOT);
 }
@@ -123,44 +157,84 @@ fn heading(drawing: &mut Drawing, [x, y, heading]: [f64; 3], window: &Window) {
     if window.view.up != 1 {
         return;
     }
-    arrow(drawing, window.pixel([x, y, 0.0]), heading, 11.0, Style::fill(Paint::new(0x2d_4560, 0.9)));
+    arrow(
+        drawing,
+        window.pixel([x, y, 0.0]),
+        heading,
+        11.0,
+        Style::fill(Paint::new(0x2d_4560, 0.9)),
+    );
 }
 
 /// Draws a star at the hardest contact, with its label.
 fn press(drawing: &mut Drawing, data: &PanelData<'_>, window: &Window, labels: &mut Labels) {
-    let Some((pressed, point)) = data.pressed.as_ref().and_then(|pressed| Some((pressed, pressed.point_m?))) else {
+    let Some((pressed, point)) = data
+        .pressed
+        .as_ref()
+        .and_then(|pressed| Some((pressed, pressed.point_m?)))
+    else {
         return;
     };
     let [x, y] = window.pixel(point);
     drawing.polygon(star([x, y], STAR_PX), paint::PRESSED);
-    let at = Rect { left: x, top: y, width: 0.0, height: 0.0 }.grown(STAR_PX);
+    let at = Rect {
+        left: x,
+        top: y,
+        width: 0.0,
+        height: 0.0,
+    }
+    .grown(STAR_PX);
     labels.keep_out(at);
     let text = pressed.label();
-    labels.write(drawing, &Label { text: &text, size: 13.0, bold: true, rgb: paint::FAILED, at });
+    labels.write(
+        drawing,
+        &Label {
+            text: &text,
+            size: 13.0,
+            bold: true,
+            rgb: paint::FAILED,
+            at,
+        },
+    );
 }
 
 /// The corners of a star with eight points.
 pub(super) fn star([x, y]: [f64; 2], radius: f64) -> Vec<[f64; 2]> {
     let corner = |step: u32| {
         let angle = std::f64::consts::TAU * f64::from(step) / 16.0;
-        let reach = if step.is_multiple_of(2) { radius } else { 0.45 * radius };
+        let reach = if step.is_multiple_of(2) {
+            radius
+        } else {
+            0.45 * radius
+        };
         [x + reach * libm::sin(angle), y - reach * libm::cos(angle)]
     };
     (0..16).map(corner).collect()
 }
 
 fn arrow(drawing: &mut Drawing, [x, y]: [f64; 2], heading: f64, size: f64, style: Style) {
-    let corners = [(0.0, 1.0), (2.5, 0.75), (std::f64::consts::PI, 0.35), (-2.5, 0.75)];
+    let corners = [
+        (0.0, 1.0),
+        (2.5, 0.75),
+        (std::f64::consts::PI, 0.35),
+        (-2.5, 0.75),
+    ];
     let corner = |(turn, reach): (f64, f64)| {
         let angle = heading + turn;
-        [x + size * reach * libm::cos(angle), y - size * reach * libm::sin(angle)]
+        [
+            x + size * reach * libm::cos(angle),
+            y - size * reach * libm::sin(angle),
+        ]
     };
     drawing.polygon(corners.map(corner).to_vec(), style);
 }
 
 fn rooms(drawing: &mut Drawing, trace: &Trace, window: &Window) {
     for room in &trace.map.rooms {
-        let bounds = Bounds { low: [room.low_m[0], room.low_m[1], 0.0], high: [room.high_m[0], room.high_m[1], 0.0] };
+        let bounds = Bounds {
+            low: [room.low_m[0], room.low_m[1], 0.0],
+            high: [room.high_m[0], room.high_m[1], 0.0],
+        };
         drawing.polygon(window.rect(&bounds).corners(), paint::ROOM);
     }
 }
@@ -169,20 +243,39 @@ fn rooms(drawing: &mut Drawing, trace: &Trace, window: &Window) {
 fn percept_parts(trace: &Trace) -> Vec<(String, Part)> {
     let standing = |pose: &actcheck_data::Pose, [x, y, z]: [f64; 3]| {
         let middle = pose.to_isometry() * nalgebra::Translation3::new(0.0, 0.0, z / 2.0);
-        Part { pose: actcheck_data::Pose::from_isometry(&middle), shape: Shape::Box { size: [x, y, z] } }
+        Part {
+            pose: actcheck_data::Pose::from_isometry(&middle),
+            shape: Shape::Box { size: [x, y, z] },
+        }
     };
     let mut parts = Vec::new();
     for action in &trace.actions {
         for percept in &action.percepts {
             parts.push((percept.id.clone(), standing(&percept.pose, percept.size_m)));
         }
-        for thing in action.perceived.iter().flat_map(|perceived| &perceived.things) {
+        for thing in action
+            .perceived
+            .iter()
+            .flat_map(|perceived| &perceived.things)
+        {
             let name = thing.category.as_deref().map_or("?", names::local);
             parts.push((name.to_owned(), standing(&thing.pose, thing.size_m)));
         }
-        for plane in action.perceived.iter().filter_map(|perceived| perceived.plane) {
+        for plane in action
+            .perceived
+            .iter()
+            .filter_map(|perceived| perceived.plane)
+        {
             let [x, y] = plane.size_m;
-            parts.push((String::new(), Part { pose: plane.pose, shape: Shape::Box { size: [x, y, 0.004] } }));
+            parts.push((
+                String::new(),
+                Part {
+                    pose: plane.pose,
+                    shape: Shape::Box {
+                        size: [x, y, 0.004],
+                    },
+                },
+            ));
         }
     }
     parts
@@ -197,20 +290,39 @@ fn percepts(drawing: &mut Drawing, trace: &Trace, window: &Window) {
 
 /// Labels percepts with their recognised category.
 fn name_percepts(drawing: &mut Drawing, trace: &Trace, window: &Window, labels: &mut Labels) {
-    let seen = trace.actions.iter().filter_map(|action| action.perceived.as_ref());
+    let seen = trace
+        .actions
+        .iter()
+        .filter_map(|action| action.perceived.as_ref());
     for thing in seen.flat_map(|perceived| &perceived.things) {
         let name = thing.category.as_deref().map_or("unknown", names::local);
         let reach = thing.size_m[0].max(thing.size_m[1]) / 2.0;
         let at = window.rect(&Bounds::point(thing.pose.position).grown(reach));
         let text = format!("seen: {name}");
-        labels.write(drawing, &Label { text: &text, size: 10.5, bold: false, rgb: paint::PERCEIVED, at });
+        labels.write(
+            drawing,
+            &Label {
+                text: &text,
+                size: 10.5,
+                bold: false,
+                rgb: paint::PERCEIVED,
+                at,
+            },
+        );
     }
 }
 
 fn paths(drawing: &mut Drawing, paths: &[Path], window: &Window) {
     // In side views, the path of the base is only a line on the floor.
-    for path in paths.iter().filter(|path| path.mover != Mover::Base || window.view.up == 1) {
-        let points: Vec<[f64; 2]> = path.points.iter().map(|point| window.pixel(*point)).collect();
+    for path in paths
+        .iter()
+        .filter(|path| path.mover != Mover::Base || window.view.up == 1)
+    {
+        let points: Vec<[f64; 2]> = path
+            .points
+            .iter()
+            .map(|point| window.pixel(*point))
+            .collect();
         let rgb = paint::action(path.action);
         if let (Some(start), Mover::Hand | Mover::Base) = (points.first(), path.mover) {
             drawing.circle(*start, 2.6, Style::fill(Paint::solid(rgb)));
@@ -221,22 +333,53 @@ fn paths(drawing: &mut Drawing, paths: &[Path], window: &Window) {
 
 /// Rectangles of movable objects, which labels should avoid.
 fn things(shown: &[&BodyState], window: &Window) -> Vec<Rect> {
-    shown.iter().filter(|body| !body.fixed).map(|body| window.rect(&Bounds::of(body))).collect()
+    shown
+        .iter()
+        .filter(|body| !body.fixed)
+        .map(|body| window.rect(&Bounds::of(body)))
+        .collect()
 }
 
 /// Draws a scale bar of a round length in the lower left corner.
 pub(super) fn ruler(drawing: &mut Drawing, window: &Window, labels: &mut Labels) {
     let lengths = [0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0];
-    let length = lengths.into_iter().find(|metres| metres * window.scale >= 45.0).unwrap_or(5.0);
+    let length = lengths
+        .into_iter()
+        .find(|metres| metres * window.scale >= 45.0)
+        .unwrap_or(5.0);
     let (left, bottom) = (window.panel.left + 10.0, window.panel.bottom() - 9.0);
     let right = left + length * window.scale;
     let line = Line::new(Paint::solid(paint::INK), 1.6);
-    drawing.line(vec![[left, bottom - 4.0], [left, bottom], [right, bottom], [right, bottom - 4.0]], line);
-    let text = if length < 1.0 { format!("{:.0} cm", length * 100.0) } else { format!("{length:.0} m") };
+    drawing.line(
+        vec![
+            [left, bottom - 4.0],
+            [left, bottom],
+            [right, bottom],
+            [right, bottom - 4.0],
+        ],
+        line,
+    );
+    let text = if length < 1.0 {
+        format!("{:.0} cm", length * 100.0)
+    } else {
+        format!("{length:.0} m")
+    };
     let width = font::width(&text, 10.5, false);
     let paint = Paint::solid(paint::INK);
-    drawing.words(Words { text, at: [right + 5.0, bottom + 1.0], size: 10.5, bold: false, paint, rim: true });
-    labels.keep_out(Rect { left, top: bottom - 12.0, width: right - left + width + 8.0, height: 16.0 });
+    drawing.words(Words {
+        text,
+        at: [right + 5.0, bottom + 1.0],
+        size: 10.5,
+        bold: false,
+        paint,
+        rim: true,
+    });
+    labels.keep_out(Rect {
+        left,
+        top: bottom - 12.0,
+        width: right - left + width + 8.0,
+        height: 16.0,
+    });
 }
 
 /// Labels rooms and locations.
@@ -244,16 +387,51 @@ fn name_places(drawing: &mut Drawing, trace: &Trace, window: &Window, labels: &m
     for location in &trace.map.locations {
         let [x, y, heading] = location.at;
         let at = window.pixel([x, y, 0.0]);
-        arrow(drawing, at, heading, 5.5, Style::fill(Paint::new(0x1f_7a4d, 0.9)));
-        let spot = Rect { left: at[0], top: at[1], width: 0.0, height: 0.0 }.grown(5.0);
+        arrow(
+            drawing,
+            at,
+            heading,
+            5.5,
+            Style::fill(Paint::new(0x1f_7a4d, 0.9)),
+        );
+        let spot = Rect {
+            left: at[0],
+            top: at[1],
+            width: 0.0,
+            height: 0.0,
+        }
+        .grown(5.0);
         labels.keep_out(spot);
-        labels.write(drawing, &Label { text: &location.name, size: 9.5, bold: false, rgb: 0x1f_6b45, at: spot });
+        labels.write(
+            drawing,
+            &Label {
+                text: &location.name,
+                size: 9.5,
+                bold: false,
+                rgb: 0x1f_6b45,
+                at: spot,
+            },
+        );
     }
     for room in &trace.map.rooms {
         let middle = [0, 1].map(|axis| f64::midpoint(room.low_m[axis], room.high_m[axis]));
         let [left, top] = window.pixel([middle[0], middle[1], 0.0]);
-        let at = Rect { left, top, width: 0.0, height: 0.0 };
-        labels.write(drawing, &Label { text: &room.name, size: 13.0, bold: true, rgb: 0x9a_9b8c, at });
+        let at = Rect {
+            left,
+            top,
+            width: 0.0,
+            height: 0.0,
+        };
+        labels.write(
+            drawing,
+            &Label {
+                text: &room.name,
+                size: 13.0,
+                bold: true,
+                rgb: 0x9a_9b8c,
+                at,
+            },
+        );
     }
 }
 
@@ -266,9 +444,18 @@ fn name_bodies(
     labels: &mut Labels,
     is_map: bool,
 ) {
-    let mut named: Vec<(&BodyState, Role)> =
-        shown.iter().filter(|body| !is_wall(body)).map(|body| (*body, data.role(body))).collect();
-    let order = [Role::Target, Role::Obstacle, Role::Other, Role::PlaceOther, Role::Platform];
+    let mut named: Vec<(&BodyState, Role)> = shown
+        .iter()
+        .filter(|body| !is_wall(body))
+        .map(|body| (*body, data.role(body)))
+        .collect();
+    let order = [
+        Role::Target,
+        Role::Obstacle,
+        Role::Other,
+        Role::PlaceOther,
+        Role::Platform,
+    ];
     let rank = |role: Role| order.iter().position(|other| *other == role);
     named.sort_by_key(|(body, role)| (body.fixed, rank(*role)));
     for (body, role) in named {
@@ -277,13 +464,28 @@ fn name_bodies(
             continue;
         }
         let at = window.rect(&Bounds::of(body));
-        let (rgb, size) = if body.fixed { (0x7a_6231, 10.0) } else { (darker(paint::rgb_of(role)), 11.0) };
-        labels.write(drawing, &Label { text: &body.id, size, bold: role == Role::Target, rgb, at });
+        let (rgb, size) = if body.fixed {
+            (0x7a_6231, 10.0)
+        } else {
+            (darker(paint::rgb_of(role)), 11.0)
+        };
+        labels.write(
+            drawing,
+            &Label {
+                text: &body.id,
+                size,
+                bold: role == Role::Target,
+                rgb,
+                at,
+            },
+        );
     }
 }
 
 /// Darkens a colour for text, which has thin strokes.
 fn darker(rgb: u32) -> u32 {
     let [_, channels @ ..] = rgb.to_be_bytes();
-    channels.into_iter().fold(0, |sum, channel| (sum << 8) | (u32::from(channel) * 2 / 3))
+    channels
+        .into_iter()
+        .fold(0, |sum, channel| (sum << 8) | (u32::from(channel) * 2 / 3))
 }

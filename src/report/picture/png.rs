@@ -1,6 +1,8 @@
 //! Rasterises a drawing and encodes it as PNG.
 
-use tiny_skia::{FillRule, LineJoin, Mask, Path, PathBuilder, Pixmap, Stroke, StrokeDash, Transform};
+use tiny_skia::{
+    FillRule, LineJoin, Mask, Path, PathBuilder, Pixmap, Stroke, StrokeDash, Transform,
+};
 
 use crate::picture::drawing::{Drawing, Line, Mark, Paint, Rect};
 use crate::picture::font;
@@ -14,12 +16,19 @@ impl Drawing {
     /// # Errors
     /// The drawing is too large for memory.
     pub fn to_png(&self) -> std::io::Result<Vec<u8>> {
-        let mut canvas = Canvas::white(self.width, self.height).ok_or(std::io::ErrorKind::OutOfMemory)?;
+        let mut canvas =
+            Canvas::white(self.width, self.height).ok_or(std::io::ErrorKind::OutOfMemory)?;
         for (clip, mark) in &self.marks {
             canvas.clip(*clip);
             match mark {
-                Mark::Shape { lines, closed, style } => {
-                    let Some(path) = path_of(lines, *closed) else { continue };
+                Mark::Shape {
+                    lines,
+                    closed,
+                    style,
+                } => {
+                    let Some(path) = path_of(lines, *closed) else {
+                        continue;
+                    };
                     if let Some(paint) = style.fill {
                         canvas.fill(&path, paint);
                     }
@@ -28,7 +37,10 @@ impl Drawing {
                     }
                 }
                 Mark::Words(words) => {
-                    let Some(path) = font::outline(&words.text, words.at, words.size, words.bold) else { continue };
+                    let Some(path) = font::outline(&words.text, words.at, words.size, words.bold)
+                    else {
+                        continue;
+                    };
                     if words.rim {
                         canvas.stroke(&path, &Line::new(Paint::solid(0xff_ffff), 3.0));
                     }
@@ -68,7 +80,11 @@ fn scale() -> Transform {
     Transform::from_scale(single(DENSITY), single(DENSITY))
 }
 
-#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "from 0 to 255")]
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "from 0 to 255"
+)]
 fn brush(Paint { rgb, opacity }: Paint) -> tiny_skia::Paint<'static> {
     let [_, red, green, blue] = rgb.to_be_bytes();
     let mut brush = tiny_skia::Paint::default();
@@ -84,7 +100,11 @@ struct Canvas {
 
 impl Canvas {
     fn white(width: f64, height: f64) -> Option<Self> {
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a few thousand pixels")]
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "a few thousand pixels"
+        )]
         let [width, height] = [width, height].map(|size| (size * DENSITY).ceil().max(1.0) as u32);
         let mut pixels = Pixmap::new(width, height)?;
         pixels.fill(tiny_skia::Color::WHITE);
@@ -100,19 +120,33 @@ impl Canvas {
 
     fn mask(&self, rect: &Rect) -> Option<Mask> {
         let mut mask = Mask::new(self.pixels.width(), self.pixels.height())?;
-        mask.fill_path(&path_of(&[rect.corners()], true)?, FillRule::Winding, false, scale());
+        mask.fill_path(
+            &path_of(&[rect.corners()], true)?,
+            FillRule::Winding,
+            false,
+            scale(),
+        );
         Some(mask)
     }
 
     fn fill(&mut self, path: &Path, paint: Paint) {
         let mask = self.clip.as_ref().map(|(_, mask)| mask);
-        self.pixels.fill_path(path, &brush(paint), FillRule::Winding, scale(), mask);
+        self.pixels
+            .fill_path(path, &brush(paint), FillRule::Winding, scale(), mask);
     }
 
     fn stroke(&mut self, path: &Path, line: &Line) {
-        let dash = line.dash.and_then(|lengths| StrokeDash::new(lengths.map(single).to_vec(), 0.0));
-        let stroke = Stroke { width: single(line.width), line_join: LineJoin::Round, dash, ..Stroke::default() };
+        let dash = line
+            .dash
+            .and_then(|lengths| StrokeDash::new(lengths.map(single).to_vec(), 0.0));
+        let stroke = Stroke {
+            width: single(line.width),
+            line_join: LineJoin::Round,
+            dash,
+            ..Stroke::default()
+        };
         let mask = self.clip.as_ref().map(|(_, mask)| mask);
-        self.pixels.stroke_path(path, &brush(line.paint), &stroke, scale(), mask);
+        self.pixels
+            .stroke_path(path, &brush(line.paint), &stroke, scale(), mask);
     }
 }

@@ -24,17 +24,24 @@ const AXIS_PX: f64 = 30.0;
 const TITLE_PX: f64 = 15.0;
 const SIZE_PX: f64 = 11.0;
 /// Views of each posture, with their titles.
-const VIEWS: [(View, &str); 2] =
-    [(View { across: 0, up: 2 }, "from the side   x → z ↑"), (View { across: 1, up: 2 }, "from behind   ← y   z ↑")];
+const VIEWS: [(View, &str); 2] = [
+    (View { across: 0, up: 2 }, "from the side   x → z ↑"),
+    (View { across: 1, up: 2 }, "from behind   ← y   z ↑"),
+];
 /// Colours of the x, y and z axes. (Okabe and Ito.)
 const AXES: [u32; 3] = [0xd5_5e00, 0x00_8a66, 0x00_72b2];
 
 /// Draws a robot in each of its postures. Returns `None` if it has no shapes.
 pub fn robot_picture(name: &str, postures: &[RobotView]) -> Option<Drawing> {
-    let points = postures.iter().flat_map(|view| &view.solids).flat_map(|solid| {
-        let pose = solid.pose.to_isometry();
-        corners(&solid.shape).into_iter().map(move |corner| Bounds::point((pose * corner).coords.into()))
-    });
+    let points = postures
+        .iter()
+        .flat_map(|view| &view.solids)
+        .flat_map(|solid| {
+            let pose = solid.pose.to_isometry();
+            corners(&solid.shape)
+                .into_iter()
+                .map(move |corner| Bounds::point((pose * corner).coords.into()))
+        });
     let bounds = Bounds::union(points)?.grown(AROUND_M);
     let widest = bounds.extent(0).max(bounds.extent(1)).max(0.1);
     let scale = (PANEL_PX[0] / widest).min(PANEL_PX[1] / bounds.extent(2).max(0.1));
@@ -42,7 +49,13 @@ pub fn robot_picture(name: &str, postures: &[RobotView]) -> Option<Drawing> {
     let columns = postures.len().min(PER_ROW) * VIEWS.len();
     let mut drawing = Drawing::new(GAP_PX + columns as f64 * (PANEL_PX[0] + GAP_PX));
     let title = format!("{name}: axes x orange, y green, z blue");
-    write(&mut drawing, &title, [GAP_PX, GAP_PX + TITLE_PX], TITLE_PX, true);
+    write(
+        &mut drawing,
+        &title,
+        [GAP_PX, GAP_PX + TITLE_PX],
+        TITLE_PX,
+        true,
+    );
     let top = GAP_PX * 2.0 + TITLE_PX;
     let row_px = height + GAP_PX * 2.0 + SIZE_PX;
     for (idx, posture) in postures.iter().enumerate() {
@@ -50,9 +63,24 @@ pub fn robot_picture(name: &str, postures: &[RobotView]) -> Option<Drawing> {
             let column = (idx % PER_ROW) * VIEWS.len() + side;
             let left = GAP_PX + column as f64 * (PANEL_PX[0] + GAP_PX);
             let above = top + (idx / PER_ROW) as f64 * row_px;
-            write(&mut drawing, &format!("{}, {from}", posture.title), [left, above + SIZE_PX], SIZE_PX, false);
-            let panel = Rect { left, top: above + SIZE_PX + 6.0, width: PANEL_PX[0], height };
-            draw(&mut drawing, posture, &Window::new(view, bounds, scale, panel));
+            write(
+                &mut drawing,
+                &format!("{}, {from}", posture.title),
+                [left, above + SIZE_PX],
+                SIZE_PX,
+                false,
+            );
+            let panel = Rect {
+                left,
+                top: above + SIZE_PX + 6.0,
+                width: PANEL_PX[0],
+                height,
+            };
+            draw(
+                &mut drawing,
+                posture,
+                &Window::new(view, bounds, scale, panel),
+            );
         }
     }
     drawing.height = top + postures.len().div_ceil(PER_ROW) as f64 * row_px;
@@ -66,10 +94,15 @@ fn draw(drawing: &mut Drawing, posture: &RobotView, window: &Window) {
     let outlines = silhouette(&posture.solids, &Isometry3::identity(), window).into_iter();
     // From behind, y points left.
     let mirrored = |point: [f64; 2]| match window.view.across {
-        1 => [window.panel.left + window.panel.right() - point[0], point[1]],
+        1 => [
+            window.panel.left + window.panel.right() - point[0],
+            point[1],
+        ],
         _ => point,
     };
-    let outlines = outlines.map(|line| line.into_iter().map(mirrored).collect()).collect();
+    let outlines = outlines
+        .map(|line| line.into_iter().map(mirrored).collect())
+        .collect();
     drawing.shape(outlines, true, paint::ROBOT);
     let mut labels = Labels::new(window.panel, Vec::new());
     ruler(drawing, window, &mut labels);
@@ -77,7 +110,12 @@ fn draw(drawing: &mut Drawing, posture: &RobotView, window: &Window) {
     for (name, pose) in &posture.frames {
         let pose = pose.to_isometry();
         let origin = mirrored(window.pixel(pose.translation.vector.into()));
-        let mut spot = Rect { left: origin[0], top: origin[1], width: 0.0, height: 0.0 };
+        let mut spot = Rect {
+            left: origin[0],
+            top: origin[1],
+            width: 0.0,
+            height: 0.0,
+        };
         for (axis, rgb) in AXES.into_iter().enumerate() {
             let mut tip = Point3::origin();
             tip[axis] = AXIS_PX / window.scale;
@@ -89,14 +127,30 @@ fn draw(drawing: &mut Drawing, posture: &RobotView, window: &Window) {
         spots.push((name, spot));
     }
     for (name, at) in spots {
-        labels.write(drawing, &Label { text: name, size: SIZE_PX, bold: false, rgb: paint::INK, at });
+        labels.write(
+            drawing,
+            &Label {
+                text: name,
+                size: SIZE_PX,
+                bold: false,
+                rgb: paint::INK,
+                at,
+            },
+        );
     }
     drawing.clip(None);
 }
 
 fn write(drawing: &mut Drawing, text: &str, at: [f64; 2], size: f64, bold: bool) {
     let (text, paint) = (text.to_owned(), Paint::solid(paint::INK));
-    drawing.words(Words { text, at, size, bold, paint, rim: false });
+    drawing.words(Words {
+        text,
+        at,
+        size,
+        bold,
+        paint,
+        rim: false,
+    });
 }
 
 #[cfg(test)]
@@ -106,10 +160,24 @@ mod tests {
 
     #[test]
     fn a_posture_is_drawn_from_two_sides_with_labelled_frames() {
-        let solid = Part { pose: Pose::upright([0.0, 0.0, 0.5], 0.0), shape: Shape::Box { size: [0.2, 0.3, 1.0] } };
-        let frames = vec![("grasp: hand".to_owned(), Pose::upright([0.3, 0.0, 0.5], 0.0))];
-        let view = RobotView { title: "home".to_owned(), solids: vec![solid], frames };
-        let svg = robot_picture("Robot", &[view]).expect("it has shapes").to_svg();
+        let solid = Part {
+            pose: Pose::upright([0.0, 0.0, 0.5], 0.0),
+            shape: Shape::Box {
+                size: [0.2, 0.3, 1.0],
+            },
+        };
+        let frames = vec![(
+            "grasp: hand".to_owned(),
+            Pose::upright([0.3, 0.0, 0.5], 0.0),
+        )];
+        let view = RobotView {
+            title: "home".to_owned(),
+            solids: vec![solid],
+            frames,
+        };
+        let svg = robot_picture("Robot", &[view])
+            .expect("it has shapes")
+            .to_svg();
         assert_eq!(svg.matches("grasp: hand").count(), 2, "{svg}");
         assert!(svg.contains("home, from the side"), "{svg}");
         assert_eq!(robot_picture("Robot", &[]), None);

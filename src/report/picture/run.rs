@@ -22,14 +22,19 @@ const HIGHEST_PX: [f64; 3] = [330.0, 430.0, 340.0];
 
 /// Draws a run. Returns `None` if it has no state to draw.
 ///
-/// On the left is the state before the first action with percepts; on the right is the state after the last action with
-/// the paths of base, hand and target, in the colour of the action, and a mark at the hardest contact of the robot with
-/// something that it is not to touch. The top row is a map, if the world is larger than
-/// the close-ups; below it are close-ups from above and from the side, and charts of the signals that decided failed
-/// properties about time.
+/// On the left is the state before the first action with percepts; on the right is the state after
+/// the last action with the paths of base, hand and target, in the colour of the action, and a mark
+/// at the hardest contact of the robot with something that it is not to touch. The top row is a
+/// map, if the world is larger than the close-ups; below it are close-ups from above and from the
+/// side, and charts of the signals that decided failed properties about time.
 pub fn run_picture(caption: &Caption, trace: &Trace) -> Option<Drawing> {
-    let of_role =
-        |role: Role| caption.roles.iter().filter(move |(_, other)| **other == role).map(|(id, _)| id.as_str());
+    let of_role = |role: Role| {
+        caption
+            .roles
+            .iter()
+            .filter(move |(_, other)| **other == role)
+            .map(|(id, _)| id.as_str())
+    };
     let target = of_role(Role::Target).next();
     let subjects: BTreeSet<&str> = match target {
         Some(target) => BTreeSet::from([target]),
@@ -40,37 +45,81 @@ pub fn run_picture(caption: &Caption, trace: &Trace) -> Option<Drawing> {
         trace,
         paths: &paths,
         roles: &caption.roles,
-        pressed: hardest_of_run(trace, caption.witnesses.iter().map(|(idx, witness)| (*idx, witness.as_str()))),
-        forms: trace.forms.iter().map(|form| (form.name.as_str(), form)).collect(),
+        pressed: hardest_of_run(
+            trace,
+            caption
+                .witnesses
+                .iter()
+                .map(|(idx, witness)| (*idx, witness.as_str())),
+        ),
+        forms: trace
+            .forms
+            .iter()
+            .map(|form| (form.name.as_str(), form))
+            .collect(),
     };
-    let close_ups = close_ups(trace, &subjects, data.pressed.as_ref().and_then(|pressed| pressed.point_m))?;
-    let base_path: Vec<[f64; 3]> =
-        paths.iter().filter(|path| path.mover == Mover::Base).flat_map(|path| path.points.iter().copied()).collect();
+    let close_ups = close_ups(
+        trace,
+        &subjects,
+        data.pressed.as_ref().and_then(|pressed| pressed.point_m),
+    )?;
+    let base_path: Vec<[f64; 3]> = paths
+        .iter()
+        .filter(|path| path.mover == Mover::Base)
+        .flat_map(|path| path.points.iter().copied())
+        .collect();
     let mut drawing = Drawing::new(WIDTH_PX);
     let inner = WIDTH_PX - 2.0 * GAP_PX;
-    let area = Rect { left: GAP_PX, top: GAP_PX - 4.0, width: inner, height: 0.0 };
+    let area = Rect {
+        left: GAP_PX,
+        top: GAP_PX - 4.0,
+        width: inner,
+        height: 0.0,
+    };
     let mut y = header::draw(&mut drawing, caption, data.pressed.as_ref(), area) + 12.0;
-    let side = View { across: across(trace, &close_ups[0]), up: 2 };
+    let side = View {
+        across: across(trace, &close_ups[0]),
+        up: 2,
+    };
     let whole = overview(trace, &close_ups, &base_path).map(|whole| (View::TOP, [whole; 2], 0));
-    for (view, bounds, kind) in whole.into_iter().chain([(View::TOP, close_ups, 1), (side, close_ups, 2)]) {
+    for (view, bounds, kind) in whole
+        .into_iter()
+        .chain([(View::TOP, close_ups, 1), (side, close_ups, 2)])
+    {
         y = row(&mut drawing, &data, view, &bounds, kind, y);
     }
-    let below = Rect { left: GAP_PX, top: y, width: inner, height: 0.0 };
+    let below = Rect {
+        left: GAP_PX,
+        top: y,
+        width: inner,
+        height: 0.0,
+    };
     y = charts::draw(&mut drawing, &caption.charts, below, GAP_PX);
     drawing.height = legend::draw(&mut drawing, &data, GAP_PX, y, inner) + GAP_PX / 2.0;
     Some(drawing)
 }
 
-/// Horizontal axis of the side view: the axis along which the robot approaches, so that hand and target do not hide
-/// each other.
+/// Horizontal axis of the side view: the axis along which the robot approaches, so that hand and
+/// target do not hide each other.
 fn across(trace: &Trace, about: &Bounds) -> usize {
-    let base = trace.snapshots.first().map_or([0.0; 3], |snapshot| snapshot.robot.base_true);
-    let distance = |axis: usize| (f64::midpoint(about.low[axis], about.high[axis]) - base[axis]).abs();
+    let base = trace
+        .snapshots
+        .first()
+        .map_or([0.0; 3], |snapshot| snapshot.robot.base_true);
+    let distance =
+        |axis: usize| (f64::midpoint(about.low[axis], about.high[axis]) - base[axis]).abs();
     usize::from(distance(1) > distance(0))
 }
 
 /// Draws two panels of one view, before and after. Returns their lower end.
-fn row(drawing: &mut Drawing, data: &PanelData<'_>, view: View, bounds: &[Bounds; 2], kind: usize, top: f64) -> f64 {
+fn row(
+    drawing: &mut Drawing,
+    data: &PanelData<'_>,
+    view: View,
+    bounds: &[Bounds; 2],
+    kind: usize,
+    top: f64,
+) -> f64 {
     let width = (WIDTH_PX - 3.0 * GAP_PX) / 2.0;
     let extent = |axis: usize| bounds[0].extent(axis).max(bounds[1].extent(axis));
     let scale = (width / extent(view.across)).min(HIGHEST_PX[kind] / extent(view.up));
@@ -78,13 +127,35 @@ fn row(drawing: &mut Drawing, data: &PanelData<'_>, view: View, bounds: &[Bounds
     let is_map = kind == 0;
     for (idx, moment) in [Moment::Before, Moment::After].into_iter().enumerate() {
         let left = GAP_PX + idx as f64 * (width + GAP_PX);
-        let panel = Rect { left, top: top + TITLE_PX, width, height };
-        let when = if moment == Moment::Before { "before" } else { "after" };
+        let panel = Rect {
+            left,
+            top: top + TITLE_PX,
+            width,
+            height,
+        };
+        let when = if moment == Moment::Before {
+            "before"
+        } else {
+            "after"
+        };
         let what = if is_map { "the whole world " } else { "" };
         let text = format!("{when}, {what}{}", view.title());
         let paint = Paint::solid(paint::GREY);
-        drawing.words(Words { text, at: [left, top + TITLE_PX - 6.0], size: 12.0, bold: false, paint, rim: false });
-        panel::draw(drawing, data, moment, &Window::new(view, bounds[idx], scale, panel), is_map);
+        drawing.words(Words {
+            text,
+            at: [left, top + TITLE_PX - 6.0],
+            size: 12.0,
+            bold: false,
+            paint,
+            rim: false,
+        });
+        panel::draw(
+            drawing,
+            data,
+            moment,
+            &Window::new(view, bounds[idx], scale, panel),
+            is_map,
+        );
     }
     top + TITLE_PX + height + 10.0
 }

@@ -21,7 +21,11 @@ impl Drawing {
                 clip = *within;
             }
             match mark {
-                Mark::Shape { lines, closed, style } => shape(&mut out, lines, *closed, style),
+                Mark::Shape {
+                    lines,
+                    closed,
+                    style,
+                } => shape(&mut out, lines, *closed, style),
                 Mark::Words(words) => text(&mut out, words),
             }
         }
@@ -35,7 +39,13 @@ fn change_clip(out: &mut String, old: Option<Rect>, new: Option<Rect>, number: u
     if old.is_some() {
         out.push_str("</g>\n");
     }
-    if let Some(Rect { left, top, width, height }) = new {
+    if let Some(Rect {
+        left,
+        top,
+        width,
+        height,
+    }) = new
+    {
         let _ = writeln!(
             out,
             "<clipPath id=\"c{number}\"><rect x=\"{left:.1}\" y=\"{top:.1}\" width=\"{width:.1}\" \
@@ -56,23 +66,45 @@ fn shape(out: &mut String, lines: &[Vec<[f64; 2]>], closed: bool, style: &Style)
         Some(paint) => paints("fill", paint),
         None => " fill=\"none\"".to_owned(),
     };
-    let _ = writeln!(out, "<path d=\"{path}\"{fill}{}/>", style.line.map_or_else(String::new, stroke));
+    let _ = writeln!(
+        out,
+        "<path d=\"{path}\"{fill}{}/>",
+        style.line.map_or_else(String::new, stroke)
+    );
 }
 
 fn stroke(line: Line) -> String {
-    let dash = line.dash.map_or_else(String::new, |[dash, gap]| format!(" stroke-dasharray=\"{dash} {gap}\""));
-    format!("{} stroke-width=\"{}\" stroke-linejoin=\"round\"{dash}", paints("stroke", line.paint), line.width)
+    let dash = line.dash.map_or_else(String::new, |[dash, gap]| {
+        format!(" stroke-dasharray=\"{dash} {gap}\"")
+    });
+    format!(
+        "{} stroke-width=\"{}\" stroke-linejoin=\"round\"{dash}",
+        paints("stroke", line.paint),
+        line.width
+    )
 }
 
 fn paints(what: &str, Paint { rgb, opacity }: Paint) -> String {
-    let opacity = if opacity < 1.0 { format!(" {what}-opacity=\"{opacity}\"") } else { String::new() };
+    let opacity = if opacity < 1.0 {
+        format!(" {what}-opacity=\"{opacity}\"")
+    } else {
+        String::new()
+    };
     format!(" {what}=\"#{rgb:06x}\"{opacity}")
 }
 
 fn text(out: &mut String, words: &Words) {
     let [x, y] = words.at;
-    let weight = if words.bold { " font-weight=\"bold\"" } else { "" };
-    let rim = if words.rim { " stroke=\"#ffffff\" stroke-width=\"3\" paint-order=\"stroke\"" } else { "" };
+    let weight = if words.bold {
+        " font-weight=\"bold\""
+    } else {
+        ""
+    };
+    let rim = if words.rim {
+        " stroke=\"#ffffff\" stroke-width=\"3\" paint-order=\"stroke\""
+    } else {
+        ""
+    };
     let _ = writeln!(
         out,
         "<text x=\"{x:.1}\" y=\"{y:.1}\" font-size=\"{}\"{weight}{}{rim}>{}</text>",

@@ -14,7 +14,10 @@ pub(super) struct Bounds {
 
 impl Bounds {
     pub(super) fn of(body: &BodyState) -> Self {
-        Self { low: body.aabb_min, high: body.aabb_max }
+        Self {
+            low: body.aabb_min,
+            high: body.aabb_max,
+        }
     }
 
     pub(super) fn point(at: [f64; 3]) -> Self {
@@ -22,18 +25,31 @@ impl Bounds {
     }
 
     pub(super) fn with(self, other: Self) -> Self {
-        let pick =
-            |choose: fn(f64, f64) -> f64, a: [f64; 3], b: [f64; 3]| [0, 1, 2].map(|axis| choose(a[axis], b[axis]));
-        Self { low: pick(f64::min, self.low, other.low), high: pick(f64::max, self.high, other.high) }
+        let pick = |choose: fn(f64, f64) -> f64, a: [f64; 3], b: [f64; 3]| {
+            [0, 1, 2].map(|axis| choose(a[axis], b[axis]))
+        };
+        Self {
+            low: pick(f64::min, self.low, other.low),
+            high: pick(f64::max, self.high, other.high),
+        }
     }
 
     pub(super) fn union(all: impl IntoIterator<Item = Self>) -> Option<Self> {
-        let finite = |bounds: &Self| bounds.low.iter().chain(&bounds.high).all(|value| value.abs() < 1e3);
+        let finite = |bounds: &Self| {
+            bounds
+                .low
+                .iter()
+                .chain(&bounds.high)
+                .all(|value| value.abs() < 1e3)
+        };
         all.into_iter().filter(finite).reduce(Self::with)
     }
 
     pub(super) fn grown(self, by: f64) -> Self {
-        Self { low: self.low.map(|value| value - by), high: self.high.map(|value| value + by) }
+        Self {
+            low: self.low.map(|value| value - by),
+            high: self.high.map(|value| value + by),
+        }
     }
 
     pub(super) fn extent(&self, axis: usize) -> f64 {
@@ -46,7 +62,11 @@ impl Bounds {
 
     /// Horizontal distance between two boxes; 0 if they overlap.
     fn level_gap(&self, other: &Self) -> f64 {
-        let gap = |axis: usize| (self.low[axis] - other.high[axis]).max(other.low[axis] - self.high[axis]).max(0.0);
+        let gap = |axis: usize| {
+            (self.low[axis] - other.high[axis])
+                .max(other.low[axis] - self.high[axis])
+                .max(0.0)
+        };
         gap(0).hypot(gap(1))
     }
 
@@ -67,7 +87,11 @@ impl View {
 
     pub(super) fn title(self) -> String {
         let letter = |axis: usize| ["x", "y", "z"][axis];
-        let from = if self.up == 1 { "from above" } else { "from the side" };
+        let from = if self.up == 1 {
+            "from above"
+        } else {
+            "from the side"
+        };
         format!("{from}   {} → {} ↑", letter(self.across), letter(self.up))
     }
 }
@@ -91,7 +115,12 @@ impl Window {
             let (middle, half) = (bounds.middle(axis), pixels / scale / 2.0);
             (wide.low[axis], wide.high[axis]) = (middle - half, middle + half);
         }
-        Self { view, bounds: wide, scale, panel }
+        Self {
+            view,
+            bounds: wide,
+            scale,
+            panel,
+        }
     }
 
     /// Projects a point of the world to a pixel.
@@ -105,12 +134,19 @@ impl Window {
     /// Projects a box of the world to a rectangle.
     pub(super) fn rect(&self, bounds: &Bounds) -> Rect {
         let ([left, bottom], [right, top]) = (self.pixel(bounds.low), self.pixel(bounds.high));
-        Rect { left, top, width: right - left, height: bottom - top }
+        Rect {
+            left,
+            top,
+            width: right - left,
+            height: bottom - top,
+        }
     }
 
     /// Whether a body overlaps the window's region on all three axes.
     pub(super) fn overlaps(&self, bounds: &Bounds) -> bool {
-        [0, 1, 2].into_iter().all(|axis| bounds.meets(&self.bounds, axis))
+        [0, 1, 2]
+            .into_iter()
+            .all(|axis| bounds.meets(&self.bounds, axis))
     }
 }
 
@@ -123,18 +159,30 @@ const AROUND_M: f64 = 0.12;
 /// The same close-up shows before and after, if it is not larger than this. Unit: metres.
 const LARGEST_CLOSE_UP_M: f64 = 2.8;
 
-/// Regions of the close-ups before and after: the same region if it is small enough. Returns `None` if the trace has no
-/// states. The region after includes `point`, if it is near enough.
-pub(super) fn close_ups(trace: &Trace, subjects: &BTreeSet<&str>, point: Option<[f64; 3]>) -> Option<[Bounds; 2]> {
+/// Regions of the close-ups before and after: the same region if it is small enough. Returns `None`
+/// if the trace has no states. The region after includes `point`, if it is near enough.
+pub(super) fn close_ups(
+    trace: &Trace,
+    subjects: &BTreeSet<&str>,
+    point: Option<[f64; 3]>,
+) -> Option<[Bounds; 2]> {
     let before = region_of_interest(trace.snapshots.first()?, subjects, trace);
     let mut after = region_of_interest(trace.snapshots.last()?, subjects, trace);
-    let is_small = |bounds: &Bounds| [0, 1].into_iter().all(|axis| bounds.extent(axis) <= LARGEST_CLOSE_UP_M);
+    let is_small = |bounds: &Bounds| {
+        [0, 1]
+            .into_iter()
+            .all(|axis| bounds.extent(axis) <= LARGEST_CLOSE_UP_M)
+    };
     let wider = point.map(|point| after.with(Bounds::point(point).grown(AROUND_M)));
     if let Some(wider) = wider.filter(is_small) {
         after = wider;
     }
     let both = before.with(after);
-    let [mut before, mut after] = if is_small(&both) { [both, both] } else { [before, after] };
+    let [mut before, mut after] = if is_small(&both) {
+        [both, both]
+    } else {
+        [before, after]
+    };
     for bounds in [&mut before, &mut after] {
         *bounds = limited(bounds.grown(AROUND_M));
     }
@@ -146,26 +194,47 @@ pub(super) fn close_ups(trace: &Trace, subjects: &BTreeSet<&str>, point: Option<
     Some([before, after])
 }
 
-/// Region of interest at a moment: the subjects, the furniture below them, their neighbours, and the hand.
+/// Region of interest at a moment: the subjects, the furniture below them, their neighbours, and
+/// the hand.
 fn region_of_interest(snapshot: &Snapshot, subjects: &BTreeSet<&str>, trace: &Trace) -> Bounds {
     let bodies = || snapshot.bodies.iter();
-    let base = Bounds::point([snapshot.robot.base_true[0], snapshot.robot.base_true[1], 0.5]);
-    let perceived = trace.actions.iter().filter_map(|action| action.perceived.as_ref()?.plane);
-    let found = bodies().filter(|body| subjects.contains(body.id.as_str())).map(Bounds::of);
+    let base = Bounds::point([
+        snapshot.robot.base_true[0],
+        snapshot.robot.base_true[1],
+        0.5,
+    ]);
+    let perceived = trace
+        .actions
+        .iter()
+        .filter_map(|action| action.perceived.as_ref()?.plane);
+    let found = bodies()
+        .filter(|body| subjects.contains(body.id.as_str()))
+        .map(Bounds::of);
     let seen = perceived.map(|plane| Bounds::point(plane.pose.position));
-    let core = Bounds::union(found).or_else(|| Bounds::union(seen)).unwrap_or_else(|| base.grown(0.5));
-    let near = bodies().filter(|body| !body.fixed).map(Bounds::of).filter(|other| core.level_gap(other) < NEIGHBOURS_M);
+    let core = Bounds::union(found)
+        .or_else(|| Bounds::union(seen))
+        .unwrap_or_else(|| base.grown(0.5));
+    let near = bodies()
+        .filter(|body| !body.fixed)
+        .map(Bounds::of)
+        .filter(|other| core.level_gap(other) < NEIGHBOURS_M);
     let mut shown = core;
     if let Some(near) = Bounds::union(near) {
         shown = shown.with(near);
     }
-    let carries = |body: &&BodyState| body.fixed && Bounds::of(body).level_gap(&core) == 0.0 && body.aabb_min[2] < 0.05;
+    let carries = |body: &&BodyState| {
+        body.fixed && Bounds::of(body).level_gap(&core) == 0.0 && body.aabb_min[2] < 0.05
+    };
     let low = |body: &&BodyState| (0..2).all(|axis| Bounds::of(body).extent(axis) < 2.0);
     if let Some(carriers) = Bounds::union(bodies().filter(carries).filter(low).map(Bounds::of)) {
         shown = shown.with(carriers);
     }
     let hand = Bounds::point(snapshot.robot.gripper.position);
-    if core.level_gap(&hand) < HAND_M { shown.with(hand) } else { shown }
+    if core.level_gap(&hand) < HAND_M {
+        shown.with(hand)
+    } else {
+        shown
+    }
 }
 
 /// Crops a region that is too large to its middle, and enlarges one that is too small.
@@ -178,18 +247,26 @@ fn limited(mut bounds: Bounds) -> Bounds {
     bounds
 }
 
-/// The whole world. Returns `None` if the close-ups already show nearly all of it: places, furniture and the path of
-/// the base.
-pub(super) fn overview(trace: &Trace, close_ups: &[Bounds; 2], paths: &[[f64; 3]]) -> Option<Bounds> {
-    let rooms = trace
-        .map
-        .rooms
+/// The whole world. Returns `None` if the close-ups already show nearly all of it: places,
+/// furniture and the path of the base.
+pub(super) fn overview(
+    trace: &Trace,
+    close_ups: &[Bounds; 2],
+    paths: &[[f64; 3]],
+) -> Option<Bounds> {
+    let rooms = trace.map.rooms.iter().map(|room| Bounds {
+        low: [room.low_m[0], room.low_m[1], 0.0],
+        high: [room.high_m[0], room.high_m[1], 0.0],
+    });
+    let bodies = trace
+        .snapshots
         .iter()
-        .map(|room| Bounds { low: [room.low_m[0], room.low_m[1], 0.0], high: [room.high_m[0], room.high_m[1], 0.0] });
-    let bodies = trace.snapshots.iter().flat_map(|snapshot| &snapshot.bodies).map(Bounds::of);
+        .flat_map(|snapshot| &snapshot.bodies)
+        .map(Bounds::of);
     let paths = paths.iter().map(|point| Bounds::point(*point).grown(0.3));
     let whole = Bounds::union(rooms.chain(bodies).chain(paths))?.grown(0.15);
     let seen = close_ups[0].with(close_ups[1]);
-    let beyond = |axis: usize| (seen.low[axis] - whole.low[axis]).max(whole.high[axis] - seen.high[axis]);
+    let beyond =
+        |axis: usize| (seen.low[axis] - whole.low[axis]).max(whole.high[axis] - seen.high[axis]);
     (beyond(0).max(beyond(1)) > 0.35).then_some(whole)
 }

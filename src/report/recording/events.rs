@@ -16,8 +16,8 @@ struct Line {
     text: String,
 }
 
-/// Records the events below `events`: actions with their phases, contacts, and outcomes other than passed. For a run
-/// without a trace, all known events are at the beginning.
+/// Records the events below `events`: actions with their phases, contacts, and outcomes other than
+/// passed. For a run without a trace, all known events are at the beginning.
 ///
 /// # Errors
 /// The rerun library rejects a line.
@@ -26,7 +26,11 @@ pub(super) fn record(
     run: &RunDetail,
     trace: Option<&Trace>,
 ) -> Result<(), RecordingFault> {
-    let kinds = [("actions", actions(run, trace)), ("contacts", contacts(trace)), ("outcomes", outcomes(run, trace))];
+    let kinds = [
+        ("actions", actions(run, trace)),
+        ("contacts", contacts(trace)),
+        ("outcomes", outcomes(run, trace)),
+    ];
     for (kind, mut lines) in kinds {
         if lines.is_empty() {
             continue;
@@ -36,15 +40,26 @@ pub(super) fn record(
             .with_many_text(lines.iter().map(|line| line.text.as_str()))
             .with_many_level(lines.iter().map(|line| line.level));
         let columns = texts.columns_of_unit_batches()?;
-        recording.log_series(place(["events", kind]), lines.iter().map(|line| line.secs), columns)?;
+        recording.log_series(
+            place(["events", kind]),
+            lines.iter().map(|line| line.secs),
+            columns,
+        )?;
     }
     Ok(())
 }
 
-/// Start time of an action, given its index in the run. Returns the end of the run if the action was never reached.
+/// Start time of an action, given its index in the run. Returns the end of the run if the action
+/// was never reached.
 fn begin(trace: Option<&Trace>, idx: usize) -> f64 {
     let Some(trace) = trace else { return 0.0 };
-    let time = |idx: usize| trace.snapshots.get(idx).or(trace.snapshots.last()).map_or(0.0, |state| state.time_secs);
+    let time = |idx: usize| {
+        trace
+            .snapshots
+            .get(idx)
+            .or(trace.snapshots.last())
+            .map_or(0.0, |state| state.time_secs)
+    };
     time(idx) - time(0)
 }
 
@@ -52,8 +67,11 @@ fn actions(run: &RunDetail, trace: Option<&Trace>) -> Vec<Line> {
     let mut lines = Vec::new();
     for (idx, action) in run.actions.iter().enumerate() {
         let (name, start) = (names::local(&action.action), begin(trace, idx));
-        let line =
-            |secs: f64, level, event: &str| Line { secs, level, text: format!("{}. {name} {event}", action.step) };
+        let line = |secs: f64, level, event: &str| Line {
+            secs,
+            level,
+            text: format!("{}. {name} {event}", action.step),
+        };
         if action.end == Outcome::Untested.word() {
             lines.push(line(start, "WARN", "was not reached"));
             continue;
@@ -64,9 +82,21 @@ fn actions(run: &RunDetail, trace: Option<&Trace>) -> Vec<Line> {
             continue;
         }
         lines.push(line(start, "INFO", "begins"));
-        let phases = trace.and_then(|trace| trace.actions.get(idx)).into_iter().flat_map(|action| &action.phases);
-        lines.extend(phases.map(|phase| line(start + phase.start_secs, "DEBUG", &format!("· {}", phase.name))));
-        let words = action.message.as_deref().filter(|message| !message.is_empty());
+        let phases = trace
+            .and_then(|trace| trace.actions.get(idx))
+            .into_iter()
+            .flat_map(|action| &action.phases);
+        lines.extend(phases.map(|phase| {
+            line(
+                start + phase.start_secs,
+                "DEBUG",
+                &format!("· {}", phase.name),
+            )
+        }));
+        let words = action
+            .message
+            .as_deref()
+            .filter(|message| !message.is_empty());
         let words = words.map_or_else(String::new, |message| format!(": {message}"));
         let (level, event) = match action.reported {
             Some(true) => ("INFO", "reports success".to_owned()),
@@ -85,13 +115,18 @@ fn contacts(trace: Option<&Trace>) -> Vec<Line> {
             let ([a, b], start) = (&contact.pair, begin(trace, idx));
             let (until, force) = (start + contact.end_secs, contact.max_force_n);
             let text = format!("{a} touches {b} until {until:.2} s, with {force:.1} N at most");
-            Line { secs: start + contact.start_secs, level: "TRACE", text }
+            Line {
+                secs: start + contact.start_secs,
+                level: "TRACE",
+                text,
+            }
         })
     });
     all.collect()
 }
 
-/// Outcomes other than passed. Failures are at the moment that decided them, all others at the end of the action.
+/// Outcomes other than passed. Failures are at the moment that decided them, all others at the end
+/// of the action.
 fn outcomes(run: &RunDetail, trace: Option<&Trace>) -> Vec<Line> {
     let mut lines = Vec::new();
     for (idx, action) in run.actions.iter().enumerate() {
@@ -107,8 +142,15 @@ fn outcomes(run: &RunDetail, trace: Option<&Trace>) -> Vec<Line> {
                 Some(trace) if failed => deciding_moment(trace, idx, &judgement.witness),
                 _ => begin(trace, idx) + action.duration_secs,
             };
-            let (action, property) = (names::local(&action.action), names::local(&judgement.property));
-            let text = format!("{action}: {property} {}: {}", judgement.outcome.word(), judgement.witness);
+            let (action, property) = (
+                names::local(&action.action),
+                names::local(&judgement.property),
+            );
+            let text = format!(
+                "{action}: {property} {}: {}",
+                judgement.outcome.word(),
+                judgement.witness
+            );
             lines.push(Line { secs, level, text });
         }
     }

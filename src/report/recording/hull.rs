@@ -18,22 +18,33 @@ pub(super) struct Face {
     pub corners: Vec<Point3<f64>>,
 }
 
-/// Computes the faces of the convex hull: all planes through three points with no point beyond them. Coplanar points
-/// give two faces, collinear points none.
+/// Computes the faces of the convex hull: all planes through three points with no point beyond
+/// them. Coplanar points give two faces, collinear points none.
 ///
 /// The complexity is O(n⁴).
 pub(super) fn faces(points: &[[f64; 3]]) -> Vec<Face> {
-    let finite = points.iter().filter(|point| point.iter().all(|value| value.is_finite()));
-    let points: Vec<Point3<f64>> = finite.take(MOST_CORNERS).map(|point| Point3::from(*point)).collect();
+    let finite = points
+        .iter()
+        .filter(|point| point.iter().all(|value| value.is_finite()));
+    let points: Vec<Point3<f64>> = finite
+        .take(MOST_CORNERS)
+        .map(|point| Point3::from(*point))
+        .collect();
     let mut faces: Vec<Face> = Vec::new();
     for (i, a) in points.iter().enumerate() {
         for (j, b) in points.iter().enumerate().skip(i + 1) {
             for c in points.iter().skip(j + 1) {
-                let Some(normal) = (b - a).cross(&(c - a)).try_normalize(1e-12) else { continue };
+                let Some(normal) = (b - a).cross(&(c - a)).try_normalize(1e-12) else {
+                    continue;
+                };
                 for normal in [normal, -normal] {
                     let reach = normal.dot(&a.coords);
                     let known = faces.iter().any(|face| is_same(face, &normal, reach));
-                    if !known && points.iter().all(|point| normal.dot(&point.coords) <= reach + FLAT_M) {
+                    if !known
+                        && points
+                            .iter()
+                            .all(|point| normal.dot(&point.coords) <= reach + FLAT_M)
+                    {
                         faces.extend(face(&points, normal, reach));
                     }
                 }
@@ -43,25 +54,44 @@ pub(super) fn faces(points: &[[f64; 3]]) -> Vec<Face> {
     faces
 }
 
-/// The face of the points that are farthest along a normal. Returns `None` if it has fewer than three corners.
+/// The face of the points that are farthest along a normal. Returns `None` if it has fewer than
+/// three corners.
 fn face(points: &[Point3<f64>], normal: Vector3<f64>, reach: f64) -> Option<Face> {
-    let on = points.iter().filter(|point| normal.dot(&point.coords) >= reach - FLAT_M);
+    let on = points
+        .iter()
+        .filter(|point| normal.dot(&point.coords) >= reach - FLAT_M);
     let corners = around(&on.copied().collect::<Vec<_>>(), &normal);
     (corners.len() > 2).then_some(Face { normal, corners })
 }
 
 fn is_same(face: &Face, normal: &Vector3<f64>, reach: f64) -> bool {
-    let corner = face.corners.first().map_or(f64::NAN, |corner| normal.dot(&corner.coords));
+    let corner = face
+        .corners
+        .first()
+        .map_or(f64::NAN, |corner| normal.dot(&corner.coords));
     face.normal.dot(normal) > 1.0 - 1e-6 && (corner - reach).abs() < 10.0 * FLAT_M
 }
 
-/// Corners of the convex hull of coplanar points, counter-clockwise seen from the side to which the normal points.
+/// Corners of the convex hull of coplanar points, counter-clockwise seen from the side to which the
+/// normal points.
 fn around(points: &[Point3<f64>], normal: &Vector3<f64>) -> Vec<Point3<f64>> {
-    let Some(first) = points.first() else { return Vec::new() };
-    let Some(u) = points.iter().find_map(|point| (point - first).try_normalize(FLAT_M)) else { return Vec::new() };
+    let Some(first) = points.first() else {
+        return Vec::new();
+    };
+    let Some(u) = points
+        .iter()
+        .find_map(|point| (point - first).try_normalize(FLAT_M))
+    else {
+        return Vec::new();
+    };
     let v = normal.cross(&u);
-    let flat = points.iter().map(|point| [(point - first).dot(&u), (point - first).dot(&v)]);
-    convex_hull(flat).into_iter().map(|[x, y]| first + u * x + v * y).collect()
+    let flat = points
+        .iter()
+        .map(|point| [(point - first).dot(&u), (point - first).dot(&v)]);
+    convex_hull(flat)
+        .into_iter()
+        .map(|[x, y]| first + u * x + v * y)
+        .collect()
 }
 
 #[cfg(test)]
@@ -70,16 +100,31 @@ mod tests {
 
     /// Corners of a box.
     fn corners([x, y, z]: [f64; 3]) -> Vec<[f64; 3]> {
-        (0..8).map(|idx| [x * f64::from(idx & 1), y * f64::from(idx >> 1 & 1), z * f64::from(idx >> 2)]).collect()
+        (0..8)
+            .map(|idx| {
+                [
+                    x * f64::from(idx & 1),
+                    y * f64::from(idx >> 1 & 1),
+                    z * f64::from(idx >> 2),
+                ]
+            })
+            .collect()
     }
 
-    /// Volume enclosed by the faces, and their area. Both are wrong if a face is missing, duplicated or inverted.
+    /// Volume enclosed by the faces, and their area. Both are wrong if a face is missing,
+    /// duplicated or inverted.
     fn measured(faces: &[Face]) -> (f64, f64) {
-        let triangles =
-            faces.iter().flat_map(|face| face.corners[1..].windows(2).map(|pair| (face.corners[0], pair[0], pair[1])));
+        let triangles = faces.iter().flat_map(|face| {
+            face.corners[1..]
+                .windows(2)
+                .map(|pair| (face.corners[0], pair[0], pair[1]))
+        });
         triangles.fold((0.0, 0.0), |(volume, area), (a, b, c)| {
             let turned = (b - a).cross(&(c - a));
-            (volume + a.coords.dot(&turned) / 6.0, area + turned.norm() / 2.0)
+            (
+                volume + a.coords.dot(&turned) / 6.0,
+                area + turned.norm() / 2.0,
+            )
         })
     }
 
@@ -90,7 +135,10 @@ mod tests {
         let faces = faces(&points);
         let (volume, area) = measured(&faces);
         assert_eq!(faces.len(), 6);
-        assert!((volume - 6.0).abs() < 1e-9 && (area - 22.0).abs() < 1e-9, "{volume} {area}");
+        assert!(
+            (volume - 6.0).abs() < 1e-9 && (area - 22.0).abs() < 1e-9,
+            "{volume} {area}"
+        );
     }
 
     #[test]

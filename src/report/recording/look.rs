@@ -16,18 +16,23 @@ impl Look {
     /// A link of the robot.
     pub const ROBOT: Self = Self::filled(0x86a5_c6ff);
     /// A perceived object.
-    pub const PERCEIVED: Self = Self { rgba: 0xb43c_b0ff, filled: false };
+    pub const PERCEIVED: Self = Self {
+        rgba: 0xb43c_b0ff,
+        filled: false,
+    };
 
     const fn filled(rgba: u32) -> Self {
         Self { rgba, filled: true }
     }
 
-    /// The look of an object by its role. Walls are not filled, because they would hide objects behind them.
+    /// The look of an object by its role. Walls are not filled, because they would hide objects
+    /// behind them.
     pub fn of(role: Option<Role>, body: Option<&BodyState>) -> Self {
         match role {
-            _ if body.is_some_and(|body| names::local(&body.category) == "Wall") => {
-                Self { rgba: 0xb9c0_c9ff, filled: false }
-            }
+            _ if body.is_some_and(|body| names::local(&body.category) == "Wall") => Self {
+                rgba: 0xb9c0_c9ff,
+                filled: false,
+            },
             Some(Role::Target) => Self::filled(0x2f7f_e0ff),
             Some(Role::Obstacle) => Self::filled(0xd08a_2eff),
             Some(Role::Platform) => Self::filled(0xd9c2_9aff),

@@ -25,10 +25,20 @@ impl Mesh {
         for face in faces {
             let first = self.positions.len() as u32;
             let normal = at.rotation * face.normal;
-            self.positions.extend(face.corners.iter().map(|corner| single((at * corner).coords)));
-            self.normals.extend(face.corners.iter().map(|_| single(normal)));
+            self.positions.extend(
+                face.corners
+                    .iter()
+                    .map(|corner| single((at * corner).coords)),
+            );
+            self.normals
+                .extend(face.corners.iter().map(|_| single(normal)));
             let corners = first..self.positions.len() as u32;
-            self.triangles.extend(corners.clone().skip(2).map(|corner| [first, corner - 1, corner]));
+            self.triangles.extend(
+                corners
+                    .clone()
+                    .skip(2)
+                    .map(|corner| [first, corner - 1, corner]),
+            );
         }
     }
 
@@ -53,7 +63,12 @@ fn single(vector: Vector3<f64>) -> [f32; 3] {
 pub(super) fn tube(radius_low: f64, radius_high: f64, wall: f64, height: f64) -> Vec<Face> {
     let top = height / 2.0;
     // Cross-section of the wall: outside, upper rim, inside, lower rim.
-    let profile = [(radius_low, -top), (radius_high, top), (radius_high - wall, top), (radius_low - wall, -top)];
+    let profile = [
+        (radius_low, -top),
+        (radius_high, top),
+        (radius_high - wall, top),
+        (radius_low - wall, -top),
+    ];
     let at = |(radius, z): (f64, f64), step: u32| {
         let angle = TAU * f64::from(step % AROUND) / f64::from(AROUND);
         let radius = radius.max(0.0);
@@ -61,12 +76,22 @@ pub(super) fn tube(radius_low: f64, radius_high: f64, wall: f64, height: f64) ->
     };
     let sides = profile.iter().zip(profile.iter().cycle().skip(1));
     let quads = sides.flat_map(|(a, b)| {
-        (0..AROUND).map(move |step| vec![at(*a, step), at(*a, step + 1), at(*b, step + 1), at(*b, step)])
+        (0..AROUND).map(move |step| {
+            vec![
+                at(*a, step),
+                at(*a, step + 1),
+                at(*b, step + 1),
+                at(*b, step),
+            ]
+        })
     });
     let face = |corners: Vec<Point3<f64>>| {
         // If the wall has no thickness, two corners of its rim coincide.
         let turned = (corners[2] - corners[0]).cross(&(corners[3] - corners[1]));
-        Some(Face { normal: turned.try_normalize(1e-12)?, corners })
+        Some(Face {
+            normal: turned.try_normalize(1e-12)?,
+            corners,
+        })
     };
     quads.filter_map(face).collect()
 }

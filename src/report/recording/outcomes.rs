@@ -13,8 +13,8 @@ pub(super) fn title(run: &RunDetail) -> String {
     Caption::of(run).title
 }
 
-/// Formats the outcomes of all properties with witness, margin and explanation (Markdown). Text of models, rules and
-/// messages is escaped.
+/// Formats the outcomes of all properties with witness, margin and explanation (Markdown). Text of
+/// models, rules and messages is escaped.
 pub(super) fn document(run: &RunDetail, explained: &[Explained]) -> String {
     let caption = Caption::of(run);
     let mut out = format!("# {}\n", plain(&caption.title));
@@ -30,9 +30,18 @@ pub(super) fn document(run: &RunDetail, explained: &[Explained]) -> String {
     out
 }
 
-fn judgement_text(out: &mut String, action: &ActionDetail, judgement: &Judgement, explained: &[Explained]) {
+fn judgement_text(
+    out: &mut String,
+    action: &ActionDetail,
+    judgement: &Judgement,
+    explained: &[Explained],
+) {
     let (property, outcome) = (names::local(&judgement.property), judgement.outcome.word());
-    let outcome = if judgement.outcome == Outcome::Passed { outcome.to_owned() } else { format!("**{outcome}**") };
+    let outcome = if judgement.outcome == Outcome::Passed {
+        outcome.to_owned()
+    } else {
+        format!("**{outcome}**")
+    };
     let _ = write!(out, "- {}: {outcome}", plain(property));
     if let Some(margin) = judgement.margin {
         let _ = write!(out, ", margin {margin:.4}");
@@ -41,7 +50,9 @@ fn judgement_text(out: &mut String, action: &ActionDetail, judgement: &Judgement
         let _ = write!(out, ". {}", plain(&judgement.witness));
     }
     out.push('\n');
-    let why = explained.iter().find(|why| why.step == action.step && why.property == judgement.property);
+    let why = explained
+        .iter()
+        .find(|why| why.step == action.step && why.property == judgement.property);
     if let Some(why) = why {
         // Indented text is shown verbatim.
         out.push('\n');

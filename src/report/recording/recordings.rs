@@ -25,7 +25,11 @@ impl Recordings {
     pub fn new() -> Result<Self, RecordingFault> {
         let options = EncodingOptions::PROTOBUF_COMPRESSED;
         let encoder = Encoder::new_eager(CrateVersion::LOCAL, options, Vec::new())?;
-        Ok(Self { encoder, runs: 0, bytes: 0 })
+        Ok(Self {
+            encoder,
+            runs: 0,
+            bytes: 0,
+        })
     }
 
     /// Adds a run. A run without a trace has no 3D content, but its outcomes are included.
@@ -41,8 +45,12 @@ impl Recordings {
         let mut recording = Recording::begin(&mut self.encoder, &run.row.run)?;
         let name = RecordingInfo::new().with_name(outcomes::title(run));
         recording.log_static(EntityPath::properties(), &[&name])?;
-        recording
-            .log_static(place(["outcomes"]), &[&TextDocument::from_markdown(outcomes::document(run, explained))])?;
+        recording.log_static(
+            place(["outcomes"]),
+            &[&TextDocument::from_markdown(outcomes::document(
+                run, explained,
+            ))],
+        )?;
         if let Some(trace) = trace.filter(|trace| !trace.snapshots.is_empty()) {
             motion::record(&mut recording, run, trace)?;
         }

@@ -21,7 +21,11 @@ struct Solids<const N: usize> {
 
 impl<const N: usize> Default for Solids<N> {
     fn default() -> Self {
-        Self { sizes: Vec::new(), middles: Vec::new(), turns: Vec::new() }
+        Self {
+            sizes: Vec::new(),
+            middles: Vec::new(),
+            turns: Vec::new(),
+        }
     }
 }
 
@@ -33,7 +37,10 @@ impl<const N: usize> Solids<N> {
     }
 
     fn column(&self, idx: usize) -> Vec<f32> {
-        self.sizes.iter().filter_map(|size| size.get(idx).copied()).collect()
+        self.sizes
+            .iter()
+            .filter_map(|size| size.get(idx).copied())
+            .collect()
     }
 }
 
@@ -55,13 +62,18 @@ impl Drawn {
         drawn
     }
 
-    /// Draws the bounding box of a body without a shape. Frame: world axes, relative to the body's origin.
+    /// Draws the bounding box of a body without a shape. Frame: world axes, relative to the body's
+    /// origin.
     pub fn around(body: &BodyState) -> Self {
-        let middle =
-            [0, 1, 2].map(|axis| f64::midpoint(body.aabb_max[axis], body.aabb_min[axis]) - body.pose.position[axis]);
+        let middle = [0, 1, 2].map(|axis| {
+            f64::midpoint(body.aabb_max[axis], body.aabb_min[axis]) - body.pose.position[axis]
+        });
         let mut drawn = Self::default();
         drawn.box_at(
-            &Pose { position: middle, ..Pose::IDENTITY },
+            &Pose {
+                position: middle,
+                ..Pose::IDENTITY
+            },
             [0, 1, 2].map(|axis| body.aabb_max[axis] - body.aabb_min[axis]),
         );
         drawn
@@ -79,11 +91,21 @@ impl Drawn {
             Shape::Cylinder { radius, height } => self.cylinders.add(&at, [*height, *radius]),
             // The origin of the viewer's capsules is the centre of their lower hemisphere.
             Shape::Capsule { radius, height } => {
-                self.capsules.add(&(at * Translation3::new(0.0, 0.0, -height / 2.0)), [*height, *radius]);
+                self.capsules.add(
+                    &(at * Translation3::new(0.0, 0.0, -height / 2.0)),
+                    [*height, *radius],
+                );
             }
             Shape::Sphere { radius } => self.spheres.add(&at, [*radius]),
-            Shape::Tube { radius_low, radius_high, wall, height, .. } => {
-                self.mesh.add(&tube(*radius_low, *radius_high, *wall, *height), &at);
+            Shape::Tube {
+                radius_low,
+                radius_high,
+                wall,
+                height,
+                ..
+            } => {
+                self.mesh
+                    .add(&tube(*radius_low, *radius_high, *wall, *height), &at);
             }
             Shape::Hull { points, .. } => self.mesh.add(&faces(points), &at),
             // Traces only contain the outermost points of a mesh.
@@ -93,7 +115,11 @@ impl Drawn {
 
     /// Returns the boxes as wireframes, for objects that are not physically present (percepts).
     pub fn boxes(self, look: Look) -> Boxes3D {
-        let fill = if look.filled { FillMode::Solid } else { FillMode::MajorWireframe };
+        let fill = if look.filled {
+            FillMode::Solid
+        } else {
+            FillMode::MajorWireframe
+        };
         Boxes3D::from_centers_and_sizes(self.boxes.middles, self.boxes.sizes)
             .with_quaternions(self.boxes.turns)
             .with_colors([Color::from(look.rgba)])
@@ -102,22 +128,37 @@ impl Drawn {
 
     /// Returns the components to record.
     pub fn recorded(mut self, look: Look) -> Vec<Box<dyn AsComponents>> {
-        let fill = if look.filled { FillMode::Solid } else { FillMode::MajorWireframe };
+        let fill = if look.filled {
+            FillMode::Solid
+        } else {
+            FillMode::MajorWireframe
+        };
         let colour = [Color::from(look.rgba)];
         let mut all: Vec<Box<dyn AsComponents>> = Vec::new();
-        let Self { cylinders, capsules, spheres, .. } = &self;
+        let Self {
+            cylinders,
+            capsules,
+            spheres,
+            ..
+        } = &self;
         if !cylinders.sizes.is_empty() {
-            let made = Cylinders3D::from_lengths_and_radii(cylinders.column(0), cylinders.column(1));
-            let placed = made.with_centers(cylinders.middles.clone()).with_quaternions(cylinders.turns.clone());
+            let made =
+                Cylinders3D::from_lengths_and_radii(cylinders.column(0), cylinders.column(1));
+            let placed = made
+                .with_centers(cylinders.middles.clone())
+                .with_quaternions(cylinders.turns.clone());
             all.push(Box::new(placed.with_colors(colour).with_fill_mode(fill)));
         }
         if !capsules.sizes.is_empty() {
             let made = Capsules3D::from_lengths_and_radii(capsules.column(0), capsules.column(1));
-            let placed = made.with_translations(capsules.middles.clone()).with_quaternions(capsules.turns.clone());
+            let placed = made
+                .with_translations(capsules.middles.clone())
+                .with_quaternions(capsules.turns.clone());
             all.push(Box::new(placed.with_colors(colour).with_fill_mode(fill)));
         }
         if !spheres.sizes.is_empty() {
-            let made = Ellipsoids3D::from_centers_and_radii(spheres.middles.clone(), spheres.column(0));
+            let made =
+                Ellipsoids3D::from_centers_and_radii(spheres.middles.clone(), spheres.column(0));
             all.push(Box::new(made.with_colors(colour).with_fill_mode(fill)));
         }
         if let Some(mesh) = std::mem::take(&mut self.mesh).drawn(look.rgba) {
@@ -132,7 +173,10 @@ impl Drawn {
 
 /// Unit: metres.
 fn position(at: &Isometry3<f64>) -> [f32; 3] {
-    (at * Point3::origin()).coords.map(|value| value as f32).into()
+    (at * Point3::origin())
+        .coords
+        .map(|value| value as f32)
+        .into()
 }
 
 fn turn(at: &Isometry3<f64>) -> Quaternion {

@@ -2,7 +2,9 @@
 
 use re_chunk::{Chunk, ChunkError, ChunkId, RowId, TimeColumn, TimePoint, Timeline};
 use re_log_encoding::{EncodeError, Encoder};
-use re_log_types::{EntityPath, EntityPathPart, LogMsg, SetStoreInfo, StoreId, StoreInfo, StoreSource};
+use re_log_types::{
+    EntityPath, EntityPathPart, LogMsg, SetStoreInfo, StoreId, StoreInfo, StoreSource,
+};
 use re_sdk_types::{AsComponents, SerializationError, SerializedComponentColumn};
 
 /// Application id; recordings of one application share their viewer settings.
@@ -10,7 +12,8 @@ const APPLICATION: &str = "actcheck";
 /// Name of the only timeline: simulated time since the run began.
 const SIM_TIME: &str = "sim_time";
 
-/// Why something can't be recorded. No run should cause these errors, but the library can return them.
+/// Why something can't be recorded. No run should cause these errors, but the library can return
+/// them.
 #[derive(Debug, thiserror::Error)]
 pub enum RecordingFault {
     /// Values can't be converted to columns.
@@ -24,7 +27,8 @@ pub enum RecordingFault {
     Message(#[from] EncodeError),
 }
 
-/// A recording that is being written. Its ids are sequential, because they only need to be unique within a recording.
+/// A recording that is being written. Its ids are sequential, because they only need to be unique
+/// within a recording.
 pub(super) struct Recording<'a> {
     encoder: &'a mut Encoder<Vec<u8>>,
     store: StoreId,
@@ -41,9 +45,18 @@ impl<'a> Recording<'a> {
     pub fn begin(encoder: &'a mut Encoder<Vec<u8>>, run: &str) -> Result<Self, RecordingFault> {
         let store = StoreId::recording(APPLICATION, run);
         let info = StoreInfo::new(store.clone(), StoreSource::Other(APPLICATION.to_owned()));
-        let begun = LogMsg::SetStoreInfo(SetStoreInfo { row_id: RowId::ZERO.as_tuid(), info });
+        let begun = LogMsg::SetStoreInfo(SetStoreInfo {
+            row_id: RowId::ZERO.as_tuid(),
+            info,
+        });
         let bytes = encoder.append(&begun)?;
-        Ok(Self { encoder, store, chunks: 0, rows: 0, bytes })
+        Ok(Self {
+            encoder,
+            store,
+            chunks: 0,
+            rows: 0,
+            bytes,
+        })
     }
 
     /// Number of bytes written so far.
@@ -55,7 +68,11 @@ impl<'a> Recording<'a> {
     ///
     /// # Errors
     /// The components can't be converted or encoded.
-    pub fn log_static(&mut self, at: EntityPath, what: &[&dyn AsComponents]) -> Result<(), RecordingFault> {
+    pub fn log_static(
+        &mut self,
+        at: EntityPath,
+        what: &[&dyn AsComponents],
+    ) -> Result<(), RecordingFault> {
         self.log(at, TimePoint::STATIC, what)
     }
 
@@ -63,18 +80,34 @@ impl<'a> Recording<'a> {
     ///
     /// # Errors
     /// The components can't be converted or encoded.
-    pub fn log_at(&mut self, at: EntityPath, secs: f64, what: &dyn AsComponents) -> Result<(), RecordingFault> {
-        self.log(at, TimePoint::default().with(Timeline::new_duration(SIM_TIME), nanos(secs)), &[what])
+    pub fn log_at(
+        &mut self,
+        at: EntityPath,
+        secs: f64,
+        what: &dyn AsComponents,
+    ) -> Result<(), RecordingFault> {
+        self.log(
+            at,
+            TimePoint::default().with(Timeline::new_duration(SIM_TIME), nanos(secs)),
+            &[what],
+        )
     }
 
-    fn log(&mut self, at: EntityPath, time: TimePoint, what: &[&dyn AsComponents]) -> Result<(), RecordingFault> {
+    fn log(
+        &mut self,
+        at: EntityPath,
+        time: TimePoint,
+        what: &[&dyn AsComponents],
+    ) -> Result<(), RecordingFault> {
         let batches = what.iter().flat_map(|what| what.as_serialized_batches());
         let row = self.row();
-        let chunk = Chunk::builder_with_id(self.chunk(), at).with_serialized_batches(row, time, batches);
+        let chunk =
+            Chunk::builder_with_id(self.chunk(), at).with_serialized_batches(row, time, batches);
         self.write(&chunk.build()?)
     }
 
-    /// Logs a time series of components. Columns have one row for each moment. Unit: seconds since the run began.
+    /// Logs a time series of components. Columns have one row for each moment. Unit: seconds since
+    /// the run began.
     ///
     /// # Errors
     /// The components can't be converted or encoded.
@@ -88,8 +121,12 @@ impl<'a> Recording<'a> {
         let rows: Vec<RowId> = nanos.iter().map(|_| self.row()).collect();
         let times = TimeColumn::new_duration_nanos(SIM_TIME, nanos);
         let timelines = std::iter::once((*times.timeline().name(), times)).collect();
-        let components = columns.into_iter().map(|column| (column.descriptor, column.list_array)).collect();
-        let chunk = Chunk::from_native_row_ids(self.chunk(), at, Some(true), &rows, timelines, components)?;
+        let components = columns
+            .into_iter()
+            .map(|column| (column.descriptor, column.list_array))
+            .collect();
+        let chunk =
+            Chunk::from_native_row_ids(self.chunk(), at, Some(true), &rows, timelines, components)?;
         self.write(&chunk)
     }
 
@@ -104,7 +141,9 @@ impl<'a> Recording<'a> {
     }
 
     fn write(&mut self, chunk: &Chunk) -> Result<(), RecordingFault> {
-        self.bytes += self.encoder.append(&LogMsg::ArrowMsg(self.store.clone(), chunk.to_arrow_msg()?))?;
+        self.bytes += self
+            .encoder
+            .append(&LogMsg::ArrowMsg(self.store.clone(), chunk.to_arrow_msg()?))?;
         Ok(())
     }
 }

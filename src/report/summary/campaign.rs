@@ -91,7 +91,8 @@ pub struct Proportion {
     pub count: u64,
     /// Denominator.
     pub of: u64,
-    /// An estimate of the proportion in further runs; `None` if outcomes ended the runs and it is biased.
+    /// An estimate of the proportion in further runs; `None` if outcomes ended the runs and it is
+    /// biased.
     pub rate: Option<f64>,
     /// The count divided by the total, and the interval.
     pub interval: Interval,
@@ -103,10 +104,16 @@ impl Proportion {
         Self::sampled(count, of, Sampling::Fixed)
     }
 
-    /// As [`Proportion::new`], with an interval that is valid for the way in which the number of runs was decided.
+    /// As [`Proportion::new`], with an interval that is valid for the way in which the number of
+    /// runs was decided.
     pub fn sampled(count: u64, of: u64, sampling: Sampling) -> Option<Self> {
         let interval = sampling.interval(count, of)?;
-        Some(Self { count, of, rate: (sampling == Sampling::Fixed).then_some(interval.rate), interval })
+        Some(Self {
+            count,
+            of,
+            rate: (sampling == Sampling::Fixed).then_some(interval.rate),
+            interval,
+        })
     }
 }
 
@@ -119,21 +126,24 @@ pub struct PropertyLine {
     pub label: String,
     /// Counts of all six outcomes.
     pub counts: Counts,
-    /// Proportion of passed among decided outcomes, with its 95 % interval. `None` if none was decided.
+    /// Proportion of passed among decided outcomes, with its 95 % interval. `None` if none was
+    /// decided.
     pub rate: Option<Proportion>,
     /// Number of passed outcomes whose property already held before the action.
     pub held_before: u64,
     /// Number of passed outcomes that say nothing because no left side of an `implies` held.
     pub vacuous: u64,
-    /// The rate with lost outcomes counted either way, if there are many. They are broken or timed out, or untested because
-    /// the run ended so.
+    /// The rate with lost outcomes counted either way, if there are many. They are broken or timed
+    /// out, or untested because the run ended so.
     pub bounds: Option<RateBounds>,
 }
 
-/// From this share of lost outcomes on, a rate without them says little: the robot may crash or hang where it would fail.
+/// From this share of lost outcomes on, a rate without them says little: the robot may crash or
+/// hang where it would fail.
 const MANY_LOST: f64 = 0.1;
 
-/// The bounds of a pass rate if lost outcomes, which are neither passed nor failed, are counted either way.
+/// The bounds of a pass rate if lost outcomes, which are neither passed nor failed, are counted
+/// either way.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RateBounds {
     /// Number of lost outcomes.
@@ -152,7 +162,11 @@ impl RateBounds {
             return None;
         }
         let as_failures = Proportion::sampled(passed, of, sampling)?;
-        Some(Self { lost, as_failures, as_passes: Proportion::sampled(passed + lost, of, sampling)? })
+        Some(Self {
+            lost,
+            as_failures,
+            as_passes: Proportion::sampled(passed + lost, of, sampling)?,
+        })
     }
 
     /// The lowest and the highest rate.
@@ -162,12 +176,19 @@ impl RateBounds {
 }
 
 impl std::fmt::Display for Proportion {
-    /// Writes, for example, `80 % [55–93] (12 of 15)`, and `[55–93 %] (12 of 15)` without an estimate of the rate.
+    /// Writes, for example, `80 % [55–93] (12 of 15)`, and `[55–93 %] (12 of 15)` without an
+    /// estimate of the rate.
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let interval = &self.interval;
         let (low, high) = (interval.low * 100.0, interval.high * 100.0);
         match self.rate {
-            Some(rate) => write!(f, "{:.0} % [{low:.0}–{high:.0}] ({} of {})", rate * 100.0, self.count, self.of),
+            Some(rate) => write!(
+                f,
+                "{:.0} % [{low:.0}–{high:.0}] ({} of {})",
+                rate * 100.0,
+                self.count,
+                self.of
+            ),
             None => write!(f, "[{low:.0}–{high:.0} %] ({} of {})", self.count, self.of),
         }
     }
@@ -225,7 +246,9 @@ impl RunSummary {
 
     /// Outcomes of all properties of all actions.
     pub fn outcomes(&self) -> impl Iterator<Item = Outcome> + '_ {
-        self.actions.iter().flat_map(|action| action.judgements.iter().map(|j| j.outcome))
+        self.actions
+            .iter()
+            .flat_map(|action| action.judgements.iter().map(|j| j.outcome))
     }
 
     /// Whether at least one property passed and all others passed or were inapplicable.
@@ -237,7 +260,9 @@ impl RunSummary {
     /// Whether the given property failed in any action.
     pub fn failed_property(&self, property: &str) -> bool {
         let judgements = self.actions.iter().flat_map(|action| &action.judgements);
-        judgements.into_iter().any(|judgement| judgement.property == property && judgement.outcome == Outcome::Failed)
+        judgements
+            .into_iter()
+            .any(|judgement| judgement.property == property && judgement.outcome == Outcome::Failed)
     }
 
     /// Whether any property failed.
@@ -249,7 +274,9 @@ impl RunSummary {
 impl CampaignSummary {
     /// The command that lists the runs of its history.
     pub(crate) fn all_runs(&self) -> ShellLine {
-        ShellLine::new(&self.program).fixed("list").option("--history", &self.history)
+        ShellLine::new(&self.program)
+            .fixed("list")
+            .option("--history", &self.history)
     }
 
     /// The paper's T over all runs. Returns `None` if there are no runs.
@@ -259,25 +286,43 @@ impl CampaignSummary {
 
     /// T over the runs that are not broken. Returns `None` if there are none.
     pub fn total_score_without_broken(&self) -> Option<f64> {
-        mean(self.runs.iter().filter(|run| run.status != RunStatus::Broken).map(|run| run.score))
+        mean(
+            self.runs
+                .iter()
+                .filter(|run| run.status != RunStatus::Broken)
+                .map(|run| run.score),
+        )
     }
 
     /// How the number of runs was decided.
     pub fn sampling(&self) -> Sampling {
-        Sampling::of(self.ended_by.as_ref().map(|ended| ended.budget), self.interrupted)
+        Sampling::of(
+            self.ended_by.as_ref().map(|ended| ended.budget),
+            self.interrupted,
+        )
     }
 
     /// Number of failed runs, if a number of them ended the campaign.
     pub fn ended_at_failures(&self) -> Option<u64> {
-        let ended = self.ended_by.as_ref().is_some_and(|ended| ended.budget == "failures");
+        let ended = self
+            .ended_by
+            .as_ref()
+            .is_some_and(|ended| ended.budget == "failures");
         ended.then(|| self.runs.iter().filter(|run| run.failed()).count() as u64)
     }
 
-    /// Proportion of runs in which everything passed, among the runs that are not broken. Returns `None` if all runs
-    /// are broken.
+    /// Proportion of runs in which everything passed, among the runs that are not broken. Returns
+    /// `None` if all runs are broken.
     pub fn pass_rate(&self) -> Option<Proportion> {
-        let judged = || self.runs.iter().filter(|run| run.status != RunStatus::Broken);
-        let (passed, of) = (judged().filter(|run| run.passed()).count() as u64, judged().count() as u64);
+        let judged = || {
+            self.runs
+                .iter()
+                .filter(|run| run.status != RunStatus::Broken)
+        };
+        let (passed, of) = (
+            judged().filter(|run| run.passed()).count() as u64,
+            judged().count() as u64,
+        );
         let failed = judged().filter(|run| run.failed()).count() as u64;
         let alike = self.interval_of_alike(None);
         let exact = alike.is_none() && passed + failed == of;
@@ -286,7 +331,11 @@ impl CampaignSummary {
 
     /// Bounds of the pass rate, if more than a tenth of the runs is broken or timed out.
     pub fn pass_rate_bounds(&self) -> Option<RateBounds> {
-        let lost = self.runs.iter().filter(|run| run.status != RunStatus::Completed && !run.failed()).count() as u64;
+        let lost = self
+            .runs
+            .iter()
+            .filter(|run| run.status != RunStatus::Completed && !run.failed())
+            .count() as u64;
         let passed = self.runs.iter().filter(|run| run.passed()).count() as u64;
         RateBounds::new(passed, self.runs.len() as u64 - lost, lost, self.sampling())
     }
@@ -294,17 +343,26 @@ impl CampaignSummary {
     /// The share of the tested runs in which exactly these properties failed.
     pub fn mode_share(&self, mode: &FailureMode) -> Proportion {
         let runs = |fails: bool| {
-            let modes = self.failure_modes.iter().filter(|mode| !fails || !mode.failed.is_empty());
+            let modes = self
+                .failure_modes
+                .iter()
+                .filter(|mode| !fails || !mode.failed.is_empty());
             modes.map(|mode| mode.runs.len() as u64).sum::<u64>()
         };
         let (count, of) = (mode.runs.len() as u64, runs(false));
         let in_failed = [if mode.failed.is_empty() { 0 } else { count }, runs(true)];
-        Proportion { count, of, rate: self.estimate([count, of], in_failed), interval: mode.share }
+        Proportion {
+            count,
+            of,
+            rate: self.estimate([count, of], in_failed),
+            interval: mode.share,
+        }
     }
 
-    /// A proportion with an interval that is valid for the way in which the campaign ended. `in_failed`: count and total within failed
-    /// runs. `alike`: the interval for scenes that were run several times. `exact`: whether the others of the total are the
-    /// failures that may have ended the campaign.
+    /// A proportion with an interval that is valid for the way in which the campaign ended.
+    /// `in_failed`: count and total within failed runs. `alike`: the interval for scenes that were
+    /// run several times. `exact`: whether the others of the total are the failures that may have
+    /// ended the campaign.
     fn proportion(
         &self,
         [count, of]: [u64; 2],
@@ -314,26 +372,36 @@ impl CampaignSummary {
     ) -> Option<Proportion> {
         let found = Proportion::sampled(count, of, self.sampling())?;
         let mut interval = alike.unwrap_or(found.interval);
-        if let Some(known) =
-            self.ended_at_failures().filter(|_| exact).and_then(|_| passes_until_failures(of - count, of))
+        if let Some(known) = self
+            .ended_at_failures()
+            .filter(|_| exact)
+            .and_then(|_| passes_until_failures(of - count, of))
         {
             (interval.low, interval.high) = (known.low, known.high);
         }
-        Some(Proportion { rate: self.estimate([count, of], in_failed), interval, ..found })
+        Some(Proportion {
+            rate: self.estimate([count, of], in_failed),
+            interval,
+            ..found
+        })
     }
 
-    /// The estimate of a rate in further runs. Returns `None` if the first failure ended the campaign, or if one did and scenes
-    /// were run several times.
+    /// The estimate of a rate in further runs. Returns `None` if the first failure ended the
+    /// campaign, or if one did and scenes were run several times.
     ///
-    /// If the failure number k ended it, the runs before that one are unbiased: they are those of the other k - 1 failures, and
-    /// of their number. Which of the failed runs was the last does not depend on anything else, so the estimate leaves out the
-    /// mean of them: a k-th of the counts within failed runs. For whole runs, this is Haldane's estimate (1945).
+    /// If the failure number k ended it, the runs before that one are unbiased: they are those of
+    /// the other k - 1 failures, and of their number. Which of the failed runs was the last does
+    /// not depend on anything else, so the estimate leaves out the mean of them: a k-th of the
+    /// counts within failed runs. For whole runs, this is Haldane's estimate (1945).
     fn estimate(&self, [count, of]: [u64; 2], [count_failed, of_failed]: [u64; 2]) -> Option<f64> {
-        let Some(failures) = self.ended_at_failures() else { return Some(count as f64 / of as f64) };
+        let Some(failures) = self.ended_at_failures() else {
+            return Some(count as f64 / of as f64);
+        };
         if failures < 2 || self.is_repeated() {
             return None;
         }
-        let without_last = |all: u64, in_failed: u64| all as f64 - in_failed as f64 / failures as f64;
+        let without_last =
+            |all: u64, in_failed: u64| all as f64 - in_failed as f64 / failures as f64;
         let of = without_last(of, of_failed);
         (of > 0.0).then(|| without_last(count, count_failed) / of)
     }
@@ -358,9 +426,14 @@ impl CampaignSummary {
         }
         let lines = |name: &String| {
             let all = self.lines_of(|action| action.name == *name);
-            all.into_iter().filter(|line| line.counts.total() > 0).collect()
+            all.into_iter()
+                .filter(|line| line.counts.total() > 0)
+                .collect()
         };
-        names.into_iter().map(|name| (name.clone(), lines(name))).collect()
+        names
+            .into_iter()
+            .map(|name| (name.clone(), lines(name)))
+            .collect()
     }
 
     /// One line for each property, over the actions that the filter accepts.
@@ -368,18 +441,24 @@ impl CampaignSummary {
         let line = |iri: &String, label: &String| {
             let judged = |which: &dyn Fn(&RunSummary) -> bool| -> Vec<&Judgement> {
                 let runs = self.runs.iter().filter(|run| which(run));
-                let actions = runs.flat_map(|run| &run.actions).filter(|action| accepts(action));
+                let actions = runs
+                    .flat_map(|run| &run.actions)
+                    .filter(|action| accepts(action));
                 let judgements = actions.flat_map(|action| &action.judgements);
-                judgements.filter(|judgement| judgement.property == *iri).collect()
+                judgements
+                    .filter(|judgement| judgement.property == *iri)
+                    .collect()
             };
-            let count = |own: &[&Judgement]| Counts::of(own.iter().map(|judgement| judgement.outcome));
+            let count =
+                |own: &[&Judgement]| Counts::of(own.iter().map(|judgement| judgement.outcome));
             let own = judged(&|_| true);
             let (counts, failed) = (count(&own), count(&judged(&RunSummary::failed)));
             let ended_early = count(&judged(&|run| run.status != RunStatus::Completed));
             let lost = counts.broken + counts.timeout + ended_early.untested;
             let alike = self.interval_of_alike(Some(iri));
             // With one property of one action, its failures are those of the runs.
-            let sole = self.properties.len() == 1 && self.runs.iter().all(|run| run.actions.len() <= 1);
+            let sole =
+                self.properties.len() == 1 && self.runs.iter().all(|run| run.actions.len() <= 1);
             let exact = sole && alike.is_none();
             PropertyLine {
                 property: iri.clone(),
@@ -391,16 +470,25 @@ impl CampaignSummary {
                     alike,
                     exact,
                 ),
-                held_before: own.iter().filter(|judgement| judgement.held_before == Some(true)).count() as u64,
-                vacuous: own.iter().filter(|judgement| judgement.vacuous == Some(true)).count() as u64,
+                held_before: own
+                    .iter()
+                    .filter(|judgement| judgement.held_before == Some(true))
+                    .count() as u64,
+                vacuous: own
+                    .iter()
+                    .filter(|judgement| judgement.vacuous == Some(true))
+                    .count() as u64,
                 bounds: RateBounds::new(counts.passed, counts.decided(), lost, self.sampling()),
             }
         };
-        self.properties.iter().map(|(iri, label, _)| line(iri, label)).collect()
+        self.properties
+            .iter()
+            .map(|(iri, label, _)| line(iri, label))
+            .collect()
     }
 
-    /// 0: everything passed. 1: a property failed, in a run or in a case. 2: nothing failed, but something could not be
-    /// tested.
+    /// 0: everything passed. 1: a property failed, in a run or in a case. 2: nothing failed, but
+    /// something could not be tested.
     pub fn exit_code(&self) -> u8 {
         let counts = self.counts();
         if counts.failed > 0 || self.regressions.iter().any(CaseSummary::fails) {
@@ -428,7 +516,11 @@ pub(crate) mod tests {
             .map(|(idx, outcome)| Judgement {
                 property: format!("http://actions#P{idx}"),
                 outcome: *outcome,
-                margin: Some(if *outcome == Outcome::Passed { 0.05 } else { -0.016 }),
+                margin: Some(if *outcome == Outcome::Passed {
+                    0.05
+                } else {
+                    -0.016
+                }),
                 witness: "glass_1 moved 0.4 cm, needs more than 2 cm".into(),
                 rule_digest: "d".into(),
                 held_before: None,
@@ -446,7 +538,11 @@ pub(crate) mod tests {
             reason: (status != RunStatus::Completed).then(|| "body left the world".into()),
             score,
             trace_hash: index.to_string(),
-            actions: vec![ActionSummary { name: "Pick".into(), score, judgements }],
+            actions: vec![ActionSummary {
+                name: "Pick".into(),
+                score,
+                judgements,
+            }],
         }
     }
 
@@ -457,7 +553,13 @@ pub(crate) mod tests {
             history: "configs/.actcheck".into(),
             program: "actcheck".into(),
             properties: (0..2)
-                .map(|i| (format!("http://actions#P{i}"), format!("property {i}"), Some("m".to_owned())))
+                .map(|i| {
+                    (
+                        format!("http://actions#P{i}"),
+                        format!("property {i}"),
+                        Some("m".to_owned()),
+                    )
+                })
                 .collect(),
             search: None,
             failure_modes: vec![],
@@ -471,7 +573,8 @@ pub(crate) mod tests {
         }
     }
 
-    /// Regression: after `--max-failures`, rates were biased and intervals assumed a fixed number of runs.
+    /// Regression: after `--max-failures`, rates were biased and intervals assumed a fixed number
+    /// of runs.
     #[test]
     fn rates_after_a_stop_at_failures_are_those_of_inverse_sampling() {
         use Outcome::{Failed, Passed};
@@ -481,31 +584,55 @@ pub(crate) mod tests {
                 .map(|(index, both)| run(index, RunStatus::Completed, &both[usize::from(sole)..]));
             let mut summary = campaign(runs.collect());
             summary.properties.truncate(if sole { 1 } else { 2 });
-            summary.ended_by = Some(EndedBy { budget: "failures", description: String::new() });
+            summary.ended_by = Some(EndedBy {
+                budget: "failures",
+                description: String::new(),
+            });
             summary
         };
-        let outcomes = [[Passed, Passed], [Passed, Failed], [Passed, Passed], [Passed, Passed], [Failed, Failed]];
+        let outcomes = [
+            [Passed, Passed],
+            [Passed, Failed],
+            [Passed, Passed],
+            [Passed, Passed],
+            [Failed, Failed],
+        ];
         let known = passes_until_failures(2, 5).expect("it has runs");
         let summary = stopped(&outcomes, false);
         let rate = summary.pass_rate().expect("decided");
         assert_eq!((rate.count, rate.of, rate.rate), (3, 5, known.rate));
-        assert_eq!((rate.interval.low, rate.interval.high), (known.low, known.high));
+        assert_eq!(
+            (rate.interval.low, rate.interval.high),
+            (known.low, known.high)
+        );
         // The first property failed in one of the two failed runs: half a failure in four runs.
         let lines = summary.property_lines();
         assert_eq!(lines[0].rate.and_then(|rate| rate.rate), Some(3.5 / 4.0));
-        assert_eq!(lines[0].rate.map(|rate| rate.interval), Sampling::Stopped.interval(4, 5));
-        let alone = stopped(&outcomes, true).property_lines()[0].rate.expect("decided");
+        assert_eq!(
+            lines[0].rate.map(|rate| rate.interval),
+            Sampling::Stopped.interval(4, 5)
+        );
+        let alone = stopped(&outcomes, true).property_lines()[0]
+            .rate
+            .expect("decided");
         assert_eq!((alone.rate, alone.interval.low), (known.rate, known.low));
         // There is no unbiased estimate at the first failure, but an interval.
         let first = stopped(&outcomes[..2], false).pass_rate().expect("decided");
-        assert!(first.rate.is_none() && first.to_string().ends_with("–99 %] (1 of 2)"), "{first}");
+        assert!(
+            first.rate.is_none() && first.to_string().ends_with("–99 %] (1 of 2)"),
+            "{first}"
+        );
         let mut interrupted = campaign(stopped(&outcomes, false).runs);
         interrupted.interrupted = true;
         let rate = interrupted.pass_rate().expect("decided");
-        assert_eq!((rate.rate, Some(rate.interval)), (Some(0.6), Sampling::Stopped.interval(3, 5)));
+        assert_eq!(
+            (rate.rate, Some(rate.interval)),
+            (Some(0.6), Sampling::Stopped.interval(3, 5))
+        );
     }
 
-    /// Regression: a program that crashed or hung whenever it would have failed had a rate of 100 %.
+    /// Regression: a program that crashed or hung whenever it would have failed had a rate of 100
+    /// %.
     #[test]
     fn many_lost_runs_give_bounds() {
         use Outcome::{Broken, Passed, Timeout, Untested};
@@ -517,25 +644,52 @@ pub(crate) mod tests {
             };
             campaign((0..20).map(of).collect())
         };
-        assert_eq!((lost(2).pass_rate_bounds(), lost(2).property_lines()[0].bounds), (None, None));
+        assert_eq!(
+            (
+                lost(2).pass_rate_bounds(),
+                lost(2).property_lines()[0].bounds
+            ),
+            (None, None)
+        );
         let summary = lost(5);
         let bounds = summary.pass_rate_bounds().expect("a quarter is lost");
         assert_eq!((bounds.lost, bounds.ends()), (5, [0.75, 1.0]));
         assert_eq!(Some(bounds.as_failures.interval), wilson(15, 20));
-        assert!(summary.property_lines().iter().all(|line| line.bounds == Some(bounds)));
+        assert!(
+            summary
+                .property_lines()
+                .iter()
+                .all(|line| line.bounds == Some(bounds))
+        );
     }
 
     /// Five runs with the same trace are no more evidence than one.
     #[test]
     fn runs_with_the_same_trace_have_the_interval_of_one() {
-        let mut summary = campaign((0..6).map(|index| run(index, RunStatus::Completed, &[Outcome::Passed])).collect());
-        let low = |summary: &CampaignSummary| summary.property_lines()[0].rate.expect("decided").interval.low;
+        let mut summary = campaign(
+            (0..6)
+                .map(|index| run(index, RunStatus::Completed, &[Outcome::Passed]))
+                .collect(),
+        );
+        let low = |summary: &CampaignSummary| {
+            summary.property_lines()[0]
+                .rate
+                .expect("decided")
+                .interval
+                .low
+        };
         let independent = low(&summary);
-        summary.runs.iter_mut().for_each(|run| run.trace_hash = (run.index % 3).to_string());
+        summary
+            .runs
+            .iter_mut()
+            .for_each(|run| run.trace_hash = (run.index % 3).to_string());
         let rate = summary.property_lines()[0].rate.expect("decided");
         assert_eq!((rate.count, rate.of), (6, 6));
         assert_eq!(Some(rate.interval), wilson(3, 3));
-        assert_eq!(summary.pass_rate().expect("decided").interval, rate.interval);
+        assert_eq!(
+            summary.pass_rate().expect("decided").interval,
+            rate.interval
+        );
         assert!(low(&summary) < independent);
     }
 
@@ -545,13 +699,22 @@ pub(crate) mod tests {
         let broken = run(0, RunStatus::Broken, &[Broken, Broken]);
         assert!(!broken.passed() && !broken.failed());
         assert_eq!(campaign(vec![broken.clone()]).exit_code(), 2);
-        assert_eq!(campaign(vec![run(0, RunStatus::Completed, &[Passed, Inapplicable])]).exit_code(), 0);
-        let mixed = campaign(vec![broken, run(1, RunStatus::Completed, &[Passed, Failed])]);
+        assert_eq!(
+            campaign(vec![run(0, RunStatus::Completed, &[Passed, Inapplicable])]).exit_code(),
+            0
+        );
+        let mixed = campaign(vec![
+            broken,
+            run(1, RunStatus::Completed, &[Passed, Failed]),
+        ]);
         assert_eq!(mixed.exit_code(), 1);
         assert_eq!(mixed.total_score(), Some(0.25));
         assert_eq!(mixed.total_score_without_broken(), Some(0.5));
         assert_eq!(mixed.property_lines()[0].counts.broken, 1);
         assert_eq!(campaign(vec![]).exit_code(), 2);
-        assert_eq!(campaign(vec![run(0, RunStatus::Completed, &[Inapplicable])]).exit_code(), 2);
+        assert_eq!(
+            campaign(vec![run(0, RunStatus::Completed, &[Inapplicable])]).exit_code(),
+            2
+        );
     }
 }

@@ -66,8 +66,9 @@ impl CompareSummary {
         self.comparison.answer(self.answer_level(), self.margin)
     }
 
-    /// The code of the answer, if it was asked for: 0 no difference, 1 worse, 3 better, 4 underpowered. Otherwise 1 if the
-    /// second side is significantly worse at the given level, and 0 if not.
+    /// The code of the answer, if it was asked for: 0 no difference, 1 worse, 3 better, 4
+    /// underpowered. Otherwise 1 if the second side is significantly worse at the given level, and
+    /// 0 if not.
     pub fn exit_code(&self) -> u8 {
         if self.decide {
             return match self.answer() {
@@ -77,12 +78,19 @@ impl CompareSummary {
                 Answer::Underpowered { .. } => 4,
             };
         }
-        u8::from(self.level.is_some_and(|level| !self.comparison.worse_at(level).is_empty()))
+        u8::from(
+            self.level
+                .is_some_and(|level| !self.comparison.worse_at(level).is_empty()),
+        )
     }
 
-    /// Configuration lines that only the first side has, and those that only the second has. Comments are ignored.
+    /// Configuration lines that only the first side has, and those that only the second has.
+    /// Comments are ignored.
     pub fn config_lines(&self) -> [Vec<String>; 2] {
-        let [first, second] = self.sides.each_ref().map(|side| settings(&side.config_text));
+        let [first, second] = self
+            .sides
+            .each_ref()
+            .map(|side| settings(&side.config_text));
         [without(&first, &second), without(&second, &first)]
     }
 }
@@ -92,7 +100,9 @@ pub(crate) fn compared_name(of: &Compared) -> String {
     match of {
         Compared::WholeRun => "whole run".to_owned(),
         Compared::Completion => "run completes".to_owned(),
-        Compared::Property { action, property } => format!("{} {}", names::local(action), names::local(property)),
+        Compared::Property { action, property } => {
+            format!("{} {}", names::local(action), names::local(property))
+        }
     }
 }
 
@@ -109,7 +119,8 @@ pub(crate) fn compared_parts(of: &Compared) -> (Option<String>, Option<String>) 
 fn settings(text: &str) -> Vec<String> {
     let (mut found, mut table) = (Vec::new(), String::new());
     for line in text.lines() {
-        // A `#` inside quotes is cut too. Both sides are cut alike, so only the printed line gets shorter.
+        // A `#` inside quotes is cut too. Both sides are cut alike, so only the printed line gets
+        // shorter.
         let line = line.split('#').next().unwrap_or_default().trim();
         if line.starts_with('[') && line.ends_with(']') && !line.contains('=') {
             table = format!("{line} ");

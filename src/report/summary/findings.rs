@@ -1,8 +1,8 @@
 //! Findings of the analysis, with the names needed to print them.
 
 use actcheck_analysis::{
-    Cascade, Collisions, Condition, FailureMode, FlakyScene, Interval, Parameter, Pattern, PatternInput, Patterns,
-    PropertyFindings, Sampling, Strongest, Trend, TwoWay,
+    Cascade, Collisions, Condition, FailureMode, FlakyScene, Interval, Parameter, Pattern,
+    PatternInput, Patterns, PropertyFindings, Sampling, Strongest, Trend, TwoWay,
 };
 use actcheck_base::{ShellLine, names};
 use actcheck_verdict::Counts;
@@ -20,7 +20,8 @@ pub struct FindingsSummary {
     pub campaigns: Vec<String>,
     /// Number of runs in the table.
     pub runs: u64,
-    /// Number of runs of the sample in which conditions and collisions were sought; `None` if that was all.
+    /// Number of runs of the sample in which conditions and collisions were sought; `None` if that
+    /// was all.
     pub sampled_runs: Option<u64>,
     /// How the number of runs was decided: which intervals are valid, and whether rates are biased.
     pub sampling: Sampling,
@@ -65,13 +66,21 @@ impl PropertyReport {
 
     /// The conditions of failures: when the property fails.
     pub fn when(&self) -> Causes<'_> {
-        Causes { report: self, input: &self.findings.input, patterns: &self.findings.patterns }
+        Causes {
+            report: self,
+            input: &self.findings.input,
+            patterns: &self.findings.patterns,
+        }
     }
 
     /// The effects that go with failures: how the property fails.
     pub fn how(&self) -> Causes<'_> {
         let effects = &self.findings.effects;
-        Causes { report: self, input: &effects.input, patterns: &effects.patterns }
+        Causes {
+            report: self,
+            input: &effects.input,
+            patterns: &effects.patterns,
+        }
     }
 
     /// Describes a pattern of conditions in one sentence.
@@ -94,31 +103,51 @@ impl<'a> Causes<'a> {
     /// Describes a pattern in one sentence.
     pub fn sentence(&self, pattern: &Pattern) -> String {
         let conditions = self.conditions(&pattern.conditions);
-        self.compared(&conditions, pattern.rate, pattern.runs.len() as u64, pattern.elsewhere)
+        self.compared(
+            &conditions,
+            pattern.rate,
+            pattern.runs.len() as u64,
+            pattern.elsewhere,
+        )
     }
 
     /// Describes one of the strongest conditions in one sentence.
     pub fn strongest_sentence(&self, strongest: &Strongest) -> String {
         let all = strongest.all;
         let condition = self.conditions(std::slice::from_ref(&strongest.condition));
-        self.compared(&condition, strongest.rate, all.failed_in + all.passed_in, Some(strongest.elsewhere))
+        self.compared(
+            &condition,
+            strongest.rate,
+            all.failed_in + all.passed_in,
+            Some(strongest.elsewhere),
+        )
     }
 
-    fn compared(&self, conditions: &str, rate: Interval, runs: u64, elsewhere: Option<Interval>) -> String {
+    fn compared(
+        &self,
+        conditions: &str,
+        rate: Interval,
+        runs: u64,
+        elsewhere: Option<Interval>,
+    ) -> String {
         let elsewhere = match elsewhere {
             Some(elsewhere) => format!("; elsewhere in {}", percent(elsewhere.rate)),
             None => String::new(),
         };
         let (name, share) = (self.report.name(), percent(rate.rate));
         let [low, high] = [rate.low * 100.0, rate.high * 100.0];
-        format!("{name} fails in {share} [{low:.0}–{high:.0}] of {runs} runs with {conditions}{elsewhere}")
+        format!(
+            "{name} fails in {share} [{low:.0}–{high:.0}] of {runs} runs with {conditions}{elsewhere}"
+        )
     }
 
     /// Describes conditions in words.
     pub fn conditions(&self, conditions: &[Condition]) -> String {
         let parameters = &self.input.parameters;
-        let conditions: Vec<String> =
-            conditions.iter().map(|condition| condition_text(condition, &parameters[condition.parameter()])).collect();
+        let conditions: Vec<String> = conditions
+            .iter()
+            .map(|condition| condition_text(condition, &parameters[condition.parameter()]))
+            .collect();
         match conditions.as_slice() {
             [first @ .., last] if !first.is_empty() => format!("{} and {last}", first.join(", ")),
             all => all.join(""),
@@ -128,8 +157,16 @@ impl<'a> Causes<'a> {
     /// Ids of the runs of a pattern, failed runs first.
     pub fn runs(&self, pattern: &Pattern) -> Vec<&'a str> {
         let (failed, examples) = (&self.input.failed, &self.report.findings.examples);
-        let of = |wanted: bool| pattern.runs.iter().filter(move |run| failed[**run] == wanted);
-        of(true).chain(of(false)).map(|run| examples[*run].run.as_str()).collect()
+        let of = |wanted: bool| {
+            pattern
+                .runs
+                .iter()
+                .filter(move |run| failed[**run] == wanted)
+        };
+        of(true)
+            .chain(of(false))
+            .map(|run| examples[*run].run.as_str())
+            .collect()
     }
 }
 
@@ -137,24 +174,38 @@ impl<'a> Causes<'a> {
 const DRAWN: &str = "sense_";
 
 impl FindingsSummary {
-    /// The command that writes a rule about the scenes of a property's pattern, by the pattern's number.
+    /// The command that writes a rule about the scenes of a property's pattern, by the pattern's
+    /// number.
     pub(crate) fn scene_rule(&self, property: &str, number: usize) -> ShellLine {
-        let line = ShellLine::new(&self.program).fixed("analyse").option("--property", property);
-        line.option("--scene-rule", number.to_string()).quoted(&self.options)
+        let line = ShellLine::new(&self.program)
+            .fixed("analyse")
+            .option("--property", property);
+        line.option("--scene-rule", number.to_string())
+            .quoted(&self.options)
     }
 }
 
 /// Formats a proportion, such as `71 %`; values below 10 % have one decimal.
 pub(crate) fn percent(share: f64) -> String {
     let share = share * 100.0;
-    if share > 0.0 && share < 9.95 { format!("{share:.1} %") } else { format!("{share:.0} %") }
+    if share > 0.0 && share < 9.95 {
+        format!("{share:.1} %")
+    } else {
+        format!("{share:.0} %")
+    }
 }
 
 /// Describes a condition, such as `target friction < 0.35`.
 fn condition_text(condition: &Condition, parameter: &Parameter) -> String {
-    let unit = parameter.unit.as_ref().map_or_else(String::new, |unit| format!(" {unit}"));
+    let unit = parameter
+        .unit
+        .as_ref()
+        .map_or_else(String::new, |unit| format!(" {unit}"));
     let bare = match &parameter.unit {
-        Some(unit) => parameter.name.strip_suffix(&format!("_{}", unit.to_lowercase())).unwrap_or(&parameter.name),
+        Some(unit) => parameter
+            .name
+            .strip_suffix(&format!("_{}", unit.to_lowercase()))
+            .unwrap_or(&parameter.name),
         None => &parameter.name,
     };
     let name = match bare.strip_prefix(DRAWN) {
@@ -163,12 +214,21 @@ fn condition_text(condition: &Condition, parameter: &Parameter) -> String {
     };
     match condition {
         Condition::Kind { kind, .. } => {
-            let thing = bare.strip_suffix("_category").or_else(|| bare.strip_suffix("_model")).unwrap_or(bare);
+            let thing = bare
+                .strip_suffix("_category")
+                .or_else(|| bare.strip_suffix("_model"))
+                .unwrap_or(bare);
             format!("{} {kind}", thing.replace('_', " "))
         }
-        Condition::Range { low: Some(low), high: Some(high), .. } => format!("{low} ≤ {name} < {high}{unit}"),
+        Condition::Range {
+            low: Some(low),
+            high: Some(high),
+            ..
+        } => format!("{low} ≤ {name} < {high}{unit}"),
         Condition::Range { low: Some(low), .. } => format!("{name} ≥ {low}{unit}"),
-        Condition::Range { high: Some(high), .. } => format!("{name} < {high}{unit}"),
+        Condition::Range {
+            high: Some(high), ..
+        } => format!("{name} < {high}{unit}"),
         Condition::Range { .. } => format!("any {name}"),
         Condition::Arc { from, to, .. } if *from == -to => format!("{name} beyond ±{from}{unit}"),
         Condition::Arc { from, to, .. } => format!("{name} ≥ {from} or < {to}{unit}"),

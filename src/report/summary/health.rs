@@ -78,7 +78,11 @@ impl HealthSummary {
     }
 
     fn show(&self, run: &str) -> String {
-        ShellLine::new(&self.program).fixed("show").word(run).option("--history", &self.history).to_string()
+        ShellLine::new(&self.program)
+            .fixed("show")
+            .word(run)
+            .option("--history", &self.history)
+            .to_string()
     }
 
     /// Pairs of bins over all pairs of parameters: number tried, number expected, total.
@@ -95,7 +99,10 @@ impl HealthSummary {
 fn neglected(parameter: &ParameterCoverage) -> Diagnostic {
     let bins = parameter.counts.len();
     let bin = parameter.neglected.unwrap_or_default();
-    let (times, even) = (parameter.counts.get(bin).copied().unwrap_or_default(), parameter.draws as f64 / bins as f64);
+    let (times, even) = (
+        parameter.counts.get(bin).copied().unwrap_or_default(),
+        parameter.draws as f64 / bins as f64,
+    );
     let message = format!(
         "`{}` fell into the {} of its {bins} equally probable bins {times} times in {} draws, not about {even:.0}",
         parameter.name,
@@ -122,7 +129,15 @@ mod tests {
 
     #[test]
     fn ordinals_have_english_suffixes() {
-        let ordinals: Vec<String> = [1, 2, 3, 4, 11, 12, 13, 21, 102].into_iter().map(ordinal).collect();
-        assert_eq!(ordinals, ["1st", "2nd", "3rd", "4th", "11th", "12th", "13th", "21st", "102nd"]);
+        let ordinals: Vec<String> = [1, 2, 3, 4, 11, 12, 13, 21, 102]
+            .into_iter()
+            .map(ordinal)
+            .collect();
+        assert_eq!(
+            ordinals,
+            [
+                "1st", "2nd", "3rd", "4th", "11th", "12th", "13th", "21st", "102nd"
+            ]
+        );
     }
 }

@@ -1,4 +1,5 @@
-//! Plain data that is printed: summaries of campaigns, comparisons, findings and other results, with exit codes.
+//! Plain data that is printed: summaries of campaigns, comparisons, findings and other results,
+//! with exit codes.
 //!
 //! Never: formats a whole report. `text`, `table` and `json` do, each with a file for each summary.
 
@@ -16,7 +17,9 @@ mod weighted;
 
 #[cfg(test)]
 pub(crate) use campaign::tests as campaign_samples;
-pub use campaign::{ActionSummary, CampaignSummary, EndedBy, PropertyLine, Proportion, RateBounds, RunSummary};
+pub use campaign::{
+    ActionSummary, CampaignSummary, EndedBy, PropertyLine, Proportion, RateBounds, RunSummary,
+};
 pub use case::CaseSummary;
 pub use compare::{CompareSummary, ComparedSide, SideChange};
 pub(crate) use compare::{compared_name, compared_parts};

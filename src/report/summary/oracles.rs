@@ -72,19 +72,30 @@ impl OracleSummary {
     }
 
     fn what(&self, fault: &str) -> &str {
-        self.faults.iter().find(|(name, _)| name == fault).map_or("", |(_, what)| what)
+        self.faults
+            .iter()
+            .find(|(name, _)| name == fault)
+            .map_or("", |(_, what)| what)
     }
 
     fn name<'a>(&'a self, property: &'a str) -> &'a str {
-        let place = self.matrix.properties.iter().position(|(iri, ..)| iri == property);
-        place.and_then(|idx| self.names.get(idx)).map_or(property, String::as_str)
+        let place = self
+            .matrix
+            .properties
+            .iter()
+            .position(|(iri, ..)| iri == property);
+        place
+            .and_then(|idx| self.names.get(idx))
+            .map_or(property, String::as_str)
     }
 
     pub(crate) fn cells(&self) -> impl Iterator<Item = (&OracleRow, &str, &OracleCell)> {
-        self.matrix
-            .rows
-            .iter()
-            .flat_map(|row| self.names.iter().zip(&row.cells).map(move |(name, cell)| (row, name.as_str(), cell)))
+        self.matrix.rows.iter().flat_map(|row| {
+            self.names
+                .iter()
+                .zip(&row.cells)
+                .map(move |(name, cell)| (row, name.as_str(), cell))
+        })
     }
 }
 

@@ -67,7 +67,10 @@ pub struct RecheckSummary {
 impl RecheckSummary {
     /// Adds one judgement.
     pub fn add(&mut self, recheck: &Recheck) {
-        let line = self.properties.entry(recheck.now.property.clone()).or_default();
+        let line = self
+            .properties
+            .entry(recheck.now.property.clone())
+            .or_default();
         line.now.add(recheck.now.outcome);
         line.vacuous += u64::from(recheck.now.vacuous == Some(true));
         line.held_before += u64::from(recheck.now.held_before == Some(true));
@@ -127,7 +130,9 @@ pub(crate) fn reason_text(why: &ChangeReason, letters: usize) -> String {
     let short = |digest: &str| digest.get(..letters).unwrap_or(digest).to_owned();
     match why {
         ChangeReason::NewProperty => "property is new".to_owned(),
-        ChangeReason::RuleChanged(before, now) => format!("rule changed {} → {}", short(before), short(now)),
+        ChangeReason::RuleChanged(before, now) => {
+            format!("rule changed {} → {}", short(before), short(now))
+        }
         ChangeReason::SameRule => "same rule, different ontology or program".to_owned(),
     }
 }

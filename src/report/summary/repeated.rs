@@ -24,7 +24,10 @@ impl CampaignSummary {
         if !self.is_repeated() {
             return Vec::new();
         }
-        let properties = self.properties.iter().map(|(iri, label, _)| (Some(iri), label.as_str()));
+        let properties = self
+            .properties
+            .iter()
+            .map(|(iri, label, _)| (Some(iri), label.as_str()));
         properties
             .chain([(None, "everything")])
             .map(|(iri, label)| RepeatedProperty {
@@ -37,17 +40,30 @@ impl CampaignSummary {
 
     /// Runs of a scene, in order of repetition.
     pub fn runs_of_scene(&self, scene: u64) -> impl Iterator<Item = &RunSummary> {
-        self.runs.iter().filter(move |run| run.repetition.is_some_and(|repetition| repetition.scene == scene))
+        self.runs.iter().filter(move |run| {
+            run.repetition
+                .is_some_and(|repetition| repetition.scene == scene)
+        })
     }
 
-    /// Interval of a pass rate that accounts for repeated scenes and bit-identical runs. Returns `None` if every scene was
-    /// run once.
+    /// Interval of a pass rate that accounts for repeated scenes and bit-identical runs. Returns
+    /// `None` if every scene was run once.
     pub(super) fn interval_of_alike(&self, property: Option<&str>) -> Option<Interval> {
-        let is_alike = self.is_repeated() || self.scenes().iter().zip(0..).any(|(scene, place)| *scene != place);
-        if is_alike { consistency(&self.decided(property), self.sampling()).rate } else { None }
+        let is_alike = self.is_repeated()
+            || self
+                .scenes()
+                .iter()
+                .zip(0..)
+                .any(|(scene, place)| *scene != place);
+        if is_alike {
+            consistency(&self.decided(property), self.sampling()).rate
+        } else {
+            None
+        }
     }
 
-    /// The scene of each run: its number if scenes are repeated, else the position of the first run with the same trace.
+    /// The scene of each run: its number if scenes are repeated, else the position of the first run
+    /// with the same trace.
     fn scenes(&self) -> Vec<u64> {
         let mut first = BTreeMap::new();
         let mut scenes = Vec::new();
@@ -70,15 +86,28 @@ impl CampaignSummary {
         let of = |(run, scene): (&RunSummary, u64)| {
             let Some(property) = property else {
                 let judged = run.status != actcheck_history::RunStatus::Broken;
-                return judged.then(|| Repeated { scene, passed: run.passed(), margin: None });
+                return judged.then(|| Repeated {
+                    scene,
+                    passed: run.passed(),
+                    margin: None,
+                });
             };
             let judgements = run.actions.iter().flat_map(|action| &action.judgements);
-            let own: Vec<&Judgement> = judgements.filter(|judgement| judgement.property == property).collect();
+            let own: Vec<&Judgement> = judgements
+                .filter(|judgement| judgement.property == property)
+                .collect();
             let counts = Counts::of(own.iter().map(|judgement| judgement.outcome));
-            let margins: Option<Vec<f64>> =
-                own.iter().filter(|judgement| is_decided(judgement)).map(|judgement| judgement.margin).collect();
+            let margins: Option<Vec<f64>> = own
+                .iter()
+                .filter(|judgement| is_decided(judgement))
+                .map(|judgement| judgement.margin)
+                .collect();
             let margin = margins.and_then(|margins| margins.into_iter().reduce(f64::min));
-            (counts.decided() > 0).then_some(Repeated { scene, passed: counts.failed == 0, margin })
+            (counts.decided() > 0).then_some(Repeated {
+                scene,
+                passed: counts.failed == 0,
+                margin,
+            })
         };
         self.runs.iter().zip(self.scenes()).filter_map(of).collect()
     }

@@ -23,7 +23,8 @@ pub struct ShrunkSummary {
     pub simulations: u64,
     /// Number of simulations for the explanation.
     pub explaining: u64,
-    /// The property that was shrunk for; `None` for all that failed. A value passes if it passes, or if everything does.
+    /// The property that was shrunk for; `None` for all that failed. A value passes if it passes,
+    /// or if everything does.
     pub property: Option<String>,
     /// The nearest scene that passes: name and value of the choice that differs.
     pub neighbour: Option<(String, PassingValue)>,
@@ -46,8 +47,8 @@ pub struct ShrunkChoice {
     pub nominal: f64,
     /// Unit of the values; empty for factors and for list indices.
     pub unit: &'static str,
-    /// Whether the run no longer fails in this way if only this choice is set to its nominal value. `None` if that was not
-    /// tried.
+    /// Whether the run no longer fails in this way if only this choice is set to its nominal value.
+    /// `None` if that was not tried.
     pub matters: Option<bool>,
     /// Range of values with which the run fails.
     pub fails: (f64, f64),
@@ -67,6 +68,10 @@ pub struct PassingValue {
 impl ShrunkSummary {
     /// Number of other objects left.
     pub fn others(&self) -> usize {
-        self.run.objects.iter().filter(|object| object.role.is_bystander()).count()
+        self.run
+            .objects
+            .iter()
+            .filter(|object| object.role.is_bystander())
+            .count()
     }
 }

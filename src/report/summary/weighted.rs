@@ -33,7 +33,10 @@ impl CampaignSummary {
     /// Failed runs of all runs of a test, for one property. Returns `None` if the test has no runs.
     pub fn raw_failures(&self, test: &str, property: &str) -> Option<Proportion> {
         let own: Vec<_> = self.runs.iter().filter(|run| run.test == test).collect();
-        let failed = own.iter().filter(|run| run.failed_property(property)).count() as u64;
+        let failed = own
+            .iter()
+            .filter(|run| run.failed_property(property))
+            .count() as u64;
         Proportion::new(failed, own.len() as u64)
     }
 }

@@ -8,25 +8,38 @@ use actcheck_history::QueryAnswer;
 
 /// Converts an answer to a table: its rows, a single `true` or `false`, or its triples.
 ///
-/// In a table for people, IRIs are abbreviated with the known prefixes; programs get them in full. In JSON, numbers of each
-/// datatype are numbers.
+/// In a table for people, IRIs are abbreviated with the known prefixes; programs get them in full.
+/// In JSON, numbers of each datatype are numbers.
 pub fn answer_table(answer: &QueryAnswer, format: TableFormat) -> Table {
     match answer {
-        QueryAnswer::Boolean(value) => Table { rows: vec![vec![Value::Bool(*value)]], ..Table::new(["answer"]) },
+        QueryAnswer::Boolean(value) => Table {
+            rows: vec![vec![Value::Bool(*value)]],
+            ..Table::new(["answer"])
+        },
         QueryAnswer::Table { columns, rows } => Table {
-            rows: rows.iter().map(|row| answer_cells(row.iter().map(Option::as_ref), format)).collect(),
+            rows: rows
+                .iter()
+                .map(|row| answer_cells(row.iter().map(Option::as_ref), format))
+                .collect(),
             ..Table::new(columns)
         },
         QueryAnswer::Graph(triples) => Table {
-            rows: triples.iter().map(|triple| answer_cells(triple.iter().map(Some), format)).collect(),
+            rows: triples
+                .iter()
+                .map(|triple| answer_cells(triple.iter().map(Some), format))
+                .collect(),
             ..Table::new(["subject", "predicate", "object"])
         },
     }
 }
 
 /// The cells of one row of an answer, as in [`answer_table`].
-pub fn answer_cells<'a>(row: impl Iterator<Item = Option<&'a Term>>, format: TableFormat) -> Vec<Value> {
-    row.map(|cell| cell.map_or(Value::Null, |term| value(term, format))).collect()
+pub fn answer_cells<'a>(
+    row: impl Iterator<Item = Option<&'a Term>>,
+    format: TableFormat,
+) -> Vec<Value> {
+    row.map(|cell| cell.map_or(Value::Null, |term| value(term, format)))
+        .collect()
 }
 
 fn value(term: &Term, format: TableFormat) -> Value {
@@ -35,11 +48,14 @@ fn value(term: &Term, format: TableFormat) -> Value {
         Term::Iri(iri) => iri.as_ref().into(),
         Term::Blank(label) => format!("_:{label}").into(),
         Term::Decimal(text) if format == TableFormat::Json => number(text),
-        Term::Literal(text, datatype) if format == TableFormat::Json && is_number(datatype) => number(text),
-        // Elsewhere they are text: converting them to `f64` could change their digits.
-        Term::String(text) | Term::LangString(text, _) | Term::Literal(text, _) | Term::Decimal(text) => {
-            text.as_ref().into()
+        Term::Literal(text, datatype) if format == TableFormat::Json && is_number(datatype) => {
+            number(text)
         }
+        // Elsewhere they are text: converting them to `f64` could change their digits.
+        Term::String(text)
+        | Term::LangString(text, _)
+        | Term::Literal(text, _)
+        | Term::Decimal(text) => text.as_ref().into(),
         Term::Integer(value) => (*value).into(),
         Term::Double(value) if value.is_finite() => (*value).into(),
         Term::Double(value) => value.to_string().into(),
@@ -47,7 +63,8 @@ fn value(term: &Term, format: TableFormat) -> Value {
     }
 }
 
-/// Whether the values of a datatype are numbers: `xsd:decimal`, `xsd:float` and the types that are derived from them.
+/// Whether the values of a datatype are numbers: `xsd:decimal`, `xsd:float` and the types that are
+/// derived from them.
 fn is_number(datatype: &str) -> bool {
     const NUMBERS: [&str; 16] = [
         "decimal",
@@ -67,10 +84,13 @@ fn is_number(datatype: &str) -> bool {
         "unsignedByte",
         "positiveInteger",
     ];
-    datatype.strip_prefix("http://www.w3.org/2001/XMLSchema#").is_some_and(|name| NUMBERS.contains(&name))
+    datatype
+        .strip_prefix("http://www.w3.org/2001/XMLSchema#")
+        .is_some_and(|name| NUMBERS.contains(&name))
 }
 
-/// A JSON number: the nearest one, if a text has more digits. Other texts, such as `INF`, stay texts.
+/// A JSON number: the nearest one, if a text has more digits. Other texts, such as `INF`, stay
+/// texts.
 fn number(text: &str) -> Value {
     let written = text.strip_prefix('+').unwrap_or(text);
     let is_digit = |c: char| c.is_ascii_digit();
@@ -100,7 +120,10 @@ mod tests {
     fn people_get_short_iris_and_programs_full_ones() {
         let answer = QueryAnswer::Table {
             columns: vec!["run".into(), "n".into()],
-            rows: vec![vec![Some(Term::iri("https://w3id.org/actcheck/run/k7f3-1")), None]],
+            rows: vec![vec![
+                Some(Term::iri("https://w3id.org/actcheck/run/k7f3-1")),
+                None,
+            ]],
         };
         assert_eq!(
             answer_table(&answer, TableFormat::Table).render(TableFormat::Csv, Page::default()),
@@ -116,18 +139,29 @@ mod tests {
     #[test]
     fn numbers_of_each_datatype_are_numbers_in_json_and_keep_their_digits_in_csv() {
         let typed = |text: &str, name: &str| {
-            Term::Literal(text.into(), format!("http://www.w3.org/2001/XMLSchema#{name}").into())
+            Term::Literal(
+                text.into(),
+                format!("http://www.w3.org/2001/XMLSchema#{name}").into(),
+            )
         };
         for (term, in_json, in_csv) in [
             (Term::Decimal("1".into()), "1", "1"),
             (Term::Decimal("+1.50".into()), "1.5", "+1.50"),
             (Term::Decimal("-3.0".into()), "-3", "-3.0"),
             (Term::Decimal(".5".into()), "0.5", ".5"),
-            (Term::Decimal("0.12345678901234567890".into()), "0.12345678901234568", "0.12345678901234567890"),
+            (
+                Term::Decimal("0.12345678901234567890".into()),
+                "0.12345678901234568",
+                "0.12345678901234567890",
+            ),
             (typed("0.1", "float"), "0.1", "0.1"),
             (typed("1e3", "float"), "1000.0", "1e3"),
             (typed("INF", "float"), "\"INF\"", "INF"),
-            (typed("18446744073709551615", "unsignedLong"), "18446744073709551615", "18446744073709551615"),
+            (
+                typed("18446744073709551615", "unsignedLong"),
+                "18446744073709551615",
+                "18446744073709551615",
+            ),
             (typed("7", "int"), "7", "7"),
             (typed("7", "gYear"), "\"7\"", "7"),
             (Term::string("7"), "\"7\"", "7"),

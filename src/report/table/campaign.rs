@@ -7,8 +7,9 @@ use actcheck_base::names;
 
 /// Builds the flat table.
 pub fn campaign_table(summary: &CampaignSummary) -> Table {
-    let mut table =
-        Table::new(["run", "index", "test", "status", "action", "property", "outcome", "margin", "witness"]);
+    let mut table = Table::new([
+        "run", "index", "test", "status", "action", "property", "outcome", "margin", "witness",
+    ]);
     for run in &summary.runs {
         for action in &run.actions {
             for judgement in &action.judgements {

@@ -49,7 +49,11 @@ pub fn compare_table(summary: &CompareSummary) -> Table {
             line.left_out[0].total().into(),
             ids(&line.worse).into(),
             ids(&line.better).into(),
-            summary.comparison.answer_of(line, summary.answer_level(), summary.margin).word().into(),
+            summary
+                .comparison
+                .answer_of(line, summary.answer_level(), summary.margin)
+                .word()
+                .into(),
         ]);
     }
     table
@@ -57,5 +61,8 @@ pub fn compare_table(summary: &CompareSummary) -> Table {
 
 /// Joins pairs of run ids into one cell.
 fn ids(runs: &[(String, String)]) -> String {
-    runs.iter().map(|(a, b)| format!("{a}/{b}")).collect::<Vec<_>>().join(" ")
+    runs.iter()
+        .map(|(a, b)| format!("{a}/{b}"))
+        .collect::<Vec<_>>()
+        .join(" ")
 }

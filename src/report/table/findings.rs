@@ -27,8 +27,18 @@ pub fn findings_table(summary: &FindingsSummary) -> Table {
         "of",
     ]);
     for report in &summary.properties {
-        let conditions = report.when().patterns.patterns.iter().map(|pattern| (report.when(), "conditions", pattern));
-        let effects = report.how().patterns.patterns.iter().map(|pattern| (report.how(), "effects", pattern));
+        let conditions = report
+            .when()
+            .patterns
+            .patterns
+            .iter()
+            .map(|pattern| (report.when(), "conditions", pattern));
+        let effects = report
+            .how()
+            .patterns
+            .patterns
+            .iter()
+            .map(|pattern| (report.how(), "effects", pattern));
         for (causes, of, pattern) in conditions.chain(effects) {
             let held_out = pattern.held_out;
             table.rows.push(vec![
@@ -60,7 +70,9 @@ pub fn findings_table(summary: &FindingsSummary) -> Table {
 
 /// Returns one row for each cell of the heat maps.
 pub fn maps_table(summary: &FindingsSummary) -> Table {
-    let mut table = Table::new(["action", "property", "by", "down", "across", "runs", "failed", "rate", "low", "high"]);
+    let mut table = Table::new([
+        "action", "property", "by", "down", "across", "runs", "failed", "rate", "low", "high",
+    ]);
     for report in &summary.properties {
         for map in &report.maps {
             for (down, cells) in map.down.iter().zip(&map.cells) {

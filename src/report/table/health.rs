@@ -4,7 +4,15 @@ use crate::{HealthSummary, Table};
 
 /// Returns one row for each parameter: how often its bins were tried.
 pub fn health_table(summary: &HealthSummary) -> Table {
-    let mut table = Table::new(["parameter", "draws", "bins", "hit", "expected_hit", "least", "most"]);
+    let mut table = Table::new([
+        "parameter",
+        "draws",
+        "bins",
+        "hit",
+        "expected_hit",
+        "least",
+        "most",
+    ]);
     for parameter in &summary.health.parameters {
         table.rows.push(vec![
             parameter.name.clone().into(),

@@ -37,13 +37,19 @@ pub struct Table {
 impl Table {
     /// Creates a table without rows.
     pub fn new<S: Into<String>>(columns: impl IntoIterator<Item = S>) -> Self {
-        Self { columns: columns.into_iter().map(Into::into).collect(), ..Self::default() }
+        Self {
+            columns: columns.into_iter().map(Into::into).collect(),
+            ..Self::default()
+        }
     }
 
     /// Sets the columns that a narrow terminal leaves out, the least important one first.
     #[must_use]
     pub fn with_expendable(self, expendable: impl IntoIterator<Item = &'static str>) -> Self {
-        Self { expendable: expendable.into_iter().collect(), ..self }
+        Self {
+            expendable: expendable.into_iter().collect(),
+            ..self
+        }
     }
 
     /// Renders the table, with a trailing newline. Only text depends on the page.
@@ -75,7 +81,8 @@ impl Table {
         })
     }
 
-    /// Aligned columns of a table that has many rows, and needs to fit no terminal. All processors format it.
+    /// Aligned columns of a table that has many rows, and needs to fit no terminal. All processors
+    /// format it.
     fn long_text(&self) -> String {
         let threads = thread::available_parallelism().map_or(1, NonZero::get);
         let blocks = self.rows.chunks(self.rows.len().div_ceil(threads).max(1));
@@ -94,7 +101,9 @@ impl Table {
     /// The texts of each column, the header first.
     fn texts(&self) -> Vec<Vec<String>> {
         let column = |(idx, name): (usize, &String)| {
-            std::iter::once(name.clone()).chain(self.rows.iter().map(|row| plain(&row[idx]))).collect()
+            std::iter::once(name.clone())
+                .chain(self.rows.iter().map(|row| plain(&row[idx])))
+                .collect()
         };
         self.columns.iter().enumerate().map(column).collect()
     }
@@ -122,7 +131,8 @@ impl Table {
     }
 }
 
-/// A table that is written in parts, so that only one part is in memory. As text, each part is a table of its own.
+/// A table that is written in parts, so that only one part is in memory. As text, each part is a
+/// table of its own.
 #[derive(Debug)]
 pub struct TableParts {
     columns: Vec<String>,
@@ -134,24 +144,40 @@ pub struct TableParts {
 
 impl TableParts {
     /// Begins a table.
-    pub fn new<S: Into<String>>(columns: impl IntoIterator<Item = S>, format: TableFormat, page: Page) -> Self {
-        Self { columns: columns.into_iter().map(Into::into).collect(), format, page, has_begun: false }
+    pub fn new<S: Into<String>>(
+        columns: impl IntoIterator<Item = S>,
+        format: TableFormat,
+        page: Page,
+    ) -> Self {
+        Self {
+            columns: columns.into_iter().map(Into::into).collect(),
+            format,
+            page,
+            has_begun: false,
+        }
     }
 
-    /// Renders the next rows. The parts and the end together are [`Table::render`] of all rows, except for text.
+    /// Renders the next rows. The parts and the end together are [`Table::render`] of all rows,
+    /// except for text.
     pub fn part(&mut self, rows: Vec<Vec<Value>>) -> String {
         if rows.is_empty() && self.format == TableFormat::Json {
             return String::new();
         }
         let is_first = !std::mem::replace(&mut self.has_begun, true);
-        let table = Table { rows, ..Table::new(&self.columns) };
+        let table = Table {
+            rows,
+            ..Table::new(&self.columns)
+        };
         let text = table.render(self.format, self.page);
         match self.format {
             TableFormat::Table => text,
             TableFormat::Csv if is_first => text,
             TableFormat::Csv => table.csv_rows(),
             TableFormat::Json => {
-                let objects = text.strip_prefix("[\n").and_then(|text| text.strip_suffix("\n]\n")).unwrap_or_default();
+                let objects = text
+                    .strip_prefix("[\n")
+                    .and_then(|text| text.strip_suffix("\n]\n"))
+                    .unwrap_or_default();
                 format!("{}{objects}", if is_first { "[\n" } else { ",\n" })
             }
         }
@@ -169,20 +195,36 @@ impl TableParts {
 }
 
 /// Converts items, each in a thread of its own, in order.
-fn in_threads<T: Send, U: Send>(items: impl Iterator<Item = T>, convert: impl Fn(T) -> U + Sync) -> Vec<U> {
+fn in_threads<T: Send, U: Send>(
+    items: impl Iterator<Item = T>,
+    convert: impl Fn(T) -> U + Sync,
+) -> Vec<U> {
     let convert = &convert;
     thread::scope(|scope| {
-        let begun: Vec<_> = items.map(|item| scope.spawn(move || convert(item))).collect();
-        begun.into_iter().map(|thread| thread.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))).collect()
+        let begun: Vec<_> = items
+            .map(|item| scope.spawn(move || convert(item)))
+            .collect();
+        begun
+            .into_iter()
+            .map(|thread| {
+                thread
+                    .join()
+                    .unwrap_or_else(|panic| std::panic::resume_unwind(panic))
+            })
+            .collect()
     })
 }
 
 fn csv_lines(rows: impl Iterator<Item = Vec<String>>) -> String {
     let mut writer = csv::WriterBuilder::new().from_writer(Vec::new());
     for row in rows {
-        writer.write_record(&row).expect("writing to memory does not fail, and every row has all columns");
+        writer
+            .write_record(&row)
+            .expect("writing to memory does not fail, and every row has all columns");
     }
-    let bytes = writer.into_inner().expect("writing to memory does not fail");
+    let bytes = writer
+        .into_inner()
+        .expect("writing to memory does not fail");
     String::from_utf8(bytes).expect("only text was written")
 }
 
@@ -203,26 +245,49 @@ mod tests {
     fn a_table_is_written_in_three_formats() {
         let mut table = Table::new(["run", "score", "note"]);
         table.rows.push(vec!["k-1".into(), 0.8.into(), Value::Null]);
-        table.rows.push(vec!["k-2".into(), 1.0.into(), "a, \"b\"".into()]);
+        table
+            .rows
+            .push(vec!["k-2".into(), 1.0.into(), "a, \"b\"".into()]);
         assert_eq!(
             table.render(TableFormat::Csv, Page::default()),
             "run,score,note\nk-1,0.8,\nk-2,1.0,\"a, \"\"b\"\"\"\n"
         );
-        assert!(table.render(TableFormat::Json, Page::default()).contains("\"note\": null"));
-        assert!(table.render(TableFormat::Table, Page::default()).contains("k-1"));
+        assert!(
+            table
+                .render(TableFormat::Json, Page::default())
+                .contains("\"note\": null")
+        );
+        assert!(
+            table
+                .render(TableFormat::Table, Page::default())
+                .contains("k-1")
+        );
     }
 
     #[test]
     fn parts_are_together_the_whole_table() {
-        let rows: Vec<Vec<Value>> = (0..5).map(|row| vec![row.into(), format!("a\n{row}").into()]).collect();
+        let rows: Vec<Vec<Value>> = (0..5)
+            .map(|row| vec![row.into(), format!("a\n{row}").into()])
+            .collect();
         for format in [TableFormat::Csv, TableFormat::Json] {
             for count in [0, 1, 2, 5] {
-                let table = Table { rows: rows[..count].to_vec(), ..Table::new(["n", "text"]) };
+                let table = Table {
+                    rows: rows[..count].to_vec(),
+                    ..Table::new(["n", "text"])
+                };
                 for size in [1, 2, 3, 5] {
                     let mut parts = TableParts::new(["n", "text"], format, Page::default());
-                    let mut text: String = table.rows.chunks(size).map(|rows| parts.part(rows.to_vec())).collect();
+                    let mut text: String = table
+                        .rows
+                        .chunks(size)
+                        .map(|rows| parts.part(rows.to_vec()))
+                        .collect();
                     text += &parts.end();
-                    assert_eq!(text, table.render(format, Page::default()), "{count} rows in parts of {size}");
+                    assert_eq!(
+                        text,
+                        table.render(format, Page::default()),
+                        "{count} rows in parts of {size}"
+                    );
                 }
             }
         }
@@ -231,7 +296,10 @@ mod tests {
     #[test]
     fn a_long_table_is_aligned_as_a_whole() {
         let mut table = Table::new(["n", "a wide title"]);
-        table.rows.extend((0..3 * LONG / 2).map(|row| vec![row.into(), "é".repeat(row % 7 + row / LONG * 9).into()]));
+        table.rows.extend(
+            (0..3 * LONG / 2)
+                .map(|row| vec![row.into(), "é".repeat(row % 7 + row / LONG * 9).into()]),
+        );
         let mut whole = ruled();
         whole.set_header(&table.columns);
         whole.add_rows(table.rows.iter().map(|row| row.iter().map(plain)));
@@ -241,12 +309,24 @@ mod tests {
     #[test]
     fn a_table_that_is_too_wide_is_stacked() {
         let mut table = Table::new(["iri", "count"]).with_expendable(["count"]);
-        table.rows.push(vec!["https://example.org/a/long/name".into(), 1.into()]);
+        table
+            .rows
+            .push(vec!["https://example.org/a/long/name".into(), 1.into()]);
         table.rows.push(vec!["b".into(), 2.into()]);
-        let wide = " iri     https://example.org/a/long/name\n count   1\n\n iri     b\n count   2\n";
-        let text = |width: usize| table.text(Page { width: Some(width), colour: false });
+        let wide =
+            " iri     https://example.org/a/long/name\n count   1\n\n iri     b\n count   2\n";
+        let text = |width: usize| {
+            table.text(Page {
+                width: Some(width),
+                colour: false,
+            })
+        };
         assert_eq!(text(22), wide);
-        assert!(text(35).contains("not shown at this width: count;"), "{}", text(35));
+        assert!(
+            text(35).contains("not shown at this width: count;"),
+            "{}",
+            text(35)
+        );
         assert!(!table.text(Page::default()).contains("not shown"));
     }
 }

@@ -1,5 +1,5 @@
-//! Tables for campaigns whose tests have several actions: one line per run with the score of each action, as in the
-//! paper's Table IV, and the properties by action.
+//! Tables for campaigns whose tests have several actions: one line per run with the score of each
+//! action, as in the paper's Table IV, and the properties by action.
 
 use comfy_table::{Attribute, Cell, Color};
 
@@ -13,8 +13,8 @@ pub(super) fn has_several_actions(summary: &CampaignSummary) -> bool {
     summary.runs.iter().any(|run| run.actions.len() > 1)
 }
 
-/// Scores of the shown runs: the paper's A of each action, and S. The last line has the means over all runs (T in
-/// column S).
+/// Scores of the shown runs: the paper's A of each action, and S. The last line has the means over
+/// all runs (T in column S).
 pub(super) fn scores_table(summary: &CampaignSummary, shown: &[&RunSummary], page: Page) -> String {
     let names = steps(summary);
     let mut table = table_of_scores(summary, shown, &names);
@@ -27,9 +27,16 @@ pub(super) fn scores_table(summary: &CampaignSummary, shown: &[&RunSummary], pag
     fitted(table_of_scores(summary, shown, &short), page, &["test"]) + &legend
 }
 
-fn table_of_scores(summary: &CampaignSummary, shown: &[&RunSummary], steps: &[String]) -> comfy_table::Table {
+fn table_of_scores(
+    summary: &CampaignSummary,
+    shown: &[&RunSummary],
+    steps: &[String],
+) -> comfy_table::Table {
     let mut table = ruled();
-    let is_one_test = summary.runs.windows(2).all(|pair| pair[0].test == pair[1].test);
+    let is_one_test = summary
+        .runs
+        .windows(2)
+        .all(|pair| pair[0].test == pair[1].test);
     let mut header = vec!["run".to_owned()];
     if !is_one_test {
         header.push("test".to_owned());
@@ -42,7 +49,9 @@ fn table_of_scores(summary: &CampaignSummary, shown: &[&RunSummary], steps: &[St
         if !is_one_test {
             row.push(Cell::new(&run.test));
         }
-        row.extend((0..steps.len()).map(|step| run.actions.get(step).map_or(Cell::new(""), score_cell)));
+        row.extend(
+            (0..steps.len()).map(|step| run.actions.get(step).map_or(Cell::new(""), score_cell)),
+        );
         row.push(Cell::new(format!("{:.2}", run.score)));
         table.add_row(row);
     }
@@ -50,7 +59,15 @@ fn table_of_scores(summary: &CampaignSummary, shown: &[&RunSummary], steps: &[St
     if !is_one_test {
         means.push(Cell::new("of all runs"));
     }
-    let of_step = |step: usize| mean(summary.runs.iter().filter_map(|run| run.actions.get(step)).map(|a| a.score));
+    let of_step = |step: usize| {
+        mean(
+            summary
+                .runs
+                .iter()
+                .filter_map(|run| run.actions.get(step))
+                .map(|a| a.score),
+        )
+    };
     means.extend((0..steps.len()).map(|step| mean_cell(of_step(step))));
     means.push(mean_cell(summary.total_score()).add_attribute(Attribute::Bold));
     table.add_row(means);
@@ -59,9 +76,18 @@ fn table_of_scores(summary: &CampaignSummary, shown: &[&RunSummary], steps: &[St
 
 /// Column headers: `A1 MoveTo`, or just `A1` if the tests differ in that action.
 fn steps(summary: &CampaignSummary) -> Vec<String> {
-    let longest = summary.runs.iter().map(|run| run.actions.len()).max().unwrap_or(0);
+    let longest = summary
+        .runs
+        .iter()
+        .map(|run| run.actions.len())
+        .max()
+        .unwrap_or(0);
     let title = |step: usize| {
-        let mut names = summary.runs.iter().filter_map(|run| run.actions.get(step)).map(|action| &action.name);
+        let mut names = summary
+            .runs
+            .iter()
+            .filter_map(|run| run.actions.get(step))
+            .map(|action| &action.name);
         let first = names.next();
         match first {
             Some(first) if names.all(|name| name == first) => format!("A{} {first}", step + 1),
@@ -99,9 +125,17 @@ pub(super) fn properties_table(
     table.set_header(header.into_iter().chain(counted));
     for (action, lines) in summary.lines_by_action() {
         for (idx, line) in lines.iter().enumerate() {
-            let first = if idx == 0 { action.clone() } else { String::new() };
+            let first = if idx == 0 {
+                action.clone()
+            } else {
+                String::new()
+            };
             let counts = Outcome::ALL.map(|outcome| line.counts.get(outcome).to_string());
-            table.add_row([first, line.label.clone(), rate(line)].into_iter().chain(counts));
+            table.add_row(
+                [first, line.label.clone(), rate(line)]
+                    .into_iter()
+                    .chain(counts),
+            );
         }
     }
     table
@@ -127,12 +161,18 @@ mod tests {
     #[test]
     fn the_table_has_a_score_per_action_and_run_and_a_line_of_means() {
         use Outcome::{Failed, Passed};
-        let runs = vec![two(0, [Passed, Passed], [Passed, Failed]), two(1, [Passed, Failed], [Failed, Failed])];
+        let runs = vec![
+            two(0, [Passed, Passed], [Passed, Failed]),
+            two(1, [Passed, Failed], [Failed, Failed]),
+        ];
         let summary = campaign(runs);
         assert!(has_several_actions(&summary));
         let shown: Vec<&RunSummary> = summary.runs.iter().collect();
         let text = scores_table(&summary, &shown, Page::default());
-        let rows: Vec<Vec<&str>> = text.lines().map(|line| line.split_whitespace().collect()).collect();
+        let rows: Vec<Vec<&str>> = text
+            .lines()
+            .map(|line| line.split_whitespace().collect())
+            .collect();
         assert_eq!(rows[0], ["run", "A1", "Pick", "A2", "Place", "S"], "{text}");
         assert_eq!(rows[2], ["k7f3-1", "1.00", "0.50", "0.75"]);
         assert_eq!(rows[3], ["k7f3-2", "0.50", "0.00", "0.25"]);
@@ -144,8 +184,20 @@ mod tests {
         use Outcome::{Failed, Passed};
         let summary = campaign(vec![two(0, [Passed, Passed], [Passed, Failed])]);
         let lines = summary.lines_by_action();
-        assert_eq!(lines.iter().map(|(name, _)| name.as_str()).collect::<Vec<_>>(), ["Pick", "Place"]);
-        let passed = |idx: usize| lines[idx].1.iter().map(|line| line.counts.passed).collect::<Vec<_>>();
+        assert_eq!(
+            lines
+                .iter()
+                .map(|(name, _)| name.as_str())
+                .collect::<Vec<_>>(),
+            ["Pick", "Place"]
+        );
+        let passed = |idx: usize| {
+            lines[idx]
+                .1
+                .iter()
+                .map(|line| line.counts.passed)
+                .collect::<Vec<_>>()
+        };
         assert_eq!((passed(0), passed(1)), (vec![1, 1], vec![1, 0]));
     }
 }

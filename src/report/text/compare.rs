@@ -12,7 +12,8 @@ use actcheck_verdict::Counts;
 /// Maximum number of runs, settings or names in a line or list; `--format json` has all.
 const MAX_LISTED: usize = 10;
 
-/// Formats both sides, their differences, rates and tests of each property, the scenes that flipped, and the verdict.
+/// Formats both sides, their differences, rates and tests of each property, the scenes that
+/// flipped, and the verdict.
 pub fn compare_text(summary: &CompareSummary, page: Page) -> String {
     let mut out = String::new();
     let [first, second] = &summary.sides;
@@ -30,8 +31,15 @@ pub fn compare_text(summary: &CompareSummary, page: Page) -> String {
 }
 
 fn side(side: &ComparedSide) -> String {
-    let lacking = if side.runs < side.planned { format!(" of {} planned", side.planned) } else { String::new() };
-    format!("{}: {}, {} runs{lacking}, started {}", side.name, side.config, side.runs, side.started)
+    let lacking = if side.runs < side.planned {
+        format!(" of {} planned", side.planned)
+    } else {
+        String::new()
+    };
+    format!(
+        "{}: {}, {} runs{lacking}, started {}",
+        side.name, side.config, side.runs, side.started
+    )
 }
 
 fn scenes(out: &mut String, summary: &CompareSummary) {
@@ -43,8 +51,17 @@ fn scenes(out: &mut String, summary: &CompareSummary) {
         }
     }
     if !found.other_scene.is_empty() {
-        let runs: Vec<String> = found.other_scene.iter().map(|(a, b)| format!("{a}/{b}")).collect();
-        let _ = writeln!(out, "{} with a different scene or test at the same index: {}", runs.len(), list(&runs));
+        let runs: Vec<String> = found
+            .other_scene
+            .iter()
+            .map(|(a, b)| format!("{a}/{b}"))
+            .collect();
+        let _ = writeln!(
+            out,
+            "{} with a different scene or test at the same index: {}",
+            runs.len(),
+            list(&runs)
+        );
     }
     if found.other_physics > 0 {
         let _ = writeln!(
@@ -66,8 +83,14 @@ fn changes(out: &mut String, summary: &CompareSummary) {
         None => "absent".to_owned(),
     };
     for change in summary.changes.iter().take(MAX_LISTED) {
-        let _ =
-            writeln!(out, "  {} {}: {} → {}", change.kind, change.name, short(&change.first), short(&change.second));
+        let _ = writeln!(
+            out,
+            "  {} {}: {} → {}",
+            change.kind,
+            change.name,
+            short(&change.first),
+            short(&change.second)
+        );
     }
     more(out, summary.changes.len());
     let [first, second] = summary.config_lines();
@@ -82,7 +105,10 @@ fn changes(out: &mut String, summary: &CompareSummary) {
 /// Shortens each digest in a text to its first eight characters.
 fn shortened(text: &str) -> String {
     let pieces = text.split_inclusive(|letter: char| !letter.is_ascii_hexdigit());
-    let short = |piece: &str| match piece.find(|letter: char| !letter.is_ascii_hexdigit()).unwrap_or(piece.len()) {
+    let short = |piece: &str| match piece
+        .find(|letter: char| !letter.is_ascii_hexdigit())
+        .unwrap_or(piece.len())
+    {
         digits if digits >= 16 => format!("{}{}", &piece[..8], &piece[digits..]),
         _ => piece.to_owned(),
     };
@@ -91,10 +117,26 @@ fn shortened(text: &str) -> String {
 
 fn lines(out: &mut String, summary: &CompareSummary, page: Page) {
     let mut table = ruled();
-    table.set_header(["passed in", "A", "B", "B − A, percent [95 %]", "only A", "only B", "p", "p corrected"]);
+    table.set_header([
+        "passed in",
+        "A",
+        "B",
+        "B − A, percent [95 %]",
+        "only A",
+        "only B",
+        "p",
+        "p corrected",
+    ]);
     for line in &summary.comparison.lines {
-        let [a, b] = line.table.passed().map(|passed| format!("{passed}/{}", line.table.pairs()));
-        let PairedTable { only_first, only_second, .. } = line.table;
+        let [a, b] = line
+            .table
+            .passed()
+            .map(|passed| format!("{passed}/{}", line.table.pairs()));
+        let PairedTable {
+            only_first,
+            only_second,
+            ..
+        } = line.table;
         table.add_row([
             compared_name(&line.of),
             a,
@@ -121,35 +163,56 @@ fn lines(out: &mut String, summary: &CompareSummary, page: Page) {
 
 fn difference(line: &ComparedLine) -> String {
     match &line.difference {
-        Some(found) => format!("{:+.1} [{:+.1}, {:+.1}]", 100.0 * found.value, 100.0 * found.low, 100.0 * found.high),
+        Some(found) => format!(
+            "{:+.1} [{:+.1}, {:+.1}]",
+            100.0 * found.value,
+            100.0 * found.low,
+            100.0 * found.high
+        ),
         None => "none decided".to_owned(),
     }
 }
 
 fn probability(p: f64) -> String {
-    if p < 0.0001 { "<0.0001".to_owned() } else { format!("{p:.4}") }
+    if p < 0.0001 {
+        "<0.0001".to_owned()
+    } else {
+        format!("{p:.4}")
+    }
 }
 
 fn flips(out: &mut String, summary: &CompareSummary) {
     for line in &summary.comparison.lines {
-        for (what, runs) in [("passed in A, failed in B", &line.worse), ("failed in A, passed in B", &line.better)] {
+        for (what, runs) in [
+            ("passed in A, failed in B", &line.worse),
+            ("failed in A, passed in B", &line.better),
+        ] {
             if !runs.is_empty() {
                 let runs: Vec<String> = runs.iter().map(|(a, b)| format!("{a}/{b}")).collect();
-                let _ = writeln!(out, "{}, {what} ({}): {}", compared_name(&line.of), runs.len(), list(&runs));
+                let _ = writeln!(
+                    out,
+                    "{}, {what} ({}): {}",
+                    compared_name(&line.of),
+                    runs.len(),
+                    list(&runs)
+                );
             }
         }
     }
 }
 
-/// Writes the scenes that were left out: a side that lost many more than the other biases the rates.
+/// Writes the scenes that were left out: a side that lost many more than the other biases the
+/// rates.
 fn left_out(out: &mut String, summary: &CompareSummary) {
     for line in &summary.comparison.lines {
         let lost = line.left_out[0].total();
         if lost > 0 {
             let [a, b] = line.left_out.map(undecided);
             let name = compared_name(&line.of);
-            let _ =
-                writeln!(out, "{name}: {lost} scenes left out because they were not decided in both (A: {a}; B: {b})");
+            let _ = writeln!(
+                out,
+                "{name}: {lost} scenes left out because they were not decided in both (A: {a}; B: {b})"
+            );
         }
     }
 }
@@ -167,7 +230,11 @@ fn alone(out: &mut String, summary: &CompareSummary) {
     for (name, of) in ["A", "B"].into_iter().zip(&summary.comparison.judged_alone) {
         if !of.is_empty() {
             let names: Vec<String> = of.iter().map(compared_name).collect();
-            let _ = writeln!(out, "judged only in {name}, not compared: {}", names.join(", "));
+            let _ = writeln!(
+                out,
+                "judged only in {name}, not compared: {}",
+                names.join(", ")
+            );
         }
     }
 }
@@ -175,16 +242,28 @@ fn alone(out: &mut String, summary: &CompareSummary) {
 /// Names the lines by their answers, and how many scenes would decide.
 fn answers(out: &mut String, summary: &CompareSummary) {
     let (level, margin) = (summary.answer_level(), summary.margin);
-    let _ =
-        writeln!(out, "\nB is … than A (at the level {level}; rates within {} points count as equal)", 100.0 * margin);
+    let _ = writeln!(
+        out,
+        "\nB is … than A (at the level {level}; rates within {} points count as equal)",
+        100.0 * margin
+    );
     for line in &summary.comparison.lines {
         let answer = summary.comparison.answer_of(line, level, margin);
         let needed = match answer {
-            Answer::Underpowered { scenes: Some(scenes) } => format!(": about {scenes} scenes would decide"),
-            Answer::Underpowered { scenes: None } => ": over a million scenes would decide".to_owned(),
+            Answer::Underpowered {
+                scenes: Some(scenes),
+            } => format!(": about {scenes} scenes would decide"),
+            Answer::Underpowered { scenes: None } => {
+                ": over a million scenes would decide".to_owned()
+            }
             _ => String::new(),
         };
-        let _ = writeln!(out, "  {}: {}{needed}", compared_name(&line.of), answer.word());
+        let _ = writeln!(
+            out,
+            "  {}: {}{needed}",
+            compared_name(&line.of),
+            answer.word()
+        );
     }
     let _ = writeln!(out, "answer: {}", summary.answer().word());
 }
@@ -192,8 +271,10 @@ fn answers(out: &mut String, summary: &CompareSummary) {
 fn verdict(out: &mut String, summary: &CompareSummary) {
     let Some(level) = summary.level else { return };
     let worse = summary.comparison.worse_at(level);
-    let how =
-        format!("at the level {level} (exact, one-sided, corrected for {} lines)", summary.comparison.lines.len());
+    let how = format!(
+        "at the level {level} (exact, one-sided, corrected for {} lines)",
+        summary.comparison.lines.len()
+    );
     if worse.is_empty() {
         let _ = writeln!(out, "\nB is not shown to be worse {how}");
         return;
@@ -202,7 +283,9 @@ fn verdict(out: &mut String, summary: &CompareSummary) {
     for line in worse {
         let lost = |passed: u64| line.table.pairs() - passed;
         let why = match (&line.of, line.table.passed().map(lost)) {
-            (Compared::Completion, [a, b]) => format!(": {b} runs are broken or timed out, {a} in A"),
+            (Compared::Completion, [a, b]) => {
+                format!(": {b} runs are broken or timed out, {a} in A")
+            }
             _ => String::new(),
         };
         let p = probability(line.second_worse_adjusted);
@@ -211,7 +294,12 @@ fn verdict(out: &mut String, summary: &CompareSummary) {
 }
 
 fn list(names: &[String]) -> String {
-    let mut text = names.iter().take(MAX_LISTED).cloned().collect::<Vec<_>>().join(", ");
+    let mut text = names
+        .iter()
+        .take(MAX_LISTED)
+        .cloned()
+        .collect::<Vec<_>>()
+        .join(", ");
     if names.len() > MAX_LISTED {
         let _ = write!(text, " and {} more", names.len() - MAX_LISTED);
     }
@@ -220,7 +308,11 @@ fn list(names: &[String]) -> String {
 
 fn more(out: &mut String, all: usize) {
     if all > MAX_LISTED {
-        let _ = writeln!(out, "    and {} more: --format json has all", all - MAX_LISTED);
+        let _ = writeln!(
+            out,
+            "    and {} more: --format json has all",
+            all - MAX_LISTED
+        );
     }
 }
 

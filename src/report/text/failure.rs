@@ -5,7 +5,8 @@ use crate::text::{Page, command};
 use actcheck_base::{Outcome, ShellLine};
 use actcheck_history::RunStatus;
 
-/// Longest reason of a failure in one line; of a longer one, only the first part is printed. Unit: characters.
+/// Longest reason of a failure in one line; of a longer one, only the first part is printed. Unit:
+/// characters.
 const LONGEST_REASON: usize = 90;
 
 /// The text about a run that failed or did not complete.
@@ -37,9 +38,15 @@ impl FailureLines<'_> {
         };
         let mut out = format!("{} {} ({})", painted(word, colour, page), run.id, run.test);
         let mut reasons: Vec<String> = run.reason.iter().cloned().collect();
-        reasons.extend(failed.iter().map(|(name, witness)| format!("{name}: {witness}")));
+        reasons.extend(
+            failed
+                .iter()
+                .map(|(name, witness)| format!("{name}: {witness}")),
+        );
         match reasons.first() {
-            _ if self.all => reasons.iter().for_each(|reason| out.push_str(&format!("\n  {reason}"))),
+            _ if self.all => reasons
+                .iter()
+                .for_each(|reason| out.push_str(&format!("\n  {reason}"))),
             Some(first) => {
                 out.push_str(&format!(": {}", shortened(first)));
                 match reasons.len() {
@@ -50,13 +57,18 @@ impl FailureLines<'_> {
             }
             None => {}
         }
-        page.set(&format!("{out}\n  {}\n", painted(&format!("more: {}", command(self.show)), "2", page)))
+        page.set(&format!(
+            "{out}\n  {}\n",
+            painted(&format!("more: {}", command(self.show)), "2", page)
+        ))
     }
 
     /// The line after the last failure that is printed. `list` is a command that lists all.
     pub fn further(list: &ShellLine, page: Page) -> String {
         let list = painted(&command(list), "2", page);
-        page.set(&format!("… further failures are not printed here (`-v` prints all): {list}\n"))
+        page.set(&format!(
+            "… further failures are not printed here (`-v` prints all): {list}\n"
+        ))
     }
 }
 
@@ -70,7 +82,11 @@ fn shortened(reason: &str) -> String {
 }
 
 fn painted(text: &str, style: &str, page: Page) -> String {
-    if page.colour { format!("\u{1b}[{style}m{text}\u{1b}[0m") } else { text.to_owned() }
+    if page.colour {
+        format!("\u{1b}[{style}m{text}\u{1b}[0m")
+    } else {
+        text.to_owned()
+    }
 }
 
 #[cfg(test)]
@@ -82,7 +98,13 @@ mod tests {
     fn lines(run: &RunSummary, all: bool, page: Page) -> String {
         let name = |iri: &str| iri.rsplit('#').next().unwrap_or(iri).to_owned();
         let show = ShellLine::default().fixed("actcheck show k7f3-1 --history h");
-        FailureLines { run, show: &show, all, name: &name }.text(page)
+        FailureLines {
+            run,
+            show: &show,
+            all,
+            name: &name,
+        }
+        .text(page)
     }
 
     #[test]
@@ -90,17 +112,34 @@ mod tests {
         let one = run(0, RunStatus::Completed, &[Passed, Failed]);
         let text = lines(&one, false, Page::default());
         let end = ": glass_1 moved 0.4 cm, needs more than 2 cm\n  more: actcheck show k7f3-1 --history h\n";
-        assert!(text.starts_with("failed k7f3-1 (Pick): ") && text.ends_with(end), "{text}");
+        assert!(
+            text.starts_with("failed k7f3-1 (Pick): ") && text.ends_with(end),
+            "{text}"
+        );
         let two = run(0, RunStatus::Completed, &[Failed, Failed]);
-        assert!(lines(&two, false, Page::default()).contains("; and 1 more property\n"), "{text}");
+        assert!(
+            lines(&two, false, Page::default()).contains("; and 1 more property\n"),
+            "{text}"
+        );
         let all = lines(&two, true, Page::default());
-        assert_eq!(all.matches("\n  ").count(), 3, "one line for each property and the command:\n{all}");
+        assert_eq!(
+            all.matches("\n  ").count(),
+            3,
+            "one line for each property and the command:\n{all}"
+        );
     }
 
     #[test]
     fn a_broken_run_is_printed_with_its_reason() {
-        let text = lines(&run(0, RunStatus::Broken, &[Broken]), false, Page::default());
-        assert!(text.starts_with("broken k7f3-1 (Pick): body left the world\n"), "{text}");
+        let text = lines(
+            &run(0, RunStatus::Broken, &[Broken]),
+            false,
+            Page::default(),
+        );
+        assert!(
+            text.starts_with("broken k7f3-1 (Pick): body left the world\n"),
+            "{text}"
+        );
     }
 
     #[test]
@@ -108,14 +147,37 @@ mod tests {
         let failed = run(0, RunStatus::Completed, &[Failed, Failed, Failed]);
         let plain = lines(&failed, false, Page::default());
         for width in [50, 200] {
-            let text = lines(&failed, false, Page { width: Some(width), colour: true });
-            assert!(text.starts_with("\u{1b}[31mfailed\u{1b}[0m k7f3-1"), "{text}");
-            let bare = text.replace("\u{1b}[31m", "").replace("\u{1b}[2m", "").replace("\u{1b}[0m", "");
-            assert!(bare.lines().all(|line| line.chars().count() <= width), "{bare}");
-            let words = |text: &str| text.split_whitespace().map(str::to_owned).collect::<Vec<_>>();
+            let text = lines(
+                &failed,
+                false,
+                Page {
+                    width: Some(width),
+                    colour: true,
+                },
+            );
+            assert!(
+                text.starts_with("\u{1b}[31mfailed\u{1b}[0m k7f3-1"),
+                "{text}"
+            );
+            let bare = text
+                .replace("\u{1b}[31m", "")
+                .replace("\u{1b}[2m", "")
+                .replace("\u{1b}[0m", "");
+            assert!(
+                bare.lines().all(|line| line.chars().count() <= width),
+                "{bare}"
+            );
+            let words = |text: &str| {
+                text.split_whitespace()
+                    .map(str::to_owned)
+                    .collect::<Vec<_>>()
+            };
             assert_eq!(words(&bare), words(&plain));
         }
-        let long = shortened(&format!("Detected: {} was seen; b was seen", "a".repeat(90)));
+        let long = shortened(&format!(
+            "Detected: {} was seen; b was seen",
+            "a".repeat(90)
+        ));
         assert!(long.ends_with("was seen; …"), "{long}");
     }
 }

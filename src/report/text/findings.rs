@@ -14,13 +14,22 @@ use actcheck_verdict::Counts;
 const MAX_LISTED: usize = 8;
 /// Maximum number of failure modes and of cascades listed.
 const MAX_LINES: usize = 10;
-/// Formats counts, failure modes, cascades and collisions, then each property with its patterns, margins, trend, flaky scenes and
-/// heat maps.
+/// Formats counts, failure modes, cascades and collisions, then each property with its patterns,
+/// margins, trend, flaky scenes and heat maps.
 pub fn findings_text(summary: &FindingsSummary, page: Page) -> String {
     let mut out = String::new();
     let campaigns = list(summary.campaigns.iter().map(String::as_str));
-    let plural = if summary.campaigns.len() == 1 { "" } else { "s" };
-    let _ = writeln!(out, "{} runs of {} campaign{plural} ({campaigns})", summary.runs, summary.campaigns.len());
+    let plural = if summary.campaigns.len() == 1 {
+        ""
+    } else {
+        "s"
+    };
+    let _ = writeln!(
+        out,
+        "{} runs of {} campaign{plural} ({campaigns})",
+        summary.runs,
+        summary.campaigns.len()
+    );
     if summary.twins > 0 {
         let _ = writeln!(out, "{}", twins_line(summary.twins));
     }
@@ -30,7 +39,12 @@ pub fn findings_text(summary: &FindingsSummary, page: Page) -> String {
             "outcomes ended a campaign (--max-failures, or an interrupt): shares are biased, and intervals are valid for that"
         );
     }
-    let _ = writeln!(out, "{} outcomes: {}", summary.counts.total(), counts(summary.counts));
+    let _ = writeln!(
+        out,
+        "{} outcomes: {}",
+        summary.counts.total(),
+        counts(summary.counts)
+    );
     if let Some(sampled) = summary.sampled_runs {
         let _ = writeln!(
             out,
@@ -49,18 +63,26 @@ pub fn findings_text(summary: &FindingsSummary, page: Page) -> String {
 fn twins_line(twins: u64) -> String {
     match twins {
         1 => "1 run is bit-for-bit a duplicate of a later one: both count once".to_owned(),
-        _ => format!("{twins} runs are bit-for-bit duplicates of a later one: each trace counts once"),
+        _ => format!(
+            "{twins} runs are bit-for-bit duplicates of a later one: each trace counts once"
+        ),
     }
 }
 
 fn counts(counts: Counts) -> String {
-    Outcome::ALL.map(|outcome| format!("{} {outcome}", counts.get(outcome))).join(", ")
+    Outcome::ALL
+        .map(|outcome| format!("{} {outcome}", counts.get(outcome)))
+        .join(", ")
 }
 
 fn list<'a>(ids: impl ExactSizeIterator<Item = &'a str>) -> String {
     let more = ids.len().saturating_sub(MAX_LISTED);
     let shown: Vec<&str> = ids.take(MAX_LISTED).collect();
-    let rest = if more > 0 { format!(", … ({more} more)") } else { String::new() };
+    let rest = if more > 0 {
+        format!(", … ({more} more)")
+    } else {
+        String::new()
+    };
     format!("{}{rest}", shown.join(", "))
 }
 
@@ -73,10 +95,23 @@ fn modes(out: &mut String, summary: &FindingsSummary, page: Page) {
     table.set_header(["share", "runs", "failed properties", "example"]);
     for mode in summary.modes.iter().take(MAX_LINES) {
         let failed: Vec<&str> = mode.failed.iter().map(|iri| names::local(iri)).collect();
-        let failed = if failed.is_empty() { "none".to_owned() } else { failed.join(", ") };
-        let share =
-            format!("{} [{:.0}–{:.0}]", percent(mode.share.rate), mode.share.low * 100.0, mode.share.high * 100.0);
-        table.add_row([share, mode.runs.len().to_string(), failed, mode.runs.first().cloned().unwrap_or_default()]);
+        let failed = if failed.is_empty() {
+            "none".to_owned()
+        } else {
+            failed.join(", ")
+        };
+        let share = format!(
+            "{} [{:.0}–{:.0}]",
+            percent(mode.share.rate),
+            mode.share.low * 100.0,
+            mode.share.high * 100.0
+        );
+        table.add_row([
+            share,
+            mode.runs.len().to_string(),
+            failed,
+            mode.runs.first().cloned().unwrap_or_default(),
+        ]);
     }
     out.push_str(&fitted(table, page, &["example"]));
     rest(out, summary.modes.len());
@@ -93,10 +128,23 @@ fn cascades(out: &mut String, summary: &FindingsSummary) {
         return;
     }
     out.push_str("\ncascades\n");
-    let name = |of: &Judged| format!("{} ({} {})", names::local(&of.property), of.step, names::local(&of.action));
+    let name = |of: &Judged| {
+        format!(
+            "{} ({} {})",
+            names::local(&of.property),
+            of.step,
+            names::local(&of.action)
+        )
+    };
     for cascade in summary.cascades.iter().take(MAX_LINES) {
         let table = cascade.table;
-        let share = |failed: u64, of: u64| if of == 0 { "none".to_owned() } else { percent(failed as f64 / of as f64) };
+        let share = |failed: u64, of: u64| {
+            if of == 0 {
+                "none".to_owned()
+            } else {
+                percent(failed as f64 / of as f64)
+            }
+        };
         let _ = writeln!(
             out,
             "if {} fails, {} fails in {} of {} runs; if it passes, in {} of {} (adjusted p {})",
@@ -114,8 +162,17 @@ fn cascades(out: &mut String, summary: &FindingsSummary) {
 
 fn property(out: &mut String, report: &PropertyReport, summary: &FindingsSummary, page: Page) {
     let found = &report.findings;
-    let _ = write!(out, "\n{} ({}): ", report.name(), names::local(&found.action));
-    match Proportion::sampled(found.counts.failed, found.counts.decided(), summary.sampling) {
+    let _ = write!(
+        out,
+        "\n{} ({}): ",
+        report.name(),
+        names::local(&found.action)
+    );
+    match Proportion::sampled(
+        found.counts.failed,
+        found.counts.decided(),
+        summary.sampling,
+    ) {
         Some(share) => {
             let _ = writeln!(out, "fails in {share}");
         }
@@ -134,10 +191,19 @@ fn property(out: &mut String, report: &PropertyReport, summary: &FindingsSummary
         let scenes: Vec<String> = report
             .flaky
             .iter()
-            .map(|scene| format!("{} scene {} ({} of {} passed)", scene.campaign, scene.scene, scene.passed, scene.of))
+            .map(|scene| {
+                format!(
+                    "{} scene {} ({} of {} passed)",
+                    scene.campaign, scene.scene, scene.passed, scene.of
+                )
+            })
             .collect();
         let (flaky, all) = (scenes.len(), report.repeated_scenes);
-        let _ = writeln!(out, "  flaky in {flaky} of {all} scenes: {}", list(scenes.iter().map(String::as_str)));
+        let _ = writeln!(
+            out,
+            "  flaky in {flaky} of {all} scenes: {}",
+            list(scenes.iter().map(String::as_str))
+        );
     }
     report.maps.iter().for_each(|shown| map(out, shown, page));
 }
@@ -182,14 +248,20 @@ fn strongest(out: &mut String, causes: &Causes<'_>, noun: &str) {
         return;
     }
     if patterns.parameters == 0 && patterns.tried == 0 && patterns.strongest.is_empty() {
-        let _ = writeln!(out, "   no {noun} was searched: too few runs, or nothing that varies");
+        let _ = writeln!(
+            out,
+            "   no {noun} was searched: too few runs, or nothing that varies"
+        );
         return;
     }
     if patterns.strongest.is_empty() {
         let _ = writeln!(out, "   no {noun} differs between its failures and passes");
         return;
     }
-    let _ = writeln!(out, "   none is confirmed beyond chance; the strongest (perhaps by chance):");
+    let _ = writeln!(
+        out,
+        "   none is confirmed beyond chance; the strongest (perhaps by chance):"
+    );
     for strongest in &patterns.strongest {
         let _ = writeln!(out, "   ? {}", causes.strongest_sentence(strongest));
         let needed = match strongest.runs_needed {
@@ -207,12 +279,17 @@ fn searched(out: &mut String, causes: Causes<'_>, summary: &FindingsSummary) {
     let confirmed = patterns.confirmed().count();
     let unconfirmed = patterns.patterns.len() - confirmed;
     if unconfirmed > 0 {
-        let _ =
-            writeln!(out, "  {unconfirmed} more were not confirmed on the held-out runs (--format json lists them)");
+        let _ = writeln!(
+            out,
+            "  {unconfirmed} more were not confirmed on the held-out runs (--format json lists them)"
+        );
     }
     if patterns.tried == 0 {
-        let _ =
-            writeln!(out, "  (too few runs failed, or passed, to search for one; {} were held out)", patterns.held_out);
+        let _ = writeln!(
+            out,
+            "  (too few runs failed, or passed, to search for one; {} were held out)",
+            patterns.held_out
+        );
         return;
     }
     let _ = writeln!(
@@ -226,7 +303,11 @@ fn searched(out: &mut String, causes: Causes<'_>, summary: &FindingsSummary) {
         summary.level
     );
     if patterns.depth == 3 && patterns.combined < patterns.parameters {
-        let _ = writeln!(out, "  (combinations of three only use the {} most promising parameters)", patterns.combined);
+        let _ = writeln!(
+            out,
+            "  (combinations of three only use the {} most promising parameters)",
+            patterns.combined
+        );
     }
 }
 
@@ -247,10 +328,20 @@ fn evidence(out: &mut String, causes: &Causes<'_>, pattern: &Pattern) {
 }
 
 /// Writes the command that generates more scenes of a pattern.
-fn more_scenes(out: &mut String, report: &PropertyReport, pattern: &Pattern, summary: &FindingsSummary, number: usize) {
+fn more_scenes(
+    out: &mut String,
+    report: &PropertyReport,
+    pattern: &Pattern,
+    summary: &FindingsSummary,
+    number: usize,
+) {
     let parameters = &report.findings.input.parameters;
     if scene_rule(&pattern.conditions, parameters, "").is_ok() {
-        let more = command(&summary.scene_rule(report.name(), number).fixed("> more.rls"));
+        let more = command(
+            &summary
+                .scene_rule(report.name(), number)
+                .fixed("> more.rls"),
+        );
         let _ = writeln!(
             out,
             "     more such scenes: {more}, and `require = \"more.rls\"` under `[scene]` of a configuration in the same \
@@ -275,7 +366,13 @@ fn margins(out: &mut String, report: &PropertyReport) {
         let _ = writeln!(
             out,
             "  margin{unit}: min {:.4}, 5 % {:.4}, 25 % {:.4}, median {:.4}, 75 % {:.4}, 95 % {:.4}, max {:.4}",
-            margins.least, margins.p05, margins.p25, margins.p50, margins.p75, margins.p95, margins.most
+            margins.least,
+            margins.p05,
+            margins.p25,
+            margins.p50,
+            margins.p75,
+            margins.p95,
+            margins.most
         );
     }
 }
@@ -287,9 +384,19 @@ fn trend(out: &mut String, report: &PropertyReport) {
     }
     let shown: Vec<String> = points
         .iter()
-        .map(|point| format!("{} {}", point.campaign, percent(point.failed as f64 / point.runs.max(1) as f64)))
+        .map(|point| {
+            format!(
+                "{} {}",
+                point.campaign,
+                percent(point.failed as f64 / point.runs.max(1) as f64)
+            )
+        })
         .collect();
-    let _ = writeln!(out, "  over campaigns: {}", list(shown.iter().map(String::as_str)));
+    let _ = writeln!(
+        out,
+        "  over campaigns: {}",
+        list(shown.iter().map(String::as_str))
+    );
     for change in &report.trend.changes {
         let _ = writeln!(
             out,
@@ -303,8 +410,15 @@ fn trend(out: &mut String, report: &PropertyReport) {
 }
 
 fn map(out: &mut String, map: &TwoWay, page: Page) {
-    let (down, across) = (map.by.first().map_or("", String::as_str), map.by.get(1).map_or("", String::as_str));
-    let title = if across.is_empty() { down.to_owned() } else { format!("{down} (down) and {across} (across)") };
+    let (down, across) = (
+        map.by.first().map_or("", String::as_str),
+        map.by.get(1).map_or("", String::as_str),
+    );
+    let title = if across.is_empty() {
+        down.to_owned()
+    } else {
+        format!("{down} (down) and {across} (across)")
+    };
     let _ = writeln!(out, "\n  failures by {title}");
     let mut table = ruled();
     table.set_header(std::iter::once(String::new()).chain(map.across.iter().cloned()));
@@ -318,6 +432,11 @@ fn map(out: &mut String, map: &TwoWay, page: Page) {
 fn shaded(cell: &TwoWayCell) -> String {
     match cell.failing {
         None => String::new(),
-        Some(failing) => format!("{} {} of {}", shade(failing.rate), percent(failing.rate), cell.runs),
+        Some(failing) => format!(
+            "{} {} of {}",
+            shade(failing.rate),
+            percent(failing.rate),
+            cell.runs
+        ),
     }
 }

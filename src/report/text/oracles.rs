@@ -10,14 +10,25 @@ use actcheck_analysis::{LEVEL, Notice};
 pub fn oracles_text(summary: &OracleSummary, page: Page) -> String {
     let mut table = ruled();
     let names = summary.names.iter().cloned();
-    table.set_header(["fault".to_owned(), "took effect".to_owned()].into_iter().chain(names));
+    table.set_header(
+        ["fault".to_owned(), "took effect".to_owned()]
+            .into_iter()
+            .chain(names),
+    );
     let matrix = &summary.matrix;
-    let alone = matrix.properties.iter().map(|(_, passed, failed)| format!("{failed}/{}", passed + failed));
+    let alone = matrix
+        .properties
+        .iter()
+        .map(|(_, passed, failed)| format!("{failed}/{}", passed + failed));
     let scenes = format!("{} of {}", matrix.scenes, summary.planned);
     table.add_row(["(none)".to_owned(), scenes].into_iter().chain(alone));
     for row in &matrix.rows {
         let cells = row.cells.iter().map(|cell| {
-            let mark = if cell.notice == Notice::Noticed { " *" } else { "" };
+            let mark = if cell.notice == Notice::Noticed {
+                " *"
+            } else {
+                ""
+            };
             format!("{}/{}{mark}", cell.failed, cell.passed + cell.failed)
         });
         let came_about = format!("{} of {}", row.came_about, row.scenes);
@@ -33,7 +44,10 @@ pub fn oracles_text(summary: &OracleSummary, page: Page) -> String {
         let _ = writeln!(out, "  {fault}: {what}");
     }
     let _ = match summary.gaps.len() {
-        0 => writeln!(out, "\nevery fault is noticed, and every property notices a fault"),
+        0 => writeln!(
+            out,
+            "\nevery fault is noticed, and every property notices a fault"
+        ),
         1 => writeln!(out, "\n1 gap"),
         gaps => writeln!(out, "\n{gaps} gaps"),
     };

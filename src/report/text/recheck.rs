@@ -26,7 +26,12 @@ pub fn recheck_text(summary: &RecheckSummary, page: Page) -> String {
         ]);
     }
     let restated: u64 = summary.properties.values().map(|line| line.restated).sum();
-    let _ = writeln!(out, "{}\n{}", fitted(table, page, &["new"]), totals(summary, restated));
+    let _ = writeln!(
+        out,
+        "{}\n{}",
+        fitted(table, page, &["new"]),
+        totals(summary, restated)
+    );
     held_before(&mut out, summary);
     changes(&mut out, summary);
     page.set(&out)
@@ -34,22 +39,37 @@ pub fn recheck_text(summary: &RecheckSummary, page: Page) -> String {
 
 /// Adds how many passes say nothing.
 fn with_vacuous(counts: String, vacuous: u64) -> String {
-    if vacuous > 0 { format!("{counts}; {vacuous} vacuously") } else { counts }
+    if vacuous > 0 {
+        format!("{counts}; {vacuous} vacuously")
+    } else {
+        counts
+    }
 }
 
 fn totals(summary: &RecheckSummary, restated: u64) -> String {
     let changed: u64 = summary.properties.values().map(|line| line.changed).sum();
     let new: u64 = summary.properties.values().map(|line| line.new).sum();
-    let mut text = format!("{} judged again: {changed} outcomes changed, {new} new", runs(summary.runs));
+    let mut text = format!(
+        "{} judged again: {changed} outcomes changed, {new} new",
+        runs(summary.runs)
+    );
     if restated > 0 {
-        let _ = write!(text, ", {restated} unchanged with a different rule, margin or witness");
+        let _ = write!(
+            text,
+            ", {restated} unchanged with a different rule, margin or witness"
+        );
     }
     text
 }
 
-/// Names the properties that already held before actions that passed them: such passes say nothing about the action.
+/// Names the properties that already held before actions that passed them: such passes say nothing
+/// about the action.
 fn held_before(out: &mut String, summary: &RecheckSummary) {
-    for (iri, line) in summary.properties.iter().filter(|(_, line)| line.held_before > 0) {
+    for (iri, line) in summary
+        .properties
+        .iter()
+        .filter(|(_, line)| line.held_before > 0)
+    {
         let _ = writeln!(
             out,
             "{} already held before the action in {} of {} passes, which say nothing about the action",
@@ -61,14 +81,23 @@ fn held_before(out: &mut String, summary: &RecheckSummary) {
 }
 
 fn runs(count: u64) -> String {
-    if count == 1 { "1 run".to_owned() } else { format!("{count} runs") }
+    if count == 1 {
+        "1 run".to_owned()
+    } else {
+        format!("{count} runs")
+    }
 }
 
 /// Writes changed outcomes, then new outcomes that failed; other new outcomes are omitted.
 fn changes(out: &mut String, summary: &RecheckSummary) {
-    let (changed, new): (Vec<&RecheckChange>, Vec<&RecheckChange>) =
-        summary.changes.iter().partition(|change| change.before.is_some());
-    let failed: Vec<&RecheckChange> = new.into_iter().filter(|change| change.now.outcome == Outcome::Failed).collect();
+    let (changed, new): (Vec<&RecheckChange>, Vec<&RecheckChange>) = summary
+        .changes
+        .iter()
+        .partition(|change| change.before.is_some());
+    let failed: Vec<&RecheckChange> = new
+        .into_iter()
+        .filter(|change| change.now.outcome == Outcome::Failed)
+        .collect();
     for change in changed.iter().chain(&failed).take(MAX_LISTED) {
         let before = change.before.map_or("new", |(outcome, _)| outcome.word());
         let _ = writeln!(
@@ -90,7 +119,8 @@ fn changes(out: &mut String, summary: &RecheckSummary) {
 }
 
 fn margins(change: &RecheckChange) -> String {
-    let number = |margin: Option<f64>| margin.map_or("none".to_owned(), |margin| format!("{margin:.4}"));
+    let number =
+        |margin: Option<f64>| margin.map_or("none".to_owned(), |margin| format!("{margin:.4}"));
     match (change.before, change.now.margin) {
         (Some((_, None)) | None, None) => String::new(),
         (Some((_, before)), now) => format!(", margin {} → {}", number(before), number(now)),
@@ -105,5 +135,9 @@ fn counted(counts: Counts) -> String {
         .filter(|outcome| counts.get(*outcome) > 0)
         .map(|outcome| format!("{} {outcome}", counts.get(outcome)))
         .collect();
-    if words.is_empty() { "none".to_owned() } else { words.join(", ") }
+    if words.is_empty() {
+        "none".to_owned()
+    } else {
+        words.join(", ")
+    }
 }

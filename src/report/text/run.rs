@@ -9,17 +9,31 @@ use actcheck_history::{ActionDetail, ObjectDetail, Repetition, RunDetail};
 
 /// Formats a run: its scene, the reports of its actions, and every outcome with margin and witness.
 ///
-/// `perceived` are sentences about the perceived target, by the action's position in the test (from 1).
+/// `perceived` are sentences about the perceived target, by the action's position in the test (from
+/// 1).
 pub fn run_text(run: &RunDetail, perceived: &BTreeMap<u32, String>, page: Page) -> String {
     let mut out = String::new();
     let row = &run.row;
-    let _ = writeln!(out, "run {} ({}), {}, S = {:.2}", row.run, row.test, row.status.word(), row.score);
+    let _ = writeln!(
+        out,
+        "run {} ({}), {}, S = {:.2}",
+        row.run,
+        row.test,
+        row.status.word(),
+        row.score
+    );
     if let Some(reason) = &run.reason {
         let _ = writeln!(out, "{}: {reason}", row.status.word());
     }
-    if let Some(printed) = run.program_output.as_ref().filter(|printed| !printed.is_empty()) {
+    if let Some(printed) = run
+        .program_output
+        .as_ref()
+        .filter(|printed| !printed.is_empty())
+    {
         let _ = writeln!(out, "the program printed last:");
-        printed.lines().for_each(|line| out.push_str(&format!("  {line}\n")));
+        printed
+            .lines()
+            .for_each(|line| out.push_str(&format!("  {line}\n")));
     }
     let _ = writeln!(
         out,
@@ -35,7 +49,10 @@ pub fn run_text(run: &RunDetail, perceived: &BTreeMap<u32, String>, page: Page) 
         let _ = writeln!(out, "run {} of scene {}", number + 1, scene + 1);
     }
     if let Some(weight) = row.weight {
-        let _ = writeln!(out, "importance weight {weight:.3}: a search chose the scene");
+        let _ = writeln!(
+            out,
+            "importance weight {weight:.3}: a search chose the scene"
+        );
     }
     let _ = writeln!(out, "trace {}", row.trace_hash);
     for (designator, values) in &run.designators {
@@ -69,14 +86,31 @@ fn scene(out: &mut String, run: &RunDetail, page: Page) {
     for object in &run.objects {
         table.add_row(object_row(object));
     }
-    out.push_str(&fitted(table, page, &["friction", "mass kg", "max tilt °", "yaw °", "role", "category"]));
+    out.push_str(&fitted(
+        table,
+        page,
+        &[
+            "friction",
+            "mass kg",
+            "max tilt °",
+            "yaw °",
+            "role",
+            "category",
+        ],
+    ));
     let [x, y, heading] = run.robot_base;
-    let _ = writeln!(out, "robot at x {x:.3} m, y {y:.3} m, heading {:.1}°", heading.to_degrees());
+    let _ = writeln!(
+        out,
+        "robot at x {x:.3} m, y {y:.3} m, heading {:.1}°",
+        heading.to_degrees()
+    );
 }
 
 fn object_row(object: &ObjectDetail) -> Vec<String> {
     let number = |value: Option<f64>, factor: f64, decimals: usize| {
-        value.map_or_else(String::new, |value| format!("{:.decimals$}", value * factor))
+        value.map_or_else(String::new, |value| {
+            format!("{:.decimals$}", value * factor)
+        })
     };
     vec![
         object.id.clone(),
@@ -92,14 +126,22 @@ fn object_row(object: &ObjectDetail) -> Vec<String> {
     ]
 }
 
-/// The designators that have other values in an action than in the scene, as ` with pickObject = can_1`.
+/// The designators that have other values in an action than in the scene, as
+/// ` with pickObject = can_1`.
 fn own_values(action: &ActionDetail, run: &RunDetail) -> String {
-    let own = action
-        .parameters
-        .iter()
-        .filter(|(name, values)| run.designators.get(*name).is_some_and(|of_scene| of_scene != *values));
-    let own: Vec<String> = own.map(|(name, values)| format!("{name} = {}", values.join(", "))).collect();
-    if own.is_empty() { String::new() } else { format!(" with {}", own.join("; ")) }
+    let own = action.parameters.iter().filter(|(name, values)| {
+        run.designators
+            .get(*name)
+            .is_some_and(|of_scene| of_scene != *values)
+    });
+    let own: Vec<String> = own
+        .map(|(name, values)| format!("{name} = {}", values.join(", ")))
+        .collect();
+    if own.is_empty() {
+        String::new()
+    } else {
+        format!(" with {}", own.join("; "))
+    }
 }
 
 fn action_text(out: &mut String, action: &ActionDetail, own_values: &str, page: Page) {
@@ -108,8 +150,15 @@ fn action_text(out: &mut String, action: &ActionDetail, own_values: &str, page: 
         Some(false) => "reported failure",
         None => "reported nothing",
     };
-    let message = action.message.as_deref().map_or_else(String::new, |message| format!(": {message}"));
-    let reported = if action.end == Outcome::Inapplicable.word() { "not performed" } else { reported };
+    let message = action
+        .message
+        .as_deref()
+        .map_or_else(String::new, |message| format!(": {message}"));
+    let reported = if action.end == Outcome::Inapplicable.word() {
+        "not performed"
+    } else {
+        reported
+    };
     let _ = writeln!(
         out,
         "\n{}. {}{own_values}: {}, {:.1} s simulated, A = {:.2}, {reported}{message}",
@@ -122,7 +171,9 @@ fn action_text(out: &mut String, action: &ActionDetail, own_values: &str, page: 
     let mut table = ruled();
     table.set_header(["property", "outcome", "margin", "witness"]);
     for judgement in &action.judgements {
-        let margin = judgement.margin.map_or_else(String::new, |margin| format!("{margin:+.4}"));
+        let margin = judgement
+            .margin
+            .map_or_else(String::new, |margin| format!("{margin:+.4}"));
         table.add_row([
             names::local(&judgement.property).to_owned(),
             match (judgement.held_before, judgement.vacuous) {

@@ -1,17 +1,21 @@
-//! Converts a pattern to a rule that generates more such scenes (`[scene] require` of a configuration).
+//! Converts a pattern to a rule that generates more such scenes (`[scene] require` of a
+//! configuration).
 
 use std::fmt::Write as _;
 
 use actcheck_analysis::{Condition, Parameter};
 use actcheck_base::names;
 
-/// Maps each numeric table parameter to the facts of a scene: the body of a rule for `value(?v)`, where `?o` is the
-/// target, `?s` its surface and `?n` any other object that is not a platform. `ontology/world.ttl` and
-/// `ontology/history.ttl` define the terms.
+/// Maps each numeric table parameter to the facts of a scene: the body of a rule for `value(?v)`,
+/// where `?o` is the target, `?s` its surface and `?n` any other object that is not a platform.
+/// `ontology/world.ttl` and `ontology/history.ttl` define the terms.
 const NUMBERS: [(&str, &str); 35] = [
     ("target_friction", "target(?o), before(?o, w:friction, ?v)"),
     ("target_mass_kg", "target(?o), before(?o, w:mass, ?v)"),
-    ("target_restitution", "target(?o), before(?o, w:restitution, ?v)"),
+    (
+        "target_restitution",
+        "target(?o), before(?o, w:restitution, ?v)",
+    ),
     ("target_x_m", "target(?o), before(?o, w:x, ?v)"),
     ("target_y_m", "target(?o), before(?o, w:y, ?v)"),
     ("target_z_m", "target(?o), before(?o, w:z, ?v)"),
@@ -19,7 +23,10 @@ const NUMBERS: [(&str, &str); 35] = [
     ("base_x_m", "before(w:robot, w:baseX, ?v)"),
     ("base_y_m", "before(w:robot, w:baseY, ?v)"),
     ("base_yaw_rad", "before(w:robot, w:baseYaw, ?v)"),
-    ("robot_distance_m", "target(?o), from_base(?o, ?x, ?y), ?v = SQRT(?x * ?x + ?y * ?y)"),
+    (
+        "robot_distance_m",
+        "target(?o), from_base(?o, ?x, ?y), ?v = SQRT(?x * ?x + ?y * ?y)",
+    ),
     (
         "target_ahead_m",
         "target(?o), from_base(?o, ?x, ?y), before(w:robot, w:baseYaw, ?a), ?v = COS(?a) * ?x + SIN(?a) * ?y",
@@ -32,8 +39,14 @@ const NUMBERS: [(&str, &str); 35] = [
         "target_turned_rad",
         "target(?o), before(?o, w:yaw, ?b), before(w:robot, w:baseYaw, ?a), ?v = ATAN2(SIN(?b - ?a), COS(?b - ?a))",
     ),
-    ("surface_x_m", "on_surface(?x, ?y, ?a), ?v = COS(?a) * ?x + SIN(?a) * ?y"),
-    ("surface_y_m", "on_surface(?x, ?y, ?a), ?v = COS(?a) * ?y - SIN(?a) * ?x"),
+    (
+        "surface_x_m",
+        "on_surface(?x, ?y, ?a), ?v = COS(?a) * ?x + SIN(?a) * ?y",
+    ),
+    (
+        "surface_y_m",
+        "on_surface(?x, ?y, ?a), ?v = COS(?a) * ?y - SIN(?a) * ?x",
+    ),
     ("neighbour_distance_m", "nearest(?v)"),
     (
         "neighbour_direction_rad",
@@ -48,23 +61,38 @@ const NUMBERS: [(&str, &str); 35] = [
     ("height_noise_m", "before(_, act:heightNoise, ?v)"),
     ("yaw_noise_rad", "before(_, act:yawNoise, ?v)"),
     ("size_noise_m", "before(_, act:sizeNoise, ?v)"),
-    ("localisation_noise_m", "before(_, act:localisationNoise, ?v)"),
+    (
+        "localisation_noise_m",
+        "before(_, act:localisationNoise, ?v)",
+    ),
     ("heading_noise_rad", "before(_, act:headingNoise, ?v)"),
     ("gripper_noise_m", "before(_, act:gripperNoise, ?v)"),
     ("range_noise_m", "before(_, act:rangeNoise, ?v)"),
     ("odometry_drift", "before(_, act:odometryDrift, ?v)"),
-    ("heading_drift_rad", "before(_, act:odometryHeadingDrift, ?v)"),
+    (
+        "heading_drift_rad",
+        "before(_, act:odometryHeadingDrift, ?v)",
+    ),
     ("landmark_every_m", "before(_, act:landmarkDistance, ?v)"),
     ("landmark_noise_m", "before(_, act:landmarkNoise, ?v)"),
-    ("landmark_noise_rad", "before(_, act:landmarkHeadingNoise, ?v)"),
+    (
+        "landmark_noise_rad",
+        "before(_, act:landmarkHeadingNoise, ?v)",
+    ),
 ];
 
 /// Maps each parameter with a name as its value to the body of a rule for `named(?t)`.
 const NAMES: [(&str, &str); 4] = [
     ("world", "before(_, act:worldName, ?t)"),
     ("target_model", "target(?o), before(?o, act:model, ?t)"),
-    ("surface_model", "parameter(act:objectSurface, ?s), before(?s, act:model, ?t)"),
-    ("neighbour_model", "nearest(?d), away(?n, _, _, ?d), before(?n, act:model, ?t)"),
+    (
+        "surface_model",
+        "parameter(act:objectSurface, ?s), before(?s, act:model, ?t)",
+    ),
+    (
+        "neighbour_model",
+        "nearest(?d), away(?n, _, _, ?d), before(?n, act:model, ?t)",
+    ),
 ];
 
 /// Maps each parameter with a class as its value to the body of a rule for `thing(?t)`.
@@ -107,7 +135,11 @@ kind(?t, ?c) :- kind(?t, ?below), ontology(?below, rdfs:subClassOf, ?c) .
 ///
 /// # Errors
 /// Returns the names of the parameters that can't be computed from the facts of a scene.
-pub fn scene_rule(conditions: &[Condition], parameters: &[Parameter], sentence: &str) -> Result<String, Vec<String>> {
+pub fn scene_rule(
+    conditions: &[Condition],
+    parameters: &[Parameter],
+    sentence: &str,
+) -> Result<String, Vec<String>> {
     let mut rules = String::new();
     let mut asked = Vec::new();
     let mut unknown = Vec::new();
@@ -125,7 +157,9 @@ pub fn scene_rule(conditions: &[Condition], parameters: &[Parameter], sentence: 
         return Err(unknown);
     }
     let mut text = format!("% More scenes like these: {sentence}.\n\n");
-    for (prefix, namespace) in names::PREFIXES.iter().filter(|(prefix, _)| ["act", "w", "rdf", "rdfs"].contains(prefix))
+    for (prefix, namespace) in names::PREFIXES
+        .iter()
+        .filter(|(prefix, _)| ["act", "w", "rdf", "rdfs"].contains(prefix))
     {
         let _ = writeln!(text, "@prefix {prefix}: <{namespace}> .");
     }
@@ -136,9 +170,15 @@ pub fn scene_rule(conditions: &[Condition], parameters: &[Parameter], sentence: 
     Ok(text)
 }
 
-/// The rules of one condition, and the literal that requires it. Returns `None` for an unknown parameter.
+/// The rules of one condition, and the literal that requires it. Returns `None` for an unknown
+/// parameter.
 fn asked_of(condition: &Condition, name: &str, number: usize) -> Option<(String, String)> {
-    let known = |among: &[(&str, &'static str)]| among.iter().find(|(known, _)| *known == name).map(|(_, body)| *body);
+    let known = |among: &[(&str, &'static str)]| {
+        among
+            .iter()
+            .find(|(known, _)| *known == name)
+            .map(|(_, body)| *body)
+    };
     match condition {
         Condition::Kind { kind, .. } => {
             if let Some(body) = known(&NAMES) {

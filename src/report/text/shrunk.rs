@@ -10,9 +10,17 @@ use actcheck_base::names;
 pub fn shrunk_text(shrunk: &ShrunkSummary, page: Page) -> String {
     let mut out = String::new();
     let failed: Vec<&str> = shrunk.failed.iter().map(|iri| names::local(iri)).collect();
-    let _ = writeln!(out, "{}: the smallest scene found that fails like {}", shrunk.run.row.run, shrunk.original);
+    let _ = writeln!(
+        out,
+        "{}: the smallest scene found that fails like {}",
+        shrunk.run.row.run, shrunk.original
+    );
     let _ = writeln!(out, "fails {}", failed.join(" + "));
-    let end = if shrunk.minimal { "nothing more can be removed" } else { "stopped at a limit: it may not be minimal" };
+    let end = if shrunk.minimal {
+        "nothing more can be removed"
+    } else {
+        "stopped at a limit: it may not be minimal"
+    };
     let _ = writeln!(
         out,
         "{} of {} other objects left, {} of {} choices not nominal; {} simulations, {} more to explain; {end}",
@@ -24,10 +32,16 @@ pub fn shrunk_text(shrunk: &ShrunkSummary, page: Page) -> String {
         shrunk.explaining
     );
     if let Some((failures, of)) = shrunk.fresh {
-        let _ = writeln!(out, "with fresh noise it fails in {failures} of {of} repetitions");
+        let _ = writeln!(
+            out,
+            "with fresh noise it fails in {failures} of {of} repetitions"
+        );
     }
     if shrunk.noise_kept {
-        let _ = writeln!(out, "with fresh noise the run does not fail often enough: its recorded noise is kept");
+        let _ = writeln!(
+            out,
+            "with fresh noise the run does not fail often enough: its recorded noise is kept"
+        );
     }
     let _ = write!(out, "\n{}", scene_table(shrunk, page));
     if shrunk.choices.is_empty() {
@@ -44,12 +58,23 @@ pub fn shrunk_text(shrunk: &ShrunkSummary, page: Page) -> String {
 
 /// Writes the meaning of a pass, and the nearest scene that passes.
 fn passing(out: &mut String, shrunk: &ShrunkSummary) {
-    let passes = shrunk.property.as_deref().map_or("everything", names::local);
-    let _ = writeln!(out, "passes at: with this value alone changed, the run was repeated and {passes} passed");
+    let passes = shrunk
+        .property
+        .as_deref()
+        .map_or("everything", names::local);
+    let _ = writeln!(
+        out,
+        "passes at: with this value alone changed, the run was repeated and {passes} passed"
+    );
     for choice in &shrunk.choices {
         for PassingValue { value, others } in passes_of(choice).filter(|at| !at.others.is_empty()) {
             let value = with_unit(*value, choice.unit);
-            let _ = writeln!(out, "at {} = {value}, {} fails there", choice.name, others.join(" + "));
+            let _ = writeln!(
+                out,
+                "at {} = {value}, {} fails there",
+                choice.name,
+                others.join(" + ")
+            );
         }
     }
     match &shrunk.neighbour {
@@ -58,7 +83,10 @@ fn passing(out: &mut String, shrunk: &ShrunkSummary) {
             let unit = choice.map_or("", |choice| choice.unit);
             let instead = choice.map_or_else(String::new, |choice| with_unit(choice.value, unit));
             let value = with_unit(at.value, unit);
-            let _ = writeln!(out, "nearest scene that passes: {name} = {value} instead of {instead}");
+            let _ = writeln!(
+                out,
+                "nearest scene that passes: {name} = {value} instead of {instead}"
+            );
         }
         None => {
             let _ = writeln!(
@@ -84,7 +112,9 @@ fn scene_table(shrunk: &ShrunkSummary, page: Page) -> String {
             format!("{:.3}", object.x),
             format!("{:.3}", object.y),
             format!("{:.1}", object.yaw.to_degrees()),
-            object.displacement_m.map_or_else(String::new, |moved| format!("{:.1}", moved * 100.0)),
+            object
+                .displacement_m
+                .map_or_else(String::new, |moved| format!("{:.1}", moved * 100.0)),
         ]);
     }
     fitted(table, page, &["yaw °", "role"])
@@ -92,7 +122,14 @@ fn scene_table(shrunk: &ShrunkSummary, page: Page) -> String {
 
 fn choice_table(shrunk: &ShrunkSummary, page: Page) -> String {
     let mut table = ruled();
-    table.set_header(["choice", "value", "nominal", "needed", "fails from … to", "passes at"]);
+    table.set_header([
+        "choice",
+        "value",
+        "nominal",
+        "needed",
+        "fails from … to",
+        "passes at",
+    ]);
     for choice in &shrunk.choices {
         let (low, high) = choice.fails;
         let passes: Vec<String> = passes_of(choice).map(|at| number(at.value)).collect();
@@ -100,16 +137,23 @@ fn choice_table(shrunk: &ShrunkSummary, page: Page) -> String {
             choice.name.clone(),
             with_unit(choice.value, choice.unit),
             number(choice.nominal),
-            choice.matters.map_or("not tried", |matters| if matters { "yes" } else { "no" }).to_owned(),
+            choice
+                .matters
+                .map_or("not tried", |matters| if matters { "yes" } else { "no" })
+                .to_owned(),
             format!("{} … {}", number(low), number(high)),
-            if passes.is_empty() { "none found".to_owned() } else { passes.join(", ") },
+            if passes.is_empty() {
+                "none found".to_owned()
+            } else {
+                passes.join(", ")
+            },
         ]);
     }
     fitted(table, page, &["passes at", "nominal", "needed"])
 }
 
-/// Writes a number with up to four decimals, or with all of them if it is not exactly such a number: the value that is
-/// printed is the one that was tried.
+/// Writes a number with up to four decimals, or with all of them if it is not exactly such a
+/// number: the value that is printed is the one that was tried.
 fn number(value: f64) -> String {
     // Adding 0 turns negative zero into zero.
     let text = format!("{:.4}", value + 0.0);
@@ -117,7 +161,11 @@ fn number(value: f64) -> String {
         return (value + 0.0).to_string();
     }
     let text = text.trim_end_matches('0').trim_end_matches('.');
-    if text == "-0" { "0".to_owned() } else { text.to_owned() }
+    if text == "-0" {
+        "0".to_owned()
+    } else {
+        text.to_owned()
+    }
 }
 
 fn with_unit(value: f64, unit: &str) -> String {

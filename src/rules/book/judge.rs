@@ -20,8 +20,8 @@ use actcheck_base::{ActionFacts, Diagnostics, Findings, RuleFault, Term, Terms};
 
 /// Every property's rules with the libraries, parsed, checked and planned. Shared between threads.
 ///
-/// The libraries are evaluated once for an action, then each property. For the rules of one property,
-/// [`Rules`](crate::Rules) is simpler.
+/// The libraries are evaluated once for an action, then each property. For the rules of one
+/// property, [`Rules`](crate::Rules) is simpler.
 ///
 /// ```
 /// use actcheck_base::Source;
@@ -75,7 +75,9 @@ pub struct RuleBook {
 
 impl std::fmt::Debug for RuleBook {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("RuleBook").field("properties", &self.properties.keys()).finish_non_exhaustive()
+        f.debug_struct("RuleBook")
+            .field("properties", &self.properties.keys())
+            .finish_non_exhaustive()
     }
 }
 
@@ -110,7 +112,9 @@ impl JudgeRules {
     /// Returns whether the rules read holds or motions, which runs of earlier versions lack.
     pub(crate) fn reads_intervals(&self) -> bool {
         match self {
-            Self::Datalog { reads_intervals, .. } => *reads_intervals,
+            Self::Datalog {
+                reads_intervals, ..
+            } => *reads_intervals,
             #[cfg(feature = "sparql")]
             Self::Sparql(query) => query.reads_intervals,
         }
@@ -118,10 +122,11 @@ impl JudgeRules {
 }
 
 impl RuleBook {
-    /// Judges an action by the given properties (IRIs). Evaluates the libraries once, then each property.
+    /// Judges an action by the given properties (IRIs). Evaluates the libraries once, then each
+    /// property.
     ///
-    /// A property that exceeds the budget or meets an invalid value gets a fault instead of findings. The others are
-    /// not affected.
+    /// A property that exceeds the budget or meets an invalid value gets a fault instead of
+    /// findings. The others are not affected.
     pub fn judge(
         &self,
         facts: &ActionFacts<'_>,
@@ -141,7 +146,12 @@ impl RuleBook {
         let mut universe = Universe::of_action(&self.terms, facts);
         let derived = match self.enriched(facts, &mut universe, budget) {
             Ok(derived) => derived,
-            Err(fault) => return properties.iter().map(|iri| (iri.clone(), Err(fault.clone()))).collect(),
+            Err(fault) => {
+                return properties
+                    .iter()
+                    .map(|iri| (iri.clone(), Err(fault.clone())))
+                    .collect();
+            }
         };
         #[cfg(feature = "sparql")]
         let graphs = std::cell::OnceCell::new();
@@ -157,13 +167,36 @@ impl RuleBook {
                     Err(RuleFault::Value(NO_INTERVALS.to_owned()))
                 }
                 None => Err(RuleFault::Value(format!("unknown property {iri}"))),
-                Some(Judge { rules: JudgeRules::Datalog { planned, verdict, reads_course, .. }, .. }) => {
-                    self.datalog((planned, verdict, *reads_course), &derived, &mut universe, budget, fails_consequents)
-                }
+                Some(Judge {
+                    rules:
+                        JudgeRules::Datalog {
+                            planned,
+                            verdict,
+                            reads_course,
+                            ..
+                        },
+                    ..
+                }) => self.datalog(
+                    (planned, verdict, *reads_course),
+                    &derived,
+                    &mut universe,
+                    budget,
+                    fails_consequents,
+                ),
                 #[cfg(feature = "sparql")]
-                Some(Judge { rules: JudgeRules::Sparql(query), .. }) => {
-                    let graphs =
-                        graphs.get_or_init(|| snapshot(&self.given, &self.statements, facts, &derived, &mut universe));
+                Some(Judge {
+                    rules: JudgeRules::Sparql(query),
+                    ..
+                }) => {
+                    let graphs = graphs.get_or_init(|| {
+                        snapshot(
+                            &self.given,
+                            &self.statements,
+                            facts,
+                            &derived,
+                            &mut universe,
+                        )
+                    });
                     query.judge(&self.statements, graphs, &universe, budget)
                 }
             };
@@ -172,23 +205,28 @@ impl RuleBook {
         results
     }
 
-    /// Judges the state before an action as if it were also the state after. If a property already holds there, its
-    /// success proves nothing about the action.
+    /// Judges the state before an action as if it were also the state after. If a property already
+    /// holds there, its success proves nothing about the action.
     pub fn held_before(
         &self,
         facts: &ActionFacts<'_>,
         properties: &[String],
         budget: &Budget,
     ) -> BTreeMap<String, Result<Findings, RuleFault>> {
-        let unchanged = ActionFacts { after: facts.before, during: &[], course: None, ..*facts };
+        let unchanged = ActionFacts {
+            after: facts.before,
+            during: &[],
+            course: None,
+            ..*facts
+        };
         self.judge(&unchanged, properties, budget)
     }
 
-    /// Judges an action as if the right side `b` of every `a implies b` were false. A property that still holds passed
-    /// vacuously: no `a` held where it matters, so that no `b` was asked for.
+    /// Judges an action as if the right side `b` of every `a implies b` were false. A property that
+    /// still holds passed vacuously: no `a` held where it matters, so that no `b` was asked for.
     ///
-    /// Only right sides count that make the property harder to pass. [`RuleBook::can_pass_vacuously`] names them
-    /// properties have one.
+    /// Only right sides count that make the property harder to pass.
+    /// [`RuleBook::can_pass_vacuously`] names them properties have one.
     pub fn without_consequents(
         &self,
         facts: &ActionFacts<'_>,
@@ -198,34 +236,41 @@ impl RuleBook {
         self.judge_as(facts, properties, budget, true)
     }
 
-    /// Returns whether a property has an `implies` whose left side may never hold while the property passes.
+    /// Returns whether a property has an `implies` whose left side may never hold while the
+    /// property passes.
     pub fn can_pass_vacuously(&self, property: &str) -> bool {
         let rules = self.properties.get(property).map(|judge| &judge.rules);
         matches!(rules, Some(JudgeRules::Datalog { implies: true, .. }))
     }
 
-    /// Returns whether a property requires a result (`success`, `ASK`); otherwise it forbids an event (`violation`,
-    /// `SELECT`).
+    /// Returns whether a property requires a result (`success`, `ASK`); otherwise it forbids an
+    /// event (`violation`, `SELECT`).
     ///
-    /// A forbidden event can't have happened before the action, so that such a property held before is not informative.
-    /// Neither is a property of the course of the action.
+    /// A forbidden event can't have happened before the action, so that such a property held before
+    /// is not informative. Neither is a property of the course of the action.
     pub fn states_success(&self, property: &str) -> bool {
         match self.properties.get(property).map(|judge| &judge.rules) {
-            Some(JudgeRules::Datalog { verdict, reads_course, .. }) => {
-                !reads_course && verdict.decisive.as_ref().is_some_and(|it| it.positive)
-            }
+            Some(JudgeRules::Datalog {
+                verdict,
+                reads_course,
+                ..
+            }) => !reads_course && verdict.decisive.as_ref().is_some_and(|it| it.positive),
             #[cfg(feature = "sparql")]
             Some(JudgeRules::Sparql(query)) => query.asks,
             None => false,
         }
     }
 
-    /// Returns the digest of a property's rule file and all libraries; empty for an unknown property.
+    /// Returns the digest of a property's rule file and all libraries; empty for an unknown
+    /// property.
     pub fn digest(&self, property: &str) -> &str {
-        self.properties.get(property).map_or("", |judge| &judge.digest)
+        self.properties
+            .get(property)
+            .map_or("", |judge| &judge.digest)
     }
 
-    /// Returns whether a rule reads quantities over time, which stored runs keep apart from the other facts.
+    /// Returns whether a rule reads quantities over time, which stored runs keep apart from the
+    /// other facts.
     pub fn reads_course(&self) -> bool {
         self.reads_course
     }
@@ -235,9 +280,15 @@ impl RuleBook {
         &self.warnings
     }
 
-    /// Returns the warnings `R055` about formulas whose intervals reach beyond the time limit of actions. Unit: seconds.
+    /// Returns the warnings `R055` about formulas whose intervals reach beyond the time limit of
+    /// actions. Unit: seconds.
     pub fn beyond(&self, limit_secs: f64) -> Diagnostics {
-        unique(self.bounds.iter().filter_map(|bound| bound.beyond(limit_secs)).collect())
+        unique(
+            self.bounds
+                .iter()
+                .filter_map(|bound| bound.beyond(limit_secs))
+                .collect(),
+        )
     }
 
     /// Returns the facts of an action with the tuples that the libraries derive from them.
@@ -247,11 +298,23 @@ impl RuleBook {
         universe: &mut Universe<'_>,
         budget: &Budget,
     ) -> Result<Tables, RuleFault> {
-        let own = self.given.load(facts, universe, &self.predicates, &self.indexes);
-        let mut layers = Layers { own, below: vec![&self.fixed] };
+        let own = self
+            .given
+            .load(facts, universe, &self.predicates, &self.indexes);
+        let mut layers = Layers {
+            own,
+            below: vec![&self.fixed],
+        };
         let mut meter = Meter::new(budget);
-        evaluate(&self.libraries, &self.predicates, &self.indexes, &mut layers, universe, &mut meter)
-            .map_err(|stopped| fault(&meter, stopped, &self.libraries))?;
+        evaluate(
+            &self.libraries,
+            &self.predicates,
+            &self.indexes,
+            &mut layers,
+            universe,
+            &mut meter,
+        )
+        .map_err(|stopped| fault(&meter, stopped, &self.libraries))?;
         Ok(layers.own)
     }
 
@@ -266,13 +329,23 @@ impl RuleBook {
         if reads_course && universe.course().is_none() {
             return Err(RuleFault::Value(UNRECORDED.to_owned()));
         }
-        let mut layers = Layers { own: Tables::default(), below: vec![derived, &self.fixed] };
+        let mut layers = Layers {
+            own: Tables::default(),
+            below: vec![derived, &self.fixed],
+        };
         let mut meter = Meter::new(budget);
         if fails_consequents {
             meter.watch.fail_consequents();
         }
-        evaluate(planned, &self.predicates, &self.indexes, &mut layers, universe, &mut meter)
-            .map_err(|stopped| fault(&meter, stopped, planned))?;
+        evaluate(
+            planned,
+            &self.predicates,
+            &self.indexes,
+            &mut layers,
+            universe,
+            &mut meter,
+        )
+        .map_err(|stopped| fault(&meter, stopped, planned))?;
         findings(verdict, &layers, universe)
     }
 }

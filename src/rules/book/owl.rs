@@ -7,13 +7,17 @@ use crate::standalone::{Engine, Program};
 use actcheck_base::{Diagnostic, Diagnostics, Source, Term, names};
 
 /// Name and text of the rule file.
-const RULES: (&str, &str) = ("built-in:rules/lib/owl-rl.rls", include_str!("../shipped/owl-rl.rls"));
+const RULES: (&str, &str) = (
+    "built-in:rules/lib/owl-rl.rls",
+    include_str!("../shipped/owl-rl.rls"),
+);
 /// Maximum number of contradictions reported; each has its proof.
 const CONTRADICTIONS_SHOWN: usize = 5;
 
 /// Returns all statements that follow from the given ones under OWL 2 RL, including these, sorted.
 ///
-/// Leaves out statements true of any term (`?x owl:sameAs ?x`) and those not allowed in RDF (a literal as subject).
+/// Leaves out statements true of any term (`?x owl:sameAs ?x`) and those not allowed in RDF (a
+/// literal as subject).
 ///
 /// ```
 /// use actcheck_base::{Term, names};
@@ -34,11 +38,18 @@ pub fn owl_closure(triples: &[[Term; 3]]) -> Result<Vec<[Term; 3]>, Diagnostics>
 }
 
 /// Like [`owl_closure`], with a budget.
-pub(crate) fn owl_closure_within(triples: &[[Term; 3]], budget: &Budget) -> Result<Vec<[Term; 3]>, Diagnostics> {
+pub(crate) fn owl_closure_within(
+    triples: &[[Term; 3]],
+    budget: &Budget,
+) -> Result<Vec<[Term; 3]>, Diagnostics> {
     let unusable = |reason: String| Diagnostics::from(Diagnostic::error("R090", reason));
     let mut program = Program::load(&Source::new(RULES.0, RULES.1), Path::new(""))?;
-    program.add_facts("triple", triples.iter().map(|triple| triple.as_slice())).map_err(unusable)?;
-    let closure = program.close(Engine::Fast, budget).map_err(|fault| unusable(fault.to_string()))?;
+    program
+        .add_facts("triple", triples.iter().map(|triple| triple.as_slice()))
+        .map_err(unusable)?;
+    let closure = program
+        .close(Engine::Fast, budget)
+        .map_err(|fault| unusable(fault.to_string()))?;
     let contradictions = closure.tuples("contradiction");
     if !contradictions.is_empty() {
         return Err(contradiction_diagnostics(&program, &contradictions));
@@ -51,7 +62,8 @@ pub(crate) fn owl_closure_within(triples: &[[Term; 3]], budget: &Budget) -> Resu
             _ => None,
         })
         .filter(|[s, p, o]| {
-            matches!(s, Term::Iri(_) | Term::Blank(_)) && !(s == o && p.as_iri() == Some(same.as_str()))
+            matches!(s, Term::Iri(_) | Term::Blank(_))
+                && !(s == o && p.as_iri() == Some(same.as_str()))
         })
         .map(|triple| triple.map(Term::clone))
         .collect();
@@ -63,14 +75,27 @@ fn contradiction_diagnostics(program: &Program, contradictions: &[Vec<Term>]) ->
     let mut diagnostics = Diagnostics::new();
     for tuple in contradictions.iter().take(CONTRADICTIONS_SHOWN) {
         let args: Vec<String> = tuple.iter().map(Term::to_string).collect();
-        let about = args.iter().skip(1).cloned().collect::<Vec<_>>().join(" and ");
-        let rule = tuple.first().map_or(String::new(), crate::model::values::lexical);
+        let about = args
+            .iter()
+            .skip(1)
+            .cloned()
+            .collect::<Vec<_>>()
+            .join(" and ");
+        let rule = tuple
+            .first()
+            .map_or(String::new(), crate::model::values::lexical);
         let proof = program
-            .explain(&format!("contradiction({})", args.join(", ")), &Budget::default())
+            .explain(
+                &format!("contradiction({})", args.join(", ")),
+                &Budget::default(),
+            )
             .map_or(String::new(), |explanation| explanation.to_text());
-        let message = format!("the ontology contradicts itself about {about} (rule {rule} of OWL 2 RL)");
-        diagnostics
-            .push(Diagnostic::error("R080", message).help(format!("remove one of the facts in this proof:\n{proof}")));
+        let message =
+            format!("the ontology contradicts itself about {about} (rule {rule} of OWL 2 RL)");
+        diagnostics.push(
+            Diagnostic::error("R080", message)
+                .help(format!("remove one of the facts in this proof:\n{proof}")),
+        );
     }
     diagnostics
 }

@@ -1,4 +1,5 @@
-//! The parts of the libraries' rules: those that properties need, and those that read only the ontology.
+//! The parts of the libraries' rules: those that properties need, and those that read only the
+//! ontology.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -22,7 +23,8 @@ pub(super) fn gathers_state(rule: &Rule) -> bool {
     &*rule.origin.source.name == GATHERED
 }
 
-/// If a rule reads `state` for a variable property, it also needs the facts derived for single properties:
+/// If a rule reads `state` for a variable property, it also needs the facts derived for single
+/// properties:
 ///
 /// ```prolog
 /// state(?phase, ?s, p, ?o) :- state_p(?phase, ?s, ?o) .
@@ -42,23 +44,46 @@ pub(super) fn gather_state(predicates: &mut Predicates) -> Vec<Rule> {
         .filter_map(|(id, p)| Some((id, p.property?)))
         .collect();
     for (id, property) in single {
-        let variables = [Operand::Variable(0), Operand::Variable(1), Operand::Variable(2)];
-        let args = vec![variables[0], variables[1], Operand::Constant(property), variables[2]];
+        let variables = [
+            Operand::Variable(0),
+            Operand::Variable(1),
+            Operand::Variable(2),
+        ];
+        let args = vec![
+            variables[0],
+            variables[1],
+            Operand::Constant(property),
+            variables[2],
+        ];
         let source = actcheck_base::Source::new(GATHERED, "");
         rules.push(Rule {
-            head: Atom { predicate: general, args, span: 0..0 },
-            body: vec![Literal::Positive(Atom { predicate: id, args: variables.to_vec(), span: 0..0 })],
+            head: Atom {
+                predicate: general,
+                args,
+                span: 0..0,
+            },
+            body: vec![Literal::Positive(Atom {
+                predicate: id,
+                args: variables.to_vec(),
+                span: 0..0,
+            })],
             aggregation: None,
             variables: vec!["phase".into(), "s".into(), "o".into()],
             head_names: vec!["phase".into(), "s".into(), String::new(), "o".into()],
-            origin: Origin { source, span: 0..0, name: None, comment: None },
+            origin: Origin {
+                source,
+                span: 0..0,
+                name: None,
+                comment: None,
+            },
             making: None,
         });
     }
     rules
 }
 
-/// Keeps the library's rules that some property reads, directly or indirectly. SPARQL reads all snapshots.
+/// Keeps the library's rules that some property reads, directly or indirectly. SPARQL reads all
+/// snapshots.
 pub(super) fn needed<'p>(
     mut library: Program,
     properties: impl Iterator<Item = &'p Program>,
@@ -66,7 +91,9 @@ pub(super) fn needed<'p>(
     predicates: &Predicates,
 ) -> Program {
     let bodies = |rules: &[Rule]| -> Vec<usize> { rules.iter().flat_map(Rule::reads).collect() };
-    let mut needed: BTreeSet<usize> = properties.flat_map(|program| bodies(&program.rules)).collect();
+    let mut needed: BTreeSet<usize> = properties
+        .flat_map(|program| bodies(&program.rules))
+        .collect();
     if snapshots {
         needed.extend((0..predicates.len()).filter(|id| predicates.get(*id).name == "state"));
     }
@@ -81,17 +108,27 @@ pub(super) fn needed<'p>(
             waiting.extend(read.into_iter().filter(|id| needed.insert(*id)));
         }
     }
-    library.rules.retain(|rule| needed.contains(&rule.head.predicate));
-    library.facts.retain(|predicate, _| needed.contains(predicate));
+    library
+        .rules
+        .retain(|rule| needed.contains(&rule.head.predicate));
+    library
+        .facts
+        .retain(|predicate, _| needed.contains(predicate));
     library
 }
 
-/// Splits the library into the rules that depend on the course of the action, directly or indirectly, and the rest.
-/// `reads` returns whether a rule reads it directly.
+/// Splits the library into the rules that depend on the course of the action, directly or
+/// indirectly, and the rest. `reads` returns whether a rule reads it directly.
 ///
-/// The first are evaluated with each property that needs them: a run without a course breaks only these properties.
+/// The first are evaluated with each property that needs them: a run without a course breaks only
+/// these properties.
 pub(super) fn split_timed(library: Program, reads: impl Fn(&Rule) -> bool) -> (Program, Program) {
-    let timed: Vec<usize> = library.rules.iter().filter(|rule| reads(rule)).map(|rule| rule.head.predicate).collect();
+    let timed: Vec<usize> = library
+        .rules
+        .iter()
+        .filter(|rule| reads(rule))
+        .map(|rule| rule.head.predicate)
+        .collect();
     let timed = with_dependents(&library.rules, timed);
     partitioned(library, &timed)
 }
@@ -102,7 +139,10 @@ fn with_dependents(rules: &[Rule], mut waiting: Vec<usize>) -> BTreeSet<usize> {
     let mut heads_of: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
     for rule in rules {
         for predicate in rule.reads() {
-            heads_of.entry(predicate).or_default().push(rule.head.predicate);
+            heads_of
+                .entry(predicate)
+                .or_default()
+                .push(rule.head.predicate);
         }
     }
     while let Some(predicate) = waiting.pop() {
@@ -116,11 +156,19 @@ fn with_dependents(rules: &[Rule], mut waiting: Vec<usize>) -> BTreeSet<usize> {
 fn partitioned(program: Program, predicates: &BTreeSet<usize>) -> (Program, Program) {
     let (mut inside, mut outside) = (Program::default(), Program::default());
     for rule in program.rules {
-        let target = if predicates.contains(&rule.head.predicate) { &mut inside } else { &mut outside };
+        let target = if predicates.contains(&rule.head.predicate) {
+            &mut inside
+        } else {
+            &mut outside
+        };
         target.rules.push(rule);
     }
     for (predicate, rows) in program.facts {
-        let target = if predicates.contains(&predicate) { &mut inside } else { &mut outside };
+        let target = if predicates.contains(&predicate) {
+            &mut inside
+        } else {
+            &mut outside
+        };
         target.facts.insert(predicate, rows);
     }
     (inside, outside)
@@ -129,7 +177,10 @@ fn partitioned(program: Program, predicates: &BTreeSet<usize>) -> (Program, Prog
 /// Splits the rules into those that read only the ontology, directly or indirectly, and the rest.
 pub(super) fn split_fixed(program: Program, predicates: &Predicates) -> (Program, Program) {
     let given = |id: &usize| predicates.get(*id).given && predicates.get(*id).name != "ontology";
-    let moving = with_dependents(&program.rules, (0..predicates.len()).filter(given).collect());
+    let moving = with_dependents(
+        &program.rules,
+        (0..predicates.len()).filter(given).collect(),
+    );
     let (rest, fixed) = partitioned(program, &moving);
     (fixed, rest)
 }

@@ -1,4 +1,5 @@
-//! Prepares the rule book of an ontology: parses and checks every file, drops unused rules and plans the rest.
+//! Prepares the rule book of an ontology: parses and checks every file, drops unused rules and
+//! plans the rest.
 
 use std::collections::BTreeMap;
 #[cfg(feature = "sparql")]
@@ -28,7 +29,9 @@ use crate::model::universe::Universe;
 #[cfg(feature = "sparql")]
 use crate::sparql::{dataset::Statements, query::Query, unchanging::is_unchanging};
 use crate::syntax::{Syntax, parse};
-use crate::temporal::{IntervalTerms, add_margin, add_moment, define_moment, mark_consequents, reads_course};
+use crate::temporal::{
+    IntervalTerms, add_margin, add_moment, define_moment, mark_consequents, reads_course,
+};
 use actcheck_base::{Diagnostic, Diagnostics, Digest, Term, TermId, Terms};
 use actcheck_ontology::{Ontology, Property, RuleLanguage};
 
@@ -49,13 +52,17 @@ impl RuleBook {
         Preparing::within(budget).run(ontology)
     }
 
-    /// Prepares the rules of an ontology that differs from this book's only in having fewer properties. The closure of
-    /// its statements is not computed again.
+    /// Prepares the rules of an ontology that differs from this book's only in having fewer
+    /// properties. The closure of its statements is not computed again.
     ///
     /// # Errors
     /// As [`RuleBook::prepare`].
     pub fn restricted(&self, ontology: &Ontology) -> Result<Self, Diagnostics> {
-        Preparing { closed: self.closed.clone(), ..Preparing::default() }.run(ontology)
+        Preparing {
+            closed: self.closed.clone(),
+            ..Preparing::default()
+        }
+        .run(ontology)
     }
 }
 
@@ -75,14 +82,18 @@ pub(crate) struct Preparing {
 
 impl Preparing {
     pub(crate) fn within(budget: &Budget) -> Self {
-        Self { budget: budget.clone(), ..Self::default() }
+        Self {
+            budget: budget.clone(),
+            ..Self::default()
+        }
     }
 
     pub(crate) fn run(mut self, ontology: &Ontology) -> Result<RuleBook, Diagnostics> {
         self.diagnostics.extend(ontology.warnings.clone());
         let phases = Phases::intern(&mut self.terms);
         let (libraries, properties) = self.parse(ontology);
-        let vocabulary = Some(&ontology.vocabulary).filter(|vocabulary| !vocabulary.terms.is_empty());
+        let vocabulary =
+            Some(&ontology.vocabulary).filter(|vocabulary| !vocabulary.terms.is_empty());
         let mut checking = Checking::new(&mut self.terms, vocabulary);
         for syntax in &libraries {
             checking.define(syntax, Role::Library);
@@ -103,7 +114,8 @@ impl Preparing {
             programs.insert(*scope, program);
             warn_unused(&mut checking, syntax, *scope);
         }
-        let (mut predicates, split, found) = (checking.predicates, checking.split, checking.diagnostics);
+        let (mut predicates, split, found) =
+            (checking.predicates, checking.split, checking.diagnostics);
         #[cfg(feature = "sparql")]
         {
             self.derived = checking.derived_terms;
@@ -111,7 +123,13 @@ impl Preparing {
         self.diagnostics.extend(found);
         self.types_and_units(ontology, &library, &programs, &properties, &predicates);
         if split {
-            self.unchanging(ontology, &library, &programs, &properties, (&predicates, phases));
+            self.unchanging(
+                ontology,
+                &library,
+                &programs,
+                &properties,
+                (&predicates, phases),
+            );
             self.one_sided(&library, &programs, &properties, &predicates);
         }
         if split {
@@ -121,7 +139,10 @@ impl Preparing {
     }
 
     /// Parses all libraries and all Datalog properties. Each property gets a scope, numbered from 1.
-    fn parse<'o>(&mut self, ontology: &'o Ontology) -> (Vec<Syntax>, Vec<(usize, &'o Property, Syntax)>) {
+    fn parse<'o>(
+        &mut self,
+        ontology: &'o Ontology,
+    ) -> (Vec<Syntax>, Vec<(usize, &'o Property, Syntax)>) {
         let mut libraries = Vec::new();
         for file in &ontology.libraries {
             if file.language == RuleLanguage::Sparql {
@@ -159,17 +180,26 @@ impl Preparing {
     ) -> Result<RuleBook, Diagnostics> {
         let triples = self.closed(ontology);
         let mut indexes = Indexes::new(&predicates);
-        let has_sparql = ontology.properties.values().any(|p| p.rule.language == RuleLanguage::Sparql);
+        let has_sparql = ontology
+            .properties
+            .values()
+            .any(|p| p.rule.language == RuleLanguage::Sparql);
         let library = self.stratified(library, &predicates);
         let intervals = IntervalTerms::new(&self.terms);
         let reads_intervals = |rule: &Rule| intervals.in_rule(rule, &predicates);
         let library = {
-            let reads =
-                |rule: &Rule| !gathers_state(rule) && (reads_course(rule, &predicates) || reads_intervals(rule));
+            let reads = |rule: &Rule| {
+                !gathers_state(rule) && (reads_course(rule, &predicates) || reads_intervals(rule))
+            };
             let (timed, rest) = split_timed(library, reads);
             self.only_own_predicates(&timed, &predicates);
             for program in programs.values_mut() {
-                let timed = needed(timed.clone(), std::iter::once(&*program), false, &predicates);
+                let timed = needed(
+                    timed.clone(),
+                    std::iter::once(&*program),
+                    false,
+                    &predicates,
+                );
                 extend(program, timed);
             }
             rest
@@ -180,14 +210,25 @@ impl Preparing {
         let (fixed, moving) = split_fixed(library, &predicates);
         let fixed = self.plan(fixed, &predicates, &mut indexes);
         let libraries = self.plan(moving, &predicates, &mut indexes);
-        let program_reads_course = |program: &Program| program.rules.iter().any(|rule| reads_course(rule, &predicates));
-        let bounds = programs.values().flat_map(|program| Bound::all_of(&program.rules)).collect();
+        let program_reads_course = |program: &Program| {
+            program
+                .rules
+                .iter()
+                .any(|rule| reads_course(rule, &predicates))
+        };
+        let bounds = programs
+            .values()
+            .flat_map(|program| Bound::all_of(&program.rules))
+            .collect();
         let any_reads_course = programs.values().any(program_reads_course);
         let mut properties = self.queries(ontology);
         for (scope, property, syntax) in syntaxes {
             let mut program = programs.remove(scope).unwrap_or_default();
             let verdict = Verdict::new(&program, &predicates, *scope);
-            let implies = verdict.decisive.as_ref().is_some_and(|decisive| mark_consequents(&mut program, decisive));
+            let implies = verdict
+                .decisive
+                .as_ref()
+                .is_some_and(|decisive| mark_consequents(&mut program, decisive));
             let reads_course = program_reads_course(&program);
             let reads_intervals = program.rules.iter().any(reads_intervals);
             let planned = Box::new(self.plan(program, &predicates, &mut indexes));
@@ -241,17 +282,26 @@ impl Preparing {
     ) {
         let ranges = Ranges::new(ontology);
         for program in std::iter::once(library).chain(programs.values()) {
-            ranges.check(&program.rules, predicates, &self.terms, &mut self.diagnostics);
+            ranges.check(
+                &program.rules,
+                predicates,
+                &self.terms,
+                &mut self.diagnostics,
+            );
             formulas::check(&program.rules, &mut self.diagnostics);
         }
         let mut units = Units::new(predicates, &ontology.vocabulary, &self.terms);
         units.learn(&library.rules);
         units.check(&library.rules, &mut self.diagnostics);
         for (scope, property, _) in properties {
-            let Some(program) = programs.get(scope) else { continue };
+            let Some(program) = programs.get(scope) else {
+                continue;
+            };
             units.learn(&program.rules);
             units.check(&program.rules, &mut self.diagnostics);
-            if let (Some(margin), Some(unit)) = (predicates.find(*scope, "margin", None), &property.unit) {
+            if let (Some(margin), Some(unit)) =
+                (predicates.find(*scope, "margin", None), &property.unit)
+            {
                 units.check_margin(&program.rules, margin, unit, &mut self.diagnostics);
             }
         }
@@ -267,12 +317,17 @@ impl Preparing {
         (predicates, phases): (&Predicates, Phases),
     ) {
         for (scope, property, syntax) in properties {
-            let Some(program) = programs.get(scope).filter(|_| syntax.whole) else { continue };
+            let Some(program) = programs.get(scope).filter(|_| syntax.whole) else {
+                continue;
+            };
             let reads = Reads::new(library, predicates, phases, &self.terms);
             if let Some(rule) = reads.unchanging(program, *scope) {
                 let (source, span) = (&rule.origin.source, rule.head.span.clone());
-                self.diagnostics
-                    .extend(unchanging::warning(ontology, property, source, span).map(Into::into).unwrap_or_default());
+                self.diagnostics.extend(
+                    unchanging::warning(ontology, property, source, span)
+                        .map(Into::into)
+                        .unwrap_or_default(),
+                );
             }
         }
     }
@@ -285,10 +340,17 @@ impl Preparing {
         properties: &[(usize, &Property, Syntax)],
         predicates: &Predicates,
     ) {
-        let Some(sides) = Sides::new(library, predicates, &self.terms) else { return };
+        let Some(sides) = Sides::new(library, predicates, &self.terms) else {
+            return;
+        };
         for (scope, _, syntax) in properties {
             if let Some(program) = programs.get(scope).filter(|_| syntax.whole) {
-                self.diagnostics.extend(sides.one_sided(program, *scope).map(Into::into).unwrap_or_default());
+                self.diagnostics.extend(
+                    sides
+                        .one_sided(program, *scope)
+                        .map(Into::into)
+                        .unwrap_or_default(),
+                );
             }
         }
     }
@@ -308,7 +370,14 @@ impl Preparing {
                 })
                 .into(),
         };
-        let ids = closed.iter().map(|triple| triple.each_ref().map(|term| self.terms.intern(term.clone()))).collect();
+        let ids = closed
+            .iter()
+            .map(|triple| {
+                triple
+                    .each_ref()
+                    .map(|term| self.terms.intern(term.clone()))
+            })
+            .collect();
         self.closed = Some(closed);
         ids
     }
@@ -317,13 +386,21 @@ impl Preparing {
     #[cfg(feature = "sparql")]
     fn queries(&mut self, ontology: &Ontology) -> BTreeMap<String, Judge> {
         let mut judges = BTreeMap::new();
-        for property in ontology.properties.values().filter(|p| p.rule.language == RuleLanguage::Sparql) {
+        for property in ontology
+            .properties
+            .values()
+            .filter(|p| p.rule.language == RuleLanguage::Sparql)
+        {
             match Query::prepare(&property.rule.source, ontology, &self.derived) {
                 Ok(mut query) => {
                     if is_unchanging(&property.rule.source.text) {
-                        let (source, start) = (&property.rule.source, query.start(&property.rule.source.text));
+                        let (source, start) = (
+                            &property.rule.source,
+                            query.start(&property.rule.source.text),
+                        );
                         let found = unchanging::warning(ontology, property, source, start);
-                        self.diagnostics.extend(found.map(Into::into).unwrap_or_default());
+                        self.diagnostics
+                            .extend(found.map(Into::into).unwrap_or_default());
                     }
                     self.diagnostics.extend(std::mem::take(&mut query.warnings));
                     let rules = JudgeRules::Sparql(Box::new(query));
@@ -335,34 +412,56 @@ impl Preparing {
         judges
     }
 
-    /// Reports library rules that derive facts of the snapshots from the course of the action: every property reads the
-    /// snapshots, also in runs without a course.
+    /// Reports library rules that derive facts of the snapshots from the course of the action:
+    /// every property reads the snapshots, also in runs without a course.
     fn only_own_predicates(&mut self, timed: &Program, predicates: &Predicates) {
-        for rule in timed.rules.iter().filter(|rule| predicates.get(rule.head.predicate).given) {
+        for rule in timed
+            .rules
+            .iter()
+            .filter(|rule| predicates.get(rule.head.predicate).given)
+        {
             let name = &predicates.get(rule.head.predicate).name;
             let message = format!("`{name}` can't depend on the course of the action");
             let help = "derive a predicate with a name of its own: every property reads the snapshots, and runs of \
                         earlier versions have no course";
             let place = rule.head.span.clone();
-            self.diagnostics.push(Diagnostic::error("R053", message).at(&rule.origin.source, place).help(help));
+            self.diagnostics.push(
+                Diagnostic::error("R053", message)
+                    .at(&rule.origin.source, place)
+                    .help(help),
+            );
         }
     }
 
     /// Reports the SPARQL properties, which need the feature `sparql`.
     #[cfg(not(feature = "sparql"))]
     fn queries(&mut self, ontology: &Ontology) -> BTreeMap<String, Judge> {
-        for property in ontology.properties.values().filter(|p| p.rule.language == RuleLanguage::Sparql) {
-            let message = format!("`{}` is a SPARQL query, which this build can't evaluate", property.rule.path);
+        for property in ontology
+            .properties
+            .values()
+            .filter(|p| p.rule.language == RuleLanguage::Sparql)
+        {
+            let message = format!(
+                "`{}` is a SPARQL query, which this build can't evaluate",
+                property.rule.path
+            );
             let help = "build `actcheck-rules` with the feature `sparql`, or write the property in Datalog (`.rls`)";
-            let diagnostic = Diagnostic::error("R062", message).in_source(&property.rule.source).help(help);
+            let diagnostic = Diagnostic::error("R062", message)
+                .in_source(&property.rule.source)
+                .help(help);
             self.diagnostics.push(diagnostic);
         }
         BTreeMap::new()
     }
 
-    /// Checks that the whole library can be stratified, including unused rules. Returns an empty program if it can't.
+    /// Checks that the whole library can be stratified, including unused rules. Returns an empty
+    /// program if it can't.
     fn stratified(&mut self, library: Program, predicates: &Predicates) -> Program {
-        match stratify(&library.rules, predicates, &Universe::new(&self.terms, None)) {
+        match stratify(
+            &library.rules,
+            predicates,
+            &Universe::new(&self.terms, None),
+        ) {
             Ok(_) => library,
             Err(found) => {
                 self.diagnostics.extend(found);
@@ -371,11 +470,17 @@ impl Preparing {
         }
     }
 
-    fn plan(&mut self, program: Program, predicates: &Predicates, indexes: &mut Indexes) -> Planned {
+    fn plan(
+        &mut self,
+        program: Program,
+        predicates: &Predicates,
+        indexes: &mut Indexes,
+    ) -> Planned {
         let universe = Universe::new(&self.terms, None);
         match stratify(&program.rules, predicates, &universe) {
             Ok(strata) => {
-                self.diagnostics.extend(warnings(&program.rules, predicates, &universe));
+                self.diagnostics
+                    .extend(warnings(&program.rules, predicates, &universe));
                 Planned::new(program, strata, indexes, &|_| None)
             }
             Err(found) => {
@@ -385,7 +490,8 @@ impl Preparing {
         }
     }
 
-    /// Evaluates the rules that depend on the ontology only. Terms created here become terms of the book.
+    /// Evaluates the rules that depend on the ontology only. Terms created here become terms of the
+    /// book.
     fn close_fixed(
         &mut self,
         fixed: &Planned,
@@ -395,12 +501,23 @@ impl Preparing {
     ) -> Result<Tables, Diagnostics> {
         let book = self.terms.clone();
         let mut universe = Universe::new(&book, None);
-        let mut layers = Layers { own, below: Vec::new() };
+        let mut layers = Layers {
+            own,
+            below: Vec::new(),
+        };
         let mut meter = Meter::new(&self.budget);
-        if let Err(stopped) = evaluate(fixed, predicates, indexes, &mut layers, &mut universe, &mut meter) {
+        if let Err(stopped) = evaluate(
+            fixed,
+            predicates,
+            indexes,
+            &mut layers,
+            &mut universe,
+            &mut meter,
+        ) {
             let message = fault(&meter, stopped, fixed).to_string();
             let help = "rules that read only the ontology must finish within this budget";
-            self.diagnostics.push(Diagnostic::error("R090", message).help(help));
+            self.diagnostics
+                .push(Diagnostic::error("R090", message).help(help));
             return Err(std::mem::take(&mut self.diagnostics));
         }
         // Created terms follow the book's terms in the same order, so their ids stay valid.
@@ -418,10 +535,15 @@ fn judge(ontology: &Ontology, property: &Property, rules: JudgeRules) -> Judge {
         digest.update(library.path.as_bytes());
         digest.update(library.digest.as_bytes());
     }
-    Judge { digest: digest.finish(), label: property.label.clone(), rules }
+    Judge {
+        digest: digest.finish(),
+        label: property.label.clone(),
+        rules,
+    }
 }
 
-/// Warns about predicates of a property's file that no rule reads and that are not part of the verdict.
+/// Warns about predicates of a property's file that no rule reads and that are not part of the
+/// verdict.
 fn warn_unused(checking: &mut Checking<'_>, syntax: &Syntax, scope: usize) {
     let has = |name: &str| checking.defined.contains_key(&(scope, name.to_owned()));
     if !has("success") && !has("violation") {
@@ -434,8 +556,12 @@ fn warn_unused(checking: &mut Checking<'_>, syntax: &Syntax, scope: usize) {
     for statement in &syntax.statements {
         if let crate::syntax::Statement::Rule(rule) = statement {
             for head in &rule.heads {
-                if !used.contains(head.predicate.as_str()) && !verdict.contains(&head.predicate.as_str()) {
-                    unused.entry(head.predicate.clone()).or_insert(head.name_span.clone());
+                if !used.contains(head.predicate.as_str())
+                    && !verdict.contains(&head.predicate.as_str())
+                {
+                    unused
+                        .entry(head.predicate.clone())
+                        .or_insert(head.name_span.clone());
                 }
             }
         }
@@ -444,7 +570,13 @@ fn warn_unused(checking: &mut Checking<'_>, syntax: &Syntax, scope: usize) {
         let known = checking.defined.contains_key(&(scope, name.clone()));
         if known {
             let help = actcheck_base::did_you_mean(&name, verdict);
-            checking.warning("R040", &syntax.source, &span, format!("`{name}` is never used"), help);
+            checking.warning(
+                "R040",
+                &syntax.source,
+                &span,
+                format!("`{name}` is never used"),
+                help,
+            );
         }
     }
 }

@@ -11,7 +11,9 @@ fn integer(value: &Term) -> Option<i64> {
 }
 
 fn fold(args: &[Value<'_>], start: i64, with: fn(i64, i64) -> i64) -> Option<Term> {
-    args.iter().try_fold(start, |sum, arg| Some(with(sum, integer(arg)?))).map(Term::Integer)
+    args.iter()
+        .try_fold(start, |sum, arg| Some(with(sum, integer(arg)?)))
+        .map(Term::Integer)
 }
 
 pub(super) fn and(args: &[Value<'_>]) -> Option<Term> {
@@ -28,7 +30,12 @@ pub(super) fn xor(args: &[Value<'_>]) -> Option<Term> {
 
 /// Returns the number and the shift distance. Returns `None` if the distance is not from 0 to 63.
 fn places(args: &[Value<'_>]) -> Option<(i64, u32)> {
-    Some((integer(&args[0])?, u32::try_from(integer(&args[1])?).ok().filter(|places| *places < 64)?))
+    Some((
+        integer(&args[0])?,
+        u32::try_from(integer(&args[1])?)
+            .ok()
+            .filter(|places| *places < 64)?,
+    ))
 }
 
 pub(super) fn shl(args: &[Value<'_>]) -> Option<Term> {
@@ -41,5 +48,6 @@ pub(super) fn shr(args: &[Value<'_>]) -> Option<Term> {
 
 /// Shifts right, filling with zeros.
 pub(super) fn shru(args: &[Value<'_>]) -> Option<Term> {
-    places(args).map(|(value, places)| Term::Integer((value.cast_unsigned() >> places).cast_signed()))
+    places(args)
+        .map(|(value, places)| Term::Integer((value.cast_unsigned() >> places).cast_signed()))
 }

@@ -15,14 +15,21 @@ struct Parts {
 
 /// Returns the parts of an `xsd:dateTime`, `xsd:date` or `xsd:time`.
 fn parts(term: &Term) -> Option<Parts> {
-    let Term::Literal(text, datatype) = term else { return None };
+    let Term::Literal(text, datatype) = term else {
+        return None;
+    };
     let kind = datatype.strip_prefix(names::XSD)?;
     let whole = match kind {
         "dateTime" | "dateTimeStamp" => text.to_string(),
         "date" => {
             // A negative year begins with the sign.
-            let zone = text.char_indices().skip(8).find(|(_, c)| "Z+-".contains(*c) && text.len() > 10);
-            let zone = zone.filter(|(at, c)| *c != '-' || text[*at..].contains(':')).map_or(text.len(), |(at, _)| at);
+            let zone = text
+                .char_indices()
+                .skip(8)
+                .find(|(_, c)| "Z+-".contains(*c) && text.len() > 10);
+            let zone = zone
+                .filter(|(at, c)| *c != '-' || text[*at..].contains(':'))
+                .map_or(text.len(), |(at, _)| at);
             format!("{}T00:00:00{}", &text[..zone], &text[zone..])
         }
         "time" => format!("2000-01-01T{text}"),
@@ -31,8 +38,18 @@ fn parts(term: &Term) -> Option<Parts> {
     let whole = datetime::canonical(&whole)?;
     let (date, time) = whole.split_once('T')?;
     let (time, zone) = time.split_at(time.find(['Z', '+', '-']).unwrap_or(time.len()));
-    let of = |wanted: bool, part: &str| if wanted { part.to_owned() } else { String::new() };
-    Some(Parts { date: of(kind != "time", date), time: of(kind != "date", time), zone: zone.to_owned() })
+    let of = |wanted: bool, part: &str| {
+        if wanted {
+            part.to_owned()
+        } else {
+            String::new()
+        }
+    };
+    Some(Parts {
+        date: of(kind != "time", date),
+        time: of(kind != "date", time),
+        zone: zone.to_owned(),
+    })
 }
 
 /// Returns a part of the date, counted from its end.
@@ -41,7 +58,11 @@ fn of_date(args: &[Value<'_>], from_end: usize) -> Option<Term> {
     let mut parts = date.rsplit('-');
     let found = parts.nth(from_end)?.parse::<i64>().ok()?;
     // Only a negative year leaves an empty part before it.
-    Some(Term::Integer(if from_end == 2 && parts.next().is_some() { -found } else { found }))
+    Some(Term::Integer(if from_end == 2 && parts.next().is_some() {
+        -found
+    } else {
+        found
+    }))
 }
 
 pub(super) fn year(args: &[Value<'_>]) -> Option<Term> {
@@ -87,7 +108,11 @@ pub(super) fn timezone(args: &[Value<'_>]) -> Option<Term> {
         ("Z", _) => ("", 0, 0),
         (sign, rest) => {
             let (hours, minutes) = rest.split_once(':')?;
-            (if sign == "-" { "-" } else { "" }, hours.parse::<u8>().ok()?, minutes.parse::<u8>().ok()?)
+            (
+                if sign == "-" { "-" } else { "" },
+                hours.parse::<u8>().ok()?,
+                minutes.parse::<u8>().ok()?,
+            )
         }
     };
     let text = match (hours, minutes) {

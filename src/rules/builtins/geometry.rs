@@ -1,4 +1,5 @@
-//! 3D geometry functions, an extension: a file that uses them must declare the prefix. Units: metres and radians.
+//! 3D geometry functions, an extension: a file that uses them must declare the prefix. Units:
+//! metres and radians.
 
 use crate::builtins::Value;
 use crate::model::values::{Number, double_term};
@@ -50,16 +51,27 @@ pub(super) fn dot(args: &[Value<'_>]) -> Option<Term> {
 /// Angle between two vectors, in [0, π]. Returns `None` if a vector has zero length.
 pub(super) fn angle(args: &[Value<'_>]) -> Option<Term> {
     let [x1, y1, z1, x2, y2, z2] = numbers(args)?;
-    let (dot, cross) = (x1 * x2 + y1 * y2 + z1 * z2, length(y1 * z2 - z1 * y2, z1 * x2 - x1 * z2, x1 * y2 - y1 * x2));
+    let (dot, cross) = (
+        x1 * x2 + y1 * y2 + z1 * z2,
+        length(y1 * z2 - z1 * y2, z1 * x2 - x1 * z2, x1 * y2 - y1 * x2),
+    );
     let lengths = length(x1, y1, z1) * length(x2, y2, z2);
-    if lengths > 0.0 { finite(libm::atan2(cross, dot)) } else { None }
+    if lengths > 0.0 {
+        finite(libm::atan2(cross, dot))
+    } else {
+        None
+    }
 }
 
 /// Signed difference from one heading to another, wrapped to (−π, π].
 pub(super) fn angle_difference(args: &[Value<'_>]) -> Option<Term> {
     let [from, to] = numbers(args)?;
     let turn = libm::remainder(to - from, std::f64::consts::TAU);
-    finite(if turn <= -std::f64::consts::PI { std::f64::consts::PI } else { turn })
+    finite(if turn <= -std::f64::consts::PI {
+        std::f64::consts::PI
+    } else {
+        turn
+    })
 }
 
 /// Angle of the rotation between two unit quaternions (x, y, z, w each), in [0, π].
@@ -79,7 +91,8 @@ pub(super) fn tilt(args: &[Value<'_>]) -> Option<Term> {
     finite(tilt_of(numbers(args)?))
 }
 
-/// Whether a point (x, y, z) is in an axis-aligned box (min x, y, z, max x, y, z), including its faces.
+/// Whether a point (x, y, z) is in an axis-aligned box (min x, y, z, max x, y, z), including its
+/// faces.
 pub(super) fn inside_box(args: &[Value<'_>]) -> Option<Term> {
     let [x, y, z, x0, y0, z0, x1, y1, z1] = numbers(args)?;
     let inside = (x0..=x1).contains(&x) && (y0..=y1).contains(&y) && (z0..=z1).contains(&z);
@@ -94,14 +107,22 @@ fn gap(low1: f64, high1: f64, low2: f64, high2: f64) -> f64 {
 /// Distance between two axis-aligned boxes (min and max corner each); 0 if they overlap.
 pub(super) fn box_distance(args: &[Value<'_>]) -> Option<Term> {
     let [ax0, ay0, az0, ax1, ay1, az1, bx0, by0, bz0, bx1, by1, bz1] = numbers(args)?;
-    let (x, y, z) = (gap(ax0, ax1, bx0, bx1), gap(ay0, ay1, by0, by1), gap(az0, az1, bz0, bz1));
+    let (x, y, z) = (
+        gap(ax0, ax1, bx0, bx1),
+        gap(ay0, ay1, by0, by1),
+        gap(az0, az1, bz0, bz1),
+    );
     finite(length(x.max(0.0), y.max(0.0), z.max(0.0)))
 }
 
 /// Whether two axis-aligned boxes (min and max corner each) have a point in common.
 pub(super) fn boxes_overlap(args: &[Value<'_>]) -> Option<Term> {
     let [ax0, ay0, az0, ax1, ay1, az1, bx0, by0, bz0, bx1, by1, bz1] = numbers(args)?;
-    let gaps = [gap(ax0, ax1, bx0, bx1), gap(ay0, ay1, by0, by1), gap(az0, az1, bz0, bz1)];
+    let gaps = [
+        gap(ax0, ax1, bx0, bx1),
+        gap(ay0, ay1, by0, by1),
+        gap(az0, az1, bz0, bz1),
+    ];
     Some(Term::Boolean(gaps.into_iter().all(|gap| gap <= 0.0)))
 }
 

@@ -11,12 +11,16 @@ use crate::builtins::Value;
 use actcheck_base::Term;
 
 fn hash<D: Digest>(args: &[Value<'_>]) -> Option<Term> {
-    let Term::String(text) = args[0].as_ref() else { return None };
-    let digits = D::digest(text.as_bytes()).iter().fold(String::new(), |mut digits, byte| {
-        // Writing to a string never fails.
-        let _ = write!(digits, "{byte:02x}");
-        digits
-    });
+    let Term::String(text) = args[0].as_ref() else {
+        return None;
+    };
+    let digits = D::digest(text.as_bytes())
+        .iter()
+        .fold(String::new(), |mut digits, byte| {
+            // Writing to a string never fails.
+            let _ = write!(digits, "{byte:02x}");
+            digits
+        });
     Some(Term::string(digits))
 }
 

@@ -1,9 +1,10 @@
 //! The built-in functions of the rule language, by name.
 //!
-//! A function returns `None` if its arguments are outside its domain: the condition does not hold, or the variable gets
-//! no value.
+//! A function returns `None` if its arguments are outside its domain: the condition does not hold,
+//! or the variable gets no value.
 //!
-//! Never: depends on a predicate, a rule or a fact; a function depends only on its arguments, and stops at the budget.
+//! Never: depends on a predicate, a rule or a fact; a function depends only on its arguments, and
+//! stops at the budget.
 
 mod bits;
 mod dates;

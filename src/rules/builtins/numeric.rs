@@ -1,4 +1,5 @@
-//! Arithmetic: integers stay integers, mixed arguments become doubles; overflow and non-finite values have no result.
+//! Arithmetic: integers stay integers, mixed arguments become doubles; overflow and non-finite
+//! values have no result.
 
 use std::cmp::Ordering;
 
@@ -24,7 +25,12 @@ pub(super) fn ordered(args: &[Value<'_>], holds: fn(Ordering) -> bool) -> Option
 }
 
 /// Applies an operation to two numbers of the same type, otherwise to both as doubles.
-fn pair(a: &Term, b: &Term, integers: fn(i64, i64) -> Option<i64>, doubles: fn(f64, f64) -> f64) -> Option<Number> {
+fn pair(
+    a: &Term,
+    b: &Term,
+    integers: fn(i64, i64) -> Option<i64>,
+    doubles: fn(f64, f64) -> f64,
+) -> Option<Number> {
     Some(match (Number::of(a)?, Number::of(b)?) {
         (Integer(a), Integer(b)) => Integer(integers(a, b)?),
         (Float(a), Float(b)) => Float(doubles(f64::from(a), f64::from(b)) as f32),
@@ -42,10 +48,16 @@ fn single(a: &Term, integer: fn(i64) -> Option<i64>, double: fn(f64) -> f64) -> 
 }
 
 /// Folds any number of arguments of the same type, otherwise all as doubles.
-fn fold(args: &[Value<'_>], integers: fn(i64, i64) -> Option<i64>, doubles: fn(f64, f64) -> f64) -> Option<Term> {
+fn fold(
+    args: &[Value<'_>],
+    integers: fn(i64, i64) -> Option<i64>,
+    doubles: fn(f64, f64) -> f64,
+) -> Option<Term> {
     let numbers: Vec<Number> = args.iter().map(|a| Number::of(a)).collect::<Option<_>>()?;
     let first = *numbers.first()?;
-    let alike = numbers.iter().all(|n| std::mem::discriminant(n) == std::mem::discriminant(&first));
+    let alike = numbers
+        .iter()
+        .all(|n| std::mem::discriminant(n) == std::mem::discriminant(&first));
     let start = if alike { first } else { Double(first.double()) };
     numbers[1..]
         .iter()
@@ -103,13 +115,22 @@ pub(super) fn sqrt(args: &[Value<'_>]) -> Option<Term> {
 }
 
 pub(super) fn pow(args: &[Value<'_>]) -> Option<Term> {
-    pair(&args[0], &args[1], |a, b| a.checked_pow(u32::try_from(b).ok()?), libm::pow)?.term()
+    pair(
+        &args[0],
+        &args[1],
+        |a, b| a.checked_pow(u32::try_from(b).ok()?),
+        libm::pow,
+    )?
+    .term()
 }
 
 /// Logarithm of the first argument to the base of the second.
 pub(super) fn log(args: &[Value<'_>]) -> Option<Term> {
     let integers = |a: i64, base: i64| (a > 0 && base >= 2).then(|| i64::from(a.ilog(base)));
-    pair(&args[0], &args[1], integers, |a, base| libm::log(a) / libm::log(base))?.term()
+    pair(&args[0], &args[1], integers, |a, base| {
+        libm::log(a) / libm::log(base)
+    })?
+    .term()
 }
 
 fn real(args: &[Value<'_>], function: fn(f64) -> f64) -> Option<Term> {
@@ -141,7 +162,11 @@ pub(super) fn acos(args: &[Value<'_>]) -> Option<Term> {
 }
 
 pub(super) fn atan2(args: &[Value<'_>]) -> Option<Term> {
-    Double(libm::atan2(Number::of(&args[0])?.double(), Number::of(&args[1])?.double())).term()
+    Double(libm::atan2(
+        Number::of(&args[0])?.double(),
+        Number::of(&args[1])?.double(),
+    ))
+    .term()
 }
 
 pub(super) fn round(args: &[Value<'_>]) -> Option<Term> {

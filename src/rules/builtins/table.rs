@@ -28,11 +28,13 @@ enum Apply {
 /// Shorter texts are not accounted for.
 const SHORT: usize = 256;
 
-/// A function makes texts of at most this many times the length of its arguments: a byte becomes `%2F`.
+/// A function makes texts of at most this many times the length of its arguments: a byte becomes
+/// `%2F`.
 const GROWTH: usize = 3;
 
 impl Builtin {
-    /// Computes the function. Returns `None` if the arguments are outside its domain, or if the budget is spent.
+    /// Computes the function. Returns `None` if the arguments are outside its domain, or if the
+    /// budget is spent.
     pub(crate) fn call(&self, args: &[Value<'_>], watch: &Watch) -> Option<Term> {
         let length: usize = args.iter().map(|arg| text_len(arg)).sum();
         if length > SHORT {
@@ -59,7 +61,12 @@ const fn entry(
     max_args: usize,
     apply: fn(&[Value<'_>]) -> Option<Term>,
 ) -> Builtin {
-    Builtin { name, min_args, max_args, apply: Apply::Plain(apply) }
+    Builtin {
+        name,
+        min_args,
+        max_args,
+        apply: Apply::Plain(apply),
+    }
 }
 
 const fn watched(
@@ -68,7 +75,12 @@ const fn watched(
     max_args: usize,
     apply: fn(&[Value<'_>], &Watch) -> Option<Term>,
 ) -> Builtin {
-    Builtin { name, min_args, max_args, apply: Apply::Watched(apply) }
+    Builtin {
+        name,
+        min_args,
+        max_args,
+        apply: Apply::Watched(apply),
+    }
 }
 
 /// Every built-in. The first six are also written as operators.
@@ -100,8 +112,12 @@ static BUILTINS: [Builtin; 109] = [
     entry("NUMGREATEREQ", 2, 2, |a| numeric::ordered(a, |o| o.is_ge())),
     entry("NUMLESS", 2, 2, |a| numeric::ordered(a, |o| o.is_lt())),
     entry("NUMLESSEQ", 2, 2, |a| numeric::ordered(a, |o| o.is_le())),
-    entry("EQUALITY", 2, 2, |a| Some(Term::Boolean(numeric::equal(&a[0], &a[1])))),
-    entry("UNEQUALITY", 2, 2, |a| Some(Term::Boolean(!numeric::equal(&a[0], &a[1])))),
+    entry("EQUALITY", 2, 2, |a| {
+        Some(Term::Boolean(numeric::equal(&a[0], &a[1])))
+    }),
+    entry("UNEQUALITY", 2, 2, |a| {
+        Some(Term::Boolean(!numeric::equal(&a[0], &a[1])))
+    }),
     entry("AND", 1, MANY, types::and),
     entry("OR", 1, MANY, types::or),
     entry("NOT", 1, 1, types::not),
@@ -181,23 +197,34 @@ static BUILTINS: [Builtin; 109] = [
     entry("SHA256", 1, 1, hashes::sha256),
     entry("SHA384", 1, 1, hashes::sha384),
     entry("SHA512", 1, 1, hashes::sha512),
-    entry("SAMETERM", 2, 2, |a| Some(Term::Boolean(numeric::equal(&a[0], &a[1])))),
+    entry("SAMETERM", 2, 2, |a| {
+        Some(Term::Boolean(numeric::equal(&a[0], &a[1])))
+    }),
 ];
 
 /// Other names of built-ins, which Nemo uses.
 const ALIASES: [(&str, &str); 2] = [("INVERTSIGN", "INVERSE"), ("SUBTRACTION", "MINUS")];
 
 /// The names of these functions are common words, so that predicates may have them in another case.
-const COMMON: [&str; 9] = ["REPLACE", "TRIM", "YEAR", "MONTH", "DAY", "HOURS", "MINUTES", "SECONDS", "TIMEZONE"];
+const COMMON: [&str; 9] = [
+    "REPLACE", "TRIM", "YEAR", "MONTH", "DAY", "HOURS", "MINUTES", "SECONDS", "TIMEZONE",
+];
 
-/// Finds a built-in by name, ignoring case; geometry functions by their full IRI. Returns `None` if it is unknown.
+/// Finds a built-in by name, ignoring case; geometry functions by their full IRI. Returns `None` if
+/// it is unknown.
 pub(crate) fn builtin(name: &str) -> Option<&'static Builtin> {
     if let Some(local) = name.strip_prefix(geometry::GEO3D) {
-        return BUILTINS.iter().find(|b| b.name.strip_prefix("geo3d:") == Some(local));
+        return BUILTINS
+            .iter()
+            .find(|b| b.name.strip_prefix("geo3d:") == Some(local));
     }
-    let alias = ALIASES.iter().find(|(alias, _)| alias.eq_ignore_ascii_case(name));
+    let alias = ALIASES
+        .iter()
+        .find(|(alias, _)| alias.eq_ignore_ascii_case(name));
     let name = alias.map_or(name, |(_, name)| name);
-    BUILTINS.iter().find(|b| b.name.eq_ignore_ascii_case(name) && !b.name.contains(':'))
+    BUILTINS
+        .iter()
+        .find(|b| b.name.eq_ignore_ascii_case(name) && !b.name.contains(':'))
 }
 
 /// Returns whether no predicate of a property may have a name, because a built-in has it.
@@ -215,7 +242,8 @@ pub(crate) fn builtin_names() -> impl Iterator<Item = &'static str> + Clone {
     BUILTINS.iter().map(|b| b.name)
 }
 
-/// Finds a built-in by the exact name that [`builtin_names`] returns. Returns `None` if it is unknown.
+/// Finds a built-in by the exact name that [`builtin_names`] returns. Returns `None` if it is
+/// unknown.
 #[cfg(feature = "sparql")]
 pub(crate) fn builtin_by_exact_name(name: &str) -> Option<&'static Builtin> {
     BUILTINS.iter().find(|b| b.name == name)

@@ -26,7 +26,8 @@ fn parts(term: &Term) -> Option<(&str, Option<&Arc<str>>)> {
     }
 }
 
-/// Returns two comparable strings: the second has no language, or the same as the first. Returns `None` otherwise.
+/// Returns two comparable strings: the second has no language, or the same as the first. Returns
+/// `None` otherwise.
 fn pair<'a>(args: &'a [Value<'_>]) -> Option<(&'a str, &'a str)> {
     let (a, tag_a) = parts(&args[0])?;
     let (b, tag_b) = parts(&args[1])?;
@@ -52,8 +53,15 @@ fn count(number: usize) -> Term {
 pub(super) fn concat(args: &[Value<'_>]) -> Option<Term> {
     let strings: Vec<_> = args.iter().map(|a| parts(a)).collect::<Option<_>>()?;
     let first = strings.first()?.1;
-    let tag = if strings.iter().all(|(_, tag)| *tag == first) { first } else { None };
-    Some(tagged(strings.iter().map(|(text, _)| *text).collect::<String>(), tag))
+    let tag = if strings.iter().all(|(_, tag)| *tag == first) {
+        first
+    } else {
+        None
+    };
+    Some(tagged(
+        strings.iter().map(|(text, _)| *text).collect::<String>(),
+        tag,
+    ))
 }
 
 pub(super) fn contains(args: &[Value<'_>]) -> Option<Term> {
@@ -90,7 +98,9 @@ pub(super) fn after(args: &[Value<'_>]) -> Option<Term> {
 
 pub(super) fn substr(args: &[Value<'_>]) -> Option<Term> {
     let (text, tag) = parts(&args[0])?;
-    let Term::Integer(start) = *args[1].as_ref() else { return None };
+    let Term::Integer(start) = *args[1].as_ref() else {
+        return None;
+    };
     let length = match args.get(2).map(AsRef::as_ref) {
         Some(Term::Integer(length)) => usize::try_from(*length).ok()?,
         Some(_) => return None,
@@ -142,15 +152,19 @@ fn pattern_of(args: &[Value<'_>], flags: usize, watch: &Watch) -> Option<regex::
 
 pub(super) fn regex(args: &[Value<'_>], watch: &Watch) -> Option<Term> {
     let pattern = pattern_of(args, 2, watch)?;
-    let (Term::String(text) | Term::LangString(text, _)) = args[0].as_ref() else { return None };
+    let (Term::String(text) | Term::LangString(text, _)) = args[0].as_ref() else {
+        return None;
+    };
     matches(&pattern, text, watch).map(Term::Boolean)
 }
 
-/// Replaces all matches of a pattern: `$1` is the text of the first group. A pattern that matches the empty text has no
-/// result, as in SPARQL.
+/// Replaces all matches of a pattern: `$1` is the text of the first group. A pattern that matches
+/// the empty text has no result, as in SPARQL.
 pub(super) fn replace(args: &[Value<'_>], watch: &Watch) -> Option<Term> {
     let pattern = pattern_of(args, 3, watch)?;
-    let (Term::String(text) | Term::LangString(text, _)) = args[0].as_ref() else { return None };
+    let (Term::String(text) | Term::LangString(text, _)) = args[0].as_ref() else {
+        return None;
+    };
     let by = replacement(parts(&args[2])?.0)?;
     if pattern.is_match("") {
         return None;
@@ -174,7 +188,8 @@ pub(super) fn replace(args: &[Value<'_>], watch: &Watch) -> Option<Term> {
     Some(tagged(found, parts(&args[0])?.1))
 }
 
-/// Converts a replacement of SPARQL, with `$1`, `\\$` and `\\\\`, to one of the library. Returns `None` if it is invalid.
+/// Converts a replacement of SPARQL, with `$1`, `\\$` and `\\\\`, to one of the library. Returns
+/// `None` if it is invalid.
 fn replacement(text: &str) -> Option<String> {
     let mut out = String::new();
     let mut chars = text.chars().peekable();
@@ -209,8 +224,9 @@ pub(crate) fn matches(pattern: &regex::Regex, text: &Arc<str>, watch: &Watch) ->
 
 /// Applies a pattern to a text. Returns `None` if the time is over.
 ///
-/// Matching takes time linear in the text, but the factor may be the size of the pattern, and it can't be interrupted.
-/// A long text is therefore matched in a thread, which is left to itself if the time is over.
+/// Matching takes time linear in the text, but the factor may be the size of the pattern, and it
+/// can't be interrupted. A long text is therefore matched in a thread, which is left to itself if
+/// the time is over.
 fn bounded<T: Send + 'static>(
     text: &Arc<str>,
     watch: &Watch,
@@ -243,29 +259,52 @@ pub(crate) fn compile_pattern(pattern: &str) -> Result<regex::Regex, String> {
     compile_pattern_as(pattern, "")
 }
 
-/// Compiles a pattern with the flags of SPARQL: `i`, `m`, `s`, `x` and `q`. Matching takes time linear in the text.
+/// Compiles a pattern with the flags of SPARQL: `i`, `m`, `s`, `x` and `q`. Matching takes time
+/// linear in the text.
 ///
 /// # Errors
 /// The reason why the pattern or a flag is invalid.
 pub(crate) fn compile_pattern_as(pattern: &str, flags: &str) -> Result<regex::Regex, String> {
     if let Some(flag) = flags.chars().find(|flag| !"imsxq".contains(*flag)) {
-        return Err(format!("unknown flag `{flag}`; the flags are i, m, s, x and q"));
+        return Err(format!(
+            "unknown flag `{flag}`; the flags are i, m, s, x and q"
+        ));
     }
     let has = |flag| flags.contains(flag);
-    let escaped = if has('q') { regex::escape(pattern) } else { pattern.to_owned() };
+    let escaped = if has('q') {
+        regex::escape(pattern)
+    } else {
+        pattern.to_owned()
+    };
     let mut builder = regex::RegexBuilder::new(&escaped);
-    builder.size_limit(PATTERN_LIMIT).case_insensitive(has('i')).multi_line(has('m'));
-    builder.dot_matches_new_line(has('s')).ignore_whitespace(has('x') && !has('q'));
+    builder
+        .size_limit(PATTERN_LIMIT)
+        .case_insensitive(has('i'))
+        .multi_line(has('m'));
+    builder
+        .dot_matches_new_line(has('s'))
+        .ignore_whitespace(has('x') && !has('q'));
     builder.build().map_err(|error| {
-        error.to_string().lines().last().unwrap_or("syntax error").trim_start_matches("error: ").to_owned()
+        error
+            .to_string()
+            .lines()
+            .last()
+            .unwrap_or("syntax error")
+            .trim_start_matches("error: ")
+            .to_owned()
     })
 }
 
-/// The number of edits between two texts, by rows of the distance table. The clock is checked at every row.
+/// The number of edits between two texts, by rows of the distance table. The clock is checked at
+/// every row.
 pub(super) fn levenshtein(args: &[Value<'_>], watch: &Watch) -> Option<Term> {
     let (a, b) = pair(args)?;
     let (long, short) = if a.len() < b.len() { (b, a) } else { (a, b) };
-    watch.make(short.len().saturating_mul(size_of::<char>() + size_of::<usize>()))?;
+    watch.make(
+        short
+            .len()
+            .saturating_mul(size_of::<char>() + size_of::<usize>()),
+    )?;
     let short: Vec<char> = short.chars().collect();
     let mut row: Vec<usize> = (1..=short.len()).collect();
     let mut distance = short.len();
@@ -287,7 +326,9 @@ pub(super) fn uri_encode(args: &[Value<'_>]) -> Option<Term> {
     map(args, |text| {
         text.bytes()
             .map(|byte| match byte {
-                b'a'..=b'z' | b'A'..=b'Z' | b'0'..=b'9' | b'-' | b'_' | b'.' | b'~' => char::from(byte).to_string(),
+                b'a'..=b'z' | b'A'..=b'Z' | b'0'..=b'9' | b'-' | b'_' | b'.' | b'~' => {
+                    char::from(byte).to_string()
+                }
                 _ => format!("%{byte:02X}"),
             })
             .collect()
@@ -300,7 +341,8 @@ pub(super) fn uri_decode(args: &[Value<'_>]) -> Option<Term> {
     let mut rest = text.as_bytes();
     while let Some((first, tail)) = rest.split_first() {
         let escaped = (*first == b'%').then(|| tail.get(..2)).flatten();
-        let decoded = escaped.and_then(|hex| u8::from_str_radix(std::str::from_utf8(hex).ok()?, 16).ok());
+        let decoded =
+            escaped.and_then(|hex| u8::from_str_radix(std::str::from_utf8(hex).ok()?, 16).ok());
         bytes.push(decoded.unwrap_or(*first));
         rest = if decoded.is_some() { &tail[2..] } else { tail };
     }

@@ -109,7 +109,9 @@ pub(super) fn lang(args: &[Value<'_>]) -> Option<Term> {
 
 pub(super) fn str_lang(args: &[Value<'_>]) -> Option<Term> {
     match (args[0].as_ref(), args[1].as_ref()) {
-        (Term::String(text), Term::String(tag)) => Some(Term::LangString(text.clone(), tag.clone())),
+        (Term::String(text), Term::String(tag)) => {
+            Some(Term::LangString(text.clone(), tag.clone()))
+        }
         _ => None,
     }
 }
@@ -123,10 +125,18 @@ pub(super) fn str_dt(args: &[Value<'_>]) -> Option<Term> {
 
 /// Returns whether a language tag is in a range: `en-GB` is in `en`, and every tag is in `*`.
 pub(super) fn lang_matches(args: &[Value<'_>]) -> Option<Term> {
-    let (Term::String(tag), Term::String(range)) = (args[0].as_ref(), args[1].as_ref()) else { return None };
+    let (Term::String(tag), Term::String(range)) = (args[0].as_ref(), args[1].as_ref()) else {
+        return None;
+    };
     let (tag, range) = (tag.to_ascii_lowercase(), range.to_ascii_lowercase());
-    let begins = tag.strip_prefix(&range).is_some_and(|rest| rest.is_empty() || rest.starts_with('-'));
-    Some(Term::Boolean(if range == "*" { !tag.is_empty() } else { begins }))
+    let begins = tag
+        .strip_prefix(&range)
+        .is_some_and(|rest| rest.is_empty() || rest.starts_with('-'));
+    Some(Term::Boolean(if range == "*" {
+        !tag.is_empty()
+    } else {
+        begins
+    }))
 }
 
 fn is(args: &[Value<'_>], kind: fn(&Term) -> bool) -> Option<Term> {
@@ -142,7 +152,9 @@ pub(super) fn is_integer(args: &[Value<'_>]) -> Option<Term> {
 }
 
 pub(super) fn is_float(args: &[Value<'_>]) -> Option<Term> {
-    is(args, |term| matches!(Number::of(term), Some(Number::Float(_))))
+    is(args, |term| {
+        matches!(Number::of(term), Some(Number::Float(_)))
+    })
 }
 
 pub(super) fn is_double(args: &[Value<'_>]) -> Option<Term> {

@@ -1,4 +1,5 @@
-//! Checks the syntax tree: names, arities, safety, vocabulary, and the predicates that a property must define.
+//! Checks the syntax tree: names, arities, safety, vocabulary, and the predicates that a property
+//! must define.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -37,7 +38,8 @@ pub(crate) struct Checking<'a> {
     pub(crate) terms: &'a mut Terms,
     pub(crate) predicates: Predicates,
     pub(crate) vocabulary: Option<&'a Vocabulary>,
-    /// Whether a constant property is part of the predicate: `false` if a rule derives `state` for a variable property.
+    /// Whether a constant property is part of the predicate: `false` if a rule derives `state` for
+    /// a variable property.
     pub(crate) split: bool,
     /// Properties that a library derives. All rules may use them like those of the vocabulary.
     pub(crate) derived_terms: BTreeSet<String>,
@@ -60,7 +62,11 @@ pub(crate) struct Definition {
 impl Definition {
     /// Returns file and line. Only called for errors, because counting lines takes time.
     pub(crate) fn place(&self) -> String {
-        format!("{}:{}", self.source.name, self.source.line_and_column(self.start).0)
+        format!(
+            "{}:{}",
+            self.source.name,
+            self.source.line_and_column(self.start).0
+        )
     }
 }
 
@@ -87,7 +93,11 @@ impl<'a> Checking<'a> {
         help: impl Into<String>,
     ) {
         self.errors += 1;
-        self.diagnostics.push(Diagnostic::error(code, message).at(source, span.clone()).help(help));
+        self.diagnostics.push(
+            Diagnostic::error(code, message)
+                .at(source, span.clone())
+                .help(help),
+        );
     }
 
     pub(crate) fn warning(
@@ -99,7 +109,11 @@ impl<'a> Checking<'a> {
         help: impl Into<String>,
     ) {
         if self.diagnostics.len() - self.errors.min(self.diagnostics.len()) < WARNING_LIMIT {
-            self.diagnostics.push(Diagnostic::warning(code, message).at(source, span.clone()).help(help));
+            self.diagnostics.push(
+                Diagnostic::warning(code, message)
+                    .at(source, span.clone())
+                    .help(help),
+            );
         }
     }
 
@@ -126,14 +140,24 @@ impl<'a> Checking<'a> {
                     }
                     if rule.body.len() > LITERAL_LIMIT {
                         let message = format!("rule with more than {LITERAL_LIMIT} conditions");
-                        self.error("R006", source, &rule.span, message, "split it into several rules");
+                        self.error(
+                            "R006",
+                            source,
+                            &rule.span,
+                            message,
+                            "split it into several rules",
+                        );
                     }
                     for head in &rule.heads {
                         self.define_head(source, head, role);
                     }
                 }
                 Statement::Transfer(transfer) if role != Role::Standalone => {
-                    let word = if transfer.import { "@import" } else { "@export" };
+                    let word = if transfer.import {
+                        "@import"
+                    } else {
+                        "@export"
+                    };
                     let help = "facts come from the run; use `actcheck datalog` for programs with imports and exports";
                     let message = format!("`{word}` is not possible in the rules of a property");
                     self.error("R030", source, &transfer.span, message, help);
@@ -150,39 +174,100 @@ impl<'a> Checking<'a> {
         }
         if role == Role::Library && VERDICT.iter().any(|(verdict, _)| *verdict == name) {
             let help = "define it in the file of one property, which `act:verifiedBy` links";
-            return self.error("R034", source, &head.name_span, format!("a library can't define `{name}`"), help);
+            return self.error(
+                "R034",
+                source,
+                &head.name_span,
+                format!("a library can't define `{name}`"),
+                help,
+            );
         }
         if role != Role::Standalone && builtins::is_reserved(name) {
             let help = "choose another name";
-            return self.error("R038", source, &head.name_span, format!("`{name}` is a built-in function"), help);
+            return self.error(
+                "R038",
+                source,
+                &head.name_span,
+                format!("`{name}` is a built-in function"),
+                help,
+            );
         }
-        let elsewhere = self.defined.get(&(0, name.to_owned())).filter(|_| role.scope() != 0);
+        let elsewhere = self
+            .defined
+            .get(&(0, name.to_owned()))
+            .filter(|_| role.scope() != 0);
         if let Some(definition) = elsewhere {
-            let message = format!("`{name}` is already defined by a library ({})", definition.place());
-            return self.error("R038", source, &head.name_span, message, "choose another name, or use the library's");
+            let message = format!(
+                "`{name}` is already defined by a library ({})",
+                definition.place()
+            );
+            return self.error(
+                "R038",
+                source,
+                &head.name_span,
+                message,
+                "choose another name, or use the library's",
+            );
         }
         if role != Role::Standalone && TemporalOperator::named(name).is_some() {
             let message = format!("`{name}` is a temporal operator");
-            return self.error("R038", source, &head.name_span, message, "choose another name");
+            return self.error(
+                "R038",
+                source,
+                &head.name_span,
+                message,
+                "choose another name",
+            );
         }
         self.define_predicate(source, name, head.args.len(), &head.span, role);
     }
 
     /// Registers a predicate with its arity.
-    pub(crate) fn define_predicate(&mut self, source: &Source, name: &str, arity: usize, span: &Span, role: Role) {
+    pub(crate) fn define_predicate(
+        &mut self,
+        source: &Source,
+        name: &str,
+        arity: usize,
+        span: &Span,
+        role: Role,
+    ) {
         let key = (role.scope(), name.to_owned());
         if let Some(known) = self.defined.get(&key) {
             if known.arity != arity {
-                let message = format!("`{name}` has {} here and {} in {}", counted(arity), known.arity, known.place());
-                self.error("R022", source, span, message, "use the same number everywhere, or another name");
+                let message = format!(
+                    "`{name}` has {} here and {} in {}",
+                    counted(arity),
+                    known.arity,
+                    known.place()
+                );
+                self.error(
+                    "R022",
+                    source,
+                    span,
+                    message,
+                    "use the same number everywhere, or another name",
+                );
             }
             return;
         }
         if arity > MAX_ARITY {
             let help = "split the tuple over several predicates that share a key";
-            return self.error("R024", source, span, format!("`{name}` has more than {MAX_ARITY} arguments"), help);
+            return self.error(
+                "R024",
+                source,
+                span,
+                format!("`{name}` has more than {MAX_ARITY} arguments"),
+                help,
+            );
         }
-        self.defined.insert(key, Definition { arity, source: source.clone(), start: span.start });
+        self.defined.insert(
+            key,
+            Definition {
+                arity,
+                source: source.clone(),
+                start: span.start,
+            },
+        );
         self.predicates.add(Predicate {
             name: name.to_owned(),
             scope: role.scope(),
@@ -204,7 +289,10 @@ impl<'a> Checking<'a> {
                     "move this rule to a library (`act:ruleLibrary`), or derive a predicate of your own",
                 )
             } else {
-                (format!("`{name}` is given and can't be derived"), "derive a predicate of your own")
+                (
+                    format!("`{name}` is given and can't be derived"),
+                    "derive a predicate of your own",
+                )
             };
             return self.error("R031", source, &head.name_span, message, help);
         }
@@ -238,16 +326,34 @@ impl<'a> Checking<'a> {
         if success && violation {
             let help = "keep one: `success` for \"there is a …\", `violation` for \"for all …\"";
             let span = place_of(syntax, "violation");
-            self.error("R025", source, &span, "the file defines both `success` and `violation`", help);
+            self.error(
+                "R025",
+                source,
+                &span,
+                "the file defines both `success` and `violation`",
+                help,
+            );
         } else if !success && !violation {
-            let own: Vec<String> =
-                self.defined.keys().filter(|(known, _)| *known == scope).map(|(_, name)| name.clone()).collect();
-            let near = own.iter().find(|name| actcheck_base::nearest(name, ["success", "violation"]).is_some());
+            let own: Vec<String> = self
+                .defined
+                .keys()
+                .filter(|(known, _)| *known == scope)
+                .map(|(_, name)| name.clone())
+                .collect();
+            let near = own
+                .iter()
+                .find(|name| actcheck_base::nearest(name, ["success", "violation"]).is_some());
             let help = match near {
-                Some(name) => format!("`{name}` is neither of them: {}", did_you_mean(name, ["success", "violation"])),
-                None => "add a rule such as `success(?o) :- parameter(act:pickObject, ?o), … .`".to_owned(),
+                Some(name) => format!(
+                    "`{name}` is neither of them: {}",
+                    did_you_mean(name, ["success", "violation"])
+                ),
+                None => "add a rule such as `success(?o) :- parameter(act:pickObject, ?o), … .`"
+                    .to_owned(),
             };
-            let fault = Diagnostic::error("R026", "the file defines neither `success` nor `violation`").help(help);
+            let fault =
+                Diagnostic::error("R026", "the file defines neither `success` nor `violation`")
+                    .help(help);
             self.diagnostics.push(match near {
                 Some(name) => fault.at(source, place_of(syntax, name)),
                 None => fault.in_source(source),
@@ -265,8 +371,16 @@ impl<'a> Checking<'a> {
     }
 
     /// Checks that an IRI in one of the ontology's namespaces is described there.
-    pub(crate) fn vocabulary(&mut self, source: &Source, iri: &str, span: &Span, as_property: bool) {
-        let Some(vocabulary) = self.vocabulary else { return };
+    pub(crate) fn vocabulary(
+        &mut self,
+        source: &Source,
+        iri: &str,
+        span: &Span,
+        as_property: bool,
+    ) {
+        let Some(vocabulary) = self.vocabulary else {
+            return;
+        };
         if self.derived_terms.contains(iri) || is_phase(iri) {
             return;
         }
@@ -278,17 +392,29 @@ impl<'a> Checking<'a> {
             }
             Some(_) => {}
             None => {
-                let Some(namespace) = [names::W, names::ACT].into_iter().find(|n| iri.starts_with(n)) else { return };
+                let Some(namespace) = [names::W, names::ACT]
+                    .into_iter()
+                    .find(|n| iri.starts_with(n))
+                else {
+                    return;
+                };
                 let locals: Vec<&str> = vocabulary
                     .terms
                     .iter()
                     .filter(|(_, term)| !as_property || term.is_property)
                     .filter_map(|(known, _)| known.strip_prefix(namespace))
-                    .chain(self.derived_terms.iter().filter_map(|known| known.strip_prefix(namespace)))
+                    .chain(
+                        self.derived_terms
+                            .iter()
+                            .filter_map(|known| known.strip_prefix(namespace)),
+                    )
                     .collect();
                 let local = &iri[namespace.len()..];
                 let help = match actcheck_base::nearest(local, locals.iter().copied()) {
-                    Some(found) => format!("did you mean `{}`?", names::shorten(&format!("{namespace}{found}"))),
+                    Some(found) => format!(
+                        "did you mean `{}`?",
+                        names::shorten(&format!("{namespace}{found}"))
+                    ),
                     None => "describe it in the ontology, or derive it in a library".to_owned(),
                 };
                 let message = format!("the ontology has no term `{}`", names::shorten(iri));
@@ -304,7 +430,10 @@ impl<'a> Checking<'a> {
             .keys()
             .filter(|(scope, name)| (*scope == 0 || *scope == role.scope()) && !name.contains('~'))
             .map(|(_, name)| name.clone());
-        let given = GIVEN.iter().filter(|_| role != Role::Standalone).map(|(name, ..)| (*name).to_owned());
+        let given = GIVEN
+            .iter()
+            .filter(|_| role != Role::Standalone)
+            .map(|(name, ..)| (*name).to_owned());
         own.chain(given).collect()
     }
 }
@@ -314,7 +443,11 @@ pub(crate) fn unique(diagnostics: Diagnostics) -> Diagnostics {
     let mut seen = BTreeSet::new();
     let mut kept = Diagnostics::new();
     for diagnostic in diagnostics {
-        if seen.insert((diagnostic.code, diagnostic.place(), diagnostic.message.clone())) {
+        if seen.insert((
+            diagnostic.code,
+            diagnostic.place(),
+            diagnostic.message.clone(),
+        )) {
             kept.push(diagnostic);
         }
     }
@@ -323,13 +456,22 @@ pub(crate) fn unique(diagnostics: Diagnostics) -> Diagnostics {
 
 /// Formats a number of arguments: "1 argument", "2 arguments".
 pub(crate) fn counted(arguments: usize) -> String {
-    if arguments == 1 { "1 argument".to_owned() } else { format!("{arguments} arguments") }
+    if arguments == 1 {
+        "1 argument".to_owned()
+    } else {
+        format!("{arguments} arguments")
+    }
 }
 
-/// Returns whether an IRI names a graph of an action. Graph names need no description in the ontology.
+/// Returns whether an IRI names a graph of an action. Graph names need no description in the
+/// ontology.
 fn is_phase(iri: &str) -> bool {
-    iri.strip_prefix(names::ACT)
-        .is_some_and(|local| matches!(local, "before" | "after" | "during" | "parameters" | "ontology"))
+    iri.strip_prefix(names::ACT).is_some_and(|local| {
+        matches!(
+            local,
+            "before" | "after" | "during" | "parameters" | "ontology"
+        )
+    })
 }
 
 /// Returns the span of the first head with a name, or the start of the file.
@@ -338,9 +480,11 @@ fn place_of(syntax: &Syntax, name: &str) -> Span {
         .statements
         .iter()
         .find_map(|statement| match statement {
-            Statement::Rule(rule) => {
-                rule.heads.iter().find(|head| head.predicate == name).map(|head| head.span.clone())
-            }
+            Statement::Rule(rule) => rule
+                .heads
+                .iter()
+                .find(|head| head.predicate == name)
+                .map(|head| head.span.clone()),
             _ => None,
         })
         .unwrap_or(0..0)

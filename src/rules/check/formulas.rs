@@ -1,4 +1,5 @@
-//! Warns of formulas that say nothing: conditions that always or never hold, and intervals without a moment.
+//! Warns of formulas that say nothing: conditions that always or never hold, and intervals without
+//! a moment.
 
 use std::collections::BTreeMap;
 
@@ -42,7 +43,8 @@ pub(crate) struct Bound {
 }
 
 impl Bound {
-    /// Returns the intervals of all formulas in some rules. Those that reach to the end of the action are left out.
+    /// Returns the intervals of all formulas in some rules. Those that reach to the end of the
+    /// action are left out.
     pub(crate) fn all_of(rules: &[Rule]) -> Vec<Self> {
         let mut found = Vec::new();
         for rule in rules {
@@ -52,7 +54,12 @@ impl Bound {
                         && (*from > 0.0 || to.is_finite())
                     {
                         let (source, span) = (rule.origin.source.clone(), span.clone());
-                        found.push(Self { source, span, from_secs: *from, to_secs: *to });
+                        found.push(Self {
+                            source,
+                            span,
+                            from_secs: *from,
+                            to_secs: *to,
+                        });
                     }
                 });
             }
@@ -60,10 +67,14 @@ impl Bound {
         found
     }
 
-    /// Returns the warning `R055` if the interval reaches beyond the time limit of actions. Unit: seconds.
+    /// Returns the warning `R055` if the interval reaches beyond the time limit of actions. Unit:
+    /// seconds.
     pub(crate) fn beyond(&self, limit_secs: f64) -> Option<Diagnostic> {
         let (message, help) = if self.from_secs > limit_secs {
-            ("the interval begins after the end of every action", "write an earlier interval")
+            (
+                "the interval begins after the end of every action",
+                "write an earlier interval",
+            )
         } else if self.to_secs.is_finite() && self.to_secs > limit_secs {
             (
                 "the interval ends after the end of every action",
@@ -73,11 +84,16 @@ impl Bound {
             return None;
         };
         let help = format!("an action takes at most {limit_secs} s (`action_secs`); {help}");
-        Some(Diagnostic::warning("R055", message).at(&self.source, self.span.clone()).help(help))
+        Some(
+            Diagnostic::warning("R055", message)
+                .at(&self.source, self.span.clone())
+                .help(help),
+        )
     }
 }
 
-/// Reports conditions that always or never hold, and intervals without a moment, in the formulas of some rules.
+/// Reports conditions that always or never hold, and intervals without a moment, in the formulas of
+/// some rules.
 pub(crate) fn check(rules: &[Rule], diagnostics: &mut Diagnostics) {
     for rule in rules {
         for formula in formulas(rule) {
@@ -94,7 +110,10 @@ pub(crate) fn check(rules: &[Rule], diagnostics: &mut Diagnostics) {
 /// Returns the formulas of a rule's conditions.
 pub(crate) fn formulas(rule: &Rule) -> impl Iterator<Item = &Formula> {
     rule.body.iter().flat_map(|literal| match literal {
-        Literal::Test { value: Expr::Timed(timed), .. } => timed.formulas(),
+        Literal::Test {
+            value: Expr::Timed(timed),
+            ..
+        } => timed.formulas(),
         _ => &[],
     })
 }
@@ -102,7 +121,10 @@ pub(crate) fn formulas(rule: &Rule) -> impl Iterator<Item = &Formula> {
 /// Returns the formulas of a rule's conditions, to be changed.
 pub(crate) fn formulas_mut(rule: &mut Rule) -> impl Iterator<Item = &mut Formula> {
     rule.body.iter_mut().flat_map(|literal| match literal {
-        Literal::Test { value: Expr::Timed(timed), .. } => timed.formulas_mut(),
+        Literal::Test {
+            value: Expr::Timed(timed),
+            ..
+        } => timed.formulas_mut(),
         _ => &mut [],
     })
 }
@@ -113,33 +135,53 @@ fn fault_of(formula: &Formula) -> Option<(Diagnostic, Span)> {
         Formula::Compare { span, .. } => {
             let holds = constant(formula)?;
             let help = "compare it with another number, or leave the condition out";
-            Some((verdict(holds, ", whatever the action does").help(help), span.clone()))
+            Some((
+                verdict(holds, ", whatever the action does").help(help),
+                span.clone(),
+            ))
         }
         Formula::And(parts) => {
             let span = exclusive(parts)?;
             let help = "write `or` if one of them is enough; `eventually(a) and eventually(b)` looks at two moments";
-            Some((verdict(false, ": the conditions exclude each other at every moment").help(help), span))
+            Some((
+                verdict(false, ": the conditions exclude each other at every moment").help(help),
+                span,
+            ))
         }
         Formula::Or(parts) => {
-            let opposites: Vec<Formula> = parts.iter().map(|part| Formula::Not(Box::new(part.clone()))).collect();
+            let opposites: Vec<Formula> = parts
+                .iter()
+                .map(|part| Formula::Not(Box::new(part.clone())))
+                .collect();
             let span = exclusive(&opposites)?;
             let help = "write `and` if both must hold";
-            Some((verdict(true, ": at every moment, one of the conditions holds").help(help), span))
+            Some((
+                verdict(true, ": at every moment, one of the conditions holds").help(help),
+                span,
+            ))
         }
         Formula::Temporal { from, to, span, .. } => {
             let first = (from * SAMPLES_PER_SEC - ROUNDING).ceil();
             let last = (to * SAMPLES_PER_SEC + ROUNDING).floor();
-            let help =
-                "a course has 60 samples a second: write an interval that includes one of them, such as `[0, 0.1]`";
+            let help = "a course has 60 samples a second: write an interval that includes one of them, such as `[0, 0.1]`";
             let message = "the interval contains no sample";
-            (last < first).then(|| (Diagnostic::warning("R055", message).help(help), span.clone()))
+            (last < first).then(|| {
+                (
+                    Diagnostic::warning("R055", message).help(help),
+                    span.clone(),
+                )
+            })
         }
         Formula::Truth { .. } | Formula::Not(_) | Formula::Consequent { .. } => None,
     }
 }
 
 fn verdict(holds: bool, why: &str) -> Diagnostic {
-    let message = if holds { format!("this always holds{why}") } else { format!("this can never hold{why}") };
+    let message = if holds {
+        format!("this always holds{why}")
+    } else {
+        format!("this can never hold{why}")
+    };
     Diagnostic::warning("R054", message)
 }
 
@@ -148,7 +190,9 @@ fn constant(formula: &Formula) -> Option<bool> {
     let mut left = Left::default();
     let (quantity, op, number) = compared(formula)?;
     if let Quantity::Recorded { iri, .. } = quantity
-        && iri.strip_prefix(names::W).is_some_and(|local| NEVER_NEGATIVE.contains(&local))
+        && iri
+            .strip_prefix(names::W)
+            .is_some_and(|local| NEVER_NEGATIVE.contains(&local))
     {
         left.keep(Comparison::GreaterEqual, 0.0);
     }
@@ -165,9 +209,23 @@ fn constant(formula: &Formula) -> Option<bool> {
 /// Returns the quantity, operator and number of a comparison with a number.
 fn compared(formula: &Formula) -> Option<(&Quantity, Comparison, f64)> {
     match formula {
-        Formula::Compare { left: Quantity::Number(_), right: Quantity::Number(_), .. } => None,
-        Formula::Compare { op, left, right: Quantity::Number(number), .. } => Some((left, *op, *number)),
-        Formula::Compare { op, left: Quantity::Number(number), right, .. } => Some((right, op.turned(), *number)),
+        Formula::Compare {
+            left: Quantity::Number(_),
+            right: Quantity::Number(_),
+            ..
+        } => None,
+        Formula::Compare {
+            op,
+            left,
+            right: Quantity::Number(number),
+            ..
+        } => Some((left, *op, *number)),
+        Formula::Compare {
+            op,
+            left: Quantity::Number(number),
+            right,
+            ..
+        } => Some((right, op.turned(), *number)),
         _ => None,
     }
 }
@@ -176,7 +234,9 @@ fn compared(formula: &Formula) -> Option<(&Quantity, Comparison, f64)> {
 fn exclusive(parts: &[Formula]) -> Option<Span> {
     let mut left: BTreeMap<String, Left> = BTreeMap::new();
     let mut flat = Vec::new();
-    parts.iter().for_each(|part| conjuncts(part, false, &mut flat));
+    parts
+        .iter()
+        .for_each(|part| conjuncts(part, false, &mut flat));
     for (part, negated) in flat {
         let (key, op, number, span) = match part {
             Formula::Truth { quantity, span } => (quantity, Comparison::Equal, 1.0, span),
@@ -195,13 +255,18 @@ fn exclusive(parts: &[Formula]) -> Option<Span> {
     None
 }
 
-/// Appends the comparisons and truths that must all hold for a formula, each with whether it is negated.
+/// Appends the comparisons and truths that must all hold for a formula, each with whether it is
+/// negated.
 fn conjuncts<'f>(formula: &'f Formula, negated: bool, found: &mut Vec<(&'f Formula, bool)>) {
     match formula {
         Formula::Not(inner) => conjuncts(inner, !negated, found),
         Formula::Consequent { formula, .. } => conjuncts(formula, negated, found),
-        Formula::And(parts) if !negated => parts.iter().for_each(|part| conjuncts(part, negated, found)),
-        Formula::Or(parts) if negated => parts.iter().for_each(|part| conjuncts(part, negated, found)),
+        Formula::And(parts) if !negated => parts
+            .iter()
+            .for_each(|part| conjuncts(part, negated, found)),
+        Formula::Or(parts) if negated => parts
+            .iter()
+            .for_each(|part| conjuncts(part, negated, found)),
         Formula::Compare { .. } if compared(formula).is_none() => {}
         Formula::Compare { .. } | Formula::Truth { .. } => found.push((formula, negated)),
         _ => {}

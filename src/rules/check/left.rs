@@ -14,22 +14,38 @@ pub(super) struct Left {
 
 impl Default for Left {
     fn default() -> Self {
-        Self { low: f64::NEG_INFINITY, high: f64::INFINITY, closed: [true; 2], excluded: Vec::new() }
+        Self {
+            low: f64::NEG_INFINITY,
+            high: f64::INFINITY,
+            closed: [true; 2],
+            excluded: Vec::new(),
+        }
     }
 }
 
 impl Left {
     /// Keeps only the numbers for which a comparison with `number` holds.
     pub(super) fn keep(&mut self, op: Comparison, number: f64) {
-        let closes = matches!(op, Comparison::Equal | Comparison::LessEqual | Comparison::GreaterEqual);
+        let closes = matches!(
+            op,
+            Comparison::Equal | Comparison::LessEqual | Comparison::GreaterEqual
+        );
         if op == Comparison::Unequal {
             self.excluded.push(number);
         }
-        if matches!(op, Comparison::Equal | Comparison::Greater | Comparison::GreaterEqual) && number >= self.low {
+        if matches!(
+            op,
+            Comparison::Equal | Comparison::Greater | Comparison::GreaterEqual
+        ) && number >= self.low
+        {
             self.closed[0] = closes && (number > self.low || self.closed[0]);
             self.low = number;
         }
-        if matches!(op, Comparison::Equal | Comparison::Less | Comparison::LessEqual) && number <= self.high {
+        if matches!(
+            op,
+            Comparison::Equal | Comparison::Less | Comparison::LessEqual
+        ) && number <= self.high
+        {
             self.closed[1] = closes && (number < self.high || self.closed[1]);
             self.high = number;
         }
@@ -38,6 +54,7 @@ impl Left {
     /// Whether no number is left.
     pub(super) fn is_empty(&self) -> bool {
         self.low > self.high
-            || (self.low == self.high && (self.closed != [true; 2] || self.excluded.contains(&self.low)))
+            || (self.low == self.high
+                && (self.closed != [true; 2] || self.excluded.contains(&self.low)))
     }
 }

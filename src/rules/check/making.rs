@@ -14,20 +14,29 @@ use actcheck_base::Span;
 /// Returns whether a head of a rule has a new thing as an argument.
 pub(crate) fn makes_new_things(rule: &RuleSyntax) -> bool {
     let args = rule.heads.iter().flat_map(|head| &head.args);
-    args.into_iter().any(|arg| matches!(arg.kind, ExpressionKind::Existential(_)))
+    args.into_iter()
+        .any(|arg| matches!(arg.kind, ExpressionKind::Existential(_)))
 }
 
 impl Translation<'_, '_> {
-    /// Returns the parts of a rule with new things, and its helper rules; empty if an error was reported.
+    /// Returns the parts of a rule with new things, and its helper rules; empty if an error was
+    /// reported.
     pub(super) fn making(mut self, rule: &RuleSyntax) -> Vec<Rule> {
         for literal in &rule.body {
             self.literal(literal);
         }
         let mut new: Vec<Variable> = Vec::new();
-        let heads: Vec<Option<Atom>> =
-            rule.heads.iter().map(|head| self.head_with_new_things(head, &mut new)).collect();
+        let heads: Vec<Option<Atom>> = rule
+            .heads
+            .iter()
+            .map(|head| self.head_with_new_things(head, &mut new))
+            .collect();
         self.one_kind_each(&new);
-        let Some(heads) = heads.into_iter().collect::<Option<Vec<Atom>>>().filter(|_| !self.faulty) else {
+        let Some(heads) = heads
+            .into_iter()
+            .collect::<Option<Vec<Atom>>>()
+            .filter(|_| !self.faulty)
+        else {
             return Vec::new();
         };
         let mut known: Vec<Variable> = Vec::new();
@@ -38,9 +47,18 @@ impl Translation<'_, '_> {
                 push_new(&mut known, *variable);
             }
         }
-        let operands = |variables: &[Variable]| variables.iter().map(|v| Operand::Variable(*v)).collect::<Vec<_>>();
+        let operands = |variables: &[Variable]| {
+            variables
+                .iter()
+                .map(|v| Operand::Variable(*v))
+                .collect::<Vec<_>>()
+        };
         let span = rule.span.clone();
-        let unnamed = Atom { predicate: heads[0].predicate, args: operands(&known), span: span.clone() };
+        let unnamed = Atom {
+            predicate: heads[0].predicate,
+            args: operands(&known),
+            span: span.clone(),
+        };
         if !safety::order(&mut self, rule, &unnamed, None) {
             return Vec::new();
         }
@@ -53,10 +71,28 @@ impl Translation<'_, '_> {
         let name = rule.heads[0].predicate.clone();
         let matches = self.part(&name, known.len(), &span);
         let made = self.part(&name, known.len() + new.len(), &span);
-        let matched = Atom { predicate: matches, args: self.pad(matches, operands(&known)), span: span.clone() };
+        let matched = Atom {
+            predicate: matches,
+            args: self.pad(matches, operands(&known)),
+            span: span.clone(),
+        };
         let all: Vec<Variable> = known.iter().chain(&new).copied().collect();
-        let filled = Atom { predicate: made, args: operands(&all), span };
-        self.parts(rule, matched, filled, Making { matches, made, new, heads })
+        let filled = Atom {
+            predicate: made,
+            args: operands(&all),
+            span,
+        };
+        self.parts(
+            rule,
+            matched,
+            filled,
+            Making {
+                matches,
+                made,
+                new,
+                heads,
+            },
+        )
     }
 
     /// Returns the rules of the parts.
@@ -81,9 +117,17 @@ impl Translation<'_, '_> {
         let unnamed = |atom: &Atom| vec![String::new(); atom.args.len()];
         let mut rules = self.extra;
         rules.push(part(&matched, self.body, unnamed(&matched)));
-        rules.push(part(&filled, vec![Literal::Positive(matched.clone())], unnamed(&filled)));
+        rules.push(part(
+            &filled,
+            vec![Literal::Positive(matched.clone())],
+            unnamed(&filled),
+        ));
         for (head, syntax) in making.heads.iter().zip(&rule.heads) {
-            let names = syntax.args.iter().map(|arg| argument_name(arg).to_owned()).collect();
+            let names = syntax
+                .args
+                .iter()
+                .map(|arg| argument_name(arg).to_owned())
+                .collect();
             rules.push(part(head, vec![Literal::Positive(filled.clone())], names));
         }
         rules
@@ -92,14 +136,16 @@ impl Translation<'_, '_> {
     /// Translates a head. Returns `None` if an error was reported.
     fn head_with_new_things(&mut self, head: &AtomSyntax, new: &mut Vec<Variable>) -> Option<Atom> {
         let (predicate, args) = self.predicate(head, true)?;
-        let needs_value =
-            matches!(head.predicate.as_str(), "margin" | "because") && matches!(self.role, Role::Property(_));
+        let needs_value = matches!(head.predicate.as_str(), "margin" | "because")
+            && matches!(self.role, Role::Property(_));
         let mut operands = Vec::new();
         for arg in &args {
             operands.push(match &arg.kind {
                 ExpressionKind::Existential(name) if needs_value => {
-                    let message =
-                        format!("`{}` needs a value, and a new thing such as `!{name}` has none", head.predicate);
+                    let message = format!(
+                        "`{}` needs a value, and a new thing such as `!{name}` has none",
+                        head.predicate
+                    );
                     self.error("R039", &arg.span, message, "write a variable of the body");
                     None
                 }
@@ -110,25 +156,39 @@ impl Translation<'_, '_> {
                     Some(Operand::Variable(variable))
                 }
                 _ if contains_aggregate(arg) => {
-                    let help = "aggregate in a rule of its own, and make the new things from its result";
-                    self.error("R039", &arg.span, "a rule can't aggregate and make new things at once", help);
+                    let help =
+                        "aggregate in a rule of its own, and make the new things from its result";
+                    self.error(
+                        "R039",
+                        &arg.span,
+                        "a rule can't aggregate and make new things at once",
+                        help,
+                    );
                     None
                 }
                 _ => self.head_argument(arg, None),
             });
         }
         let operands: Vec<Operand> = operands.into_iter().collect::<Option<_>>()?;
-        Some(Atom { predicate, args: self.pad(predicate, operands), span: head.span.clone() })
+        Some(Atom {
+            predicate,
+            args: self.pad(predicate, operands),
+            span: head.span.clone(),
+        })
     }
 
     /// Reports new things that have the name of a variable.
     fn one_kind_each(&mut self, new: &[Variable]) {
         for variable in new {
             let (name, span) = self.variables[*variable].clone();
-            let Some(plain) = name.strip_prefix('!') else { continue };
+            let Some(plain) = name.strip_prefix('!') else {
+                continue;
+            };
             if self.variables.iter().any(|(other, _)| other == plain) {
                 let message = format!("`?{plain}` and `!{plain}` in one rule");
-                let help = format!("`!{plain}` is a new thing and `?{plain}` a known one: give them different names");
+                let help = format!(
+                    "`!{plain}` is a new thing and `?{plain}` a known one: give them different names"
+                );
                 self.error("R039", &span, message, help);
             }
         }
@@ -137,8 +197,12 @@ impl Translation<'_, '_> {
     /// Adds a helper predicate, and returns it.
     fn part(&mut self, head: &str, arity: usize, span: &Span) -> PredicateId {
         let name = format!("{head}~{}", self.checking.predicates.len());
-        self.checking.define_predicate(self.source, &name, arity, span, self.role);
-        self.checking.predicates.find(self.role.scope(), &name, None).expect("it was defined in the line above")
+        self.checking
+            .define_predicate(self.source, &name, arity, span, self.role);
+        self.checking
+            .predicates
+            .find(self.role.scope(), &name, None)
+            .expect("it was defined in the line above")
     }
 }
 

@@ -1,4 +1,5 @@
-//! Syntax trees to checked rules: names, arities, safety, units, ranges and strata. All errors are reported at once.
+//! Syntax trees to checked rules: names, arities, safety, units, ranges and strata. All errors are
+//! reported at once.
 //!
 //! Never: reads a fact, or evaluates a rule.
 

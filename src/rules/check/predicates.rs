@@ -9,7 +9,8 @@ use crate::temporal::{known_quantity, quantity_names};
 use actcheck_base::{Term, did_you_mean, names};
 
 impl Translation<'_, '_> {
-    /// Returns the predicate of an atom and the arguments that are columns. Returns `None` if an error was reported.
+    /// Returns the predicate of an atom and the arguments that are columns. Returns `None` if an
+    /// error was reported.
     pub(super) fn predicate<'e>(
         &mut self,
         atom: &'e AtomSyntax,
@@ -32,7 +33,9 @@ impl Translation<'_, '_> {
             return Some(self.given(atom, args));
         }
         for scope in [self.role.scope(), 0] {
-            let Some(definition) = self.checking.defined.get(&(scope, name.to_owned())) else { continue };
+            let Some(definition) = self.checking.defined.get(&(scope, name.to_owned())) else {
+                continue;
+            };
             if definition.arity != args.len() {
                 if !head {
                     let message = format!(
@@ -41,12 +44,21 @@ impl Translation<'_, '_> {
                         definition.arity,
                         definition.place()
                     );
-                    self.error("R022", &atom.span, message, "use the same number everywhere, or another name");
+                    self.error(
+                        "R022",
+                        &atom.span,
+                        message,
+                        "use the same number everywhere, or another name",
+                    );
                 }
                 self.faulty = true;
                 return None;
             }
-            return self.checking.predicates.find(scope, name, None).map(|id| (id, args));
+            return self
+                .checking
+                .predicates
+                .find(scope, name, None)
+                .map(|id| (id, args));
         }
         self.faulty = true;
         if !head {
@@ -63,16 +75,25 @@ impl Translation<'_, '_> {
         }
         let known = self.checking.known_names(self.role);
         let help = did_you_mean(name, known.iter().map(String::as_str));
-        self.error("R023", &atom.name_span, format!("no rule defines `{name}`"), help);
+        self.error(
+            "R023",
+            &atom.name_span,
+            format!("no rule defines `{name}`"),
+            help,
+        );
     }
 
-    /// Checks that the property of `course` is a quantity of one thing. Reports an error if it is not.
+    /// Checks that the property of `course` is a quantity of one thing. Reports an error if it is
+    /// not.
     fn names_quantity(&mut self, property: &Expression) -> bool {
         let iri = match &property.kind {
             ExpressionKind::Constant(Term::Iri(iri)) => iri.to_string(),
-            ExpressionKind::Global(global) => {
-                self.globals.get(global).and_then(Term::as_iri).unwrap_or_default().to_owned()
-            }
+            ExpressionKind::Global(global) => self
+                .globals
+                .get(global)
+                .and_then(Term::as_iri)
+                .unwrap_or_default()
+                .to_owned(),
             _ => String::new(),
         };
         let (message, help) = match iri.strip_prefix(names::W) {
@@ -83,7 +104,10 @@ impl Translation<'_, '_> {
                     format!("`w:{local}` is not a quantity of one thing"),
                     "read it in a formula, such as `always(w:distance(?a, ?b) > 0.1)`".to_owned(),
                 ),
-                None => (format!("unknown quantity `w:{local}`"), did_you_mean(local, quantity_names())),
+                None => (
+                    format!("unknown quantity `w:{local}`"),
+                    did_you_mean(local, quantity_names()),
+                ),
             },
             None => (
                 "`course` needs a constant property".to_owned(),
@@ -94,7 +118,8 @@ impl Translation<'_, '_> {
         false
     }
 
-    /// Resolves a given predicate: shorthands become `state`, a constant property becomes part of the predicate.
+    /// Resolves a given predicate: shorthands become `state`, a constant property becomes part of
+    /// the predicate.
     fn given<'e>(
         &mut self,
         atom: &'e AtomSyntax,
@@ -103,7 +128,13 @@ impl Translation<'_, '_> {
         let mut name = atom.predicate.as_str();
         if let Some(phase) = phase_of(name) {
             let kind = ExpressionKind::Constant(Term::iri(phase));
-            args.insert(0, std::borrow::Cow::Owned(Expression { kind, span: atom.name_span.clone() }));
+            args.insert(
+                0,
+                std::borrow::Cow::Owned(Expression {
+                    kind,
+                    span: atom.name_span.clone(),
+                }),
+            );
             name = "state";
         }
         let Some(place) = property_place(name) else {
@@ -111,7 +142,11 @@ impl Translation<'_, '_> {
         };
         let property = match &args[place].kind {
             ExpressionKind::Constant(Term::Iri(iri)) => Some(iri.to_string()),
-            ExpressionKind::Global(global) => self.globals.get(global).and_then(Term::as_iri).map(str::to_owned),
+            ExpressionKind::Global(global) => self
+                .globals
+                .get(global)
+                .and_then(Term::as_iri)
+                .map(str::to_owned),
             _ => None,
         };
         if let Some(iri) = &property {
@@ -122,7 +157,10 @@ impl Translation<'_, '_> {
             Some(iri) => {
                 let property = self.checking.terms.intern(Term::iri(iri));
                 args.remove(place);
-                (add_given(&mut self.checking.predicates, name, Some(property)), args)
+                (
+                    add_given(&mut self.checking.predicates, name, Some(property)),
+                    args,
+                )
             }
             None => (add_given(&mut self.checking.predicates, name, None), args),
         }

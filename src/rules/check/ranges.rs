@@ -1,5 +1,5 @@
-//! Reports conditions that no fact can satisfy, because the ontology declares another type for the property's values, or
-//! because they contradict each other.
+//! Reports conditions that no fact can satisfy, because the ontology declares another type for the
+//! property's values, or because they contradict each other.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -24,12 +24,23 @@ const TYPES: [&str; 4] = ["double", "integer", "boolean", "string"];
 
 impl Ranges {
     pub(crate) fn new(ontology: &Ontology) -> Self {
-        let (range, kind) = (format!("{}range", names::RDFS), format!("{}type", names::RDF));
+        let (range, kind) = (
+            format!("{}range", names::RDFS),
+            format!("{}type", names::RDF),
+        );
         let things = format!("{}ObjectProperty", names::OWL);
-        let mut ranges = Self { datatypes: BTreeMap::new(), of_things: BTreeSet::new() };
+        let mut ranges = Self {
+            datatypes: BTreeMap::new(),
+            of_things: BTreeSet::new(),
+        };
         for [s, p, o] in &ontology.triples {
-            let (Some(s), Some(p), Some(o)) = (s.as_iri(), p.as_iri(), o.as_iri()) else { continue };
-            if p == range && o.strip_prefix(names::XSD).is_some_and(|local| TYPES.contains(&local)) {
+            let (Some(s), Some(p), Some(o)) = (s.as_iri(), p.as_iri(), o.as_iri()) else {
+                continue;
+            };
+            if p == range
+                && o.strip_prefix(names::XSD)
+                    .is_some_and(|local| TYPES.contains(&local))
+            {
                 ranges.datatypes.insert(s.to_owned(), o.to_owned());
             } else if p == kind && o == things {
                 ranges.of_things.insert(s.to_owned());
@@ -39,15 +50,30 @@ impl Ranges {
     }
 
     /// Reports `R043` for each condition that can't hold.
-    pub(crate) fn check(&self, rules: &[Rule], predicates: &Predicates, terms: &Terms, diagnostics: &mut Diagnostics) {
+    pub(crate) fn check(
+        &self,
+        rules: &[Rule],
+        predicates: &Predicates,
+        terms: &Terms,
+        diagnostics: &mut Diagnostics,
+    ) {
         for rule in rules {
             // The property that each variable gets its value from, with its datatype.
             let mut typed: BTreeMap<Variable, (&str, &str)> = BTreeMap::new();
             for atom in rule.body.iter().filter_map(Literal::atom) {
-                let Some(property) = self.property(atom, predicates, terms) else { continue };
+                let Some(property) = self.property(atom, predicates, terms) else {
+                    continue;
+                };
                 match (atom.args.last(), self.datatypes.get(property)) {
                     (Some(Operand::Constant(id)), datatype) => {
-                        self.constant(rule, property, datatype.map(String::as_str), terms.term(*id), atom, diagnostics);
+                        self.constant(
+                            rule,
+                            property,
+                            datatype.map(String::as_str),
+                            terms.term(*id),
+                            atom,
+                            diagnostics,
+                        );
                     }
                     (Some(Operand::Variable(variable)), Some(datatype)) => {
                         typed.insert(*variable, (property, datatype));
@@ -59,16 +85,27 @@ impl Ranges {
             numbers_of_formulas(rule, &typed, diagnostics);
             opposites(rule, diagnostics);
             for literal in &rule.body {
-                let Literal::Compare { op, left, right, span } = literal else { continue };
+                let Literal::Compare {
+                    op,
+                    left,
+                    right,
+                    span,
+                } = literal
+                else {
+                    continue;
+                };
                 let ((Expr::Variable(variable), Expr::Constant(term))
                 | (Expr::Constant(term), Expr::Variable(variable))) = (left, right)
                 else {
                     continue;
                 };
-                let Some((property, datatype)) = typed.get(variable) else { continue };
+                let Some((property, datatype)) = typed.get(variable) else {
+                    continue;
+                };
                 let is_other = match op {
                     Comparison::Equal => {
-                        crate::model::values::datatype(term) != *datatype && !same_integer(term, datatype)
+                        crate::model::values::datatype(term) != *datatype
+                            && !same_integer(term, datatype)
                     }
                     Comparison::Unequal => false,
                     // Numbers of all types can be compared, but nothing else.
@@ -83,7 +120,12 @@ impl Ranges {
     }
 
     /// Returns the constant property of an atom, or `None` if its property is a variable.
-    fn property<'t>(&self, atom: &Atom, predicates: &Predicates, terms: &'t Terms) -> Option<&'t str> {
+    fn property<'t>(
+        &self,
+        atom: &Atom,
+        predicates: &Predicates,
+        terms: &'t Terms,
+    ) -> Option<&'t str> {
         let property: TermId = predicates.get(atom.predicate).property?;
         terms.term(property).as_iri()
     }
@@ -99,13 +141,19 @@ impl Ranges {
     ) {
         let literal = !matches!(term, Term::Iri(_) | Term::Blank(_));
         let fault = match datatype {
-            Some(datatype) if crate::model::values::datatype(term) != datatype && !same_integer(term, datatype) => {
+            Some(datatype)
+                if crate::model::values::datatype(term) != datatype
+                    && !same_integer(term, datatype) =>
+            {
                 never(property, datatype, term)
             }
             None if literal && self.of_things.contains(property) => {
-                let message =
-                    format!("this can never hold: the values of `{}` are individuals", names::shorten(property));
-                Diagnostic::error("R043", message).help("write an individual, such as `obj:glass_1`, or a variable")
+                let message = format!(
+                    "this can never hold: the values of `{}` are individuals",
+                    names::shorten(property)
+                );
+                Diagnostic::error("R043", message)
+                    .help("write an individual, such as `obj:glass_1`, or a variable")
             }
             _ => return,
         };
@@ -113,8 +161,13 @@ impl Ranges {
     }
 }
 
-/// Reports `R043` for variables that a formula compares with numbers, although their values are not numbers.
-fn numbers_of_formulas(rule: &Rule, typed: &BTreeMap<Variable, (&str, &str)>, diagnostics: &mut Diagnostics) {
+/// Reports `R043` for variables that a formula compares with numbers, although their values are not
+/// numbers.
+fn numbers_of_formulas(
+    rule: &Rule,
+    typed: &BTreeMap<Variable, (&str, &str)>,
+    diagnostics: &mut Diagnostics,
+) {
     for formula in formulas(rule) {
         formula.visit(&mut |part| {
             let Formula::Compare { left, right, span, .. } = part else { return };
@@ -138,10 +191,20 @@ fn numbers_of_formulas(rule: &Rule, typed: &BTreeMap<Variable, (&str, &str)>, di
 fn contradictions(rule: &Rule, diagnostics: &mut Diagnostics) {
     let mut left: BTreeMap<Variable, Left> = BTreeMap::new();
     for literal in &rule.body {
-        let Literal::Compare { op, left: a, right: b, span } = literal else { continue };
+        let Literal::Compare {
+            op,
+            left: a,
+            right: b,
+            span,
+        } = literal
+        else {
+            continue;
+        };
         let (variable, number, op) = match (a, b) {
             (Expr::Variable(variable), Expr::Constant(term)) => (variable, term.number(), *op),
-            (Expr::Constant(term), Expr::Variable(variable)) => (variable, term.number(), op.turned()),
+            (Expr::Constant(term), Expr::Variable(variable)) => {
+                (variable, term.number(), op.turned())
+            }
             _ => continue,
         };
         let Some(number) = number else { continue };
@@ -149,24 +212,37 @@ fn contradictions(rule: &Rule, diagnostics: &mut Diagnostics) {
         known.keep(op, number);
         if known.is_empty() {
             let name = &rule.variables[*variable];
-            let message = format!("this can never hold: no number satisfies all comparisons of `?{name}` in this rule");
+            let message = format!(
+                "this can never hold: no number satisfies all comparisons of `?{name}` in this rule"
+            );
             let help = "`,` means and: for or, write one rule for each case";
-            diagnostics.push(Diagnostic::error("R044", message).at(&rule.origin.source, span.clone()).help(help));
+            diagnostics.push(
+                Diagnostic::error("R044", message)
+                    .at(&rule.origin.source, span.clone())
+                    .help(help),
+            );
             return;
         }
     }
 }
 
-/// Reports `R044` for conditions that exclude each other: comparisons of the same two variables, a variable that equals
-/// two constants, and a pattern that is both required and excluded. One for each rule.
+/// Reports `R044` for conditions that exclude each other: comparisons of the same two variables, a
+/// variable that equals two constants, and a pattern that is both required and excluded. One for
+/// each rule.
 fn opposites(rule: &Rule, diagnostics: &mut Diagnostics) {
-    let found = compared_variables(rule).or_else(|| two_constants(rule)).or_else(|| required_and_excluded(rule));
+    let found = compared_variables(rule)
+        .or_else(|| two_constants(rule))
+        .or_else(|| required_and_excluded(rule));
     if let Some((message, span)) = found {
         let help = match message.ends_with("itself") {
             true => "compare it with another variable or a number",
             false => "`,` means and: for or, write one rule for each case",
         };
-        diagnostics.push(Diagnostic::error("R044", message).at(&rule.origin.source, span).help(help));
+        diagnostics.push(
+            Diagnostic::error("R044", message)
+                .at(&rule.origin.source, span)
+                .help(help),
+        );
     }
 }
 
@@ -174,10 +250,20 @@ fn compared_variables(rule: &Rule) -> Option<(String, Span)> {
     // Which of less, equal and greater are left for each pair.
     let mut left: BTreeMap<(Variable, Variable), [bool; 3]> = BTreeMap::new();
     for literal in &rule.body {
-        let Literal::Compare { op, left: Expr::Variable(a), right: Expr::Variable(b), span } = literal else {
+        let Literal::Compare {
+            op,
+            left: Expr::Variable(a),
+            right: Expr::Variable(b),
+            span,
+        } = literal
+        else {
             continue;
         };
-        let (pair, op) = if a <= b { ((*a, *b), *op) } else { ((*b, *a), op.turned()) };
+        let (pair, op) = if a <= b {
+            ((*a, *b), *op)
+        } else {
+            ((*b, *a), op.turned())
+        };
         let allowed = match op {
             Comparison::Equal => [false, true, false],
             Comparison::Unequal => [true, false, true],
@@ -186,13 +272,21 @@ fn compared_variables(rule: &Rule) -> Option<(String, Span)> {
             Comparison::Greater => [false, false, true],
             Comparison::GreaterEqual => [false, true, true],
         };
-        let left = left.entry(pair).or_insert(if a == b { [false, true, false] } else { [true; 3] });
-        left.iter_mut().zip(allowed).for_each(|(left, allowed)| *left &= allowed);
+        let left = left.entry(pair).or_insert(if a == b {
+            [false, true, false]
+        } else {
+            [true; 3]
+        });
+        left.iter_mut()
+            .zip(allowed)
+            .for_each(|(left, allowed)| *left &= allowed);
         if *left == [false; 3] {
             let [a, b] = [pair.0, pair.1].map(|variable| &rule.variables[variable]);
             let message = match a == b {
                 true => format!("this can never hold: `?{a}` is compared with itself"),
-                false => format!("this can never hold: the comparisons of `?{a}` with `?{b}` exclude each other"),
+                false => format!(
+                    "this can never hold: the comparisons of `?{a}` with `?{b}` exclude each other"
+                ),
             };
             return Some((message, span.clone()));
         }
@@ -203,16 +297,27 @@ fn compared_variables(rule: &Rule) -> Option<(String, Span)> {
 fn two_constants(rule: &Rule) -> Option<(String, Span)> {
     let mut equal: BTreeMap<Variable, &Term> = BTreeMap::new();
     for literal in &rule.body {
-        let Literal::Compare { op: Comparison::Equal, left, right, span } = literal else { continue };
-        let ((Expr::Variable(variable), Expr::Constant(term)) | (Expr::Constant(term), Expr::Variable(variable))) =
-            (left, right)
+        let Literal::Compare {
+            op: Comparison::Equal,
+            left,
+            right,
+            span,
+        } = literal
+        else {
+            continue;
+        };
+        let ((Expr::Variable(variable), Expr::Constant(term))
+        | (Expr::Constant(term), Expr::Variable(variable))) = (left, right)
         else {
             continue;
         };
         let first = equal.entry(*variable).or_insert(term);
         if first.number().is_none() && *first != term {
             let name = &rule.variables[*variable];
-            return Some((format!("this can never hold: `?{name}` is `{first}` and `{term}`"), span.clone()));
+            return Some((
+                format!("this can never hold: `?{name}` is `{first}` and `{term}`"),
+                span.clone(),
+            ));
         }
     }
     None
@@ -221,13 +326,17 @@ fn two_constants(rule: &Rule) -> Option<(String, Span)> {
 fn required_and_excluded(rule: &Rule) -> Option<(String, Span)> {
     let positive = |atom: &Atom| {
         rule.body.iter().any(|literal| match literal {
-            Literal::Positive(other) => other.predicate == atom.predicate && other.args == atom.args,
+            Literal::Positive(other) => {
+                other.predicate == atom.predicate && other.args == atom.args
+            }
             _ => false,
         })
     };
     rule.body.iter().find_map(|literal| match literal {
         Literal::Negative(atom) if !atom.args.contains(&Operand::Any) && positive(atom) => {
-            let message = "this can never hold: the same condition is required and, with `~`, excluded".to_owned();
+            let message =
+                "this can never hold: the same condition is required and, with `~`, excluded"
+                    .to_owned();
             Some((message, atom.span.clone()))
         }
         _ => None,
@@ -245,8 +354,10 @@ fn same_integer(term: &Term, datatype: &str) -> bool {
 
 fn never(property: &str, datatype: &str, term: &Term) -> Diagnostic {
     let local = names::shorten(datatype);
-    let message =
-        format!("this can never hold: the values of `{}` are {local}, but `{term}` is not", names::shorten(property));
+    let message = format!(
+        "this can never hold: the values of `{}` are {local}, but `{term}` is not",
+        names::shorten(property)
+    );
     let help = match (datatype.rsplit('#').next(), term) {
         (Some("double"), Term::Integer(value)) => {
             format!("`=` compares terms: write `{value}.0`, or compare with `<=` and `>=`")

@@ -1,14 +1,18 @@
-//! Warns of rules that depend on the order of a contact's two sides: which side is `w:first` depends only on names.
+//! Warns of rules that depend on the order of a contact's two sides: which side is `w:first`
+//! depends only on names.
 //!
-//! A property reads both sides alike if its rules stay the same when `w:first` and `w:second` are exchanged: up to the names
-//! of variables, the order of conditions, and the predicates and arguments that the exchange turns into each other. This is
-//! the greatest set of such pairs: all pairs are assumed, and those that contradict the rules are taken out.
+//! A property reads both sides alike if its rules stay the same when `w:first` and `w:second` are
+//! exchanged: up to the names of variables, the order of conditions, and the predicates and
+//! arguments that the exchange turns into each other. This is the greatest set of such pairs: all
+//! pairs are assumed, and those that contradict the rules are taken out.
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use crate::model::expression::{Expr, Variable};
 use crate::model::given::VERDICT;
-use crate::model::program::{Atom, Literal, Operand, PredicateId, Predicates, Program, Rule, Scope};
+use crate::model::program::{
+    Atom, Literal, Operand, PredicateId, Predicates, Program, Rule, Scope,
+};
 use actcheck_base::{Diagnostic, Term, Terms, names};
 
 /// The properties of contacts of two things, and of two links of the robot.
@@ -21,7 +25,8 @@ const STEPS: usize = 200_000;
 /// Most arguments of a predicate whose arguments may be exchanged.
 const MOST_EXCHANGED: usize = 6;
 
-/// Warning R056 at a place that reads one side of a contact. `property`: the local name of the property that it reads.
+/// Warning R056 at a place that reads one side of a contact. `property`: the local name of the
+/// property that it reads.
 pub(crate) fn warning(property: &str, help: &str) -> Diagnostic {
     let message = format!(
         "the outcome depends on which side of a contact `w:{property}` is, and that depends only on the names of the two"
@@ -29,7 +34,8 @@ pub(crate) fn warning(property: &str, help: &str) -> Diagnostic {
     Diagnostic::warning("R056", message).help(help)
 }
 
-/// The image of a predicate under the exchange of sides: another one (or the same), and for each argument its place there.
+/// The image of a predicate under the exchange of sides: another one (or the same), and for each
+/// argument its place there.
 type Image = (PredicateId, Vec<usize>);
 
 /// The rules below a property.
@@ -53,8 +59,13 @@ struct Plain<'a> {
 }
 
 impl<'a> Sides<'a> {
-    /// `library`: the rules of the libraries. Returns `None` if no rule or query can read a side by its name.
-    pub(crate) fn new(library: &'a Program, predicates: &'a Predicates, terms: &Terms) -> Option<Self> {
+    /// `library`: the rules of the libraries. Returns `None` if no rule or query can read a side by
+    /// its name.
+    pub(crate) fn new(
+        library: &'a Program,
+        predicates: &'a Predicates,
+        terms: &Terms,
+    ) -> Option<Self> {
         let id = |local: &str| {
             let property = terms.id(&Term::iri(names::w(local)))?;
             predicates.find(0, "state", Some(property))
@@ -70,14 +81,23 @@ impl<'a> Sides<'a> {
             }
         }
         let names = properties;
-        let mut sides = Self { rules: BTreeMap::new(), with_facts: BTreeSet::new(), predicates, other, names };
+        let mut sides = Self {
+            rules: BTreeMap::new(),
+            with_facts: BTreeSet::new(),
+            predicates,
+            other,
+            names,
+        };
         sides.add(library);
         (!sides.other.is_empty()).then_some(sides)
     }
 
     fn add(&mut self, program: &'a Program) {
         for rule in &program.rules {
-            self.rules.entry(rule.head.predicate).or_default().push(rule);
+            self.rules
+                .entry(rule.head.predicate)
+                .or_default()
+                .push(rule);
         }
         self.with_facts.extend(program.facts.keys());
     }
@@ -103,12 +123,20 @@ impl<'a> Sides<'a> {
             return None;
         }
         let plain = below.plain(&read, &reading);
-        let mut exchange = Exchange { sides: &below, read: &read, plain: &plain, images: BTreeMap::new(), steps: 0 };
+        let mut exchange = Exchange {
+            sides: &below,
+            read: &read,
+            plain: &plain,
+            images: BTreeMap::new(),
+            steps: 0,
+        };
         exchange.find();
         if exchange.steps > STEPS {
             return None;
         }
-        let faulty = verdict.into_iter().find(|p| reading.contains(p) && !exchange.is_alike(*p))?;
+        let faulty = verdict
+            .into_iter()
+            .find(|p| reading.contains(p) && !exchange.is_alike(*p))?;
         exchange.innermost(faulty)
     }
 
@@ -123,9 +151,15 @@ impl<'a> Sides<'a> {
         }
         while let Some(predicate) = waiting.pop() {
             for rule in self.rules.get(&predicate).into_iter().flatten() {
-                for atom in plain(rule, &read[&predicate]).body.iter().filter_map(Literal::atom) {
+                for atom in plain(rule, &read[&predicate])
+                    .body
+                    .iter()
+                    .filter_map(Literal::atom)
+                {
                     let known = read.contains_key(&atom.predicate);
-                    let args = read.entry(atom.predicate).or_insert_with(|| vec![false; atom.args.len()]);
+                    let args = read
+                        .entry(atom.predicate)
+                        .or_insert_with(|| vec![false; atom.args.len()]);
                     let mut more = !known;
                     for (is_read, arg) in args.iter_mut().zip(&atom.args) {
                         if !*is_read && *arg != Operand::Any {
@@ -144,12 +178,25 @@ impl<'a> Sides<'a> {
 
     /// Those of some predicates that read a side of a contact, directly or indirectly.
     fn reading_sides(&self, read: &BTreeMap<PredicateId, Vec<bool>>) -> BTreeSet<PredicateId> {
-        let mut reading: BTreeSet<PredicateId> = self.other.keys().copied().filter(|p| read.contains_key(p)).collect();
+        let mut reading: BTreeSet<PredicateId> = self
+            .other
+            .keys()
+            .copied()
+            .filter(|p| read.contains_key(p))
+            .collect();
         loop {
             let reads = |predicate: &PredicateId| {
-                self.rules.get(predicate).into_iter().flatten().any(|rule| rule.reads().any(|p| reading.contains(&p)))
+                self.rules
+                    .get(predicate)
+                    .into_iter()
+                    .flatten()
+                    .any(|rule| rule.reads().any(|p| reading.contains(&p)))
             };
-            let more: Vec<PredicateId> = read.keys().copied().filter(|p| !reading.contains(p) && reads(p)).collect();
+            let more: Vec<PredicateId> = read
+                .keys()
+                .copied()
+                .filter(|p| !reading.contains(p) && reads(p))
+                .collect();
             if more.is_empty() {
                 return reading;
             }
@@ -163,18 +210,33 @@ impl<'a> Sides<'a> {
         reading: &BTreeSet<PredicateId>,
     ) -> BTreeMap<PredicateId, Vec<Plain<'a>>> {
         let of = |predicate: &PredicateId| {
-            self.rules.get(predicate).into_iter().flatten().map(|rule| plain(rule, &read[predicate])).collect()
+            self.rules
+                .get(predicate)
+                .into_iter()
+                .flatten()
+                .map(|rule| plain(rule, &read[predicate]))
+                .collect()
         };
-        reading.iter().filter(|p| !self.other.contains_key(p)).map(|p| (*p, of(p))).collect()
+        reading
+            .iter()
+            .filter(|p| !self.other.contains_key(p))
+            .map(|p| (*p, of(p)))
+            .collect()
     }
 }
 
-/// Returns a rule without the values that nothing reads. `read`: whether the arguments of its head are read.
+/// Returns a rule without the values that nothing reads. `read`: whether the arguments of its head
+/// are read.
 fn plain<'a>(rule: &'a Rule, read: &[bool]) -> Plain<'a> {
     // An aggregate depends on all values.
     let is_read = |at: usize| rule.aggregation.is_some() || read.get(at).copied().unwrap_or(true);
-    let head: Vec<Option<Operand>> =
-        rule.head.args.iter().enumerate().map(|(at, arg)| is_read(at).then_some(*arg)).collect();
+    let head: Vec<Option<Operand>> = rule
+        .head
+        .args
+        .iter()
+        .enumerate()
+        .map(|(at, arg)| is_read(at).then_some(*arg))
+        .collect();
     let mut body: Vec<Literal> = rule.body.clone();
     loop {
         let mut count: BTreeMap<Variable, usize> = BTreeMap::new();
@@ -183,7 +245,9 @@ fn plain<'a>(rule: &'a Rule, read: &[bool]) -> Plain<'a> {
         }
         let length = body.len();
         let once = |variable: Variable| count.get(&variable).copied().unwrap_or_default() < 2;
-        body.retain(|literal| !matches!(literal, Literal::Assign { variable, .. } if once(*variable)));
+        body.retain(
+            |literal| !matches!(literal, Literal::Assign { variable, .. } if once(*variable)),
+        );
         if body.len() < length {
             continue;
         }
@@ -214,11 +278,16 @@ fn occurrences(head: &[Option<Operand>], body: &[Literal], rule: &Rule) -> Vec<V
         }
     };
     head.iter().flatten().for_each(&mut operand);
-    body.iter().filter_map(Literal::atom).flat_map(|atom| &atom.args).for_each(&mut operand);
+    body.iter()
+        .filter_map(Literal::atom)
+        .flat_map(|atom| &atom.args)
+        .for_each(&mut operand);
     for literal in body {
         match literal {
             Literal::Positive(_) | Literal::Negative(_) => {}
-            Literal::Assign { variable, value, .. } => {
+            Literal::Assign {
+                variable, value, ..
+            } => {
                 found.push(*variable);
                 value.variables(&mut found);
             }
@@ -292,12 +361,15 @@ impl Renaming {
             (Expr::Constant(a), Expr::Constant(b)) => a == b,
             (Expr::Variable(a), Expr::Variable(b)) => self.variable(*a, *b),
             (Expr::Format(a), Expr::Format(b)) => self.all(a, b),
-            (Expr::Matches(a, of), Expr::Matches(b, with)) => of.as_str() == with.as_str() && self.expression(a, b),
+            (Expr::Matches(a, of), Expr::Matches(b, with)) => {
+                of.as_str() == with.as_str() && self.expression(a, b)
+            }
             (Expr::Call(f, a), Expr::Call(g, b)) if f.name == g.name => {
                 let half = a.len() / 2;
                 let turned: Vec<Expr> = match (f.name, a.as_slice()) {
                     ("ABS", [Expr::Call(h, inner)])
-                        if matches!(h.name, "MINUS" | "geo3d:angleDifference") && inner.len() == 2 =>
+                        if matches!(h.name, "MINUS" | "geo3d:angleDifference")
+                            && inner.len() == 2 =>
                     {
                         vec![Expr::Call(h, vec![inner[1].clone(), inner[0].clone()])]
                     }
@@ -306,13 +378,16 @@ impl Renaming {
                     }
                     _ => return self.all(a, b),
                 };
-                self.either([&|renaming| renaming.all(a, b), &|renaming| renaming.all(&turned, b)])
+                self.either([&|renaming| renaming.all(a, b), &|renaming| {
+                    renaming.all(&turned, b)
+                }])
             }
             // A formula is only the same as itself.
             (Expr::Timed(_), Expr::Timed(_)) => {
                 let mut variables = Vec::new();
                 a.variables(&mut variables);
-                format!("{a:?}") == format!("{b:?}") && variables.into_iter().all(|v| self.variable(v, v))
+                format!("{a:?}") == format!("{b:?}")
+                    && variables.into_iter().all(|v| self.variable(v, v))
             }
             _ => false,
         }
@@ -321,9 +396,19 @@ impl Renaming {
 
 /// Whether a built-in gives the same for the two halves of its arguments in the other order.
 fn has_alike_halves(name: &str) -> bool {
-    let geometry = ["distance", "distance2d", "boxDistance", "boxesOverlap", "overlapArea", "dot", "angle"];
+    let geometry = [
+        "distance",
+        "distance2d",
+        "boxDistance",
+        "boxesOverlap",
+        "overlapArea",
+        "dot",
+        "angle",
+    ];
     matches!(name, "SUM" | "PRODUCT" | "MAX" | "MIN" | "AND" | "OR")
-        || name.strip_prefix("geo3d:").is_some_and(|local| geometry.contains(&local))
+        || name
+            .strip_prefix("geo3d:")
+            .is_some_and(|local| geometry.contains(&local))
 }
 
 impl<'a> Exchange<'_, 'a> {
@@ -335,14 +420,19 @@ impl<'a> Exchange<'_, 'a> {
                 .get(&predicate)
                 .into_iter()
                 .flatten()
-                .any(|(image, places)| *image == predicate && places.iter().enumerate().all(|(at, place)| at == *place))
+                .any(|(image, places)| {
+                    *image == predicate && places.iter().enumerate().all(|(at, place)| at == *place)
+                })
     }
 
     /// Finds the images of all predicates.
     fn find(&mut self) {
         let plain = self.plain;
         for predicate in plain.keys() {
-            let candidates = plain.keys().flat_map(|image| self.candidates(*predicate, *image)).collect();
+            let candidates = plain
+                .keys()
+                .flat_map(|image| self.candidates(*predicate, *image))
+                .collect();
             self.images.insert(*predicate, candidates);
         }
         let mut changed = true;
@@ -380,25 +470,39 @@ impl<'a> Exchange<'_, 'a> {
                 }
             }
         }
-        orders.retain(|order| order.iter().enumerate().all(|(at, place)| read[at] == there[*place]));
+        orders.retain(|order| {
+            order
+                .iter()
+                .enumerate()
+                .all(|(at, place)| read[at] == there[*place])
+        });
         orders.into_iter().map(|order| (image, order)).collect()
     }
 
-    /// Whether each rule of a predicate has a counterpart among those of its image, and the reverse.
+    /// Whether each rule of a predicate has a counterpart among those of its image, and the
+    /// reverse.
     fn fits(&mut self, predicate: PredicateId, (image, places): &Image) -> bool {
         let plain = self.plain;
         let [rules, others] = [&plain[&predicate], &plain[image]];
-        rules.iter().all(|rule| others.iter().any(|other| self.same(rule, other, places)))
-            && others.iter().all(|other| rules.iter().any(|rule| self.same(rule, other, places)))
+        rules
+            .iter()
+            .all(|rule| others.iter().any(|other| self.same(rule, other, places)))
+            && others
+                .iter()
+                .all(|other| rules.iter().any(|rule| self.same(rule, other, places)))
     }
 
     /// Whether the exchange of sides turns a rule into another.
     fn same(&mut self, rule: &Plain<'a>, other: &Plain<'a>, places: &[usize]) -> bool {
         let mut renaming = Renaming::default();
-        let heads = rule.head.iter().zip(places).all(|(arg, place)| match (arg, &other.head[*place]) {
-            (Some(a), Some(b)) => renaming.operand(a, b),
-            (a, b) => a.is_none() && b.is_none(),
-        });
+        let heads =
+            rule.head
+                .iter()
+                .zip(places)
+                .all(|(arg, place)| match (arg, &other.head[*place]) {
+                    (Some(a), Some(b)) => renaming.operand(a, b),
+                    (a, b) => a.is_none() && b.is_none(),
+                });
         if !heads || rule.body.len() != other.body.len() {
             return false;
         }
@@ -417,19 +521,25 @@ impl<'a> Exchange<'_, 'a> {
                             && renaming.variable(a.input, b.input)
                             && lists(&mut renaming, &a.distinct, &b.distinct)
                     })
-                    && a.after
-                        .iter()
-                        .zip(&b.after)
-                        .all(|((v, a), (w, b))| renaming.variable(*v, *w) && renaming.expression(a, b))
+                    && a.after.iter().zip(&b.after).all(|((v, a), (w, b))| {
+                        renaming.variable(*v, *w) && renaming.expression(a, b)
+                    })
             }
             _ => false,
         };
-        aggregates && self.bodies(&rule.body, &mut other.body.iter().collect::<Vec<_>>(), &renaming)
+        aggregates
+            && self.bodies(
+                &rule.body,
+                &mut other.body.iter().collect::<Vec<_>>(),
+                &renaming,
+            )
     }
 
     /// Whether the first condition has a counterpart, and the rest has, too.
     fn bodies(&mut self, body: &[Literal], other: &mut Vec<&Literal>, renaming: &Renaming) -> bool {
-        let Some((literal, rest)) = body.split_first() else { return true };
+        let Some((literal, rest)) = body.split_first() else {
+            return true;
+        };
         for at in 0..other.len() {
             self.steps += 1;
             if self.steps > STEPS {
@@ -451,18 +561,45 @@ impl<'a> Exchange<'_, 'a> {
     fn literals(&self, literal: &Literal, other: &Literal, renaming: &Renaming) -> Vec<Renaming> {
         let mut copy = renaming.clone();
         let holds = match (literal, other) {
-            (Literal::Positive(a), Literal::Positive(b)) | (Literal::Negative(a), Literal::Negative(b)) => {
+            (Literal::Positive(a), Literal::Positive(b))
+            | (Literal::Negative(a), Literal::Negative(b)) => {
                 return self.atoms(a, b, renaming);
             }
-            (Literal::Assign { variable: v, value: a, .. }, Literal::Assign { variable: w, value: b, .. }) => {
-                copy.variable(*v, *w) && copy.expression(a, b)
+            (
+                Literal::Assign {
+                    variable: v,
+                    value: a,
+                    ..
+                },
+                Literal::Assign {
+                    variable: w,
+                    value: b,
+                    ..
+                },
+            ) => copy.variable(*v, *w) && copy.expression(a, b),
+            (Literal::Test { value: a, .. }, Literal::Test { value: b, .. }) => {
+                copy.expression(a, b)
             }
-            (Literal::Test { value: a, .. }, Literal::Test { value: b, .. }) => copy.expression(a, b),
-            (Literal::Compare { op, left, right, .. }, Literal::Compare { op: op_b, left: l, right: r, .. }) => copy
-                .either([
-                    &|renaming| op == op_b && renaming.expression(left, l) && renaming.expression(right, r),
-                    &|renaming| *op == op_b.turned() && renaming.expression(left, r) && renaming.expression(right, l),
-                ]),
+            (
+                Literal::Compare {
+                    op, left, right, ..
+                },
+                Literal::Compare {
+                    op: op_b,
+                    left: l,
+                    right: r,
+                    ..
+                },
+            ) => copy.either([
+                &|renaming| {
+                    op == op_b && renaming.expression(left, l) && renaming.expression(right, r)
+                },
+                &|renaming| {
+                    *op == op_b.turned()
+                        && renaming.expression(left, r)
+                        && renaming.expression(right, l)
+                },
+            ]),
             _ => false,
         };
         if holds { vec![copy] } else { Vec::new() }
@@ -472,7 +609,9 @@ impl<'a> Exchange<'_, 'a> {
         let same: Vec<usize> = (0..a.args.len()).collect();
         let images: Vec<Image> = match self.sides.other.get(&a.predicate) {
             // That a contact has a side says nothing about which.
-            Some(other) if a.args.last() == Some(&Operand::Any) => vec![(*other, same.clone()), (a.predicate, same)],
+            Some(other) if a.args.last() == Some(&Operand::Any) => {
+                vec![(*other, same.clone()), (a.predicate, same)]
+            }
             Some(other) => vec![(*other, same)],
             None if self.plain.contains_key(&a.predicate) => self.images[&a.predicate].clone(),
             None => vec![(a.predicate, same)],
@@ -482,7 +621,10 @@ impl<'a> Exchange<'_, 'a> {
             let mut copy = renaming.clone();
             if image == b.predicate
                 && a.args.len() == b.args.len()
-                && a.args.iter().zip(&places).all(|(arg, place)| copy.operand(arg, &b.args[*place]))
+                && a.args
+                    .iter()
+                    .zip(&places)
+                    .all(|(arg, place)| copy.operand(arg, &b.args[*place]))
             {
                 found.push(copy);
             }
@@ -490,13 +632,19 @@ impl<'a> Exchange<'_, 'a> {
         found
     }
 
-    /// The warning at the rule that makes the difference, for a predicate that the exchange changes.
+    /// The warning at the rule that makes the difference, for a predicate that the exchange
+    /// changes.
     fn innermost(&mut self, predicate: PredicateId) -> Option<Diagnostic> {
         let (mut at, mut seen) = (predicate, BTreeSet::new());
         let plain = self.plain;
         while seen.insert(at) {
-            let atoms = plain[&at].iter().flat_map(|rule| &rule.body).filter_map(Literal::atom);
-            let mut below = atoms.map(|atom| atom.predicate).filter(|p| plain.contains_key(p) && !seen.contains(p));
+            let atoms = plain[&at]
+                .iter()
+                .flat_map(|rule| &rule.body)
+                .filter_map(Literal::atom);
+            let mut below = atoms
+                .map(|atom| atom.predicate)
+                .filter(|p| plain.contains_key(p) && !seen.contains(p));
             match below.find(|p| self.images[p].is_empty()) {
                 Some(next) => at = next,
                 None => break,
@@ -504,15 +652,28 @@ impl<'a> Exchange<'_, 'a> {
         }
         let itself: Vec<usize> = (0..self.read[&at].len()).collect();
         let rules = &plain[&at];
-        let lonely =
-            |exchange: &mut Self, rule: &&Plain<'a>| !rules.iter().any(|other| exchange.same(rule, other, &itself));
-        let rule = rules.iter().find(|rule| lonely(self, rule)).or(rules.first())?;
+        let lonely = |exchange: &mut Self, rule: &&Plain<'a>| {
+            !rules
+                .iter()
+                .any(|other| exchange.same(rule, other, &itself))
+        };
+        let rule = rules
+            .iter()
+            .find(|rule| lonely(self, rule))
+            .or(rules.first())?;
         let tells_apart = |atom: &&Atom| match self.sides.other.contains_key(&atom.predicate) {
             true => atom.args.last() != Some(&Operand::Any),
             false => !self.is_alike(atom.predicate),
         };
-        let atom = rule.body.iter().filter_map(Literal::atom).filter(tells_apart).min_by_key(|atom| atom.span.start);
-        let property = atom.and_then(|atom| self.side_below(atom.predicate)).unwrap_or(SIDES[0][0]);
+        let atom = rule
+            .body
+            .iter()
+            .filter_map(Literal::atom)
+            .filter(tells_apart)
+            .min_by_key(|atom| atom.span.start);
+        let property = atom
+            .and_then(|atom| self.side_below(atom.predicate))
+            .unwrap_or(SIDES[0][0]);
         let help = match SIDES[0].contains(&property) {
             true => "use `contact(?c, ?a, ?b)`, in which each side comes first once",
             false => "use `self_contact(?c, ?a, ?b)`, in which each link comes first once",
@@ -531,7 +692,12 @@ impl<'a> Exchange<'_, 'a> {
             if self.sides.other.contains_key(&predicate) {
                 return self.sides.names.get(&predicate).copied();
             }
-            let atoms = self.plain.get(&predicate).into_iter().flatten().flat_map(|rule| &rule.body);
+            let atoms = self
+                .plain
+                .get(&predicate)
+                .into_iter()
+                .flatten()
+                .flat_map(|rule| &rule.body);
             waiting.extend(atoms.filter_map(Literal::atom).map(|atom| atom.predicate));
         }
         None

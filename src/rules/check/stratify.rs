@@ -40,19 +40,29 @@ pub(crate) fn stratify(
     let component = components(&graph);
     let mut diagnostics = Diagnostics::new();
     for (from, edges) in graph.iter().enumerate() {
-        for edge in edges.iter().filter(|e| e.strict && component[e.to] == component[from]) {
+        for edge in edges
+            .iter()
+            .filter(|e| e.strict && component[e.to] == component[from])
+        {
             if diagnostics.len() == FAULT_LIMIT {
                 return Err(diagnostics);
             }
-            diagnostics.push(cycle_fault(from, edge, &graph, &component, rules, predicates, terms));
+            diagnostics.push(cycle_fault(
+                from, edge, &graph, &component, rules, predicates, terms,
+            ));
         }
     }
     if diagnostics.has_errors() {
         return Err(diagnostics);
     }
     let count = component.iter().max().map_or(0, |last| last + 1);
-    let mut strata: Vec<Stratum> =
-        (0..count).map(|_| Stratum { rules: Vec::new(), predicates: Vec::new(), recursive: false }).collect();
+    let mut strata: Vec<Stratum> = (0..count)
+        .map(|_| Stratum {
+            rules: Vec::new(),
+            predicates: Vec::new(),
+            recursive: false,
+        })
+        .collect();
     for (predicate, number) in component.iter().enumerate() {
         strata[*number].predicates.push(predicate);
     }
@@ -79,18 +89,26 @@ fn graph(rules: &[Rule], predicates: usize) -> Vec<Vec<Edge>> {
                 _ => continue,
             };
             let strict = negated || rule.aggregation.is_some();
-            graph[rule.head.predicate].push(Edge { to: atom.predicate, strict, rule: idx });
+            graph[rule.head.predicate].push(Edge {
+                to: atom.predicate,
+                strict,
+                rule: idx,
+            });
         }
         // New things depend on all heads, so that these are derived together.
         for head in rule.makes().into_iter().flat_map(|making| &making.heads) {
-            graph[rule.head.predicate].push(Edge { to: head.predicate, strict: false, rule: idx });
+            graph[rule.head.predicate].push(Edge {
+                to: head.predicate,
+                strict: false,
+                rule: idx,
+            });
         }
     }
     graph
 }
 
-/// Computes the strongly connected component of each predicate, numbered in dependency order (Tarjan's algorithm,
-/// iterative because chains of rules may be long).
+/// Computes the strongly connected component of each predicate, numbered in dependency order
+/// (Tarjan's algorithm, iterative because chains of rules may be long).
 fn components(graph: &[Vec<Edge>]) -> Vec<usize> {
     const NEW: usize = usize::MAX;
     let n = graph.len();
@@ -154,28 +172,46 @@ fn cycle_fault(
         .find(|literal| literal.atom().is_some_and(|atom| atom.predicate == edge.to))
         .map_or(rule.origin.span.clone(), |literal| literal.span().clone());
     let back = way_back(edge.to, from, graph, component);
-    let mut way: Vec<String> =
-        back.iter().take(CYCLE_SHOWN).map(|predicate| shown(predicates, *predicate, terms)).collect();
+    let mut way: Vec<String> = back
+        .iter()
+        .take(CYCLE_SHOWN)
+        .map(|predicate| shown(predicates, *predicate, terms))
+        .collect();
     // Parts of one rule have one name.
     way.dedup();
-    if let Some(left_out) = back.len().checked_sub(CYCLE_SHOWN + 1).filter(|count| *count > 0) {
+    if let Some(left_out) = back
+        .len()
+        .checked_sub(CYCLE_SHOWN + 1)
+        .filter(|count| *count > 0)
+    {
         way.push(format!("({left_out} more)"));
     }
     if back.len() > CYCLE_SHOWN {
         way.push(shown(predicates, from, terms));
     }
     let name = shown(predicates, from, terms);
-    let word = if rule.aggregation.is_some() { "aggregates over" } else { "negates" };
+    let word = if rule.aggregation.is_some() {
+        "aggregates over"
+    } else {
+        "negates"
+    };
     let target = shown(predicates, edge.to, terms);
     let message = format!("`{name}` {word} `{target}`, which depends on `{name}`");
     let cycle = format!("{name} → {}", way.join(" → "));
     Diagnostic::error("R050", message)
         .at(&rule.origin.source, span)
-        .help(format!("the cycle is {cycle}; break it with a predicate that does not depend on `{name}`"))
+        .help(format!(
+            "the cycle is {cycle}; break it with a predicate that does not depend on `{name}`"
+        ))
 }
 
 /// Returns the predicates on a shortest path inside one component, both ends included.
-fn way_back(start: PredicateId, goal: PredicateId, graph: &[Vec<Edge>], component: &[usize]) -> Vec<PredicateId> {
+fn way_back(
+    start: PredicateId,
+    goal: PredicateId,
+    graph: &[Vec<Edge>],
+    component: &[usize],
+) -> Vec<PredicateId> {
     let mut came_from = vec![None; graph.len()];
     let mut queue = std::collections::VecDeque::from([start]);
     let mut seen = BTreeSet::from([start]);
@@ -183,7 +219,10 @@ fn way_back(start: PredicateId, goal: PredicateId, graph: &[Vec<Edge>], componen
         if node == goal {
             break;
         }
-        for edge in graph[node].iter().filter(|e| component[e.to] == component[goal]) {
+        for edge in graph[node]
+            .iter()
+            .filter(|e| component[e.to] == component[goal])
+        {
             if seen.insert(edge.to) {
                 came_from[edge.to] = Some(node);
                 queue.push_back(edge.to);
@@ -202,7 +241,11 @@ fn way_back(start: PredicateId, goal: PredicateId, graph: &[Vec<Edge>], componen
 pub(crate) fn shown(predicates: &Predicates, id: PredicateId, terms: &Universe<'_>) -> String {
     let predicate = predicates.get(id);
     match predicate.property.map(|property| terms.term(property)) {
-        Some(term) => format!("{}(… {} …)", predicate.name, term.as_iri().map_or(term.to_string(), names::shorten)),
+        Some(term) => format!(
+            "{}(… {} …)",
+            predicate.name,
+            term.as_iri().map_or(term.to_string(), names::shorten)
+        ),
         None => predicate.helps().unwrap_or(&predicate.name).to_owned(),
     }
 }

@@ -1,4 +1,5 @@
-//! Checks formulas over the course of an action: their quantities, their things and their intervals.
+//! Checks formulas over the course of an action: their quantities, their things and their
+//! intervals.
 
 use crate::builtins::{self, Builtin};
 use crate::check::checking::{Role, counted};
@@ -13,7 +14,12 @@ impl Translation<'_, '_> {
     pub(super) fn formula(&mut self, formula: &syntax::Formula) -> Option<Formula> {
         if self.role == Role::Standalone {
             let help = "write it in a property or in a rule library: a program on its own has no course of an action";
-            self.error("R053", &formula.span, "a temporal operator can't be used here", help);
+            self.error(
+                "R053",
+                &formula.span,
+                "a temporal operator can't be used here",
+                help,
+            );
             return None;
         }
         self.checked(formula)
@@ -24,7 +30,12 @@ impl Translation<'_, '_> {
         Some(match &formula.kind {
             FormulaKind::Compare(op, left, right) => {
                 let (left, right) = (self.quantity(left), self.quantity(right));
-                Formula::Compare { op: *op, left: left?, right: right?, span }
+                Formula::Compare {
+                    op: *op,
+                    left: left?,
+                    right: right?,
+                    span,
+                }
             }
             FormulaKind::Signal(expression) => {
                 let quantity = self.quantity(expression)?;
@@ -40,14 +51,27 @@ impl Translation<'_, '_> {
             FormulaKind::Or(parts) => Formula::Or(self.all_checked(parts)?),
             FormulaKind::Implies(left, right) => {
                 let (left, right) = (self.checked(left), self.checked(right));
-                let consequent = Formula::Consequent { formula: Box::new(right?), needed: false };
+                let consequent = Formula::Consequent {
+                    formula: Box::new(right?),
+                    needed: false,
+                };
                 Formula::Or(vec![Formula::Not(Box::new(left?)), consequent])
             }
-            FormulaKind::Temporal { operator, bound, parts } => {
+            FormulaKind::Temporal {
+                operator,
+                bound,
+                parts,
+            } => {
                 let interval = self.interval(bound.as_ref(), operator.name());
                 let parts = self.all_checked(parts);
                 let (from, to) = interval?;
-                Formula::Temporal { operator: *operator, from, to, parts: parts?, span }
+                Formula::Temporal {
+                    operator: *operator,
+                    from,
+                    to,
+                    parts: parts?,
+                    span,
+                }
             }
         })
     }
@@ -57,16 +81,25 @@ impl Translation<'_, '_> {
         parts.into_iter().collect()
     }
 
-    /// Returns the ends of an interval. Unit: seconds. Without an interval, the operator reaches to the end of the action,
-    /// or to its start.
+    /// Returns the ends of an interval. Unit: seconds. Without an interval, the operator reaches to
+    /// the end of the action, or to its start.
     fn interval(&mut self, bound: Option<&[Expression; 2]>, operator: &str) -> Option<(f64, f64)> {
-        let Some([from, to]) = bound else { return Some((0.0, f64::INFINITY)) };
+        let Some([from, to]) = bound else {
+            return Some((0.0, f64::INFINITY));
+        };
         let mut end = |expression: &Expression| {
             let value = self.ground(expression)?;
             let number = value.number().filter(|number| *number >= 0.0);
             if number.is_none() {
-                let help = format!("write seconds, as in `{operator}[0, 1.5](…)`; `once` and `since` look back");
-                self.error("R051", &expression.span, format!("{value} is not a time"), help);
+                let help = format!(
+                    "write seconds, as in `{operator}[0, 1.5](…)`; `once` and `since` look back"
+                );
+                self.error(
+                    "R051",
+                    &expression.span,
+                    format!("{value} is not a time"),
+                    help,
+                );
             }
             number
         };
@@ -74,7 +107,8 @@ impl Translation<'_, '_> {
         let (from_secs, to_secs) = (from_secs?, to_secs?);
         if to_secs < from_secs {
             let span = from.span.start..to.span.end;
-            let help = format!("write the earlier end first: `{operator}[{to_secs}, {from_secs}](…)`");
+            let help =
+                format!("write the earlier end first: `{operator}[{to_secs}, {from_secs}](…)`");
             self.error("R051", &span, "the interval is empty", help);
             return None;
         }
@@ -85,7 +119,9 @@ impl Translation<'_, '_> {
         let span = &expression.span;
         match &expression.kind {
             ExpressionKind::Variable(name) => Some(Quantity::Variable(self.variable(name, span))),
-            ExpressionKind::Call(name, args) if name.contains(':') && !name.starts_with(builtins::GEO3D) => {
+            ExpressionKind::Call(name, args)
+                if name.contains(':') && !name.starts_with(builtins::GEO3D) =>
+            {
                 self.recorded(name, args, span)
             }
             ExpressionKind::Call(name, args) => {
@@ -102,9 +138,10 @@ impl Translation<'_, '_> {
                 let builtin = builtins::builtin(operator(*op))?;
                 self.call_of(builtin, [left.as_ref(), right.as_ref()].into_iter())
             }
-            ExpressionKind::Negative(inner) => {
-                self.call_of(builtins::builtin("INVERSE")?, std::iter::once(inner.as_ref()))
-            }
+            ExpressionKind::Negative(inner) => self.call_of(
+                builtins::builtin("INVERSE")?,
+                std::iter::once(inner.as_ref()),
+            ),
             _ => {
                 let value = self.ground(expression)?;
                 let number = value.number();
@@ -123,18 +160,33 @@ impl Translation<'_, '_> {
         args: impl Iterator<Item = &'e Expression>,
     ) -> Option<Quantity> {
         let args: Vec<Option<Quantity>> = args.map(|arg| self.quantity(arg)).collect();
-        Some(Quantity::Call(builtin, args.into_iter().collect::<Option<_>>()?))
+        Some(Quantity::Call(
+            builtin,
+            args.into_iter().collect::<Option<_>>()?,
+        ))
     }
 
     /// Checks a quantity and the number of its things.
     fn recorded(&mut self, iri: &str, args: &[Expression], span: &Span) -> Option<Quantity> {
         if let Some(local) = iri.strip_prefix(names::W) {
             let Some(things) = known_quantity(local) else {
-                let (message, help) = if self.checking.vocabulary.is_some_and(|known| known.terms.contains_key(iri)) {
+                let (message, help) = if self
+                    .checking
+                    .vocabulary
+                    .is_some_and(|known| known.terms.contains_key(iri))
+                {
                     let message = format!("`w:{local}` is not recorded over time");
-                    (message, format!("read it before or after the action: `before(?thing, w:{local}, ?value)`"))
+                    (
+                        message,
+                        format!(
+                            "read it before or after the action: `before(?thing, w:{local}, ?value)`"
+                        ),
+                    )
                 } else {
-                    (format!("unknown quantity `w:{local}`"), did_you_mean(local, quantity_names()))
+                    (
+                        format!("unknown quantity `w:{local}`"),
+                        did_you_mean(local, quantity_names()),
+                    )
                 };
                 self.error("R052", span, message, help);
                 return None;
@@ -152,7 +204,10 @@ impl Translation<'_, '_> {
         }
         let things: Vec<Option<Thing>> = args.iter().map(|arg| self.thing(arg)).collect();
         let things = things.into_iter().collect::<Option<_>>()?;
-        Some(Quantity::Recorded { iri: iri.to_owned(), things })
+        Some(Quantity::Recorded {
+            iri: iri.to_owned(),
+            things,
+        })
     }
 
     fn thing(&mut self, arg: &Expression) -> Option<Thing> {

@@ -10,10 +10,15 @@ use crate::check::options::globals;
 use crate::check::safety;
 use crate::engine::budget::Budget;
 use crate::model::expression::{Expr, Variable};
-use crate::model::program::{Aggregation, Atom, Literal, Operand, Origin, PredicateId, Program, Rule};
+use crate::model::program::{
+    Aggregation, Atom, Literal, Operand, Origin, PredicateId, Program, Rule,
+};
 use crate::model::universe::Universe;
 use crate::syntax::limits::{FAULT_LIMIT, LITERAL_LIMIT, VARIABLE_LIMIT};
-use crate::syntax::{AtomSyntax, Comparison, Expression, ExpressionKind, LiteralSyntax, RuleSyntax, Statement, Syntax};
+use crate::syntax::{
+    AtomSyntax, Comparison, Expression, ExpressionKind, LiteralSyntax, RuleSyntax, Statement,
+    Syntax,
+};
 use crate::temporal::Timed;
 use crate::watch::Watch;
 use actcheck_base::{Source, Span, Term, TermId, Terms};
@@ -32,18 +37,22 @@ pub(crate) fn translate(checking: &mut Checking<'_>, syntax: &Syntax, role: Role
             Statement::Rule(rule) if rule.body.len() > LITERAL_LIMIT => {}
             Statement::Rule(rule) if rule.body.is_empty() => {
                 for head in &rule.heads {
-                    let fact = Translation::new(checking, &syntax.source, role, &globals).fact(head);
+                    let fact =
+                        Translation::new(checking, &syntax.source, role, &globals).fact(head);
                     if let Some((predicate, row)) = fact {
                         program.facts.entry(predicate).or_default().extend(row);
                     }
                 }
             }
             Statement::Rule(rule) if makes_new_things(rule) => {
-                program.rules.extend(Translation::new(checking, &syntax.source, role, &globals).making(rule));
+                program.rules.extend(
+                    Translation::new(checking, &syntax.source, role, &globals).making(rule),
+                );
             }
             Statement::Rule(rule) => {
                 for head in 0..rule.heads.len() {
-                    let rules = Translation::new(checking, &syntax.source, role, &globals).rule(rule, head);
+                    let rules =
+                        Translation::new(checking, &syntax.source, role, &globals).rule(rule, head);
                     program.rules.extend(rules);
                 }
             }
@@ -100,12 +109,18 @@ impl<'c, 'a> Translation<'c, 'a> {
         self.checking.error(code, self.source, span, message, help);
     }
 
-    /// Returns the helper rules followed by the checked rule of one head; empty if an error was reported.
+    /// Returns the helper rules followed by the checked rule of one head; empty if an error was
+    /// reported.
     fn rule(mut self, rule: &RuleSyntax, head: usize) -> Vec<Rule> {
         for literal in &rule.body {
             self.literal(literal);
         }
-        for (_, other) in rule.heads.iter().enumerate().filter(|(idx, _)| *idx != head) {
+        for (_, other) in rule
+            .heads
+            .iter()
+            .enumerate()
+            .filter(|(idx, _)| *idx != head)
+        {
             self.values(other);
         }
         let head = &rule.heads[head];
@@ -113,16 +128,30 @@ impl<'c, 'a> Translation<'c, 'a> {
             Some(found) => found,
             None => return Vec::new(),
         };
-        let head_names = head.args.iter().map(|arg| variable_name(arg).unwrap_or_default().to_owned()).collect();
-        let mut aggregation = Aggregation { group: Vec::new(), aggregates: Vec::new(), after: Vec::new() };
+        let head_names = head
+            .args
+            .iter()
+            .map(|arg| variable_name(arg).unwrap_or_default().to_owned())
+            .collect();
+        let mut aggregation = Aggregation {
+            group: Vec::new(),
+            aggregates: Vec::new(),
+            after: Vec::new(),
+        };
         let has_aggregate = args.iter().any(|arg| contains_aggregate(arg));
         let mut operands = Vec::new();
         for arg in &args {
             operands.push(self.head_argument(arg, has_aggregate.then_some(&mut aggregation)));
         }
         let operands: Option<Vec<Operand>> = operands.into_iter().collect();
-        let Some(operands) = operands.filter(|_| !self.faulty) else { return Vec::new() };
-        let head = Atom { predicate, args: self.pad(predicate, operands), span: head.span.clone() };
+        let Some(operands) = operands.filter(|_| !self.faulty) else {
+            return Vec::new();
+        };
+        let head = Atom {
+            predicate,
+            args: self.pad(predicate, operands),
+            span: head.span.clone(),
+        };
         let aggregation = has_aggregate.then_some(aggregation);
         if !safety::order(&mut self, rule, &head, aggregation.as_ref()) {
             return Vec::new();
@@ -135,17 +164,36 @@ impl<'c, 'a> Translation<'c, 'a> {
         };
         let variables = self.variables.into_iter().map(|(name, _)| name).collect();
         let mut rules = self.extra;
-        rules.push(Rule { head, body: self.body, aggregation, variables, head_names, origin, making: None });
+        rules.push(Rule {
+            head,
+            body: self.body,
+            aggregation,
+            variables,
+            head_names,
+            origin,
+            making: None,
+        });
         rules
     }
 
-    /// Adds the computed values of another head as conditions: a rule applies to a match as a whole or not at all.
+    /// Adds the computed values of another head as conditions: a rule applies to a match as a whole
+    /// or not at all.
     fn values(&mut self, head: &AtomSyntax) {
-        // Its own translation reports wrong predicates. The faults here are those of the other head, not of this one.
+        // Its own translation reports wrong predicates. The faults here are those of the other
+        // head, not of this one.
         let faulty = self.faulty;
-        let args = self.predicate(head, true).map_or(Vec::new(), |(_, args)| args);
-        let mut unused = Aggregation { group: Vec::new(), aggregates: Vec::new(), after: Vec::new() };
-        for arg in args.iter().filter(|arg| !matches!(arg.kind, ExpressionKind::Variable(_))) {
+        let args = self
+            .predicate(head, true)
+            .map_or(Vec::new(), |(_, args)| args);
+        let mut unused = Aggregation {
+            group: Vec::new(),
+            aggregates: Vec::new(),
+            after: Vec::new(),
+        };
+        for arg in args
+            .iter()
+            .filter(|arg| !matches!(arg.kind, ExpressionKind::Variable(_)))
+        {
             let before = self.body.len();
             self.head_argument(arg, Some(&mut unused));
             if matches!(self.body.last(), Some(Literal::Assign { value, .. }) if value.is_total()) {
@@ -158,7 +206,8 @@ impl<'c, 'a> Translation<'c, 'a> {
     fn fact(mut self, head: &AtomSyntax) -> Option<(PredicateId, Vec<TermId>)> {
         let (predicate, args) = self.predicate(head, true)?;
         if let Some((name, span)) = head.args.iter().find_map(new_thing) {
-            let help = "a rule makes new things, one for each match of its body: write a body after `:-`";
+            let help =
+                "a rule makes new things, one for each match of its body: write a body after `:-`";
             self.error("R039", span, format!("new thing `!{name}` in a fact"), help);
             return None;
         }
@@ -181,15 +230,29 @@ impl<'c, 'a> Translation<'c, 'a> {
         if let Some(variable) = variables.first() {
             let name = self.variables[*variable].0.clone();
             let help = "a fact may contain only constants; for a rule, write a body after `:-`";
-            self.error("R020", &expression.span, format!("variable `?{name}` in a fact"), help);
+            self.error(
+                "R020",
+                &expression.span,
+                format!("variable `?{name}` in a fact"),
+                help,
+            );
             return None;
         }
         let nothing = Terms::new();
         let value = expr
-            .value(&[], &Universe::new(&nothing, None), &Watch::new(&Budget::default()))
+            .value(
+                &[],
+                &Universe::new(&nothing, None),
+                &Watch::new(&Budget::default()),
+            )
             .map(|value| value.into_owned());
         if value.is_none() {
-            self.error("R037", &expression.span, "the expression has no value", "check the types of its arguments");
+            self.error(
+                "R037",
+                &expression.span,
+                "the expression has no value",
+                "check the types of its arguments",
+            );
         }
         value
     }
@@ -214,7 +277,8 @@ impl<'c, 'a> Translation<'c, 'a> {
         self.add_variable("", span)
     }
 
-    /// Adds a variable. A rule with too many variables is marked as faulty and returns a dummy index.
+    /// Adds a variable. A rule with too many variables is marked as faulty and returns a dummy
+    /// index.
     fn add_variable(&mut self, name: &str, span: &Span) -> Variable {
         if self.variables.len() == VARIABLE_LIMIT {
             if !self.variable_limit_reported {
@@ -237,7 +301,10 @@ impl<'c, 'a> Translation<'c, 'a> {
                         span: atom.span.clone(),
                     };
                     if let Some(value) = self.expression(&call) {
-                        self.body.push(Literal::Test { value, span: atom.span.clone() });
+                        self.body.push(Literal::Test {
+                            value,
+                            span: atom.span.clone(),
+                        });
                     }
                 } else if let Some(atom) = self.body_atom(atom) {
                     self.body.push(Literal::Positive(atom));
@@ -251,21 +318,39 @@ impl<'c, 'a> Translation<'c, 'a> {
             LiteralSyntax::Temporal(formula) => {
                 if let Some(checked) = self.formula(formula) {
                     let value = Expr::Timed(Box::new(Timed::truth(checked)));
-                    self.body.push(Literal::Test { value, span: formula.span.clone() });
+                    self.body.push(Literal::Test {
+                        value,
+                        span: formula.span.clone(),
+                    });
                 }
             }
-            LiteralSyntax::Comparison { op, left, right, span } => {
+            LiteralSyntax::Comparison {
+                op,
+                left,
+                right,
+                span,
+            } => {
                 let (left, right) = (self.expression(left), self.expression(right));
                 if let (Some(left), Some(right)) = (left, right) {
-                    self.body.push(Literal::Compare { op: *op, left, right, span: span.clone() });
+                    self.body.push(Literal::Compare {
+                        op: *op,
+                        left,
+                        right,
+                        span: span.clone(),
+                    });
                 }
             }
         }
     }
 
-    /// Returns whether an atom is a call of a built-in: a predicate of the same name takes precedence.
+    /// Returns whether an atom is a call of a built-in: a predicate of the same name takes
+    /// precedence.
     fn is_test(&self, atom: &AtomSyntax) -> bool {
-        let defined = |scope| self.checking.defined.contains_key(&(scope, atom.predicate.clone()));
+        let defined = |scope| {
+            self.checking
+                .defined
+                .contains_key(&(scope, atom.predicate.clone()))
+        };
         builtins::builtin(&atom.predicate).is_some() && !defined(0) && !defined(self.role.scope())
     }
 
@@ -278,22 +363,37 @@ impl<'c, 'a> Translation<'c, 'a> {
                 }
                 // An undefined predicate is empty.
                 self.faulty = false;
-                self.checking.define_predicate(self.source, &atom.predicate, atom.args.len(), &atom.span, self.role);
+                self.checking.define_predicate(
+                    self.source,
+                    &atom.predicate,
+                    atom.args.len(),
+                    &atom.span,
+                    self.role,
+                );
                 let id = self.checking.predicates.find(0, &atom.predicate, None)?;
-                (id, atom.args.iter().map(std::borrow::Cow::Borrowed).collect())
+                (
+                    id,
+                    atom.args.iter().map(std::borrow::Cow::Borrowed).collect(),
+                )
             }
         };
         let mut operands = Vec::new();
         for arg in &args {
             operands.push(self.body_argument(arg)?);
         }
-        Some(Atom { predicate, args: self.pad(predicate, operands), span: atom.span.clone() })
+        Some(Atom {
+            predicate,
+            args: self.pad(predicate, operands),
+            span: atom.span.clone(),
+        })
     }
 
     fn body_argument(&mut self, arg: &Expression) -> Option<Operand> {
         match &arg.kind {
             ExpressionKind::Anonymous => Some(Operand::Any),
-            ExpressionKind::Variable(name) => Some(Operand::Variable(self.variable(name, &arg.span))),
+            ExpressionKind::Variable(name) => {
+                Some(Operand::Variable(self.variable(name, &arg.span)))
+            }
             _ => match self.expression(arg)? {
                 Expr::Constant(term) => Some(Operand::Constant(self.checking.terms.intern(term))),
                 value => {
@@ -311,10 +411,19 @@ impl<'c, 'a> Translation<'c, 'a> {
         }
     }
 
-    pub(super) fn head_argument(&mut self, arg: &Expression, aggregation: Option<&mut Aggregation>) -> Option<Operand> {
+    pub(super) fn head_argument(
+        &mut self,
+        arg: &Expression,
+        aggregation: Option<&mut Aggregation>,
+    ) -> Option<Operand> {
         match &arg.kind {
             ExpressionKind::Anonymous => {
-                self.error("R035", &arg.span, "`_` in a head", "write a variable or a constant instead of `_`");
+                self.error(
+                    "R035",
+                    &arg.span,
+                    "`_` in a head",
+                    "write a variable or a constant instead of `_`",
+                );
                 None
             }
             ExpressionKind::Variable(name) => {
@@ -335,7 +444,11 @@ impl<'c, 'a> Translation<'c, 'a> {
                 Expr::Constant(term) => Some(Operand::Constant(self.checking.terms.intern(term))),
                 value => {
                     let variable = self.fresh_variable(&arg.span);
-                    self.body.push(Literal::Assign { variable, value, span: arg.span.clone() });
+                    self.body.push(Literal::Assign {
+                        variable,
+                        value,
+                        span: arg.span.clone(),
+                    });
                     if let Some(aggregation) = aggregation {
                         push_new(&mut aggregation.group, variable);
                     }
@@ -345,24 +458,51 @@ impl<'c, 'a> Translation<'c, 'a> {
         }
     }
 
-    /// Adds a helper rule that projects a negated atom to its bound variables. Returns the helper's head, to be negated
-    /// instead.
+    /// Adds a helper rule that projects a negated atom to its bound variables. Returns the helper's
+    /// head, to be negated instead.
     pub(crate) fn helper(&mut self, negated: Atom, bound: &[Variable]) -> Atom {
-        let name =
-            format!("{}~{}", self.checking.predicates.get(negated.predicate).name, self.checking.predicates.len());
-        let kept: Vec<Variable> =
-            bound.iter().copied().filter(|variable| negated.args.contains(&Operand::Variable(*variable))).collect();
+        let name = format!(
+            "{}~{}",
+            self.checking.predicates.get(negated.predicate).name,
+            self.checking.predicates.len()
+        );
+        let kept: Vec<Variable> = bound
+            .iter()
+            .copied()
+            .filter(|variable| negated.args.contains(&Operand::Variable(*variable)))
+            .collect();
         let span = negated.span.clone();
-        self.checking.define_predicate(self.source, &name, kept.len(), &span, self.role);
-        let predicate = self.checking.predicates.find(self.role.scope(), &name, None).unwrap_or(negated.predicate);
-        let args: Vec<Operand> = kept.iter().map(|variable| Operand::Variable(*variable)).collect();
-        let head = Atom { predicate, args: self.pad(predicate, args), span: span.clone() };
-        let origin = Origin { source: self.source.clone(), span, name: None, comment: None };
+        self.checking
+            .define_predicate(self.source, &name, kept.len(), &span, self.role);
+        let predicate = self
+            .checking
+            .predicates
+            .find(self.role.scope(), &name, None)
+            .unwrap_or(negated.predicate);
+        let args: Vec<Operand> = kept
+            .iter()
+            .map(|variable| Operand::Variable(*variable))
+            .collect();
+        let head = Atom {
+            predicate,
+            args: self.pad(predicate, args),
+            span: span.clone(),
+        };
+        let origin = Origin {
+            source: self.source.clone(),
+            span,
+            name: None,
+            comment: None,
+        };
         self.extra.push(Rule {
             head: head.clone(),
             body: vec![Literal::Positive(negated)],
             aggregation: None,
-            variables: self.variables.iter().map(|(name, _)| name.clone()).collect(),
+            variables: self
+                .variables
+                .iter()
+                .map(|(name, _)| name.clone())
+                .collect(),
             head_names: vec![String::new(); kept.len()],
             origin,
             making: None,

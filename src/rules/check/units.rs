@@ -1,4 +1,5 @@
-//! Checks the units of values in rules, based on the vocabulary: a length can't be compared with a mass.
+//! Checks the units of values in rules, based on the vocabulary: a length can't be compared with a
+//! mass.
 
 use std::collections::{BTreeSet, HashMap};
 
@@ -24,7 +25,8 @@ const FULL_TURN_RAD: f64 = std::f64::consts::TAU;
 /// Passes over the rules: units propagate through at least this many predicates in a row.
 const PASSES: usize = 4;
 
-/// Parses a unit of the vocabulary: symbols and `/`, for example `m/s`. Returns `None` if a symbol is unknown.
+/// Parses a unit of the vocabulary: symbols and `/`, for example `m/s`. Returns `None` if a symbol
+/// is unknown.
 fn dimension(text: &str) -> Unit {
     let (above, below) = text.split_once('/').unwrap_or((text, "1"));
     let [above, below] = [above, below].map(|part| {
@@ -51,9 +53,21 @@ fn combine(a: Dimension, b: Dimension, sign: i8) -> Dimension {
 /// Formats a dimension.
 fn shown(dimension: Dimension) -> String {
     let part = |wanted: fn(i8) -> bool| -> String {
-        let symbols = ["m", "kg", "s", "rad"].into_iter().zip(dimension).filter(|(_, power)| wanted(*power));
-        let power = |power: i8| if power.abs() == 1 { String::new() } else { power.abs().to_string() };
-        symbols.map(|(symbol, p)| format!("{symbol}{}", power(p))).collect::<Vec<_>>().join("·")
+        let symbols = ["m", "kg", "s", "rad"]
+            .into_iter()
+            .zip(dimension)
+            .filter(|(_, power)| wanted(*power));
+        let power = |power: i8| {
+            if power.abs() == 1 {
+                String::new()
+            } else {
+                power.abs().to_string()
+            }
+        };
+        symbols
+            .map(|(symbol, p)| format!("{symbol}{}", power(p)))
+            .collect::<Vec<_>>()
+            .join("·")
     };
     match (part(|power| power > 0), part(|power| power < 0)) {
         (above, below) if above.is_empty() && below.is_empty() => "a plain number".to_owned(),
@@ -73,8 +87,17 @@ pub(crate) struct Units<'a> {
 }
 
 impl<'a> Units<'a> {
-    pub(crate) fn new(predicates: &'a Predicates, vocabulary: &'a Vocabulary, terms: &'a Terms) -> Self {
-        Self { predicates, vocabulary, terms, columns: HashMap::new() }
+    pub(crate) fn new(
+        predicates: &'a Predicates,
+        vocabulary: &'a Vocabulary,
+        terms: &'a Terms,
+    ) -> Self {
+        Self {
+            predicates,
+            vocabulary,
+            terms,
+            columns: HashMap::new(),
+        }
     }
 
     /// Infers the units of the rules' head predicates. ([`Units::check`] reports the errors.)
@@ -88,7 +111,10 @@ impl<'a> Units<'a> {
                         _ => None,
                     };
                     // If rules disagree, the unit is unknown.
-                    let known = self.columns.entry((rule.head.predicate, column)).or_insert(unit);
+                    let known = self
+                        .columns
+                        .entry((rule.head.predicate, column))
+                        .or_insert(unit);
                     if unit.is_some() && *known != unit {
                         *known = known.xor(unit);
                     }
@@ -105,11 +131,24 @@ impl<'a> Units<'a> {
     }
 
     /// Reports `R042` if the margin is not in the property's unit.
-    pub(crate) fn check_margin(&self, rules: &[Rule], margin: PredicateId, unit: &str, diagnostics: &mut Diagnostics) {
-        let (Some(Some(found)), Some(wanted)) = (self.columns.get(&(margin, 0)), dimension(unit)) else { return };
+    pub(crate) fn check_margin(
+        &self,
+        rules: &[Rule],
+        margin: PredicateId,
+        unit: &str,
+        diagnostics: &mut Diagnostics,
+    ) {
+        let (Some(Some(found)), Some(wanted)) = (self.columns.get(&(margin, 0)), dimension(unit))
+        else {
+            return;
+        };
         let rule = rules.iter().find(|rule| rule.head.predicate == margin);
         if let Some(rule) = rule.filter(|_| *found != wanted) {
-            let message = format!("the margin is in {}, but the property's unit is {}", shown(*found), shown(wanted));
+            let message = format!(
+                "the margin is in {}, but the property's unit is {}",
+                shown(*found),
+                shown(wanted)
+            );
             let help = match shown(*found) {
                 unit if found.iter().any(|power| *power != 0) => {
                     format!(
@@ -118,8 +157,11 @@ impl<'a> Units<'a> {
                 }
                 _ => "change `act:unit` in the property's entry of the ontology, or convert the margin".to_owned(),
             };
-            diagnostics
-                .push(Diagnostic::error("R042", message).at(&rule.origin.source, rule.head.span.clone()).help(help));
+            diagnostics.push(
+                Diagnostic::error("R042", message)
+                    .at(&rule.origin.source, rule.head.span.clone())
+                    .help(help),
+            );
         }
     }
 
@@ -128,17 +170,30 @@ impl<'a> Units<'a> {
         let predicate = self.predicates.get(atom.predicate);
         match predicate.property {
             Some(property) if column + 1 == predicate.width => {
-                let term = self.vocabulary.terms.get(self.terms.term(property).as_iri()?)?;
+                let term = self
+                    .vocabulary
+                    .terms
+                    .get(self.terms.term(property).as_iri()?)?;
                 dimension(term.unit.as_deref()?)
             }
-            _ => self.columns.get(&(atom.predicate, column)).copied().flatten(),
+            _ => self
+                .columns
+                .get(&(atom.predicate, column))
+                .copied()
+                .flatten(),
         }
     }
 
     /// Infers the units of a rule's variables and reports mismatches.
     fn rule(&self, rule: &Rule, diagnostics: &mut Diagnostics) -> Vec<Unit> {
         let units = vec![None; rule.variables.len()];
-        let mut seen = Seen { rule, vocabulary: self.vocabulary, units, of_properties: BTreeSet::new(), diagnostics };
+        let mut seen = Seen {
+            rule,
+            vocabulary: self.vocabulary,
+            units,
+            of_properties: BTreeSet::new(),
+            diagnostics,
+        };
         for literal in &rule.body {
             if let Literal::Positive(atom) = literal {
                 let property = self.predicates.get(atom.predicate).property;
@@ -154,13 +209,26 @@ impl<'a> Units<'a> {
         }
         for literal in &rule.body {
             match literal {
-                Literal::Assign { variable, value, span } => {
+                Literal::Assign {
+                    variable,
+                    value,
+                    span,
+                } => {
                     let unit = seen.expression(value, span);
                     seen.both(*variable, unit, span);
                 }
-                Literal::Compare { op, left, right, span } => {
+                Literal::Compare {
+                    op,
+                    left,
+                    right,
+                    span,
+                } => {
                     let (left, right) = (seen.expression(left, span), seen.expression(right, span));
-                    let word = if *op == Comparison::Equal { "equates" } else { "compares" };
+                    let word = if *op == Comparison::Equal {
+                        "equates"
+                    } else {
+                        "compares"
+                    };
                     seen.alike(left, right, word, span);
                 }
                 Literal::Test { value, span } => {
@@ -170,7 +238,13 @@ impl<'a> Units<'a> {
             }
         }
         for literal in &rule.body {
-            if let Literal::Compare { op, left, right, span } = literal {
+            if let Literal::Compare {
+                op,
+                left,
+                right,
+                span,
+            } = literal
+            {
                 seen.degrees(left, right, span);
                 seen.degrees(right, left, span);
                 if *op != Comparison::Unequal {
@@ -179,11 +253,23 @@ impl<'a> Units<'a> {
                 }
             }
         }
-        for aggregate in rule.aggregation.iter().flat_map(|aggregation| &aggregation.aggregates) {
+        for aggregate in rule
+            .aggregation
+            .iter()
+            .flat_map(|aggregation| &aggregation.aggregates)
+        {
             use crate::model::program::AggregateKind::Count;
-            seen.units[aggregate.output] = if aggregate.kind == Count { None } else { seen.units[aggregate.input] };
+            seen.units[aggregate.output] = if aggregate.kind == Count {
+                None
+            } else {
+                seen.units[aggregate.input]
+            };
         }
-        for (variable, value) in rule.aggregation.iter().flat_map(|aggregation| &aggregation.after) {
+        for (variable, value) in rule
+            .aggregation
+            .iter()
+            .flat_map(|aggregation| &aggregation.after)
+        {
             let unit = seen.expression(value, &rule.head.span);
             seen.units[*variable] = unit;
         }
@@ -204,48 +290,80 @@ struct Seen<'a> {
 impl Seen<'_> {
     fn fault(&mut self, message: String, span: &Span) {
         let help = "units of properties are declared in ontology/world.ttl; a number in the rule text fits every unit";
-        let fault = Diagnostic::error("R042", message).at(&self.rule.origin.source, span.clone()).help(help);
+        let fault = Diagnostic::error("R042", message)
+            .at(&self.rule.origin.source, span.clone())
+            .help(help);
         self.diagnostics.push(fault);
     }
 
-    /// Reports `R043` for a number with a unit that is compared with a text. `Ranges` reports values of properties.
+    /// Reports `R043` for a number with a unit that is compared with a text. `Ranges` reports
+    /// values of properties.
     fn text(&mut self, number: &Expr, text: &Expr, span: &Span) {
-        let (Expr::Constant(Term::String(text)), Some(unit)) = (text, self.unit_of(number, span)) else { return };
-        let is_of_property = matches!(number, Expr::Variable(variable) if self.of_properties.contains(variable));
+        let (Expr::Constant(Term::String(text)), Some(unit)) = (text, self.unit_of(number, span))
+        else {
+            return;
+        };
+        let is_of_property =
+            matches!(number, Expr::Variable(variable) if self.of_properties.contains(variable));
         if is_of_property {
             return;
         }
-        let of = if unit == NONE { String::new() } else { format!(" in {}", shown(unit)) };
-        let message = format!("this can never hold: a number{of} is compared with the text `\"{text}\"`");
+        let of = if unit == NONE {
+            String::new()
+        } else {
+            format!(" in {}", shown(unit))
+        };
+        let message =
+            format!("this can never hold: a number{of} is compared with the text `\"{text}\"`");
         let help = match text.parse::<f64>() {
             Ok(_) => format!("write the number without quotes: `{text}`"),
             Err(_) => "compare it with a number".to_owned(),
         };
-        self.diagnostics.push(Diagnostic::error("R043", message).at(&self.rule.origin.source, span.clone()).help(help));
+        self.diagnostics.push(
+            Diagnostic::error("R043", message)
+                .at(&self.rule.origin.source, span.clone())
+                .help(help),
+        );
     }
 
     /// The unit of an expression, whose mismatches are reported elsewhere.
     fn unit_of(&self, expr: &Expr, span: &Span) -> Unit {
-        let (units, of_properties, mut ignored) = (self.units.clone(), BTreeSet::new(), Diagnostics::new());
+        let (units, of_properties, mut ignored) =
+            (self.units.clone(), BTreeSet::new(), Diagnostics::new());
         let vocabulary = self.vocabulary;
-        Seen { rule: self.rule, vocabulary, units, of_properties, diagnostics: &mut ignored }.expression(expr, span)
+        Seen {
+            rule: self.rule,
+            vocabulary,
+            units,
+            of_properties,
+            diagnostics: &mut ignored,
+        }
+        .expression(expr, span)
     }
 
-    /// Warns (R045) of an angle that is compared with a number beyond a full turn, which is probably in degrees.
+    /// Warns (R045) of an angle that is compared with a number beyond a full turn, which is
+    /// probably in degrees.
     fn degrees(&mut self, angle: &Expr, number: &Expr, span: &Span) {
         let unit = self.unit_of(angle, span);
         let Expr::Constant(term) = number else { return };
-        let Some(number) = term.number().filter(|number| unit == Some(RADIAN) && number.abs() > FULL_TURN_RAD) else {
+        let Some(number) = term
+            .number()
+            .filter(|number| unit == Some(RADIAN) && number.abs() > FULL_TURN_RAD)
+        else {
             return;
         };
         self.beyond_full_turn(number, span);
     }
 
     fn beyond_full_turn(&mut self, number: f64, span: &Span) {
-        let message = format!("an angle in rad is compared with {number}, which is more than a full turn");
+        let message =
+            format!("an angle in rad is compared with {number}, which is more than a full turn");
         let help = format!("{number} degrees are {:.4} rad", number.to_radians());
-        self.diagnostics
-            .push(Diagnostic::warning("R045", message).at(&self.rule.origin.source, span.clone()).help(help));
+        self.diagnostics.push(
+            Diagnostic::warning("R045", message)
+                .at(&self.rule.origin.source, span.clone())
+                .help(help),
+        );
     }
 
     /// Records the unit of a variable and reports a conflict with its known unit.
@@ -253,7 +371,10 @@ impl Seen<'_> {
         match (self.units[variable], unit) {
             (Some(known), Some(unit)) if known != unit => {
                 let name = &self.rule.variables[variable];
-                self.fault(format!("`?{name}` is in {} and in {}", shown(known), shown(unit)), span);
+                self.fault(
+                    format!("`?{name}` is in {} and in {}", shown(known), shown(unit)),
+                    span,
+                );
             }
             (None, unit) => self.units[variable] = unit,
             _ => {}
@@ -265,7 +386,10 @@ impl Seen<'_> {
             && a != b
         {
             let between = if word == "adds" { "and" } else { "with" };
-            self.fault(format!("the rule {word} {} {between} {}", shown(a), shown(b)), span);
+            self.fault(
+                format!("the rule {word} {} {between} {}", shown(a), shown(b)),
+                span,
+            );
         }
         a.or(b)
     }
@@ -285,9 +409,16 @@ impl Seen<'_> {
             }
             Expr::Timed(timed) => {
                 let mut units = Vec::new();
-                timed.formulas().iter().for_each(|formula| self.formula(formula, &mut units));
+                timed
+                    .formulas()
+                    .iter()
+                    .for_each(|formula| self.formula(formula, &mut units));
                 // Robustness has a unit if all comparisons have the same.
-                units.first().copied().flatten().filter(|unit| units.iter().all(|other| *other == Some(*unit)))
+                units
+                    .first()
+                    .copied()
+                    .flatten()
+                    .filter(|unit| units.iter().all(|other| *other == Some(*unit)))
             }
             Expr::Constant(_) | Expr::Matches(..) => None,
         }
@@ -296,7 +427,9 @@ impl Seen<'_> {
     /// Checks the comparisons of a formula and appends the unit of each.
     fn formula(&mut self, formula: &Formula, found: &mut Vec<Unit>) {
         match formula {
-            Formula::Compare { left, right, span, .. } => {
+            Formula::Compare {
+                left, right, span, ..
+            } => {
                 let (a, b) = (self.quantity(left, span), self.quantity(right, span));
                 found.push(self.alike(a, b, "compares", span));
                 for (unit, other) in [(a, right), (b, left)] {
@@ -308,7 +441,9 @@ impl Seen<'_> {
                 }
             }
             Formula::Truth { .. } => {}
-            Formula::Not(inner) | Formula::Consequent { formula: inner, .. } => self.formula(inner, found),
+            Formula::Not(inner) | Formula::Consequent { formula: inner, .. } => {
+                self.formula(inner, found)
+            }
             Formula::And(parts) | Formula::Or(parts) | Formula::Temporal { parts, .. } => {
                 parts.iter().for_each(|part| self.formula(part, found));
             }
@@ -319,7 +454,9 @@ impl Seen<'_> {
         match quantity {
             Quantity::Number(_) => None,
             Quantity::Variable(variable) => self.units[*variable],
-            Quantity::Recorded { iri, .. } => dimension(self.vocabulary.terms.get(iri.as_str())?.unit.as_deref()?),
+            Quantity::Recorded { iri, .. } => {
+                dimension(self.vocabulary.terms.get(iri.as_str())?.unit.as_deref()?)
+            }
             Quantity::Call(builtin, args) => {
                 let units: Vec<Unit> = args.iter().map(|arg| self.quantity(arg, span)).collect();
                 self.call(builtin.name, &units, span)
@@ -331,17 +468,32 @@ impl Seen<'_> {
         let first = units.first().copied().flatten();
         match name {
             "SUM" | "MINUS" | "MIN" | "MAX" => {
-                let word = if name == "SUM" || name == "MINUS" { "adds" } else { "compares" };
-                units.iter().fold(None, |known, unit| self.alike(known, *unit, word, span))
+                let word = if name == "SUM" || name == "MINUS" {
+                    "adds"
+                } else {
+                    "compares"
+                };
+                units
+                    .iter()
+                    .fold(None, |known, unit| self.alike(known, *unit, word, span))
             }
-            "PRODUCT" => units.iter().copied().reduce(|a, b| Some(combine(a?, b?, 1))).flatten(),
+            "PRODUCT" => units
+                .iter()
+                .copied()
+                .reduce(|a, b| Some(combine(a?, b?, 1)))
+                .flatten(),
             "DIVISION" => Some(combine(first?, units.get(1).copied().flatten()?, -1)),
-            "SQRT" => first.filter(|unit| unit.iter().all(|power| power % 2 == 0)).map(|unit| unit.map(|p| p / 2)),
-            "ABS" | "ROUND" | "FLOOR" | "CEIL" | "INVERSE" | "NEGATIVE" | "DOUBLE" | "geo3d:distance"
-            | "geo3d:distance2d" | "geo3d:norm" | "geo3d:boxDistance" => first,
+            "SQRT" => first
+                .filter(|unit| unit.iter().all(|power| power % 2 == 0))
+                .map(|unit| unit.map(|p| p / 2)),
+            "ABS" | "ROUND" | "FLOOR" | "CEIL" | "INVERSE" | "NEGATIVE" | "DOUBLE"
+            | "geo3d:distance" | "geo3d:distance2d" | "geo3d:norm" | "geo3d:boxDistance" => first,
             "SIN" | "COS" | "TAN" => {
                 if let Some(unit) = first.filter(|unit| *unit != RADIAN && *unit != NONE) {
-                    self.fault(format!("{name} takes an angle in rad, not {}", shown(unit)), span);
+                    self.fault(
+                        format!("{name} takes an angle in rad, not {}", shown(unit)),
+                        span,
+                    );
                 }
                 Some(NONE)
             }

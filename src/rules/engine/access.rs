@@ -76,13 +76,18 @@ impl<'a> Access<'a> {
             own.grown[place].batches(part, index, &mut found);
             return found;
         }
-        let Some(table) = layers.get(predicate) else { return found };
+        let Some(table) = layers.get(predicate) else {
+            return found;
+        };
         // Tables of other evaluations know the planned indexes only.
         if index < self.planned.of(predicate).len() {
             found.push(Batch::Plain(table.index(index)));
             return found;
         }
-        let (width, order) = (self.predicates.get(predicate).width, &self.indexes.of(predicate)[index]);
+        let (width, order) = (
+            self.predicates.get(predicate).width,
+            &self.indexes.of(predicate)[index],
+        );
         let unaccounted = &mut self.unaccounted;
         let rows = self.added.entry((predicate, index)).or_insert_with(|| {
             *unaccounted += size_of_val(table.index(0));
@@ -103,14 +108,22 @@ impl<'a> Access<'a> {
         meter: &mut Meter,
     ) -> Result<Vec<Batch<'b>>, Stop> {
         let (predicate, name) = keyed.id();
-        if !self.keyed.get(&predicate).is_some_and(|known| known.contains_key(name)) {
-            let [old, recent] = [Part::Old, Part::Recent].map(|part| self.batches(predicate, part, 0, layers, own));
+        if !self
+            .keyed
+            .get(&predicate)
+            .is_some_and(|known| known.contains_key(name))
+        {
+            let [old, recent] =
+                [Part::Old, Part::Recent].map(|part| self.batches(predicate, part, 0, layers, own));
             // The parts of finished tuples are equal.
             let is_own = own.is_some_and(|own| own.place(predicate).is_some());
             let recent = if is_own { recent } else { Vec::new() };
             let width = self.predicates.get(predicate).width;
             let rows = KeyedRows::new(keyed, (&old, &recent), width, universe, meter)?;
-            self.keyed.entry(predicate).or_default().insert(name.to_owned(), rows);
+            self.keyed
+                .entry(predicate)
+                .or_default()
+                .insert(name.to_owned(), rows);
         }
         let mut found = Vec::new();
         if let Some(rows) = self.keyed.get(&predicate).and_then(|known| known.get(name)) {
@@ -119,8 +132,8 @@ impl<'a> Access<'a> {
         Ok(found)
     }
 
-    /// Begins a round of a recursive stratum for the rows that are sorted by computed values. `places`: the predicates of
-    /// the stratum that may have changed.
+    /// Begins a round of a recursive stratum for the rows that are sorted by computed values.
+    /// `places`: the predicates of the stratum that may have changed.
     pub(crate) fn advance(
         &mut self,
         places: &[usize],
@@ -130,17 +143,25 @@ impl<'a> Access<'a> {
     ) -> Result<(), Stop> {
         for place in places {
             let predicate = own.stratum.predicates[*place];
-            let Some(known) = self.keyed.get_mut(&predicate) else { continue };
+            let Some(known) = self.keyed.get_mut(&predicate) else {
+                continue;
+            };
             let mut recent = Vec::new();
             own.grown[*place].batches(Part::Recent, 0, &mut recent);
             for rows in known.values_mut() {
-                rows.advance(&recent, self.predicates.get(predicate).width, universe, meter)?;
+                rows.advance(
+                    &recent,
+                    self.predicates.get(predicate).width,
+                    universe,
+                    meter,
+                )?;
             }
         }
         Ok(())
     }
 
-    /// Returns an index that begins with some columns (in any order) and is there already, or quickly made.
+    /// Returns an index that begins with some columns (in any order) and is there already, or
+    /// quickly made.
     pub(crate) fn index_at_hand(
         &mut self,
         predicate: PredicateId,
@@ -174,7 +195,12 @@ impl<'a> Access<'a> {
         let count = batches.iter().map(|rows| rows.len() / width).sum();
         let known = self.distinct.entry(predicate).or_default();
         if known.0 != count || known.1.is_empty() {
-            *known = (count, (0..width).map(|column| distinct_values(&batches, width, column)).collect());
+            *known = (
+                count,
+                (0..width)
+                    .map(|column| distinct_values(&batches, width, column))
+                    .collect(),
+            );
         }
         known.1.get(column).copied().unwrap_or(1.0).max(1.0)
     }

@@ -10,10 +10,19 @@ use crate::model::universe::Universe;
 use crate::model::values::{Number, decimal, double_term, is_beyond_64_bits, lexical};
 use actcheck_base::{Term, TermId};
 
-/// Returns the operands that an aggregation reads: the group, then each aggregate's input and distinct variables.
+/// Returns the operands that an aggregation reads: the group, then each aggregate's input and
+/// distinct variables.
 pub(crate) fn projection(aggregation: &Aggregation) -> Vec<Operand> {
-    let inputs = aggregation.aggregates.iter().flat_map(|a| std::iter::once(&a.input).chain(&a.distinct));
-    aggregation.group.iter().chain(inputs).map(|variable| Operand::Variable(*variable)).collect()
+    let inputs = aggregation
+        .aggregates
+        .iter()
+        .flat_map(|a| std::iter::once(&a.input).chain(&a.distinct));
+    aggregation
+        .group
+        .iter()
+        .chain(inputs)
+        .map(|variable| Operand::Variable(*variable))
+        .collect()
 }
 
 /// Gives ids to computed values.
@@ -48,7 +57,8 @@ impl<'t> Ids<'t> for Known<'_, 't> {
     }
 }
 
-/// Returns the head rows of an aggregating rule. `matches`: rows of the projection, sorted and distinct.
+/// Returns the head rows of an aggregating rule. `matches`: rows of the projection, sorted and
+/// distinct.
 pub(crate) fn aggregate(
     rule: &Rule,
     aggregation: &Aggregation,
@@ -72,8 +82,8 @@ pub(crate) fn aggregate(
     Ok(out)
 }
 
-/// Returns the head row of one group, which consists of rows of the projection. Returns `None` if the group is empty, if
-/// an aggregate has no value, or if the budget is spent.
+/// Returns the head row of one group, which consists of rows of the projection. Returns `None` if
+/// the group is empty, if an aggregate has no value, or if the budget is spent.
 pub(crate) fn group_head<'t>(
     rule: &Rule,
     aggregation: &Aggregation,
@@ -106,12 +116,22 @@ pub(crate) fn group_head<'t>(
         let value = value.value(&binding, ids.universe(), watch)?.into_owned();
         binding[*variable] = ids.id_of(value, watch)?;
     }
-    Some(rule.head.args.iter().map(|arg| operand_value(*arg, &binding)).collect())
+    Some(
+        rule.head
+            .args
+            .iter()
+            .map(|arg| operand_value(*arg, &binding))
+            .collect(),
+    )
 }
 
-/// Computes the value of an aggregate, which does not depend on the order of the inputs. Returns `None` if it needs
-/// numbers and no input is one, or if the evaluation must stop.
-fn combine<'a>(kind: AggregateKind, inputs: impl Iterator<Item = &'a Term>, watch: &Watch) -> Option<Term> {
+/// Computes the value of an aggregate, which does not depend on the order of the inputs. Returns
+/// `None` if it needs numbers and no input is one, or if the evaluation must stop.
+fn combine<'a>(
+    kind: AggregateKind,
+    inputs: impl Iterator<Item = &'a Term>,
+    watch: &Watch,
+) -> Option<Term> {
     match kind {
         AggregateKind::Count => Some(Term::Integer(i64::try_from(inputs.count()).ok()?)),
         AggregateKind::Min => numbers(inputs).min_by(by_size).cloned(),
@@ -135,7 +155,9 @@ fn exactly(a: &Term, b: &Term) -> Ordering {
     match (a, b) {
         (Term::Integer(a), Term::Integer(b)) => a.cmp(b),
         // Rounding keeps the order, so that only equal doubles need all digits.
-        _ => builtins::compare(a, b).filter(|order| order.is_ne()).unwrap_or_else(|| by_digits(&digits(a), &digits(b))),
+        _ => builtins::compare(a, b)
+            .filter(|order| order.is_ne())
+            .unwrap_or_else(|| by_digits(&digits(a), &digits(b))),
     }
 }
 
@@ -170,9 +192,9 @@ fn by_digits(a: &str, b: &str) -> Ordering {
 /// Doubles whose sum is beyond the largest double are scaled by this, and summed again.
 const SCALE: f64 = 1.0 / (1u64 << 40) as f64;
 
-/// Sums numbers: the result is an integer if all are integers, otherwise a double. Integers are summed exactly, and doubles
-/// in sorted order. Returns `None` if there are no numbers, or if one is not finite. A sum that its type can't hold stops
-/// the evaluation.
+/// Sums numbers: the result is an integer if all are integers, otherwise a double. Integers are
+/// summed exactly, and doubles in sorted order. Returns `None` if there are no numbers, or if one
+/// is not finite. A sum that its type can't hold stops the evaluation.
 fn sum<'a>(inputs: impl Iterator<Item = &'a Term>, watch: &Watch) -> Option<Term> {
     let (mut whole, mut parts, mut any) = (0i128, Vec::new(), false);
     for term in inputs {
@@ -188,7 +210,9 @@ fn sum<'a>(inputs: impl Iterator<Item = &'a Term>, watch: &Watch) -> Option<Term
     }
     if parts.is_empty() {
         let sum = i64::try_from(whole).map(Term::Integer);
-        return sum.inspect_err(|_| watch.no_value(format!("the sum {whole} does not fit in 64 bits"))).ok();
+        return sum
+            .inspect_err(|_| watch.no_value(format!("the sum {whole} does not fit in 64 bits")))
+            .ok();
     }
     parts.sort_by(f64::total_cmp);
     let mut total = parts.iter().sum::<f64>() + whole as f64;
@@ -215,7 +239,9 @@ mod tests {
         for term in inputs {
             let mut longer = Vec::new();
             for order in &orders {
-                longer.extend((0..=order.len()).map(|at| [&order[..at], &[term], &order[at..]].concat()));
+                longer.extend(
+                    (0..=order.len()).map(|at| [&order[..at], &[term], &order[at..]].concat()),
+                );
             }
             orders = longer;
         }
@@ -226,7 +252,10 @@ mod tests {
         };
         let mut values = orders.into_iter().map(value);
         let first = values.next().expect("there is one order at least");
-        assert!(values.all(|value| value == first), "{kind:?} of {inputs:?} depends on the order");
+        assert!(
+            values.all(|value| value == first),
+            "{kind:?} of {inputs:?} depends on the order"
+        );
         first
     }
 
@@ -238,21 +267,77 @@ mod tests {
         let huge = i64::MAX;
         for (kind, inputs, value) in [
             (Sum, vec![int(huge), int(1), int(-2)], Some(int(huge - 1))),
-            (Sum, vec![int(i64::MIN), int(-1), int(5), int(huge)], Some(int(3))),
-            (Sum, vec![double(1.7e308), double(1.6e308), double(-1.7e308)], Some(double(1.6e308))),
-            (Sum, vec![double(0.5), double(1e15), int(3), double(-1e15)], Some(double(3.5))),
+            (
+                Sum,
+                vec![int(i64::MIN), int(-1), int(5), int(huge)],
+                Some(int(3)),
+            ),
+            (
+                Sum,
+                vec![double(1.7e308), double(1.6e308), double(-1.7e308)],
+                Some(double(1.6e308)),
+            ),
+            (
+                Sum,
+                vec![double(0.5), double(1e15), int(3), double(-1e15)],
+                Some(double(3.5)),
+            ),
             (Sum, vec![double(f64::INFINITY), int(1)], None),
             (Sum, vec![double(f64::NAN), int(1)], None),
             (Sum, vec![Term::string("a")], None),
-            (Min, vec![int(1), double(1.0), decimal("1.5"), Term::string("a")], Some(int(1))),
-            (Max, vec![int(1), double(1.0), double(f64::NAN)], Some(double(1.0))),
-            (Max, vec![int(huge), double(9.3e18), int(huge - 1)], Some(double(9.3e18))),
-            (Max, vec![int(huge), double(9.223372036854775e18), int(huge - 1)], Some(int(huge))),
-            (Max, vec![int(huge), double(9_223_372_036_854_775_808.0)], Some(double(9_223_372_036_854_775_808.0))),
-            (Min, vec![decimal("0.1"), double(0.1), decimal("0.10000000000000000001")], Some(decimal("0.1"))),
-            (Max, vec![decimal("0.1"), double(0.1), decimal("0.10000000000000000001")], Some(double(0.1))),
-            (Min, vec![decimal("-0.5"), decimal("-0.50000000000000000001")], Some(decimal("-0.50000000000000000001"))),
-            (Max, vec![double(f64::INFINITY), int(1)], Some(double(f64::INFINITY))),
+            (
+                Min,
+                vec![int(1), double(1.0), decimal("1.5"), Term::string("a")],
+                Some(int(1)),
+            ),
+            (
+                Max,
+                vec![int(1), double(1.0), double(f64::NAN)],
+                Some(double(1.0)),
+            ),
+            (
+                Max,
+                vec![int(huge), double(9.3e18), int(huge - 1)],
+                Some(double(9.3e18)),
+            ),
+            (
+                Max,
+                vec![int(huge), double(9.223372036854775e18), int(huge - 1)],
+                Some(int(huge)),
+            ),
+            (
+                Max,
+                vec![int(huge), double(9_223_372_036_854_775_808.0)],
+                Some(double(9_223_372_036_854_775_808.0)),
+            ),
+            (
+                Min,
+                vec![
+                    decimal("0.1"),
+                    double(0.1),
+                    decimal("0.10000000000000000001"),
+                ],
+                Some(decimal("0.1")),
+            ),
+            (
+                Max,
+                vec![
+                    decimal("0.1"),
+                    double(0.1),
+                    decimal("0.10000000000000000001"),
+                ],
+                Some(double(0.1)),
+            ),
+            (
+                Min,
+                vec![decimal("-0.5"), decimal("-0.50000000000000000001")],
+                Some(decimal("-0.50000000000000000001")),
+            ),
+            (
+                Max,
+                vec![double(f64::INFINITY), int(1)],
+                Some(double(f64::INFINITY)),
+            ),
         ] {
             assert_eq!(of(kind, &inputs), Ok(value), "{kind:?} of {inputs:?}");
         }
@@ -260,8 +345,15 @@ mod tests {
 
     #[test]
     fn a_sum_that_does_not_fit_stops_the_evaluation() {
-        for inputs in [[Term::Integer(i64::MAX), Term::Integer(1)], [Term::Double(1.7e308), Term::Double(1.6e308)]] {
-            assert_eq!(of(AggregateKind::Sum, &inputs), Err(Stop::Value), "{inputs:?}");
+        for inputs in [
+            [Term::Integer(i64::MAX), Term::Integer(1)],
+            [Term::Double(1.7e308), Term::Double(1.6e308)],
+        ] {
+            assert_eq!(
+                of(AggregateKind::Sum, &inputs),
+                Err(Stop::Value),
+                "{inputs:?}"
+            );
         }
     }
 }

@@ -3,7 +3,8 @@
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-/// Limits on one evaluation. Change single limits of the default, so that new ones keep their default:
+/// Limits on one evaluation. Change single limits of the default, so that new ones keep their
+/// default:
 ///
 /// ```
 /// use actcheck_rules::Budget;
@@ -21,13 +22,21 @@ pub struct Budget {
     pub new_things: usize,
     /// Wall time. Unit: seconds.
     pub secs: f64,
-    /// Set by another thread to stop the evaluation, but not before it has run for 0.2 s: short ones are finished.
+    /// Set by another thread to stop the evaluation, but not before it has run for 0.2 s: short
+    /// ones are finished.
     pub stop: Arc<AtomicBool>,
 }
 
 impl Default for Budget {
     fn default() -> Self {
-        // A pick run derives some hundred tuples in under a millisecond, so all limits are far above realistic rules.
-        Self { tuples: 5_000_000, bytes: 1 << 30, new_things: 10_000, secs: 10.0, stop: Arc::default() }
+        // A pick run derives some hundred tuples in under a millisecond, so all limits are far
+        // above realistic rules.
+        Self {
+            tuples: 5_000_000,
+            bytes: 1 << 30,
+            new_things: 10_000,
+            secs: 10.0,
+            stop: Arc::default(),
+        }
     }
 }

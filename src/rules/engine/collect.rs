@@ -21,11 +21,15 @@ pub(crate) struct Sink {
 
 impl Sink {
     pub(crate) fn new(operands: Vec<Operand>) -> Self {
-        Self { operands, rows: Vec::new(), limit: LEAST_SINK }
+        Self {
+            operands,
+            rows: Vec::new(),
+            limit: LEAST_SINK,
+        }
     }
 
-    /// Sets the next limit: in proportion to the collected rows, so that merging takes amortised constant time for a
-    /// row, and small if memory is short. `collected`: terms.
+    /// Sets the next limit: in proportion to the collected rows, so that merging takes amortised
+    /// constant time for a row, and small if memory is short. `collected`: terms.
     pub(crate) fn adapt(&mut self, collected: usize, watch: &Watch) {
         let eighth = watch.left() / 8;
         let most = (eighth / size_of::<TermId>()).max(LEAST_SINK);
@@ -45,10 +49,16 @@ pub(crate) struct Distinct {
 }
 
 impl Distinct {
-    /// `rows`: sorted, without duplicates, and accounted for. `copies`: how often a row is stored later.
+    /// `rows`: sorted, without duplicates, and accounted for. `copies`: how often a row is stored
+    /// later.
     pub(crate) fn new(width: usize, rows: Vec<TermId>, copies: usize) -> Self {
         let known = rows.len() / width;
-        Self { width, rows, row_bytes: bytes_of_row(width, copies), known }
+        Self {
+            width,
+            rows,
+            row_bytes: bytes_of_row(width, copies),
+            known,
+        }
     }
 
     /// Adds the rows of a sink and empties it.
@@ -82,7 +92,8 @@ impl Distinct {
     }
 }
 
-/// Returns the memory of a row that is stored `copies` times, with the copy of a sort or merge. Unit: bytes.
+/// Returns the memory of a row that is stored `copies` times, with the copy of a sort or merge.
+/// Unit: bytes.
 pub(crate) fn bytes_of_row(width: usize, copies: usize) -> usize {
     width * size_of::<TermId>() * (copies + 1)
 }
@@ -105,13 +116,19 @@ mod tests {
                 distinct.add(&mut sink, &watch).expect("there is room");
             }
             assert_eq!(distinct.new_rows(), 2);
-            assert_eq!(distinct.into_rows(), [1, 5, 9].into_iter().flat_map(row).collect::<Vec<_>>());
+            assert_eq!(
+                distinct.into_rows(),
+                [1, 5, 9].into_iter().flat_map(row).collect::<Vec<_>>()
+            );
         }
     }
 
     #[test]
     fn rows_beyond_the_memory_are_refused() {
-        let watch = Watch::new(&Budget { bytes: 1000, ..Budget::default() });
+        let watch = Watch::new(&Budget {
+            bytes: 1000,
+            ..Budget::default()
+        });
         let mut distinct = Distinct::new(1, Vec::new(), 1);
         let mut sink = Sink::new(Vec::new());
         sink.rows.extend(0..100);

@@ -1,9 +1,10 @@
 //! Equalities as joins.
 //!
-//! In `r(?i), ?j = ?i + 1, s(?j)`, the value of `?j` is known before `s` is read, so that only its rows are looked up. In
-//! `r(?a), s(?b), ?a + 1 = ROUND(?b)`, the rows of `s` are sorted by the value of `ROUND(?b)`, and looked up by that of
-//! `?a + 1`. Two values are equal if they are the same term, and the same term has one id: a look-up finds exactly the
-//! rows for which the equality holds.
+//! In `r(?i), ?j = ?i + 1, s(?j)`, the value of `?j` is known before `s` is read, so that only its
+//! rows are looked up. In `r(?a), s(?b), ?a + 1 = ROUND(?b)`, the rows of `s` are sorted by the
+//! value of `ROUND(?b)`, and looked up by that of `?a + 1`. Two values are equal if they are the
+//! same term, and the same term has one id: a look-up finds exactly the rows for which the equality
+//! holds.
 
 use std::sync::Arc;
 
@@ -18,13 +19,23 @@ use crate::model::universe::Universe;
 use crate::syntax::Comparison;
 use actcheck_base::TermId;
 
-/// Returns the two sides of a condition that holds exactly if both have the same value. Formulas over time are left where
-/// they are, because their values may be missing.
+/// Returns the two sides of a condition that holds exactly if both have the same value. Formulas
+/// over time are left where they are, because their values may be missing.
 fn sides(literal: &Literal) -> Option<(Expr, Expr)> {
     let (left, right) = match literal {
-        Literal::Compare { op: Comparison::Equal, left, right, .. } => (left.clone(), right.clone()),
-        Literal::Assign { variable, value, .. } => (Expr::Variable(*variable), value.clone()),
-        Literal::Test { value: Expr::Call(function, args), .. } => match args.as_slice() {
+        Literal::Compare {
+            op: Comparison::Equal,
+            left,
+            right,
+            ..
+        } => (left.clone(), right.clone()),
+        Literal::Assign {
+            variable, value, ..
+        } => (Expr::Variable(*variable), value.clone()),
+        Literal::Test {
+            value: Expr::Call(function, args),
+            ..
+        } => match args.as_slice() {
             [left, right] if builtins::is_equality(function) => (left.clone(), right.clone()),
             _ => return None,
         },
@@ -46,10 +57,14 @@ fn variables(expr: &Expr) -> Vec<Variable> {
 /// Returns the unbound variable that an equality gives a value, and the value.
 pub(crate) fn given(literal: &Literal, bound: &[bool]) -> Option<(Variable, Expr)> {
     let (left, right) = sides(literal)?;
-    [(&left, &right), (&right, &left)].into_iter().find_map(|(target, value)| match target {
-        Expr::Variable(variable) if !bound[*variable] && all_bound(value, bound) => Some((*variable, value.clone())),
-        _ => None,
-    })
+    [(&left, &right), (&right, &left)]
+        .into_iter()
+        .find_map(|(target, value)| match target {
+            Expr::Variable(variable) if !bound[*variable] && all_bound(value, bound) => {
+                Some((*variable, value.clone()))
+            }
+            _ => None,
+        })
 }
 
 /// Marks the variables to which equalities of a group give values.
@@ -66,7 +81,8 @@ pub(crate) fn is_assigned(rule: &Rule, variable: Variable) -> bool {
         .any(|literal| matches!(literal, Literal::Assign { variable: assigned, .. } if *assigned == variable))
 }
 
-/// An equality of a value that is known before an atom is read, and one computed from the atom's columns.
+/// An equality of a value that is known before an atom is read, and one computed from the atom's
+/// columns.
 #[derive(Debug, Clone)]
 pub(crate) struct Meeting {
     /// Position of the equality in the body.
@@ -85,12 +101,19 @@ pub(crate) fn meeting(
     let own = operand_variables(&atom.args);
     conditions.into_iter().find_map(|idx| {
         let (left, right) = sides(&rule.body[idx])?;
-        [(&left, &right), (&right, &left)].into_iter().find_map(|(known, computed)| {
-            let read = variables(computed);
-            let is_computed = read.iter().all(|variable| own.contains(variable)) && !all_bound(computed, bound);
-            let found = is_computed && all_bound(known, bound);
-            found.then(|| Meeting { idx, known: known.clone(), computed: computed.clone() })
-        })
+        [(&left, &right), (&right, &left)]
+            .into_iter()
+            .find_map(|(known, computed)| {
+                let read = variables(computed);
+                let is_computed = read.iter().all(|variable| own.contains(variable))
+                    && !all_bound(computed, bound);
+                let found = is_computed && all_bound(known, bound);
+                found.then(|| Meeting {
+                    idx,
+                    known: known.clone(),
+                    computed: computed.clone(),
+                })
+            })
     })
 }
 
@@ -115,15 +138,16 @@ pub(crate) struct Keyed {
 }
 
 impl Keyed {
-    /// Returns the sorted rows for an atom; their key; and how the columns after it are matched, by their offsets. `slot`:
-    /// the variable that has the known value.
+    /// Returns the sorted rows for an atom; their key; and how the columns after it are matched, by
+    /// their offsets. `slot`: the variable that has the known value.
     pub(crate) fn new(
         atom: &Atom,
         meeting: &Meeting,
         slot: Variable,
         bound: &mut [bool],
     ) -> (Self, Vec<Operand>, Vec<(usize, Column)>) {
-        let (mut constants, mut columns, mut key, mut open) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+        let (mut constants, mut columns, mut key, mut open) =
+            (Vec::new(), Vec::new(), Vec::new(), Vec::new());
         for (column, arg) in atom.args.iter().enumerate() {
             match arg {
                 Operand::Constant(id) => constants.push((column, *id)),
@@ -139,18 +163,35 @@ impl Keyed {
         let mut matched = Vec::new();
         for column in open {
             if let Operand::Variable(variable) = atom.args[column] {
-                let how = if bound[variable] { Column::Same(variable) } else { Column::Bind(variable) };
+                let how = if bound[variable] {
+                    Column::Same(variable)
+                } else {
+                    Column::Bind(variable)
+                };
                 bound[variable] = true;
                 matched.push((columns.len(), how));
             }
             columns.push(Source::Column(column));
         }
         let place = |variable: Variable| {
-            atom.args.iter().position(|arg| *arg == Operand::Variable(variable)).unwrap_or_default()
+            atom.args
+                .iter()
+                .position(|arg| *arg == Operand::Variable(variable))
+                .unwrap_or_default()
         };
         let value = meeting.computed.renamed(&place);
         let name = format!("{value:?} {constants:?} {columns:?}");
-        (Self { predicate: atom.predicate, constants, columns, value, name }, key, matched)
+        (
+            Self {
+                predicate: atom.predicate,
+                constants,
+                columns,
+                value,
+                name,
+            },
+            key,
+            matched,
+        )
     }
 
     /// Returns the number of columns of the sorted rows.
@@ -174,12 +215,20 @@ impl Keyed {
         let mut sorted = Vec::new();
         for row in batches.iter().flat_map(|rows| rows.chunks_exact(width)) {
             meter.step()?;
-            if self.constants.iter().any(|(column, id)| row[*column] != *id) {
+            if self
+                .constants
+                .iter()
+                .any(|(column, id)| row[*column] != *id)
+            {
                 continue;
             }
             let watch = &meter.watch;
             watch.begin();
-            let Some(value) = self.value.value(row, universe, watch).map(std::borrow::Cow::into_owned) else {
+            let Some(value) = self
+                .value
+                .value(row, universe, watch)
+                .map(std::borrow::Cow::into_owned)
+            else {
                 watch.stopped()?;
                 continue;
             };
@@ -196,7 +245,8 @@ impl Keyed {
     }
 }
 
-/// Sorted rows during one evaluation. Those of growing tuples are kept in runs of decreasing length.
+/// Sorted rows during one evaluation. Those of growing tuples are kept in runs of decreasing
+/// length.
 #[derive(Debug)]
 pub(crate) struct KeyedRows {
     keyed: Arc<Keyed>,
@@ -215,7 +265,11 @@ impl KeyedRows {
     ) -> Result<Self, Stop> {
         let old = keyed.sorted(old, width, universe, meter)?;
         let recent = keyed.sorted(recent, width, universe, meter)?;
-        Ok(Self { keyed: Arc::clone(keyed), old: vec![old.into()], recent: recent.into() })
+        Ok(Self {
+            keyed: Arc::clone(keyed),
+            old: vec![old.into()],
+            recent: recent.into(),
+        })
     }
 
     /// Begins a round: the recent rows become old, and others are recent.

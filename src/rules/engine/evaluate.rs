@@ -35,7 +35,10 @@ impl Tables {
 
     /// Removes and returns the rows of a predicate.
     pub(crate) fn take_rows(&mut self, predicate: PredicateId) -> Vec<TermId> {
-        self.list.get_mut(predicate).and_then(Option::take).map_or(Vec::new(), |table| table.into_rows())
+        self.list
+            .get_mut(predicate)
+            .and_then(Option::take)
+            .map_or(Vec::new(), |table| table.into_rows())
     }
 
     pub(crate) fn set(&mut self, predicate: PredicateId, table: Box<dyn Finished>) {
@@ -46,7 +49,8 @@ impl Tables {
     }
 }
 
-/// Finished tuples in layers: a predicate missing from the own tables is looked up in the layers below.
+/// Finished tuples in layers: a predicate missing from the own tables is looked up in the layers
+/// below.
 pub(crate) struct Layers<'a> {
     pub(crate) own: Tables,
     /// Nearest layer first.
@@ -55,7 +59,9 @@ pub(crate) struct Layers<'a> {
 
 impl Layers<'_> {
     pub(crate) fn get(&self, predicate: PredicateId) -> Option<&dyn Finished> {
-        self.own.get(predicate).or_else(|| self.below.iter().find_map(|tables| tables.get(predicate)))
+        self.own
+            .get(predicate)
+            .or_else(|| self.below.iter().find_map(|tables| tables.get(predicate)))
     }
 
     /// Returns the sorted rows of a predicate; empty if it has no tuples.
@@ -80,7 +86,12 @@ pub(crate) struct Planned {
 
 impl Planned {
     /// Plans every rule of a stratified program.
-    pub(crate) fn new(program: Program, strata: Vec<Stratum>, indexes: &mut Indexes, sizes: Sizes<'_>) -> Self {
+    pub(crate) fn new(
+        program: Program,
+        strata: Vec<Stratum>,
+        indexes: &mut Indexes,
+        sizes: Sizes<'_>,
+    ) -> Self {
         let mut plans: Vec<Option<RulePlan>> = vec![None; program.rules.len()];
         let mut searches: Vec<Option<Search>> = vec![None; program.rules.len()];
         for stratum in &strata {
@@ -93,7 +104,14 @@ impl Planned {
             }
         }
         let endless = endless(&program.rules).iter().map(Endless::made).collect();
-        Self { rules: program.rules, strata, facts: program.facts, plans, searches, endless }
+        Self {
+            rules: program.rules,
+            strata,
+            facts: program.facts,
+            plans,
+            searches,
+            endless,
+        }
     }
 }
 
@@ -105,8 +123,8 @@ pub(crate) struct Stopped {
     pub(crate) rule: Option<usize>,
 }
 
-/// The round in which each tuple of a recursive stratum was first derived, counted over all strata. A proof that uses
-/// only premises of earlier rounds can't be circular.
+/// The round in which each tuple of a recursive stratum was first derived, counted over all strata.
+/// A proof that uses only premises of earlier rounds can't be circular.
 #[derive(Debug, Default)]
 pub(crate) struct Rounds {
     of: HashMap<(PredicateId, Vec<TermId>), u32>,
@@ -143,8 +161,17 @@ pub(crate) fn evaluate_recording_rounds(
     rounds: Option<&mut Rounds>,
 ) -> Result<(), Stopped> {
     let access = Access::new(predicates, indexes);
-    Run { planned, predicates, access, adapted: Adapted::new(), spent: HashMap::new(), universe, meter, rounds }
-        .all(layers)
+    Run {
+        planned,
+        predicates,
+        access,
+        adapted: Adapted::new(),
+        spent: HashMap::new(),
+        universe,
+        meter,
+        rounds,
+    }
+    .all(layers)
 }
 
 /// Memory of a recorded round without the row. Unit: bytes.
@@ -169,9 +196,13 @@ pub(crate) type Grown = Vec<Box<dyn Growing>>;
 impl Run<'_, '_, '_> {
     /// Evaluates all strata.
     pub(crate) fn all(&mut self, layers: &mut Layers<'_>) -> Result<(), Stopped> {
-        self.facts(layers).map_err(|stop| Stopped { stop, rule: None })?;
+        self.facts(layers)
+            .map_err(|stop| Stopped { stop, rule: None })?;
         for stratum in &self.planned.strata {
-            self.meter.check().map_err(|stop| Stopped { stop, rule: stratum.rules.first().copied() })?;
+            self.meter.check().map_err(|stop| Stopped {
+                stop,
+                rule: stratum.rules.first().copied(),
+            })?;
             if stratum.recursive {
                 self.recursive(stratum, layers)?;
             } else {
@@ -190,7 +221,9 @@ impl Run<'_, '_, '_> {
                 continue;
             }
             rows.extend(facts);
-            self.meter.watch.hold(rows.len() / self.predicates.get(*predicate).width * self.row_bytes(*predicate))?;
+            self.meter.watch.hold(
+                rows.len() / self.predicates.get(*predicate).width * self.row_bytes(*predicate),
+            )?;
             self.finish(*predicate, &rows, layers);
         }
         Ok(())
@@ -198,18 +231,29 @@ impl Run<'_, '_, '_> {
 
     /// Returns the memory of a tuple in all its orders. Unit: bytes.
     pub(crate) fn row_bytes(&self, predicate: PredicateId) -> usize {
-        bytes_of_row(self.predicates.get(predicate).width, self.access.indexes.of(predicate).len())
+        bytes_of_row(
+            self.predicates.get(predicate).width,
+            self.access.indexes.of(predicate).len(),
+        )
     }
 
     fn finish(&self, predicate: PredicateId, rows: &[TermId], layers: &mut Layers<'_>) {
         let width = self.predicates.get(predicate).width;
-        layers.own.set(predicate, finished(width, rows, self.access.indexes.of(predicate).clone()));
+        layers.own.set(
+            predicate,
+            finished(width, rows, self.access.indexes.of(predicate).clone()),
+        );
     }
 
     /// Evaluates a stratum without recursion: each rule once.
     fn once(&mut self, stratum: &Stratum, layers: &mut Layers<'_>) -> Result<(), Stopped> {
-        let Some(predicate) = stratum.predicates.first().copied() else { return Ok(()) };
-        let (width, orders) = (self.predicates.get(predicate).width, self.access.indexes.of(predicate).len());
+        let Some(predicate) = stratum.predicates.first().copied() else {
+            return Ok(());
+        };
+        let (width, orders) = (
+            self.predicates.get(predicate).width,
+            self.access.indexes.of(predicate).len(),
+        );
         let mut found = Distinct::new(width, layers.rows(predicate).to_vec(), orders);
         let mut sink = Sink::new(Vec::new());
         let mut empty = |sink: &mut Sink, meter: &Meter| {
@@ -217,14 +261,23 @@ impl Run<'_, '_, '_> {
             meter.room_for(found.new_rows())
         };
         for rule in &stratum.rules {
-            let stopped = |stop| Stopped { stop, rule: Some(*rule) };
+            let stopped = |stop| Stopped {
+                stop,
+                rule: Some(*rule),
+            };
             for variant in 0..self.variants(*rule).len() {
                 let mut empty = |_: &Grown, sink: &mut Sink, meter: &Meter| empty(sink, meter);
                 let grown = &mut Grown::new();
-                self.variant(*rule, variant, stratum, layers, grown, &mut sink, &mut empty).map_err(stopped)?;
+                self.variant(
+                    *rule, variant, stratum, layers, grown, &mut sink, &mut empty,
+                )
+                .map_err(stopped)?;
             }
         }
-        let stopped = |stop| Stopped { stop, rule: stratum.rules.last().copied() };
+        let stopped = |stop| Stopped {
+            stop,
+            rule: stratum.rules.last().copied(),
+        };
         empty(&mut sink, self.meter).map_err(stopped)?;
         self.meter.derived(found.new_rows()).map_err(stopped)?;
         self.finish(predicate, &found.into_rows(), layers);
@@ -235,7 +288,9 @@ impl Run<'_, '_, '_> {
     fn recursive(&mut self, stratum: &Stratum, layers: &mut Layers<'_>) -> Result<(), Stopped> {
         let mut grown = self.grow(stratum, layers);
         let readers = self.readers(stratum);
-        let mut makers = self.makers(stratum, layers).map_err(|stop| Stopped { stop, rule: None })?;
+        let mut makers = self
+            .makers(stratum, layers)
+            .map_err(|stop| Stopped { stop, rule: None })?;
         // The predicates that have new tuples, or had some in the last round.
         let mut active: BTreeSet<usize> = (0..grown.len()).collect();
         // Number of new tuples of the round.
@@ -251,8 +306,19 @@ impl Run<'_, '_, '_> {
             let places: Vec<usize> = active.iter().copied().collect();
             active.retain(|place| grown[*place].changed());
             self.access
-                .advance(&places, Own { stratum, grown: &grown }, self.universe, self.meter)
-                .map_err(|stop| Stopped { stop, rule: stratum.rules.first().copied() })?;
+                .advance(
+                    &places,
+                    Own {
+                        stratum,
+                        grown: &grown,
+                    },
+                    self.universe,
+                    self.meter,
+                )
+                .map_err(|stop| Stopped {
+                    stop,
+                    rule: stratum.rules.first().copied(),
+                })?;
             if active.is_empty() {
                 active.extend(self.turn(&mut makers, stratum, layers, &grown, &mut new)?);
                 if active.is_empty() {
@@ -260,17 +326,28 @@ impl Run<'_, '_, '_> {
                 }
                 continue;
             }
-            let mut due: Vec<(usize, usize)> = active.iter().flat_map(|place| &readers[*place]).copied().collect();
+            let mut due: Vec<(usize, usize)> = active
+                .iter()
+                .flat_map(|place| &readers[*place])
+                .copied()
+                .collect();
             due.sort_unstable();
-            let rule = due.first().map(|(rule, _)| *rule).or(stratum.rules.first().copied());
+            let rule = due
+                .first()
+                .map(|(rule, _)| *rule)
+                .or(stratum.rules.first().copied());
             let stopped = |stop| Stopped { stop, rule };
-            self.record_rounds(stratum, &active, &grown).map_err(stopped)?;
-            makers.add_matches(&active, &grown, &self.meter.watch).map_err(stopped)?;
+            self.record_rounds(stratum, &active, &grown)
+                .map_err(stopped)?;
+            makers
+                .add_matches(&active, &grown, &self.meter.watch)
+                .map_err(stopped)?;
             self.meter.derived(new).map_err(stopped)?;
             self.meter.check().map_err(stopped)?;
             new = 0;
             for (rule, variant) in due {
-                active.extend(self.insert_all(rule, variant, stratum, layers, &mut grown, &mut new)?);
+                active
+                    .extend(self.insert_all(rule, variant, stratum, layers, &mut grown, &mut new)?);
             }
         }
         for (predicate, growing) in stratum.predicates.iter().zip(grown) {
@@ -279,7 +356,8 @@ impl Run<'_, '_, '_> {
         Ok(())
     }
 
-    /// Returns the variants that read the recent tuples of each predicate of a stratum, as rule and position.
+    /// Returns the variants that read the recent tuples of each predicate of a stratum, as rule and
+    /// position.
     fn readers(&self, stratum: &Stratum) -> Vec<Vec<(usize, usize)>> {
         let mut readers = vec![Vec::new(); stratum.predicates.len()];
         for rule in &stratum.rules {
@@ -296,12 +374,21 @@ impl Run<'_, '_, '_> {
     }
 
     fn variants(&self, rule: usize) -> &'_ [Variant] {
-        self.planned.plans[rule].as_ref().map_or(&[], |plan| &plan.variants)
+        self.planned.plans[rule]
+            .as_ref()
+            .map_or(&[], |plan| &plan.variants)
     }
 
     /// Records the round of the recent tuples, if rounds are requested.
-    fn record_rounds(&mut self, stratum: &Stratum, active: &BTreeSet<usize>, grown: &Grown) -> Result<(), Stop> {
-        let Some(rounds) = &mut self.rounds else { return Ok(()) };
+    fn record_rounds(
+        &mut self,
+        stratum: &Stratum,
+        active: &BTreeSet<usize>,
+        grown: &Grown,
+    ) -> Result<(), Stop> {
+        let Some(rounds) = &mut self.rounds else {
+            return Ok(());
+        };
         rounds.next += 1;
         for place in active {
             let predicate = &stratum.predicates[*place];
@@ -310,7 +397,9 @@ impl Run<'_, '_, '_> {
             let width = self.predicates.get(*predicate).width;
             for row in batches.iter().flat_map(|batch| batch.chunks_exact(width)) {
                 rounds.of.insert((*predicate, row.to_vec()), rounds.next);
-                self.meter.watch.hold(ROUND_BYTES + bytes_of_row(width, 0))?;
+                self.meter
+                    .watch
+                    .hold(ROUND_BYTES + bytes_of_row(width, 0))?;
             }
         }
         Ok(())
@@ -318,19 +407,31 @@ impl Run<'_, '_, '_> {
 
     /// Creates the growing tuples of the stratum's predicates, with the known tuples inserted.
     fn grow(&self, stratum: &Stratum, layers: &Layers<'_>) -> Grown {
-        let mut wanted: Vec<Vec<bool>> =
-            stratum.predicates.iter().map(|p| vec![false; self.access.indexes.of(*p).len()]).collect();
+        let mut wanted: Vec<Vec<bool>> = stratum
+            .predicates
+            .iter()
+            .map(|p| vec![false; self.access.indexes.of(*p).len()])
+            .collect();
         for rule in &stratum.rules {
-            for op in self.variants(*rule).iter().flat_map(|v| v.guards.iter().flatten().chain(&v.ops)) {
-                if let Op::Scan(Scan { predicate, index, .. }) = op
+            for op in self
+                .variants(*rule)
+                .iter()
+                .flat_map(|v| v.guards.iter().flatten().chain(&v.ops))
+            {
+                if let Op::Scan(Scan {
+                    predicate, index, ..
+                }) = op
                     && let Ok(place) = stratum.predicates.binary_search(predicate)
                 {
                     wanted[place][*index] = true;
                 }
             }
         }
-        for scan in
-            stratum.rules.iter().filter_map(|rule| self.planned.searches[*rule].as_ref()).flat_map(Search::steps)
+        for scan in stratum
+            .rules
+            .iter()
+            .filter_map(|rule| self.planned.searches[*rule].as_ref())
+            .flat_map(Search::steps)
         {
             if let Ok(place) = stratum.predicates.binary_search(&scan.predicate) {
                 wanted[place][scan.index] = true;
@@ -338,8 +439,11 @@ impl Run<'_, '_, '_> {
         }
         let mut grown = Vec::new();
         for (predicate, wanted) in stratum.predicates.iter().zip(&wanted) {
-            let growing =
-                growing(self.predicates.get(*predicate).width, self.access.indexes.of(*predicate).clone(), wanted);
+            let growing = growing(
+                self.predicates.get(*predicate).width,
+                self.access.indexes.of(*predicate).clone(),
+                wanted,
+            );
             let mut known = layers.rows(*predicate).to_vec();
             if !known.is_empty() {
                 growing.insert(&mut known);
@@ -349,8 +453,8 @@ impl Run<'_, '_, '_> {
         grown
     }
 
-    /// Adds the tuples that a variant derives. Returns the place of their predicate if some are new. `new`: number of new
-    /// tuples in this round.
+    /// Adds the tuples that a variant derives. Returns the place of their predicate if some are
+    /// new. `new`: number of new tuples in this round.
     fn insert_all(
         &mut self,
         rule: usize,
@@ -361,9 +465,14 @@ impl Run<'_, '_, '_> {
         new: &mut usize,
     ) -> Result<Option<usize>, Stopped> {
         let predicate = self.planned.rules[rule].head.predicate;
-        let Ok(place) = stratum.predicates.binary_search(&predicate) else { return Ok(None) };
+        let Ok(place) = stratum.predicates.binary_search(&predicate) else {
+            return Ok(None);
+        };
         let row_bytes = self.row_bytes(predicate);
-        let stopped = |stop| Stopped { stop, rule: Some(rule) };
+        let stopped = |stop| Stopped {
+            stop,
+            rule: Some(rule),
+        };
         let before = *new;
         let mut empty = |grown: &Grown, sink: &mut Sink, meter: &Meter| {
             let target = &grown[place];
@@ -374,17 +483,21 @@ impl Run<'_, '_, '_> {
             meter.room_for(*new)
         };
         let mut sink = Sink::new(Vec::new());
-        self.variant(rule, variant, stratum, layers, grown, &mut sink, &mut empty).map_err(stopped)?;
+        self.variant(rule, variant, stratum, layers, grown, &mut sink, &mut empty)
+            .map_err(stopped)?;
         if !sink.rows.is_empty() {
             empty(grown, &mut sink, self.meter).map_err(stopped)?;
         }
         Ok((*new > before).then_some(place))
     }
 
-    /// Adds the head rows that one variant derives to a sink; `empty` empties it when it is full. If the variant reads more
-    /// rows than expected, it is planned by samples and begins again; tuples that it has already added are right in any
-    /// case.
-    #[expect(clippy::too_many_arguments, reason = "the parts of one evaluation, borrowed separately")]
+    /// Adds the head rows that one variant derives to a sink; `empty` empties it when it is full.
+    /// If the variant reads more rows than expected, it is planned by samples and begins again;
+    /// tuples that it has already added are right in any case.
+    #[expect(
+        clippy::too_many_arguments,
+        reason = "the parts of one evaluation, borrowed separately"
+    )]
     fn variant(
         &mut self,
         rule_idx: usize,
@@ -397,21 +510,43 @@ impl Run<'_, '_, '_> {
     ) -> Result<(), Stop> {
         let planned = self.planned;
         let rule = &planned.rules[rule_idx];
-        let Some(planned) = planned.plans[rule_idx].as_ref().map(|plan| &plan.variants[position]) else {
+        let Some(planned) = planned.plans[rule_idx]
+            .as_ref()
+            .map(|plan| &plan.variants[position])
+        else {
             return Ok(());
         };
         let adapted = self.adapted.get(&(rule_idx, position));
-        let (variant, allowed) =
-            adapted.map_or((planned, allowance(planned, rule, &self.access)), |(variant, allowed)| (variant, *allowed));
+        let (variant, allowed) = adapted.map_or(
+            (planned, allowance(planned, rule, &self.access)),
+            |(variant, allowed)| (variant, *allowed),
+        );
         // A few rows in each of many rounds are many, too.
         let spent = self.spent.entry((rule_idx, position)).or_default();
         let is_doubtful = adapted.is_none() && planned.may_meet;
-        let allowed = if is_doubtful { allowed.saturating_sub(*spent) } else { allowed };
+        let allowed = if is_doubtful {
+            allowed.saturating_sub(*spent)
+        } else {
+            allowed
+        };
         let before = self.access.rows_read;
-        let mut context = Context { access: &mut self.access, universe: self.universe, meter: self.meter };
+        let mut context = Context {
+            access: &mut self.access,
+            universe: self.universe,
+            meter: self.meter,
+        };
         let own = stratum.recursive.then_some(Own { stratum, grown });
         let mut flush = |sink: &mut Sink, meter: &Meter| empty(grown, sink, meter);
-        match attempt(&mut context, rule, variant, layers, own, allowed, sink, &mut flush) {
+        match attempt(
+            &mut context,
+            rule,
+            variant,
+            layers,
+            own,
+            allowed,
+            sink,
+            &mut flush,
+        ) {
             Ok(()) => {
                 *spent += context.access.rows_read - before;
                 return Ok(());
@@ -424,8 +559,18 @@ impl Run<'_, '_, '_> {
         add_indexes(&variant, stratum, &context, grown)?;
         let own = stratum.recursive.then_some(Own { stratum, grown });
         let mut flush = |sink: &mut Sink, meter: &Meter| empty(grown, sink, meter);
-        let ended = attempt(&mut context, rule, &variant, layers, own, u64::MAX, sink, &mut flush);
-        self.adapted.insert((rule_idx, position), (variant, allowed));
+        let ended = attempt(
+            &mut context,
+            rule,
+            &variant,
+            layers,
+            own,
+            u64::MAX,
+            sink,
+            &mut flush,
+        );
+        self.adapted
+            .insert((rule_idx, position), (variant, allowed));
         ended.map_err(|halt| match halt {
             Halt::Stop(stop) => stop,
             Halt::Replan => Stop::Time,
@@ -444,13 +589,18 @@ fn add_indexes(
         return Ok(());
     }
     for op in variant.guards.iter().flatten().chain(&variant.ops) {
-        if let Op::Scan(Scan { predicate, index, .. }) = op
+        if let Op::Scan(Scan {
+            predicate, index, ..
+        }) = op
             && let Ok(place) = stratum.predicates.binary_search(predicate)
             && !grown[place].has_index(*index)
         {
             let orders = context.access.indexes.of(*predicate);
             let rows = grown[place].add_index(*index, orders);
-            context.meter.watch.hold(rows * bytes_of_row(orders[0].len(), 0))?;
+            context
+                .meter
+                .watch
+                .hold(rows * bytes_of_row(orders[0].len(), 0))?;
         }
     }
     Ok(())

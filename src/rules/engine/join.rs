@@ -1,4 +1,5 @@
-//! Evaluates one variant of a rule: finds all bindings that satisfy its conditions by lookups in sorted rows.
+//! Evaluates one variant of a rule: finds all bindings that satisfy its conditions by lookups in
+//! sorted rows.
 
 use std::borrow::Cow;
 
@@ -47,7 +48,8 @@ pub(crate) struct Join<'a, 'u, 't> {
 const FEW_ROWS: usize = 16;
 
 impl Join<'_, '_, '_> {
-    /// Runs the steps from `at` on, for every binding that satisfies them. Returns whether there was one.
+    /// Runs the steps from `at` on, for every binding that satisfies them. Returns whether there
+    /// was one.
     pub(crate) fn run(&mut self, at: usize) -> Result<bool, Halt> {
         let ops = self.ops;
         match ops.get(at) {
@@ -59,14 +61,18 @@ impl Join<'_, '_, '_> {
                 let width = self.widths[at];
                 let found = self.batches[at].iter().any(|rows| {
                     let start = lower_bound(rows, width, &values[..length]);
-                    rows.get(start..start + width).is_some_and(|row| row[..length] == values[..length])
+                    rows.get(start..start + width)
+                        .is_some_and(|row| row[..length] == values[..length])
                 });
                 if found { Ok(false) } else { self.run(at + 1) }
             }
             Some(Op::Assign { variable, value }) => {
                 let watch = &self.meter.watch;
                 watch.begin();
-                let Some(term) = value.value(&self.binding, self.universe, watch).map(Cow::into_owned) else {
+                let Some(term) = value
+                    .value(&self.binding, self.universe, watch)
+                    .map(Cow::into_owned)
+                else {
                     watch.stopped()?;
                     return Ok(false);
                 };
@@ -94,7 +100,9 @@ impl Join<'_, '_, '_> {
                 watch.begin();
                 let left = left.value(&self.binding, self.universe, watch);
                 let right = right.value(&self.binding, self.universe, watch);
-                let found = left.zip(right).map(|(left, right)| holds(*op, &left, &right));
+                let found = left
+                    .zip(right)
+                    .map(|(left, right)| holds(*op, &left, &right));
                 self.go_on(at, found)
             }
             Some(Op::Test { value }) => {
@@ -134,7 +142,11 @@ impl Join<'_, '_, '_> {
         let batches = self.batches;
         let mut any = false;
         for rows in &batches[at] {
-            let start = if length == 0 { 0 } else { lower_bound(rows, width, key) };
+            let start = if length == 0 {
+                0
+            } else {
+                lower_bound(rows, width, key)
+            };
             let mut settled: &[TermId] = &[];
             for row in rows[start..].chunks_exact(width) {
                 if row[..length] != *key {
@@ -165,7 +177,8 @@ impl Join<'_, '_, '_> {
         Ok(self.meter.step()?)
     }
 
-    /// Like a scan, but if a later check has fewer rows that fit, reads these and looks them up in the scan's rows.
+    /// Like a scan, but if a later check has fewer rows that fit, reads these and looks them up in
+    /// the scan's rows.
     fn meet(&mut self, at: usize, scan: &Scan) -> Result<bool, Halt> {
         let (values, length) = self.key(&scan.key);
         let key = &values[..length];
@@ -181,9 +194,13 @@ impl Join<'_, '_, '_> {
                 (fewest, chosen) = (count, Some((rival, length)));
             }
         }
-        let Some((rival, prefix)) = chosen else { return self.scan(at, scan) };
+        let Some((rival, prefix)) = chosen else {
+            return self.scan(at, scan);
+        };
         let (rival_values, _) = self.key(&rival.key);
-        let [(_, Column::Bind(variable))] = scan.columns.as_slice() else { return self.scan(at, scan) };
+        let [(_, Column::Bind(variable))] = scan.columns.as_slice() else {
+            return self.scan(at, scan);
+        };
         let (batches, width) = (self.batches, self.widths[rival.at]);
         let mut any = false;
         for rows in &batches[rival.at] {
@@ -219,7 +236,8 @@ impl Join<'_, '_, '_> {
         let width = self.widths[at];
         self.batches[at].iter().any(|rows| {
             let last = lower_bound(rows, width, key) + FEW_ROWS * width;
-            rows.get(last..last + key.len()).is_some_and(|row| row == key)
+            rows.get(last..last + key.len())
+                .is_some_and(|row| row == key)
         })
     }
 
@@ -277,7 +295,11 @@ pub(crate) fn equal_range(rows: &[TermId], width: usize, key: &[TermId]) -> std:
     high = (high - 1).min((rows.len() - start) / width);
     while low < high {
         let middle = low.midpoint(high);
-        if equal(middle) { low = middle + 1 } else { high = middle }
+        if equal(middle) {
+            low = middle + 1
+        } else {
+            high = middle
+        }
     }
     start..start + low * width
 }

@@ -26,7 +26,8 @@ pub(crate) struct Given {
     /// `ontology` for one property each.
     ontology: HashMap<TermId, PredicateId>,
     any_ontology: Option<PredicateId>,
-    /// `course` for one quantity each. In order: loading creates terms, whose IDs must not depend on the process.
+    /// `course` for one quantity each. In order: loading creates terms, whose IDs must not depend
+    /// on the process.
     course: BTreeMap<TermId, CourseReader>,
 }
 
@@ -34,7 +35,8 @@ pub(crate) struct Given {
 #[derive(Debug, Clone)]
 struct CourseReader {
     predicate: PredicateId,
-    /// The things that rules name, if they name one everywhere: the samples of others are not needed.
+    /// The things that rules name, if they name one everywhere: the samples of others are not
+    /// needed.
     things: Option<BTreeSet<TermId>>,
 }
 
@@ -49,7 +51,12 @@ impl Given {
             any_ontology: None,
             course: BTreeMap::new(),
         };
-        for (id, predicate) in predicates.list.iter().enumerate().filter(|(_, predicate)| predicate.given) {
+        for (id, predicate) in predicates
+            .list
+            .iter()
+            .enumerate()
+            .filter(|(_, predicate)| predicate.given)
+        {
             match (predicate.name.as_str(), predicate.property) {
                 ("state", Some(property)) => {
                     given.state.insert(property, id);
@@ -60,7 +67,13 @@ impl Given {
                 }
                 ("ontology", None) => given.any_ontology = Some(id),
                 ("course", Some(quantity)) => {
-                    given.course.insert(quantity, CourseReader { predicate: id, things: None });
+                    given.course.insert(
+                        quantity,
+                        CourseReader {
+                            predicate: id,
+                            things: None,
+                        },
+                    );
                 }
                 _ => given.parameter = Some(id),
             }
@@ -72,9 +85,12 @@ impl Given {
     pub(crate) fn restrict_course(&mut self, programs: &[&Program]) {
         let rules = || programs.iter().flat_map(|program| &program.rules);
         for reader in self.course.values_mut() {
-            let atoms = rules().flat_map(|rule| &rule.body).filter_map(Literal::atom);
-            let subjects =
-                atoms.filter(|atom| atom.predicate == reader.predicate).map(|atom| match atom.args.first() {
+            let atoms = rules()
+                .flat_map(|rule| &rule.body)
+                .filter_map(Literal::atom);
+            let subjects = atoms
+                .filter(|atom| atom.predicate == reader.predicate)
+                .map(|atom| match atom.args.first() {
                     Some(Operand::Constant(thing)) => Some(*thing),
                     _ => None,
                 });
@@ -83,7 +99,12 @@ impl Given {
     }
 
     /// Loads the ontology's statements.
-    pub(crate) fn load_ontology(&self, triples: &[[TermId; 3]], predicates: &Predicates, indexes: &Indexes) -> Tables {
+    pub(crate) fn load_ontology(
+        &self,
+        triples: &[[TermId; 3]],
+        predicates: &Predicates,
+        indexes: &Indexes,
+    ) -> Tables {
         let mut rows: HashMap<PredicateId, Vec<TermId>> = HashMap::new();
         for [s, p, o] in triples {
             if let Some(predicate) = self.ontology.get(p) {
@@ -105,7 +126,10 @@ impl Given {
         indexes: &Indexes,
     ) -> Tables {
         let mut rows: Vec<Vec<TermId>> = vec![Vec::new(); predicates.len()];
-        let mut readers = Readers { given: self, of_property: vec![None; facts.terms.len()] };
+        let mut readers = Readers {
+            given: self,
+            of_property: vec![None; facts.terms.len()],
+        };
         for (phase, triples) in self.graphs(facts) {
             for [s, p, o] in triples {
                 let reader = readers.of(*p, universe);
@@ -118,7 +142,11 @@ impl Given {
                     rows.extend([phase, s, o]);
                 }
                 if let Some(predicate) = self.any_state {
-                    let (s, p, o) = (universe.of_run(*s), universe.of_run(*p), universe.of_run(*o));
+                    let (s, p, o) = (
+                        universe.of_run(*s),
+                        universe.of_run(*p),
+                        universe.of_run(*o),
+                    );
                     rows[predicate].extend([phase, s, p, o]);
                 }
             }
@@ -130,25 +158,48 @@ impl Given {
         }
         if let Some(course) = facts.course {
             for (quantity, reader) in &self.course {
-                load_course(course, *quantity, reader.things.as_ref(), universe, &mut rows[reader.predicate]);
+                load_course(
+                    course,
+                    *quantity,
+                    reader.things.as_ref(),
+                    universe,
+                    &mut rows[reader.predicate],
+                );
             }
         }
         let mut tables = Tables::new(predicates.len());
-        for (predicate, rows) in rows.into_iter().enumerate().filter(|(_, rows)| !rows.is_empty()) {
-            tables.set(predicate, finished(predicates.get(predicate).width, &rows, indexes.of(predicate).clone()));
+        for (predicate, rows) in rows
+            .into_iter()
+            .enumerate()
+            .filter(|(_, rows)| !rows.is_empty())
+        {
+            tables.set(
+                predicate,
+                finished(
+                    predicates.get(predicate).width,
+                    &rows,
+                    indexes.of(predicate).clone(),
+                ),
+            );
         }
         tables
     }
 
     /// Returns the three snapshots, each with the id of its phase.
     pub(crate) fn graphs<'a>(&self, facts: &ActionFacts<'a>) -> [(TermId, &'a [Triple]); 3] {
-        [(self.phases.before, facts.before), (self.phases.after, facts.after), (self.phases.during, facts.during)]
+        [
+            (self.phases.before, facts.before),
+            (self.phases.after, facts.after),
+            (self.phases.during, facts.during),
+        ]
     }
 
     /// Returns the `state` predicates for single properties, each with its property.
     #[cfg(feature = "sparql")]
     pub(crate) fn states(&self) -> impl Iterator<Item = (TermId, PredicateId)> + '_ {
-        self.state.iter().map(|(property, predicate)| (*property, *predicate))
+        self.state
+            .iter()
+            .map(|(property, predicate)| (*property, *predicate))
     }
 
     /// Returns `state` for any property, or `None` if no rule reads or derives it.
@@ -166,15 +217,20 @@ fn load_course(
     universe: &mut Universe<'_>,
     rows: &mut Vec<TermId>,
 ) {
-    let Some(iri) = universe.term(quantity).as_iri().map(str::to_owned) else { return };
-    let times: Vec<TermId> =
-        (0..course.count).map(|idx| universe.intern(Term::Double(idx as f64 * course.period_secs))).collect();
+    let Some(iri) = universe.term(quantity).as_iri().map(str::to_owned) else {
+        return;
+    };
+    let times: Vec<TermId> = (0..course.count)
+        .map(|idx| universe.intern(Term::Double(idx as f64 * course.period_secs)))
+        .collect();
     for thing in things_of(course) {
         let id = universe.intern(Term::iri(thing.as_str()));
         if only.is_some_and(|things| !things.contains(&id)) {
             continue;
         }
-        let Some(values) = values_of(course, &iri, std::slice::from_ref(&thing)) else { continue };
+        let Some(values) = values_of(course, &iri, std::slice::from_ref(&thing)) else {
+            continue;
+        };
         // Most things are at rest most of the time: their values are the same for many samples.
         let mut last: Option<(f64, TermId)> = None;
         for (time, value) in times.iter().zip(values) {
@@ -201,10 +257,21 @@ impl Readers<'_> {
     }
 }
 
-fn tables(rows: HashMap<PredicateId, Vec<TermId>>, predicates: &Predicates, indexes: &Indexes) -> Tables {
+fn tables(
+    rows: HashMap<PredicateId, Vec<TermId>>,
+    predicates: &Predicates,
+    indexes: &Indexes,
+) -> Tables {
     let mut tables = Tables::new(predicates.len());
     for (predicate, rows) in rows {
-        tables.set(predicate, finished(predicates.get(predicate).width, &rows, indexes.of(predicate).clone()));
+        tables.set(
+            predicate,
+            finished(
+                predicates.get(predicate).width,
+                &rows,
+                indexes.of(predicate).clone(),
+            ),
+        );
     }
     tables
 }

@@ -1,11 +1,13 @@
 //! New things (`!x` in heads): the restricted chase.
 //!
-//! In each stratum, all other rules are applied until there are no new tuples. Then the rules that make new things take
-//! turns in the order of the text. A turn visits the matches that are new since the rule's last turn, in the order of
-//! their values: if no known tuples satisfy all heads of a match, it gets new things. This sees the things made earlier
-//! in the same turn. After a turn that made something, all other rules are applied again.
+//! In each stratum, all other rules are applied until there are no new tuples. Then the rules that
+//! make new things take turns in the order of the text. A turn visits the matches that are new
+//! since the rule's last turn, in the order of their values: if no known tuples satisfy all heads
+//! of a match, it gets new things. This sees the things made earlier in the same turn. After a turn
+//! that made something, all other rules are applied again.
 //!
-//! The order depends on values, not on ids or plans, so that the same facts always give the same things.
+//! The order depends on values, not on ids or plans, so that the same facts always give the same
+//! things.
 
 use std::cmp::Ordering;
 use std::collections::BTreeSet;
@@ -31,13 +33,21 @@ pub(crate) struct Search {
 impl Search {
     /// Plans the search: heads with the most known arguments first.
     pub(crate) fn new(rule: &Rule, making: &Making, indexes: &mut Indexes) -> Self {
-        let mut bound: Vec<bool> = (0..rule.variables.len()).map(|variable| !making.new.contains(&variable)).collect();
+        let mut bound: Vec<bool> = (0..rule.variables.len())
+            .map(|variable| !making.new.contains(&variable))
+            .collect();
         let mut left: Vec<&Atom> = making.heads.iter().collect();
         let mut steps = Vec::new();
         while !left.is_empty() {
-            let open =
-                |atom: &Atom| atom.args.iter().filter(|arg| matches!(arg, Operand::Variable(v) if !bound[*v])).count();
-            let next = (0..left.len()).min_by_key(|at| (open(left[*at]), *at)).unwrap_or(0);
+            let open = |atom: &Atom| {
+                atom.args
+                    .iter()
+                    .filter(|arg| matches!(arg, Operand::Variable(v) if !bound[*v]))
+                    .count()
+            };
+            let next = (0..left.len())
+                .min_by_key(|at| (open(left[*at]), *at))
+                .unwrap_or(0);
             if let Op::Scan(scan) = scan(left.remove(next), Part::All, &mut bound, indexes) {
                 steps.push(scan);
             }
@@ -76,9 +86,16 @@ impl Makers {
     }
 
     /// Adds the recent matches of each rule.
-    pub(crate) fn add_matches(&mut self, active: &BTreeSet<usize>, grown: &Grown, watch: &Watch) -> Result<(), Stop> {
+    pub(crate) fn add_matches(
+        &mut self,
+        active: &BTreeSet<usize>,
+        grown: &Grown,
+        watch: &Watch,
+    ) -> Result<(), Stop> {
         for maker in &mut self.list {
-            let Some(place) = maker.matches.filter(|place| active.contains(place)) else { continue };
+            let Some(place) = maker.matches.filter(|place| active.contains(place)) else {
+                continue;
+            };
             let mut batches = Vec::new();
             grown[place].batches(Part::Recent, 0, &mut batches);
             for rows in &batches {
@@ -93,20 +110,37 @@ impl Makers {
 impl Run<'_, '_, '_> {
     /// Returns the rules of a stratum that make new things, with the matches that are complete.
     pub(crate) fn makers(&self, stratum: &Stratum, layers: &Layers<'_>) -> Result<Makers, Stop> {
-        let rules = stratum.rules.iter().filter(|rule| self.planned.rules[**rule].makes().is_some());
+        let rules = stratum
+            .rules
+            .iter()
+            .filter(|rule| self.planned.rules[**rule].makes().is_some());
         let mut makers = Makers::default();
         for rule in rules {
-            let Some(matches) = self.planned.rules[*rule].body.iter().find_map(Literal::atom) else { continue };
+            let Some(matches) = self.planned.rules[*rule]
+                .body
+                .iter()
+                .find_map(Literal::atom)
+            else {
+                continue;
+            };
             let place = stratum.predicates.binary_search(&matches.predicate).ok();
-            let pending = if place.is_some() { Vec::new() } else { layers.rows(matches.predicate).to_vec() };
+            let pending = if place.is_some() {
+                Vec::new()
+            } else {
+                layers.rows(matches.predicate).to_vec()
+            };
             self.meter.watch.hold(size_of_val(pending.as_slice()))?;
-            makers.list.push(Maker { rule: *rule, matches: place, pending });
+            makers.list.push(Maker {
+                rule: *rule,
+                matches: place,
+                pending,
+            });
         }
         Ok(makers)
     }
 
-    /// Lets the rules that make new things take turns, until one of them makes some. Returns the place of their
-    /// predicate. `new`: number of new tuples in this round.
+    /// Lets the rules that make new things take turns, until one of them makes some. Returns the
+    /// place of their predicate. `new`: number of new tuples in this round.
     pub(crate) fn turn(
         &mut self,
         makers: &mut Makers,
@@ -117,20 +151,41 @@ impl Run<'_, '_, '_> {
     ) -> Result<Option<usize>, Stopped> {
         let planned = self.planned;
         for _ in 0..makers.list.len() {
-            let Maker { rule: idx, pending, .. } = makers.next();
+            let Maker {
+                rule: idx, pending, ..
+            } = makers.next();
             let (idx, pending) = (*idx, std::mem::take(pending));
             let rule = &planned.rules[idx];
-            let (Some(making), Some(search)) = (rule.makes(), &planned.searches[idx]) else { continue };
-            let Ok(place) = stratum.predicates.binary_search(&making.made) else { continue };
-            let stopped = |stop| Stopped { stop, rule: Some(idx) };
-            let turn = Turn::new(rule, making, search, &mut self.access, layers, Own { stratum, grown });
+            let (Some(making), Some(search)) = (rule.makes(), &planned.searches[idx]) else {
+                continue;
+            };
+            let Ok(place) = stratum.predicates.binary_search(&making.made) else {
+                continue;
+            };
+            let stopped = |stop| Stopped {
+                stop,
+                rule: Some(idx),
+            };
+            let turn = Turn::new(
+                rule,
+                making,
+                search,
+                &mut self.access,
+                layers,
+                Own { stratum, grown },
+            );
             let limit = planned.endless.contains(&making.made);
-            let mut rows = turn.run(&pending, limit, self.universe, self.meter).map_err(stopped)?;
+            let mut rows = turn
+                .run(&pending, limit, self.universe, self.meter)
+                .map_err(stopped)?;
             self.meter.watch.release(size_of_val(pending.as_slice()));
             let count = grown[place].insert(&mut rows);
             if count > 0 {
                 *new += count;
-                self.meter.watch.hold(count * self.row_bytes(making.made)).map_err(stopped)?;
+                self.meter
+                    .watch
+                    .hold(count * self.row_bytes(making.made))
+                    .map_err(stopped)?;
                 self.meter.room_for(*new).map_err(stopped)?;
                 return Ok(Some(place));
             }
@@ -166,12 +221,24 @@ impl<'a, 'b> Turn<'a, 'b> {
             .iter()
             .map(|step| access.batches(step.predicate, Part::All, step.index, layers, Some(own)))
             .collect();
-        let orders = search.steps.iter().map(|step| access.indexes.of(step.predicate)[step.index].clone()).collect();
+        let orders = search
+            .steps
+            .iter()
+            .map(|step| access.indexes.of(step.predicate)[step.index].clone())
+            .collect();
         let added = vec![BTreeSet::new(); search.steps.len()];
-        Self { rule, making, steps: &search.steps, batches, orders, added }
+        Self {
+            rule,
+            making,
+            steps: &search.steps,
+            batches,
+            orders,
+            added,
+        }
     }
 
-    /// Returns the values of all matches that lack the heads, each with its new things, as rows one after another.
+    /// Returns the values of all matches that lack the heads, each with its new things, as rows one
+    /// after another.
     ///
     /// `matches`: rows of the rule's matches. `limit`: whether the number of new things is limited.
     pub(crate) fn run(
@@ -181,7 +248,9 @@ impl<'a, 'b> Turn<'a, 'b> {
         universe: &mut Universe<'_>,
         meter: &mut Meter,
     ) -> Result<Vec<TermId>, Stop> {
-        let Some(atom) = self.rule.body.iter().find_map(Literal::atom) else { return Ok(Vec::new()) };
+        let Some(atom) = self.rule.body.iter().find_map(Literal::atom) else {
+            return Ok(Vec::new());
+        };
         let mut rows: Vec<&[TermId]> = matches.chunks_exact(atom.args.len().max(1)).collect();
         sort_by_value(&mut rows, universe);
         let mut binding = vec![0; self.rule.variables.len()];
@@ -197,7 +266,13 @@ impl<'a, 'b> Turn<'a, 'b> {
                     meter.made()?;
                 }
             }
-            made.extend(self.rule.head.args.iter().map(|arg| operand_value(*arg, &binding)));
+            made.extend(
+                self.rule
+                    .head
+                    .args
+                    .iter()
+                    .map(|arg| operand_value(*arg, &binding)),
+            );
             meter.watch.room(size_of_val(made.as_slice()))?;
             self.add(&binding);
         }
@@ -209,16 +284,32 @@ impl<'a, 'b> Turn<'a, 'b> {
         for head in &self.making.heads {
             for ((step, order), added) in self.steps.iter().zip(&self.orders).zip(&mut self.added) {
                 if step.predicate == head.predicate {
-                    added.insert(order.iter().map(|column| operand_value(head.args[*column], binding)).collect());
+                    added.insert(
+                        order
+                            .iter()
+                            .map(|column| operand_value(head.args[*column], binding))
+                            .collect(),
+                    );
                 }
             }
         }
     }
 
     /// Returns whether known tuples satisfy the heads from a step on.
-    fn is_satisfied(&self, at: usize, binding: &mut Vec<TermId>, meter: &mut Meter) -> Result<bool, Stop> {
-        let Some(step) = self.steps.get(at) else { return Ok(true) };
-        let key: Vec<TermId> = step.key.iter().map(|operand| operand_value(*operand, binding)).collect();
+    fn is_satisfied(
+        &self,
+        at: usize,
+        binding: &mut Vec<TermId>,
+        meter: &mut Meter,
+    ) -> Result<bool, Stop> {
+        let Some(step) = self.steps.get(at) else {
+            return Ok(true);
+        };
+        let key: Vec<TermId> = step
+            .key
+            .iter()
+            .map(|operand| operand_value(*operand, binding))
+            .collect();
         let width = self.orders[at].len();
         for rows in &self.batches[at] {
             for row in rows[equal_range(rows, width, &key)].chunks_exact(width) {
@@ -228,7 +319,10 @@ impl<'a, 'b> Turn<'a, 'b> {
                 }
             }
         }
-        for row in self.added[at].range(key.clone()..).take_while(|row| row.starts_with(&key)) {
+        for row in self.added[at]
+            .range(key.clone()..)
+            .take_while(|row| row.starts_with(&key))
+        {
             meter.step()?;
             if fits(step, row, binding) && self.is_satisfied(at + 1, binding, meter)? {
                 return Ok(true);
@@ -263,7 +357,9 @@ pub(crate) fn sort_by_value(rows: &mut [&[TermId]], universe: &Universe<'_>) {
     rows.sort_by(|a, b| {
         let pairs = a.iter().zip(*b).filter(|(a, b)| a != b);
         let mut orders = pairs.map(|(a, b)| by_value(universe.term(*a), universe.term(*b)));
-        orders.find(|order| order.is_ne()).unwrap_or(Ordering::Equal)
+        orders
+            .find(|order| order.is_ne())
+            .unwrap_or(Ordering::Equal)
     });
 }
 
@@ -287,7 +383,10 @@ mod tests {
         let rows: Vec<Vec<TermId>> = labels.iter().map(|id| vec![*id, 0]).collect();
         let mut rows: Vec<&[TermId]> = rows.iter().map(Vec::as_slice).collect();
         sort_by_value(&mut rows, &universe);
-        let sorted: Vec<String> = rows.iter().map(|row| universe.term(row[0]).to_string()).collect();
+        let sorted: Vec<String> = rows
+            .iter()
+            .map(|row| universe.term(row[0]).to_string())
+            .collect();
         assert_eq!(sorted, ["_:2", "_:9", "_:10"]);
     }
 }

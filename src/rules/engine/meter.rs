@@ -5,7 +5,8 @@ use crate::model::program::Rule;
 pub(crate) use crate::watch::{Stop, Watch};
 use actcheck_base::RuleFault;
 
-/// Tracks how much of a budget is spent. One meter covers everything that is evaluated for one property.
+/// Tracks how much of a budget is spent. One meter covers everything that is evaluated for one
+/// property.
 #[derive(Debug)]
 pub(crate) struct Meter {
     budget: Budget,
@@ -20,7 +21,13 @@ const STEPS_PER_CHECK: u32 = 16_384;
 
 impl Meter {
     pub(crate) fn new(budget: &Budget) -> Self {
-        Self { budget: budget.clone(), watch: Watch::new(budget), tuples: 0, new_things: 0, steps: 0 }
+        Self {
+            budget: budget.clone(),
+            watch: Watch::new(budget),
+            tuples: 0,
+            new_things: 0,
+            steps: 0,
+        }
     }
 
     /// Counts one row read.
@@ -46,13 +53,21 @@ impl Meter {
 
     /// Returns an error if fewer than `count` more tuples may be derived.
     pub(crate) fn room_for(&self, count: usize) -> Result<(), Stop> {
-        if self.tuples.saturating_add(count) > self.budget.tuples { Err(Stop::Tuples) } else { Ok(()) }
+        if self.tuples.saturating_add(count) > self.budget.tuples {
+            Err(Stop::Tuples)
+        } else {
+            Ok(())
+        }
     }
 
     /// Counts a new thing of a rule that may make them without end.
     pub(crate) fn made(&mut self) -> Result<(), Stop> {
         self.new_things += 1;
-        if self.new_things > self.budget.new_things { Err(Stop::NewThings) } else { Ok(()) }
+        if self.new_things > self.budget.new_things {
+            Err(Stop::NewThings)
+        } else {
+            Ok(())
+        }
     }
 
     /// Ends the count; the explanation of the result uses the time and memory that are left.
@@ -67,7 +82,10 @@ impl Meter {
             None => format!(" in the rule at {}", rule.origin.place()),
         });
         match stop {
-            Stop::Tuples => RuleFault::BudgetSpent(format!("more than {} derived tuples{place}", self.budget.tuples)),
+            Stop::Tuples => RuleFault::BudgetSpent(format!(
+                "more than {} derived tuples{place}",
+                self.budget.tuples
+            )),
             Stop::NewThings => {
                 let most = self.budget.new_things;
                 RuleFault::BudgetSpent(format!(
@@ -75,10 +93,13 @@ impl Meter {
                      don't satisfy"
                 ))
             }
-            Stop::Bytes => {
-                RuleFault::BudgetSpent(format!("more than {} of memory{place}", mebibytes(self.budget.bytes)))
+            Stop::Bytes => RuleFault::BudgetSpent(format!(
+                "more than {} of memory{place}",
+                mebibytes(self.budget.bytes)
+            )),
+            Stop::Time => {
+                RuleFault::BudgetSpent(format!("more than {} s{place}", self.budget.secs))
             }
-            Stop::Time => RuleFault::BudgetSpent(format!("more than {} s{place}", self.budget.secs)),
             Stop::Requested => RuleFault::Interrupted,
             Stop::Value => RuleFault::Value(format!("{}{place}", self.watch.value_text())),
         }
@@ -91,5 +112,9 @@ pub(crate) const NEW_THINGS: &str = "new things (`!x`)";
 /// Formats an amount of memory.
 pub(crate) fn mebibytes(bytes: usize) -> String {
     const MEBIBYTE: usize = 1 << 20;
-    if bytes < MEBIBYTE { format!("{bytes} bytes") } else { format!("{} MiB", bytes / MEBIBYTE) }
+    if bytes < MEBIBYTE {
+        format!("{bytes} bytes")
+    } else {
+        format!("{} MiB", bytes / MEBIBYTE)
+    }
 }

@@ -1,4 +1,5 @@
-//! Checked rules and facts to derived tuples: semi-naive evaluation within a budget, and its naive oracle.
+//! Checked rules and facts to derived tuples: semi-naive evaluation within a budget, and its naive
+//! oracle.
 //!
 //! Never: parses or checks a rule, or decides an outcome.
 

@@ -36,11 +36,16 @@ impl Random {
 }
 
 fn load(text: &str) -> Program {
-    Program::load(&Source::new("orders.rls", text), Path::new("")).unwrap_or_else(|faults| panic!("{faults}\n{text}"))
+    Program::load(&Source::new("orders.rls", text), Path::new(""))
+        .unwrap_or_else(|faults| panic!("{faults}\n{text}"))
 }
 
 fn budget() -> Budget {
-    Budget { tuples: 100_000_000, secs: 600.0, ..Budget::default() }
+    Budget {
+        tuples: 100_000_000,
+        secs: 600.0,
+        ..Budget::default()
+    }
 }
 
 /// Evaluates a program. Returns the number of rows read and the rows of a predicate.
@@ -48,7 +53,10 @@ fn evaluated(program: &Program, unquestioned: u64, predicate: &str) -> (u64, Vec
     let (mut universe, mut meter) = (Universe::new(&program.terms, None), Meter::new(&budget()));
     let mut access = Access::new(&program.predicates, &program.indexes);
     access.unquestioned = unquestioned;
-    let mut layers = Layers { own: Tables::new(program.predicates.len()), below: Vec::new() };
+    let mut layers = Layers {
+        own: Tables::new(program.predicates.len()),
+        below: Vec::new(),
+    };
     let mut run = Run {
         planned: &program.planned,
         predicates: &program.predicates,
@@ -59,41 +67,85 @@ fn evaluated(program: &Program, unquestioned: u64, predicate: &str) -> (u64, Vec
         meter: &mut meter,
         rounds: None,
     };
-    run.all(&mut layers).unwrap_or_else(|stopped| panic!("{stopped:?}"));
+    run.all(&mut layers)
+        .unwrap_or_else(|stopped| panic!("{stopped:?}"));
     let rows_read = run.access.rows_read;
-    let id = program.predicates.find(0, predicate, None).expect("the program defines it");
+    let id = program
+        .predicates
+        .find(0, predicate, None)
+        .expect("the program defines it");
     (rows_read, layers.rows(id).to_vec())
 }
 
 /// The fewest rows that the only rule of a program reads in any order of its atoms, up to a limit.
 fn best_order(program: &Program, limit: u64, expected: &[TermId]) -> u64 {
     let rule = &program.planned.rules[0];
-    let atoms: Vec<usize> =
-        (0..rule.body.len()).filter(|idx| matches!(rule.body[*idx], Literal::Positive(_))).collect();
+    let atoms: Vec<usize> = (0..rule.body.len())
+        .filter(|idx| matches!(rule.body[*idx], Literal::Positive(_)))
+        .collect();
     let parts = Parts::new(rule, &program.planned.strata[0], None);
     let (mut universe, mut meter) = (Universe::new(&program.terms, None), Meter::new(&budget()));
     let mut access = Access::new(&program.predicates, &program.indexes);
-    let mut layers = Layers { own: Tables::new(program.predicates.len()), below: Vec::new() };
+    let mut layers = Layers {
+        own: Tables::new(program.predicates.len()),
+        below: Vec::new(),
+    };
     for (predicate, rows) in &program.planned.facts {
-        let (width, orders) = (program.predicates.get(*predicate).width, program.indexes.of(*predicate).clone());
-        layers.own.set(*predicate, crate::engine::relation::finished(width, rows, orders));
+        let (width, orders) = (
+            program.predicates.get(*predicate).width,
+            program.indexes.of(*predicate).clone(),
+        );
+        layers.own.set(
+            *predicate,
+            crate::engine::relation::finished(width, rows, orders),
+        );
     }
     let mut best = limit;
     for order in permutations(&atoms) {
         let orders = Orders::new(rule, &parts, &mut |group, _| {
-            order.iter().copied().filter(|idx| group.contains(idx)).collect()
+            order
+                .iter()
+                .copied()
+                .filter(|idx| group.contains(idx))
+                .collect()
         });
-        let variant = plan_variant(rule, &parts, &orders, access.indexes.to_mut(), Some(&BTreeSet::new()));
+        let variant = plan_variant(
+            rule,
+            &parts,
+            &orders,
+            access.indexes.to_mut(),
+            Some(&BTreeSet::new()),
+        );
         let before = access.rows_read;
-        let mut context = Context { access: &mut access, universe: &mut universe, meter: &mut meter };
+        let mut context = Context {
+            access: &mut access,
+            universe: &mut universe,
+            meter: &mut meter,
+        };
         let mut sink = Sink::new(Vec::new());
         sink.limit = usize::MAX;
-        match attempt(&mut context, rule, &variant, &layers, None, best, &mut sink, &mut |_, _| Ok(())) {
+        match attempt(
+            &mut context,
+            rule,
+            &variant,
+            &layers,
+            None,
+            best,
+            &mut sink,
+            &mut |_, _| Ok(()),
+        ) {
             Ok(()) => {
                 let rows = sink.rows;
                 let width = program.predicates.get(rule.head.predicate).width;
-                let sorted = |rows: &[TermId]| rows.chunks(width).map(<[TermId]>::to_vec).collect::<BTreeSet<_>>();
-                assert!(sorted(&rows) == sorted(expected), "the order {order:?} derives other tuples");
+                let sorted = |rows: &[TermId]| {
+                    rows.chunks(width)
+                        .map(<[TermId]>::to_vec)
+                        .collect::<BTreeSet<_>>()
+                };
+                assert!(
+                    sorted(&rows) == sorted(expected),
+                    "the order {order:?} derives other tuples"
+                );
                 best = best.min(access.rows_read - before);
             }
             Err(Halt::Replan) => {}
@@ -119,7 +171,8 @@ fn permutations(items: &[usize]) -> Vec<Vec<usize>> {
     all
 }
 
-/// A random conjunctive query over skewed relations of different sizes, with all variables or some in its head.
+/// A random conjunctive query over skewed relations of different sizes, with all variables or some
+/// in its head.
 fn random_query(random: &mut Random) -> String {
     let mut text = String::new();
     let mut atoms: Vec<String> = Vec::new();
@@ -152,10 +205,16 @@ fn random_query(random: &mut Random) -> String {
                 .map(|column| {
                     let skewed = random.below(3) > 0;
                     let domain = domains[column];
-                    (if skewed { random.skewed(domain) } else { random.below(domain) }).to_string()
+                    (if skewed {
+                        random.skewed(domain)
+                    } else {
+                        random.below(domain)
+                    })
+                    .to_string()
                 })
                 .collect();
-            writeln!(text, "r{number}({}) .", values.join(", ")).expect("a string takes everything");
+            writeln!(text, "r{number}({}) .", values.join(", "))
+                .expect("a string takes everything");
         }
     }
     let kept = 1 + random.below(used.len() as u64) as usize;
@@ -163,14 +222,17 @@ fn random_query(random: &mut Random) -> String {
     format!("q({}) :- {} .\n{text}", head.join(", "), atoms.join(", "))
 }
 
-/// Number of rows that are read before the first choice in the random queries, so that small ones are planned by samples.
+/// Number of rows that are read before the first choice in the random queries, so that small ones
+/// are planned by samples.
 const EARLY: u64 = 512;
 
-/// The order chosen during the evaluation reads at most three times the rows of the best order, beyond the rows that are
-/// read before the first choice. `ACTCHECK_ORDERS`: the number of queries.
+/// The order chosen during the evaluation reads at most three times the rows of the best order,
+/// beyond the rows that are read before the first choice. `ACTCHECK_ORDERS`: the number of queries.
 #[test]
 fn the_chosen_order_reads_at_most_three_times_the_rows_of_the_best() {
-    let wanted = std::env::var("ACTCHECK_ORDERS").ok().and_then(|count| count.parse().ok());
+    let wanted = std::env::var("ACTCHECK_ORDERS")
+        .ok()
+        .and_then(|count| count.parse().ok());
     let (mut planned, mut worst) = (0, (0.0, 0));
     for seed in 1..=wanted.unwrap_or(120u64) {
         let text = random_query(&mut Random(seed.wrapping_mul(0x9E37_79B9_7F4A_7C15)));
@@ -186,13 +248,23 @@ fn the_chosen_order_reads_at_most_three_times_the_rows_of_the_best() {
         if wanted.is_some() && share > 2.0 {
             println!("seed {seed}: {chosen} rows instead of {best}: {rule}");
         }
-        assert!(wanted.is_some() || share <= 3.0, "seed {seed}: {chosen} rows instead of {best}: {rule}");
+        assert!(
+            wanted.is_some() || share <= 3.0,
+            "seed {seed}: {chosen} rows instead of {best}: {rule}"
+        );
     }
-    println!("{planned} queries planned by samples; at most {:.2} times the best order (seed {})", worst.0, worst.1);
-    assert!(planned >= 30, "only {planned} queries are large enough to be planned by samples");
+    println!(
+        "{planned} queries planned by samples; at most {:.2} times the best order (seed {})",
+        worst.0, worst.1
+    );
+    assert!(
+        planned >= 30,
+        "only {planned} queries are large enough to be planned by samples"
+    );
 }
 
-/// A rule with an unconnected condition, a recursive one and one with a negation; the join is planned anew all the time.
+/// A rule with an unconnected condition, a recursive one and one with a negation; the join is
+/// planned anew all the time.
 #[test]
 fn rules_planned_anew_in_every_round_derive_the_same_as_the_naive_evaluator() {
     for seed in 1..=12u64 {
@@ -207,22 +279,37 @@ fn rules_planned_anew_in_every_round_derive_the_same_as_the_naive_evaluator() {
              n(#count(?x), ?z) :- p(?x, ?y), e(?y, ?z), node(?y) .\n",
         );
         for _ in 0..16 {
-            writeln!(text, "e({}, {}) . node({}) .", random.below(7), random.skewed(7), random.below(8))
-                .expect("a string takes everything");
+            writeln!(
+                text,
+                "e({}, {}) . node({}) .",
+                random.below(7),
+                random.skewed(7),
+                random.below(8)
+            )
+            .expect("a string takes everything");
         }
         writeln!(text, "w({}) .", random.below(9)).expect("a string takes everything");
         let program = load(&text);
-        let naive = program.close(Engine::Naive, &budget()).expect("in its budget");
+        let naive = program
+            .close(Engine::Naive, &budget())
+            .expect("in its budget");
         for predicate in ["p", "t", "any", "n"] {
             let rows = evaluated(&program, 2, predicate).1;
             let width = naive.arity(predicate).expect("the program defines it");
-            assert_eq!(rows.len() / width, naive.count(predicate), "{predicate} with seed {seed}");
+            assert_eq!(
+                rows.len() / width,
+                naive.count(predicate),
+                "{predicate} with seed {seed}"
+            );
         }
     }
 }
 
 fn rows_read(rules: &str, facts: impl IntoIterator<Item = String>) -> u64 {
-    let text = format!("{rules}\n{}", facts.into_iter().collect::<Vec<_>>().join("\n"));
+    let text = format!(
+        "{rules}\n{}",
+        facts.into_iter().collect::<Vec<_>>().join("\n")
+    );
     evaluated(&load(&text), UNQUESTIONED, "q").0
 }
 
@@ -230,7 +317,10 @@ fn rows_read(rules: &str, facts: impl IntoIterator<Item = String>) -> u64 {
 fn a_triangle_through_a_hub_does_not_read_all_paths_through_it() {
     let spokes = (1..2_000).map(|i| format!("e({i}, 0) . e(0, {i}) . e({i}, {}) .", i + 1));
     let read = rows_read("q(?x, ?y, ?z) :- e(?x, ?y), e(?y, ?z), e(?x, ?z) .", spokes);
-    assert!(read < 60_000, "{read} rows, but there are 4 million paths through the hub");
+    assert!(
+        read < 60_000,
+        "{read} rows, but there are 4 million paths through the hub"
+    );
 }
 
 #[test]
@@ -239,13 +329,17 @@ fn an_unconnected_condition_is_checked_once() {
     let read = rows_read("q(?x) :- b(?u), a(?x, ?y), c(?y), ~d(?u) . d(-1) .", facts);
     assert!(read < 20_000, "{read}");
     let facts = (0..3_000).map(|i| format!("a({i}, {}) . b({i}, {}) . c({i}, 0) .", i + 1, i % 50));
-    let read = rows_read("q(?x) :- a(?x, _), b(?u, ?v), c(?v, ?w), b(?w, ?v), ?v > 9999 .", facts);
+    let read = rows_read(
+        "q(?x) :- a(?x, _), b(?u, ?v), c(?v, ?w), b(?w, ?v), ?v > 9999 .",
+        facts,
+    );
     assert!(read < 40_000, "{read}");
 }
 
 #[test]
 fn a_match_of_the_conditions_behind_the_head_is_found_once() {
-    let facts = (0..200).flat_map(|i| (0..100).map(move |j| format!("a({i}, {j}) . b({j}, {i}) .")));
+    let facts =
+        (0..200).flat_map(|i| (0..100).map(move |j| format!("a({i}, {j}) . b({j}, {i}) .")));
     let read = rows_read("q(?x) :- a(?x, ?y), b(?y, ?z), a(?z, ?u) .", facts);
     assert!(read < 40_000, "{read}");
 }

@@ -31,31 +31,61 @@ pub(crate) struct Decisive {
 impl Verdict {
     pub(crate) fn new(program: &Program, predicates: &Predicates, scope: usize) -> Self {
         let find = |name: &str| predicates.find(scope, name, None);
-        let decisive = [("success", true), ("violation", false)].into_iter().find_map(|(name, positive)| {
-            let predicate = find(name)?;
-            let rule = program.rules.iter().find(|rule| rule.head.predicate == predicate);
-            let names = rule.map_or(Vec::new(), |rule| rule.head_names.clone());
-            Some(Decisive { predicate, positive, arity: predicates.get(predicate).arity, names })
-        });
-        Self { decisive, margin: find("margin"), applicable: find("applicable"), because: find("because") }
+        let decisive = [("success", true), ("violation", false)]
+            .into_iter()
+            .find_map(|(name, positive)| {
+                let predicate = find(name)?;
+                let rule = program
+                    .rules
+                    .iter()
+                    .find(|rule| rule.head.predicate == predicate);
+                let names = rule.map_or(Vec::new(), |rule| rule.head_names.clone());
+                Some(Decisive {
+                    predicate,
+                    positive,
+                    arity: predicates.get(predicate).arity,
+                    names,
+                })
+            });
+        Self {
+            decisive,
+            margin: find("margin"),
+            applicable: find("applicable"),
+            because: find("because"),
+        }
     }
 }
 
 /// Reads the findings of a property.
-pub(crate) fn findings(verdict: &Verdict, layers: &Layers<'_>, universe: &Universe<'_>) -> Result<Findings, RuleFault> {
+pub(crate) fn findings(
+    verdict: &Verdict,
+    layers: &Layers<'_>,
+    universe: &Universe<'_>,
+) -> Result<Findings, RuleFault> {
     let Some(decisive) = &verdict.decisive else {
-        return Err(RuleFault::Value("the rules define neither success nor violation".into()));
+        return Err(RuleFault::Value(
+            "the rules define neither success nor violation".into(),
+        ));
     };
     let width = decisive.arity.max(1);
     let rows = layers.rows(decisive.predicate);
     let witness_count = rows.len() / width;
     let mut tuples: Vec<Vec<Term>> = rows
         .chunks_exact(width)
-        .map(|row| row[..decisive.arity].iter().map(|id| universe.term(*id).clone()).collect())
+        .map(|row| {
+            row[..decisive.arity]
+                .iter()
+                .map(|id| universe.term(*id).clone())
+                .collect()
+        })
         .collect();
     tuples.sort();
     tuples.truncate(Findings::WITNESS_LIMIT);
-    let predicate = if decisive.positive { "success" } else { "violation" };
+    let predicate = if decisive.positive {
+        "success"
+    } else {
+        "violation"
+    };
     let witness = tuples
         .into_iter()
         .map(|tuple| WitnessRow {
@@ -68,7 +98,9 @@ pub(crate) fn findings(verdict: &Verdict, layers: &Layers<'_>, universe: &Univer
         })
         .collect();
     Ok(Findings {
-        applicable: verdict.applicable.is_none_or(|predicate| !layers.rows(predicate).is_empty()),
+        applicable: verdict
+            .applicable
+            .is_none_or(|predicate| !layers.rows(predicate).is_empty()),
         holds: (witness_count > 0) == decisive.positive,
         witness,
         witness_count,
@@ -77,9 +109,16 @@ pub(crate) fn findings(verdict: &Verdict, layers: &Layers<'_>, universe: &Univer
     })
 }
 
-fn margin(verdict: &Verdict, layers: &Layers<'_>, universe: &Universe<'_>) -> Result<Option<f64>, RuleFault> {
+fn margin(
+    verdict: &Verdict,
+    layers: &Layers<'_>,
+    universe: &Universe<'_>,
+) -> Result<Option<f64>, RuleFault> {
     let mut smallest: Option<f64> = None;
-    for id in verdict.margin.map_or(&[][..], |predicate| layers.rows(predicate)) {
+    for id in verdict
+        .margin
+        .map_or(&[][..], |predicate| layers.rows(predicate))
+    {
         smallest = Some(smaller_margin(smallest, universe.term(*id))?);
     }
     Ok(smallest)
@@ -90,13 +129,17 @@ fn margin(verdict: &Verdict, layers: &Layers<'_>, universe: &Universe<'_>) -> Re
 /// # Errors
 /// The term is not a number.
 pub(crate) fn smaller_margin(smallest: Option<f64>, term: &Term) -> Result<f64, RuleFault> {
-    let value = Number::of(term).map(Number::double).filter(|value| !value.is_nan());
+    let value = Number::of(term)
+        .map(Number::double)
+        .filter(|value| !value.is_nan());
     let value = value.ok_or_else(|| RuleFault::Value(format!("margin {term} is not a number")))?;
     Ok(smallest.map_or(value, |least| least.min(value)))
 }
 
 fn because(verdict: &Verdict, layers: &Layers<'_>, universe: &Universe<'_>) -> Vec<String> {
-    let rows = verdict.because.map_or(&[][..], |predicate| layers.rows(predicate));
+    let rows = verdict
+        .because
+        .map_or(&[][..], |predicate| layers.rows(predicate));
     let mut texts: Vec<String> = rows.iter().map(|id| lexical(universe.term(*id))).collect();
     texts.sort();
     texts

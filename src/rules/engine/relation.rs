@@ -1,4 +1,5 @@
-//! Tuples of one predicate as datafrog relations of any width, in every column order that the rules use.
+//! Tuples of one predicate as datafrog relations of any width, in every column order that the rules
+//! use.
 
 use std::cell::{Ref, RefCell};
 use std::ops::Deref;
@@ -34,7 +35,8 @@ macro_rules! with_width {
     };
 }
 
-/// Tuples that no longer change. Rows are stored one after another, sorted by the index's column order.
+/// Tuples that no longer change. Rows are stored one after another, sorted by the index's column
+/// order.
 pub(crate) trait Finished: Send + Sync {
     /// Returns the rows in the order of an index. The index is built on first use.
     fn index(&self, index: usize) -> &[TermId];
@@ -48,11 +50,13 @@ pub(crate) trait Growing {
     fn insert(&self, rows: &mut Vec<TermId>) -> usize;
     /// Returns the length of the rows added in this round. Unit: terms.
     fn added(&self) -> usize;
-    /// Begins a round: new tuples added since the last round become recent. Returns `false` if there are none.
+    /// Begins a round: new tuples added since the last round become recent. Returns `false` if
+    /// there are none.
     fn changed(&mut self) -> bool;
     /// Returns whether the rows are kept in the order of an index.
     fn has_index(&self, index: usize) -> bool;
-    /// Keeps the rows also in the order of an index. `orders`: the column orders of all indexes. Returns the number of rows.
+    /// Keeps the rows also in the order of an index. `orders`: the column orders of all indexes.
+    /// Returns the number of rows.
     fn add_index(&mut self, index: usize, orders: &Arc<Vec<Order>>) -> usize;
     /// Appends the rows of a part in the order of an index, as sorted batches.
     fn batches<'a>(&'a self, part: Part, index: usize, found: &mut Vec<Batch<'a>>);
@@ -102,18 +106,23 @@ impl<const W: usize> FinishedOf<W> {
 
 impl<const W: usize> Finished for FinishedOf<W> {
     fn index(&self, index: usize) -> &[TermId] {
-        let relation = self.indexes[index].get_or_init(|| permuted(self.primary(), &self.orders[index]));
+        let relation =
+            self.indexes[index].get_or_init(|| permuted(self.primary(), &self.orders[index]));
         relation.elements.as_flattened()
     }
 
     fn into_rows(self: Box<Self>) -> Vec<TermId> {
-        let first = self.indexes.into_iter().next().and_then(OnceLock::into_inner);
+        let first = self
+            .indexes
+            .into_iter()
+            .next()
+            .and_then(OnceLock::into_inner);
         first.map_or(Vec::new(), |relation| relation.elements.into_flattened())
     }
 }
 
-/// One column order of growing tuples: a datafrog variable with its own iteration, so that all orders of a
-/// predicate advance from round to round together.
+/// One column order of growing tuples: a datafrog variable with its own iteration, so that all
+/// orders of a predicate advance from round to round together.
 struct Grown<const W: usize> {
     iteration: Iteration,
     variable: Variable<[TermId; W]>,
@@ -124,7 +133,10 @@ impl<const W: usize> Grown<W> {
         let mut iteration = Iteration::new();
         // Only new rows are inserted, so that no duplicates have to be removed.
         let variable = iteration.variable_indistinct("");
-        Self { iteration, variable }
+        Self {
+            iteration,
+            variable,
+        }
     }
 }
 
@@ -139,8 +151,16 @@ struct GrowingOf<const W: usize> {
 impl<const W: usize> GrowingOf<W> {
     /// `wanted`: the indexes that the stratum's rules read while the tuples grow.
     fn new(orders: Arc<Vec<Order>>, wanted: &[bool]) -> Self {
-        let indexes = wanted.iter().map(|wanted| wanted.then(Grown::new)).collect();
-        Self { orders, indexes, primary: Grown::new(), added: RefCell::default() }
+        let indexes = wanted
+            .iter()
+            .map(|wanted| wanted.then(Grown::new))
+            .collect();
+        Self {
+            orders,
+            indexes,
+            primary: Grown::new(),
+            added: RefCell::default(),
+        }
     }
 }
 
@@ -165,14 +185,18 @@ impl<const W: usize> Growing for GrowingOf<W> {
     fn changed(&mut self) -> bool {
         let added = self.added.take();
         if !added.is_empty() {
-            self.primary.variable.insert(Relation { elements: added.as_chunks::<W>().0.to_vec() });
+            self.primary.variable.insert(Relation {
+                elements: added.as_chunks::<W>().0.to_vec(),
+            });
         }
         drop(added);
         let changed = self.primary.iteration.changed();
         for (index, grown) in self.indexes.iter_mut().enumerate().skip(1) {
             if let Some(grown) = grown {
                 let recent = self.primary.variable.recent.borrow();
-                grown.variable.insert(permuted(&recent, &self.orders[index]));
+                grown
+                    .variable
+                    .insert(permuted(&recent, &self.orders[index]));
                 grown.iteration.changed();
             }
         }
@@ -197,7 +221,8 @@ impl<const W: usize> Growing for GrowingOf<W> {
         let recent = self.primary.variable.recent.borrow();
         grown.variable.insert(permuted(&recent, order));
         grown.iteration.changed();
-        self.indexes.resize_with(self.indexes.len().max(index + 1), || None);
+        self.indexes
+            .resize_with(self.indexes.len().max(index + 1), || None);
         self.indexes[index] = Some(grown);
         count + recent.len()
     }
@@ -210,16 +235,25 @@ impl<const W: usize> Growing for GrowingOf<W> {
         if part != Part::Recent {
             let stable = variable.stable.borrow();
             for idx in 0..stable.len() {
-                found.push(Batch::Held(Ref::map(Ref::clone(&stable), |s| s[idx].elements.as_flattened())));
+                found.push(Batch::Held(Ref::map(Ref::clone(&stable), |s| {
+                    s[idx].elements.as_flattened()
+                })));
             }
         }
         if part != Part::Old {
-            found.push(Batch::Held(Ref::map(variable.recent.borrow(), |recent| recent.elements.as_flattened())));
+            found.push(Batch::Held(Ref::map(variable.recent.borrow(), |recent| {
+                recent.elements.as_flattened()
+            })));
         }
     }
 
     fn complete(self: Box<Self>) -> Box<dyn Finished> {
-        let Self { orders, indexes, primary, added } = *self;
+        let Self {
+            orders,
+            indexes,
+            primary,
+            added,
+        } = *self;
         drop((indexes, added));
         Box::new(FinishedOf::new(primary.variable.complete(), orders))
     }
@@ -227,7 +261,10 @@ impl<const W: usize> Growing for GrowingOf<W> {
 
 /// Permutes the columns of rows and sorts the result.
 fn permuted<const W: usize>(rows: &[[TermId; W]], order: &[usize]) -> Relation<[TermId; W]> {
-    let mut out: Vec<[TermId; W]> = rows.iter().map(|row| std::array::from_fn(|column| row[order[column]])).collect();
+    let mut out: Vec<[TermId; W]> = rows
+        .iter()
+        .map(|row| std::array::from_fn(|column| row[order[column]]))
+        .collect();
     sort(&mut out);
     Relation { elements: out }
 }
@@ -291,7 +328,9 @@ fn merged<const W: usize>(rows: &[TermId], more: &[TermId]) -> Vec<TermId> {
 fn remove_known<const W: usize>(rows: &mut Vec<TermId>, known: &[[TermId; W]]) {
     let (mut rest, mut kept) = (known, 0);
     for start in (0..rows.len()).step_by(W) {
-        let Ok(row) = <[TermId; W]>::try_from(&rows[start..start + W]) else { break };
+        let Ok(row) = <[TermId; W]>::try_from(&rows[start..start + W]) else {
+            break;
+        };
         rest = skip_less(rest, &row);
         if rest.first() != Some(&row) {
             rows.copy_within(start..start + W, kept);
@@ -301,8 +340,12 @@ fn remove_known<const W: usize>(rows: &mut Vec<TermId>, known: &[[TermId; W]]) {
     rows.truncate(kept);
 }
 
-/// Skips the sorted rows that are less than a given one, by steps of doubling length and then by halves.
-fn skip_less<'r, const W: usize>(mut rows: &'r [[TermId; W]], row: &[TermId; W]) -> &'r [[TermId; W]] {
+/// Skips the sorted rows that are less than a given one, by steps of doubling length and then by
+/// halves.
+fn skip_less<'r, const W: usize>(
+    mut rows: &'r [[TermId; W]],
+    row: &[TermId; W],
+) -> &'r [[TermId; W]] {
     if rows.first().is_none_or(|first| first >= row) {
         return rows;
     }
@@ -316,7 +359,10 @@ fn skip_less<'r, const W: usize>(mut rows: &'r [[TermId; W]], row: &[TermId; W])
 }
 
 fn permuted_rows_of<const W: usize>(rows: &[TermId], order: &[usize]) -> Arc<[TermId]> {
-    permuted::<W>(rows.as_chunks::<W>().0, order).elements.as_flattened().into()
+    permuted::<W>(rows.as_chunks::<W>().0, order)
+        .elements
+        .as_flattened()
+        .into()
 }
 
 fn relation_of<const W: usize>(rows: &[TermId]) -> Relation<[TermId; W]> {
@@ -326,12 +372,14 @@ fn relation_of<const W: usize>(rows: &[TermId]) -> Relation<[TermId; W]> {
     Relation { elements: rows }
 }
 
-/// Sorts rows. Two or three columns are compared as one number, which is much faster than column by column.
+/// Sorts rows. Two or three columns are compared as one number, which is much faster than column by
+/// column.
 fn sort<const W: usize>(rows: &mut [[TermId; W]]) {
     match W {
         2 => rows.sort_unstable_by_key(|row| (u64::from(row[0]) << 32) | u64::from(row[1])),
-        3 => rows
-            .sort_unstable_by_key(|row| (u128::from(row[0]) << 64) | (u128::from(row[1]) << 32) | u128::from(row[2])),
+        3 => rows.sort_unstable_by_key(|row| {
+            (u128::from(row[0]) << 64) | (u128::from(row[1]) << 32) | u128::from(row[2])
+        }),
         _ => rows.sort_unstable(),
     }
 }
@@ -345,7 +393,11 @@ fn boxed_growing<const W: usize>(orders: Arc<Vec<Order>>, wanted: &[bool]) -> Bo
 }
 
 /// Creates finished tuples from rows in any order.
-pub(crate) fn finished(width: usize, rows: &[TermId], orders: Arc<Vec<Order>>) -> Box<dyn Finished> {
+pub(crate) fn finished(
+    width: usize,
+    rows: &[TermId],
+    orders: Arc<Vec<Order>>,
+) -> Box<dyn Finished> {
     with_width!(width, boxed_finished(rows, orders))
 }
 

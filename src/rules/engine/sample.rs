@@ -1,7 +1,8 @@
 //! Orders the atoms of a rule by the numbers of their matches, counted for a sample of bindings.
 //!
-//! An order is built from its start: a partial order is a set of atoms that have been read, with a sample of the
-//! bindings that satisfy them. The cheapest partial order is extended first, so the first complete one is the cheapest.
+//! An order is built from its start: a partial order is a set of atoms that have been read, with a
+//! sample of the bindings that satisfy them. The cheapest partial order is extended first, so the
+//! first complete one is the cheapest.
 
 use std::collections::BTreeSet;
 
@@ -54,12 +55,14 @@ struct Drawn {
     origin: usize,
 }
 
-/// The atoms after those that bind the head's variables: the evaluation searches one match of them for each binding.
+/// The atoms after those that bind the head's variables: the evaluation searches one match of them
+/// for each binding.
 #[derive(Debug, Clone, Default)]
 struct Search {
     /// Cost of the atoms before. Unit: rows read.
     before: f64,
-    /// For each binding before, the number of bindings that it represents, and the cost to find all its matches.
+    /// For each binding before, the number of bindings that it represents, and the cost to find all
+    /// its matches.
     origins: Vec<(f64, f64)>,
 }
 
@@ -67,15 +70,32 @@ impl Search {
     /// Begins a search for each binding of a sample, which is reduced.
     fn begin(partial: &mut Partial) -> Self {
         partial.sample = thinned(std::mem::take(&mut partial.sample), ORIGINS);
-        partial.sample.iter_mut().enumerate().for_each(|(place, drawn)| drawn.origin = place);
-        Self { before: partial.cost, origins: partial.sample.iter().map(|drawn| (drawn.weight, 0.0)).collect() }
+        partial
+            .sample
+            .iter_mut()
+            .enumerate()
+            .for_each(|(place, drawn)| drawn.origin = place);
+        Self {
+            before: partial.cost,
+            origins: partial
+                .sample
+                .iter()
+                .map(|drawn| (drawn.weight, 0.0))
+                .collect(),
+        }
     }
 
     /// Returns the expected number of rows read until each search has found a match or has failed.
     fn cost(&self, sample: &[Drawn]) -> f64 {
         let mut matches = vec![0.0; self.origins.len()];
-        sample.iter().for_each(|drawn| matches[drawn.origin] += drawn.weight);
-        let costs = self.origins.iter().zip(matches).map(|((weight, all), matches)| all / (1.0 + matches / weight));
+        sample
+            .iter()
+            .for_each(|drawn| matches[drawn.origin] += drawn.weight);
+        let costs = self
+            .origins
+            .iter()
+            .zip(matches)
+            .map(|((weight, all), matches)| all / (1.0 + matches / weight));
         self.before + costs.sum::<f64>()
     }
 }
@@ -99,17 +119,29 @@ struct Partial {
 }
 
 impl Sampler<'_, '_, '_> {
-    /// Returns the order of a group's atoms that reads the fewest rows, the estimated number of these rows, and the atoms
-    /// that have many rows for each key, so that a computed value should be part of it.
-    pub(crate) fn order(&mut self, group: &[usize], first: Option<usize>) -> (Vec<usize>, f64, BTreeSet<usize>) {
-        let atoms: Vec<usize> =
-            group.iter().copied().filter(|idx| matches!(self.rule.body[*idx], Literal::Positive(_))).collect();
+    /// Returns the order of a group's atoms that reads the fewest rows, the estimated number of
+    /// these rows, and the atoms that have many rows for each key, so that a computed value should
+    /// be part of it.
+    pub(crate) fn order(
+        &mut self,
+        group: &[usize],
+        first: Option<usize>,
+    ) -> (Vec<usize>, f64, BTreeSet<usize>) {
+        let atoms: Vec<usize> = group
+            .iter()
+            .copied()
+            .filter(|idx| matches!(self.rule.body[*idx], Literal::Positive(_)))
+            .collect();
         let nothing = vec![0; self.rule.variables.len()];
         let mut start = Partial {
             atoms: Vec::new(),
             bound: vec![false; self.rule.variables.len()],
             tested: BTreeSet::new(),
-            sample: vec![Drawn { binding: nothing, weight: 1.0, origin: 0 }],
+            sample: vec![Drawn {
+                binding: nothing,
+                weight: 1.0,
+                origin: 0,
+            }],
             keyed: BTreeSet::new(),
             search: None,
             count: 1.0,
@@ -144,21 +176,30 @@ impl Sampler<'_, '_, '_> {
     fn extended(&mut self, partial: &Partial, idx: usize, group: &[usize]) -> Partial {
         let mut next = partial.clone();
         next.atoms.push(idx);
-        let Literal::Positive(atom) = &self.rule.body[idx] else { return next };
-        let fixed: Vec<usize> =
-            (0..atom.args.len()).filter(|column| is_fixed(atom.args[*column], &next.bound)).collect();
+        let Literal::Positive(atom) = &self.rule.body[idx] else {
+            return next;
+        };
+        let fixed: Vec<usize> = (0..atom.args.len())
+            .filter(|column| is_fixed(atom.args[*column], &next.bound))
+            .collect();
         for arg in &atom.args {
             if let Operand::Variable(variable) = arg {
                 next.bound[*variable] = true;
             }
         }
-        let open = group.iter().copied().filter(|idx| !partial.tested.contains(idx));
+        let open = group
+            .iter()
+            .copied()
+            .filter(|idx| !partial.tested.contains(idx));
         // With the assigned variables, which have no values in a sample.
         let mut known = partial.bound.clone();
         settle(self.rule, group, &mut known);
         let meets = !partial.atoms.is_empty() && meeting(self.rule, open, atom, &known).is_some();
         let one_match = !self.reads_new(partial, &next, group);
-        if next.search.is_none() && !partial.sample.is_empty() && self.outputs_are_bound(partial, group) {
+        if next.search.is_none()
+            && !partial.sample.is_empty()
+            && self.outputs_are_bound(partial, group)
+        {
             next.search = Some(Search::begin(&mut next));
         }
         let mut search = next.search.take();
@@ -168,7 +209,15 @@ impl Sampler<'_, '_, '_> {
                 search.origins[drawn.origin].1 += drawn.weight * (rows_read + LOOKUP);
             }
         };
-        let mut rows_read = match self.matches(&next, &partial.bound, idx, atom, &fixed, one_match, &mut count) {
+        let mut rows_read = match self.matches(
+            &next,
+            &partial.bound,
+            idx,
+            atom,
+            &fixed,
+            one_match,
+            &mut count,
+        ) {
             Some((rows_read, sample)) => {
                 next.count = sample.iter().map(|drawn| drawn.weight).sum();
                 next.sample = thinned(sample, SAMPLE);
@@ -176,7 +225,11 @@ impl Sampler<'_, '_, '_> {
             }
             None => {
                 let rows_read = self.expected(partial, idx, atom, &fixed);
-                next.count = if one_match { rows_read.min(partial.count) } else { rows_read };
+                next.count = if one_match {
+                    rows_read.min(partial.count)
+                } else {
+                    rows_read
+                };
                 next.sample.clear();
                 rows_read
             }
@@ -185,40 +238,58 @@ impl Sampler<'_, '_, '_> {
             self.test(&mut next, group);
         }
         self.settle(&mut next, group);
-        let is_free = fixed.iter().all(|column| matches!(atom.args[*column], Operand::Constant(_)));
+        let is_free = fixed
+            .iter()
+            .all(|column| matches!(atom.args[*column], Operand::Constant(_)));
         if meets && (is_free || rows_read > partial.count * MANY_ROWS) {
             next.keyed.insert(idx);
             rows_read = rows_read.min(next.count);
         }
         next.cost = match &search {
-            Some(search) if !partial.sample.is_empty() => search.cost(&next.sample).max(partial.cost),
+            Some(search) if !partial.sample.is_empty() => {
+                search.cost(&next.sample).max(partial.cost)
+            }
             _ => partial.cost + rows_read + partial.count * LOOKUP,
         };
         next.search = search;
         if next.sample.is_empty() && !partial.sample.is_empty() {
             // No binding of the sample has a match, but others may have.
-            next.count = rows_read.max(partial.count).min(next.count.max(partial.count)) / (2 * SAMPLE) as f64;
+            next.count = rows_read
+                .max(partial.count)
+                .min(next.count.max(partial.count))
+                / (2 * SAMPLE) as f64;
         }
         next
     }
 
     /// Returns whether all variables of a group that the head reads are bound.
     fn outputs_are_bound(&self, partial: &Partial, group: &[usize]) -> bool {
-        let mut read = group.iter().flat_map(|idx| literal_variables(&self.rule.body[*idx]));
-        read.all(|variable| partial.bound[variable] || !self.outputs.get(variable).copied().unwrap_or(false))
+        let mut read = group
+            .iter()
+            .flat_map(|idx| literal_variables(&self.rule.body[*idx]));
+        read.all(|variable| {
+            partial.bound[variable] || !self.outputs.get(variable).copied().unwrap_or(false)
+        })
     }
 
     /// Returns whether a later condition, or the head, reads a variable that an atom has bound.
     fn reads_new(&self, before: &Partial, after: &Partial, group: &[usize]) -> bool {
-        let new: Vec<Variable> = (0..after.bound.len()).filter(|v| after.bound[*v] && !before.bound[*v]).collect();
-        let later = group.iter().filter(|idx| !after.atoms.contains(idx) && !after.tested.contains(idx));
-        let read: Vec<Variable> = later.flat_map(|idx| literal_variables(&self.rule.body[*idx])).collect();
-        new.iter().any(|v| self.outputs.get(*v).copied().unwrap_or(false) || read.contains(v))
+        let new: Vec<Variable> = (0..after.bound.len())
+            .filter(|v| after.bound[*v] && !before.bound[*v])
+            .collect();
+        let later = group
+            .iter()
+            .filter(|idx| !after.atoms.contains(idx) && !after.tested.contains(idx));
+        let read: Vec<Variable> = later
+            .flat_map(|idx| literal_variables(&self.rule.body[*idx]))
+            .collect();
+        new.iter()
+            .any(|v| self.outputs.get(*v).copied().unwrap_or(false) || read.contains(v))
     }
 
-    /// Looks up an atom for each binding of a sample. Returns the number of rows read and the extended bindings; `None`
-    /// without an index for the lookup. `known`: the variables bound before. `count_rows` gets the rows read for each
-    /// binding.
+    /// Looks up an atom for each binding of a sample. Returns the number of rows read and the
+    /// extended bindings; `None` without an index for the lookup. `known`: the variables bound
+    /// before. `count_rows` gets the rows read for each binding.
     #[expect(clippy::too_many_arguments, reason = "the parts of one look-up")]
     fn matches(
         &mut self,
@@ -233,19 +304,40 @@ impl Sampler<'_, '_, '_> {
         if partial.sample.is_empty() {
             return None;
         }
-        let index = self.access.index_at_hand(atom.predicate, fixed, self.layers, self.own)?;
-        let batches = self.access.batches(atom.predicate, self.parts.of(idx), index, self.layers, self.own);
+        let index = self
+            .access
+            .index_at_hand(atom.predicate, fixed, self.layers, self.own)?;
+        let batches = self.access.batches(
+            atom.predicate,
+            self.parts.of(idx),
+            index,
+            self.layers,
+            self.own,
+        );
         let order = &self.access.indexes.of(atom.predicate)[index];
         let width = order.len();
         let most = (4 * SAMPLE).div_ceil(partial.sample.len());
         let (mut rows_read, mut found) = (0.0, Vec::new());
         for drawn in &partial.sample {
-            let Drawn { binding, weight, origin } = drawn;
-            let key: Vec<TermId> =
-                order[..fixed.len()].iter().map(|column| operand_value(atom.args[*column], binding)).collect();
-            let ranges: Vec<&[TermId]> = batches.iter().map(|rows| &rows[equal_range(rows, width, &key)]).collect();
+            let Drawn {
+                binding,
+                weight,
+                origin,
+            } = drawn;
+            let key: Vec<TermId> = order[..fixed.len()]
+                .iter()
+                .map(|column| operand_value(atom.args[*column], binding))
+                .collect();
+            let ranges: Vec<&[TermId]> = batches
+                .iter()
+                .map(|rows| &rows[equal_range(rows, width, &key)])
+                .collect();
             let count = ranges.iter().map(|rows| rows.len() / width).sum::<usize>();
-            let taken = if one_match { count.min(1) } else { count.min(most) };
+            let taken = if one_match {
+                count.min(1)
+            } else {
+                count.min(most)
+            };
             let read = if one_match { count.min(1) } else { count } as f64;
             count_rows(drawn, read);
             rows_read += weight * read;
@@ -258,8 +350,16 @@ impl Sampler<'_, '_, '_> {
                 });
                 let mut binding = binding.clone();
                 if row.is_some_and(|row| bind(atom, order, fixed.len(), row, known, &mut binding)) {
-                    let share = if one_match { 1.0 } else { count as f64 / taken as f64 };
-                    found.push(Drawn { binding, weight: weight * share, origin: *origin });
+                    let share = if one_match {
+                        1.0
+                    } else {
+                        count as f64 / taken as f64
+                    };
+                    found.push(Drawn {
+                        binding,
+                        weight: weight * share,
+                        origin: *origin,
+                    });
                 }
             }
         }
@@ -268,11 +368,15 @@ impl Sampler<'_, '_, '_> {
 
     /// Returns the expected number of rows read, if values were spread evenly.
     fn expected(&mut self, partial: &Partial, idx: usize, atom: &Atom, fixed: &[usize]) -> f64 {
-        let batches = self.access.batches(atom.predicate, self.parts.of(idx), 0, self.layers, self.own);
+        let batches =
+            self.access
+                .batches(atom.predicate, self.parts.of(idx), 0, self.layers, self.own);
         let rows: usize = batches.iter().map(|rows| rows.len()).sum();
         let mut each = rows as f64 / self.access.predicates.get(atom.predicate).width as f64;
         for column in fixed {
-            each /= self.access.distinct(atom.predicate, *column, self.layers, self.own);
+            each /= self
+                .access
+                .distinct(atom.predicate, *column, self.layers, self.own);
         }
         partial.count * each
     }
@@ -280,10 +384,15 @@ impl Sampler<'_, '_, '_> {
     /// Binds the variables to which equalities give values.
     fn settle(&self, partial: &mut Partial, group: &[usize]) {
         let found = |partial: &Partial| {
-            let open = group.iter().copied().filter(|idx| !partial.tested.contains(idx));
+            let open = group
+                .iter()
+                .copied()
+                .filter(|idx| !partial.tested.contains(idx));
             // Assigned variables occur in no atom.
-            let given = |idx: usize| given(&self.rule.body[idx], &partial.bound).map(|found| (idx, found));
-            open.filter_map(given).find(|(_, (variable, _))| !is_assigned(self.rule, *variable))
+            let given =
+                |idx: usize| given(&self.rule.body[idx], &partial.bound).map(|found| (idx, found));
+            open.filter_map(given)
+                .find(|(_, (variable, _))| !is_assigned(self.rule, *variable))
         };
         let is_sampled = !partial.sample.is_empty();
         while let Some((idx, (variable, value))) = found(partial) {
@@ -310,7 +419,9 @@ impl Sampler<'_, '_, '_> {
                 continue;
             }
             match literal {
-                Literal::Compare { op, left, right, .. } => partial.sample.retain(|Drawn { binding, .. }| {
+                Literal::Compare {
+                    op, left, right, ..
+                } => partial.sample.retain(|Drawn { binding, .. }| {
                     self.watch.begin();
                     let left = left.value(binding, self.universe, self.watch);
                     match (left, right.value(binding, self.universe, self.watch)) {
@@ -318,10 +429,14 @@ impl Sampler<'_, '_, '_> {
                         _ => false,
                     }
                 }),
-                Literal::Test { value, .. } => partial.sample.retain(|Drawn { binding, .. }| {
-                    self.watch.begin();
-                    value.value(binding, self.universe, self.watch).is_some_and(|value| *value == Term::Boolean(true))
-                }),
+                Literal::Test { value, .. } => {
+                    partial.sample.retain(|Drawn { binding, .. }| {
+                        self.watch.begin();
+                        value
+                            .value(binding, self.universe, self.watch)
+                            .is_some_and(|value| *value == Term::Boolean(true))
+                    })
+                }
                 // Assigned variables occur in no atom, and the share of absent tuples is left open.
                 _ => continue,
             }
@@ -332,7 +447,12 @@ impl Sampler<'_, '_, '_> {
 }
 
 fn cheapest(open: &[Partial]) -> Option<usize> {
-    (0..open.len()).min_by(|a, b| open[*a].cost.total_cmp(&open[*b].cost).then(open[*a].atoms.cmp(&open[*b].atoms)))
+    (0..open.len()).min_by(|a, b| {
+        open[*a]
+            .cost
+            .total_cmp(&open[*b].cost)
+            .then(open[*a].atoms.cmp(&open[*b].atoms))
+    })
 }
 
 fn is_fixed(arg: Operand, bound: &[bool]) -> bool {
@@ -343,11 +463,21 @@ fn is_fixed(arg: Operand, bound: &[bool]) -> bool {
     }
 }
 
-/// Binds the variables of an atom to a row. Returns `false` if one of them occurs twice with different values.
-fn bind(atom: &Atom, order: &[usize], from: usize, row: &[TermId], known: &[bool], binding: &mut [TermId]) -> bool {
+/// Binds the variables of an atom to a row. Returns `false` if one of them occurs twice with
+/// different values.
+fn bind(
+    atom: &Atom,
+    order: &[usize],
+    from: usize,
+    row: &[TermId],
+    known: &[bool],
+    binding: &mut [TermId],
+) -> bool {
     let mut new: Vec<Variable> = Vec::new();
     for (offset, column) in order.iter().enumerate().skip(from) {
-        let Operand::Variable(variable) = atom.args[*column] else { continue };
+        let Operand::Variable(variable) = atom.args[*column] else {
+            continue;
+        };
         if known[variable] || new.contains(&variable) {
             if binding[variable] != row[offset] {
                 return false;
@@ -370,7 +500,10 @@ fn thinned(sample: Vec<Drawn>, size: usize) -> Vec<Drawn> {
     for drawn in sample {
         sum += drawn.weight;
         while next < sum && kept.len() < size {
-            kept.push(Drawn { weight: step, ..drawn.clone() });
+            kept.push(Drawn {
+                weight: step,
+                ..drawn.clone()
+            });
             next += step;
         }
     }

@@ -15,12 +15,14 @@ use crate::engine::sample::{SAMPLED_ATOMS, Sampler};
 use crate::model::program::{Literal, Rule};
 use crate::model::universe::Universe;
 
-/// Number of rows that a variant reads before its order is questioned. Fewer are read faster than sampled.
+/// Number of rows that a variant reads before its order is questioned. Fewer are read faster than
+/// sampled.
 pub(crate) const UNQUESTIONED: u64 = 4_096;
 /// How many times the expected number of rows a variant reads before its order is questioned.
 const TOLERANCE: f64 = 4.0;
 
-/// The variants that were planned by samples, and the number of rows that each may read before it is planned again.
+/// The variants that were planned by samples, and the number of rows that each may read before it
+/// is planned again.
 pub(crate) type Adapted = HashMap<(usize, usize), (Variant, u64)>;
 
 /// The facts, terms and limits with which a rule is evaluated.
@@ -32,8 +34,16 @@ pub(crate) struct Context<'s, 'a, 'u, 't> {
 
 /// Returns the number of rows that a variant may read before its order is questioned.
 pub(crate) fn allowance(variant: &Variant, rule: &Rule, access: &Access<'_>) -> u64 {
-    let atoms = rule.body.iter().filter(|literal| matches!(literal, Literal::Positive(_))).count();
-    if variant.has_choice && atoms <= SAMPLED_ATOMS { access.unquestioned } else { u64::MAX }
+    let atoms = rule
+        .body
+        .iter()
+        .filter(|literal| matches!(literal, Literal::Positive(_)))
+        .count();
+    if variant.has_choice && atoms <= SAMPLED_ATOMS {
+        access.unquestioned
+    } else {
+        u64::MAX
+    }
 }
 
 /// Plans a variant by samples of the tuples that are there now.
@@ -63,12 +73,24 @@ pub(crate) fn replanned(
         many.extend(keyed);
         atoms
     });
-    let variant = plan_variant(rule, parts, &orders, context.access.indexes.to_mut(), Some(&many));
-    (variant, ((rows_read * TOLERANCE) as u64).max(context.access.unquestioned))
+    let variant = plan_variant(
+        rule,
+        parts,
+        &orders,
+        context.access.indexes.to_mut(),
+        Some(&many),
+    );
+    (
+        variant,
+        ((rows_read * TOLERANCE) as u64).max(context.access.unquestioned),
+    )
 }
 
 /// Adds the head rows that one variant derives to a sink, which `flush` empties when it is full.
-#[expect(clippy::too_many_arguments, reason = "the parts of one evaluation, borrowed separately")]
+#[expect(
+    clippy::too_many_arguments,
+    reason = "the parts of one evaluation, borrowed separately"
+)]
 pub(crate) fn attempt(
     context: &mut Context<'_, '_, '_, '_>,
     rule: &Rule,
@@ -79,11 +101,22 @@ pub(crate) fn attempt(
     sink: &mut Sink,
     flush: Flush<'_>,
 ) -> Result<(), Halt> {
-    let Some(main) = Sources::new(context, &variant.ops, layers, own)? else { return Ok(()) };
+    let Some(main) = Sources::new(context, &variant.ops, layers, own)? else {
+        return Ok(());
+    };
     for guard in &variant.guards {
-        let Some(sources) = Sources::new(context, guard, layers, own)? else { return Ok(()) };
+        let Some(sources) = Sources::new(context, guard, layers, own)? else {
+            return Ok(());
+        };
         let (mut nothing, mut ignore) = (Sink::new(Vec::new()), |_: &mut Sink, _: &Meter| Ok(()));
-        if !sources.run(context, rule, guard, &mut rows_left, &mut nothing, &mut ignore)? {
+        if !sources.run(
+            context,
+            rule,
+            guard,
+            &mut rows_left,
+            &mut nothing,
+            &mut ignore,
+        )? {
             return Ok(());
         }
     }
@@ -97,13 +130,26 @@ pub(crate) fn attempt(
     let mut matches = Distinct::new(operands.len().max(1), Vec::new(), 4);
     let mut collected = Sink::new(operands);
     let mut collect = |sink: &mut Sink, meter: &Meter| matches.add(sink, &meter.watch);
-    let joined = main.run(context, rule, &variant.ops, &mut rows_left, &mut collected, &mut collect);
+    let joined = main.run(
+        context,
+        rule,
+        &variant.ops,
+        &mut rows_left,
+        &mut collected,
+        &mut collect,
+    );
     if let Err(halt) = joined {
         context.meter.watch.release(matches.new_bytes());
         return Err(halt);
     }
     collect(&mut collected, context.meter)?;
-    let heads = aggregate(rule, aggregation, matches.rows(), context.universe, context.meter)?;
+    let heads = aggregate(
+        rule,
+        aggregation,
+        matches.rows(),
+        context.universe,
+        context.meter,
+    )?;
     context.meter.watch.release(matches.new_bytes());
     sink.rows.extend(heads);
     if sink.rows.len() >= sink.limit {
@@ -130,11 +176,19 @@ impl<'b> Sources<'b> {
         own: Option<Own<'b>>,
     ) -> Result<Option<Self>, Stop> {
         let access = &mut *context.access;
-        let mut sources = Self { batches: Vec::with_capacity(ops.len()), widths: Vec::with_capacity(ops.len()) };
+        let mut sources = Self {
+            batches: Vec::with_capacity(ops.len()),
+            widths: Vec::with_capacity(ops.len()),
+        };
         for op in ops {
             let (predicate, part, index) = match op {
-                Op::Scan(Scan { keyed: Some(keyed), part, .. }) => {
-                    let found = access.keyed(keyed, *part, layers, own, context.universe, context.meter)?;
+                Op::Scan(Scan {
+                    keyed: Some(keyed),
+                    part,
+                    ..
+                }) => {
+                    let found =
+                        access.keyed(keyed, *part, layers, own, context.universe, context.meter)?;
                     if found.iter().all(|batch| batch.is_empty()) {
                         return Ok(None);
                     }
@@ -142,8 +196,15 @@ impl<'b> Sources<'b> {
                     sources.widths.push(keyed.width());
                     continue;
                 }
-                Op::Scan(Scan { predicate, part, index, .. }) => (*predicate, *part, *index),
-                Op::Absent { predicate, index, .. } => (*predicate, Part::All, *index),
+                Op::Scan(Scan {
+                    predicate,
+                    part,
+                    index,
+                    ..
+                }) => (*predicate, *part, *index),
+                Op::Absent {
+                    predicate, index, ..
+                } => (*predicate, Part::All, *index),
                 _ => {
                     sources.batches.push(Vec::new());
                     sources.widths.push(1);
@@ -157,7 +218,10 @@ impl<'b> Sources<'b> {
             sources.batches.push(found);
             sources.widths.push(access.predicates.get(predicate).width);
         }
-        context.meter.watch.hold(std::mem::take(&mut access.unaccounted))?;
+        context
+            .meter
+            .watch
+            .hold(std::mem::take(&mut access.unaccounted))?;
         Ok(Some(sources))
     }
 

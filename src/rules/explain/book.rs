@@ -20,11 +20,17 @@ impl RuleBook {
     ///
     /// # Errors
     /// The property is unknown, a value is invalid, or the budget was exceeded.
-    pub fn explain(&self, facts: &ActionFacts<'_>, property: &str, budget: &Budget) -> Result<Explanation, RuleFault> {
+    pub fn explain(
+        &self,
+        facts: &ActionFacts<'_>,
+        property: &str,
+        budget: &Budget,
+    ) -> Result<Explanation, RuleFault> {
         self.explain_all(facts, &[property], budget).remove(0)
     }
 
-    /// Explains several properties (by IRI) in an action, in the given order. Evaluates the libraries once.
+    /// Explains several properties (by IRI) in an action, in the given order. Evaluates the
+    /// libraries once.
     ///
     /// Each property has an error of its own: see [`RuleBook::explain`].
     pub fn explain_all(
@@ -34,7 +40,10 @@ impl RuleBook {
         budget: &Budget,
     ) -> Vec<Result<Explanation, RuleFault>> {
         let mut base = None;
-        properties.iter().map(|property| self.explained(facts, property, &mut base, budget)).collect()
+        properties
+            .iter()
+            .map(|property| self.explained(facts, property, &mut base, budget))
+            .collect()
     }
 
     fn explained<'a>(
@@ -49,30 +58,42 @@ impl RuleBook {
             return Err(RuleFault::Value(NO_INTERVALS.to_owned()));
         }
         match &judge.rules {
-            JudgeRules::Datalog { planned, verdict, .. } => {
+            JudgeRules::Datalog {
+                planned, verdict, ..
+            } => {
                 let base = match base {
                     Some(base) => base,
                     None => base.insert(self.base(facts, budget)?),
                 };
                 let evaluated = self.evaluate_for_proofs(base, planned, verdict, budget)?;
                 let context = evaluated.context(self, base, planned);
-                Ok(explained(&judge.label, evaluated.findings.clone()?, verdict, &context))
+                Ok(explained(
+                    &judge.label,
+                    evaluated.findings.clone()?,
+                    verdict,
+                    &context,
+                ))
             }
             #[cfg(feature = "sparql")]
             JudgeRules::Sparql(_) => {
-                let results = self.judge(facts, &[property.to_owned()], budget).remove(property);
-                let findings =
-                    results.unwrap_or_else(|| Err(RuleFault::Value("the property was not judged".into())))?;
+                let results = self
+                    .judge(facts, &[property.to_owned()], budget)
+                    .remove(property);
+                let findings = results.unwrap_or_else(|| {
+                    Err(RuleFault::Value("the property was not judged".into()))
+                })?;
                 Ok(of_query(&judge.label, findings))
             }
         }
     }
 
-    /// Explains why the rules of a property (by IRI) derive a statement such as `near(obj:cup_1, _)` in an action, or
-    /// why not. `_` matches any value. The statement may use the prefixes of the property's rule file.
+    /// Explains why the rules of a property (by IRI) derive a statement such as
+    /// `near(obj:cup_1, _)` in an action, or why not. `_` matches any value. The statement may use
+    /// the prefixes of the property's rule file.
     ///
     /// # Errors
-    /// The property is unknown or a SPARQL query, the statement is invalid, or the budget was exceeded.
+    /// The property is unknown or a SPARQL query, the statement is invalid, or the budget was
+    /// exceeded.
     pub fn explain_statement(
         &self,
         facts: &ActionFacts<'_>,
@@ -81,7 +102,13 @@ impl RuleBook {
         budget: &Budget,
     ) -> Result<Explanation, RuleFault> {
         match &self.property(property)?.rules {
-            JudgeRules::Datalog { planned, verdict, scope, prefixes, .. } => {
+            JudgeRules::Datalog {
+                planned,
+                verdict,
+                scope,
+                prefixes,
+                ..
+            } => {
                 let goal = Goal::parse(statement, prefixes).and_then(|goal| {
                     let predicate = goal.predicate(&self.predicates, &[*scope, 0])?;
                     Ok((goal, predicate))
@@ -91,30 +118,53 @@ impl RuleBook {
                 let evaluated = self.evaluate_for_proofs(&mut base, planned, verdict, budget)?;
                 let (known, unknown) = goal.known(&mut base.universe);
                 let context = evaluated.context(self, &base, planned);
-                Ok(Explanation { unknown, ..goal_explained(statement, predicate, &known, &context) })
+                Ok(Explanation {
+                    unknown,
+                    ..goal_explained(statement, predicate, &known, &context)
+                })
             }
             #[cfg(feature = "sparql")]
-            JudgeRules::Sparql(_) => {
-                Err(RuleFault::Value("a SPARQL query derives no statements; explain the property instead".into()))
-            }
+            JudgeRules::Sparql(_) => Err(RuleFault::Value(
+                "a SPARQL query derives no statements; explain the property instead".into(),
+            )),
         }
     }
 
     fn property(&self, iri: &str) -> Result<&Judge, RuleFault> {
-        self.properties.get(iri).ok_or_else(|| RuleFault::Value(format!("unknown property {iri}")))
+        self.properties
+            .get(iri)
+            .ok_or_else(|| RuleFault::Value(format!("unknown property {iri}")))
     }
 
     /// Evaluates the libraries over an action, and keeps the tuples of every stage.
     fn base<'a>(&'a self, facts: &ActionFacts<'a>, budget: &Budget) -> Result<Base<'a>, RuleFault> {
         let mut universe = Universe::of_action(&self.terms, facts);
         let (mut rounds, mut meter) = (Rounds::default(), Meter::new(budget));
-        let given = self.given.load(facts, &mut universe, &self.predicates, &self.indexes);
-        let own = self.given.load(facts, &mut universe, &self.predicates, &self.indexes);
-        let mut layers = Layers { own, below: vec![&self.fixed] };
-        self.evaluate_recording(&self.libraries, &mut layers, (&mut universe, &mut rounds), &mut meter)?;
+        let given = self
+            .given
+            .load(facts, &mut universe, &self.predicates, &self.indexes);
+        let own = self
+            .given
+            .load(facts, &mut universe, &self.predicates, &self.indexes);
+        let mut layers = Layers {
+            own,
+            below: vec![&self.fixed],
+        };
+        self.evaluate_recording(
+            &self.libraries,
+            &mut layers,
+            (&mut universe, &mut rounds),
+            &mut meter,
+        )?;
         let enriched = layers.own;
         let label = universe.next_label();
-        Ok(Base { universe, label, rounds, given, enriched })
+        Ok(Base {
+            universe,
+            label,
+            rounds,
+            given,
+            enriched,
+        })
     }
 
     /// Evaluates the rules of a property.
@@ -125,15 +175,33 @@ impl RuleBook {
         verdict: &Verdict,
         budget: &Budget,
     ) -> Result<Evaluated, RuleFault> {
-        let Base { universe, label, rounds, enriched, .. } = base;
+        let Base {
+            universe,
+            label,
+            rounds,
+            enriched,
+            ..
+        } = base;
         universe.label_from(*label);
         let mut meter = Meter::new(budget);
-        let mut layers = Layers { own: Tables::default(), below: vec![enriched, &self.fixed] };
+        let mut layers = Layers {
+            own: Tables::default(),
+            below: vec![enriched, &self.fixed],
+        };
         self.evaluate_recording(planned, &mut layers, (universe, rounds), &mut meter)?;
         let findings = findings(verdict, &layers, universe);
         let (own, watch) = (layers.own, meter.into_watch());
-        let stated = stated_facts(&[planned, &self.libraries, &self.fixed_rules], &self.predicates, &self.indexes);
-        Ok(Evaluated { stated, own, watch, findings })
+        let stated = stated_facts(
+            &[planned, &self.libraries, &self.fixed_rules],
+            &self.predicates,
+            &self.indexes,
+        );
+        Ok(Evaluated {
+            stated,
+            own,
+            watch,
+            findings,
+        })
     }
 
     fn evaluate_recording(
@@ -144,8 +212,16 @@ impl RuleBook {
         meter: &mut Meter,
     ) -> Result<(), RuleFault> {
         let (predicates, indexes) = (&self.predicates, &self.indexes);
-        evaluate_recording_rounds(planned, predicates, indexes, layers, universe, meter, Some(rounds))
-            .map_err(|stopped| fault(meter, stopped, planned))
+        evaluate_recording_rounds(
+            planned,
+            predicates,
+            indexes,
+            layers,
+            universe,
+            meter,
+            Some(rounds),
+        )
+        .map_err(|stopped| fault(meter, stopped, planned))
     }
 }
 
@@ -172,10 +248,20 @@ struct Evaluated {
 }
 
 impl Evaluated {
-    fn context<'c>(&'c self, book: &'c RuleBook, base: &'c Base<'_>, planned: &'c Planned) -> ProofContext<'c> {
+    fn context<'c>(
+        &'c self,
+        book: &'c RuleBook,
+        base: &'c Base<'_>,
+        planned: &'c Planned,
+    ) -> ProofContext<'c> {
         ProofContext {
             predicates: &book.predicates,
-            rules: planned.rules.iter().chain(&book.libraries.rules).chain(&book.fixed_rules.rules).collect(),
+            rules: planned
+                .rules
+                .iter()
+                .chain(&book.libraries.rules)
+                .chain(&book.fixed_rules.rules)
+                .collect(),
             layers: vec![&self.own, &base.enriched, &book.fixed],
             facts: vec![&base.given, &book.fixed_facts, &self.stated],
             rounds: &base.rounds,
@@ -187,7 +273,12 @@ impl Evaluated {
     }
 }
 
-fn explained(label: &str, findings: Findings, verdict: &Verdict, context: &ProofContext<'_>) -> Explanation {
+fn explained(
+    label: &str,
+    findings: Findings,
+    verdict: &Verdict,
+    context: &ProofContext<'_>,
+) -> Explanation {
     let mut explanation = Explanation {
         title: label.to_owned(),
         findings: None,
@@ -201,18 +292,26 @@ fn explained(label: &str, findings: Findings, verdict: &Verdict, context: &Proof
         let mut prover = Prover::new(context);
         let mut rows: Vec<&[u32]> = context.rows(decisive.predicate).collect();
         rows.truncate(PROOFS_SHOWN);
-        explanation.proofs = rows.into_iter().map(|row| prover.prove(decisive.predicate, row, 0)).collect();
+        explanation.proofs = rows
+            .into_iter()
+            .map(|row| prover.prove(decisive.predicate, row, 0))
+            .collect();
         if explanation.proofs.is_empty() {
             explanation.miss = context.miss(decisive.predicate, &vec![None; decisive.arity], 0);
         }
         let shown = explanation.proofs.len();
         if findings.witness_count > shown {
-            explanation.notes.push(format!("and {} more like this", findings.witness_count - shown));
+            explanation.notes.push(format!(
+                "and {} more like this",
+                findings.witness_count - shown
+            ));
         }
     }
     explanation.notes.extend(stopped_early(context));
     if !findings.applicable {
-        explanation.notes.push("the property is inapplicable here: `applicable` has no tuples".to_owned());
+        explanation
+            .notes
+            .push("the property is inapplicable here: `applicable` has no tuples".to_owned());
     }
     explanation.findings = Some(findings);
     explanation.deciding = context.deciding_in(&explanation.to_text());
@@ -226,10 +325,17 @@ fn of_query(label: &str, findings: Findings) -> Explanation {
         .witness
         .iter()
         .map(|row| {
-            let values: Vec<String> = row.values.iter().map(|(name, term)| format!("?{name} = {term}")).collect();
+            let values: Vec<String> = row
+                .values
+                .iter()
+                .map(|(name, term)| format!("?{name} = {term}"))
+                .collect();
             format!("row: {}", values.join(", "))
         })
-        .chain(["a SPARQL property is explained by its rows; only Datalog properties have proofs".to_owned()])
+        .chain([
+            "a SPARQL property is explained by its rows; only Datalog properties have proofs"
+                .to_owned(),
+        ])
         .collect();
     let (proofs, unknown) = (Vec::new(), Vec::new());
     Explanation {

@@ -5,7 +5,8 @@ use std::fmt::Write as _;
 use crate::explain::model::{Explanation, Failure, Miss, Premise, Proof, Support};
 
 impl Explanation {
-    /// Returns a graph in Graphviz's DOT language: statements are boxes, facts are grey, missing conditions are dashed.
+    /// Returns a graph in Graphviz's DOT language: statements are boxes, facts are grey, missing
+    /// conditions are dashed.
     pub fn to_dot(&self) -> String {
         let mut drawing = Drawing::default();
         let title = match (&self.findings, self.holds()) {
@@ -21,7 +22,10 @@ impl Explanation {
             let node = drawing.miss(miss);
             drawing.edge(root, node);
         }
-        format!("digraph why {{\n  rankdir=LR;\n  node [shape=box, fontname=\"sans-serif\"];\n{}}}\n", drawing.text)
+        format!(
+            "digraph why {{\n  rankdir=LR;\n  node [shape=box, fontname=\"sans-serif\"];\n{}}}\n",
+            drawing.text
+        )
     }
 }
 
@@ -51,11 +55,14 @@ impl Drawing {
             _ => "style=solid",
         };
         let node = self.node(&proof.statement, style);
-        if let Support::Rule { premises, .. } | Support::Aggregate { premises, .. } = &proof.support {
+        if let Support::Rule { premises, .. } | Support::Aggregate { premises, .. } = &proof.support
+        {
             for premise in premises {
                 let child = match premise {
                     Premise::Proof(proof) => self.proof(proof),
-                    Premise::Absent(text) => self.node(&format!("no match for {text}"), "style=dotted"),
+                    Premise::Absent(text) => {
+                        self.node(&format!("no match for {text}"), "style=dotted")
+                    }
                     Premise::Computed(text) => self.node(text, "shape=plaintext"),
                 };
                 self.edge(node, child);
@@ -70,10 +77,16 @@ impl Drawing {
             let child = self.node(text, "style=solid");
             self.edge(node, child);
         }
-        let failed = self.node(&format!("missing: {}", miss.failed), "style=dashed, color=red");
+        let failed = self.node(
+            &format!("missing: {}", miss.failed),
+            "style=dashed, color=red",
+        );
         self.edge(node, failed);
         match &miss.failure {
-            Failure::NoMatch { because: Some(inner), .. } => {
+            Failure::NoMatch {
+                because: Some(inner),
+                ..
+            } => {
                 let child = self.miss(inner);
                 self.edge(failed, child);
             }

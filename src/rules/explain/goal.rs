@@ -10,7 +10,9 @@ use crate::model::given::GIVEN;
 use crate::model::program::{PredicateId, Predicates, Scope};
 use crate::model::universe::Universe;
 use crate::syntax::{AtomSyntax, ExpressionKind, Statement, parse};
-use actcheck_base::{Diagnostic, Diagnostics, RuleFault, Source, Span, Term, TermId, did_you_mean, nearest};
+use actcheck_base::{
+    Diagnostic, Diagnostics, RuleFault, Source, Span, Term, TermId, did_you_mean, nearest,
+};
 
 /// Maximum number of proofs shown.
 pub(super) const PROOFS_SHOWN: usize = 3;
@@ -33,9 +35,16 @@ impl Goal {
     /// Parses a statement such as `p(1, _)`. A variable matches any value, like `_`.
     ///
     /// # Errors
-    /// `R092`: the text is not one statement, an argument is neither a constant nor `_`, or a variable is repeated.
-    pub(super) fn parse(statement: &str, prefixes: &[(String, String)]) -> Result<Self, Diagnostics> {
-        let prefixes: String = prefixes.iter().map(|(prefix, iri)| format!("@prefix {prefix}: <{iri}> .\n")).collect();
+    /// `R092`: the text is not one statement, an argument is neither a constant nor `_`, or a
+    /// variable is repeated.
+    pub(super) fn parse(
+        statement: &str,
+        prefixes: &[(String, String)],
+    ) -> Result<Self, Diagnostics> {
+        let prefixes: String = prefixes
+            .iter()
+            .map(|(prefix, iri)| format!("@prefix {prefix}: <{iri}> .\n"))
+            .collect();
         let source = Source::new("goal", statement.trim().trim_end_matches('.').trim_end());
         let (syntax, faults) = parse(&Source::new("goal", format!("{prefixes}{} .", source.text)));
         // Places in the parsed text, which begins with the prefixes, as places in the goal.
@@ -44,68 +53,134 @@ impl Goal {
             of_goal(span.start)..of_goal(span.end)
         };
         let fault = |message: String, span: &Span| {
-            Diagnostics::from(Diagnostic::error("R092", message).at(&source, place(span)).help(FORM))
+            Diagnostics::from(
+                Diagnostic::error("R092", message)
+                    .at(&source, place(span))
+                    .help(FORM),
+            )
         };
         if let Some(found) = faults.iter().next() {
-            return Err(fault(found.message.clone(), &found.span.clone().unwrap_or_default()));
+            return Err(fault(
+                found.message.clone(),
+                &found.span.clone().unwrap_or_default(),
+            ));
         }
         let end = prefixes.len()..prefixes.len() + source.text.len();
         let head = match syntax.statements.as_slice() {
             [Statement::Rule(rule)] if rule.body.is_empty() => match rule.heads.as_slice() {
                 [head] => head,
-                _ => return Err(fault("a goal is one statement, not several".to_owned(), &end)),
+                _ => {
+                    return Err(fault(
+                        "a goal is one statement, not several".to_owned(),
+                        &end,
+                    ));
+                }
             },
-            [_] => return Err(fault("a goal is a statement without conditions".to_owned(), &end)),
+            [_] => {
+                return Err(fault(
+                    "a goal is a statement without conditions".to_owned(),
+                    &end,
+                ));
+            }
             _ => return Err(fault("a goal is one statement".to_owned(), &end)),
         };
         let args = arguments(head).map_err(|(message, span)| fault(message, &span))?;
-        let args = args.into_iter().map(|(term, span)| (term, place(&span))).collect();
+        let args = args
+            .into_iter()
+            .map(|(term, span)| (term, place(&span)))
+            .collect();
         let (name_span, span) = (place(&head.name_span), place(&head.span));
-        Ok(Self { predicate: head.predicate.clone(), name_span, span, args, source })
+        Ok(Self {
+            predicate: head.predicate.clone(),
+            name_span,
+            span,
+            args,
+            source,
+        })
     }
 
     /// Returns the predicate in the first of the scopes that has it.
     ///
     /// # Errors
     /// `R092`: no scope has the predicate, or it has another number of arguments.
-    pub(super) fn predicate(&self, predicates: &Predicates, scopes: &[Scope]) -> Result<PredicateId, Diagnostics> {
+    pub(super) fn predicate(
+        &self,
+        predicates: &Predicates,
+        scopes: &[Scope],
+    ) -> Result<PredicateId, Diagnostics> {
         let name = &self.predicate;
         let fault = |message: String, span: &Span, help: String| {
-            Diagnostics::from(Diagnostic::error("R092", message).at(&self.source, span.clone()).help(help))
+            Diagnostics::from(
+                Diagnostic::error("R092", message)
+                    .at(&self.source, span.clone())
+                    .help(help),
+            )
         };
-        let found = scopes.iter().find_map(|scope| predicates.find(*scope, name, None));
+        let found = scopes
+            .iter()
+            .find_map(|scope| predicates.find(*scope, name, None));
         let Some(found) = found.filter(|id| !predicates.get(*id).given) else {
             if GIVEN.iter().any(|(given, ..)| given == name) && *scopes != [0] {
-                let message = format!("`{name}` is given: only derived statements have an explanation");
-                return Err(fault(message, &self.name_span, "name a predicate of the rules".to_owned()));
+                let message =
+                    format!("`{name}` is given: only derived statements have an explanation");
+                return Err(fault(
+                    message,
+                    &self.name_span,
+                    "name a predicate of the rules".to_owned(),
+                ));
             }
-            let known =
-                predicates.list.iter().filter(|p| scopes.contains(&p.scope) && !p.given && !p.name.contains('~'));
+            let known = predicates
+                .list
+                .iter()
+                .filter(|p| scopes.contains(&p.scope) && !p.given && !p.name.contains('~'));
             let help = did_you_mean(name, known.map(|predicate| predicate.name.as_str()));
-            return Err(fault(format!("the program has no predicate `{name}`"), &self.name_span, help));
+            return Err(fault(
+                format!("the program has no predicate `{name}`"),
+                &self.name_span,
+                help,
+            ));
         };
         let arity = predicates.get(found).arity;
         if arity != self.args.len() {
             let message = format!("`{name}` has {}, not {}", counted(arity), self.args.len());
             let args: Vec<&str> = vec!["_"; arity];
-            return Err(fault(message, &self.span, format!("write `{name}({})`", args.join(", "))));
+            return Err(fault(
+                message,
+                &self.span,
+                format!("write `{name}({})`", args.join(", ")),
+            ));
         }
         Ok(found)
     }
 
-    /// Returns the ids of the arguments, and the constants that had none. These get an id, so that the closest attempt
-    /// can name them.
-    pub(super) fn known(&self, universe: &mut Universe<'_>) -> (Vec<Option<TermId>>, Vec<UnknownTerm>) {
-        let missing = self.args.iter().filter_map(|(term, span)| Some((term.as_ref()?, span)));
+    /// Returns the ids of the arguments, and the constants that had none. These get an id, so that
+    /// the closest attempt can name them.
+    pub(super) fn known(
+        &self,
+        universe: &mut Universe<'_>,
+    ) -> (Vec<Option<TermId>>, Vec<UnknownTerm>) {
+        let missing = self
+            .args
+            .iter()
+            .filter_map(|(term, span)| Some((term.as_ref()?, span)));
         let unknown = missing
             .filter(|(term, _)| universe.id(term).is_none())
             .map(|(term, span)| UnknownTerm {
-                text: self.source.text.get(span.clone()).unwrap_or_default().to_owned(),
+                text: self
+                    .source
+                    .text
+                    .get(span.clone())
+                    .unwrap_or_default()
+                    .to_owned(),
                 span: span.clone(),
                 similar: similar(term, universe),
             })
             .collect();
-        let ids = self.args.iter().map(|(term, _)| term.as_ref().map(|term| universe.intern(term.clone()))).collect();
+        let ids = self
+            .args
+            .iter()
+            .map(|(term, _)| term.as_ref().map(|term| universe.intern(term.clone())))
+            .collect();
         (ids, unknown)
     }
 }
@@ -123,10 +198,16 @@ fn arguments(head: &AtomSyntax) -> Result<Vec<GoalArgument>, (String, Span)> {
             ExpressionKind::Anonymous => None,
             ExpressionKind::Variable(name) if variables.insert(name) => None,
             ExpressionKind::Variable(name) => {
-                let message = format!("`?{name}` occurs twice, but a variable of a goal matches any value");
+                let message =
+                    format!("`?{name}` occurs twice, but a variable of a goal matches any value");
                 return Err((message, arg.span.clone()));
             }
-            _ => return Err(("a statement may contain only constants and `_`".to_owned(), arg.span.clone())),
+            _ => {
+                return Err((
+                    "a statement may contain only constants and `_`".to_owned(),
+                    arg.span.clone(),
+                ));
+            }
         };
         args.push((term, arg.span.clone()));
     }
@@ -142,7 +223,11 @@ fn similar(term: &Term, universe: &Universe<'_>) -> Option<String> {
         _ => None,
     };
     let wanted = name(term)?;
-    let known: Vec<String> = universe.terms().take(TERMS_COMPARED).filter_map(name).collect();
+    let known: Vec<String> = universe
+        .terms()
+        .take(TERMS_COMPARED)
+        .filter_map(name)
+        .collect();
     nearest(&wanted, known.iter().map(String::as_str)).map(str::to_owned)
 }
 
@@ -157,7 +242,10 @@ pub(super) fn invalid_goal(faults: &Diagnostics) -> RuleFault {
 
 /// Returns the remark that a search for the closest rule was stopped.
 pub(super) fn stopped_early(context: &ProofContext<'_>) -> Option<String> {
-    context.exhausted.get().then(|| "the search stopped at its limit: another rule may be closer".to_owned())
+    context
+        .exhausted
+        .get()
+        .then(|| "the search stopped at its limit: another rule may be closer".to_owned())
 }
 
 /// Explains why the tuples that match a goal hold, or why there are none.
@@ -167,10 +255,19 @@ pub(super) fn goal_explained(
     known: &[Option<TermId>],
     context: &ProofContext<'_>,
 ) -> Explanation {
-    let matches = |row: &&[TermId]| known.iter().zip(*row).all(|(known, value)| known.is_none_or(|id| id == *value));
+    let matches = |row: &&[TermId]| {
+        known
+            .iter()
+            .zip(*row)
+            .all(|(known, value)| known.is_none_or(|id| id == *value))
+    };
     let mut prover = Prover::new(context);
-    let proofs: Vec<_> =
-        context.rows(predicate).filter(matches).take(PROOFS_SHOWN).map(|row| prover.prove(predicate, row, 0)).collect();
+    let proofs: Vec<_> = context
+        .rows(predicate)
+        .filter(matches)
+        .take(PROOFS_SHOWN)
+        .map(|row| prover.prove(predicate, row, 0))
+        .collect();
     let mut notes = Vec::new();
     let mut miss = None;
     if proofs.is_empty() {
@@ -181,5 +278,13 @@ pub(super) fn goal_explained(
         }
     }
     let title = statement.trim().to_owned();
-    Explanation { title, findings: None, proofs, miss, unknown: Vec::new(), notes, deciding: Vec::new() }
+    Explanation {
+        title,
+        findings: None,
+        proofs,
+        miss,
+        unknown: Vec::new(),
+        notes,
+        deciding: Vec::new(),
+    }
 }

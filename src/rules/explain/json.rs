@@ -30,10 +30,20 @@ fn proof(of: &Proof) -> Value {
         Support::Fact => ("fact", Value::Null, Value::Null, &[][..]),
         Support::Cut => ("cut", Value::Null, Value::Null, &[][..]),
         Support::Omitted => ("omitted", Value::Null, Value::Null, &[][..]),
-        Support::Rule { rule: cited, premises } => ("rule", rule(cited), Value::Null, premises.as_slice()),
-        Support::Aggregate { rule: cited, matches, premises } => {
-            ("aggregate", rule(cited), json!(matches), premises.as_slice())
-        }
+        Support::Rule {
+            rule: cited,
+            premises,
+        } => ("rule", rule(cited), Value::Null, premises.as_slice()),
+        Support::Aggregate {
+            rule: cited,
+            matches,
+            premises,
+        } => (
+            "aggregate",
+            rule(cited),
+            json!(matches),
+            premises.as_slice(),
+        ),
     };
     json!({
         "statement": of.statement,

@@ -1,4 +1,5 @@
-//! Explanations: the proof of a goal that holds, or the closest rule and its failed condition for one that does not.
+//! Explanations: the proof of a goal that holds, or the closest rule and its failed condition for
+//! one that does not.
 //!
 //! Never: changes a result, decides an outcome, or costs time unless an explanation is requested.
 

@@ -2,7 +2,8 @@
 
 use actcheck_base::{DecidingSignal, Findings, Span};
 
-/// Explains why a property or goal holds or does not hold: a tree, which [`Explanation::to_text`] formats.
+/// Explains why a property or goal holds or does not hold: a tree, which [`Explanation::to_text`]
+/// formats.
 ///
 /// ```
 /// use actcheck_rules::explain::{Failure, Premise, Support};
@@ -49,7 +50,9 @@ pub struct Explanation {
 impl Explanation {
     /// Returns whether the property holds, or whether the goal is derived.
     pub fn holds(&self) -> bool {
-        self.findings.as_ref().map_or(!self.proofs.is_empty(), |findings| findings.holds)
+        self.findings
+            .as_ref()
+            .map_or(!self.proofs.is_empty(), |findings| findings.holds)
     }
 }
 

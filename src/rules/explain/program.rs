@@ -14,15 +14,21 @@ use crate::standalone::Program;
 use actcheck_base::{Diagnostics, RuleFault};
 
 impl Program {
-    /// Explains why the program derives a statement such as `p(1, "a")`, or why not. `_` matches any value.
+    /// Explains why the program derives a statement such as `p(1, "a")`, or why not. `_` matches
+    /// any value.
     ///
     /// # Errors
     /// The statement is invalid, or the budget was exceeded.
     pub fn explain(&self, statement: &str, budget: &Budget) -> Result<Explanation, RuleFault> {
-        let (goal, predicate) = self.goal(statement).map_err(|faults| invalid_goal(&faults))?;
+        let (goal, predicate) = self
+            .goal(statement)
+            .map_err(|faults| invalid_goal(&faults))?;
         let mut universe = Universe::new(&self.terms, None);
         let (mut rounds, mut meter) = (Rounds::default(), Meter::new(budget));
-        let mut layers = Layers { own: Tables::new(self.predicates.len()), below: Vec::new() };
+        let mut layers = Layers {
+            own: Tables::new(self.predicates.len()),
+            below: Vec::new(),
+        };
         let planned = &self.planned;
         evaluate_recording_rounds(
             planned,
@@ -48,13 +54,17 @@ impl Program {
             exhausted: Cell::new(false),
             deciding: RefCell::default(),
         };
-        Ok(Explanation { unknown, ..goal_explained(statement, predicate, &known, &context) })
+        Ok(Explanation {
+            unknown,
+            ..goal_explained(statement, predicate, &known, &context)
+        })
     }
 
     /// Checks a statement such as `p(1, "a")` before it is explained.
     ///
     /// # Errors
-    /// `R092` with the place in the statement: a syntax error, an unknown predicate, the wrong number of arguments.
+    /// `R092` with the place in the statement: a syntax error, an unknown predicate, the wrong
+    /// number of arguments.
     pub fn check_goal(&self, statement: &str) -> Result<(), Diagnostics> {
         self.goal(statement).map(|_| ())
     }

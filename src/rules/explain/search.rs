@@ -36,16 +36,24 @@ pub(crate) struct ProofContext<'a> {
 }
 
 /// Returns the facts written in the programs or read by their imports, without derived tuples.
-pub(super) fn stated_facts(programs: &[&Planned], predicates: &Predicates, indexes: &Indexes) -> Tables {
+pub(super) fn stated_facts(
+    programs: &[&Planned],
+    predicates: &Predicates,
+    indexes: &Indexes,
+) -> Tables {
     let mut facts = Tables::default();
     for (predicate, rows) in programs.iter().flat_map(|planned| &planned.facts) {
         let width = predicates.get(*predicate).width;
-        facts.set(*predicate, finished(width, rows, indexes.of(*predicate).clone()));
+        facts.set(
+            *predicate,
+            finished(width, rows, indexes.of(*predicate).clone()),
+        );
     }
     facts
 }
 
-/// Maximum number of rows read for one explanation, so that it stays fast enough for interactive use.
+/// Maximum number of rows read for one explanation, so that it stays fast enough for interactive
+/// use.
 const STEP_LIMIT: usize = 20_000_000;
 /// Steps between two checks of the clock.
 const STEPS_PER_CHECK: usize = 4096;
@@ -62,16 +70,29 @@ impl<'a> ProofContext<'a> {
     }
 
     /// Returns all tuples of a predicate.
-    pub(super) fn rows(&self, predicate: PredicateId) -> impl Iterator<Item = &'a [TermId]> + use<'a> {
+    pub(super) fn rows(
+        &self,
+        predicate: PredicateId,
+    ) -> impl Iterator<Item = &'a [TermId]> + use<'a> {
         let width = self.predicates.get(predicate).width;
         let table = self.layers.iter().find_map(|tables| tables.get(predicate));
-        table.map_or(&[][..], |table| table.index(0)).chunks_exact(width)
+        table
+            .map_or(&[][..], |table| table.index(0))
+            .chunks_exact(width)
     }
 
-    /// Returns the tuples that may match an atom under a binding; uses binary search if the first argument is known.
-    pub(super) fn candidates(&self, atom: &Atom, binding: &Binding) -> impl Iterator<Item = &'a [TermId]> + use<'a> {
+    /// Returns the tuples that may match an atom under a binding; uses binary search if the first
+    /// argument is known.
+    pub(super) fn candidates(
+        &self,
+        atom: &Atom,
+        binding: &Binding,
+    ) -> impl Iterator<Item = &'a [TermId]> + use<'a> {
         let width = self.predicates.get(atom.predicate).width;
-        let table = self.layers.iter().find_map(|tables| tables.get(atom.predicate));
+        let table = self
+            .layers
+            .iter()
+            .find_map(|tables| tables.get(atom.predicate));
         let rows = table.map_or(&[][..], |table| table.index(0));
         let first = match atom.args.first() {
             Some(Operand::Constant(id)) => Some(*id),
@@ -81,7 +102,9 @@ impl<'a> ProofContext<'a> {
         let (start, end) = match first {
             Some(id) => {
                 let count = rows.len() / width;
-                let before = |limit: &dyn Fn(TermId) -> bool| partition(count, |idx| limit(rows[idx * width]));
+                let before = |limit: &dyn Fn(TermId) -> bool| {
+                    partition(count, |idx| limit(rows[idx * width]))
+                };
                 (before(&|value| value < id), before(&|value| value <= id))
             }
             None => (0, rows.len() / width),
@@ -92,11 +115,16 @@ impl<'a> ProofContext<'a> {
     /// Returns whether a tuple is a given fact.
     pub(super) fn is_fact(&self, predicate: PredicateId, row: &[TermId]) -> bool {
         let width = self.predicates.get(predicate).width;
-        self.facts.iter().filter_map(|tables| tables.get(predicate)).any(|table| {
-            let rows = table.index(0);
-            let start = partition(rows.len() / width, |idx| &rows[idx * width..(idx + 1) * width] < row);
-            rows.get(start * width..(start + 1) * width) == Some(row)
-        })
+        self.facts
+            .iter()
+            .filter_map(|tables| tables.get(predicate))
+            .any(|table| {
+                let rows = table.index(0);
+                let start = partition(rows.len() / width, |idx| {
+                    &rows[idx * width..(idx + 1) * width] < row
+                });
+                rows.get(start * width..(start + 1) * width) == Some(row)
+            })
     }
 
     /// Returns the round of a tuple, or `None` if its stratum is not recursive.
@@ -106,7 +134,10 @@ impl<'a> ProofContext<'a> {
 
     /// Returns the rules that derive a predicate.
     pub(super) fn rules_of(&self, predicate: PredicateId) -> impl Iterator<Item = &'a Rule> + '_ {
-        self.rules.iter().copied().filter(move |rule| rule.head.predicate == predicate)
+        self.rules
+            .iter()
+            .copied()
+            .filter(move |rule| rule.head.predicate == predicate)
     }
 
     /// Returns the binding under which a rule's head equals a tuple, or `None` if they don't match.
@@ -115,13 +146,15 @@ impl<'a> ProofContext<'a> {
         unify(&rule.head, row, &mut binding).then_some(binding)
     }
 
-    /// Returns whether a condition other than a positive atom holds; an assignment binds its variable. Returns `None`
-    /// if a value is missing.
+    /// Returns whether a condition other than a positive atom holds; an assignment binds its
+    /// variable. Returns `None` if a value is missing.
     pub(super) fn tested(&self, literal: &Literal, binding: &mut Binding) -> Option<bool> {
         match literal {
             Literal::Positive(_) => None,
             Literal::Negative(atom) => Some(self.blocking(atom, binding).is_none()),
-            Literal::Assign { variable, value, .. } => {
+            Literal::Assign {
+                variable, value, ..
+            } => {
                 let value = self.value(value, binding)?;
                 // A value without an id occurs in no derived tuple.
                 let id = self.universe.id(&value);
@@ -134,7 +167,9 @@ impl<'a> ProofContext<'a> {
                     (_, None) => Some(false),
                 }
             }
-            Literal::Compare { op, left, right, .. } => {
+            Literal::Compare {
+                op, left, right, ..
+            } => {
                 let (left, right) = (self.value(left, binding)?, self.value(right, binding)?);
                 Some(holds(*op, &left, &right))
             }
@@ -144,11 +179,13 @@ impl<'a> ProofContext<'a> {
 
     /// Returns a tuple that matches a negated atom, or `None` if the negation holds.
     pub(super) fn blocking(&self, atom: &Atom, binding: &Binding) -> Option<&'a [TermId]> {
-        self.candidates(atom, binding).find(|row| unify(atom, row, &mut binding.clone()))
+        self.candidates(atom, binding)
+            .find(|row| unify(atom, row, &mut binding.clone()))
     }
 }
 
-/// Binary search: returns the first of `count` indices for which `holds` is `false`. `holds` must be monotone.
+/// Binary search: returns the first of `count` indices for which `holds` is `false`. `holds` must
+/// be monotone.
 fn partition(count: usize, holds: impl Fn(usize) -> bool) -> usize {
     let (mut low, mut high) = (0, count);
     while low < high {
@@ -162,7 +199,8 @@ fn partition(count: usize, holds: impl Fn(usize) -> bool) -> usize {
     low
 }
 
-/// Returns the evaluation order of a rule's conditions: atoms in textual order, others once their inputs are bound.
+/// Returns the evaluation order of a rule's conditions: atoms in textual order, others once their
+/// inputs are bound.
 pub(super) fn reading_order(rule: &Rule, known: &Binding) -> Vec<usize> {
     let mut bound: Vec<bool> = known.iter().map(Option::is_some).collect();
     let mut left: Vec<usize> = (0..rule.body.len()).collect();
@@ -172,7 +210,9 @@ pub(super) fn reading_order(rule: &Rule, known: &Binding) -> Vec<usize> {
             let literal = &rule.body[*idx];
             !matches!(literal, Literal::Positive(_)) && literal.needs().iter().all(|v| bound[*v])
         });
-        let chosen = ready.or_else(|| next_atom(rule, &left, &bound)).unwrap_or(left[0]);
+        let chosen = ready
+            .or_else(|| next_atom(rule, &left, &bound))
+            .unwrap_or(left[0]);
         left.retain(|idx| *idx != chosen);
         match &rule.body[chosen] {
             Literal::Positive(atom) => {
@@ -190,12 +230,15 @@ pub(super) fn reading_order(rule: &Rule, known: &Binding) -> Vec<usize> {
     order
 }
 
-/// Returns a fully bound atom, which is only a test; otherwise the first atom that shares a bound variable, to keep the
-/// textual order, which is easier to follow; otherwise the first atom. Returns `None` if no atom is left.
+/// Returns a fully bound atom, which is only a test; otherwise the first atom that shares a bound
+/// variable, to keep the textual order, which is easier to follow; otherwise the first atom.
+/// Returns `None` if no atom is left.
 fn next_atom(rule: &Rule, left: &[usize], bound: &[bool]) -> Option<usize> {
     let mut best: Option<(usize, usize)> = None;
     for idx in left.iter().copied() {
-        let Literal::Positive(atom) = &rule.body[idx] else { continue };
+        let Literal::Positive(atom) = &rule.body[idx] else {
+            continue;
+        };
         let is_open = |arg: &Operand| match arg {
             Operand::Variable(v) => !bound[*v],
             Operand::Constant(_) => false,
@@ -204,7 +247,10 @@ fn next_atom(rule: &Rule, left: &[usize], bound: &[bool]) -> Option<usize> {
         if !atom.args.iter().any(is_open) {
             return Some(idx);
         }
-        let connected = atom.args.iter().any(|arg| matches!(arg, Operand::Variable(v) if bound[*v]));
+        let connected = atom
+            .args
+            .iter()
+            .any(|arg| matches!(arg, Operand::Variable(v) if bound[*v]));
         let rank = usize::from(!connected && bound.contains(&true));
         if best.is_none_or(|(least, _)| rank < least) {
             best = Some((rank, idx));

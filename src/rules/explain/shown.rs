@@ -15,10 +15,16 @@ impl ProofContext<'_> {
         self.format_atom(predicate, args)
     }
 
-    /// Formats an atom with its bound values, and `_` for unbound arguments. Unbound variables that occur repeatedly keep
-    /// their names, because their values must be equal.
+    /// Formats an atom with its bound values, and `_` for unbound arguments. Unbound variables that
+    /// occur repeatedly keep their names, because their values must be equal.
     pub(super) fn pattern(&self, atom: &Atom, binding: &Binding, names: &[String]) -> String {
-        let is_repeated = |variable| atom.args.iter().filter(|arg| **arg == Operand::Variable(variable)).count() > 1;
+        let is_repeated = |variable| {
+            atom.args
+                .iter()
+                .filter(|arg| **arg == Operand::Variable(variable))
+                .count()
+                > 1
+        };
         let unbound = |variable: usize| match names.get(variable) {
             Some(name) if name.starts_with('!') && is_repeated(variable) => name.clone(),
             Some(name) if !name.is_empty() && is_repeated(variable) => format!("?{name}"),
@@ -38,7 +44,8 @@ impl ProofContext<'_> {
         self.format_atom(atom.predicate, args)
     }
 
-    /// Formats a predicate with its arguments as in the rule text: with the property, and the phase as a shorthand.
+    /// Formats a predicate with its arguments as in the rule text: with the property, and the phase
+    /// as a shorthand.
     fn format_atom(&self, predicate: PredicateId, mut args: Vec<String>) -> String {
         let predicate = self.predicates.get(predicate);
         let name = predicate.name.as_str();
@@ -54,7 +61,11 @@ impl ProofContext<'_> {
             args.remove(0);
             return format!("{phase}({})", args.join(", "));
         }
-        let name = if name.contains(':') { names::shorten(name) } else { name.to_owned() };
+        let name = if name.contains(':') {
+            names::shorten(name)
+        } else {
+            name.to_owned()
+        };
         format!("{name}({})", args.join(", "))
     }
 
@@ -72,15 +83,29 @@ impl ProofContext<'_> {
                 let value = binding[*variable].map_or("(no value)".into(), |id| self.term(id));
                 let name = &rule.variables[*variable];
                 let text = self.source_text(rule, span.clone());
-                if name.is_empty() { format!("{text} is {value}") } else { format!("{text}, so ?{name} is {value}") }
+                if name.is_empty() {
+                    format!("{text} is {value}")
+                } else {
+                    format!("{text}, so ?{name} is {value}")
+                }
             }
-            Literal::Compare { op, left, right, span } => {
-                let values = [left, right]
-                    .map(|side| self.value(side, binding).map_or("(no value)".into(), |term| shown(&term)));
+            Literal::Compare {
+                op,
+                left,
+                right,
+                span,
+            } => {
+                let values = [left, right].map(|side| {
+                    self.value(side, binding)
+                        .map_or("(no value)".into(), |term| shown(&term))
+                });
                 let text = self.source_text(rule, span.clone());
                 format!("{text}, with {} {} {}", values[0], op.symbol(), values[1])
             }
-            Literal::Test { value: Expr::Timed(timed), span } => {
+            Literal::Test {
+                value: Expr::Timed(timed),
+                span,
+            } => {
                 let text = self.source_text(rule, span.clone());
                 match self.evidence(timed, rule, binding) {
                     Some(evidence) => {
@@ -95,18 +120,28 @@ impl ProofContext<'_> {
         }
     }
 
-    /// Formats a condition that is not satisfied. For an assignment, this is the computed value and the required one.
+    /// Formats a condition that is not satisfied. For an assignment, this is the computed value and
+    /// the required one.
     pub(super) fn unsatisfied(&self, rule: &Rule, literal: &Literal, binding: &Binding) -> String {
-        if let Literal::Assign { variable, value, span } = literal
+        if let Literal::Assign {
+            variable,
+            value,
+            span,
+        } = literal
             && let (Some(wanted), Some(found)) = (binding[*variable], self.value(value, binding))
         {
             let text = self.source_text(rule, span.clone());
-            return format!("{text}, which gives {}, not {}", shown(&found), self.term(wanted));
+            return format!(
+                "{text}, which gives {}, not {}",
+                shown(&found),
+                self.term(wanted)
+            );
         }
         self.literal(rule, literal, binding)
     }
 
-    /// Formats a negated atom. For a helper predicate, which is not in the rule text, returns the source text instead.
+    /// Formats a negated atom. For a helper predicate, which is not in the rule text, returns the
+    /// source text instead.
     pub(super) fn negated(&self, rule: &Rule, atom: &Atom, binding: &Binding) -> String {
         if self.predicates.get(atom.predicate).name.contains('~') {
             return self.source_text(rule, atom.span.clone());
@@ -114,7 +149,8 @@ impl ProofContext<'_> {
         self.pattern(atom, binding, &rule.variables)
     }
 
-    /// Computes an expression. Returns `None` if a variable is unbound or the expression has no value.
+    /// Computes an expression. Returns `None` if a variable is unbound or the expression has no
+    /// value.
     pub(super) fn value(&self, expr: &Expr, binding: &Binding) -> Option<Term> {
         let mut used = Vec::new();
         expr.variables(&mut used);
@@ -122,7 +158,8 @@ impl ProofContext<'_> {
             return None;
         }
         let values: Vec<TermId> = binding.iter().map(|id| id.unwrap_or(0)).collect();
-        expr.value(&values, self.universe, self.watch).map(std::borrow::Cow::into_owned)
+        expr.value(&values, self.universe, self.watch)
+            .map(std::borrow::Cow::into_owned)
     }
 
     /// Returns the moment that decides a formula, with the values there.
@@ -133,13 +170,20 @@ impl ProofContext<'_> {
             return None;
         }
         let values: Vec<TermId> = binding.iter().map(|id| id.unwrap_or(0)).collect();
-        timed.evidence(&values, self.universe, self.watch, &|span| self.source_text(rule, span))
+        timed.evidence(&values, self.universe, self.watch, &|span| {
+            self.source_text(rule, span)
+        })
     }
 
     /// Takes the signals that decided the formulas of an explanation with this text, each once.
     pub(super) fn deciding_in(&self, text: &str) -> Vec<DecidingSignal> {
         let mut signals: Vec<DecidingSignal> = Vec::new();
-        for evidence in self.deciding.take().into_iter().filter(|evidence| text.contains(&evidence.text)) {
+        for evidence in self
+            .deciding
+            .take()
+            .into_iter()
+            .filter(|evidence| text.contains(&evidence.text))
+        {
             for signal in evidence.signals {
                 if !signals.contains(&signal) {
                     signals.push(signal);
@@ -171,7 +215,11 @@ fn shown(term: &Term) -> String {
         Term::Double(value) if *value != 0.0 && value.is_finite() => {
             let digits = (5.0 - value.abs().log10().floor()).clamp(0.0, 12.0) as usize;
             let text = format!("{value:.digits$}");
-            if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
+            if text.contains('.') {
+                text.trim_end_matches('0').trim_end_matches('.').to_owned()
+            } else {
+                text
+            }
         }
         term => term.to_string(),
     }

@@ -26,7 +26,14 @@ impl Explanation {
             write_miss(&mut out, 1, miss);
         }
         for term in &self.unknown {
-            line(&mut out, 1, &format!("`{}` occurs neither in the rules nor in any tuple", term.text));
+            line(
+                &mut out,
+                1,
+                &format!(
+                    "`{}` occurs neither in the rules nor in any tuple",
+                    term.text
+                ),
+            );
         }
         for note in &self.notes {
             line(&mut out, 1, note);
@@ -57,13 +64,29 @@ fn write_proof(out: &mut String, depth: usize, proof: &Proof) {
     match &proof.support {
         Support::Fact => line(out, depth, &format!("{}  (fact)", proof.statement)),
         Support::Cut => line(out, depth, &format!("{}  (shown above)", proof.statement)),
-        Support::Omitted => line(out, depth, &format!("{}  (derived; its proof is too long)", proof.statement)),
+        Support::Omitted => line(
+            out,
+            depth,
+            &format!("{}  (derived; its proof is too long)", proof.statement),
+        ),
         Support::Rule { rule, premises } => {
             line(out, depth, &format!("{}  {}", proof.statement, cited(rule)));
             write_premises(out, depth + 1, premises);
         }
-        Support::Aggregate { rule, matches, premises } => {
-            line(out, depth, &format!("{}  over {matches} matches {}", proof.statement, cited(rule)));
+        Support::Aggregate {
+            rule,
+            matches,
+            premises,
+        } => {
+            line(
+                out,
+                depth,
+                &format!(
+                    "{}  over {matches} matches {}",
+                    proof.statement,
+                    cited(rule)
+                ),
+            );
             write_premises(out, depth + 1, premises);
         }
     }
@@ -81,8 +104,19 @@ fn write_premises(out: &mut String, depth: usize, premises: &[Premise]) {
 
 fn write_miss(out: &mut String, depth: usize, miss: &Miss) {
     match &miss.rule {
-        Some(rule) => line(out, depth, &format!("{} came closest {}", miss.goal, cited(rule))),
-        None => line(out, depth, &format!("{} is not a fact, and no rule has a matching head", miss.goal)),
+        Some(rule) => line(
+            out,
+            depth,
+            &format!("{} came closest {}", miss.goal, cited(rule)),
+        ),
+        None => line(
+            out,
+            depth,
+            &format!(
+                "{} is not a fact, and no rule has a matching head",
+                miss.goal
+            ),
+        ),
     }
     for text in &miss.satisfied {
         line(out, depth + 1, &format!("ok      {text}"));
@@ -99,7 +133,9 @@ fn write_miss(out: &mut String, depth: usize, miss: &Miss) {
                 write_miss(out, depth + 2, miss);
             }
         }
-        Failure::Comparison { distance: Some(distance) } => line(out, depth + 2, &format!("missed by {distance:.6}")),
+        Failure::Comparison {
+            distance: Some(distance),
+        } => line(out, depth + 2, &format!("missed by {distance:.6}")),
         Failure::Comparison { distance: None } => {}
         Failure::Blocked(proof) => {
             line(out, depth + 2, "blocked by");

@@ -44,12 +44,15 @@ const OTHERS: [&str; 16] = [
 /// Longer literals are compared as they are. Unit: bytes.
 const LONGEST: usize = 1 << 20;
 
-/// Returns the term that represents a literal's value: equal values have equal terms. Returns `None` if the literal is
-/// ill-typed or its datatype is unknown.
+/// Returns the term that represents a literal's value: equal values have equal terms. Returns
+/// `None` if the literal is ill-typed or its datatype is unknown.
 pub(crate) fn canonical(term: &Term) -> Option<Term> {
     match term {
         Term::Iri(_) | Term::Blank(_) => None,
-        Term::LangString(text, tag) => Some(Term::LangString(text.clone(), tag.to_ascii_lowercase().into())),
+        Term::LangString(text, tag) => Some(Term::LangString(
+            text.clone(),
+            tag.to_ascii_lowercase().into(),
+        )),
         Term::Decimal(text) => number(text),
         Term::Literal(text, _) if text.len() > LONGEST => None,
         Term::Literal(text, datatype) => match local(datatype)? {
@@ -62,24 +65,33 @@ pub(crate) fn canonical(term: &Term) -> Option<Term> {
             Local::XmlLiteral => Some(term.clone()),
             Local::LangString | Local::Any => None,
         },
-        Term::String(_) | Term::Integer(_) | Term::Double(_) | Term::Boolean(_) => Some(term.clone()),
+        Term::String(_) | Term::Integer(_) | Term::Double(_) | Term::Boolean(_) => {
+            Some(term.clone())
+        }
     }
 }
 
-/// Returns whether the value of a literal belongs to a datatype. Returns `None` if either datatype is unknown.
+/// Returns whether the value of a literal belongs to a datatype. Returns `None` if either datatype
+/// is unknown.
 pub(crate) fn belongs(term: &Term, datatype: &str) -> Option<bool> {
     let wanted = local(datatype)?;
     let Some(value) = canonical(term) else {
-        let Term::Literal(text, own) = term else { return None };
+        let Term::Literal(text, own) = term else {
+            return None;
+        };
         // An ill-typed literal has no value.
         return (local(own).is_some() && text.len() <= LONGEST).then_some(false);
     };
     let name = match wanted {
         Local::Any => return Some(true),
-        Local::PlainLiteral => return Some(matches!(value, Term::String(_) | Term::LangString(..))),
+        Local::PlainLiteral => {
+            return Some(matches!(value, Term::String(_) | Term::LangString(..)));
+        }
         Local::LangString => return Some(matches!(value, Term::LangString(..))),
         Local::XmlLiteral => {
-            return Some(matches!(&value, Term::Literal(_, own) if matches!(local(own), Some(Local::XmlLiteral))));
+            return Some(
+                matches!(&value, Term::Literal(_, own) if matches!(local(own), Some(Local::XmlLiteral))),
+            );
         }
         Local::Xsd(name) => name,
     };
@@ -91,7 +103,9 @@ pub(crate) fn belongs(term: &Term, datatype: &str) -> Option<bool> {
         Term::String(text) => of_string(text, name),
         Term::Literal(text, own) => match own.strip_prefix(names::XSD) {
             Some("integer") => name == "decimal" || beyond(text, name),
-            Some("dateTime") => name == "dateTime" || (name == "dateTimeStamp" && datetime::has_zone(text)),
+            Some("dateTime") => {
+                name == "dateTime" || (name == "dateTimeStamp" && datetime::has_zone(text))
+            }
             Some(own) => name == own,
             None => false,
         },
@@ -116,7 +130,10 @@ fn local(datatype: &str) -> Option<Local<'_>> {
         let known = OTHERS.contains(&name) || INTEGERS.iter().any(|(known, ..)| *known == name);
         return known.then_some(Local::Xsd(name));
     }
-    match (datatype.strip_prefix(names::RDF), datatype.strip_prefix(names::RDFS)) {
+    match (
+        datatype.strip_prefix(names::RDF),
+        datatype.strip_prefix(names::RDFS),
+    ) {
         (Some("PlainLiteral"), _) => Some(Local::PlainLiteral),
         (Some("XMLLiteral"), _) => Some(Local::XmlLiteral),
         (Some("langString"), _) => Some(Local::LangString),
@@ -127,7 +144,9 @@ fn local(datatype: &str) -> Option<Local<'_>> {
 
 /// Returns the value of a lexical form. Returns `None` if the form is invalid.
 fn of_schema(text: &str, name: &str) -> Option<Term> {
-    let typed = |text: String, name: &str| Term::Literal(text.into(), format!("{}{name}", names::XSD).into());
+    let typed = |text: String, name: &str| {
+        Term::Literal(text.into(), format!("{}{name}", names::XSD).into())
+    };
     let collapsed = collapse(text);
     match name {
         "string" => Some(Term::string(text)),
@@ -151,7 +170,8 @@ fn of_schema(text: &str, name: &str) -> Option<Term> {
             })
             .map(|value: f32| typed(value.to_string(), name)),
         "hexBinary" => {
-            let valid = collapsed.len().is_multiple_of(2) && collapsed.bytes().all(|byte| byte.is_ascii_hexdigit());
+            let valid = collapsed.len().is_multiple_of(2)
+                && collapsed.bytes().all(|byte| byte.is_ascii_hexdigit());
             valid.then(|| typed(collapsed.to_ascii_uppercase(), name))
         }
         "base64Binary" => base64(&collapsed).map(|text| typed(text, name)),
@@ -161,7 +181,9 @@ fn of_schema(text: &str, name: &str) -> Option<Term> {
             (name == "dateTime" || datetime::has_zone(&moment)).then(|| typed(moment, "dateTime"))
         }
         _ => {
-            let value = (!collapsed.contains('.')).then(|| number(&collapsed)).flatten()?;
+            let value = (!collapsed.contains('.'))
+                .then(|| number(&collapsed))
+                .flatten()?;
             let fits = match &value {
                 Term::Integer(value) => in_range(i128::from(*value), name),
                 Term::Literal(text, _) => beyond(text, name),
@@ -185,13 +207,19 @@ fn number(text: &str) -> Option<Term> {
 /// Returns whether an integer belongs to an integer type; `false` for other types.
 fn in_range(value: i128, name: &str) -> bool {
     INTEGERS.iter().any(|(known, least, most)| {
-        *known == name && least.is_none_or(|least| least <= value) && most.is_none_or(|most| value <= most)
+        *known == name
+            && least.is_none_or(|least| least <= value)
+            && most.is_none_or(|most| value <= most)
     })
 }
 
 /// Returns whether a canonical integer beyond 64 bits belongs to an integer type.
 fn beyond(text: &str, name: &str) -> bool {
-    let huge = if text.starts_with('-') { i128::MIN } else { i128::MAX };
+    let huge = if text.starts_with('-') {
+        i128::MIN
+    } else {
+        i128::MAX
+    };
     in_range(text.parse().unwrap_or(huge), name)
 }
 
@@ -200,27 +228,42 @@ fn float(text: &str) -> Option<f64> {
         "INF" | "+INF" => Some(f64::INFINITY),
         "-INF" => Some(f64::NEG_INFINITY),
         "NaN" => Some(f64::NAN),
-        _ if text.bytes().all(|byte| byte.is_ascii_digit() || b"+-.eE".contains(&byte)) => text.parse().ok(),
+        _ if text
+            .bytes()
+            .all(|byte| byte.is_ascii_digit() || b"+-.eE".contains(&byte)) =>
+        {
+            text.parse().ok()
+        }
         _ => None,
     }
 }
 
 /// Replaces every run of spaces, tabs and line ends by one space, and removes those at both ends.
 fn collapse(text: &str) -> String {
-    text.split([' ', '\t', '\n', '\r']).filter(|part| !part.is_empty()).collect::<Vec<_>>().join(" ")
+    text.split([' ', '\t', '\n', '\r'])
+        .filter(|part| !part.is_empty())
+        .collect::<Vec<_>>()
+        .join(" ")
 }
 
-/// Returns whether a string belongs to `xsd:string` or a type derived from it; `false` for other types.
+/// Returns whether a string belongs to `xsd:string` or a type derived from it; `false` for other
+/// types.
 fn of_string(text: &str, name: &str) -> bool {
     let first = |c: char| c.is_alphabetic() || c == '_';
-    let later = |c: char| c.is_alphanumeric() || "_-.\u{b7}".contains(c) || ('\u{300}'..='\u{36f}').contains(&c);
+    let later = |c: char| {
+        c.is_alphanumeric() || "_-.\u{b7}".contains(c) || ('\u{300}'..='\u{36f}').contains(&c)
+    };
     let begins = |allowed: &dyn Fn(char) -> bool| text.chars().next().is_some_and(allowed);
     match name {
         "string" => true,
         "normalizedString" => !text.contains(['\t', '\n', '\r']),
-        "token" => collapse(text).len() == text_len(&Term::string(text)) && !text.contains(['\t', '\n', '\r']),
+        "token" => {
+            collapse(text).len() == text_len(&Term::string(text))
+                && !text.contains(['\t', '\n', '\r'])
+        }
         "language" => text.split('-').enumerate().all(|(idx, part)| {
-            let allowed = |byte: u8| byte.is_ascii_alphabetic() || (idx > 0 && byte.is_ascii_digit());
+            let allowed =
+                |byte: u8| byte.is_ascii_alphabetic() || (idx > 0 && byte.is_ascii_digit());
             (1..=8).contains(&part.len()) && part.bytes().all(allowed)
         }),
         "NMTOKEN" => !text.is_empty() && text.chars().all(|c| later(c) || c == ':'),
@@ -237,7 +280,10 @@ fn base64(text: &str) -> Option<String> {
     let padding = text.len() - digits.len();
     let alphabet = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
     let value = |byte: u8| alphabet.iter().position(|letter| *letter == byte);
-    if !text.len().is_multiple_of(4) || padding > 2 || !digits.bytes().all(|byte| value(byte).is_some()) {
+    if !text.len().is_multiple_of(4)
+        || padding > 2
+        || !digits.bytes().all(|byte| value(byte).is_some())
+    {
         return None;
     }
     // The bits of the last digit that belong to no byte are zero.
@@ -261,17 +307,32 @@ mod tests {
             (typed(" a \n b ", "token"), Term::string("a b")),
             (typed("a\tb", "normalizedString"), Term::string("a b")),
             (typed("ff", "hexBinary"), typed("FF", "hexBinary")),
-            (typed("Zg ==", "base64Binary"), typed("Zg==", "base64Binary")),
+            (
+                typed("Zg ==", "base64Binary"),
+                typed("Zg==", "base64Binary"),
+            ),
             (typed("5", "int"), Term::Integer(5)),
             (typed("+05", "unsignedByte"), Term::Integer(5)),
             (Term::Decimal("2.0".into()), Term::Integer(2)),
             (typed("1.50", "decimal"), Term::Decimal("1.5".into())),
             (typed("1.0", "float"), typed("1", "float")),
-            (typed("99999999999999999999", "integer"), typed("+099999999999999999999", "nonNegativeInteger")),
+            (
+                typed("99999999999999999999", "integer"),
+                typed("+099999999999999999999", "nonNegativeInteger"),
+            ),
             (typed(" 1 ", "boolean"), Term::Boolean(true)),
-            (typed("2026-01-02T03:04:05.500Z", "dateTime"), typed("2026-01-02T03:04:05.5+00:00", "dateTimeStamp")),
-            (typed("2026-02-28T24:00:00", "dateTime"), typed("2026-03-01T00:00:00", "dateTime")),
-            (Term::LangString("a".into(), "EN".into()), Term::LangString("a".into(), "en".into())),
+            (
+                typed("2026-01-02T03:04:05.500Z", "dateTime"),
+                typed("2026-01-02T03:04:05.5+00:00", "dateTimeStamp"),
+            ),
+            (
+                typed("2026-02-28T24:00:00", "dateTime"),
+                typed("2026-03-01T00:00:00", "dateTime"),
+            ),
+            (
+                Term::LangString("a".into(), "EN".into()),
+                Term::LangString("a".into(), "en".into()),
+            ),
             (
                 Term::Literal("a@en".into(), format!("{}PlainLiteral", names::RDF).into()),
                 Term::LangString("a".into(), "en".into()),
@@ -295,10 +356,15 @@ mod tests {
             (typed("a", "anyURI"), Term::string("a")),
             (typed("00", "hexBinary"), typed("AAAA", "base64Binary")),
             (Term::Double(0.0), Term::Double(-0.0)),
-            (typed("2026-01-02T03:04:05Z", "dateTime"), typed("2026-01-02T03:04:05", "dateTime")),
+            (
+                typed("2026-01-02T03:04:05Z", "dateTime"),
+                typed("2026-01-02T03:04:05", "dateTime"),
+            ),
         ] {
             assert!(
-                canonical(&a).is_some() && canonical(&b).is_some() && canonical(&a) != canonical(&b),
+                canonical(&a).is_some()
+                    && canonical(&b).is_some()
+                    && canonical(&a) != canonical(&b),
                 "{a} and {b}"
             );
         }
@@ -329,9 +395,19 @@ mod tests {
         ] {
             let term = typed(text, name);
             assert_eq!(canonical(&term), None, "{term}");
-            assert_eq!(belongs(&term, &format!("{}{name}", names::XSD)), Some(false), "{term}");
+            assert_eq!(
+                belongs(&term, &format!("{}{name}", names::XSD)),
+                Some(false),
+                "{term}"
+            );
         }
-        assert_eq!(belongs(&Term::Literal("x".into(), "http://x/own".into()), &format!("{}string", names::XSD)), None);
+        assert_eq!(
+            belongs(
+                &Term::Literal("x".into(), "http://x/own".into()),
+                &format!("{}string", names::XSD)
+            ),
+            None
+        );
         assert_eq!(belongs(&Term::Integer(1), "http://x/own"), None);
     }
 
@@ -343,19 +419,54 @@ mod tests {
                 "decimal integer short unsignedByte positiveInteger",
                 "byte negativeInteger double string",
             ),
-            (typed("18446744073709551615", "integer"), "unsignedLong decimal", "long unsignedInt"),
-            (Term::string("en"), "string token language Name NCName NMTOKEN", "anyURI integer"),
+            (
+                typed("18446744073709551615", "integer"),
+                "unsignedLong decimal",
+                "long unsignedInt",
+            ),
+            (
+                Term::string("en"),
+                "string token language Name NCName NMTOKEN",
+                "anyURI integer",
+            ),
             (Term::string(" a"), "string normalizedString", "token"),
             (Term::string("a:b"), "Name NMTOKEN", "NCName language"),
-            (Term::LangString("a".into(), "en".into()), "", "string token"),
-            (Term::Decimal("1.5".into()), "decimal", "integer double float"),
-            (typed("2026-01-02T03:04:05Z", "dateTime"), "dateTime dateTimeStamp", "string"),
-            (typed("2026-01-02T03:04:05", "dateTime"), "dateTime", "dateTimeStamp"),
+            (
+                Term::LangString("a".into(), "en".into()),
+                "",
+                "string token",
+            ),
+            (
+                Term::Decimal("1.5".into()),
+                "decimal",
+                "integer double float",
+            ),
+            (
+                typed("2026-01-02T03:04:05Z", "dateTime"),
+                "dateTime dateTimeStamp",
+                "string",
+            ),
+            (
+                typed("2026-01-02T03:04:05", "dateTime"),
+                "dateTime",
+                "dateTimeStamp",
+            ),
         ] {
             let of = |name: &str| belongs(&term, &format!("{}{name}", names::XSD));
-            assert!(within.split_whitespace().all(|name| of(name) == Some(true)), "{term}: {within}");
-            assert!(outside.split_whitespace().all(|name| of(name) == Some(false)), "{term}: not {outside}");
-            assert_eq!(belongs(&term, &format!("{}Literal", names::RDFS)), Some(true));
+            assert!(
+                within.split_whitespace().all(|name| of(name) == Some(true)),
+                "{term}: {within}"
+            );
+            assert!(
+                outside
+                    .split_whitespace()
+                    .all(|name| of(name) == Some(false)),
+                "{term}: not {outside}"
+            );
+            assert_eq!(
+                belongs(&term, &format!("{}Literal", names::RDFS)),
+                Some(true)
+            );
         }
     }
 }

@@ -2,22 +2,33 @@
 
 /// Returns whether a valid moment has a time zone.
 pub(crate) fn has_zone(text: &str) -> bool {
-    text.ends_with('Z') || text.split_once('T').is_some_and(|(_, time)| time.contains(['+', '-']))
+    text.ends_with('Z')
+        || text
+            .split_once('T')
+            .is_some_and(|(_, time)| time.contains(['+', '-']))
 }
 
-/// Returns the text of an identical moment without redundant digits. Two moments are identical if they agree in the time
-/// zone, too. Returns `None` if the text is invalid.
+/// Returns the text of an identical moment without redundant digits. Two moments are identical if
+/// they agree in the time zone, too. Returns `None` if the text is invalid.
 pub(crate) fn canonical(text: &str) -> Option<String> {
     let (date, rest) = text.split_once('T')?;
-    let (negative, date) = date.strip_prefix('-').map_or((false, date), |date| (true, date));
-    let [year, month, day] = date.split('-').collect::<Vec<_>>()[..] else { return None };
+    let (negative, date) = date
+        .strip_prefix('-')
+        .map_or((false, date), |date| (true, date));
+    let [year, month, day] = date.split('-').collect::<Vec<_>>()[..] else {
+        return None;
+    };
     if year.len() < 4 || (year.len() > 4 && year.starts_with('0')) {
         return None;
     }
     let (time, zone) = rest.split_at(rest.find(['Z', '+', '-']).unwrap_or(rest.len()));
     let zone = canonical_zone(zone)?;
-    let [hour, minute, second] = time.split(':').collect::<Vec<_>>()[..] else { return None };
-    let (second, fraction) = second.split_once('.').map_or((second, None), |(whole, part)| (whole, Some(part)));
+    let [hour, minute, second] = time.split(':').collect::<Vec<_>>()[..] else {
+        return None;
+    };
+    let (second, fraction) = second
+        .split_once('.')
+        .map_or((second, None), |(whole, part)| (whole, Some(part)));
     let digits = |part: &str| part.bytes().all(|byte| byte.is_ascii_digit());
     if !digits(year) || fraction.is_some_and(|part| part.is_empty() || !digits(part)) {
         return None;
@@ -43,7 +54,9 @@ pub(crate) fn canonical(text: &str) -> Option<String> {
     }
     let (sign, year) = (if year < 0 { "-" } else { "" }, year.abs());
     let dot = if fraction.is_empty() { "" } else { "." };
-    Some(format!("{sign}{year:04}-{month:02}-{day:02}T{hour:02}:{minute:02}:{second:02}{dot}{fraction}{zone}"))
+    Some(format!(
+        "{sign}{year:04}-{month:02}-{day:02}T{hour:02}:{minute:02}:{second:02}{dot}{fraction}{zone}"
+    ))
 }
 
 /// Reads two digits, at most `most`.
@@ -80,7 +93,10 @@ mod tests {
     #[test]
     fn moments_are_valid_dates_and_times() {
         for (text, wanted) in [
-            ("2024-02-29T12:00:00.10-05:30", "2024-02-29T12:00:00.1-05:30"),
+            (
+                "2024-02-29T12:00:00.10-05:30",
+                "2024-02-29T12:00:00.1-05:30",
+            ),
             ("-0044-03-15T00:00:00", "-0044-03-15T00:00:00"),
             ("2025-12-31T24:00:00Z", "2026-01-01T00:00:00Z"),
         ] {

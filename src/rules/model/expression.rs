@@ -37,7 +37,9 @@ impl Expr {
         match self {
             Self::Constant(_) => {}
             Self::Variable(variable) => found.push(*variable),
-            Self::Call(_, args) | Self::Format(args) => args.iter().for_each(|arg| arg.variables(found)),
+            Self::Call(_, args) | Self::Format(args) => {
+                args.iter().for_each(|arg| arg.variables(found))
+            }
             Self::Matches(arg, _) => arg.variables(found),
             Self::Timed(timed) => timed.variables(found),
         }
@@ -49,7 +51,9 @@ impl Expr {
         match self {
             Self::Variable(variable) => Self::Variable(new(*variable)),
             Self::Call(builtin, args) => Self::Call(builtin, all(args)),
-            Self::Matches(arg, pattern) => Self::Matches(Box::new(arg.renamed(new)), pattern.clone()),
+            Self::Matches(arg, pattern) => {
+                Self::Matches(Box::new(arg.renamed(new)), pattern.clone())
+            }
             Self::Format(parts) => Self::Format(all(parts)),
             Self::Constant(_) | Self::Timed(_) => self.clone(),
         }
@@ -74,26 +78,39 @@ impl Expr {
         }
     }
 
-    /// Computes the value. Returns `None` if a built-in has no result for its arguments, or if the budget is spent
-    /// (see [`Watch::stopped`]).
-    pub(crate) fn value<'a>(&'a self, binding: &[TermId], terms: &'a Universe<'_>, watch: &Watch) -> Option<Value<'a>> {
+    /// Computes the value. Returns `None` if a built-in has no result for its arguments, or if the
+    /// budget is spent (see [`Watch::stopped`]).
+    pub(crate) fn value<'a>(
+        &'a self,
+        binding: &[TermId],
+        terms: &'a Universe<'_>,
+        watch: &Watch,
+    ) -> Option<Value<'a>> {
         match self {
             Self::Constant(term) => Some(Cow::Borrowed(term)),
             Self::Variable(variable) => Some(Cow::Borrowed(terms.term(binding[*variable]))),
             Self::Call(builtin, args) => match args.as_slice() {
                 [a] => builtin.call(&[a.value(binding, terms, watch)?], watch),
-                [a, b] => builtin.call(&[a.value(binding, terms, watch)?, b.value(binding, terms, watch)?], watch),
+                [a, b] => builtin.call(
+                    &[
+                        a.value(binding, terms, watch)?,
+                        b.value(binding, terms, watch)?,
+                    ],
+                    watch,
+                ),
                 _ => {
-                    let args: Vec<Value<'a>> =
-                        args.iter().map(|arg| arg.value(binding, terms, watch)).collect::<Option<_>>()?;
+                    let args: Vec<Value<'a>> = args
+                        .iter()
+                        .map(|arg| arg.value(binding, terms, watch))
+                        .collect::<Option<_>>()?;
                     builtin.call(&args, watch)
                 }
             }
             .map(Cow::Owned),
             Self::Matches(arg, pattern) => match arg.value(binding, terms, watch)?.as_ref() {
-                Term::String(text) | Term::LangString(text, _) => {
-                    Some(Cow::Owned(Term::Boolean(builtins::matches(pattern, text, watch)?)))
-                }
+                Term::String(text) | Term::LangString(text, _) => Some(Cow::Owned(Term::Boolean(
+                    builtins::matches(pattern, text, watch)?,
+                ))),
                 _ => None,
             },
             Self::Format(parts) => {

@@ -1,4 +1,5 @@
-//! Checked rules and the terms they compute with: the product of the check and the input of the engine.
+//! Checked rules and the terms they compute with: the product of the check and the input of the
+//! engine.
 //!
 //! Never: reports a diagnostic, or derives a tuple.
 

@@ -1,4 +1,5 @@
-//! Checked rules: predicates and variables are indices, every variable is bound, every name is resolved.
+//! Checked rules: predicates and variables are indices, every variable is bound, every name is
+//! resolved.
 
 use std::collections::{BTreeMap, HashMap};
 use std::sync::Arc;
@@ -34,8 +35,8 @@ pub(crate) struct Predicate {
 }
 
 impl Predicate {
-    /// Returns the predicate of the text that a helper predicate, such as `p~12`, was added for. Returns `None` for any
-    /// other predicate.
+    /// Returns the predicate of the text that a helper predicate, such as `p~12`, was added for.
+    /// Returns `None` for any other predicate.
     pub(crate) fn helps(&self) -> Option<&str> {
         let (name, number) = self.name.rsplit_once('~')?;
         (!number.is_empty() && number.bytes().all(|byte| byte.is_ascii_digit())).then_some(name)
@@ -50,8 +51,15 @@ pub(crate) struct Predicates {
 }
 
 impl Predicates {
-    pub(crate) fn find(&self, scope: Scope, name: &str, property: Option<TermId>) -> Option<PredicateId> {
-        self.by_key.get(&(scope, name.to_owned(), property)).copied()
+    pub(crate) fn find(
+        &self,
+        scope: Scope,
+        name: &str,
+        property: Option<TermId>,
+    ) -> Option<PredicateId> {
+        self.by_key
+            .get(&(scope, name.to_owned(), property))
+            .copied()
     }
 
     pub(crate) fn add(&mut self, predicate: Predicate) -> PredicateId {
@@ -100,9 +108,18 @@ pub(crate) enum Literal {
     /// No tuple matches.
     Negative(Atom),
     /// A variable gets a value.
-    Assign { variable: Variable, value: Expr, span: Span },
+    Assign {
+        variable: Variable,
+        value: Expr,
+        span: Span,
+    },
     /// The comparison of two values holds.
-    Compare { op: Comparison, left: Expr, right: Expr, span: Span },
+    Compare {
+        op: Comparison,
+        left: Expr,
+        right: Expr,
+        span: Span,
+    },
     /// A built-in returns `true`.
     Test { value: Expr, span: Span },
 }
@@ -120,7 +137,9 @@ impl Literal {
     pub(crate) fn span(&self) -> &Span {
         match self {
             Self::Positive(atom) | Self::Negative(atom) => &atom.span,
-            Self::Assign { span, .. } | Self::Compare { span, .. } | Self::Test { span, .. } => span,
+            Self::Assign { span, .. } | Self::Compare { span, .. } | Self::Test { span, .. } => {
+                span
+            }
         }
     }
 
@@ -152,7 +171,8 @@ pub(crate) enum AggregateKind {
     Max,
 }
 
-/// One aggregate of a head, computed over the distinct combinations of `input` and `distinct` in a group.
+/// One aggregate of a head, computed over the distinct combinations of `input` and `distinct` in a
+/// group.
 #[derive(Debug, Clone)]
 pub(crate) struct Aggregate {
     pub(crate) kind: AggregateKind,
@@ -185,7 +205,11 @@ pub(crate) struct Origin {
 impl Origin {
     /// `file:line`.
     pub(crate) fn place(&self) -> String {
-        format!("{}:{}", self.source.name, self.source.line_and_column(self.span.start).0)
+        format!(
+            "{}:{}",
+            self.source.name,
+            self.source.line_and_column(self.span.start).0
+        )
     }
 }
 
@@ -197,7 +221,8 @@ pub(crate) struct Rule {
     pub(crate) aggregation: Option<Aggregation>,
     /// Names of the variables; empty for generated variables.
     pub(crate) variables: Vec<String>,
-    /// Names of the head's arguments: the variable's name, or an empty string for any other argument.
+    /// Names of the head's arguments: the variable's name, or an empty string for any other
+    /// argument.
     pub(crate) head_names: Vec<String>,
     pub(crate) origin: Origin,
     /// The rule with new things that this rule is a part of.
@@ -207,18 +232,25 @@ pub(crate) struct Rule {
 impl Rule {
     /// Returns the rule with new things if this is the part that makes them.
     pub(crate) fn makes(&self) -> Option<&Making> {
-        self.making.as_deref().filter(|making| making.made == self.head.predicate)
+        self.making
+            .as_deref()
+            .filter(|making| making.made == self.head.predicate)
     }
 
-    /// Returns the predicates that the rule reads. A rule that makes new things also reads its own heads.
+    /// Returns the predicates that the rule reads. A rule that makes new things also reads its own
+    /// heads.
     pub(crate) fn reads(&self) -> impl Iterator<Item = PredicateId> {
         let heads = self.makes().into_iter().flat_map(|making| &making.heads);
-        self.body.iter().filter_map(Literal::atom).chain(heads).map(|atom| atom.predicate)
+        self.body
+            .iter()
+            .filter_map(Literal::atom)
+            .chain(heads)
+            .map(|atom| atom.predicate)
     }
 }
 
-/// A rule with new things (`!x`) in its heads. For `h(?x, !v), g(!v) :- b(?x, ?y) .`, it consists of these parts, which
-/// have the same variables:
+/// A rule with new things (`!x`) in its heads. For `h(?x, !v), g(!v) :- b(?x, ?y) .`, it consists
+/// of these parts, which have the same variables:
 ///
 /// ```prolog
 /// matches(?x) :- b(?x, ?y) .

@@ -30,7 +30,11 @@ pub(crate) fn to_rdf(term: &Term) -> RdfTerm {
         Term::Integer(value) => Literal::from(*value).into(),
         Term::Double(value) => Literal::from(*value).into(),
         Term::Boolean(value) => Literal::from(*value).into(),
-        Term::Decimal(text) => Literal::new_typed_literal(text.as_ref(), iri(&format!("{}decimal", names::XSD))).into(),
-        Term::Literal(text, datatype) => Literal::new_typed_literal(text.as_ref(), iri(datatype)).into(),
+        Term::Decimal(text) => {
+            Literal::new_typed_literal(text.as_ref(), iri(&format!("{}decimal", names::XSD))).into()
+        }
+        Term::Literal(text, datatype) => {
+            Literal::new_typed_literal(text.as_ref(), iri(datatype)).into()
+        }
     }
 }

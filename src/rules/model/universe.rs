@@ -11,14 +11,15 @@ use actcheck_base::{ActionFacts, Course, Term, TermId, Terms};
 /// The IRI of a quantity over time, and the IRIs of the things it is of.
 type QuantityKey = (String, Vec<String>);
 
-/// Terms of three origins with common ids. The terms of the rules and of the run are borrowed, not copied.
+/// Terms of three origins with common ids. The terms of the rules and of the run are borrowed, not
+/// copied.
 #[derive(Debug)]
 pub(crate) struct Universe<'a> {
     book: &'a Terms,
     run: Option<&'a Terms>,
     course: Option<&'a Course>,
-    /// Quantities over time that were computed so far; `None` if they are not known. Several properties read the same
-    /// ones.
+    /// Quantities over time that were computed so far; `None` if they are not known. Several
+    /// properties read the same ones.
     quantities: RefCell<BTreeMap<QuantityKey, Option<Rc<Vec<f64>>>>>,
     /// Common id of each term of the run, or [`UNKNOWN`] until first used.
     run_ids: Vec<TermId>,
@@ -29,7 +30,8 @@ pub(crate) struct Universe<'a> {
     next_label: u64,
 }
 
-/// Memory of a created term without its text: two copies of the term and its entry in the table. Unit: bytes.
+/// Memory of a created term without its text: two copies of the term and its entry in the table.
+/// Unit: bytes.
 const TERM_BYTES: usize = 2 * size_of::<Term>() + 48;
 
 const UNKNOWN: TermId = TermId::MAX;
@@ -52,7 +54,10 @@ impl<'a> Universe<'a> {
 
     /// Creates the universe of the rules' terms and the facts of an action.
     pub(crate) fn of_action(book: &'a Terms, facts: &ActionFacts<'a>) -> Self {
-        Self { course: facts.course, ..Self::new(book, Some(facts.terms)) }
+        Self {
+            course: facts.course,
+            ..Self::new(book, Some(facts.terms))
+        }
     }
 
     /// Returns the quantities of the action over time; `None` if they were not recorded.
@@ -91,7 +96,10 @@ impl<'a> Universe<'a> {
             return known;
         }
         let Some(run) = self.run else { return id };
-        let found = self.book.id(run.term(id)).unwrap_or_else(|| number(self.run_start() + id as usize));
+        let found = self
+            .book
+            .id(run.term(id))
+            .unwrap_or_else(|| number(self.run_start() + id as usize));
         self.run_ids[id as usize] = found;
         found
     }
@@ -113,12 +121,18 @@ impl<'a> Universe<'a> {
         self.book
             .id(term)
             .or_else(|| Some(number(self.run_start() + self.run?.id(term)? as usize)))
-            .or_else(|| Some(number(self.created_start() + self.created.id(term)? as usize)))
+            .or_else(|| {
+                Some(number(
+                    self.created_start() + self.created.id(term)? as usize,
+                ))
+            })
     }
 
     /// Returns the terms created by the evaluation, ordered by id.
     pub(crate) fn into_created(self) -> Vec<Term> {
-        (0..self.created.len()).map(|idx| self.created.term(number(idx)).clone()).collect()
+        (0..self.created.len())
+            .map(|idx| self.created.term(number(idx)).clone())
+            .collect()
     }
 
     /// Returns the common id of a term, adding the term if it is new.
@@ -161,7 +175,8 @@ impl<'a> Universe<'a> {
         self.next_label
     }
 
-    /// Labels new things from a number on, so that they don't depend on evaluations whose tuples are not read.
+    /// Labels new things from a number on, so that they don't depend on evaluations whose tuples
+    /// are not read.
     pub(crate) fn label_from(&mut self, label: u64) {
         self.next_label = label;
     }
@@ -169,7 +184,9 @@ impl<'a> Universe<'a> {
     /// Returns all terms.
     pub(crate) fn terms<'s>(&'s self) -> impl Iterator<Item = &'s Term> {
         let of = |terms: &'s Terms| (0..terms.len()).map(move |id| terms.term(number(id)));
-        of(self.book).chain(self.run.into_iter().flat_map(of)).chain(of(&self.created))
+        of(self.book)
+            .chain(self.run.into_iter().flat_map(of))
+            .chain(of(&self.created))
     }
 }
 

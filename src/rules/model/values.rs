@@ -36,13 +36,17 @@ impl Number {
         }
     }
 
-    /// Returns the term. Returns `None` if the value is not finite, because such a computation has no result.
+    /// Returns the term. Returns `None` if the value is not finite, because such a computation has
+    /// no result.
     pub(crate) fn term(self) -> Option<Term> {
         match self {
             Self::Integer(value) => Some(Term::Integer(value)),
-            Self::Float(value) => value
-                .is_finite()
-                .then(|| Term::Literal(value.to_string().into(), format!("{}float", names::XSD).into())),
+            Self::Float(value) => value.is_finite().then(|| {
+                Term::Literal(
+                    value.to_string().into(),
+                    format!("{}float", names::XSD).into(),
+                )
+            }),
             Self::Double(value) => value.is_finite().then(|| double_term(value)),
         }
     }
@@ -70,10 +74,13 @@ const INTEGER_TYPES: [&str; 13] = [
     "unsignedByte",
 ];
 
-/// Converts a literal to a term: canonical if the datatype is known and the text is valid, otherwise unchanged.
+/// Converts a literal to a term: canonical if the datatype is known and the text is valid,
+/// otherwise unchanged.
 pub(crate) fn literal(text: &str, datatype: &str) -> Term {
     let other = || Term::Literal(text.into(), datatype.into());
-    let Some(local) = datatype.strip_prefix(names::XSD) else { return other() };
+    let Some(local) = datatype.strip_prefix(names::XSD) else {
+        return other();
+    };
     match local {
         "string" => Term::string(text),
         "boolean" => match text {
@@ -83,7 +90,9 @@ pub(crate) fn literal(text: &str, datatype: &str) -> Term {
         },
         "double" => xsd_float(text).map_or_else(other, Term::Double),
         "float" => match xsd_float(text) {
-            Some(value) if value.is_finite() => Term::Literal((value as f32).to_string().into(), datatype.into()),
+            Some(value) if value.is_finite() => {
+                Term::Literal((value as f32).to_string().into(), datatype.into())
+            }
             _ => other(),
         },
         "decimal" => decimal(text).map_or_else(other, |canonical| match whole(&canonical) {
@@ -91,18 +100,27 @@ pub(crate) fn literal(text: &str, datatype: &str) -> Term {
             None => Term::Decimal(canonical.into()),
         }),
         _ if INTEGER_TYPES.contains(&local) => integer(text)
-            .filter(|value| local == "integer" || crate::model::datatypes::belongs(value, datatype) == Some(true))
+            .filter(|value| {
+                local == "integer"
+                    || crate::model::datatypes::belongs(value, datatype) == Some(true)
+            })
             .unwrap_or_else(other),
         _ => other(),
     }
 }
 
-/// Converts an integer of any length, in decimal digits with an optional sign. Returns `None` for any other text.
+/// Converts an integer of any length, in decimal digits with an optional sign. Returns `None` for
+/// any other text.
 ///
-/// An integer that does not fit in 64 bits becomes, as in Nemo, an `xsd:integer` literal in canonical form. It is exact
-/// and equal only to itself, but not a number for computation, because a double would be rounded.
+/// An integer that does not fit in 64 bits becomes, as in Nemo, an `xsd:integer` literal in
+/// canonical form. It is exact and equal only to itself, but not a number for computation, because
+/// a double would be rounded.
 pub(crate) fn integer(text: &str) -> Option<Term> {
-    if text.contains('.') { None } else { whole(&decimal(text)?) }
+    if text.contains('.') {
+        None
+    } else {
+        whole(&decimal(text)?)
+    }
 }
 
 /// Converts a canonical decimal to an integer term. Returns `None` if it has a fraction.
@@ -110,7 +128,10 @@ fn whole(canonical: &str) -> Option<Term> {
     match canonical.parse() {
         Ok(value) => Some(Term::Integer(value)),
         Err(_) if canonical.contains('.') => None,
-        Err(_) => Some(Term::Literal(canonical.into(), format!("{}integer", names::XSD).into())),
+        Err(_) => Some(Term::Literal(
+            canonical.into(),
+            format!("{}integer", names::XSD).into(),
+        )),
     }
 }
 
@@ -126,13 +147,18 @@ fn xsd_float(text: &str) -> Option<f64> {
         "INF" | "+INF" => Some(f64::INFINITY),
         "-INF" => Some(f64::NEG_INFINITY),
         "NaN" => Some(f64::NAN),
-        _ if text.bytes().all(|b| b.is_ascii_digit() || b"+-.eE".contains(&b)) => text.parse().ok(),
+        _ if text
+            .bytes()
+            .all(|b| b.is_ascii_digit() || b"+-.eE".contains(&b)) =>
+        {
+            text.parse().ok()
+        }
         _ => None,
     }
 }
 
-/// Returns the canonical form of a decimal: no redundant zeros, and no dot without a fraction. Returns `None` if the
-/// text is not a decimal.
+/// Returns the canonical form of a decimal: no redundant zeros, and no dot without a fraction.
+/// Returns `None` if the text is not a decimal.
 pub(crate) fn decimal(text: &str) -> Option<String> {
     let (negative, digits) = match text.strip_prefix('-') {
         Some(rest) => (true, rest),
@@ -146,14 +172,24 @@ pub(crate) fn decimal(text: &str) -> Option<String> {
     let whole = whole.trim_start_matches('0');
     let fraction = fraction.trim_end_matches('0');
     let whole = if whole.is_empty() { "0" } else { whole };
-    let sign = if negative && (whole != "0" || !fraction.is_empty()) { "-" } else { "" };
-    Some(if fraction.is_empty() { format!("{sign}{whole}") } else { format!("{sign}{whole}.{fraction}") })
+    let sign = if negative && (whole != "0" || !fraction.is_empty()) {
+        "-"
+    } else {
+        ""
+    };
+    Some(if fraction.is_empty() {
+        format!("{sign}{whole}")
+    } else {
+        format!("{sign}{whole}.{fraction}")
+    })
 }
 
 /// Returns the length of a term's text; 0 for numbers. Unit: bytes.
 pub(crate) fn text_len(term: &Term) -> usize {
     match term {
-        Term::Iri(text) | Term::Blank(text) | Term::String(text) | Term::Decimal(text) => text.len(),
+        Term::Iri(text) | Term::Blank(text) | Term::String(text) | Term::Decimal(text) => {
+            text.len()
+        }
         Term::LangString(text, more) | Term::Literal(text, more) => text.len() + more.len(),
         Term::Integer(_) | Term::Double(_) | Term::Boolean(_) => 0,
     }
@@ -162,14 +198,18 @@ pub(crate) fn text_len(term: &Term) -> usize {
 /// Returns the lexical form of a term, as `STR` does.
 pub(crate) fn lexical(term: &Term) -> String {
     match term {
-        Term::Iri(text) | Term::Blank(text) | Term::String(text) | Term::LangString(text, _) | Term::Decimal(text) => {
-            text.to_string()
-        }
+        Term::Iri(text)
+        | Term::Blank(text)
+        | Term::String(text)
+        | Term::LangString(text, _)
+        | Term::Decimal(text) => text.to_string(),
         Term::Literal(text, _) => text.to_string(),
         Term::Integer(value) => value.to_string(),
         Term::Boolean(value) => value.to_string(),
         Term::Double(value) if value.is_nan() => "NaN".into(),
-        Term::Double(value) if value.is_infinite() => if *value > 0.0 { "INF" } else { "-INF" }.into(),
+        Term::Double(value) if value.is_infinite() => {
+            if *value > 0.0 { "INF" } else { "-INF" }.into()
+        }
         Term::Double(value) => value.to_string(),
     }
 }

@@ -1,4 +1,5 @@
-//! One action's facts as a SPARQL dataset: sorted term ids, searched in place, without copying the ontology.
+//! One action's facts as a SPARQL dataset: sorted term ids, searched in place, without copying the
+//! ontology.
 
 use std::convert::Infallible;
 use std::hash::{Hash, Hasher};
@@ -24,9 +25,13 @@ impl Graph {
     pub(crate) fn new(mut triples: Vec<[TermId; 3]>) -> Self {
         triples.sort_unstable();
         triples.dedup();
-        let mut by_property: Vec<[TermId; 3]> = triples.iter().map(|[s, p, o]| [*p, *o, *s]).collect();
+        let mut by_property: Vec<[TermId; 3]> =
+            triples.iter().map(|[s, p, o]| [*p, *o, *s]).collect();
         by_property.sort_unstable();
-        Self { by_subject: triples, by_property }
+        Self {
+            by_subject: triples,
+            by_property,
+        }
     }
 
     /// Returns the statements that match the given parts; `None` matches any term.
@@ -35,11 +40,22 @@ impl Graph {
             s.is_none_or(|s| s == *a) && p.is_none_or(|p| p == *b) && o.is_none_or(|o| o == *c)
         };
         match (s, p) {
-            (Some(s), _) => range(&self.by_subject, s, p).iter().filter(|t| fits(t)).copied().collect(),
-            (None, Some(p)) => {
-                range(&self.by_property, p, o).iter().map(|[p, o, s]| [*s, *p, *o]).filter(fits).collect()
-            }
-            (None, None) => self.by_subject.iter().filter(|t| fits(t)).copied().collect(),
+            (Some(s), _) => range(&self.by_subject, s, p)
+                .iter()
+                .filter(|t| fits(t))
+                .copied()
+                .collect(),
+            (None, Some(p)) => range(&self.by_property, p, o)
+                .iter()
+                .map(|[p, o, s]| [*s, *p, *o])
+                .filter(fits)
+                .collect(),
+            (None, None) => self
+                .by_subject
+                .iter()
+                .filter(|t| fits(t))
+                .copied()
+                .collect(),
         }
     }
 }
@@ -153,11 +169,18 @@ impl Hash for ViewTerm<'_> {
 impl<'a> View<'a> {
     fn graphs(&self) -> impl Iterator<Item = (TermId, &'a Graph)> + use<'a> {
         let statements = self.statements;
-        self.snapshot.graphs.iter().map(|(name, graph)| (*name, graph)).chain([(statements.name, &statements.graph)])
+        self.snapshot
+            .graphs
+            .iter()
+            .map(|(name, graph)| (*name, graph))
+            .chain([(statements.name, &statements.graph)])
     }
 
     fn handed_out(&self, value: Value<'a>) -> ViewTerm<'a> {
-        ViewTerm { value, _entry: Entry::new(self.ledger) }
+        ViewTerm {
+            value,
+            _entry: Entry::new(self.ledger),
+        }
     }
 }
 
@@ -172,7 +195,8 @@ impl<'a> QueryableDataset<'a> for View<'a> {
         object: Option<&ViewTerm<'a>>,
         graph_name: Option<Option<&ViewTerm<'a>>>,
     ) -> impl Iterator<Item = Result<InternalQuad<ViewTerm<'a>>, Infallible>> + use<'a> {
-        // A lookup without results returns no counted terms but takes time, so check the clock here.
+        // A lookup without results returns no counted terms but takes time, so check the clock
+        // here.
         self.ledger.check();
         let mut found = Vec::new();
         let parts = [subject, predicate, object];
@@ -185,20 +209,33 @@ impl<'a> QueryableDataset<'a> for View<'a> {
                     Some(Some(wanted)) if wanted.id() == Some(name) => true,
                     Some(Some(_)) => continue,
                 };
-                found.extend(graph.find(s, p, o).into_iter().map(|triple| (triple, named.then_some(name))));
+                found.extend(
+                    graph
+                        .find(s, p, o)
+                        .into_iter()
+                        .map(|triple| (triple, named.then_some(name))),
+                );
             }
         }
         let view = *self;
         found.into_iter().map(move |(triple, graph)| {
             let known = |id| view.handed_out(Value::Known(id));
             let [subject, predicate, object] = triple.map(known);
-            Ok(InternalQuad { subject, predicate, object, graph_name: graph.map(known) })
+            Ok(InternalQuad {
+                subject,
+                predicate,
+                object,
+                graph_name: graph.map(known),
+            })
         })
     }
 
-    fn internal_named_graphs(&self) -> impl Iterator<Item = Result<ViewTerm<'a>, Infallible>> + use<'a> {
+    fn internal_named_graphs(
+        &self,
+    ) -> impl Iterator<Item = Result<ViewTerm<'a>, Infallible>> + use<'a> {
         let view = *self;
-        view.graphs().map(move |(name, _)| Ok(view.handed_out(Value::Known(name))))
+        view.graphs()
+            .map(move |(name, _)| Ok(view.handed_out(Value::Known(name))))
     }
 
     fn contains_internal_graph_name(&self, graph_name: &ViewTerm<'a>) -> Result<bool, Infallible> {
@@ -210,7 +247,10 @@ impl<'a> QueryableDataset<'a> for View<'a> {
             return Ok(self.handed_out(Value::Known(known)));
         }
         let weight = Weight::new(self.ledger, length_of(&term));
-        let created = Created { term, _weight: weight };
+        let created = Created {
+            term,
+            _weight: weight,
+        };
         Ok(self.handed_out(Value::Created(Rc::new(created))))
     }
 

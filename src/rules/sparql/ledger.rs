@@ -1,9 +1,10 @@
 //! Enforces the budget of a SPARQL evaluation by counting every term that the evaluator copies.
 //!
-//! The evaluator checks its cancellation token only when it reads statements, not while it builds products, groups and
-//! sorted lists. All of these consist of copied terms, however. A copy that exceeds the budget unwinds the stack up to
-//! [`Ledger::hold`], as rust-analyzer's database (salsa) unwinds a cancelled query. This is not a panic: no hook runs,
-//! and no state of the evaluation is used afterwards.
+//! The evaluator checks its cancellation token only when it reads statements, not while it builds
+//! products, groups and sorted lists. All of these consist of copied terms, however. A copy that
+//! exceeds the budget unwinds the stack up to [`Ledger::hold`], as rust-analyzer's database (salsa)
+//! unwinds a cancelled query. This is not a panic: no hook runs, and no state of the evaluation is
+//! used afterwards.
 
 use std::cell::Cell;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
@@ -70,7 +71,8 @@ impl Ledger {
 
     /// Calls a function that makes a text, and unwinds if the text is too long.
     pub(crate) fn text(function: TextFunction, args: &[Term]) -> Option<Term> {
-        function(args, LONGEST_TEXT.get()).unwrap_or_else(|TextTooLong| resume_unwind(Box::new(Stop::Bytes)))
+        function(args, LONGEST_TEXT.get())
+            .unwrap_or_else(|TextTooLong| resume_unwind(Box::new(Stop::Bytes)))
     }
 
     /// Counts a text that is appended to another one, with a separator.
@@ -142,6 +144,8 @@ impl<'a> Weight<'a> {
 
 impl Drop for Weight<'_> {
     fn drop(&mut self) {
-        self.ledger.bytes.set(self.ledger.bytes.get().saturating_sub(self.bytes));
+        self.ledger
+            .bytes
+            .set(self.ledger.bytes.get().saturating_sub(self.bytes));
     }
 }

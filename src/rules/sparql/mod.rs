@@ -1,4 +1,5 @@
-//! Properties written in SPARQL (feature `sparql`): prepared once, evaluated over the named graphs of an action.
+//! Properties written in SPARQL (feature `sparql`): prepared once, evaluated over the named graphs
+//! of an action.
 //!
 //! Never: copies the ontology for an action, or exceeds the budget of an evaluation.
 

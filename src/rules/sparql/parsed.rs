@@ -7,9 +7,14 @@ use actcheck_base::names;
 
 /// Parses a query with the known prefixes. Returns `None` if it is invalid.
 pub(super) fn parsed(text: &str) -> Option<Query> {
-    let parser = names::PREFIXES.iter().fold(SparqlParser::new(), |parser, (prefix, namespace)| {
-        parser.clone().with_prefix(*prefix, *namespace).unwrap_or(parser)
-    });
+    let parser = names::PREFIXES
+        .iter()
+        .fold(SparqlParser::new(), |parser, (prefix, namespace)| {
+            parser
+                .clone()
+                .with_prefix(*prefix, *namespace)
+                .unwrap_or(parser)
+        });
     parser.parse_query(text).ok()
 }
 

@@ -17,8 +17,10 @@ pub(crate) struct Word {
 
 /// Returns the words of a query, without comments and strings.
 pub(crate) fn scan(text: &str) -> Vec<Word> {
-    let mut prefixes: BTreeMap<String, String> =
-        names::PREFIXES.iter().map(|(prefix, iri)| ((*prefix).to_owned(), (*iri).to_owned())).collect();
+    let mut prefixes: BTreeMap<String, String> = names::PREFIXES
+        .iter()
+        .map(|(prefix, iri)| ((*prefix).to_owned(), (*iri).to_owned()))
+        .collect();
     let mut words: Vec<Word> = Vec::new();
     let mut at = 0;
     while let Some(c) = text[at..].chars().next() {
@@ -35,19 +37,29 @@ pub(crate) fn scan(text: &str) -> Vec<Word> {
                     {
                         prefixes.insert(name.word.trim_end_matches(':').to_owned(), iri);
                     } else {
-                        words.push(Word { word: String::new(), iri: Some(iri), span: start..at });
+                        words.push(Word {
+                            word: String::new(),
+                            iri: Some(iri),
+                            span: start..at,
+                        });
                     }
                 }
                 _ => at += 1,
             },
             c if c.is_alphanumeric() || "?$_:".contains(c) => {
-                let length =
-                    text[at..].find(|c: char| !(c.is_alphanumeric() || "?$_:-".contains(c))).unwrap_or(text.len() - at);
+                let length = text[at..]
+                    .find(|c: char| !(c.is_alphanumeric() || "?$_:-".contains(c)))
+                    .unwrap_or(text.len() - at);
                 at += length;
                 let word = text[start..at].to_owned();
-                let iri =
-                    word.split_once(':').and_then(|(prefix, local)| Some(format!("{}{local}", prefixes.get(prefix)?)));
-                words.push(Word { word, iri, span: start..at });
+                let iri = word
+                    .split_once(':')
+                    .and_then(|(prefix, local)| Some(format!("{}{local}", prefixes.get(prefix)?)));
+                words.push(Word {
+                    word,
+                    iri,
+                    span: start..at,
+                });
             }
             c => at += c.len_utf8(),
         }
@@ -57,12 +69,19 @@ pub(crate) fn scan(text: &str) -> Vec<Word> {
 
 /// Returns the names of the variables in a query.
 pub(crate) fn variables(text: &str) -> BTreeSet<String> {
-    scan(text).into_iter().filter_map(|word| word.word.strip_prefix(['?', '$']).map(str::to_owned)).collect()
+    scan(text)
+        .into_iter()
+        .filter_map(|word| word.word.strip_prefix(['?', '$']).map(str::to_owned))
+        .collect()
 }
 
-/// Returns the offset of the first `{` outside strings, IRIs and comments. Returns `None` if there is no such brace.
+/// Returns the offset of the first `{` outside strings, IRIs and comments. Returns `None` if there
+/// is no such brace.
 pub(crate) fn first_group(text: &str) -> Option<usize> {
-    braces(text).into_iter().find(|(_, open)| *open).map(|(at, _)| at)
+    braces(text)
+        .into_iter()
+        .find(|(_, open)| *open)
+        .map(|(at, _)| at)
 }
 
 /// Returns the span of every `{ … }`, braces included, in the order of the opening braces.
@@ -80,7 +99,8 @@ pub(crate) fn groups(text: &str) -> Vec<Span> {
     found
 }
 
-/// Returns the offsets of braces outside strings, IRIs and comments, and whether each is an opening brace.
+/// Returns the offsets of braces outside strings, IRIs and comments, and whether each is an opening
+/// brace.
 fn braces(text: &str) -> Vec<(usize, bool)> {
     let mut found = Vec::new();
     let mut at = 0;

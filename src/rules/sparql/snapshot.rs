@@ -17,7 +17,15 @@ pub(crate) fn snapshot(
     let mut graphs: Vec<(TermId, Vec<[TermId; 3]>)> = given
         .graphs(facts)
         .into_iter()
-        .map(|(name, triples)| (name, triples.iter().map(|triple| triple.map(|id| universe.of_run(id))).collect()))
+        .map(|(name, triples)| {
+            (
+                name,
+                triples
+                    .iter()
+                    .map(|triple| triple.map(|id| universe.of_run(id)))
+                    .collect(),
+            )
+        })
         .collect();
     let mut add = |phase: TermId, triple: [TermId; 3]| {
         if let Some((_, triples)) = graphs.iter_mut().find(|(name, _)| *name == phase) {
@@ -25,12 +33,20 @@ pub(crate) fn snapshot(
         }
     };
     for (property, predicate) in given.states() {
-        for row in derived.get(predicate).map_or(&[][..], |table| table.index(0)).chunks_exact(3) {
+        for row in derived
+            .get(predicate)
+            .map_or(&[][..], |table| table.index(0))
+            .chunks_exact(3)
+        {
             add(row[0], [row[1], property, row[2]]);
         }
     }
     if let Some(predicate) = given.any_state() {
-        for row in derived.get(predicate).map_or(&[][..], |table| table.index(0)).chunks_exact(4) {
+        for row in derived
+            .get(predicate)
+            .map_or(&[][..], |table| table.index(0))
+            .chunks_exact(4)
+        {
             add(row[0], [row[1], row[2], row[3]]);
         }
     }
@@ -44,5 +60,10 @@ pub(crate) fn snapshot(
         })
         .collect();
     graphs.push((statements.parameters, parameters));
-    Snapshot { graphs: graphs.into_iter().map(|(name, triples)| (name, Graph::new(triples))).collect() }
+    Snapshot {
+        graphs: graphs
+            .into_iter()
+            .map(|(name, triples)| (name, Graph::new(triples)))
+            .collect(),
+    }
 }

@@ -20,7 +20,9 @@ use crate::standalone::table::ColumnKind;
 use crate::syntax::{Statement, Syntax, Transfer};
 use actcheck_base::{Below, Diagnostic, Diagnostics, RuleFault, Span, Term, TermId, did_you_mean};
 
-const FORMATS: [&str; 9] = ["csv", "dsv", "tsv", "rdf", "ntriples", "nquads", "turtle", "trig", "rdfxml"];
+const FORMATS: [&str; 9] = [
+    "csv", "dsv", "tsv", "rdf", "ntriples", "nquads", "turtle", "trig", "rdfxml",
+];
 const TABLE_OPTIONS: [&str; 5] = ["resource", "format", "delimiter", "compression", "limit"];
 const RDF_OPTIONS: [&str; 3] = ["resource", "compression", "limit"];
 
@@ -50,10 +52,14 @@ pub(super) fn exports(program: &Program, diagnostics: &mut Diagnostics) -> Vec<E
     let mut found: Vec<Export> = Vec::new();
     for statement in &syntax.statements {
         let (exports, span): (Vec<Export>, Option<&Span>) = match statement {
-            Statement::Transfer(transfer) if !transfer.import => {
-                (export(program, transfer, diagnostics).into_iter().collect(), Some(&transfer.span))
-            }
-            Statement::Output { predicates } => (predicates.iter().map(|one| output(syntax, one)).collect(), None),
+            Statement::Transfer(transfer) if !transfer.import => (
+                export(program, transfer, diagnostics).into_iter().collect(),
+                Some(&transfer.span),
+            ),
+            Statement::Output { predicates } => (
+                predicates.iter().map(|one| output(syntax, one)).collect(),
+                None,
+            ),
             _ => (Vec::new(), None),
         };
         for export in exports {
@@ -63,8 +69,12 @@ pub(super) fn exports(program: &Program, diagnostics: &mut Diagnostics) -> Vec<E
                 Some(other) if *other == export => {}
                 Some(other) => {
                     let (path, predicate) = (export.path.display(), &export.predicate);
-                    let message = format!("`{path}` is the file of `{predicate}` and of `{}`", other.predicate);
-                    let error = Diagnostic::error("R073", message).help("name another file with `resource = \"…\"`");
+                    let message = format!(
+                        "`{path}` is the file of `{predicate}` and of `{}`",
+                        other.predicate
+                    );
+                    let error = Diagnostic::error("R073", message)
+                        .help("name another file with `resource = \"…\"`");
                     diagnostics.push(match span {
                         Some(span) => error.at(&syntax.source, span.clone()),
                         None => error.in_source(&syntax.source),
@@ -78,8 +88,17 @@ pub(super) fn exports(program: &Program, diagnostics: &mut Diagnostics) -> Vec<E
 
 fn output(syntax: &Syntax, predicate: &str) -> Export {
     let path = PathBuf::from(format!("{}.csv", file_name(syntax, predicate)));
-    let content = Content::Table { delimiter: b',', columns: None };
-    Export { predicate: predicate.to_owned(), path, content, compression: Compression::None, limit: usize::MAX }
+    let content = Content::Table {
+        delimiter: b',',
+        columns: None,
+    };
+    Export {
+        predicate: predicate.to_owned(),
+        path,
+        content,
+        compression: Compression::None,
+        limit: usize::MAX,
+    }
 }
 
 fn export(program: &Program, transfer: &Transfer, diagnostics: &mut Diagnostics) -> Option<Export> {
@@ -88,20 +107,43 @@ fn export(program: &Program, transfer: &Transfer, diagnostics: &mut Diagnostics)
     if !FORMATS.contains(&format) {
         let message = format!("exports to `{format}` are not supported");
         let help = did_you_mean(format, FORMATS);
-        diagnostics.push(Diagnostic::error("R070", message).at(&syntax.source, transfer.span.clone()).help(help));
+        diagnostics.push(
+            Diagnostic::error("R070", message)
+                .at(&syntax.source, transfer.span.clone())
+                .help(help),
+        );
         return None;
     }
     let is_table = matches!(format, "csv" | "dsv" | "tsv");
-    let mut settings = Settings::new(syntax, transfer, if is_table { &TABLE_OPTIONS } else { &RDF_OPTIONS });
+    let mut settings = Settings::new(
+        syntax,
+        transfer,
+        if is_table {
+            &TABLE_OPTIONS
+        } else {
+            &RDF_OPTIONS
+        },
+    );
     let resource = settings.text("resource");
     let named = resource.as_deref().map(Path::new);
-    let rdf = if is_table { None } else { rdf_format(format, named.unwrap_or(Path::new(""))) };
-    let arity = program.predicates.find(0, &transfer.predicate, None).map(|id| program.predicates.get(id).arity);
+    let rdf = if is_table {
+        None
+    } else {
+        rdf_format(format, named.unwrap_or(Path::new("")))
+    };
+    let arity = program
+        .predicates
+        .find(0, &transfer.predicate, None)
+        .map(|id| program.predicates.get(id).arity);
     let content = match rdf {
         Some(rdf) => {
             let wanted = if rdf.supports_datasets() { 4 } else { 3 };
             if let Some(arity) = arity.filter(|arity| *arity != wanted) {
-                let message = format!("`{}` has {}, but `{format}` needs {wanted}", transfer.predicate, counted(arity));
+                let message = format!(
+                    "`{}` has {}, but `{format}` needs {wanted}",
+                    transfer.predicate,
+                    counted(arity)
+                );
                 settings.error(
                     &transfer.span,
                     message,
@@ -117,50 +159,96 @@ fn export(program: &Program, transfer: &Transfer, diagnostics: &mut Diagnostics)
             if let (Some(columns), Some(arity)) = (&columns, arity.filter(|arity| *arity > 0))
                 && columns.len() != arity
             {
-                let message =
-                    format!("`{}` has {}, but `format` has {}", transfer.predicate, counted(arity), columns.len());
-                settings.error(&settings.span("format"), message, "write one word for each column");
+                let message = format!(
+                    "`{}` has {}, but `format` has {}",
+                    transfer.predicate,
+                    counted(arity),
+                    columns.len()
+                );
+                settings.error(
+                    &settings.span("format"),
+                    message,
+                    "write one word for each column",
+                );
             }
             Content::Table { delimiter, columns }
         }
         None => {
             let message = "the RDF format of the export is unknown".to_owned();
             let help = "name the format: ntriples, nquads, turtle, trig or rdfxml";
-            let found = Diagnostic::error("R070", message).at(&syntax.source, transfer.span.clone()).help(help);
+            let found = Diagnostic::error("R070", message)
+                .at(&syntax.source, transfer.span.clone())
+                .help(help);
             diagnostics.push(found);
             return None;
         }
     };
     let compression = compression(&mut settings, named.unwrap_or(Path::new("")));
-    let packed = if compression == Compression::Gzip { ".gz" } else { "" };
+    let packed = if compression == Compression::Gzip {
+        ".gz"
+    } else {
+        ""
+    };
     let extension = rdf.map_or(format, |rdf| rdf.file_extension());
-    let usual = || format!("{}.{extension}{packed}", file_name(syntax, &transfer.predicate));
+    let usual = || {
+        format!(
+            "{}.{extension}{packed}",
+            file_name(syntax, &transfer.predicate)
+        )
+    };
     let path = resource.unwrap_or_else(usual);
     let limit = settings.count("limit").unwrap_or(usize::MAX);
     if compression == Compression::Gzip && !cfg!(feature = "gzip") {
         let help = "export without compression, or build `actcheck-rules` with the feature `gzip`";
-        settings.error(&settings.span("resource"), "this build can't compress exports".to_owned(), help);
+        settings.error(
+            &settings.span("resource"),
+            "this build can't compress exports".to_owned(),
+            help,
+        );
     }
     let failed = settings.diagnostics.has_errors();
     diagnostics.extend(settings.diagnostics);
     let relative = Path::new(&path);
-    let inside = relative.is_relative() && !relative.components().any(|c| matches!(c, Component::ParentDir));
+    let inside = relative.is_relative()
+        && !relative
+            .components()
+            .any(|c| matches!(c, Component::ParentDir));
     if !inside {
         let message = format!("`{path}` is outside the output folder");
         let help = "use a relative path without `..`, and set the output folder with `-D`";
-        diagnostics.push(Diagnostic::error("R073", message).at(&syntax.source, transfer.span.clone()).help(help));
+        diagnostics.push(
+            Diagnostic::error("R073", message)
+                .at(&syntax.source, transfer.span.clone())
+                .help(help),
+        );
         return None;
     }
     // Without `.`, so that equal files have equal paths.
-    let path = relative.components().filter(|c| matches!(c, Component::Normal(_))).collect();
-    (!failed).then(|| Export { predicate: transfer.predicate.clone(), path, content, compression, limit })
+    let path = relative
+        .components()
+        .filter(|c| matches!(c, Component::Normal(_)))
+        .collect();
+    (!failed).then(|| Export {
+        predicate: transfer.predicate.clone(),
+        path,
+        content,
+        compression,
+        limit,
+    })
 }
 
 /// Converts a predicate's name, with its base, to a file name. Other characters become `_`.
 fn file_name(syntax: &Syntax, predicate: &str) -> String {
-    let base = syntax.base.as_deref().filter(|_| !predicate.contains(':')).unwrap_or("");
+    let base = syntax
+        .base
+        .as_deref()
+        .filter(|_| !predicate.contains(':'))
+        .unwrap_or("");
     let fits = |c: char| c.is_alphanumeric() || ".-_".contains(c);
-    format!("{base}{predicate}").chars().map(|c| if fits(c) { c } else { '_' }).collect()
+    format!("{base}{predicate}")
+        .chars()
+        .map(|c| if fits(c) { c } else { '_' })
+        .collect()
 }
 
 /// Number of rows of an export.
@@ -175,14 +263,35 @@ pub(super) struct Written {
 ///
 /// # Errors
 /// The reason why the file can't be written, or `stop` was set.
-pub(super) fn write(export: &Export, folder: &Path, closure: &Closure, stop: &AtomicBool) -> Result<Written, String> {
+pub(super) fn write(
+    export: &Export,
+    folder: &Path,
+    closure: &Closure,
+    stop: &AtomicBool,
+) -> Result<Written, String> {
     let (path, below) = (folder.join(&export.path), Below::new(folder));
     let lower = |error: std::io::Error| error.to_string().to_lowercase();
-    below.create_folder(path.parent().unwrap_or(folder)).map_err(lower)?;
+    below
+        .create_folder(path.parent().unwrap_or(folder))
+        .map_err(lower)?;
     let mut rows: Vec<&[TermId]> = closure.rows_unsorted(&export.predicate).collect();
-    rows.sort_unstable_by(|a, b| a.iter().map(|id| closure.term(*id)).cmp(b.iter().map(|id| closure.term(*id))));
-    let rows = rows.into_iter().map(|row| row.iter().map(|id| closure.term(*id)).collect::<Vec<&Term>>());
-    let rows = rows.map(|row| if stop.load(Ordering::Relaxed) { Err(RuleFault::Interrupted) } else { Ok(row) });
+    rows.sort_unstable_by(|a, b| {
+        a.iter()
+            .map(|id| closure.term(*id))
+            .cmp(b.iter().map(|id| closure.term(*id)))
+    });
+    let rows = rows.into_iter().map(|row| {
+        row.iter()
+            .map(|id| closure.term(*id))
+            .collect::<Vec<&Term>>()
+    });
+    let rows = rows.map(|row| {
+        if stop.load(Ordering::Relaxed) {
+            Err(RuleFault::Interrupted)
+        } else {
+            Ok(row)
+        }
+    });
     let new = below.new_file(&path).map_err(lower)?;
     let mut packed = Packed::new(new.writer().map_err(lower)?, export.compression);
     let written = match &export.content {
@@ -198,7 +307,8 @@ pub(super) fn write(export: &Export, folder: &Path, closure: &Closure, stop: &At
     Ok(written)
 }
 
-/// Writes rows as delimited text. A row with a value that does not fit its column is left out, as in Nemo.
+/// Writes rows as delimited text. A row with a value that does not fit its column is left out, as
+/// in Nemo.
 fn table<'r>(
     rows: impl Iterator<Item = Result<Vec<&'r Term>, RuleFault>>,
     limit: usize,
@@ -206,13 +316,26 @@ fn table<'r>(
     columns: Option<&[ColumnKind]>,
     writer: &mut dyn Write,
 ) -> std::io::Result<Written> {
-    let mut writer = csv::WriterBuilder::new().delimiter(delimiter).from_writer(writer);
+    let mut writer = csv::WriterBuilder::new()
+        .delimiter(delimiter)
+        .from_writer(writer);
     let mut written = Written::default();
     for row in rows {
         let row = row.map_err(std::io::Error::other)?;
-        let kind = |column| columns.and_then(|columns| columns.get(column)).copied().unwrap_or(ColumnKind::Any);
-        let kinds = (0..row.len()).map(kind).zip(&row).filter(|(kind, _)| *kind != ColumnKind::Skip);
-        let Some(fields) = kinds.map(|(kind, term)| field(kind, term)).collect::<Option<Vec<String>>>() else {
+        let kind = |column| {
+            columns
+                .and_then(|columns| columns.get(column))
+                .copied()
+                .unwrap_or(ColumnKind::Any)
+        };
+        let kinds = (0..row.len())
+            .map(kind)
+            .zip(&row)
+            .filter(|(kind, _)| *kind != ColumnKind::Skip);
+        let Some(fields) = kinds
+            .map(|(kind, term)| field(kind, term))
+            .collect::<Option<Vec<String>>>()
+        else {
             continue;
         };
         if written.rows == limit {
@@ -232,7 +355,9 @@ fn field(kind: ColumnKind, term: &Term) -> Option<String> {
     match (kind, term) {
         (ColumnKind::Any | ColumnKind::Skip, term) => Some(values::full(term)),
         (ColumnKind::String, Term::String(text)) => Some(text.to_string()),
-        (ColumnKind::Int, Term::Integer(_)) | (ColumnKind::Double, Term::Double(_)) => Some(values::lexical(term)),
+        (ColumnKind::Int, Term::Integer(_)) | (ColumnKind::Double, Term::Double(_)) => {
+            Some(values::lexical(term))
+        }
         (ColumnKind::Int, term) if values::is_beyond_64_bits(term) => Some(values::lexical(term)),
         _ => None,
     }
@@ -279,7 +404,9 @@ fn quad(row: &[&Term]) -> Option<Quad> {
         Some(term) => node(term)?.into(),
         None => GraphName::DefaultGraph,
     };
-    let NamedOrBlankNode::NamedNode(predicate) = node(predicate)? else { return None };
+    let NamedOrBlankNode::NamedNode(predicate) = node(predicate)? else {
+        return None;
+    };
     let object = match to_rdf(object) {
         RdfTerm::NamedNode(node) if !is_iri(node.as_str()) => return None,
         object => object,
@@ -299,9 +426,10 @@ impl Packed {
         let file = BufWriter::new(file);
         match compression {
             #[cfg(feature = "gzip")]
-            Compression::Gzip => {
-                Self::Gzip(Box::new(flate2::write::GzEncoder::new(file, flate2::Compression::default())))
-            }
+            Compression::Gzip => Self::Gzip(Box::new(flate2::write::GzEncoder::new(
+                file,
+                flate2::Compression::default(),
+            ))),
             _ => Self::Plain(file),
         }
     }

@@ -43,14 +43,23 @@ impl Faults {
     /// Returns all faults as one message.
     pub(super) fn message(&self, path: &Path) -> String {
         let path = path.display();
-        let shown = self.first.iter().map(|(at, why)| format!("{path}:{}:{}: {why}", at.line, at.column));
+        let shown = self
+            .first
+            .iter()
+            .map(|(at, why)| format!("{path}:{}:{}: {why}", at.line, at.column));
         let shown = shown.collect::<Vec<_>>().join("; ");
         let more = match self.count - self.first.len() {
             0 => String::new(),
             more => format!("; and {more} more"),
         };
-        let cut = self.cut.map_or(String::new(), |line| format!("; nothing is read from line {line} on"));
-        let faults = if self.count == 1 { "1 fault".to_owned() } else { format!("{} faults", self.count) };
+        let cut = self.cut.map_or(String::new(), |line| {
+            format!("; nothing is read from line {line} on")
+        });
+        let faults = if self.count == 1 {
+            "1 fault".to_owned()
+        } else {
+            format!("{} faults", self.count)
+        };
         format!("an imported file has {faults}: {shown}{more}{cut}")
     }
 }

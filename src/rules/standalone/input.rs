@@ -22,8 +22,8 @@ pub(super) struct Limits<'a> {
     unsettled: Cell<usize>,
 }
 
-/// A parser takes at most about this memory for each byte of a text from which it makes no rows, such as brackets and
-/// prefixes.
+/// A parser takes at most about this memory for each byte of a text from which it makes no rows,
+/// such as brackets and prefixes.
 const PARSER_BYTES: usize = 48;
 
 /// Text that is read before its rows are counted.
@@ -42,7 +42,13 @@ impl<'a> Limits<'a> {
     pub(super) fn new(budget: &'a Budget) -> Self {
         let time = Duration::try_from_secs_f64(budget.secs.max(0.0)).ok();
         let end = time.and_then(|time| Instant::now().checked_add(time));
-        Self { budget, end, ended: Cell::new(None), facts: Cell::new(0), unsettled: Cell::new(0) }
+        Self {
+            budget,
+            end,
+            ended: Cell::new(None),
+            facts: Cell::new(0),
+            unsettled: Cell::new(0),
+        }
     }
 
     /// Returns the limit that ended an import, if one did.
@@ -77,10 +83,13 @@ impl<'a> Limits<'a> {
         self.unsettled.set(0);
     }
 
-    /// Returns a reader for a parser that makes rows while it reads. Reads fail if the parser may need more than the
-    /// permitted memory for a text from which it makes none.
+    /// Returns a reader for a parser that makes rows while it reads. Reads fail if the parser may
+    /// need more than the permitted memory for a text from which it makes none.
     pub(super) fn counted<R: Read>(&'a self, inner: R) -> Counted<'a, R> {
-        Counted { inner, limits: self }
+        Counted {
+            inner,
+            limits: self,
+        }
     }
 
     fn end(&self, ended: Ended) -> Error {
@@ -115,15 +124,26 @@ pub(super) fn open<'a>(
         true => Box::new(File::open(path).map_err(lower)?),
         false => Box::new(Pipe::open(path.to_owned(), limits)?),
     };
-    let file = Limited { inner: file, limits };
+    let file = Limited {
+        inner: file,
+        limits,
+    };
     let mut text: Box<dyn Read + 'a> = match compression {
         Compression::None => Box::new(file),
-        Compression::Gzip => Box::new(Limited { inner: unpacked(BufReader::with_capacity(1 << 16, file))?, limits }),
+        Compression::Gzip => Box::new(Limited {
+            inner: unpacked(BufReader::with_capacity(1 << 16, file))?,
+            limits,
+        }),
     };
     let mut head = Vec::new();
-    text.by_ref().take(3).read_to_end(&mut head).map_err(lower)?;
+    text.by_ref()
+        .take(3)
+        .read_to_end(&mut head)
+        .map_err(lower)?;
     match head.as_slice() {
-        [0xff, 0xfe, ..] | [0xfe, 0xff, ..] => return Err("it is UTF-16 text; convert it to UTF-8".to_owned()),
+        [0xff, 0xfe, ..] | [0xfe, 0xff, ..] => {
+            return Err("it is UTF-16 text; convert it to UTF-8".to_owned());
+        }
         [0, ..] | [_, 0, ..] => {
             return Err("it is not UTF-8 text: a zero byte is at its beginning, as in UTF-16 or binary data".to_owned());
         }
@@ -154,9 +174,17 @@ pub(super) struct Counted<'a, R> {
 impl<R: Read> Read for Counted<'_, R> {
     fn read(&mut self, buffer: &mut [u8]) -> std::io::Result<usize> {
         let count = self.inner.read(buffer)?;
-        let Limits { unsettled, facts, budget, .. } = self.limits;
+        let Limits {
+            unsettled,
+            facts,
+            budget,
+            ..
+        } = self.limits;
         unsettled.set(unsettled.get() + count);
-        let parser = unsettled.get().saturating_sub(READ_AHEAD).saturating_mul(PARSER_BYTES);
+        let parser = unsettled
+            .get()
+            .saturating_sub(READ_AHEAD)
+            .saturating_mul(PARSER_BYTES);
         if facts.get().saturating_add(parser) > budget.bytes {
             return Err(self.limits.end(Ended::Memory));
         }
@@ -177,7 +205,8 @@ impl<R: Read> Read for Limited<'_, R> {
     }
 }
 
-/// A pipe or device. It is opened and read in a thread of its own, because either may wait for ever.
+/// A pipe or device. It is opened and read in a thread of its own, because either may wait for
+/// ever.
 struct Pipe<'a> {
     chunks: Receiver<std::io::Result<Vec<u8>>>,
     chunk: Cursor<Vec<u8>>,
@@ -212,8 +241,14 @@ impl<'a> Pipe<'a> {
                 }
             }
         };
-        std::thread::Builder::new().spawn(read).map_err(|error| error.to_string().to_lowercase())?;
-        Ok(Self { chunks, chunk: Cursor::new(Vec::new()), limits })
+        std::thread::Builder::new()
+            .spawn(read)
+            .map_err(|error| error.to_string().to_lowercase())?;
+        Ok(Self {
+            chunks,
+            chunk: Cursor::new(Vec::new()),
+            limits,
+        })
     }
 }
 

@@ -1,8 +1,9 @@
 //! Reads a JSON file as facts, with the triples that Nemo makes of it.
 //!
-//! Each value has a number, and 0 is the whole document. `(n, type, "object")` gives the type of a value: `object`,
-//! `array`, `string`, `number`, `bool` or `null`. `(n, value, v)` gives the value of a string, number or bool, and
-//! `(n, key, m)` the member of an object, or the element of an array, of which the first has the key 0.
+//! Each value has a number, and 0 is the whole document. `(n, type, "object")` gives the type of a
+//! value: `object`, `array`, `string`, `number`, `bool` or `null`. `(n, value, v)` gives the value
+//! of a string, number or bool, and `(n, key, m)` the member of an object, or the element of an
+//! array, of which the first has the key 0.
 
 use std::collections::BTreeSet;
 use std::io::Read;
@@ -17,7 +18,8 @@ const DEPTH_LIMIT: usize = 500;
 /// Values between two checks of the memory.
 const VALUES_PER_CHECK: usize = 4096;
 
-/// Reads the facts of a document, at most `limit`. A document that is not valid is a fault, and has no facts.
+/// Reads the facts of a document, at most `limit`. A document that is not valid is a fault, and has
+/// no facts.
 ///
 /// # Errors
 /// Reading failed, or a limit was reached.
@@ -34,17 +36,26 @@ pub(super) fn read_json(
         if bytes.len() == before {
             break;
         }
-        sink.limits.check_with(sink.other_bytes + sink.terms.bytes() + bytes.len())?;
+        sink.limits
+            .check_with(sink.other_bytes + sink.terms.bytes() + bytes.len())?;
     }
     let text = match std::str::from_utf8(&bytes) {
         Ok(text) => text,
         Err(error) => {
             let valid = String::from_utf8_lossy(&bytes[..error.valid_up_to()]);
-            faults.add(place(&valid, valid.len()), || "the text is not UTF-8".to_owned());
+            faults.add(place(&valid, valid.len()), || {
+                "the text is not UTF-8".to_owned()
+            });
             return Ok(());
         }
     };
-    let mut parser = Parser { text, at: 0, depth: 0, values: Vec::new(), sink };
+    let mut parser = Parser {
+        text,
+        at: 0,
+        depth: 0,
+        values: Vec::new(),
+        sink,
+    };
     match parser.document() {
         Ok(root) => emit(&parser.values, root, limit, parser.sink),
         Err(Halt::Fault(at, reason)) => {
@@ -59,7 +70,13 @@ pub(super) fn read_json(
 fn place(text: &str, at: usize) -> Place {
     let before = &text[..at];
     let line = before.matches('\n').count() as u64 + 1;
-    let column = before.rsplit('\n').next().unwrap_or_default().chars().count() as u64 + 1;
+    let column = before
+        .rsplit('\n')
+        .next()
+        .unwrap_or_default()
+        .chars()
+        .count() as u64
+        + 1;
     Place { line, column }
 }
 
@@ -106,7 +123,10 @@ impl Parser<'_, '_, '_> {
     /// Skips white space and returns the next byte.
     fn peek(&mut self) -> Option<u8> {
         let rest = &self.text.as_bytes()[self.at..];
-        self.at += rest.iter().take_while(|byte| b" \t\r\n".contains(byte)).count();
+        self.at += rest
+            .iter()
+            .take_while(|byte| b" \t\r\n".contains(byte))
+            .count();
         self.text.as_bytes().get(self.at).copied()
     }
 
@@ -122,16 +142,18 @@ impl Parser<'_, '_, '_> {
         if self.values.len().is_multiple_of(VALUES_PER_CHECK) {
             let bytes = self.text.len() + self.values.len() * 2 * size_of::<Value>();
             let sink = &self.sink;
-            sink.limits.check_with(sink.other_bytes + sink.terms.bytes() + bytes).map_err(Halt::Limit)?;
+            sink.limits
+                .check_with(sink.other_bytes + sink.terms.bytes() + bytes)
+                .map_err(Halt::Limit)?;
         }
         Ok(self.values.len() - 1)
     }
 
     fn value(&mut self) -> Result<usize, Halt> {
         match self.peek() {
-            Some(b'{' | b'[') if self.depth == DEPTH_LIMIT => {
-                self.fault(format!("more than {DEPTH_LIMIT} arrays and objects in each other"))
-            }
+            Some(b'{' | b'[') if self.depth == DEPTH_LIMIT => self.fault(format!(
+                "more than {DEPTH_LIMIT} arrays and objects in each other"
+            )),
             Some(b'{') => self.nested(Self::object),
             Some(b'[') => self.nested(Self::array),
             Some(b'"') => {
@@ -196,7 +218,12 @@ impl Parser<'_, '_, '_> {
         }
         members.sort();
         let terms = &mut *self.sink.terms;
-        Ok(Value::Object(members.into_iter().map(|(key, value)| (terms.intern_string(&key), value)).collect()))
+        Ok(Value::Object(
+            members
+                .into_iter()
+                .map(|(key, value)| (terms.intern_string(&key), value))
+                .collect(),
+        ))
     }
 
     fn word(&mut self) -> Result<usize, Halt> {
@@ -211,7 +238,10 @@ impl Parser<'_, '_, '_> {
     }
 
     fn digits(&mut self) -> usize {
-        let count = self.text.as_bytes()[self.at..].iter().take_while(|byte| byte.is_ascii_digit()).count();
+        let count = self.text.as_bytes()[self.at..]
+            .iter()
+            .take_while(|byte| byte.is_ascii_digit())
+            .count();
         self.at += count;
         count
     }
@@ -243,7 +273,12 @@ impl Parser<'_, '_, '_> {
             }
         }
         let text = &self.text[start..self.at];
-        let double = || text.parse().ok().filter(|value: &f64| value.is_finite()).map(double_term);
+        let double = || {
+            text.parse()
+                .ok()
+                .filter(|value: &f64| value.is_finite())
+                .map(double_term)
+        };
         let Some(term) = (if whole { integer(text) } else { double() }) else {
             self.at = start;
             return self.fault("the number is out of range");
@@ -308,8 +343,8 @@ impl Parser<'_, '_, '_> {
     }
 }
 
-/// Adds the facts of the values. They are numbered as Nemo does it: the parts of a value when it is visited, and the last
-/// part is visited first.
+/// Adds the facts of the values. They are numbered as Nemo does it: the parts of a value when it is
+/// visited, and the last part is visited first.
 fn emit(values: &[Value], root: usize, limit: usize, sink: &mut Sink<'_>) -> std::io::Result<()> {
     let [kind, content] = ["type", "value"].map(|name| sink.terms.intern_iri(name));
     let (mut stack, mut last, mut left) = (vec![(0_i64, root)], 0_i64, limit);
@@ -331,8 +366,17 @@ fn emit(values: &[Value], root: usize, limit: usize, sink: &mut Sink<'_>) -> std
             Value::Number(id) => ("number", Some(*id), Vec::new()),
             Value::Text(id) => ("string", Some(*id), Vec::new()),
             Value::Array(elements) => {
-                let key = |key: usize, sink: &mut Sink<'_>| sink.terms.intern(Term::Integer(key as i64));
-                ("array", None, elements.iter().enumerate().map(|(idx, at)| (key(idx, sink), *at)).collect())
+                let key =
+                    |key: usize, sink: &mut Sink<'_>| sink.terms.intern(Term::Integer(key as i64));
+                (
+                    "array",
+                    None,
+                    elements
+                        .iter()
+                        .enumerate()
+                        .map(|(idx, at)| (key(idx, sink), *at))
+                        .collect(),
+                )
             }
             Value::Object(members) => ("object", None, members.clone()),
         };
@@ -343,7 +387,9 @@ fn emit(values: &[Value], root: usize, limit: usize, sink: &mut Sink<'_>) -> std
         for (key, part) in parts {
             last += 1;
             let number = last;
-            row(sink, &|terms| [id, key, terms.intern(Term::Integer(number))])?;
+            row(sink, &|terms| {
+                [id, key, terms.intern(Term::Integer(number))]
+            })?;
             stack.push((number, part));
         }
     }
@@ -360,16 +406,22 @@ mod tests {
         std::fs::write(folder.path().join("f.json"), json).expect("the folder is writable");
         let text = format!("@import p :- json{{resource = \"f.json\"{options}}} .");
         let program = Program::load(&Source::new("p.rls", text), folder.path())?;
-        let closure = program.close(Engine::Fast, &crate::Budget::default()).expect("it is small");
-        let shown =
-            |tuple: &Vec<actcheck_base::Term>| tuple.iter().map(ToString::to_string).collect::<Vec<_>>().join(" ");
+        let closure = program
+            .close(Engine::Fast, &crate::Budget::default())
+            .expect("it is small");
+        let shown = |tuple: &Vec<actcheck_base::Term>| {
+            tuple
+                .iter()
+                .map(ToString::to_string)
+                .collect::<Vec<_>>()
+                .join(" ")
+        };
         Ok(closure.tuples("p").iter().map(shown).collect())
     }
 
     #[test]
     fn a_document_gives_triples() {
-        let json =
-            r#"{"b": [true, null], "a": {"x": -1.55e1, "y": "\u00e9\ud83e\udd80\n", "z": 18446744073709551616}}"#;
+        let json = r#"{"b": [true, null], "a": {"x": -1.55e1, "y": "\u00e9\ud83e\udd80\n", "z": 18446744073709551616}}"#;
         let mut expected = vec![
             r#"0 <type> "object""#,
             r#"0 "a" 1"#,
@@ -395,7 +447,12 @@ mod tests {
         let mut found = facts(json.as_bytes(), "").expect("it is valid");
         found.sort_unstable();
         assert_eq!(found, expected);
-        assert_eq!(facts(json.as_bytes(), ", limit = 3").expect("it is valid").len(), 3);
+        assert_eq!(
+            facts(json.as_bytes(), ", limit = 3")
+                .expect("it is valid")
+                .len(),
+            3
+        );
     }
 
     #[test]
@@ -419,11 +476,21 @@ mod tests {
             (deep.as_str(), "f.json:1:501:", "more than 500"),
         ] {
             let found = facts(json.as_bytes(), "").expect_err(json).to_string();
-            assert!(found.contains("R074") && found.contains(place) && found.contains(reason), "{json}: {found}");
+            assert!(
+                found.contains("R074") && found.contains(place) && found.contains(reason),
+                "{json}: {found}"
+            );
         }
-        let found = facts(b"[\"\xff\"]", "").expect_err("it is not UTF-8").to_string();
-        assert!(found.contains("f.json:1:3: the text is not UTF-8"), "{found}");
-        let found = facts(b"[]", ", format = (any)").expect_err("not an option of JSON").to_string();
+        let found = facts(b"[\"\xff\"]", "")
+            .expect_err("it is not UTF-8")
+            .to_string();
+        assert!(
+            found.contains("f.json:1:3: the text is not UTF-8"),
+            "{found}"
+        );
+        let found = facts(b"[]", ", format = (any)")
+            .expect_err("not an option of JSON")
+            .to_string();
         assert!(found.contains("R071"), "{found}");
     }
 }

@@ -1,6 +1,8 @@
-//! Standalone Datalog programs: they read facts from files, run on the same engine, and write their results to files.
+//! Standalone Datalog programs: they read facts from files, run on the same engine, and write their
+//! results to files.
 //!
-//! Never: depends on an action, a snapshot or an ontology; uses the network; writes outside the given folder.
+//! Never: depends on an action, a snapshot or an ontology; uses the network; writes outside the
+//! given folder.
 
 mod export;
 mod faults;

@@ -17,7 +17,9 @@ use crate::model::universe::Universe;
 use crate::standalone::import::{define_imports, import};
 use crate::standalone::input::Limits;
 use crate::syntax::{Expression, Statement, Syntax, parse};
-use actcheck_base::{Diagnostic, Diagnostics, RuleFault, Source, Term, TermId, Terms, did_you_mean};
+use actcheck_base::{
+    Diagnostic, Diagnostics, RuleFault, Source, Term, TermId, Terms, did_you_mean,
+};
 
 /// The evaluator of a program.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -49,7 +51,11 @@ pub struct Loading {
 impl Loading {
     /// Strict, with these limits and without values of parameters.
     pub fn within(budget: &Budget) -> Self {
-        Self { budget: budget.clone(), lenient: false, parameters: BTreeMap::new() }
+        Self {
+            budget: budget.clone(),
+            lenient: false,
+            parameters: BTreeMap::new(),
+        }
     }
 }
 
@@ -57,13 +63,18 @@ impl Default for Loading {
     /// Strict, with at most 4 GiB of facts and without a time limit.
     fn default() -> Self {
         Self {
-            budget: Budget { bytes: 4 << 30, secs: f64::INFINITY, ..Budget::default() },
+            budget: Budget {
+                bytes: 4 << 30,
+                secs: f64::INFINITY,
+                ..Budget::default()
+            },
             ..Self::within(&Budget::default())
         }
     }
 }
 
-/// A checked program with its facts. Unlike the rules of a property, it has only predicates of its own.
+/// A checked program with its facts. Unlike the rules of a property, it has only predicates of its
+/// own.
 ///
 /// ```
 /// use std::path::Path;
@@ -130,7 +141,9 @@ impl Closure {
 
     /// Returns the number of tuples of a predicate.
     pub fn count(&self, predicate: &str) -> usize {
-        self.tables.get(predicate).map_or(0, |(arity, rows)| rows.len() / (*arity).max(1))
+        self.tables
+            .get(predicate)
+            .map_or(0, |(arity, rows)| rows.len() / (*arity).max(1))
     }
 
     /// Returns the number of arguments of a predicate, or `None` if the program does not use it.
@@ -140,13 +153,18 @@ impl Closure {
 
     /// Returns the tuples of a predicate, in no particular order.
     pub fn tuples_unsorted(&self, predicate: &str) -> impl Iterator<Item = Vec<&Term>> {
-        self.rows_unsorted(predicate).map(move |row| row.iter().map(|id| self.term(*id)).collect())
+        self.rows_unsorted(predicate)
+            .map(move |row| row.iter().map(|id| self.term(*id)).collect())
     }
 
     /// Returns the rows of a predicate, in no particular order.
     pub(super) fn rows_unsorted(&self, predicate: &str) -> impl Iterator<Item = &[TermId]> {
-        let (arity, rows) = self.tables.get(predicate).map_or((0, &[][..]), |(arity, rows)| (*arity, rows.as_slice()));
-        rows.chunks_exact(arity.max(1)).map(move |row| &row[..arity])
+        let (arity, rows) = self
+            .tables
+            .get(predicate)
+            .map_or((0, &[][..]), |(arity, rows)| (*arity, rows.as_slice()));
+        rows.chunks_exact(arity.max(1))
+            .map(move |row| &row[..arity])
     }
 
     /// Returns the term of an id in a row.
@@ -159,26 +177,32 @@ impl Closure {
 
     /// Returns the tuples of a predicate, sorted.
     pub fn tuples(&self, predicate: &str) -> Vec<Vec<Term>> {
-        let mut tuples: Vec<Vec<Term>> =
-            self.tuples_unsorted(predicate).map(|tuple| tuple.into_iter().cloned().collect()).collect();
+        let mut tuples: Vec<Vec<Term>> = self
+            .tuples_unsorted(predicate)
+            .map(|tuple| tuple.into_iter().cloned().collect())
+            .collect();
         tuples.sort();
         tuples
     }
 }
 
 impl Program {
-    /// Checks a program and reads its imports. Relative paths of imports are resolved against `folder`.
+    /// Checks a program and reads its imports. Relative paths of imports are resolved against
+    /// `folder`.
     ///
     /// # Errors
-    /// All errors with their places: syntax errors, invalid rules, files that can't be read, and rows of files.
+    /// All errors with their places: syntax errors, invalid rules, files that can't be read, and
+    /// rows of files.
     pub fn load(source: &Source, folder: &Path) -> Result<Self, Diagnostics> {
         Self::load_as(source, folder, &Loading::default())
     }
 
-    /// Like [`Program::load`], with limits on the imports, and on request without the rows that can't be read.
+    /// Like [`Program::load`], with limits on the imports, and on request without the rows that
+    /// can't be read.
     ///
     /// # Errors
-    /// All errors with their places; a limit was reached (`R090`), or the budget's `stop` was set (`R091`).
+    /// All errors with their places; a limit was reached (`R090`), or the budget's `stop` was set
+    /// (`R091`).
     pub fn load_as(source: &Source, folder: &Path, loading: &Loading) -> Result<Self, Diagnostics> {
         let limits = Limits::new(&loading.budget);
         let (mut syntax, mut diagnostics) = parse(source);
@@ -196,32 +220,60 @@ impl Program {
             return Err(diagnostics);
         }
         for table in imports {
-            let found = import(table, &predicates, &mut terms, &mut program, &limits, loading.lenient);
+            let found = import(
+                table,
+                &predicates,
+                &mut terms,
+                &mut program,
+                &limits,
+                loading.lenient,
+            );
             diagnostics.extend(found);
             // A later import would end at the same limit.
             if limits.ended().is_some() {
                 return Err(diagnostics);
             }
         }
-        let strata = stratify(&program.rules, &predicates, &Universe::new(&terms, None)).unwrap_or_else(|found| {
-            diagnostics.extend(found);
-            Vec::new()
-        });
+        let strata = stratify(&program.rules, &predicates, &Universe::new(&terms, None))
+            .unwrap_or_else(|found| {
+                diagnostics.extend(found);
+                Vec::new()
+            });
         let sizes: Vec<Option<usize>> = (0..predicates.len())
-            .map(|id| program.facts.get(&id).map(|rows| rows.len() / predicates.get(id).width))
+            .map(|id| {
+                program
+                    .facts
+                    .get(&id)
+                    .map(|rows| rows.len() / predicates.get(id).width)
+            })
             .collect();
-        diagnostics.extend(warnings(&program.rules, &predicates, &Universe::new(&terms, None)));
+        diagnostics.extend(warnings(
+            &program.rules,
+            &predicates,
+            &Universe::new(&terms, None),
+        ));
         let mut indexes = Indexes::new(&predicates);
         let planned = Planned::new(program, strata, &mut indexes, &|id| sizes[id]);
         let terms = Arc::new(terms);
-        diagnostics.clone().or(Self { syntax, terms, predicates, indexes, planned, warnings: diagnostics })
+        diagnostics.clone().or(Self {
+            syntax,
+            terms,
+            predicates,
+            indexes,
+            planned,
+            warnings: diagnostics,
+        })
     }
 
     /// Adds facts of a predicate that the program uses.
     ///
     /// # Errors
     /// The program does not use the predicate, or a row has the wrong number of terms.
-    pub fn add_facts<'t>(&mut self, predicate: &str, rows: impl IntoIterator<Item = &'t [Term]>) -> Result<(), String> {
+    pub fn add_facts<'t>(
+        &mut self,
+        predicate: &str,
+        rows: impl IntoIterator<Item = &'t [Term]>,
+    ) -> Result<(), String> {
         let id = self
             .predicates
             .find(0, predicate, None)
@@ -230,7 +282,10 @@ impl Program {
         let facts = self.planned.facts.entry(id).or_default();
         for row in rows {
             if row.len() != width || width == 0 {
-                return Err(format!("a row of `{predicate}` has {} terms instead of {width}", row.len()));
+                return Err(format!(
+                    "a row of `{predicate}` has {} terms instead of {width}",
+                    row.len()
+                ));
             }
             let terms = Arc::make_mut(&mut self.terms);
             facts.extend(row.iter().map(|term| terms.intern(term.clone())));
@@ -247,10 +302,22 @@ impl Program {
         let mut meter = Meter::new(budget);
         let rows: Vec<(PredicateId, Vec<TermId>)> = match engine {
             Engine::Fast => {
-                let mut layers = Layers { own: Tables::new(self.predicates.len()), below: Vec::new() };
-                evaluate(&self.planned, &self.predicates, &self.indexes, &mut layers, &mut universe, &mut meter)
-                    .map_err(|stopped| fault(&meter, stopped, &self.planned))?;
-                (0..self.predicates.len()).map(|id| (id, layers.own.take_rows(id))).collect()
+                let mut layers = Layers {
+                    own: Tables::new(self.predicates.len()),
+                    below: Vec::new(),
+                };
+                evaluate(
+                    &self.planned,
+                    &self.predicates,
+                    &self.indexes,
+                    &mut layers,
+                    &mut universe,
+                    &mut meter,
+                )
+                .map_err(|stopped| fault(&meter, stopped, &self.planned))?;
+                (0..self.predicates.len())
+                    .map(|id| (id, layers.own.take_rows(id)))
+                    .collect()
             }
             Engine::Naive => self.naive(&mut universe, &mut meter)?,
         };
@@ -261,7 +328,11 @@ impl Program {
                 tables.insert(predicate.name.clone(), (predicate.arity, rows));
             }
         }
-        Ok(Closure { terms: Arc::clone(&self.terms), created: universe.into_created(), tables })
+        Ok(Closure {
+            terms: Arc::clone(&self.terms),
+            created: universe.into_created(),
+            tables,
+        })
     }
 
     fn naive(
@@ -272,50 +343,91 @@ impl Program {
         let mut sets = naive::Sets::new();
         for (predicate, rows) in &self.planned.facts {
             let width = self.predicates.get(*predicate).width;
-            sets.entry(*predicate).or_default().extend(rows.chunks_exact(width).map(<[TermId]>::to_vec));
+            sets.entry(*predicate)
+                .or_default()
+                .extend(rows.chunks_exact(width).map(<[TermId]>::to_vec));
         }
-        let Planned { rules, strata, endless, .. } = &self.planned;
-        naive::close(rules, strata, endless, &mut sets, universe, meter).map_err(|stop| meter.fault(stop, None))?;
-        let rows = |id| sets.get(&id).map_or(Vec::new(), |set| set.iter().flatten().copied().collect());
-        Ok((0..self.predicates.len()).map(|id| (id, rows(id))).collect())
+        let Planned {
+            rules,
+            strata,
+            endless,
+            ..
+        } = &self.planned;
+        naive::close(rules, strata, endless, &mut sets, universe, meter)
+            .map_err(|stop| meter.fault(stop, None))?;
+        let rows = |id| {
+            sets.get(&id)
+                .map_or(Vec::new(), |set| set.iter().flatten().copied().collect())
+        };
+        Ok((0..self.predicates.len())
+            .map(|id| (id, rows(id)))
+            .collect())
     }
 }
 
-/// Gives parameters other values. Reports those that the program does not have, and values that are not constants.
+/// Gives parameters other values. Reports those that the program does not have, and values that are
+/// not constants.
 fn set_parameters(syntax: &mut Syntax, values: &BTreeMap<String, String>) -> Diagnostics {
     let mut found = Diagnostics::new();
     for (name, text) in values {
         let source = Source::new("parameter", format!("value({text}) ."));
         let (parsed, faults) = parse(&source);
         let value = match parsed.statements.as_slice() {
-            [Statement::Rule(rule)] if rule.body.is_empty() && !faults.has_errors() => {
-                rule.heads.first().and_then(|head| Some((head.args.first()?.clone(), head.args.len() == 1)))
-            }
+            [Statement::Rule(rule)] if rule.body.is_empty() && !faults.has_errors() => rule
+                .heads
+                .first()
+                .and_then(|head| Some((head.args.first()?.clone(), head.args.len() == 1))),
             _ => None,
         };
         let Some((value, true)) = value else {
             let help = "write a constant as in rules, such as `limit=1` or `name=\"text\"`";
-            found.push(Diagnostic::error("R036", format!("`{text}` is not a value for `${name}`")).help(help));
+            found.push(
+                Diagnostic::error("R036", format!("`{text}` is not a value for `${name}`"))
+                    .help(help),
+            );
             continue;
         };
         let mut known = Vec::new();
         let mut is_set = false;
         for statement in &mut syntax.statements {
-            let Statement::Parameter { name: own, value: old, span } = statement else { continue };
+            let Statement::Parameter {
+                name: own,
+                value: old,
+                span,
+            } = statement
+            else {
+                continue;
+            };
             known.push(own.clone());
             if own == name {
                 // Faults of the value are shown at the parameter.
-                *old = Some(Expression { kind: value.kind.clone(), span: span.clone() });
+                *old = Some(Expression {
+                    kind: value.kind.clone(),
+                    span: span.clone(),
+                });
                 is_set = true;
             }
         }
         // As in Nemo, a program may use a parameter that only the caller sets.
         if !is_set && syntax.source.text.contains(&format!("${name}")) {
-            let value = Some(Expression { kind: value.kind, span: 0..0 });
-            syntax.statements.insert(0, Statement::Parameter { name: name.clone(), value, span: 0..0 });
+            let value = Some(Expression {
+                kind: value.kind,
+                span: 0..0,
+            });
+            syntax.statements.insert(
+                0,
+                Statement::Parameter {
+                    name: name.clone(),
+                    value,
+                    span: 0..0,
+                },
+            );
         } else if !is_set {
             let help = did_you_mean(name, known.iter().map(String::as_str));
-            found.push(Diagnostic::error("R036", format!("the program has no parameter `${name}`")).help(help));
+            found.push(
+                Diagnostic::error("R036", format!("the program has no parameter `${name}`"))
+                    .help(help),
+            );
         }
     }
     found

@@ -1,8 +1,8 @@
 //! Splits delimited text into rows and fields, without copying them.
 //!
-//! As RFC 4180, and as the crate `csv` where that is silent: a row ends with `\n`, `\r\n` or `\r`, empty lines are
-//! skipped, and a quote inside an unquoted field is a character. Unlike `csv`, it knows the place of each field, and finds
-//! quotes that do not end and text after a closing quote.
+//! As RFC 4180, and as the crate `csv` where that is silent: a row ends with `\n`, `\r\n` or `\r`,
+//! empty lines are skipped, and a quote inside an unquoted field is a character. Unlike `csv`, it
+//! knows the place of each field, and finds quotes that do not end and text after a closing quote.
 
 use std::borrow::Cow;
 use std::io::Read;
@@ -43,7 +43,8 @@ struct Field {
 enum Form {
     /// The bytes are the text.
     Plain,
-    /// The bytes have doubled quotes. They include the opening quote, and the closing one if text follows it.
+    /// The bytes have doubled quotes. They include the opening quote, and the closing one if text
+    /// follows it.
     Escaped { torn: bool },
 }
 
@@ -121,7 +122,8 @@ impl<R: Read> Records<R> {
                     State::Quoted
                 }
                 _ if closes => {
-                    let empty_line = byte != self.delimiter && state == State::Start && self.fields.is_empty();
+                    let empty_line =
+                        byte != self.delimiter && state == State::Start && self.fields.is_empty();
                     if byte == b'\n' || (byte == b'\r' && !self.at_newline()?) {
                         self.newlines += 1;
                     }
@@ -155,7 +157,8 @@ impl<R: Read> Records<R> {
         self.at += rest.iter().position(closes).unwrap_or(rest.len());
     }
 
-    /// Returns whether the next byte is a newline, which is then counted with the carriage return before it.
+    /// Returns whether the next byte is a newline, which is then counted with the carriage return
+    /// before it.
     fn at_newline(&mut self) -> std::io::Result<bool> {
         Ok((self.at < self.filled || self.more()?) && self.buffer[self.at] == b'\n')
     }
@@ -174,10 +177,22 @@ impl<R: Read> Records<R> {
 
     fn push(&mut self, state: State, start: usize, end: usize, doubled: bool) {
         let field = match state {
-            State::Torn => Field { bytes: start..end, form: Form::Escaped { torn: true } },
-            State::Quote if doubled => Field { bytes: start..end - 1, form: Form::Escaped { torn: false } },
-            State::Quote => Field { bytes: start + 1..end - 1, form: Form::Plain },
-            _ => Field { bytes: start..end, form: Form::Plain },
+            State::Torn => Field {
+                bytes: start..end,
+                form: Form::Escaped { torn: true },
+            },
+            State::Quote if doubled => Field {
+                bytes: start..end - 1,
+                form: Form::Escaped { torn: false },
+            },
+            State::Quote => Field {
+                bytes: start + 1..end - 1,
+                form: Form::Plain,
+            },
+            _ => Field {
+                bytes: start..end,
+                form: Form::Plain,
+            },
         };
         self.fields.push(field);
     }
@@ -216,7 +231,8 @@ impl<R: Read> Records<R> {
     /// The text is not UTF-8.
     pub(super) fn text(&self, field: usize) -> Result<Cow<'_, str>, std::str::Utf8Error> {
         let Field { bytes, form } = &self.fields[field];
-        let text = std::str::from_utf8(&self.buffer[self.start + bytes.start..self.start + bytes.end])?;
+        let text =
+            std::str::from_utf8(&self.buffer[self.start + bytes.start..self.start + bytes.end])?;
         Ok(match form {
             Form::Plain => Cow::Borrowed(text),
             Form::Escaped { .. } => Cow::Owned(unescaped(text)),
@@ -236,10 +252,19 @@ impl<R: Read> Records<R> {
     fn place(&self, offset: usize) -> Place {
         let before = &self.buffer[self.start..self.start + offset];
         let newlines = before.iter().filter(|byte| **byte == b'\n').count() as u64;
-        let line_start = before.iter().rposition(|byte| *byte == b'\n').map_or(0, |end| end + 1);
+        let line_start = before
+            .iter()
+            .rposition(|byte| *byte == b'\n')
+            .map_or(0, |end| end + 1);
         // Bytes that continue a character have the high bits `10`.
-        let characters = before[line_start..].iter().filter(|byte| **byte & 0xc0 != 0x80).count() as u64;
-        Place { line: self.line + newlines, column: characters + 1 }
+        let characters = before[line_start..]
+            .iter()
+            .filter(|byte| **byte & 0xc0 != 0x80)
+            .count() as u64;
+        Place {
+            line: self.line + newlines,
+            column: characters + 1,
+        }
     }
 }
 
@@ -283,7 +308,9 @@ mod tests {
         loop {
             match records.next().expect("a slice can be read") {
                 Found::Row => rows.push(
-                    (0..records.len()).map(|field| records.text(field).expect("it is UTF-8").into_owned()).collect(),
+                    (0..records.len())
+                        .map(|field| records.text(field).expect("it is UTF-8").into_owned())
+                        .collect(),
                 ),
                 end => return (rows, end),
             }
@@ -292,8 +319,27 @@ mod tests {
 
     #[test]
     fn rows_are_those_of_the_crate_csv() {
-        let quotes = ["\"a\",b", "\"a\"\"b\"\"\",\"\"", "\"\"\"\"", "\"a\nb\"", "a\"b\",c", "\"a\"b\",c", "\"\"\"@en"];
-        let plain = ["", "a", ",", ",,\n", "\n\na,b\n\n", "a\r\nb\rc\n\r\nd", "é,ü", "a,b\n c ,", "\r", "\n,"];
+        let quotes = [
+            "\"a\",b",
+            "\"a\"\"b\"\"\",\"\"",
+            "\"\"\"\"",
+            "\"a\nb\"",
+            "a\"b\",c",
+            "\"a\"b\",c",
+            "\"\"\"@en",
+        ];
+        let plain = [
+            "",
+            "a",
+            ",",
+            ",,\n",
+            "\n\na,b\n\n",
+            "a\r\nb\rc\n\r\nd",
+            "é,ü",
+            "a,b\n c ,",
+            "\r",
+            "\n,",
+        ];
         for text in quotes.into_iter().chain(plain) {
             for quoting in [true, false] {
                 let (found, end) = rows(text, quoting);
@@ -301,9 +347,20 @@ mod tests {
                     continue;
                 }
                 let mut reader = csv::ReaderBuilder::new();
-                let mut reader = reader.has_headers(false).flexible(true).quoting(quoting).from_reader(text.as_bytes());
-                let wanted: Vec<Vec<String>> =
-                    reader.records().map(|row| row.expect("it is UTF-8").iter().map(str::to_owned).collect()).collect();
+                let mut reader = reader
+                    .has_headers(false)
+                    .flexible(true)
+                    .quoting(quoting)
+                    .from_reader(text.as_bytes());
+                let wanted: Vec<Vec<String>> = reader
+                    .records()
+                    .map(|row| {
+                        row.expect("it is UTF-8")
+                            .iter()
+                            .map(str::to_owned)
+                            .collect()
+                    })
+                    .collect();
                 assert_eq!(found, wanted, "{text:?}, quoting: {quoting}");
             }
         }
@@ -315,16 +372,31 @@ mod tests {
         let mut records = Records::new(text.as_bytes(), b',', true);
         let place = |line, column| Place { line, column };
         assert_eq!(records.next().ok(), Some(Found::Row));
-        assert_eq!((records.place_of(0), records.is_torn(0)), (place(1, 1), false));
+        assert_eq!(
+            (records.place_of(0), records.is_torn(0)),
+            (place(1, 1), false)
+        );
         assert_eq!(records.next().ok(), Some(Found::Row));
-        assert_eq!((records.place_of(1), records.is_torn(1)), (place(4, 3), true));
+        assert_eq!(
+            (records.place_of(1), records.is_torn(1)),
+            (place(4, 3), true)
+        );
         assert_eq!(records.text(1).ok().as_deref(), Some("xy"));
-        assert_eq!(records.next().ok(), Some(Found::Broken(place(6, 1), "the quote that begins here has no end")));
+        assert_eq!(
+            records.next().ok(),
+            Some(Found::Broken(
+                place(6, 1),
+                "the quote that begins here has no end"
+            ))
+        );
     }
 
     #[test]
     fn an_endless_row_is_refused() {
         let mut records = Records::new(std::io::repeat(b'x'), b',', true);
-        assert!(matches!(records.next(), Ok(Found::Broken(Place { line: 1, column: 1 }, _))));
+        assert!(matches!(
+            records.next(),
+            Ok(Found::Broken(Place { line: 1, column: 1 }, _))
+        ));
     }
 }

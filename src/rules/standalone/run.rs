@@ -20,67 +20,109 @@ pub struct Summary {
     pub warnings: Diagnostics,
 }
 
-/// Runs a program: reads its imports (relative to its folder), evaluates it, and writes its exports below `out_dir`.
+/// Runs a program: reads its imports (relative to its folder), evaluates it, and writes its exports
+/// below `out_dir`.
 ///
 /// # Errors
-/// All errors of the program and its files; the budget was exceeded (`R090`); a sum does not fit (`R065`); an export can't be written (`R073`); the
-/// budget's `stop` was set (`R091`).
+/// All errors of the program and its files; the budget was exceeded (`R090`); a sum does not fit
+/// (`R065`); an export can't be written (`R073`); the budget's `stop` was set (`R091`).
 pub fn run(path: &Path, out_dir: &Path, budget: &Budget) -> Result<Summary, Diagnostics> {
     run_as(path, out_dir, &Loading::within(budget))
 }
 
-/// Like [`run`], on request without the rows of imports that can't be read. The imports may take the
-/// budget's time, and then the evaluation too.
+/// Like [`run`], on request without the rows of imports that can't be read. The imports may take
+/// the budget's time, and then the evaluation too.
 ///
 /// # Errors
 /// As [`run`].
 pub fn run_as(path: &Path, out_dir: &Path, loading: &Loading) -> Result<Summary, Diagnostics> {
-    let source = Files::Disk
-        .read_program(path)
-        .map_err(|reason| Diagnostic::error("R072", format!("`{}` can't be read: {reason}", path.display())))?;
+    let source = Files::Disk.read_program(path).map_err(|reason| {
+        Diagnostic::error(
+            "R072",
+            format!("`{}` can't be read: {reason}", path.display()),
+        )
+    })?;
     let program = Program::load_as(&source, path.parent().unwrap_or(Path::new("")), loading)?;
     let mut diagnostics = Diagnostics::new();
     let exports = exports(&program, &mut diagnostics);
     if diagnostics.has_errors() {
         return Err(diagnostics);
     }
-    let closure =
-        program.close(Engine::Fast, &loading.budget).map_err(|fault| stopped(&fault, &program.warnings, &source))?;
-    let mut summary = Summary { warnings: program.warnings, ..Summary::default() };
-    summary.tuples = closure.predicates().map(|name| (name.to_owned(), closure.count(name))).collect();
+    let closure = program
+        .close(Engine::Fast, &loading.budget)
+        .map_err(|fault| stopped(&fault, &program.warnings, &source))?;
+    let mut summary = Summary {
+        warnings: program.warnings,
+        ..Summary::default()
+    };
+    summary.tuples = closure
+        .predicates()
+        .map(|name| (name.to_owned(), closure.count(name)))
+        .collect();
     for export in exports {
-        let written = write(&export, out_dir, &closure, &loading.budget.stop).map_err(|reason| {
-            let message = format!("`{}` can't be written: {reason}", out_dir.join(&export.path).display());
-            Diagnostic::error("R073", message).in_source(&source)
-        })?;
+        let written =
+            write(&export, out_dir, &closure, &loading.budget.stop).map_err(|reason| {
+                let message = format!(
+                    "`{}` can't be written: {reason}",
+                    out_dir.join(&export.path).display()
+                );
+                Diagnostic::error("R073", message).in_source(&source)
+            })?;
         if written.left_out > 0 {
             let count = written.left_out;
-            let rows = if count == 1 { "1 row was".to_owned() } else { format!("{count} rows were") };
-            let message = format!("{rows} left out of the export of `{}`: not RDF statements", export.predicate);
+            let rows = if count == 1 {
+                "1 row was".to_owned()
+            } else {
+                format!("{count} rows were")
+            };
+            let message = format!(
+                "{rows} left out of the export of `{}`: not RDF statements",
+                export.predicate
+            );
             let help = "a subject is an IRI or a blank node, and a predicate an IRI";
-            summary.warnings.push(Diagnostic::warning("R075", message).in_source(&source).help(help));
+            summary.warnings.push(
+                Diagnostic::warning("R075", message)
+                    .in_source(&source)
+                    .help(help),
+            );
         }
-        summary.written.push((out_dir.join(&export.path), written.rows));
+        summary
+            .written
+            .push((out_dir.join(&export.path), written.rows));
     }
     Ok(summary)
 }
 
-/// Returns the error of a stopped evaluation; if there were too many new things, after the warnings that say why.
+/// Returns the error of a stopped evaluation; if there were too many new things, after the warnings
+/// that say why.
 fn stopped(fault: &RuleFault, warnings: &Diagnostics, source: &Source) -> Diagnostics {
     if *fault == RuleFault::Interrupted {
-        return Diagnostic::error("R091", fault.to_string()).in_source(source).into();
+        return Diagnostic::error("R091", fault.to_string())
+            .in_source(source)
+            .into();
     }
     if let RuleFault::Value(reason) = fault {
-        let help = "sum doubles, as in `#sum(?x)` with `?x = DOUBLE(?n)`, or fewer values in each group";
-        return Diagnostic::error("R065", reason).in_source(source).help(help).into();
+        let help =
+            "sum doubles, as in `#sum(?x)` with `?x = DOUBLE(?n)`, or fewer values in each group";
+        return Diagnostic::error("R065", reason)
+            .in_source(source)
+            .help(help)
+            .into();
     }
     let mut found = Diagnostics::new();
     let help = if fault.reason().contains(NEW_THINGS) {
-        warnings.iter().filter(|warning| warning.code == "R063").for_each(|warning| found.push(warning.clone()));
+        warnings
+            .iter()
+            .filter(|warning| warning.code == "R063")
+            .for_each(|warning| found.push(warning.clone()));
         "a rule that makes new things for its own things may never terminate; `--max-new` sets the limit"
     } else {
         "a recursive rule that computes new values may never terminate; add a limit such as `?x < 100`"
     };
-    found.push(Diagnostic::error("R090", fault.to_string()).in_source(source).help(help));
+    found.push(
+        Diagnostic::error("R090", fault.to_string())
+            .in_source(source)
+            .help(help),
+    );
     found
 }

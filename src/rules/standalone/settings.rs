@@ -24,18 +24,36 @@ impl<'a> Settings<'a> {
         let mut checking = Checking::new(&mut terms, None);
         let values = options(&mut checking, syntax, transfer);
         let diagnostics = checking.diagnostics;
-        let mut settings = Self { source: &syntax.source, transfer, values, diagnostics };
+        let mut settings = Self {
+            source: &syntax.source,
+            transfer,
+            values,
+            diagnostics,
+        };
         for (idx, (name, value)) in transfer.options.iter().enumerate() {
             let format = &transfer.format;
             if !known.contains(&name.as_str()) {
                 let message = match ALL.contains(&name.as_str()) {
-                    true if transfer.import => format!("an import of `{format}` has no option `{name}`"),
+                    true if transfer.import => {
+                        format!("an import of `{format}` has no option `{name}`")
+                    }
                     true => format!("an export to `{format}` has no option `{name}`"),
                     false => format!("unknown option `{name}`"),
                 };
-                settings.error(&value.span, message, &did_you_mean(name, known.iter().copied()));
-            } else if transfer.options[..idx].iter().any(|(earlier, _)| earlier == name) {
-                settings.error(&value.span, format!("the option `{name}` is given twice"), "remove one of them");
+                settings.error(
+                    &value.span,
+                    message,
+                    &did_you_mean(name, known.iter().copied()),
+                );
+            } else if transfer.options[..idx]
+                .iter()
+                .any(|(earlier, _)| earlier == name)
+            {
+                settings.error(
+                    &value.span,
+                    format!("the option `{name}` is given twice"),
+                    "remove one of them",
+                );
             }
         }
         settings
@@ -43,13 +61,23 @@ impl<'a> Settings<'a> {
 
     /// Adds an error at a place.
     pub(super) fn error(&mut self, span: &Span, message: String, help: &str) {
-        self.diagnostics.push(Diagnostic::error("R071", message).at(self.source, span.clone()).help(help));
+        self.diagnostics.push(
+            Diagnostic::error("R071", message)
+                .at(self.source, span.clone())
+                .help(help),
+        );
     }
 
     /// Returns an option's place, or that of the whole statement.
     pub(super) fn span(&self, name: &str) -> Span {
-        let option = self.transfer.options.iter().find(|(known, _)| known == name);
-        option.map_or(&self.transfer.span, |(_, value)| &value.span).clone()
+        let option = self
+            .transfer
+            .options
+            .iter()
+            .find(|(known, _)| known == name);
+        option
+            .map_or(&self.transfer.span, |(_, value)| &value.span)
+            .clone()
     }
 
     /// Returns an option's single value. Reports a tuple.
@@ -57,7 +85,11 @@ impl<'a> Settings<'a> {
         match self.values.get(name)? {
             OptionValue::One(term) => Some(term.clone()),
             OptionValue::Many(_) => {
-                self.error(&self.span(name), format!("`{name}` must be {wanted}"), "write a single value");
+                self.error(
+                    &self.span(name),
+                    format!("`{name}` must be {wanted}"),
+                    "write a single value",
+                );
                 None
             }
         }
@@ -77,7 +109,12 @@ impl<'a> Settings<'a> {
         match lexical(&value).as_str() {
             "true" => Some(true),
             "false" => Some(false),
-            _ => self.refuse(name, &value, "`true` or `false`", "write one of them without quotes"),
+            _ => self.refuse(
+                name,
+                &value,
+                "`true` or `false`",
+                "write one of them without quotes",
+            ),
         }
     }
 
@@ -85,28 +122,52 @@ impl<'a> Settings<'a> {
     pub(super) fn count(&mut self, name: &str) -> Option<usize> {
         let value = self.one(name, "a number of rows")?;
         match value {
-            Term::Integer(count) if count >= 0 => Some(usize::try_from(count).unwrap_or(usize::MAX)),
-            _ => self.refuse(name, &value, "a number of rows", "write an integer that is not negative"),
+            Term::Integer(count) if count >= 0 => {
+                Some(usize::try_from(count).unwrap_or(usize::MAX))
+            }
+            _ => self.refuse(
+                name,
+                &value,
+                "a number of rows",
+                "write an integer that is not negative",
+            ),
         }
     }
 
-    /// Returns the delimiter between fields: that of the option, or of the format. Reports a missing one.
+    /// Returns the delimiter between fields: that of the option, or of the format. Reports a
+    /// missing one.
     pub(super) fn delimiter(&mut self) -> u8 {
-        let usual = if self.transfer.format == "tsv" { b'\t' } else { b',' };
-        if !self.transfer.options.iter().any(|(name, _)| name == "delimiter") {
+        let usual = if self.transfer.format == "tsv" {
+            b'\t'
+        } else {
+            b','
+        };
+        if !self
+            .transfer
+            .options
+            .iter()
+            .any(|(name, _)| name == "delimiter")
+        {
             if self.transfer.format == "dsv" {
                 let help = "add `delimiter = \";\"`, or use the format `csv` or `tsv`";
-                self.error(&self.transfer.span, "the format `dsv` needs a `delimiter`".to_owned(), help);
+                self.error(
+                    &self.transfer.span,
+                    "the format `dsv` needs a `delimiter`".to_owned(),
+                    help,
+                );
             }
             return usual;
         }
-        let Some(text) = self.text("delimiter") else { return usual };
+        let Some(text) = self.text("delimiter") else {
+            return usual;
+        };
         match text.as_bytes() {
             [byte] if byte.is_ascii() && !b"\"\n\r".contains(byte) => *byte,
             _ => {
                 let help = "it can be any ASCII character except a quote or the end of a line";
                 let value = Term::string(text);
-                self.refuse::<u8>("delimiter", &value, "one character", help).unwrap_or(usual)
+                self.refuse::<u8>("delimiter", &value, "one character", help)
+                    .unwrap_or(usual)
             }
         }
     }
@@ -119,25 +180,54 @@ impl<'a> Settings<'a> {
         };
         let words: Vec<String> = terms.iter().map(lexical).collect();
         let span = self.span("format");
-        if let Some(word) = words.iter().find(|word| ColumnKind::from_word(word).is_none()) {
+        if let Some(word) = words
+            .iter()
+            .find(|word| ColumnKind::from_word(word).is_none())
+        {
             let help = did_you_mean(word, ColumnKind::NAMES);
             self.error(&span, format!("unknown column format `{word}`"), &help);
             return None;
         }
-        let columns: Vec<ColumnKind> = words.iter().filter_map(|word| ColumnKind::from_word(word)).collect();
+        let columns: Vec<ColumnKind> = words
+            .iter()
+            .filter_map(|word| ColumnKind::from_word(word))
+            .collect();
         if columns.iter().all(|column| *column == ColumnKind::Skip) {
-            self.error(&span, "all columns are skipped".to_owned(), "import at least one column");
+            self.error(
+                &span,
+                "all columns are skipped".to_owned(),
+                "import at least one column",
+            );
             return None;
         }
         Some(columns)
     }
 
     /// Reports a wrong value.
-    pub(super) fn refuse<T>(&mut self, name: &str, value: &Term, wanted: &str, help: &str) -> Option<T> {
-        self.error(&self.span(name), format!("`{name}` must be {wanted}, but is {value}"), help);
+    pub(super) fn refuse<T>(
+        &mut self,
+        name: &str,
+        value: &Term,
+        wanted: &str,
+        help: &str,
+    ) -> Option<T> {
+        self.error(
+            &self.span(name),
+            format!("`{name}` must be {wanted}, but is {value}"),
+            help,
+        );
         None
     }
 }
 
 /// All options of any format.
-const ALL: [&str; 8] = ["resource", "format", "delimiter", "quoting", "compression", "ignore_headers", "limit", "base"];
+const ALL: [&str; 8] = [
+    "resource",
+    "format",
+    "delimiter",
+    "quoting",
+    "compression",
+    "ignore_headers",
+    "limit",
+    "base",
+];

@@ -18,18 +18,26 @@ pub(super) struct Sink<'a> {
 }
 
 impl Sink<'_> {
-    /// Adds the row that `intern` appends to its argument. If `intern` returns `false`, there is none.
+    /// Adds the row that `intern` appends to its argument. If `intern` returns `false`, there is
+    /// none.
     ///
     /// # Errors
     /// A limit was reached.
-    pub(super) fn row(&mut self, intern: impl FnOnce(&mut Terms, &mut Vec<TermId>) -> bool) -> std::io::Result<()> {
+    pub(super) fn row(
+        &mut self,
+        intern: impl FnOnce(&mut Terms, &mut Vec<TermId>) -> bool,
+    ) -> std::io::Result<()> {
         let before = self.rows.len();
         if !intern(self.terms, self.rows) {
             self.rows.truncate(before);
         }
         self.limits.settle();
         self.unchecked += 1;
-        if self.unchecked < ROWS_PER_CHECK { Ok(()) } else { self.check() }
+        if self.unchecked < ROWS_PER_CHECK {
+            Ok(())
+        } else {
+            self.check()
+        }
     }
 
     /// Checks the limits.
@@ -39,6 +47,8 @@ impl Sink<'_> {
     pub(super) fn check(&mut self) -> std::io::Result<()> {
         self.unchecked = 0;
         self.limits.settle();
-        self.limits.check_with(self.other_bytes + self.terms.bytes() + self.rows.len() * size_of::<TermId>())
+        self.limits.check_with(
+            self.other_bytes + self.terms.bytes() + self.rows.len() * size_of::<TermId>(),
+        )
     }
 }

@@ -14,10 +14,12 @@ use actcheck_base::{Term, TermId, Terms, TurtleGuard, XmlGuard, XmlProgress};
 /// Nemo's name for the default graph.
 pub(super) const DEFAULT_GRAPH: &str = "tag:nemo:defaultgraph";
 
-/// Minimum length of the labels that the parser draws: 128 bits in hexadecimal digits, without zeros at the beginning.
+/// Minimum length of the labels that the parser draws: 128 bits in hexadecimal digits, without
+/// zeros at the beginning.
 const RANDOM_LABEL: usize = 24;
 
-/// Reads the statements of a file, at most `limit`. A statement that can't be parsed is a fault and left out.
+/// Reads the statements of a file, at most `limit`. A statement that can't be parsed is a fault and
+/// left out.
 ///
 /// # Errors
 /// Reading failed, or the base IRI is invalid.
@@ -107,7 +109,10 @@ fn fault(
         RdfParseError::Syntax(error) => error,
     };
     let place = match error.location() {
-        Some(location) => Place { line: location.start.line + 1, column: location.start.column + 1 },
+        Some(location) => Place {
+            line: location.start.line + 1,
+            column: location.start.column + 1,
+        },
         None => Place { line: 1, column: 1 },
     };
     // A statement of a graph in TriG would be read as one of the default graph.
@@ -138,8 +143,8 @@ struct Blanks {
 }
 
 impl Blanks {
-    /// Returns the node's term. Its label is that of the file, with a number if another file has it; a node without a
-    /// label gets one, because those of the parser are random.
+    /// Returns the node's term. Its label is that of the file, with a number if another file has
+    /// it; a node without a label gets one, because those of the parser are random.
     fn intern(&mut self, node: &BlankNode, terms: &mut Terms) -> TermId {
         if let Some(id) = self.known.get(node) {
             return *id;

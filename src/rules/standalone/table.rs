@@ -30,7 +30,10 @@ impl ColumnKind {
     const ALL: [Self; 5] = [Self::Any, Self::String, Self::Int, Self::Double, Self::Skip];
 
     pub(super) fn from_word(word: &str) -> Option<Self> {
-        Self::ALL.into_iter().zip(Self::NAMES).find_map(|(kind, name)| (name == word).then_some(kind))
+        Self::ALL
+            .into_iter()
+            .zip(Self::NAMES)
+            .find_map(|(kind, name)| (name == word).then_some(kind))
     }
 
     /// Interns a field. Returns `None` if the field does not match the column's type.
@@ -38,7 +41,9 @@ impl ColumnKind {
         match self {
             Self::Any => Some(any(field, terms)),
             Self::String | Self::Skip => Some(terms.intern_string(field)),
-            Self::Int => small_integer(field).or_else(|| integer(field)).map(|term| terms.intern(term)),
+            Self::Int => small_integer(field)
+                .or_else(|| integer(field))
+                .map(|term| terms.intern(term)),
             Self::Double => {
                 let value = field.parse().ok().filter(|value: &f64| value.is_finite())?;
                 Some(terms.intern(double_term(value)))
@@ -66,7 +71,8 @@ pub(super) struct Layout {
     pub(super) columns: Vec<ColumnKind>,
 }
 
-/// Reads the rows of a table, at most `limit`. A row that does not match the columns is a fault and left out.
+/// Reads the rows of a table, at most `limit`. A row that does not match the columns is a fault and
+/// left out.
 ///
 /// # Errors
 /// Reading failed.
@@ -105,22 +111,38 @@ fn intern_row(
     faults: &mut Faults,
 ) -> bool {
     if records.len() != columns.len() {
-        let beyond = if records.len() > columns.len() { columns.len() } else { 0 };
-        let counted = |count| if count == 1 { "1 field".to_owned() } else { format!("{count} fields") };
-        faults.add(records.place_of(beyond), || format!("{} instead of {}", counted(records.len()), columns.len()));
+        let beyond = if records.len() > columns.len() {
+            columns.len()
+        } else {
+            0
+        };
+        let counted = |count| {
+            if count == 1 {
+                "1 field".to_owned()
+            } else {
+                format!("{count} fields")
+            }
+        };
+        faults.add(records.place_of(beyond), || {
+            format!("{} instead of {}", counted(records.len()), columns.len())
+        });
         return false;
     }
     for (field, kind) in columns.iter().enumerate() {
         let text = match records.text(field) {
             Ok(text) => text,
             Err(_) => {
-                faults.add(records.place_of(field), || "the field is not UTF-8 text".to_owned());
+                faults.add(records.place_of(field), || {
+                    "the field is not UTF-8 text".to_owned()
+                });
                 return false;
             }
         };
         if records.is_torn(field) {
             // The row is kept, as other programs read it.
-            faults.add(records.place_of(field), || format!("text follows the closing quote of `{}`", short(&text)));
+            faults.add(records.place_of(field), || {
+                format!("text follows the closing quote of `{}`", short(&text))
+            });
         }
         if *kind == ColumnKind::Skip {
             continue;
@@ -128,7 +150,9 @@ fn intern_row(
         match kind.intern(&text, terms) {
             Some(id) => row.push(id),
             None => {
-                faults.add(records.place_of(field), || format!("`{}` is not {}", short(&text), kind.wanted()));
+                faults.add(records.place_of(field), || {
+                    format!("`{}` is not {}", short(&text), kind.wanted())
+                });
                 return false;
             }
         }
@@ -153,10 +177,14 @@ fn small_integer(field: &str) -> Option<Term> {
     field.parse().ok().map(Term::Integer)
 }
 
-/// Infers the term of a field: an IRI, a number as a rule's text has it, a literal, a name, or otherwise a string.
+/// Infers the term of a field: an IRI, a number as a rule's text has it, a literal, a name, or
+/// otherwise a string.
 fn any(field: &str, terms: &mut Terms) -> TermId {
     let field = field.trim();
-    if let Some(iri) = field.strip_prefix('<').and_then(|rest| rest.strip_suffix('>')) {
+    if let Some(iri) = field
+        .strip_prefix('<')
+        .and_then(|rest| rest.strip_suffix('>'))
+    {
         return terms.intern_iri(iri);
     }
     if field.starts_with(|c: char| c.is_ascii_digit() || "+-.".contains(c))
@@ -174,7 +202,10 @@ fn any(field: &str, terms: &mut Terms) -> TermId {
         if let Some(tag) = rest.strip_prefix('@') {
             return terms.intern(Term::LangString(text.into(), tag.into()));
         }
-        if let Some(datatype) = rest.strip_prefix("^^<").and_then(|rest| rest.strip_suffix('>')) {
+        if let Some(datatype) = rest
+            .strip_prefix("^^<")
+            .and_then(|rest| rest.strip_suffix('>'))
+        {
             return terms.intern(literal(text, datatype));
         }
     }
@@ -186,8 +217,8 @@ fn any(field: &str, terms: &mut Terms) -> TermId {
     }
 }
 
-/// Converts a number: an integer, or a double as `1.5` and `1e-05` are in rules. A decimal that a double would round
-/// is kept exactly. Returns `None` for any other text.
+/// Converts a number: an integer, or a double as `1.5` and `1e-05` are in rules. A decimal that a
+/// double would round is kept exactly. Returns `None` for any other text.
 fn number(field: &str) -> Option<Term> {
     if let Some(small) = small_integer(field) {
         return Some(small);
@@ -197,8 +228,13 @@ fn number(field: &str) -> Option<Term> {
     if is_number && !field.contains('.') {
         return Some(exact);
     }
-    let proper = field.bytes().all(|byte| byte.is_ascii_digit() || b"+-.eE".contains(&byte));
-    let value = field.parse().ok().filter(|value: &f64| proper && value.is_finite())?;
+    let proper = field
+        .bytes()
+        .all(|byte| byte.is_ascii_digit() || b"+-.eE".contains(&byte));
+    let value = field
+        .parse()
+        .ok()
+        .filter(|value: &f64| proper && value.is_finite())?;
     if is_number && literal(&value.to_string(), &format!("{}decimal", names::XSD)) != exact {
         return Some(exact);
     }
@@ -219,8 +255,14 @@ mod tests {
         assert_eq!(number("1e-05"), Some(Term::Double(0.000_01)));
         assert_eq!(number(".5E2"), Some(Term::Double(50.0)));
         assert_eq!(number("-0.0"), Some(Term::Double(0.0)));
-        assert_eq!(number("0.1000000000000000055"), decimal("0.1000000000000000055"), "a double would round it");
-        for name in ["-", "+", ".", "1e400", "1-2", "12:30", "1.2.3", "e5", "1e", "--1"] {
+        assert_eq!(
+            number("0.1000000000000000055"),
+            decimal("0.1000000000000000055"),
+            "a double would round it"
+        );
+        for name in [
+            "-", "+", ".", "1e400", "1-2", "12:30", "1.2.3", "e5", "1e", "--1",
+        ] {
             assert_eq!(number(name), None, "{name}");
         }
     }

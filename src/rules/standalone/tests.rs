@@ -7,16 +7,25 @@ use crate::standalone::{Engine, Loading, Program, run};
 use actcheck_base::Source;
 
 fn load(text: &str) -> Program {
-    Program::load(&Source::new("edge.rls", text), Path::new("")).unwrap_or_else(|faults| panic!("{faults}\n{text}"))
+    Program::load(&Source::new("edge.rls", text), Path::new(""))
+        .unwrap_or_else(|faults| panic!("{faults}\n{text}"))
 }
 
 /// Evaluates a program with both engines. Returns the tuples of a predicate, as text.
 fn derived(text: &str, predicate: &str) -> String {
     let program = load(text);
     let [fast, naive] = [Engine::Fast, Engine::Naive].map(|engine| {
-        let closure = program.close(engine, &Budget::default()).unwrap_or_else(|fault| panic!("{fault}\n{text}"));
+        let closure = program
+            .close(engine, &Budget::default())
+            .unwrap_or_else(|fault| panic!("{fault}\n{text}"));
         let tuples = closure.tuples(predicate);
-        let row = |tuple: &Vec<_>| tuple.iter().map(ToString::to_string).collect::<Vec<_>>().join(" ");
+        let row = |tuple: &Vec<_>| {
+            tuple
+                .iter()
+                .map(ToString::to_string)
+                .collect::<Vec<_>>()
+                .join(" ")
+        };
         tuples.iter().map(row).collect::<Vec<_>>().join(", ")
     });
     assert_eq!(fast, naive, "{text}");
@@ -43,7 +52,8 @@ fn a_rule_with_several_heads_applies_as_a_whole_or_not_at_all() {
 #[test]
 fn faults_of_a_rule_with_several_heads_are_reported_once() {
     let text = "p(?w + 1), q(?v), r(ABSS(?v)) :- e(?v) .";
-    let faults = Program::load(&Source::new("edge.rls", text), Path::new("")).expect_err("it has two faults");
+    let faults = Program::load(&Source::new("edge.rls", text), Path::new(""))
+        .expect_err("it has two faults");
     let mut codes: Vec<_> = faults.iter().map(|fault| fault.code).collect();
     codes.sort_unstable();
     assert_eq!(codes, ["R021", "R027"], "{faults}");
@@ -52,14 +62,31 @@ fn faults_of_a_rule_with_several_heads_are_reported_once() {
 #[test]
 fn a_sum_is_right_or_an_error_whatever_the_order_of_the_facts() {
     let facts = ["v(9223372036854775807) .", "v(1) .", "v(-2) ."];
-    for order in [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]] {
+    for order in [
+        [0, 1, 2],
+        [0, 2, 1],
+        [1, 0, 2],
+        [1, 2, 0],
+        [2, 0, 1],
+        [2, 1, 0],
+    ] {
         let facts: String = order.map(|idx| facts[idx]).concat();
-        assert_eq!(derived(&format!("{facts} s(#sum(?x)) :- v(?x) ."), "s"), "9223372036854775806");
+        assert_eq!(
+            derived(&format!("{facts} s(#sum(?x)) :- v(?x) ."), "s"),
+            "9223372036854775806"
+        );
     }
     let program = load("v(9223372036854775807) . v(1) . s(#sum(?x)) :- v(?x) .");
     for engine in [Engine::Fast, Engine::Naive] {
-        let fault = program.close(engine, &Budget::default()).expect_err("the sum does not fit");
-        assert!(fault.to_string().contains("the sum 9223372036854775808 does not fit in 64 bits"), "{fault}");
+        let fault = program
+            .close(engine, &Budget::default())
+            .expect_err("the sum does not fit");
+        assert!(
+            fault
+                .to_string()
+                .contains("the sum 9223372036854775808 does not fit in 64 bits"),
+            "{fault}"
+        );
     }
 }
 
@@ -130,19 +157,31 @@ fn exported(text: &str) -> Vec<(String, String)> {
     let program = folder.path().join("p.rls");
     std::fs::write(&program, text).expect("the folder is writable");
     let out = folder.path().join("out");
-    let summary = run(&program, &out, &Budget::default()).unwrap_or_else(|faults| panic!("{faults}\n{text}"));
+    let summary =
+        run(&program, &out, &Budget::default()).unwrap_or_else(|faults| panic!("{faults}\n{text}"));
     let read = |path: &std::path::PathBuf| {
         let bytes = std::fs::read(path).expect("it was written");
         let mut text = String::new();
         if path.extension().is_some_and(|extension| extension == "gz") {
             #[cfg(feature = "gzip")]
-            std::io::Read::read_to_string(&mut flate2::read::GzDecoder::new(bytes.as_slice()), &mut text)
-                .expect("it is compressed");
+            std::io::Read::read_to_string(
+                &mut flate2::read::GzDecoder::new(bytes.as_slice()),
+                &mut text,
+            )
+            .expect("it is compressed");
         } else {
             text = String::from_utf8(bytes).expect("it is text");
         }
-        let name = path.strip_prefix(&out).expect("exports are below the folder").display().to_string();
-        let warnings: String = summary.warnings.iter().map(|warning| format!("{} ", warning.code)).collect();
+        let name = path
+            .strip_prefix(&out)
+            .expect("exports are below the folder")
+            .display()
+            .to_string();
+        let warnings: String = summary
+            .warnings
+            .iter()
+            .map(|warning| format!("{} ", warning.code))
+            .collect();
         (name, format!("{warnings}{text}"))
     };
     summary.written.iter().map(|(path, _)| read(path)).collect()
@@ -160,7 +199,11 @@ fn exports_are_tables_or_rdf() {
              <http://e/a> <http://e/p> \"2\"^^<http://www.w3.org/2001/XMLSchema#integer> .\n\
              _:b <http://e/p> <http://e/a> .\n",
         ),
-        ("@export t :- rdf{resource = \"o.nt\", limit = 1} .", "o.nt", "<http://e/a> <http://e/p> \"x\" .\n"),
+        (
+            "@export t :- rdf{resource = \"o.nt\", limit = 1} .",
+            "o.nt",
+            "<http://e/a> <http://e/p> \"x\" .\n",
+        ),
         (
             "@export g :- nquads{} . g(e:g, ?s, ?p, ?o) :- t(?s, ?p, ?o), isString(?o) .",
             "g.nq",
@@ -171,8 +214,16 @@ fn exports_are_tables_or_rdf() {
             "w.nt",
             "R075 <http://e/a> <http://e/p> _:b .\n",
         ),
-        ("@export m :- csv{format = (int, string, skip)} .", "m.csv", "1,\"a,b\"\n"),
-        ("@export m :- tsv{format = (skip, skip, double), limit = 2} .", "m.tsv", "1.5\n2.5\n"),
+        (
+            "@export m :- csv{format = (int, string, skip)} .",
+            "m.csv",
+            "1,\"a,b\"\n",
+        ),
+        (
+            "@export m :- tsv{format = (skip, skip, double), limit = 2} .",
+            "m.tsv",
+            "1.5\n2.5\n",
+        ),
         #[cfg(feature = "gzip")]
         (
             "@export m :- csv{compression = \"gzip\", format = (int, any, any), limit = 1} .",
@@ -180,20 +231,31 @@ fn exports_are_tables_or_rdf() {
             "1,\"\"\"a,b\"\"\",\"\"\"2.5\"\"^^<http://www.w3.org/2001/XMLSchema#double>\"\n",
         ),
         #[cfg(feature = "gzip")]
-        ("@export n :- csv{resource = \"x/n.csv.gz\"} . n(?x) :- m(?x, _, _), isInteger(?x) .", "x/n.csv.gz", "1\n2\n"),
+        (
+            "@export n :- csv{resource = \"x/n.csv.gz\"} . n(?x) :- m(?x, _, _), isInteger(?x) .",
+            "x/n.csv.gz",
+            "1\n2\n",
+        ),
     ] {
         let found = exported(&format!("{facts} {export}"));
         assert_eq!(found, [(name.to_owned(), text.to_owned())], "{export}");
     }
     for export in ["turtle{}", "trig{}", "rdfxml{}"] {
         let facts = facts.replace("_:b", "e:b");
-        let quads = if export == "trig{}" { "g(e:g, ?s, ?p, ?o) :- t(?s, ?p, ?o) . @export g" } else { "@export t" };
+        let quads = if export == "trig{}" {
+            "g(e:g, ?s, ?p, ?o) :- t(?s, ?p, ?o) . @export g"
+        } else {
+            "@export t"
+        };
         let (name, text) = exported(&format!("{facts} {quads} :- {export} .")).remove(0);
         let folder = tempfile::tempdir().expect("there is a folder for temporary files");
         std::fs::write(folder.path().join(&name), text).expect("the folder is writable");
         let back = format!("@import t :- rdf{{resource = \"{name}\"}} .");
-        let program = Program::load(&Source::new("back.rls", back), folder.path()).expect("the export is valid");
-        let closure = program.close(Engine::Fast, &Budget::default()).expect("it is small");
+        let program = Program::load(&Source::new("back.rls", back), folder.path())
+            .expect("the export is valid");
+        let closure = program
+            .close(Engine::Fast, &Budget::default())
+            .expect("it is small");
         assert_eq!(closure.count("t"), 3, "{name}");
     }
 }
@@ -202,43 +264,83 @@ fn exports_are_tables_or_rdf() {
 fn wrong_exports_are_reported() {
     for (export, code) in [
         ("@export m :- turtle{} . m(1, 2) .", "R071"),
-        ("@export m :- rdf{resource = \"m.abc\"} . m(1, 2, 3) .", "R070"),
+        (
+            "@export m :- rdf{resource = \"m.abc\"} . m(1, 2, 3) .",
+            "R070",
+        ),
         ("@export m :- csv{format = (int)} . m(1, 2) .", "R071"),
-        ("@export m :- csv{compression = \"zip\"} . m(1, 2) .", "R071"),
-        ("@export m :- ntriples{delimiter = \";\"} . m(1, 2, 3) .", "R071"),
+        (
+            "@export m :- csv{compression = \"zip\"} . m(1, 2) .",
+            "R071",
+        ),
+        (
+            "@export m :- ntriples{delimiter = \";\"} . m(1, 2, 3) .",
+            "R071",
+        ),
     ] {
         let folder = tempfile::tempdir().expect("there is a folder for temporary files");
         let program = folder.path().join("p.rls");
         std::fs::write(&program, export).expect("the folder is writable");
         let found = run(&program, folder.path(), &Budget::default()).expect_err(export);
-        assert!(found.iter().any(|fault| fault.code == code), "{export}: {found}");
+        assert!(
+            found.iter().any(|fault| fault.code == code),
+            "{export}: {found}"
+        );
     }
 }
 
 #[test]
 fn parameters_have_the_values_that_the_caller_gives() {
     let load = |text: &str, values: &[(&str, &str)]| {
-        let parameters = values.iter().map(|(name, value)| ((*name).to_owned(), (*value).to_owned())).collect();
-        let loading = Loading { parameters, ..Loading::default() };
+        let parameters = values
+            .iter()
+            .map(|(name, value)| ((*name).to_owned(), (*value).to_owned()))
+            .collect();
+        let loading = Loading {
+            parameters,
+            ..Loading::default()
+        };
         Program::load_as(&Source::new("edge.rls", text), Path::new(""), &loading)
     };
     let text = "@parameter $limit . @parameter $twice = $limit * 2 . q($limit, $twice) .";
-    let closure = load(text, &[("limit", "-3")]).expect("it is set").close(Engine::Fast, &Budget::default());
+    let closure = load(text, &[("limit", "-3")])
+        .expect("it is set")
+        .close(Engine::Fast, &Budget::default());
     assert_eq!(
         closure.expect("it is small").tuples("q"),
-        [[actcheck_base::Term::Integer(-3), actcheck_base::Term::Integer(-6)]]
+        [[
+            actcheck_base::Term::Integer(-3),
+            actcheck_base::Term::Integer(-6)
+        ]]
     );
     let text = "@parameter $name = \"a\" . q($name) .";
-    let closure = load(text, &[("name", "\"b\"")]).expect("it is set").close(Engine::Fast, &Budget::default());
-    assert_eq!(closure.expect("it is small").tuples("q"), [[actcheck_base::Term::string("b")]]);
-    for values in
-        [&[("names", "1")][..], &[("name", "")], &[("name", "?x")], &[("name", "1) . p(2")], &[("name", "1, 2")]]
-    {
+    let closure = load(text, &[("name", "\"b\"")])
+        .expect("it is set")
+        .close(Engine::Fast, &Budget::default());
+    assert_eq!(
+        closure.expect("it is small").tuples("q"),
+        [[actcheck_base::Term::string("b")]]
+    );
+    for values in [
+        &[("names", "1")][..],
+        &[("name", "")],
+        &[("name", "?x")],
+        &[("name", "1) . p(2")],
+        &[("name", "1, 2")],
+    ] {
         let found = load(text, values).expect_err("it is wrong");
-        assert!(found.iter().all(|fault| ["R036", "R020"].contains(&fault.code)), "{found}");
+        assert!(
+            found
+                .iter()
+                .all(|fault| ["R036", "R020"].contains(&fault.code)),
+            "{found}"
+        );
     }
     assert!(load("@parameter $limit . q($limit) .", &[]).is_err());
-    assert!(load("q($limit) .", &[("limit", "2")]).is_ok(), "a parameter needs no declaration");
+    assert!(
+        load("q($limit) .", &[("limit", "2")]).is_ok(),
+        "a parameter needs no declaration"
+    );
 }
 
 #[test]
@@ -253,11 +355,23 @@ fn imports_end_at_the_budget_also_for_texts_without_facts() {
         packed.finish().expect("there is room");
     };
     let many = |text: &str| std::iter::repeat_n(text.repeat(10_000), 300);
-    pack("brackets.ttl.gz", &mut std::iter::once("<a:a> <a:b> ".to_owned()).chain(many("(")));
-    pack("lists.ttl.gz", &mut std::iter::once("<a:a> <a:b> ".to_owned()).chain(many("(1 ")));
-    pack("prefixes.ttl.gz", &mut (0..2_000_000).map(|n| format!("@prefix p{n}: <a:{n}> .\n")));
+    pack(
+        "brackets.ttl.gz",
+        &mut std::iter::once("<a:a> <a:b> ".to_owned()).chain(many("(")),
+    );
+    pack(
+        "lists.ttl.gz",
+        &mut std::iter::once("<a:a> <a:b> ".to_owned()).chain(many("(1 ")),
+    );
+    pack(
+        "prefixes.ttl.gz",
+        &mut (0..2_000_000).map(|n| format!("@prefix p{n}: <a:{n}> .\n")),
+    );
     pack("row.csv.gz", &mut many(",,,,,,,,,,"));
-    pack("list.ttl.gz", &mut std::iter::once("<a:a> <a:b> (".to_owned()).chain(many("1 2 3 ")));
+    pack(
+        "list.ttl.gz",
+        &mut std::iter::once("<a:a> <a:b> (".to_owned()).chain(many("1 2 3 ")),
+    );
     for (format, name, code) in [
         ("turtle", "brackets.ttl.gz", "R072"),
         ("turtle", "lists.ttl.gz", "R072"),
@@ -265,10 +379,22 @@ fn imports_end_at_the_budget_also_for_texts_without_facts() {
         ("csv", "row.csv.gz", "R090"),
         ("turtle", "list.ttl.gz", "R090"),
     ] {
-        let columns = if format == "csv" { ", format = (any, any)" } else { "" };
+        let columns = if format == "csv" {
+            ", format = (any, any)"
+        } else {
+            ""
+        };
         let text = format!("@import t :- {format}{{resource = \"{name}\"{columns}}} .");
-        let loading = Loading::within(&Budget { bytes: 64 << 20, secs: 60.0, ..Budget::default() });
-        let found = Program::load_as(&Source::new("p.rls", text), folder.path(), &loading).expect_err(name);
-        assert!(found.iter().all(|fault| fault.code == code), "{name}: {found}");
+        let loading = Loading::within(&Budget {
+            bytes: 64 << 20,
+            secs: 60.0,
+            ..Budget::default()
+        });
+        let found =
+            Program::load_as(&Source::new("p.rls", text), folder.path(), &loading).expect_err(name);
+        assert!(
+            found.iter().all(|fault| fault.code == code),
+            "{name}: {found}"
+        );
     }
 }

@@ -60,9 +60,18 @@ pub struct Spanned {
     pub span: Span,
 }
 
-/// Splits a text into tokens. Errors are reported and skipped; the last token is always [`Token::End`].
+/// Splits a text into tokens. Errors are reported and skipped; the last token is always
+/// [`Token::End`].
 pub fn lex(source: &Source, diagnostics: &mut Diagnostics) -> Vec<Spanned> {
-    Lexer { source, text: &source.text, at: 0, end: source.text.len(), depth: 0, diagnostics }.run()
+    Lexer {
+        source,
+        text: &source.text,
+        at: 0,
+        end: source.text.len(),
+        depth: 0,
+        diagnostics,
+    }
+    .run()
 }
 
 pub(crate) struct Lexer<'a> {
@@ -76,8 +85,8 @@ pub(crate) struct Lexer<'a> {
 
 /// A symbol comes before its own prefixes, so that the longest one matches.
 const SYMBOLS: [&str; 25] = [
-    ":-", ">=", "<=", "!=", "^^", "(", ")", "{", "}", "[", "]", ",", ".", "~", "=", "<", ">", "+", "-", "*", "/", ":",
-    "|", ";", "&",
+    ":-", ">=", "<=", "!=", "^^", "(", ")", "{", "}", "[", "]", ",", ".", "~", "=", "<", ">", "+",
+    "-", "*", "/", ":", "|", ";", "&",
 ];
 
 impl Lexer<'_> {
@@ -90,11 +99,17 @@ impl Lexer<'_> {
             self.skip_blank();
             let start = self.at;
             if self.at >= self.end {
-                tokens.push(Spanned { token: Token::End, span: start..start });
+                tokens.push(Spanned {
+                    token: Token::End,
+                    span: start..start,
+                });
                 return tokens;
             }
             if let Some(token) = self.next(tokens.last()) {
-                tokens.push(Spanned { token, span: start..self.at });
+                tokens.push(Spanned {
+                    token,
+                    span: start..self.at,
+                });
             }
         }
     }
@@ -119,7 +134,11 @@ impl Lexer<'_> {
 
     pub(crate) fn error(&mut self, code: &'static str, span: Span, message: String, help: &str) {
         if self.diagnostics.len() < FAULT_LIMIT {
-            self.diagnostics.push(Diagnostic::error(code, message).at(self.source, span).help(help));
+            self.diagnostics.push(
+                Diagnostic::error(code, message)
+                    .at(self.source, span)
+                    .help(help),
+            );
         }
     }
 
@@ -135,7 +154,12 @@ impl Lexer<'_> {
                     Some(length) => self.at += length + 2,
                     None => {
                         self.at = self.end;
-                        self.error("R001", start..start + 2, "comment has no end".into(), "close it with `*/`");
+                        self.error(
+                            "R001",
+                            start..start + 2,
+                            "comment has no end".into(),
+                            "close it with `*/`",
+                        );
                     }
                 }
             } else {
@@ -163,13 +187,21 @@ impl Lexer<'_> {
             '#' => self.hash(),
             '@' => {
                 self.at += 1;
-                let tag = before.is_some_and(|b| matches!(b.token, Token::String(_)) && b.span.end == start);
-                let name = self.take_while(|c| c.is_ascii_alphanumeric() || c == '_' || (tag && c == '-'));
-                Some(if tag { Token::Language(name) } else { Token::Directive(name) })
+                let tag = before
+                    .is_some_and(|b| matches!(b.token, Token::String(_)) && b.span.end == start);
+                let name =
+                    self.take_while(|c| c.is_ascii_alphanumeric() || c == '_' || (tag && c == '-'));
+                Some(if tag {
+                    Token::Language(name)
+                } else {
+                    Token::Directive(name)
+                })
             }
             '_' if self.rest().starts_with("_:") => {
                 self.at += 2;
-                Some(Token::Blank(self.take_while(|c| continues_name(c) || c == '-')))
+                Some(Token::Blank(
+                    self.take_while(|c| continues_name(c) || c == '-'),
+                ))
             }
             '_' => {
                 self.at += 1;
@@ -189,14 +221,20 @@ impl Lexer<'_> {
             c if starts_name(c) => Some(self.name()),
             ':' if self.peek_second().is_some_and(starts_name) => {
                 self.at += 1;
-                Some(Token::Prefixed(String::new(), self.take_while(continues_name)))
+                Some(Token::Prefixed(
+                    String::new(),
+                    self.take_while(continues_name),
+                ))
             }
             _ => self.symbol(),
         }
     }
 
     fn symbol(&mut self) -> Option<Token> {
-        if let Some(symbol) = SYMBOLS.into_iter().find(|symbol| self.rest().starts_with(symbol)) {
+        if let Some(symbol) = SYMBOLS
+            .into_iter()
+            .find(|symbol| self.rest().starts_with(symbol))
+        {
             self.at += symbol.len();
             return Some(Token::Symbol(symbol));
         }
@@ -208,7 +246,12 @@ impl Lexer<'_> {
             '!' => "write `~` before an atom for \"not\", `!=` for \"differs from\"",
             _ => "remove it, or put it in a string",
         };
-        self.error("R002", start..self.at, format!("unexpected character `{c}`"), help);
+        self.error(
+            "R002",
+            start..self.at,
+            format!("unexpected character `{c}`"),
+            help,
+        );
         None
     }
 
@@ -223,11 +266,19 @@ impl Lexer<'_> {
         Token::Name(name)
     }
 
-    /// Reads a name, which may contain percent escapes such as `%20`. (Any other `%` begins a comment.)
+    /// Reads a name, which may contain percent escapes such as `%20`. (Any other `%` begins a
+    /// comment.)
     fn name_with_escapes(&mut self) -> String {
         let mut name = self.take_while(continues_name);
         while self.rest().starts_with('%')
-            && self.rest().chars().skip(1).take(2).filter(char::is_ascii_hexdigit).count() == 2
+            && self
+                .rest()
+                .chars()
+                .skip(1)
+                .take(2)
+                .filter(char::is_ascii_hexdigit)
+                .count()
+                == 2
         {
             self.at += 1;
             name.push('%');
@@ -236,13 +287,16 @@ impl Lexer<'_> {
         name
     }
 
-    /// Reads an IRI if the matching `>` comes before any white space; otherwise `<` is the operator. Returns
-    /// `None` if neither fits.
+    /// Reads an IRI if the matching `>` comes before any white space; otherwise `<` is the
+    /// operator. Returns `None` if neither fits.
     fn iri_or_less(&mut self) -> Option<Token> {
         let inside = &self.rest()[1..];
         let length = inside.find(|c: char| c == '>' || c.is_whitespace() || "<\"{}|^`".contains(c));
         match length {
-            Some(length) if inside[length..].starts_with('>') && !inside.starts_with(['=', '?', '(', '$']) => {
+            Some(length)
+                if inside[length..].starts_with('>')
+                    && !inside.starts_with(['=', '?', '(', '$']) =>
+            {
                 let iri = inside[..length].to_owned();
                 self.at += length + 2;
                 Some(Token::Iri(iri))
@@ -275,11 +329,14 @@ impl Lexer<'_> {
         Some(Token::Aggregate(name))
     }
 
-    /// Reads digits, fraction, exponent and type suffix; or an integer that begins with `0b`, `0o` or `0x`.
+    /// Reads digits, fraction, exponent and type suffix; or an integer that begins with `0b`, `0o`
+    /// or `0x`.
     fn number(&mut self) -> Token {
         let start = self.at;
         for (prefix, radix) in [("0b", 2), ("0o", 8), ("0x", 16)] {
-            if self.rest().starts_with(prefix) && self.rest()[2..].starts_with(|c: char| c.is_digit(radix)) {
+            if self.rest().starts_with(prefix)
+                && self.rest()[2..].starts_with(|c: char| c.is_digit(radix))
+            {
                 self.at += 2;
                 self.take_while(|c| c.is_digit(radix));
                 return Token::Number(self.text[start..self.at].to_owned());
@@ -297,7 +354,9 @@ impl Lexer<'_> {
                 self.take_while(|c| c.is_ascii_digit());
             }
         }
-        if self.peek().is_some_and(|c| c == 'f' || c == 'd') && !self.peek_second().is_some_and(continues_name) {
+        if self.peek().is_some_and(|c| c == 'f' || c == 'd')
+            && !self.peek_second().is_some_and(continues_name)
+        {
             self.at += 1;
         }
         Token::Number(self.text[start..self.at].to_owned())

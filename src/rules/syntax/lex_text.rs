@@ -51,21 +51,41 @@ impl Lexer<'_> {
             'U' => 8,
             _ => {
                 let help = "known escapes: \\n \\t \\r \\b \\f \\\" \\' \\\\ \\uXXXX \\UXXXXXXXX";
-                return self.error("R004", start..self.at, format!("unknown escape `\\{c}`"), help);
+                return self.error(
+                    "R004",
+                    start..self.at,
+                    format!("unknown escape `\\{c}`"),
+                    help,
+                );
             }
         };
-        let hex: String = self.rest().chars().take(digits).take_while(char::is_ascii_hexdigit).collect();
+        let hex: String = self
+            .rest()
+            .chars()
+            .take(digits)
+            .take_while(char::is_ascii_hexdigit)
+            .collect();
         self.at += hex.len();
-        match u32::from_str_radix(&hex, 16).ok().filter(|_| hex.len() == digits).and_then(char::from_u32) {
+        match u32::from_str_radix(&hex, 16)
+            .ok()
+            .filter(|_| hex.len() == digits)
+            .and_then(char::from_u32)
+        {
             Some(c) => out.push(c),
             None => {
                 let help = "write a Unicode code point with 4 (\\u) or 8 (\\U) hexadecimal digits";
-                self.error("R004", start..self.at, "the escape is not a Unicode character".into(), help);
+                self.error(
+                    "R004",
+                    start..self.at,
+                    "the escape is not a Unicode character".into(),
+                    help,
+                );
             }
         }
     }
 
-    /// Reads `f"…{code}…"`; `{{` and `}}` are escaped braces. Returns `None` if an error was reported.
+    /// Reads `f"…{code}…"`; `{{` and `}}` are escaped braces. Returns `None` if an error was
+    /// reported.
     pub(crate) fn format(&mut self) -> Option<Token> {
         let start = self.at;
         let triple = self.rest().starts_with("f\"\"\"");
@@ -98,7 +118,12 @@ impl Lexer<'_> {
                 }
             }
         }
-        self.error("R003", start..start + 2, "string has no end".into(), "close it with `\"`");
+        self.error(
+            "R003",
+            start..start + 2,
+            "string has no end".into(),
+            "close it with `\"`",
+        );
         pieces.push(FormatPiece::Text(text));
         Some(Token::Format(pieces))
     }
@@ -110,13 +135,19 @@ impl Lexer<'_> {
         if self.depth >= FORMAT_DEPTH {
             self.at = self.end;
             let help = "compute the inner text in a separate assignment";
-            self.error("R005", start..start + 1, "f-strings are nested too deeply".into(), help);
+            self.error(
+                "R005",
+                start..start + 1,
+                "f-strings are nested too deeply".into(),
+                help,
+            );
             return None;
         }
         self.depth += 1;
         let mut tokens: Vec<Spanned> = Vec::new();
         let mut open = 0usize;
-        // The span of the closing brace; empty if it is missing, because a span must not split a character.
+        // The span of the closing brace; empty if it is missing, because a span must not split a
+        // character.
         let close = loop {
             self.skip_blank();
             let at = self.at;
@@ -139,11 +170,17 @@ impl Lexer<'_> {
                     Token::Symbol("}") => open = open.saturating_sub(1),
                     _ => {}
                 }
-                tokens.push(Spanned { token, span: at..self.at });
+                tokens.push(Spanned {
+                    token,
+                    span: at..self.at,
+                });
             }
         };
         self.depth -= 1;
-        tokens.push(Spanned { token: Token::End, span: close });
+        tokens.push(Spanned {
+            token: Token::End,
+            span: close,
+        });
         Some(tokens)
     }
 }

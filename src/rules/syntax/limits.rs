@@ -1,6 +1,8 @@
-//! Size limits of rule texts, so that the stages after the parser stay fast and their recursion shallow on any input.
+//! Size limits of rule texts, so that the stages after the parser stay fast and their recursion
+//! shallow on any input.
 //!
-//! Each limit is far above realistic rules. Exceeding one is reported as an error that names the limit.
+//! Each limit is far above realistic rules. Exceeding one is reported as an error that names the
+//! limit.
 
 /// Maximum size of a text. Unit: bytes. (The largest rule file we know of is a hundredth of it.)
 pub(crate) const SIZE_LIMIT: usize = 32 << 20;

@@ -1,6 +1,7 @@
 //! Rule text to its syntax tree, with a span for each part.
 //!
-//! Never: resolves a predicate or checks a rule; a text with errors yields the statements that could be parsed.
+//! Never: resolves a predicate or checks a rule; a text with errors yields the statements that
+//! could be parsed.
 
 mod lex;
 mod lex_text;
@@ -12,6 +13,6 @@ mod tree;
 
 pub use parse::parse;
 pub use tree::{
-    AtomSyntax, Comparison, Expression, ExpressionKind, Formula, FormulaKind, LiteralSyntax, RuleSyntax, Statement,
-    Syntax, TemporalOperator, Transfer,
+    AtomSyntax, Comparison, Expression, ExpressionKind, Formula, FormulaKind, LiteralSyntax,
+    RuleSyntax, Statement, Syntax, TemporalOperator, Transfer,
 };

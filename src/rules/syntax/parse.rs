@@ -1,20 +1,30 @@
-//! Parser: turns tokens into statements. It continues after an error, so that one pass reports several.
+//! Parser: turns tokens into statements. It continues after an error, so that one pass reports
+//! several.
 
 use crate::syntax::lex::{Spanned, Token, lex};
 use crate::syntax::limits::{FAULT_LIMIT, PREFIX_LIMIT, SIZE_LIMIT};
 use crate::syntax::tree::{
-    AtomSyntax, Comparison, ExpressionKind, Formula, FormulaKind, LiteralSyntax, RuleSyntax, Statement, Syntax,
-    Transfer,
+    AtomSyntax, Comparison, ExpressionKind, Formula, FormulaKind, LiteralSyntax, RuleSyntax,
+    Statement, Syntax, Transfer,
 };
 use actcheck_base::{Diagnostic, Diagnostics, Source, Span, did_you_mean};
 
 /// Directives of the language.
-const DIRECTIVES: [&str; 7] = ["base", "declare", "export", "import", "output", "parameter", "prefix"];
+const DIRECTIVES: [&str; 7] = [
+    "base",
+    "declare",
+    "export",
+    "import",
+    "output",
+    "parameter",
+    "prefix",
+];
 
 /// An error was reported and the statement is abandoned.
 pub(crate) struct ErrorReported;
 
-/// Parses a rule text. Never fails: statements with errors are left out and reported in the diagnostics.
+/// Parses a rule text. Never fails: statements with errors are left out and reported in the
+/// diagnostics.
 ///
 /// ```
 /// use actcheck_base::Source;
@@ -28,16 +38,33 @@ pub(crate) struct ErrorReported;
 /// ```
 pub fn parse(source: &Source) -> (Syntax, Diagnostics) {
     let mut diagnostics = Diagnostics::new();
-    let mut syntax =
-        Syntax { source: source.clone(), prefixes: Vec::new(), base: None, statements: Vec::new(), whole: false };
+    let mut syntax = Syntax {
+        source: source.clone(),
+        prefixes: Vec::new(),
+        base: None,
+        statements: Vec::new(),
+        whole: false,
+    };
     if source.text.len() > SIZE_LIMIT {
         let message = format!("rule text of {} bytes is too large", source.text.len());
         let help = format!("at most {SIZE_LIMIT} bytes; keep large tables of facts in a CSV file");
-        diagnostics.push(Diagnostic::error("R006", message).in_source(source).help(help));
+        diagnostics.push(
+            Diagnostic::error("R006", message)
+                .in_source(source)
+                .help(help),
+        );
         return (syntax, diagnostics);
     }
     let tokens = lex(source, &mut diagnostics);
-    let mut parser = Parser { source, tokens: &tokens, at: 0, prefixes: Vec::new(), base: None, depth: 0, diagnostics };
+    let mut parser = Parser {
+        source,
+        tokens: &tokens,
+        at: 0,
+        prefixes: Vec::new(),
+        base: None,
+        depth: 0,
+        diagnostics,
+    };
     while !matches!(parser.token(), Token::End) && parser.diagnostics.len() < FAULT_LIMIT {
         let start = parser.at;
         match parser.statement() {
@@ -73,7 +100,9 @@ impl Parser<'_> {
 
     /// Returns the end of the previous token.
     pub(crate) fn end(&self) -> usize {
-        self.at.checked_sub(1).map_or(0, |at| self.tokens[at].span.end)
+        self.at
+            .checked_sub(1)
+            .map_or(0, |at| self.tokens[at].span.end)
     }
 
     pub(crate) fn advance(&mut self) {
@@ -95,7 +124,11 @@ impl Parser<'_> {
     }
 
     pub(crate) fn expect(&mut self, symbol: &str, place: &str) -> Result<(), ErrorReported> {
-        if self.take(symbol) { Ok(()) } else { Err(self.unexpected(&format!("`{symbol}` {place}"))) }
+        if self.take(symbol) {
+            Ok(())
+        } else {
+            Err(self.unexpected(&format!("`{symbol}` {place}")))
+        }
     }
 
     pub(crate) fn fault(
@@ -105,7 +138,11 @@ impl Parser<'_> {
         message: impl Into<String>,
         help: impl Into<String>,
     ) -> ErrorReported {
-        self.diagnostics.push(Diagnostic::error(code, message).at(self.source, span).help(help));
+        self.diagnostics.push(
+            Diagnostic::error(code, message)
+                .at(self.source, span)
+                .help(help),
+        );
         ErrorReported
     }
 
@@ -117,14 +154,20 @@ impl Parser<'_> {
         let text = &self.source.text[self.span().start..];
         let before = &self.source.text[..self.end()];
         let help = match self.token() {
-            _ if text.starts_with("<-") || text.starts_with("<=") => "a rule is written `head(…) :- body(…) .`",
+            _ if text.starts_with("<-") || text.starts_with("<=") => {
+                "a rule is written `head(…) :- body(…) .`"
+            }
             Token::Symbol("=") if before.ends_with('=') => "equality is written `=`",
-            Token::Name(_) | Token::Prefixed(..) if before.ends_with("not") => "negation is written `~atom(…)`",
+            Token::Name(_) | Token::Prefixed(..) if before.ends_with("not") => {
+                "negation is written `~atom(…)`"
+            }
             Token::Name(_) if before.ends_with(|c: char| c.is_ascii_digit()) => {
                 "numbers are written without a unit, in metres, radians, seconds and kilograms"
             }
             Token::End => "end the statement with `.`",
-            Token::Symbol(":-") => "a rule has one `:-`; the statement before it may lack its final `.`",
+            Token::Symbol(":-") => {
+                "a rule has one `:-`; the statement before it may lack its final `.`"
+            }
             Token::Symbol(";") => "write one rule for each alternative",
             _ => "a rule has the form `head(?x) :- atom(?x), ~atom(?x), ?x > 1 .`",
         };
@@ -132,14 +175,25 @@ impl Parser<'_> {
         self.fault("R010", span, message, help)
     }
 
-    /// Reports a statement without its full stop at its end, if the next token begins a statement in another line.
+    /// Reports a statement without its full stop at its end, if the next token begins a statement
+    /// in another line.
     fn unfinished(&mut self, wanted: &str) -> Option<ErrorReported> {
         let (end, next) = (self.end(), self.span().start);
-        let begins = matches!(self.token(), Token::Name(_) | Token::Directive(_) | Token::AttributeOpen);
-        let is_next = begins && self.source.text[end..next].contains('\n') && self.source.text[..next].ends_with('\n');
+        let begins = matches!(
+            self.token(),
+            Token::Name(_) | Token::Directive(_) | Token::AttributeOpen
+        );
+        let is_next = begins
+            && self.source.text[end..next].contains('\n')
+            && self.source.text[..next].ends_with('\n');
         (is_next && wanted.starts_with("`.` ")).then(|| {
             let help = "end every statement with ` .`";
-            self.fault("R010", end.saturating_sub(1)..end, "the statement has no `.` at its end", help)
+            self.fault(
+                "R010",
+                end.saturating_sub(1)..end,
+                "the statement has no `.` at its end",
+                help,
+            )
         })
     }
 
@@ -204,7 +258,13 @@ impl Parser<'_> {
             }
         }
         self.expect(".", "at the end of the statement")?;
-        Ok(RuleSyntax { name, heads, body, span: start..self.end(), comment })
+        Ok(RuleSyntax {
+            name,
+            heads,
+            body,
+            span: start..self.end(),
+            comment,
+        })
     }
 
     /// Returns the comment lines directly above a place, joined. Returns `None` if there are none.
@@ -232,7 +292,10 @@ impl Parser<'_> {
                 let start = self.tokens[self.at - 1].span.start;
                 let formula = self.temporal()?;
                 let span = start..formula.span.end;
-                return Ok(LiteralSyntax::Temporal(Formula { kind: FormulaKind::Not(Box::new(formula)), span }));
+                return Ok(LiteralSyntax::Temporal(Formula {
+                    kind: FormulaKind::Not(Box::new(formula)),
+                    span,
+                }));
             }
             return Ok(LiteralSyntax::Negated(self.atom("an atom after `~`")?));
         }
@@ -244,15 +307,23 @@ impl Parser<'_> {
         let Some(op) = self.comparison() else {
             let name_span = self.tokens[start].span.clone();
             return match left.kind {
-                ExpressionKind::Call(predicate, args) => {
-                    Ok(LiteralSyntax::Atom(AtomSyntax { predicate, args, span: left.span, name_span }))
-                }
+                ExpressionKind::Call(predicate, args) => Ok(LiteralSyntax::Atom(AtomSyntax {
+                    predicate,
+                    args,
+                    span: left.span,
+                    name_span,
+                })),
                 _ => Err(self.unexpected("a comparison")),
             };
         };
         let right = self.expression()?;
         let span = left.span.start..right.span.end;
-        Ok(LiteralSyntax::Comparison { op, left, right, span })
+        Ok(LiteralSyntax::Comparison {
+            op,
+            left,
+            right,
+            span,
+        })
     }
 
     /// Takes a comparison operator, if one is next.
@@ -275,7 +346,12 @@ impl Parser<'_> {
         let predicate = self.predicate(wanted)?;
         self.expect("(", &format!("after the predicate `{predicate}`"))?;
         let args = self.expressions(")")?;
-        Ok(AtomSyntax { predicate, args, span: name_span.start..self.end(), name_span })
+        Ok(AtomSyntax {
+            predicate,
+            args,
+            span: name_span.start..self.end(),
+            name_span,
+        })
     }
 
     /// Parses a predicate: a name, prefixed name or IRI.
@@ -298,12 +374,19 @@ impl Parser<'_> {
             "prefix" => self.prefix()?,
             "base" => self.base()?,
             "parameter" => Some(self.parameter(start.start)?),
-            "import" | "export" => Some(Statement::Transfer(self.transfer(name == "import", start.start)?)),
+            "import" | "export" => Some(Statement::Transfer(
+                self.transfer(name == "import", start.start)?,
+            )),
             "output" => Some(self.output()?),
             "declare" => Some(self.declare(start.start)?),
             _ => {
                 let help = did_you_mean(name, DIRECTIVES);
-                return Err(self.fault("R011", start, format!("unknown directive `@{name}`"), help));
+                return Err(self.fault(
+                    "R011",
+                    start,
+                    format!("unknown directive `@{name}`"),
+                    help,
+                ));
             }
         };
         self.expect(".", "at the end of the directive")?;
@@ -335,7 +418,12 @@ impl Parser<'_> {
         self.prefixes.retain(|(known, _)| *known != prefix);
         if self.prefixes.len() == PREFIX_LIMIT {
             let help = "write the other names as IRIs in `<…>`";
-            return Err(self.fault("R006", span, format!("more than {PREFIX_LIMIT} prefixes"), help));
+            return Err(self.fault(
+                "R006",
+                span,
+                format!("more than {PREFIX_LIMIT} prefixes"),
+                help,
+            ));
         }
         self.prefixes.push((prefix, namespace));
         Ok(None)
@@ -355,8 +443,16 @@ impl Parser<'_> {
             return Err(self.unexpected("a parameter such as `$limit`"));
         };
         self.advance();
-        let value = if self.take("=") { Some(self.expression()?) } else { None };
-        Ok(Statement::Parameter { name, value, span: start..self.end() })
+        let value = if self.take("=") {
+            Some(self.expression()?)
+        } else {
+            None
+        };
+        Ok(Statement::Parameter {
+            name,
+            value,
+            span: start..self.end(),
+        })
     }
 
     fn transfer(&mut self, import: bool, start: usize) -> Result<Transfer, ErrorReported> {
@@ -388,7 +484,14 @@ impl Parser<'_> {
             self.expect("=", "after the variable")?;
             bindings.push((variable, self.expression()?));
         }
-        Ok(Transfer { import, predicate, format, options, bindings, span: start..self.end() })
+        Ok(Transfer {
+            import,
+            predicate,
+            format,
+            options,
+            bindings,
+            span: start..self.end(),
+        })
     }
 
     fn output(&mut self) -> Result<Statement, ErrorReported> {
@@ -411,7 +514,11 @@ impl Parser<'_> {
             }
             self.advance();
         }
-        Ok(Statement::Declare { name, arity: columns, span: start..self.end() })
+        Ok(Statement::Declare {
+            name,
+            arity: columns,
+            span: start..self.end(),
+        })
     }
 }
 

@@ -10,7 +10,8 @@ use actcheck_base::{Span, Term, did_you_mean, names};
 
 /// Maximum nesting depth of expressions, so that recursion over them is safe everywhere.
 pub(super) const DEPTH_LIMIT: usize = 64;
-/// Maximum number of operators in one chain (`a + b + …`), which is the depth of its tree on the left side.
+/// Maximum number of operators in one chain (`a + b + …`), which is the depth of its tree on the
+/// left side.
 const CHAIN_LIMIT: usize = 256;
 
 impl Parser<'_> {
@@ -18,7 +19,9 @@ impl Parser<'_> {
     pub(crate) fn expression(&mut self) -> Result<Expression, ErrorReported> {
         let help = "name parts of it with assignments such as `?part = …`";
         self.nested("expression is nested too deeply", help, |parser| {
-            parser.chain(&["+", "-"], |parser| parser.chain(&["*", "/"], Self::factor))
+            parser.chain(&["+", "-"], |parser| {
+                parser.chain(&["*", "/"], Self::factor)
+            })
         })
     }
 
@@ -31,7 +34,12 @@ impl Parser<'_> {
     ) -> Result<T, ErrorReported> {
         if self.depth >= DEPTH_LIMIT {
             let span = self.span();
-            return Err(self.fault("R005", span, message, format!("at most {DEPTH_LIMIT} levels; {help}")));
+            return Err(self.fault(
+                "R005",
+                span,
+                message,
+                format!("at most {DEPTH_LIMIT} levels; {help}"),
+            ));
         }
         self.depth += 1;
         let result = part(self);
@@ -56,7 +64,10 @@ impl Parser<'_> {
                 return Err(self.fault("R005", span, "chain of operators is too long", help));
             }
             let symbol = operator.chars().next().unwrap_or('+');
-            left = Expression { kind: ExpressionKind::Arithmetic(symbol, Box::new(left), Box::new(right)), span };
+            left = Expression {
+                kind: ExpressionKind::Arithmetic(symbol, Box::new(left), Box::new(right)),
+                span,
+            };
         }
         Ok(left)
     }
@@ -66,7 +77,10 @@ impl Parser<'_> {
         if self.take("(") {
             let inner = self.expression()?;
             self.expect(")", "at the end of the parenthesis")?;
-            return Ok(Expression { kind: inner.kind, span: start..self.end() });
+            return Ok(Expression {
+                kind: inner.kind,
+                span: start..self.end(),
+            });
         }
         if self.is("-") || self.is("+") {
             let negative = self.is("-");
@@ -76,12 +90,19 @@ impl Parser<'_> {
                 self.advance();
                 return Ok(self.number(&text, negative, span));
             }
-            let inner = self.nested("expression is nested too deeply", "remove some of the signs", Self::factor)?;
+            let inner = self.nested(
+                "expression is nested too deeply",
+                "remove some of the signs",
+                Self::factor,
+            )?;
             if !negative {
                 return Ok(inner);
             }
             let span = start..inner.span.end;
-            return Ok(Expression { kind: ExpressionKind::Negative(Box::new(inner)), span });
+            return Ok(Expression {
+                kind: ExpressionKind::Negative(Box::new(inner)),
+                span,
+            });
         }
         self.primary()
     }
@@ -111,7 +132,10 @@ impl Parser<'_> {
                 self.expect("(", "after the aggregate")?;
                 let args = self.expressions(")")?;
                 let span = span.start..self.end();
-                return Ok(Expression { kind: ExpressionKind::Aggregate(name, args), span });
+                return Ok(Expression {
+                    kind: ExpressionKind::Aggregate(name, args),
+                    span,
+                });
             }
             Token::Name(_) | Token::Prefixed(..) | Token::Iri(_) => return self.name_or_call(),
             Token::Symbol("{") => {
@@ -137,7 +161,10 @@ impl Parser<'_> {
         self.advance();
         if self.take("(") {
             let args = self.expressions(")")?;
-            return Ok(Expression { kind: ExpressionKind::Call(name, args), span: span.start..self.end() });
+            return Ok(Expression {
+                kind: ExpressionKind::Call(name, args),
+                span: span.start..self.end(),
+            });
         }
         let term = match token {
             Token::Name(word) if word == "true" => Term::Boolean(true),
@@ -145,18 +172,29 @@ impl Parser<'_> {
             Token::Name(word) => Term::iri(self.resolve(&word)),
             _ => Term::iri(name),
         };
-        Ok(Expression { kind: ExpressionKind::Constant(term), span })
+        Ok(Expression {
+            kind: ExpressionKind::Constant(term),
+            span,
+        })
     }
 
     /// Parses expressions separated by commas up to a closing symbol. A trailing comma is allowed.
-    pub(crate) fn expressions(&mut self, close: &'static str) -> Result<Vec<Expression>, ErrorReported> {
+    pub(crate) fn expressions(
+        &mut self,
+        close: &'static str,
+    ) -> Result<Vec<Expression>, ErrorReported> {
         let mut found = Vec::new();
         while !self.take(close) {
             found.push(self.expression()?);
             if found.len() > ARGUMENT_LIMIT {
                 let span = self.span();
                 let help = "split the values over several facts or assignments";
-                return Err(self.fault("R006", span, format!("more than {ARGUMENT_LIMIT} arguments"), help));
+                return Err(self.fault(
+                    "R006",
+                    span,
+                    format!("more than {ARGUMENT_LIMIT} arguments"),
+                    help,
+                ));
             }
             if !self.is(close) {
                 self.expect(",", &format!("or `{close}`"))?;
@@ -171,7 +209,10 @@ impl Parser<'_> {
         if self.is("(") {
             self.advance();
             let items = self.expressions(")")?;
-            return Ok(Expression { kind: ExpressionKind::Tuple(items), span: start..self.end() });
+            return Ok(Expression {
+                kind: ExpressionKind::Tuple(items),
+                span: start..self.end(),
+            });
         }
         self.expression()
     }
@@ -187,22 +228,35 @@ impl Parser<'_> {
                 self.advance();
                 match self.predicate("a datatype after `^^`") {
                     Ok(datatype) => literal(&text, &datatype),
-                    Err(ErrorReported) => return Expression { kind: ExpressionKind::Broken, span: start..self.end() },
+                    Err(ErrorReported) => {
+                        return Expression {
+                            kind: ExpressionKind::Broken,
+                            span: start..self.end(),
+                        };
+                    }
                 }
             }
             _ => Term::string(text),
         };
-        Expression { kind: ExpressionKind::Constant(term), span: start..self.end() }
+        Expression {
+            kind: ExpressionKind::Constant(term),
+            span: start..self.end(),
+        }
     }
 
-    fn format(&mut self, pieces: Vec<FormatPiece>, span: Span) -> Result<Expression, ErrorReported> {
+    fn format(
+        &mut self,
+        pieces: Vec<FormatPiece>,
+        span: Span,
+    ) -> Result<Expression, ErrorReported> {
         let mut parts = Vec::new();
         for piece in pieces {
             match piece {
                 FormatPiece::Text(text) if text.is_empty() => {}
-                FormatPiece::Text(text) => {
-                    parts.push(Expression { kind: ExpressionKind::Constant(Term::string(text)), span: span.clone() })
-                }
+                FormatPiece::Text(text) => parts.push(Expression {
+                    kind: ExpressionKind::Constant(Term::string(text)),
+                    span: span.clone(),
+                }),
                 FormatPiece::Code(tokens) => {
                     let mut inner = Parser {
                         source: self.source,
@@ -223,7 +277,10 @@ impl Parser<'_> {
                 }
             }
         }
-        Ok(Expression { kind: ExpressionKind::Format(parts), span })
+        Ok(Expression {
+            kind: ExpressionKind::Format(parts),
+            span,
+        })
     }
 
     fn number(&mut self, text: &str, negative: bool, span: Span) -> Expression {
@@ -236,26 +293,53 @@ impl Parser<'_> {
         };
         let plain = text.trim_end_matches(['f', 'd']);
         let term = match radix {
-            Some(radix) => i128::from_str_radix(&format!("{sign}{}", &text[2..]), radix).ok().map(encoded_integer),
+            Some(radix) => i128::from_str_radix(&format!("{sign}{}", &text[2..]), radix)
+                .ok()
+                .map(encoded_integer),
             None if plain.len() == text.len() && text.bytes().all(|b| b.is_ascii_digit()) => {
                 integer(&format!("{sign}{text}"))
             }
-            None => format!("{sign}{plain}").parse::<f64>().ok().filter(|v| v.is_finite()).map(double_term),
+            None => format!("{sign}{plain}")
+                .parse::<f64>()
+                .ok()
+                .filter(|v| v.is_finite())
+                .map(double_term),
         };
         match term {
-            Some(term) => Expression { kind: ExpressionKind::Constant(term), span },
+            Some(term) => Expression {
+                kind: ExpressionKind::Constant(term),
+                span,
+            },
             None => {
                 let help = "doubles reach up to about 1.8e308; integers in other bases than ten have up to 127 bits";
-                self.fault("R013", span.clone(), format!("number `{text}` is out of range"), help);
-                Expression { kind: ExpressionKind::Broken, span }
+                self.fault(
+                    "R013",
+                    span.clone(),
+                    format!("number `{text}` is out of range"),
+                    help,
+                );
+                Expression {
+                    kind: ExpressionKind::Broken,
+                    span,
+                }
             }
         }
     }
 
-    /// Returns the IRI of a prefixed name. Reports an undeclared prefix and then returns the name as written.
+    /// Returns the IRI of a prefixed name. Reports an undeclared prefix and then returns the name
+    /// as written.
     pub(crate) fn expand(&mut self, prefix: &str, local: &str, span: Span) -> String {
-        let declared = self.prefixes.iter().find(|(known, _)| known == prefix).map(|(_, namespace)| namespace.clone());
-        let known = || names::PREFIXES.iter().find(|(known, _)| *known == prefix).map(|(_, n)| (*n).to_owned());
+        let declared = self
+            .prefixes
+            .iter()
+            .find(|(known, _)| known == prefix)
+            .map(|(_, namespace)| namespace.clone());
+        let known = || {
+            names::PREFIXES
+                .iter()
+                .find(|(known, _)| *known == prefix)
+                .map(|(_, n)| (*n).to_owned())
+        };
         match declared.or_else(known) {
             Some(namespace) => format!("{namespace}{local}"),
             None => {
@@ -266,7 +350,10 @@ impl Parser<'_> {
                     .chain(names::PREFIXES.iter().map(|(known, _)| (*known).to_owned()))
                     .collect();
                 let help = match prefix {
-                    "geo3d" => format!("declare the extension with `@prefix geo3d: <{}> .`", builtins::GEO3D),
+                    "geo3d" => format!(
+                        "declare the extension with `@prefix geo3d: <{}> .`",
+                        builtins::GEO3D
+                    ),
                     _ => format!(
                         "declare it with `@prefix {prefix}: <…> .`, or {}",
                         did_you_mean(prefix, candidates.iter().map(String::as_str))
@@ -281,7 +368,10 @@ impl Parser<'_> {
     /// Resolves a relative IRI against the base, if one is declared.
     pub(crate) fn resolve(&self, iri: &str) -> String {
         let absolute = iri.split_once(':').is_some_and(|(scheme, _)| {
-            !scheme.is_empty() && scheme.chars().all(|c| c.is_ascii_alphanumeric() || "+-.".contains(c))
+            !scheme.is_empty()
+                && scheme
+                    .chars()
+                    .all(|c| c.is_ascii_alphanumeric() || "+-.".contains(c))
         });
         match &self.base {
             Some(base) if !absolute => format!("{base}{iri}"),
@@ -290,8 +380,8 @@ impl Parser<'_> {
     }
 }
 
-/// Converts an integer written in binary, octal or hexadecimal. Above 64 bits the datatype is the text `xsd:integer`
-/// instead of an IRI, as in Nemo's published test tables.
+/// Converts an integer written in binary, octal or hexadecimal. Above 64 bits the datatype is the
+/// text `xsd:integer` instead of an IRI, as in Nemo's published test tables.
 fn encoded_integer(value: i128) -> Term {
     match i64::try_from(value) {
         Ok(value) => Term::Integer(value),

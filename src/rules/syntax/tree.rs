@@ -178,12 +178,20 @@ pub enum TemporalOperator {
 
 impl TemporalOperator {
     /// All operators.
-    pub const ALL: [Self; 6] =
-        [Self::Always, Self::Eventually, Self::Until, Self::Historically, Self::Once, Self::Since];
+    pub const ALL: [Self; 6] = [
+        Self::Always,
+        Self::Eventually,
+        Self::Until,
+        Self::Historically,
+        Self::Once,
+        Self::Since,
+    ];
 
     /// Returns the operator of a name.
     pub fn named(name: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|operator| operator.name() == name)
+        Self::ALL
+            .into_iter()
+            .find(|operator| operator.name() == name)
     }
 
     /// Returns the name as written.
@@ -205,7 +213,11 @@ impl TemporalOperator {
 
     /// Returns the number of its parts.
     pub fn parts(self) -> usize {
-        if matches!(self, Self::Until | Self::Since) { 2 } else { 1 }
+        if matches!(self, Self::Until | Self::Since) {
+            2
+        } else {
+            1
+        }
     }
 }
 

@@ -18,24 +18,49 @@ pub(super) enum Decisive<'f> {
 
 impl Decisive<'_> {
     /// Returns the sentence.
-    pub(super) fn text(&self, reader: &Reader<'_>, source: &dyn Fn(Span) -> String) -> Option<String> {
+    pub(super) fn text(
+        &self,
+        reader: &Reader<'_>,
+        source: &dyn Fn(Span) -> String,
+    ) -> Option<String> {
         let (at, formula) = match self {
             Self::Atom { at, formula } => (*at, *formula),
-            Self::Since { at } => return Some(format!("fails from {} s on", shown(reader.secs(*at)))),
+            Self::Since { at } => {
+                return Some(format!("fails from {} s on", shown(reader.secs(*at))));
+            }
             Self::NoTime => return Some("the action ends before the interval begins".to_owned()),
         };
         let secs = shown(reader.secs(at));
         match formula {
-            Formula::Compare { op, left, right, span } => {
-                let (left, right) = (*reader.quantity(left)?.get(at)?, *reader.quantity(right)?.get(at)?);
-                let verb = if compares(*op, left, right) { "holds" } else { "fails" };
+            Formula::Compare {
+                op,
+                left,
+                right,
+                span,
+            } => {
+                let (left, right) = (
+                    *reader.quantity(left)?.get(at)?,
+                    *reader.quantity(right)?.get(at)?,
+                );
+                let verb = if compares(*op, left, right) {
+                    "holds"
+                } else {
+                    "fails"
+                };
                 let (text, symbol) = (source(span.clone()), op.symbol());
-                Some(format!("at {secs} s, `{text}` {verb} with {} {symbol} {}", shown(left), shown(right)))
+                Some(format!(
+                    "at {secs} s, `{text}` {verb} with {} {symbol} {}",
+                    shown(left),
+                    shown(right)
+                ))
             }
             Formula::Truth { quantity, span } => {
                 let holds = *reader.quantity(quantity)?.get(at)? != 0.0;
                 let word = if holds { "is" } else { "is not" };
-                Some(format!("at {secs} s, `{}` {word} true", source(span.clone())))
+                Some(format!(
+                    "at {secs} s, `{}` {word} true",
+                    source(span.clone())
+                ))
             }
             _ => None,
         }
@@ -48,19 +73,35 @@ pub(super) fn deciding_signal(
     reader: &Reader<'_>,
     source: &dyn Fn(Span) -> String,
 ) -> Option<DecidingSignal> {
-    let Decisive::Atom { at, formula } = decisive else { return None };
+    let Decisive::Atom { at, formula } = decisive else {
+        return None;
+    };
     let period_secs = reader.course.period_secs;
     match formula {
-        Formula::Compare { op, left, right, span } => {
+        Formula::Compare {
+            op,
+            left,
+            right,
+            span,
+        } => {
             let text = source(span.clone());
-            let (one, other) = text.split_once(&format!(" {} ", op.symbol())).unwrap_or((text.as_str(), ""));
+            let (one, other) = text
+                .split_once(&format!(" {} ", op.symbol()))
+                .unwrap_or((text.as_str(), ""));
             // A number on the left is a limit, too.
             let swapped = !left.is_recorded() && right.is_recorded();
-            let (quantity, signal, limit) = if swapped { (other, right, left) } else { (one, left, right) };
+            let (quantity, signal, limit) = if swapped {
+                (other, right, left)
+            } else {
+                (one, left, right)
+            };
             let op = if swapped { mirrored(*op) } else { *op };
             let (values, limit) = (reader.quantity(signal)?, reader.quantity(limit)?);
-            let holds: Vec<bool> =
-                values.iter().zip(limit.iter()).map(|(value, limit)| compares(op, *value, *limit)).collect();
+            let holds: Vec<bool> = values
+                .iter()
+                .zip(limit.iter())
+                .map(|(value, limit)| compares(op, *value, *limit))
+                .collect();
             Some(DecidingSignal {
                 quantity: readable(quantity),
                 unit: unit_of(signal),
@@ -130,8 +171,8 @@ fn unit_of(quantity: &Quantity) -> &'static str {
     match quantity {
         Quantity::Number(_) | Quantity::Variable(_) => "",
         Quantity::Recorded { iri, .. } => match iri.strip_prefix(names::W).unwrap_or_default() {
-            "x" | "y" | "z" | "opening" | "baseX" | "baseY" | "believedX" | "believedY" | "rise" | "displacement"
-            | "pathLength" | "distance" | "distance2d" | "gap" => "m",
+            "x" | "y" | "z" | "opening" | "baseX" | "baseY" | "believedX" | "believedY"
+            | "rise" | "displacement" | "pathLength" | "distance" | "distance2d" | "gap" => "m",
             "vx" | "vy" | "vz" | "speed" | "relativeSpeed" => "m/s",
             "acceleration" | "acceleration2d" | "accelerationZ" => "m/s²",
             "jerk" => "m/s³",
@@ -142,9 +183,11 @@ fn unit_of(quantity: &Quantity) -> &'static str {
             _ => "",
         },
         Quantity::Call(builtin, args) => match builtin.name {
-            "SUM" | "MINUS" | "ABS" | "MIN" | "MAX" | "INVERSE" | "NEGATIVE" => {
-                args.iter().map(unit_of).find(|unit| !unit.is_empty()).unwrap_or("")
-            }
+            "SUM" | "MINUS" | "ABS" | "MIN" | "MAX" | "INVERSE" | "NEGATIVE" => args
+                .iter()
+                .map(unit_of)
+                .find(|unit| !unit.is_empty())
+                .unwrap_or(""),
             "ATAN2" | "ATAN" | "ACOS" | "ASIN" => "rad",
             _ => "",
         },
@@ -155,5 +198,9 @@ fn unit_of(quantity: &Quantity) -> &'static str {
 pub(super) fn shown(value: f64) -> String {
     let text = format!("{value:.4}");
     let text = text.trim_end_matches('0').trim_end_matches('.');
-    if text == "-0" { "0".to_owned() } else { text.to_owned() }
+    if text == "-0" {
+        "0".to_owned()
+    } else {
+        text.to_owned()
+    }
 }

@@ -16,8 +16,8 @@ pub(crate) struct Evidence {
 }
 
 impl Timed {
-    /// Describes when and by which values its first formula is decided. `source` returns the text of a span. Returns
-    /// `None` if a quantity was not recorded.
+    /// Describes when and by which values its first formula is decided. `source` returns the text
+    /// of a span. Returns `None` if a quantity was not recorded.
     pub(crate) fn evidence(
         &self,
         binding: &[TermId],
@@ -29,13 +29,26 @@ impl Timed {
         let reader = Reader::new(binding, terms, watch)?;
         let mut found = Vec::new();
         Search { reader: &reader }.decides(formula, reader.moment(formula), &mut found)?;
-        let texts: Option<Vec<String>> = found.iter().map(|one| one.text(&reader, source)).collect();
-        let signals = found.iter().filter_map(|one| deciding_signal(one, &reader, source)).collect();
-        Some(Evidence { text: texts?.join("; "), signals })
+        let texts: Option<Vec<String>> =
+            found.iter().map(|one| one.text(&reader, source)).collect();
+        let signals = found
+            .iter()
+            .filter_map(|one| deciding_signal(one, &reader, source))
+            .collect();
+        Some(Evidence {
+            text: texts?.join("; "),
+            signals,
+        })
     }
 
-    /// Returns the moment that decides the formula that is nearest to failing. Unit: seconds since the action began.
-    pub(super) fn moment(&self, binding: &[TermId], terms: &Universe<'_>, watch: &Watch) -> Option<f64> {
+    /// Returns the moment that decides the formula that is nearest to failing. Unit: seconds since
+    /// the action began.
+    pub(super) fn moment(
+        &self,
+        binding: &[TermId],
+        terms: &Universe<'_>,
+        watch: &Watch,
+    ) -> Option<f64> {
         let reader = Reader::new(binding, terms, watch)?;
         let mut nearest: Option<(f64, &Formula)> = None;
         for formula in &self.formulas {
@@ -61,13 +74,20 @@ struct Search<'a> {
 
 impl Search<'_> {
     /// Appends the values that decide a formula at a sample.
-    fn decides<'f>(&self, formula: &'f Formula, at: usize, found: &mut Vec<Decisive<'f>>) -> Option<()> {
+    fn decides<'f>(
+        &self,
+        formula: &'f Formula,
+        at: usize,
+        found: &mut Vec<Decisive<'f>>,
+    ) -> Option<()> {
         match formula {
             Formula::Compare { .. } | Formula::Truth { .. } => {
                 found.push(Decisive::Atom { at, formula });
                 Some(())
             }
-            Formula::Not(inner) | Formula::Consequent { formula: inner, .. } => self.decides(inner, at, found),
+            Formula::Not(inner) | Formula::Consequent { formula: inner, .. } => {
+                self.decides(inner, at, found)
+            }
             Formula::And(parts) => self.decides(self.extreme(parts, at, f64::lt)?, at, found),
             Formula::Or(parts) => {
                 let best = self.extreme(parts, at, f64::gt)?;
@@ -75,16 +95,27 @@ impl Search<'_> {
                     return self.decides(best, at, found);
                 }
                 // All alternatives fail.
-                parts.iter().try_for_each(|part| self.decides(part, at, found))
+                parts
+                    .iter()
+                    .try_for_each(|part| self.decides(part, at, found))
             }
-            Formula::Temporal { operator, from, to, parts, .. } => {
-                self.temporal(*operator, (*from, *to), parts, at, found)
-            }
+            Formula::Temporal {
+                operator,
+                from,
+                to,
+                parts,
+                ..
+            } => self.temporal(*operator, (*from, *to), parts, at, found),
         }
     }
 
     /// Returns the part with the smallest or largest robustness at a sample.
-    fn extreme<'f>(&self, parts: &'f [Formula], at: usize, better: fn(&f64, &f64) -> bool) -> Option<&'f Formula> {
+    fn extreme<'f>(
+        &self,
+        parts: &'f [Formula],
+        at: usize,
+        better: fn(&f64, &f64) -> bool,
+    ) -> Option<&'f Formula> {
         let mut best: Option<(f64, &Formula)> = None;
         for part in parts {
             let value = *self.reader.over_time(part)?.get(at)?;
@@ -107,9 +138,12 @@ impl Search<'_> {
         let window = self.reader.window(from, to);
         let reach = window.to.unwrap_or(count);
         let times: Vec<usize> = if operator.is_past() {
-            (at.saturating_sub(reach)..=at).filter(|time| time + window.from <= at).collect()
+            (at.saturating_sub(reach)..=at)
+                .filter(|time| time + window.from <= at)
+                .collect()
         } else {
-            (at.saturating_add(window.from)..=at.saturating_add(reach).min(count.saturating_sub(1))).collect()
+            (at.saturating_add(window.from)..=at.saturating_add(reach).min(count.saturating_sub(1)))
+                .collect()
         };
         if times.is_empty() {
             found.push(Decisive::NoTime);
@@ -117,19 +151,39 @@ impl Search<'_> {
         }
         let decisive = parts.last()?;
         let values = self.reader.over_time(decisive)?;
-        let smallest = matches!(operator, TemporalOperator::Always | TemporalOperator::Historically);
-        let rank = |time: &usize| if smallest { values[*time] } else { -values[*time] };
-        let chosen = times.into_iter().min_by(|a, b| rank(a).total_cmp(&rank(b)))?;
+        let smallest = matches!(
+            operator,
+            TemporalOperator::Always | TemporalOperator::Historically
+        );
+        let rank = |time: &usize| {
+            if smallest {
+                values[*time]
+            } else {
+                -values[*time]
+            }
+        };
+        let chosen = times
+            .into_iter()
+            .min_by(|a, b| rank(a).total_cmp(&rank(b)))?;
         if smallest && values[chosen] < 0.0 {
-            let since = (0..=chosen).rev().take_while(|time| values[*time] < 0.0).last().unwrap_or(chosen);
+            let since = (0..=chosen)
+                .rev()
+                .take_while(|time| values[*time] < 0.0)
+                .last()
+                .unwrap_or(chosen);
             if since < chosen {
                 found.push(Decisive::Since { at: since });
             }
         }
         if let [first, second] = parts {
-            // Until: the first part must hold up to the second, so the one that is farther from holding decides.
+            // Until: the first part must hold up to the second, so the one that is farther from
+            // holding decides.
             let held = self.reader.over_time(first)?;
-            let (low, high) = if operator.is_past() { (chosen + 1, at + 1) } else { (at, chosen) };
+            let (low, high) = if operator.is_past() {
+                (chosen + 1, at + 1)
+            } else {
+                (at, chosen)
+            };
             let worst = (low..high).min_by(|a, b| held[*a].total_cmp(&held[*b]));
             if let Some(worst) = worst.filter(|worst| held[*worst] < values[chosen]) {
                 return self.decides(first, worst, found);

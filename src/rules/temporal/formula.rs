@@ -32,7 +32,8 @@ pub(crate) enum Formula {
         /// Whether the property can only become harder to pass if this is false.
         needed: bool,
     },
-    /// An operator over times between `from` and `to` after the present, or before it. Unit: seconds.
+    /// An operator over times between `from` and `to` after the present, or before it. Unit:
+    /// seconds.
     Temporal {
         operator: TemporalOperator,
         from: f64,
@@ -78,7 +79,9 @@ impl Formula {
 
     fn variables(&self, found: &mut Vec<Variable>) {
         match self {
-            Self::Compare { left, right, .. } => [left, right].into_iter().for_each(|side| side.variables(found)),
+            Self::Compare { left, right, .. } => [left, right]
+                .into_iter()
+                .for_each(|side| side.variables(found)),
             Self::Truth { quantity, .. } => quantity.variables(found),
             Self::Not(inner) | Self::Consequent { formula: inner, .. } => inner.variables(found),
             Self::And(parts) | Self::Or(parts) | Self::Temporal { parts, .. } => {
@@ -87,7 +90,8 @@ impl Formula {
         }
     }
 
-    /// Returns whether its value is read at the end of the action: its outermost operator looks back.
+    /// Returns whether its value is read at the end of the action: its outermost operator looks
+    /// back.
     pub(super) fn looks_back(&self) -> bool {
         match self {
             Self::Temporal { operator, .. } => operator.is_past(),
@@ -111,10 +115,12 @@ impl Quantity {
         match self {
             Self::Number(_) => {}
             Self::Variable(variable) => found.push(*variable),
-            Self::Recorded { things, .. } => found.extend(things.iter().filter_map(|thing| match thing {
-                Thing::Variable(variable) => Some(*variable),
-                Thing::Constant(_) => None,
-            })),
+            Self::Recorded { things, .. } => {
+                found.extend(things.iter().filter_map(|thing| match thing {
+                    Thing::Variable(variable) => Some(*variable),
+                    Thing::Constant(_) => None,
+                }))
+            }
             Self::Call(_, args) => args.iter().for_each(|arg| arg.variables(found)),
         }
     }
@@ -138,17 +144,26 @@ pub(crate) struct Timed {
 impl Timed {
     /// Asks whether a formula holds.
     pub(crate) fn truth(formula: Formula) -> Self {
-        Self { formulas: vec![formula], asked: Asked::Truth }
+        Self {
+            formulas: vec![formula],
+            asked: Asked::Truth,
+        }
     }
 
     /// Asks for the robustness of several formulas together: the smallest.
     pub(super) fn robustness_of(formulas: Vec<Formula>) -> Self {
-        Self { formulas, asked: Asked::Robustness }
+        Self {
+            formulas,
+            asked: Asked::Robustness,
+        }
     }
 
     /// Asks for the moment that decides several formulas together.
     pub(super) fn moment_of(formulas: Vec<Formula>) -> Self {
-        Self { formulas, asked: Asked::Moment }
+        Self {
+            formulas,
+            asked: Asked::Moment,
+        }
     }
 
     /// Asks for the robustness of the same formulas.
@@ -158,7 +173,9 @@ impl Timed {
 
     /// Appends the variables of its formulas.
     pub(crate) fn variables(&self, found: &mut Vec<Variable>) {
-        self.formulas.iter().for_each(|formula| formula.variables(found));
+        self.formulas
+            .iter()
+            .for_each(|formula| formula.variables(found));
     }
 
     /// Returns its formulas.
@@ -171,16 +188,25 @@ impl Timed {
         &mut self.formulas
     }
 
-    /// Returns the truth, the robustness if it is finite, or the moment. Returns `None` if a quantity was not recorded; then the
-    /// watch stops the evaluation.
-    pub(crate) fn value(&self, binding: &[TermId], terms: &Universe<'_>, watch: &Watch) -> Option<Term> {
+    /// Returns the truth, the robustness if it is finite, or the moment. Returns `None` if a
+    /// quantity was not recorded; then the watch stops the evaluation.
+    pub(crate) fn value(
+        &self,
+        binding: &[TermId],
+        terms: &Universe<'_>,
+        watch: &Watch,
+    ) -> Option<Term> {
         if self.asked == Asked::Moment {
             return self.moment(binding, terms, watch).map(Term::Double);
         }
         let reader = Reader::new(binding, terms, watch)?;
         match self.asked {
             Asked::Truth => {
-                let truths: Option<Vec<bool>> = self.formulas.iter().map(|formula| reader.holds(formula)).collect();
+                let truths: Option<Vec<bool>> = self
+                    .formulas
+                    .iter()
+                    .map(|formula| reader.holds(formula))
+                    .collect();
                 Some(Term::Boolean(truths?.into_iter().all(|holds| holds)))
             }
             Asked::Robustness => {

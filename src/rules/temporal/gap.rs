@@ -1,7 +1,7 @@
 //! The distance between the surfaces of two things at each sample.
 //!
-//! Source: Gilbert, Johnson and Keerthi, "A fast procedure for computing the distance between complex objects in
-//! three-dimensional space", 1988.
+//! Source: Gilbert, Johnson and Keerthi, "A fast procedure for computing the distance between
+//! complex objects in three-dimensional space", 1988.
 
 use crate::temporal::quantities::{place, recorded, turned_back};
 use actcheck_base::{Course, Solid, names};
@@ -15,8 +15,9 @@ const ACCURACY: f64 = 1e-9;
 /// Square of a distance below which two solids touch. Unit: square metres.
 const TOUCHING: f64 = 1e-18;
 
-/// Returns the smallest distance between the surfaces of two things; 0 if they touch or overlap. The gripper is the point
-/// between its fingertips. Returns `None` if the shape or the poses of one of them are not known.
+/// Returns the smallest distance between the surfaces of two things; 0 if they touch or overlap.
+/// The gripper is the point between its fingertips. Returns `None` if the shape or the poses of one
+/// of them are not known.
 pub(super) fn gaps(course: &Course, one: &str, other: &str) -> Option<Vec<f64>> {
     let (one, other) = (Body::of(course, one)?, Body::of(course, other)?);
     let mut guesses = Vec::new();
@@ -47,11 +48,25 @@ impl Body {
     fn of(course: &Course, thing: &str) -> Option<Self> {
         let place = place(course, thing)?;
         if thing == names::w("gripper") {
-            return Some(Self { solids: vec![Solid { points: vec![[0.0; 3]], radius: 0.0 }], place, turn: None });
+            return Some(Self {
+                solids: vec![Solid {
+                    points: vec![[0.0; 3]],
+                    radius: 0.0,
+                }],
+                place,
+                turn: None,
+            });
         }
         let [x, y, z, w] = ["qx", "qy", "qz", "qw"].map(|part| recorded(course, part, thing));
-        let solids = course.solids(thing).filter(|solids| !solids.is_empty())?.to_vec();
-        Some(Self { solids, place, turn: Some([x?, y?, z?, w?]) })
+        let solids = course
+            .solids(thing)
+            .filter(|solids| !solids.is_empty())?
+            .to_vec();
+        Some(Self {
+            solids,
+            place,
+            turn: Some([x?, y?, z?, w?]),
+        })
     }
 
     /// Returns whether it has the same pose at all samples.
@@ -70,27 +85,40 @@ impl Body {
             };
             [0, 1, 2].map(|axis| turned[axis] + self.place[axis][at])
         };
-        let moved = |solid: &Solid| Solid { points: solid.points.iter().map(placed).collect(), ..*solid };
+        let moved = |solid: &Solid| Solid {
+            points: solid.points.iter().map(placed).collect(),
+            ..*solid
+        };
         self.solids.iter().map(moved).collect()
     }
 }
 
-/// Returns the smallest distance of two sets of solids. `guesses` has the vector between the nearest points of each pair at the
-/// sample before, from which the search begins.
+/// Returns the smallest distance of two sets of solids. `guesses` has the vector between the
+/// nearest points of each pair at the sample before, from which the search begins.
 fn gap(ones: &[Solid], others: &[Solid], guesses: &mut Vec<Point>) -> f64 {
     guesses.resize(ones.len() * others.len(), [1.0, 0.0, 0.0]);
-    let pairs = ones.iter().flat_map(|one| others.iter().map(move |other| (one, other)));
+    let pairs = ones
+        .iter()
+        .flat_map(|one| others.iter().map(move |other| (one, other)));
     let of_pair = |((one, other), guess): ((&Solid, &Solid), &mut Point)| {
         (hull_distance(&one.points, &other.points, guess) - one.radius - other.radius).max(0.0)
     };
-    pairs.zip(guesses).map(of_pair).fold(f64::INFINITY, f64::min)
+    pairs
+        .zip(guesses)
+        .map(of_pair)
+        .fold(f64::INFINITY, f64::min)
 }
 
-/// Returns the distance of the convex hulls of two sets of points. The search begins along the guess, which becomes the
-/// vector between the nearest points.
+/// Returns the distance of the convex hulls of two sets of points. The search begins along the
+/// guess, which becomes the vector between the nearest points.
 fn hull_distance(ones: &[Point], others: &[Point], guess: &mut Point) -> f64 {
-    let start = (lowest(ones, *guess), lowest(others, guess.map(|part| -part)));
-    let (Some(first), Some(second)) = start else { return f64::INFINITY };
+    let start = (
+        lowest(ones, *guess),
+        lowest(others, guess.map(|part| -part)),
+    );
+    let (Some(first), Some(second)) = start else {
+        return f64::INFINITY;
+    };
     let mut nearest = minus(first, second);
     let mut simplex: Vec<Point> = vec![nearest];
     for _ in 0..MOST_ITERATIONS {
@@ -99,7 +127,10 @@ fn hull_distance(ones: &[Point], others: &[Point], guess: &mut Point) -> f64 {
             return 0.0;
         }
         // The point of the difference of the hulls that is farthest towards the origin.
-        let (Some(one), Some(other)) = (lowest(ones, nearest), lowest(others, nearest.map(|part| -part))) else {
+        let (Some(one), Some(other)) = (
+            lowest(ones, nearest),
+            lowest(others, nearest.map(|part| -part)),
+        ) else {
             break;
         };
         let further = minus(one, other);
@@ -107,7 +138,9 @@ fn hull_distance(ones: &[Point], others: &[Point], guess: &mut Point) -> f64 {
             break;
         }
         simplex.push(further);
-        let Some((kept, point)) = nearest_of(&simplex) else { break };
+        let Some((kept, point)) = nearest_of(&simplex) else {
+            break;
+        };
         if dot(point, point) >= square {
             break;
         }
@@ -129,48 +162,74 @@ fn lowest(points: &[Point], direction: Point) -> Option<Point> {
     best.map(|(point, _)| point)
 }
 
-/// Returns the point of a simplex that is nearest to the origin, and the corners of the face that contains it.
+/// Returns the point of a simplex that is nearest to the origin, and the corners of the face that
+/// contains it.
 fn nearest_of(simplex: &[Point]) -> Option<(Vec<Point>, Point)> {
     let mut best: Option<(usize, Point)> = None;
     for chosen in 1_usize..1 << simplex.len() {
         let mut corners = [[0.0; 3]; 4];
         let mut count = 0;
-        for (_, corner) in simplex.iter().enumerate().filter(|(idx, _)| chosen >> idx & 1 == 1) {
+        for (_, corner) in simplex
+            .iter()
+            .enumerate()
+            .filter(|(idx, _)| chosen >> idx & 1 == 1)
+        {
             corners[count] = *corner;
             count += 1;
         }
-        let Some(weights) = weights_of(&corners[..count]) else { continue };
+        let Some(weights) = weights_of(&corners[..count]) else {
+            continue;
+        };
         if weights[..count].iter().any(|weight| *weight < 0.0) {
             continue;
         }
-        let sum = |axis: usize| (0..count).map(|idx| corners[idx][axis] * weights[idx]).sum();
+        let sum = |axis: usize| {
+            (0..count)
+                .map(|idx| corners[idx][axis] * weights[idx])
+                .sum()
+        };
         let point: Point = [sum(0), sum(1), sum(2)];
         if best.is_none_or(|(_, nearest)| dot(point, point) < dot(nearest, nearest)) {
             best = Some((chosen, point));
         }
     }
     let (chosen, point) = best?;
-    let kept = simplex.iter().enumerate().filter(|(idx, _)| chosen >> idx & 1 == 1).map(|(_, corner)| *corner);
+    let kept = simplex
+        .iter()
+        .enumerate()
+        .filter(|(idx, _)| chosen >> idx & 1 == 1)
+        .map(|(_, corner)| *corner);
     Some((kept.collect(), point))
 }
 
-/// Returns the weights of at most four corners, with sum 1, in the point of their plane that is nearest to the origin. Returns
-/// `None` if the corners are not independent.
+/// Returns the weights of at most four corners, with sum 1, in the point of their plane that is
+/// nearest to the origin. Returns `None` if the corners are not independent.
 fn weights_of(corners: &[Point]) -> Option<[f64; 4]> {
     let (origin, rest) = corners.split_first()?;
     let mut edges = [[0.0; 3]; 3];
-    edges.iter_mut().zip(rest).for_each(|(edge, corner)| *edge = minus(*corner, *origin));
+    edges
+        .iter_mut()
+        .zip(rest)
+        .for_each(|(edge, corner)| *edge = minus(*corner, *origin));
     // The normal equations: the nearest point is perpendicular to every edge.
     let mut rows = [[0.0; 4]; 3];
     for (row, edge) in rows.iter_mut().zip(&edges) {
-        row.iter_mut().zip(&edges).for_each(|(value, other)| *value = dot(*edge, *other));
+        row.iter_mut()
+            .zip(&edges)
+            .for_each(|(value, other)| *value = dot(*edge, *other));
         row[3] = -dot(*edge, *origin);
     }
     let solved = solved(&mut rows[..rest.len()])?;
-    Some([1.0 - solved.iter().sum::<f64>(), solved[0], solved[1], solved[2]])
+    Some([
+        1.0 - solved.iter().sum::<f64>(),
+        solved[0],
+        solved[1],
+        solved[2],
+    ])
 }
 
-/// Solves at most three linear equations; the last number of each row is its right side. Unknowns without an equation are 0.
+/// Solves at most three linear equations; the last number of each row is its right side. Unknowns
+/// without an equation are 0.
 fn solved(rows: &mut [[f64; 4]]) -> Option<[f64; 3]> {
     let count = rows.len();
     for column in 0..count {
@@ -184,13 +243,23 @@ fn solved(rows: &mut [[f64; 4]]) -> Option<[f64; 3]> {
         }
         rows[column].iter_mut().for_each(|value| *value /= divisor);
         let row = rows[column];
-        for (_, other) in rows.iter_mut().enumerate().filter(|(idx, _)| *idx != column) {
+        for (_, other) in rows
+            .iter_mut()
+            .enumerate()
+            .filter(|(idx, _)| *idx != column)
+        {
             let factor = other[column];
-            other.iter_mut().zip(&row).for_each(|(value, part)| *value -= factor * part);
+            other
+                .iter_mut()
+                .zip(&row)
+                .for_each(|(value, part)| *value -= factor * part);
         }
     }
     let mut found = [0.0; 3];
-    found.iter_mut().zip(rows).for_each(|(value, row)| *value = row[3]);
+    found
+        .iter_mut()
+        .zip(rows)
+        .for_each(|(value, row)| *value = row[3]);
     Some(found)
 }
 
@@ -209,7 +278,9 @@ mod tests {
 
     fn boxed(middle: Point, half: Point) -> Vec<Point> {
         let sign = |idx: usize, bit: usize| if idx >> bit & 1 == 0 { -1.0 } else { 1.0 };
-        (0..8).map(|idx| [0, 1, 2].map(|axis| middle[axis] + sign(idx, axis) * half[axis])).collect()
+        (0..8)
+            .map(|idx| [0, 1, 2].map(|axis| middle[axis] + sign(idx, axis) * half[axis]))
+            .collect()
     }
 
     fn apart_by(ones: &[Point], others: &[Point]) -> f64 {
@@ -245,9 +316,17 @@ mod tests {
 
     #[test]
     fn crossing_rods_are_as_far_apart_as_their_axes() {
-        let (one, other) = ([[-1.0, 0.0, 0.0], [1.0, 0.0, 0.0]], [[0.0, -1.0, 0.3], [0.0, 1.0, 0.3]]);
+        let (one, other) = (
+            [[-1.0, 0.0, 0.0], [1.0, 0.0, 0.0]],
+            [[0.0, -1.0, 0.3], [0.0, 1.0, 0.3]],
+        );
         assert!((apart_by(&one, &other) - 0.3).abs() < 1e-9);
-        let solid = |points: &[Point]| [Solid { points: points.to_vec(), radius: 0.1 }];
+        let solid = |points: &[Point]| {
+            [Solid {
+                points: points.to_vec(),
+                radius: 0.1,
+            }]
+        };
         assert!((gap(&solid(&one), &solid(&other), &mut Vec::new()) - 0.1).abs() < 1e-9);
         assert_eq!(apart_by(&one, &[[0.5, 0.0, 0.0]]), 0.0);
     }

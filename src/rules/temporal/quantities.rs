@@ -52,9 +52,13 @@ const QUANTITIES: [(&str, usize); 43] = [
     ("time", 0),
 ];
 
-/// Returns the number of things that a quantity of the world vocabulary is of. Returns `None` for an unknown quantity.
+/// Returns the number of things that a quantity of the world vocabulary is of. Returns `None` for
+/// an unknown quantity.
 pub(crate) fn known_quantity(local: &str) -> Option<usize> {
-    QUANTITIES.iter().find(|(name, _)| *name == local).map(|(_, things)| *things)
+    QUANTITIES
+        .iter()
+        .find(|(name, _)| *name == local)
+        .map(|(_, things)| *things)
 }
 
 /// Returns the names of all quantities of the world vocabulary.
@@ -62,7 +66,8 @@ pub(crate) fn quantity_names() -> impl Iterator<Item = &'static str> + Clone {
     QUANTITIES.iter().map(|(name, _)| *name)
 }
 
-/// Returns a quantity at each sample. Returns `None` if it was not recorded and does not follow from recorded ones.
+/// Returns a quantity at each sample. Returns `None` if it was not recorded and does not follow
+/// from recorded ones.
 pub(crate) fn values_of(course: &Course, iri: &str, things: &[String]) -> Option<Vec<f64>> {
     let first = things.first().map_or("", String::as_str);
     let second = things.get(1).map_or("", String::as_str);
@@ -72,17 +77,27 @@ pub(crate) fn values_of(course: &Course, iri: &str, things: &[String]) -> Option
     let seconds = || (0..course.count).map(|idx| idx as f64 * course.period_secs);
     match (iri.strip_prefix(names::W)?, things) {
         ("time", []) => Some(seconds().collect()),
-        ("phase", [name]) => {
-            Some(seconds().map(|time| f64::from(u8::from(phase_at(course, time) == Some(name)))).collect())
-        }
+        ("phase", [name]) => Some(
+            seconds()
+                .map(|time| f64::from(u8::from(phase_at(course, time) == Some(name))))
+                .collect(),
+        ),
         ("distance", [a, b]) => Some(distances(&place(course, a)?, &place(course, b)?)),
-        ("distance2d", [a, b]) => Some(distances(&flat(place(course, a)?), &flat(place(course, b)?))),
+        ("distance2d", [a, b]) => Some(distances(
+            &flat(place(course, a)?),
+            &flat(place(course, b)?),
+        )),
         ("gap", [a, b]) => gaps(course, a, b),
-        ("relativeSpeed", [a, b]) => Some(norms(&rates(&seen_from(course, a, b)?, course.period_secs))),
-        ("contactForce", [a, b]) => force(course, a, b),
-        ("touches", [a, b]) => {
-            Some(force(course, a, b)?.into_iter().map(|force| f64::from(u8::from(force > 0.0))).collect())
+        ("relativeSpeed", [a, b]) => {
+            Some(norms(&rates(&seen_from(course, a, b)?, course.period_secs)))
         }
+        ("contactForce", [a, b]) => force(course, a, b),
+        ("touches", [a, b]) => Some(
+            force(course, a, b)?
+                .into_iter()
+                .map(|force| f64::from(u8::from(force > 0.0)))
+                .collect(),
+        ),
         (local, [thing]) => of_one(course, local, thing),
         _ => None,
     }
@@ -90,13 +105,17 @@ pub(crate) fn values_of(course: &Course, iri: &str, things: &[String]) -> Option
 
 /// Returns every thing of which a quantity was recorded, sorted.
 pub(crate) fn things_of(course: &Course) -> BTreeSet<String> {
-    course.signals().filter(|(key, _)| key[2].is_empty()).map(|(key, _)| key[1].clone()).collect()
+    course
+        .signals()
+        .filter(|(key, _)| key[2].is_empty())
+        .map(|(key, _)| key[1].clone())
+        .collect()
 }
 
 /// Returns a quantity that follows from the recorded ones of one thing.
 fn of_one(course: &Course, local: &str, thing: &str) -> Option<Vec<f64>> {
-    let [x0, y0, z0] =
-        [0, 1, 2].map(|axis| move |place: &[Vec<f64>; 3]| place[axis].first().copied().unwrap_or(f64::NAN));
+    let [x0, y0, z0] = [0, 1, 2]
+        .map(|axis| move |place: &[Vec<f64>; 3]| place[axis].first().copied().unwrap_or(f64::NAN));
     Some(match local {
         "x" | "y" | "z" => {
             let axis = usize::from(local.as_bytes().first()?.checked_sub(b'x')?);
@@ -104,10 +123,13 @@ fn of_one(course: &Course, local: &str, thing: &str) -> Option<Vec<f64>> {
         }
         "yaw" if thing == names::w("robot") => recorded(course, "baseYaw", thing)?,
         "tilt" | "yaw" => {
-            let [qx, qy, qz, qw] = ["qx", "qy", "qz", "qw"].map(|part| recorded(course, part, thing));
+            let [qx, qy, qz, qw] =
+                ["qx", "qy", "qz", "qw"].map(|part| recorded(course, part, thing));
             let (qx, qy, qz, qw) = (qx?, qy?, qz?, qw?);
             let angle = if local == "tilt" { tilt_of } else { yaw_of };
-            (0..course.count).map(|idx| angle([qx[idx], qy[idx], qz[idx], qw[idx]])).collect()
+            (0..course.count)
+                .map(|idx| angle([qx[idx], qy[idx], qz[idx], qw[idx]]))
+                .collect()
         }
         "speed" => norms(&velocity(course, thing)?),
         "angularSpeed" => {
@@ -120,7 +142,10 @@ fn of_one(course: &Course, local: &str, thing: &str) -> Option<Vec<f64>> {
             let [_, _, z] = rates(&velocity(course, thing)?, course.period_secs);
             z
         }
-        "jerk" => norms(&rates(&rates(&velocity(course, thing)?, course.period_secs), course.period_secs)),
+        "jerk" => norms(&rates(
+            &rates(&velocity(course, thing)?, course.period_secs),
+            course.period_secs,
+        )),
         "rise" => {
             let place = place(course, thing)?;
             let initial = z0(&place);
@@ -128,7 +153,8 @@ fn of_one(course: &Course, local: &str, thing: &str) -> Option<Vec<f64>> {
         }
         "displacement" => {
             let place = place(course, thing)?;
-            let initial = [x0(&place), y0(&place), z0(&place)].map(|value| vec![value; course.count]);
+            let initial =
+                [x0(&place), y0(&place), z0(&place)].map(|value| vec![value; course.count]);
             distances(&place, &initial)
         }
         "pathLength" => {
@@ -147,7 +173,11 @@ fn of_one(course: &Course, local: &str, thing: &str) -> Option<Vec<f64>> {
 }
 
 pub(super) fn recorded(course: &Course, local: &str, thing: &str) -> Option<Vec<f64>> {
-    Some(course.get(&names::w(local), thing, "")?.values(course.count))
+    Some(
+        course
+            .get(&names::w(local), thing, "")?
+            .values(course.count),
+    )
 }
 
 /// Returns the position of a thing. The robot is where its base is, on the floor.
@@ -173,14 +203,23 @@ fn velocity(course: &Course, thing: &str) -> Option<[Vec<f64>; 3]> {
     }
 }
 
-/// Returns the position of one thing in the frame of another. A thing without an orientation has that of the world.
+/// Returns the position of one thing in the frame of another. A thing without an orientation has
+/// that of the world.
 fn seen_from(course: &Course, thing: &str, from: &str) -> Option<[Vec<f64>; 3]> {
     let (there, here) = (place(course, thing)?, place(course, from)?);
-    let mut seen =
-        [0, 1, 2].map(|axis| (0..course.count).map(|idx| there[axis][idx] - here[axis][idx]).collect::<Vec<_>>());
-    if let [Some(x), Some(y), Some(z), Some(w)] = ["qx", "qy", "qz", "qw"].map(|part| recorded(course, part, from)) {
+    let mut seen = [0, 1, 2].map(|axis| {
+        (0..course.count)
+            .map(|idx| there[axis][idx] - here[axis][idx])
+            .collect::<Vec<_>>()
+    });
+    if let [Some(x), Some(y), Some(z), Some(w)] =
+        ["qx", "qy", "qz", "qw"].map(|part| recorded(course, part, from))
+    {
         for idx in 0..course.count {
-            let turned = turned_back([x[idx], y[idx], z[idx], w[idx]], [0, 1, 2].map(|axis| seen[axis][idx]));
+            let turned = turned_back(
+                [x[idx], y[idx], z[idx], w[idx]],
+                [0, 1, 2].map(|axis| seen[axis][idx]),
+            );
             (0..3).for_each(|axis| seen[axis][idx] = turned[axis]);
         }
     }
@@ -189,8 +228,13 @@ fn seen_from(course: &Course, thing: &str, from: &str) -> Option<[Vec<f64>; 3]> 
 
 /// Rotates a vector by the inverse of a unit quaternion.
 pub(super) fn turned_back([x, y, z, w]: [f64; 4], v: [f64; 3]) -> [f64; 3] {
-    let cross =
-        |a: [f64; 3], b: [f64; 3]| [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
+    let cross = |a: [f64; 3], b: [f64; 3]| {
+        [
+            a[1] * b[2] - a[2] * b[1],
+            a[2] * b[0] - a[0] * b[2],
+            a[0] * b[1] - a[1] * b[0],
+        ]
+    };
     let axis = [-x, -y, -z];
     let once = cross(axis, v);
     let twice = cross(axis, once);
@@ -201,12 +245,16 @@ pub(super) fn turned_back([x, y, z, w]: [f64; 4], v: [f64; 3]) -> [f64; 3] {
 fn rates(values: &[Vec<f64>; 3], period_secs: f64) -> [Vec<f64>; 3] {
     [0, 1, 2].map(|axis| {
         let values = &values[axis];
-        (0..values.len()).map(|idx| (values[idx] - values[idx.saturating_sub(1)]) / period_secs).collect()
+        (0..values.len())
+            .map(|idx| (values[idx] - values[idx.saturating_sub(1)]) / period_secs)
+            .collect()
     })
 }
 
 fn norms(values: &[Vec<f64>; 3]) -> Vec<f64> {
-    (0..values[0].len()).map(|idx| norm([0, 1, 2].map(|axis| values[axis][idx]))).collect()
+    (0..values[0].len())
+        .map(|idx| norm([0, 1, 2].map(|axis| values[axis][idx])))
+        .collect()
 }
 
 fn norm([x, y, z]: [f64; 3]) -> f64 {
@@ -214,7 +262,9 @@ fn norm([x, y, z]: [f64; 3]) -> f64 {
 }
 
 fn distances(a: &[Vec<f64>; 3], b: &[Vec<f64>; 3]) -> Vec<f64> {
-    (0..a[0].len()).map(|idx| norm([0, 1, 2].map(|axis| a[axis][idx] - b[axis][idx]))).collect()
+    (0..a[0].len())
+        .map(|idx| norm([0, 1, 2].map(|axis| a[axis][idx] - b[axis][idx])))
+        .collect()
 }
 
 /// Returns the contact force of two things; 0 while they don't touch. The robot is all its links.
@@ -222,7 +272,8 @@ fn force(course: &Course, a: &str, b: &str) -> Option<Vec<f64>> {
     if !(is_body(course, a) && is_body(course, b)) {
         return None;
     }
-    let matches = |thing: &str, asked: &str| thing == asked || (asked == names::w("robot") && is_link(thing));
+    let matches =
+        |thing: &str, asked: &str| thing == asked || (asked == names::w("robot") && is_link(thing));
     let name = names::w("contactForce");
     let mut sum = vec![0.0; course.count];
     for (pair, signal) in course.of(&name) {
@@ -235,21 +286,32 @@ fn force(course: &Course, a: &str, b: &str) -> Option<Vec<f64>> {
 }
 
 fn add(sum: &mut [f64], signal: &Signal, count: usize) {
-    sum.iter_mut().zip(signal.values(count)).for_each(|(slot, value)| *slot += value);
+    sum.iter_mut()
+        .zip(signal.values(count))
+        .for_each(|(slot, value)| *slot += value);
 }
 
 fn is_link(thing: &str) -> bool {
-    thing.strip_prefix(names::W).is_some_and(|local| local.starts_with("link/"))
+    thing
+        .strip_prefix(names::W)
+        .is_some_and(|local| local.starts_with("link/"))
 }
 
 /// Returns whether a thing has contacts: a body, the robot, one of its links, or the floor.
 fn is_body(course: &Course, thing: &str) -> bool {
     is_link(thing)
-        || [names::w("robot"), names::w("floor")].iter().any(|known| known == thing)
+        || [names::w("robot"), names::w("floor")]
+            .iter()
+            .any(|known| known == thing)
         || course.get(&names::w("x"), thing, "").is_some()
 }
 
 /// Returns the phase of the action at a time.
 fn phase_at(course: &Course, secs: f64) -> Option<&String> {
-    course.phases.iter().rev().find(|(_, start)| *start <= secs + 1e-9).map(|(name, _)| name)
+    course
+        .phases
+        .iter()
+        .rev()
+        .find(|(_, start)| *start <= secs + 1e-9)
+        .map(|(name, _)| name)
 }

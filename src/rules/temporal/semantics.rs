@@ -1,7 +1,7 @@
 //! The truth and the robustness of a formula over the samples of an action.
 //!
-//! Source: Donzé and Maler, "Robust satisfaction of temporal logic over real-valued signals", 2010. On samples, windows
-//! contain the samples between their ends, and end with the action.
+//! Source: Donzé and Maler, "Robust satisfaction of temporal logic over real-valued signals", 2010.
+//! On samples, windows contain the samples between their ends, and end with the action.
 
 use crate::builtins::Builtin;
 use crate::model::expression::Variable;
@@ -16,8 +16,7 @@ use std::borrow::Cow;
 use std::rc::Rc;
 
 /// Why a run can't be judged by a rule about time.
-pub(crate) const UNRECORDED: &str =
-    "the course of the action was not recorded: the run is of an earlier version; run the campaign again";
+pub(crate) const UNRECORDED: &str = "the course of the action was not recorded: the run is of an earlier version; run the campaign again";
 
 /// Reads formulas under one binding of a rule's variables.
 pub(super) struct Reader<'a> {
@@ -34,7 +33,8 @@ enum Side {
     Each(Rc<Vec<f64>>),
 }
 
-/// The contribution of a comparison: its distance from flipping, or only whether it holds (1 or −1).
+/// The contribution of a comparison: its distance from flipping, or only whether it holds (1 or
+/// −1).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Scale {
     Robustness,
@@ -43,12 +43,21 @@ enum Scale {
 
 impl<'a> Reader<'a> {
     /// Returns `None`, and stops the evaluation, if the course of the action was not recorded.
-    pub(super) fn new(binding: &'a [TermId], terms: &'a Universe<'a>, watch: &'a Watch) -> Option<Self> {
+    pub(super) fn new(
+        binding: &'a [TermId],
+        terms: &'a Universe<'a>,
+        watch: &'a Watch,
+    ) -> Option<Self> {
         let Some(course) = terms.course().filter(|course| course.count > 0) else {
             watch.no_value(UNRECORDED.to_owned());
             return None;
         };
-        Some(Self { course, binding, terms, watch })
+        Some(Self {
+            course,
+            binding,
+            terms,
+            watch,
+        })
     }
 
     /// Returns whether a formula holds in the action.
@@ -59,7 +68,11 @@ impl<'a> Reader<'a> {
         }
         // On the border, `<` and `<=` differ.
         let truth = self.samples(formula, Scale::Truth)?;
-        Some(truth.get(self.moment(formula)).is_some_and(|value| *value > 0.0))
+        Some(
+            truth
+                .get(self.moment(formula))
+                .is_some_and(|value| *value > 0.0),
+        )
     }
 
     /// Returns how far a formula is from flipping in the action; infinite if no number can flip it.
@@ -69,7 +82,11 @@ impl<'a> Reader<'a> {
 
     /// Returns the sample at which a formula is read: the first, or the last if it looks back.
     pub(super) fn moment(&self, formula: &Formula) -> usize {
-        if formula.looks_back() { self.course.count.saturating_sub(1) } else { 0 }
+        if formula.looks_back() {
+            self.course.count.saturating_sub(1)
+        } else {
+            0
+        }
     }
 
     /// Returns the time of a sample since the action began. Unit: seconds.
@@ -90,7 +107,9 @@ impl<'a> Reader<'a> {
     fn samples(&self, formula: &Formula, scale: Scale) -> Option<Vec<f64>> {
         self.watch.work(size_of::<f64>() * self.course.count)?;
         match formula {
-            Formula::Compare { op, left, right, .. } => {
+            Formula::Compare {
+                op, left, right, ..
+            } => {
                 let sides = (self.side(left)?, self.side(right)?);
                 let count = self.course.count;
                 Some(match (scale, op) {
@@ -106,29 +125,60 @@ impl<'a> Reader<'a> {
                 })
             }
             Formula::Truth { quantity, .. } => {
-                let factor = if scale == Scale::Truth { 1.0 } else { f64::INFINITY };
-                Some(self.quantity(quantity)?.iter().map(|value| factor * sign(*value != 0.0)).collect())
+                let factor = if scale == Scale::Truth {
+                    1.0
+                } else {
+                    f64::INFINITY
+                };
+                Some(
+                    self.quantity(quantity)?
+                        .iter()
+                        .map(|value| factor * sign(*value != 0.0))
+                        .collect(),
+                )
             }
             Formula::Not(inner) => self.samples(inner, scale).map(negated),
             Formula::Consequent { needed: true, .. } if self.watch.fails_consequents() => {
-                Some(vec![if scale == Scale::Truth { -1.0 } else { f64::NEG_INFINITY }; self.course.count])
+                Some(vec![
+                    if scale == Scale::Truth {
+                        -1.0
+                    } else {
+                        f64::NEG_INFINITY
+                    };
+                    self.course.count
+                ])
             }
             Formula::Consequent { formula, .. } => self.samples(formula, scale),
             Formula::And(parts) => self.joined(parts, scale, f64::min),
             Formula::Or(parts) => self.joined(parts, scale, f64::max),
-            Formula::Temporal { operator, from, to, parts, .. } => {
-                let parts: Option<Vec<Vec<f64>>> = parts.iter().map(|part| self.samples(part, scale)).collect();
+            Formula::Temporal {
+                operator,
+                from,
+                to,
+                parts,
+                ..
+            } => {
+                let parts: Option<Vec<Vec<f64>>> =
+                    parts.iter().map(|part| self.samples(part, scale)).collect();
                 Some(temporal(*operator, self.window(*from, *to), parts?))
             }
         }
     }
 
-    fn joined(&self, parts: &[Formula], scale: Scale, join: fn(f64, f64) -> f64) -> Option<Vec<f64>> {
+    fn joined(
+        &self,
+        parts: &[Formula],
+        scale: Scale,
+        join: fn(f64, f64) -> f64,
+    ) -> Option<Vec<f64>> {
         let mut parts = parts.iter();
         let mut joined = self.samples(parts.next()?, scale)?;
         for part in parts {
             let more = self.samples(part, scale)?;
-            joined.iter_mut().zip(more).for_each(|(slot, value)| *slot = join(*slot, value));
+            joined
+                .iter_mut()
+                .zip(more)
+                .for_each(|(slot, value)| *slot = join(*slot, value));
         }
         Some(joined)
     }
@@ -159,16 +209,24 @@ impl<'a> Reader<'a> {
             Quantity::Variable(variable) => Some(Rc::new(vec![self.number(*variable)?; count])),
             Quantity::Recorded { iri, things, .. } => {
                 let named: Vec<String> = things.iter().map(|thing| self.thing(thing)).collect();
-                let values = self.terms.quantity(iri, named, |things| values_of(self.course, iri, things));
+                let values = self
+                    .terms
+                    .quantity(iri, named, |things| values_of(self.course, iri, things));
                 if values.is_none() {
-                    let things = things.iter().map(|thing| names::shorten(&self.thing(thing)));
+                    let things = things
+                        .iter()
+                        .map(|thing| names::shorten(&self.thing(thing)));
                     let of = things.collect::<Vec<_>>().join(" and ");
-                    self.watch.no_value(format!("`{}` of {of} was not recorded", names::shorten(iri)));
+                    self.watch.no_value(format!(
+                        "`{}` of {of} was not recorded",
+                        names::shorten(iri)
+                    ));
                 }
                 values
             }
             Quantity::Call(builtin, args) => {
-                let args: Option<Vec<Rc<Vec<f64>>>> = args.iter().map(|arg| self.quantity(arg)).collect();
+                let args: Option<Vec<Rc<Vec<f64>>>> =
+                    args.iter().map(|arg| self.quantity(arg)).collect();
                 Some(Rc::new(self.called(builtin, &args?)))
             }
         }
@@ -201,15 +259,26 @@ impl<'a> Reader<'a> {
             ("SQRT", [a]) => each(&|idx| a[idx].sqrt()),
             ("ATAN2", [a, b]) => each(&|idx| libm::atan2(a[idx], b[idx])),
             _ => each(&|idx| {
-                let values: Vec<Cow<'_, Term>> = at(idx).map(|value| Cow::Owned(Term::Double(value))).collect();
-                builtin.call(&values, self.watch).and_then(|term| term.number()).unwrap_or(f64::NAN)
+                let values: Vec<Cow<'_, Term>> = at(idx)
+                    .map(|value| Cow::Owned(Term::Double(value)))
+                    .collect();
+                builtin
+                    .call(&values, self.watch)
+                    .and_then(|term| term.number())
+                    .unwrap_or(f64::NAN)
             }),
         }
     }
 }
 
 fn temporal(operator: TemporalOperator, window: Window, parts: Vec<Vec<f64>>) -> Vec<f64> {
-    let mut parts = parts.into_iter().map(|values| if operator.is_past() { reversed(values) } else { values });
+    let mut parts = parts.into_iter().map(|values| {
+        if operator.is_past() {
+            reversed(values)
+        } else {
+            values
+        }
+    });
     let first = parts.next().unwrap_or_default();
     let values = match operator {
         TemporalOperator::Always | TemporalOperator::Historically => smallest_after(&first, window),
@@ -219,7 +288,11 @@ fn temporal(operator: TemporalOperator, window: Window, parts: Vec<Vec<f64>>) ->
             until(&first, &second, window)
         }
     };
-    if operator.is_past() { reversed(values) } else { values }
+    if operator.is_past() {
+        reversed(values)
+    } else {
+        values
+    }
 }
 
 /// Applies a comparison at each sample.
@@ -227,17 +300,26 @@ fn pairs((left, right): (Side, Side), count: usize, compare: impl Fn(f64, f64) -
     match (left, right) {
         (Side::Each(left), Side::Same(b)) => left.iter().map(|a| compare(*a, b)).collect(),
         (Side::Same(a), Side::Each(right)) => right.iter().map(|b| compare(a, *b)).collect(),
-        (Side::Each(left), Side::Each(right)) => left.iter().zip(&*right).map(|(a, b)| compare(*a, *b)).collect(),
+        (Side::Each(left), Side::Each(right)) => left
+            .iter()
+            .zip(&*right)
+            .map(|(a, b)| compare(*a, *b))
+            .collect(),
         (Side::Same(a), Side::Same(b)) => vec![compare(a, b); count],
     }
 }
 
 /// A value that is not a number can't hold.
 fn known(value: f64) -> f64 {
-    if value.is_nan() { f64::NEG_INFINITY } else { value }
+    if value.is_nan() {
+        f64::NEG_INFINITY
+    } else {
+        value
+    }
 }
 
-/// Returns how far a comparison is from flipping; negative if it does not hold. A value that is not a number can't hold.
+/// Returns how far a comparison is from flipping; negative if it does not hold. A value that is not
+/// a number can't hold.
 fn distance(op: Comparison, left: f64, right: f64) -> f64 {
     let value = match op {
         Comparison::Less | Comparison::LessEqual => right - left,

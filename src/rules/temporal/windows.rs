@@ -1,4 +1,5 @@
-//! Extremes over moving windows of samples, in time linear in the samples whatever the windows' length.
+//! Extremes over moving windows of samples, in time linear in the samples whatever the windows'
+//! length.
 
 use std::collections::VecDeque;
 
@@ -14,13 +15,19 @@ pub(super) struct Window {
 const ROUNDING: f64 = 1e-6;
 
 impl Window {
-    /// Returns the samples between two times. Unit: seconds. Returns an empty window (`to` before `from`) if no sample is
-    /// between them.
+    /// Returns the samples between two times. Unit: seconds. Returns an empty window (`to` before
+    /// `from`) if no sample is between them.
     pub(super) fn of(from_secs: f64, to_secs: f64, period_secs: f64) -> Self {
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "the cast saturates")]
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "the cast saturates"
+        )]
         let (from, to) = (
             (from_secs / period_secs - ROUNDING).ceil().max(0.0) as usize,
-            to_secs.is_finite().then(|| (to_secs / period_secs + ROUNDING).floor().max(0.0) as usize),
+            to_secs
+                .is_finite()
+                .then(|| (to_secs / period_secs + ROUNDING).floor().max(0.0) as usize),
         );
         Self { from, to }
     }
@@ -48,26 +55,36 @@ pub(super) fn smallest_after(values: &[f64], window: Window) -> Vec<f64> {
     let mut next = window.from;
     let found = (0..count).map(|now| {
         while next < count && next <= now.saturating_add(to) {
-            while candidates.back().is_some_and(|last| values[*last] >= values[next]) {
+            while candidates
+                .back()
+                .is_some_and(|last| values[*last] >= values[next])
+            {
                 candidates.pop_back();
             }
             candidates.push_back(next);
             next += 1;
         }
-        while candidates.front().is_some_and(|first| *first < now.saturating_add(window.from)) {
+        while candidates
+            .front()
+            .is_some_and(|first| *first < now.saturating_add(window.from))
+        {
             candidates.pop_front();
         }
-        candidates.front().map_or(f64::INFINITY, |first| values[*first])
+        candidates
+            .front()
+            .map_or(f64::INFINITY, |first| values[*first])
     });
     found.collect()
 }
 
-/// Returns the largest value in the window after each sample; negative infinity for an empty window.
+/// Returns the largest value in the window after each sample; negative infinity for an empty
+/// window.
 pub(super) fn largest_after(values: &[f64], window: Window) -> Vec<f64> {
     negated(smallest_after(&negated(values.to_vec()), window))
 }
 
-/// Returns the robustness of "`first` until `second`", with `second` in the window after each sample.
+/// Returns the robustness of "`first` until `second`", with `second` in the window after each
+/// sample.
 pub(super) fn until(first: &[f64], second: &[f64], window: Window) -> Vec<f64> {
     let count = first.len();
     let mut unbounded = vec![f64::NEG_INFINITY; count];
@@ -83,10 +100,19 @@ pub(super) fn until(first: &[f64], second: &[f64], window: Window) -> Vec<f64> {
     let in_time = largest_after(second, window);
     let before = match window.from {
         0 => vec![f64::INFINITY; count],
-        from => smallest_after(first, Window { from: 0, to: Some(from - 1) }),
+        from => smallest_after(
+            first,
+            Window {
+                from: 0,
+                to: Some(from - 1),
+            },
+        ),
     };
     let found = (0..count).map(|at| {
-        let from_window = unbounded.get(at.saturating_add(window.from)).copied().unwrap_or(f64::NEG_INFINITY);
+        let from_window = unbounded
+            .get(at.saturating_add(window.from))
+            .copied()
+            .unwrap_or(f64::NEG_INFINITY);
         in_time[at].min(before[at]).min(from_window)
     });
     found.collect()
@@ -151,8 +177,20 @@ mod tests {
     #[test]
     fn bounds_between_samples_select_the_samples_inside() {
         let inside = |from, to| Window::of(from, to, 1.0 / 60.0);
-        assert_eq!(inside(0.0, 0.1), Window { from: 0, to: Some(6) });
-        assert_eq!(inside(0.01, 0.02), Window { from: 1, to: Some(1) });
+        assert_eq!(
+            inside(0.0, 0.1),
+            Window {
+                from: 0,
+                to: Some(6)
+            }
+        );
+        assert_eq!(
+            inside(0.01, 0.02),
+            Window {
+                from: 1,
+                to: Some(1)
+            }
+        );
         assert_eq!(inside(0.5, f64::INFINITY), Window { from: 30, to: None });
     }
 }

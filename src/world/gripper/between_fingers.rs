@@ -1,5 +1,5 @@
-//! Shapes between the fingers, which would keep every object out: markers of the middle of a grasp, and coarse shapes that include
-//! the fingers.
+//! Shapes between the fingers, which would keep every object out: markers of the middle of a grasp,
+//! and coarse shapes that include the fingers.
 
 use std::ops::Range;
 
@@ -20,15 +20,26 @@ const SMALL_M: f64 = 0.03;
 const APART_M: f32 = 0.002;
 
 /// Returns the names of the URDF links with shapes between the two fingers.
-pub(crate) fn between_fingers(model: &RobotModel, fingers: [usize; 2], grasp: (usize, Isometry3<f64>)) -> Vec<String> {
+pub(crate) fn between_fingers(
+    model: &RobotModel,
+    fingers: [usize; 2],
+    grasp: (usize, Isometry3<f64>),
+) -> Vec<String> {
     let mut found = afloat(model, grasp);
-    let around = around(model, fingers, grasp).into_iter().filter(|name| !found.contains(name));
+    let around = around(model, fingers, grasp)
+        .into_iter()
+        .filter(|name| !found.contains(name));
     found.extend(around.collect::<Vec<_>>());
     found
 }
 
-/// The URDF links that carry the hand, or are part of it, and have a shape around the origin of the grasp frame.
-fn around(model: &RobotModel, fingers: [usize; 2], (body, frame): (usize, Isometry3<f64>)) -> Vec<String> {
+/// The URDF links that carry the hand, or are part of it, and have a shape around the origin of the
+/// grasp frame.
+fn around(
+    model: &RobotModel,
+    fingers: [usize; 2],
+    (body, frame): (usize, Isometry3<f64>),
+) -> Vec<String> {
     // The pose of the grasp frame in that of each link towards the root, with all joints at 0.
     let (mut link, mut at) = (body, frame);
     let mut frames = vec![(link, at)];
@@ -39,35 +50,63 @@ fn around(model: &RobotModel, fingers: [usize; 2], (body, frame): (usize, Isomet
     }
     let contains = |solid: &Part, place: Vector3<f64>| {
         let built = collider(solid, Owner::Floor, 0.0, 0.0).map(|made| made.build());
-        built.is_some_and(|built| built.shape().contains_point(built.position(), to_vector(&place)))
+        built.is_some_and(|built| {
+            built
+                .shape()
+                .contains_point(built.position(), to_vector(&place))
+        })
     };
     let is_around = |of: usize, own: Range<usize>| {
-        let place = frames.iter().find(|(link, _)| *link == of).map(|(_, at)| at.translation.vector);
-        place.is_some_and(|place| model.links[of].solids[own].iter().any(|solid| contains(solid, place)))
+        let place = frames
+            .iter()
+            .find(|(link, _)| *link == of)
+            .map(|(_, at)| at.translation.vector);
+        place.is_some_and(|place| {
+            model.links[of].solids[own]
+                .iter()
+                .any(|solid| contains(solid, place))
+        })
     };
-    let shapes = model.shapes_of_links().filter(|(_, of, _)| !fingers.contains(of));
-    shapes.filter(|(_, of, own)| is_around(*of, own.clone())).map(|(name, ..)| name.to_owned()).collect()
+    let shapes = model
+        .shapes_of_links()
+        .filter(|(_, of, _)| !fingers.contains(of));
+    shapes
+        .filter(|(_, of, own)| is_around(*of, own.clone()))
+        .map(|(name, ..)| name.to_owned())
+        .collect()
 }
 
 /// The URDF links whose shapes are small, near the grasp frame, and attached to nothing.
 fn afloat(model: &RobotModel, (body, frame): (usize, Isometry3<f64>)) -> Vec<String> {
     let solids = &model.links[body].solids;
-    let all: Vec<Option<Collider>> =
-        solids.iter().map(|solid| Some(collider(solid, Owner::Floor, 0.0, 0.0)?.build())).collect();
+    let all: Vec<Option<Collider>> = solids
+        .iter()
+        .map(|solid| Some(collider(solid, Owner::Floor, 0.0, 0.0)?.build()))
+        .collect();
     let apart = |one: &Collider, other: &Collider| {
         let found = distance(one.position(), one.shape(), other.position(), other.shape());
         found.is_ok_and(|found| found.distance > APART_M)
     };
-    let shapes = model.shapes_of_links().filter(|(_, of, own)| *of == body && own.len() < solids.len());
+    let shapes = model
+        .shapes_of_links()
+        .filter(|(_, of, own)| *of == body && own.len() < solids.len());
     let floating = shapes.filter(|(_, _, own)| {
         let (low, high) = bounds(&solids[own.clone()]);
         let (low, high) = (Vector3::from(low), Vector3::from(high));
         let off = (low + high) / 2.0 - frame.translation.vector;
-        let others =
-            all.iter().enumerate().filter(|(idx, _)| !own.contains(idx)).filter_map(|(_, other)| other.as_ref());
+        let others = all
+            .iter()
+            .enumerate()
+            .filter(|(idx, _)| !own.contains(idx))
+            .filter_map(|(_, other)| other.as_ref());
         off.norm() < NEAR_M
             && (high - low).max() < SMALL_M
-            && others.into_iter().all(|other| all[own.clone()].iter().flatten().all(|one| apart(one, other)))
+            && others.into_iter().all(|other| {
+                all[own.clone()]
+                    .iter()
+                    .flatten()
+                    .all(|one| apart(one, other))
+            })
     });
     floating.map(|(name, ..)| name.to_owned()).collect()
 }

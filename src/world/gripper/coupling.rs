@@ -26,10 +26,17 @@ pub(super) fn leaders(named: &[usize], model: &RobotModel) -> Vec<usize> {
 
 /// Returns the joints that follow these leaders.
 pub(super) fn followers(leaders: &[usize], model: &RobotModel) -> Vec<Follower> {
-    let followers = (0..model.joints.len()).filter(|joint| model.joints[*joint].mimic.is_some()).filter_map(|joint| {
-        let (leader, factor, offset) = model.leader_of(joint);
-        let leader = leaders.iter().position(|known| *known == leader)?;
-        Some(Follower { joint, leader, factor, offset })
-    });
+    let followers = (0..model.joints.len())
+        .filter(|joint| model.joints[*joint].mimic.is_some())
+        .filter_map(|joint| {
+            let (leader, factor, offset) = model.leader_of(joint);
+            let leader = leaders.iter().position(|known| *known == leader)?;
+            Some(Follower {
+                joint,
+                leader,
+                factor,
+                offset,
+            })
+        });
     followers.collect()
 }

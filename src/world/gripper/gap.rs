@@ -16,7 +16,8 @@ use actcheck_data::Part;
 use rapier3d::math::{Real, Vector as EngineVector};
 use rapier3d::prelude::Collider;
 
-/// Distances from the grasp frame along the fingers at which their surfaces are measured. Unit: metres.
+/// Distances from the grasp frame along the fingers at which their surfaces are measured. Unit:
+/// metres.
 const ALONG_M: [f64; 5] = [-0.01, -0.005, 0.0, 0.005, 0.01];
 /// The same for the direction of the fingers' width. Fingertips are seldom narrower than 1 cm.
 const ACROSS_M: [f64; 5] = [-0.008, -0.004, 0.0, 0.004, 0.008];
@@ -49,7 +50,10 @@ impl Gap {
     /// This gap at share 0 and another at share 1.
     pub(crate) fn towards(&self, other: &Self, share: f64) -> Self {
         let between = |from: f64, to: f64| from + share * (to - from);
-        Self { left_m: between(self.left_m, other.left_m), right_m: between(self.right_m, other.right_m) }
+        Self {
+            left_m: between(self.left_m, other.left_m),
+            right_m: between(self.right_m, other.right_m),
+        }
     }
 }
 
@@ -86,8 +90,13 @@ struct Face {
 
 impl Surface {
     pub(crate) fn of(solids: &[Part]) -> Self {
-        let built = solids.iter().filter_map(|solid| collider(solid, Owner::Floor, 0.0, 0.0)).map(|made| made.build());
-        Self { solids: built.map(Solid::new).collect() }
+        let built = solids
+            .iter()
+            .filter_map(|solid| collider(solid, Owner::Floor, 0.0, 0.0))
+            .map(|made| made.build());
+        Self {
+            solids: built.map(Solid::new).collect(),
+        }
     }
 }
 
@@ -95,26 +104,45 @@ impl Solid {
     fn new(collider: Collider) -> Self {
         let face = |hull: &ConvexPolyhedron, outwards: EngineVector| {
             let along = hull.points().iter().map(|point| outwards.dot(*point));
-            Face { outwards, offset: along.fold(Real::NEG_INFINITY, Real::max) }
+            Face {
+                outwards,
+                offset: along.fold(Real::NEG_INFINITY, Real::max),
+            }
         };
         let hull = collider.shape().as_shape::<Hull>().map(Hull::polyhedron);
-        let faces = hull.map(|hull| hull.faces().iter().map(|one| face(hull, one.normal)).collect());
-        Self { around: collider.compute_aabb().loosened(BOX_SLACK_M), faces, collider }
+        let faces = hull.map(|hull| {
+            hull.faces()
+                .iter()
+                .map(|one| face(hull, one.normal))
+                .collect()
+        });
+        Self {
+            around: collider.compute_aabb().loosened(BOX_SLACK_M),
+            faces,
+            collider,
+        }
     }
 
-    /// Distance along a ray in the frame of the link to this solid, if it is less than `most`: 0 inside. The ray is cut off at
-    /// each face of a hull, which takes a tenth of the time of the library's search.
+    /// Distance along a ray in the frame of the link to this solid, if it is less than `most`: 0
+    /// inside. The ray is cut off at each face of a hull, which takes a tenth of the time of the
+    /// library's search.
     fn hit(&self, ray: &Ray, most: Real) -> Option<Real> {
         if !self.around.intersects_local_ray(ray, most) {
             return None;
         }
         let Some(faces) = &self.faces else {
-            return self.collider.shape().cast_ray(self.collider.position(), ray, most, true);
+            return self
+                .collider
+                .shape()
+                .cast_ray(self.collider.position(), ray, most, true);
         };
         let ray = ray.inverse_transform_by(self.collider.position());
         let (mut enters, mut leaves) = (0.0, most);
         for face in faces {
-            let (behind, along) = (face.offset - face.outwards.dot(ray.origin), face.outwards.dot(ray.dir));
+            let (behind, along) = (
+                face.offset - face.outwards.dot(ray.origin),
+                face.outwards.dot(ray.dir),
+            );
             if along < 0.0 {
                 enters = Real::max(enters, behind / along);
             } else if along > 0.0 {
@@ -136,8 +164,17 @@ pub(crate) struct Probe<'a> {
 }
 
 impl<'a> Probe<'a> {
-    pub(crate) fn new(model: &'a RobotModel, links: [usize; 2], grasp: (usize, Isometry3<f64>)) -> Self {
-        Self { model, links, grasp, surfaces: links.map(|link| model.links[link].surface()) }
+    pub(crate) fn new(
+        model: &'a RobotModel,
+        links: [usize; 2],
+        grasp: (usize, Isometry3<f64>),
+    ) -> Self {
+        Self {
+            model,
+            links,
+            grasp,
+            surfaces: links.map(|link| model.links[link].surface()),
+        }
     }
 
     /// The links of the fingertips, left and right.
@@ -149,39 +186,60 @@ impl<'a> Probe<'a> {
     pub(crate) fn moving(&self, joints: &[usize]) -> Moving {
         let above = |link: usize| -> Vec<usize> {
             let parent = |joint: &usize| self.model.joints[*joint].parent.checked_sub(1);
-            std::iter::successors(link.checked_sub(1), parent).filter(|joint| joints.contains(joint)).collect()
+            std::iter::successors(link.checked_sub(1), parent)
+                .filter(|joint| joints.contains(joint))
+                .collect()
         };
-        Moving { grasp_frame: !above(self.grasp.0).is_empty(), fingers: self.links.map(above) }
+        Moving {
+            grasp_frame: !above(self.grasp.0).is_empty(),
+            fingers: self.links.map(above),
+        }
     }
 
-    /// Measures the gap at these joint positions. Returns `None` if a finger has no surface at the grasp frame.
+    /// Measures the gap at these joint positions. Returns `None` if a finger has no surface at the
+    /// grasp frame.
     pub(crate) fn gap(&self, positions: &[f64]) -> Option<Gap> {
         let grasp = self.pose(self.grasp.0, positions) * self.grasp.1;
         let [left, right] = [0, 1].map(|side| {
-            // The left finger's inner surface is its lowest along y, the right finger's its highest.
+            // The left finger's inner surface is its lowest along y, the right finger's its
+            // highest.
             let sign = if side == 0 { 1.0 } else { -1.0 };
             let from_grasp = self.pose(self.links[side], positions).inverse() * grasp;
-            self.nearest_hit(side, Self::rays(&from_grasp, sign)).map(|along| sign * (along - AWAY_M))
+            self.nearest_hit(side, Self::rays(&from_grasp, sign))
+                .map(|along| sign * (along - AWAY_M))
         });
-        Some(Gap { left_m: left?, right_m: right? })
+        Some(Gap {
+            left_m: left?,
+            right_m: right?,
+        })
     }
 
-    /// Returns the share of the measured length along the fingers at which their gap is nearly the smallest: 1 if the
-    /// grasp frame is in the middle of two parallel pads.
+    /// Returns the share of the measured length along the fingers at which their gap is nearly the
+    /// smallest: 1 if the grasp frame is in the middle of two parallel pads.
     pub(crate) fn flat_share(&self, positions: &[f64]) -> f64 {
         let grasp = self.pose(self.grasp.0, positions) * self.grasp.1;
         let width = |row: usize| -> Option<f64> {
             let [left, right] = [0, 1].map(|side| {
                 let sign = if side == 0 { 1.0 } else { -1.0 };
                 let from_grasp = self.pose(self.links[side], positions).inverse() * grasp;
-                let rays = Self::rays(&from_grasp, sign).skip(row * ACROSS_M.len()).take(ACROSS_M.len());
+                let rays = Self::rays(&from_grasp, sign)
+                    .skip(row * ACROSS_M.len())
+                    .take(ACROSS_M.len());
                 self.nearest_hit(side, rays).map(|along| along - AWAY_M)
             });
             Some(left? + right?)
         };
         let widths: Vec<Option<f64>> = (0..ALONG_M.len()).map(width).collect();
-        let least = widths.iter().flatten().copied().fold(f64::INFINITY, f64::min);
-        let flat = widths.iter().flatten().filter(|width| **width < least + FLAT_M).count();
+        let least = widths
+            .iter()
+            .flatten()
+            .copied()
+            .fold(f64::INFINITY, f64::min);
+        let flat = widths
+            .iter()
+            .flatten()
+            .filter(|width| **width < least + FLAT_M)
+            .count();
         flat as f64 / ALONG_M.len() as f64
     }
 
@@ -201,7 +259,9 @@ impl<'a> Probe<'a> {
         let solids = || self.surfaces[side].solids.iter();
         // Solids whose box begins beyond the nearest one so far need no look.
         let nearest = rays.fold(farthest, |nearest, ray| {
-            solids().fold(nearest, |nearest, solid| solid.hit(&ray, nearest).unwrap_or(nearest).min(nearest))
+            solids().fold(nearest, |nearest, solid| {
+                solid.hit(&ray, nearest).unwrap_or(nearest).min(nearest)
+            })
         });
         (nearest < farthest).then_some(f64::from(nearest))
     }
@@ -209,11 +269,14 @@ impl<'a> Probe<'a> {
     /// A finger: its link, and the link's pose in the grasp frame at these joint positions.
     pub(crate) fn finger(&self, side: usize, positions: &[f64]) -> (usize, Isometry3<f64>) {
         let grasp = self.pose(self.grasp.0, positions) * self.grasp.1;
-        (self.links[side], grasp.inverse() * self.pose(self.links[side], positions))
+        (
+            self.links[side],
+            grasp.inverse() * self.pose(self.links[side], positions),
+        )
     }
 
-    /// Returns the point of a link that is nearest to the origin of the grasp frame, in that frame; `None` if the link has no
-    /// shape. Unit: metres.
+    /// Returns the point of a link that is nearest to the origin of the grasp frame, in that frame;
+    /// `None` if the link has no shape. Unit: metres.
     pub(super) fn nearest(&self, link: usize, positions: &[f64]) -> Option<Vector3<f64>> {
         let grasp = self.pose(self.grasp.0, positions) * self.grasp.1;
         let from_grasp = grasp.inverse() * self.pose(link, positions);
@@ -221,10 +284,16 @@ impl<'a> Probe<'a> {
         let surface = self.model.links[link].surface();
         let nearest = |solid: &Solid| {
             let shape = solid.collider.shape();
-            let at = shape.project_point(solid.collider.position(), origin, true).point;
+            let at = shape
+                .project_point(solid.collider.position(), origin, true)
+                .point;
             (from_grasp * Point3::new(f64::from(at.x), f64::from(at.y), f64::from(at.z))).coords
         };
-        surface.solids.iter().map(nearest).min_by(|a, b| a.norm().total_cmp(&b.norm()))
+        surface
+            .solids
+            .iter()
+            .map(nearest)
+            .min_by(|a, b| a.norm().total_cmp(&b.norm()))
     }
 
     /// Pose of a link in the frame of the root, with the other joints at 0.
@@ -245,7 +314,8 @@ mod tests {
     use super::*;
     use actcheck_data::{Pose, Shape};
 
-    /// The planes through any three points that have all others on one side: outward normal and offset.
+    /// The planes through any three points that have all others on one side: outward normal and
+    /// offset.
     fn planes(points: &[Vector3<f64>]) -> Vec<(Vector3<f64>, f64)> {
         let mut found = Vec::new();
         for (a, first) in points.iter().enumerate() {
@@ -254,7 +324,10 @@ mod tests {
                     let normal = (second - first).cross(&(third - first)).normalize();
                     for outwards in [normal, -normal] {
                         let offset = outwards.dot(first);
-                        if points.iter().all(|point| outwards.dot(point) <= offset + 1e-9) {
+                        if points
+                            .iter()
+                            .all(|point| outwards.dot(point) <= offset + 1e-9)
+                        {
                             found.push((outwards, offset));
                         }
                     }
@@ -268,9 +341,22 @@ mod tests {
     #[test]
     fn rays_meet_hulls_where_they_begin() {
         let at = |n: u32| libm::sin(f64::from(n * n) * 12.9898) * 0.03;
-        let points: Vec<[f64; 3]> = (0..60).map(|n| [at(n), at(n + 1000), 2.0 * at(n + 2000)]).collect();
-        let planes = planes(&points.iter().map(|point| Vector3::from(*point)).collect::<Vec<_>>());
-        let part = Part { pose: Pose::IDENTITY, shape: Shape::Hull { points, volume: 1e-5 } };
+        let points: Vec<[f64; 3]> = (0..60)
+            .map(|n| [at(n), at(n + 1000), 2.0 * at(n + 2000)])
+            .collect();
+        let planes = planes(
+            &points
+                .iter()
+                .map(|point| Vector3::from(*point))
+                .collect::<Vec<_>>(),
+        );
+        let part = Part {
+            pose: Pose::IDENTITY,
+            shape: Shape::Hull {
+                points,
+                volume: 1e-5,
+            },
+        };
         let surface = Surface::of(&[part]);
         let mut hits = 0;
         for trial in 0..500 {
@@ -280,11 +366,19 @@ mod tests {
             for (outwards, offset) in &planes {
                 let along = outwards.dot(&direction);
                 let end = (offset - outwards.dot(&origin)) / along;
-                if along < 0.0 { enters = enters.max(end) } else { leaves = leaves.min(end) }
+                if along < 0.0 {
+                    enters = enters.max(end)
+                } else {
+                    leaves = leaves.min(end)
+                }
             }
-            let found = surface.solids[0].hit(&Ray::new(to_vector(&origin), to_vector(&direction)), 1.0);
+            let found =
+                surface.solids[0].hit(&Ray::new(to_vector(&origin), to_vector(&direction)), 1.0);
             match found {
-                Some(found) => assert!((f64::from(found) - enters).abs() < 5e-4, "trial {trial}: {found} {enters}"),
+                Some(found) => assert!(
+                    (f64::from(found) - enters).abs() < 5e-4,
+                    "trial {trial}: {found} {enters}"
+                ),
                 None => assert!(leaves < enters + 5e-4, "trial {trial}: {enters} {leaves}"),
             }
             hits += usize::from(found.is_some());

@@ -14,7 +14,8 @@ use crate::gripper::sliding::sliding;
 use crate::gripper::table::{Entry, longest_run, travel};
 use actcheck_data::RobotProfile;
 
-/// Intervals of the table. At this number, the error between entries is about 0.01 mm for a finger of 10 cm.
+/// Intervals of the table. At this number, the error between entries is about 0.01 mm for a finger
+/// of 10 cm.
 const INTERVALS: usize = 60;
 /// Intervals where candidates are compared.
 const FEW_INTERVALS: usize = 15;
@@ -24,10 +25,12 @@ const LEAST_TRAVEL_M: f64 = 0.005;
 const LEAST_LEVER_M: f64 = 1e-4;
 
 impl Gripper {
-    /// Finds the gripper of a profile. `links` are the fingers, `grasp` is the grasp frame with its link.
+    /// Finds the gripper of a profile. `links` are the fingers, `grasp` is the grasp frame with its
+    /// link.
     ///
     /// # Errors
-    /// [`WorldError::Gripper`] if the opening can't be measured, [`WorldError::Missing`] for an unknown joint.
+    /// [`WorldError::Gripper`] if the opening can't be measured, [`WorldError::Missing`] for an
+    /// unknown joint.
     pub(crate) fn find(
         profile: &RobotProfile,
         model: &RobotModel,
@@ -57,20 +60,32 @@ impl Gripper {
         if let Some(cup) = &profile.suction {
             return Ok(Self::cup(2.0 * cup.radius_m));
         }
-        let named = profile.finger_joints.iter().map(|name| model.joint(name)).collect::<Result<Vec<_>, _>>()?;
+        let named = profile
+            .finger_joints
+            .iter()
+            .map(|name| model.joint(name))
+            .collect::<Result<Vec<_>, _>>()?;
         let [left, right] = links;
         // Some robots name their fingers as seen from the front.
         let probes = [[left, right], [right, left]].map(|links| Probe::new(model, links, grasp));
-        if let Some(sliding) = probes.iter().find_map(|probe| sliding(&named, model, probe)) {
+        if let Some(sliding) = probes
+            .iter()
+            .find_map(|probe| sliding(&named, model, probe))
+        {
             return Ok(sliding);
         }
         let [usual, swapped] = probes.map(|probe| measured(&named, model, &probe, n_intervals));
         let found = match (usual, swapped) {
-            (Ok(usual), Ok(swapped)) if swapped.widest_m > usual.widest_m => Ok(swapped.with_sides_swapped()),
+            (Ok(usual), Ok(swapped)) if swapped.widest_m > usual.widest_m => {
+                Ok(swapped.with_sides_swapped())
+            }
             (Err(_), Ok(swapped)) => Ok(swapped.with_sides_swapped()),
             (usual, _) => usual,
         };
-        found.map_err(|what| WorldError::Gripper { name: profile.urdf.name.to_string(), what })
+        found.map_err(|what| WorldError::Gripper {
+            name: profile.urdf.name.to_string(),
+            what,
+        })
     }
 
     /// The same gripper with the fingers in the profile's order.
@@ -81,14 +96,23 @@ impl Gripper {
 }
 
 /// Measures the opening on the model. The error is a sentence.
-fn measured(named: &[usize], model: &RobotModel, probe: &Probe<'_>, n_intervals: usize) -> Result<Gripper, String> {
+fn measured(
+    named: &[usize],
+    model: &RobotModel,
+    probe: &Probe<'_>,
+    n_intervals: usize,
+) -> Result<Gripper, String> {
     let drive = Drive::find(named, model, probe)?;
     let best = drive
         .ways()
         .into_iter()
         .filter_map(|ends| {
-            let gap = |idx: usize| probe.gap(&drive.posture(&ends, idx as f64 / n_intervals as f64));
-            Some((longest_run(&(0..=n_intervals).map(gap).collect::<Vec<_>>())?, ends))
+            let gap =
+                |idx: usize| probe.gap(&drive.posture(&ends, idx as f64 / n_intervals as f64));
+            Some((
+                longest_run(&(0..=n_intervals).map(gap).collect::<Vec<_>>())?,
+                ends,
+            ))
         })
         .max_by(|a, b| travel(&a.0).total_cmp(&travel(&b.0)));
     let Some((table, ends)) = best.filter(|(table, _)| travel(table) > LEAST_TRAVEL_M) else {
@@ -118,54 +142,93 @@ impl<'a> Drive<'a> {
     fn find(named: &[usize], model: &'a RobotModel, probe: &Probe<'_>) -> Result<Self, String> {
         let all = leaders(named, model);
         let coupled = followers(&all, model);
-        let joints: Vec<usize> = all.iter().copied().chain(coupled.iter().map(|own| own.joint)).collect();
+        let joints: Vec<usize> = all
+            .iter()
+            .copied()
+            .chain(coupled.iter().map(|own| own.joint))
+            .collect();
         let moving = probe.moving(&joints);
         if moving.grasp_frame {
             return Err("its fingers can't be measured: the joints in `finger_joints` move the `grasp_link`".to_owned());
         }
         let leader_of = |joint: usize| {
-            let followed = coupled.iter().find(|own| own.joint == joint).map(|own| all[own.leader]);
+            let followed = coupled
+                .iter()
+                .find(|own| own.joint == joint)
+                .map(|own| all[own.leader]);
             followed.unwrap_or(joint)
         };
-        let by_finger = moving.fingers.map(|joints| joints.into_iter().map(leader_of).collect::<Vec<_>>());
-        let (leaders, others): (Vec<usize>, Vec<usize>) =
-            all.iter().partition(|joint| by_finger.iter().any(|of_finger| of_finger.contains(joint)));
+        let by_finger = moving
+            .fingers
+            .map(|joints| joints.into_iter().map(leader_of).collect::<Vec<_>>());
+        let (leaders, others): (Vec<usize>, Vec<usize>) = all
+            .iter()
+            .partition(|joint| by_finger.iter().any(|of_finger| of_finger.contains(joint)));
         // The outermost joint of a finger.
-        let side = |joints: &Vec<usize>| joints.first().and_then(|own| leaders.iter().position(|other| other == own));
+        let side = |joints: &Vec<usize>| {
+            joints
+                .first()
+                .and_then(|own| leaders.iter().position(|other| other == own))
+        };
         let sides = match by_finger.each_ref().map(side) {
             [Some(left), Some(right)] => [left, right],
             [Some(only), None] | [None, Some(only)] => [only; 2],
-            [None, None] => return Err("none of its `finger_joints` moves one of its `finger_links`".to_owned()),
+            [None, None] => {
+                return Err(
+                    "none of its `finger_joints` moves one of its `finger_links`".to_owned(),
+                );
+            }
         };
         let unlimited = |joint: &&usize| !model.joints[**joint].upper.is_finite();
         if let Some(joint) = all.iter().find(unlimited) {
             let name = &model.joints[*joint].name;
-            return Err(format!("the opening of its gripper can't be measured: `{name}` has no limits"));
+            return Err(format!(
+                "the opening of its gripper can't be measured: `{name}` has no limits"
+            ));
         }
-        let further = others.iter().map(|joint| Further::find(*joint, model, probe)).collect();
+        let further = others
+            .iter()
+            .map(|joint| Further::find(*joint, model, probe))
+            .collect();
         let followers = followers(&[leaders.clone(), others].concat(), model);
-        Ok(Self { model, leaders, further, followers, sides })
+        Ok(Self {
+            model,
+            leaders,
+            further,
+            followers,
+            sides,
+        })
     }
 
-    /// Returns the ways on which the gripper may open: the first and the last position of each leader, then of each further
-    /// joint.
+    /// Returns the ways on which the gripper may open: the first and the last position of each
+    /// leader, then of each further joint.
     fn ways(&self) -> Vec<Vec<(f64, f64)>> {
         let limits = |joint: &usize| {
-            let Joint { kind, lower, upper, .. } = self.model.joints[*joint];
+            let Joint {
+                kind, lower, upper, ..
+            } = self.model.joints[*joint];
             match kind {
                 // More than a turn repeats it, with fewer entries in each turn.
                 JointKind::Revolute if upper - lower > TAU => (lower.max(-PI), upper.min(PI)),
                 _ => (lower, upper),
             }
         };
-        let turned = |(from, to): (f64, f64), falls: bool| if falls { (to, from) } else { (from, to) };
+        let turned =
+            |(from, to): (f64, f64), falls: bool| if falls { (to, from) } else { (from, to) };
         // Joints may open in opposite directions. Bit n: the leader n falls.
         let all_fall = (1_usize << self.leaders.len()) - 1;
         let ways = [0, all_fall].into_iter().chain((1..all_fall).rev());
-        let further = || self.further.iter().map(|own| turned(limits(&own.joint), own.falls));
+        let further = || {
+            self.further
+                .iter()
+                .map(|own| turned(limits(&own.joint), own.falls))
+        };
         let of = |way: usize| {
-            let leaders =
-                self.leaders.iter().enumerate().map(|(idx, joint)| turned(limits(joint), way >> idx & 1 == 1));
+            let leaders = self
+                .leaders
+                .iter()
+                .enumerate()
+                .map(|(idx, joint)| turned(limits(joint), way >> idx & 1 == 1));
             leaders.chain(further()).collect()
         };
         ways.map(of).collect()
@@ -173,7 +236,11 @@ impl<'a> Drive<'a> {
 
     /// All joints with motors.
     fn motors(&self) -> Vec<usize> {
-        self.leaders.iter().copied().chain(self.further.iter().map(|own| own.joint)).collect()
+        self.leaders
+            .iter()
+            .copied()
+            .chain(self.further.iter().map(|own| own.joint))
+            .collect()
     }
 
     /// Returns the positions of all joints at a share of a way.
@@ -183,7 +250,13 @@ impl<'a> Drive<'a> {
         for (motor, (from, to)) in motors.iter().zip(ends) {
             positions[*motor] = from + share * (to - from);
         }
-        for Follower { joint, leader, factor, offset } in &self.followers {
+        for Follower {
+            joint,
+            leader,
+            factor,
+            offset,
+        } in &self.followers
+        {
             positions[*joint] = factor * positions[motors[*leader]] + offset;
         }
         positions
@@ -198,25 +271,40 @@ impl<'a> Drive<'a> {
         let travels = [open.left_m - closed.left_m, closed.right_m - open.right_m];
         let n_measured = self.leaders.len();
         // Fingers on the same side of an object share the force with which the other side presses.
-        let n_on = [0, 1].map(|side| 1 + self.further.iter().filter(|own| own.side == side).count());
+        let n_on =
+            [0, 1].map(|side| 1 + self.further.iter().filter(|own| own.side == side).count());
         let motors = self.motors();
-        let leaders = motors.iter().zip(ends).enumerate().map(|(idx, (joint, (from, to)))| {
-            let side_of = |idx: usize| self.further.get(idx - n_measured).map_or(0, |own| own.side);
-            let sides: Vec<usize> = match idx < n_measured {
-                true => (0..2).filter(|side| self.sides[*side] == idx).collect(),
-                false => vec![side_of(idx)],
-            };
-            let moved: f64 = sides.iter().map(|side| travels[*side]).sum();
-            let at = |share: f64| from + share * (to - from);
-            let lever_m = (moved / (at(last) - at(first))).abs().max(LEAST_LEVER_M);
-            let force_share = match sides[..] {
-                [side] => 1.0 / n_on[side] as f64,
-                _ => 1.0,
-            };
-            Leader { joint: *joint, closed: at(first), open: at(last), lever_m, force_share }
-        });
+        let leaders = motors
+            .iter()
+            .zip(ends)
+            .enumerate()
+            .map(|(idx, (joint, (from, to)))| {
+                let side_of =
+                    |idx: usize| self.further.get(idx - n_measured).map_or(0, |own| own.side);
+                let sides: Vec<usize> = match idx < n_measured {
+                    true => (0..2).filter(|side| self.sides[*side] == idx).collect(),
+                    false => vec![side_of(idx)],
+                };
+                let moved: f64 = sides.iter().map(|side| travels[*side]).sum();
+                let at = |share: f64| from + share * (to - from);
+                let lever_m = (moved / (at(last) - at(first))).abs().max(LEAST_LEVER_M);
+                let force_share = match sides[..] {
+                    [side] => 1.0 / n_on[side] as f64,
+                    _ => 1.0,
+                };
+                Leader {
+                    joint: *joint,
+                    closed: at(first),
+                    open: at(last),
+                    lever_m,
+                    force_share,
+                }
+            });
         let leaders: Vec<Leader> = leaders.collect();
-        let shared = |entry: &Entry| Entry { share: (entry.share - first) / (last - first), gap: entry.gap };
+        let shared = |entry: &Entry| Entry {
+            share: (entry.share - first) / (last - first),
+            gap: entry.gap,
+        };
         Gripper {
             leaders,
             n_measured,

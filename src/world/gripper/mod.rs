@@ -1,9 +1,10 @@
-//! The gripper: which joints move its fingers, and how far apart these are at any position of the joints.
+//! The gripper: which joints move its fingers, and how far apart these are at any position of the
+//! joints.
 //!
-//! Two fingers that slide apart from 0 need no table: each is at half of the opening. For all other grippers (turning
-//! fingers, other directions, couplings, one moving finger), the opening is measured on the model at evenly spaced
-//! positions between open and closed. Hands with more fingers have an opening between two of them; the further ones open
-//! and close with these.
+//! Two fingers that slide apart from 0 need no table: each is at half of the opening. For all other
+//! grippers (turning fingers, other directions, couplings, one moving finger), the opening is
+//! measured on the model at evenly spaced positions between open and closed. Hands with more
+//! fingers have an opening between two of them; the further ones open and close with these.
 //!
 //! Never: knows the engine's state, or decides how wide to open.
 

@@ -4,8 +4,8 @@ use crate::description::{JointKind, RobotModel};
 use crate::gripper::gap::Probe;
 use crate::gripper::opening::{Gripper, Leader};
 
-/// Two sliding fingers whose measured opening differs by less than this from the sum of their positions need no table.
-/// Unit: metres.
+/// Two sliding fingers whose measured opening differs by less than this from the sum of their
+/// positions need no table. Unit: metres.
 const SLIDING_SLACK_M: f64 = 0.005;
 /// Tolerance of limits, which are often rounded. Unit: metres.
 const LIMIT_SLACK_M: f64 = 1e-3;
@@ -22,14 +22,22 @@ pub(super) fn sliding(named: &[usize], model: &RobotModel, probe: &Probe<'_>) ->
             positions[joint] = end(model.joints[joint].lower, model.joints[joint].upper);
         }
         let known = positions[left] + positions[right];
-        probe.gap(&positions).is_none_or(|gap| (gap.width_m() - known).abs() < SLIDING_SLACK_M)
+        probe
+            .gap(&positions)
+            .is_none_or(|gap| (gap.width_m() - known).abs() < SLIDING_SLACK_M)
     };
     if !(opens_as_known(f64::min) && opens_as_known(f64::max)) {
         return None;
     }
     let leaders = [left, right].map(|idx| {
         let joint = &model.joints[idx];
-        Leader { joint: idx, closed: joint.lower, open: joint.upper, lever_m: 1.0, force_share: 1.0 }
+        Leader {
+            joint: idx,
+            closed: joint.lower,
+            open: joint.upper,
+            lever_m: 1.0,
+            force_share: 1.0,
+        }
     });
     Some(Gripper {
         leaders: leaders.to_vec(),
@@ -47,5 +55,8 @@ fn slides_from_0(joint: usize, named: &[usize], model: &RobotModel) -> bool {
     let as_the_other = joint.mimic.is_none_or(|(leader, factor, offset)| {
         named.contains(&leader) && (factor - 1.0).abs() < 1e-9 && offset.abs() < 1e-9
     });
-    as_the_other && joint.kind == JointKind::Prismatic && joint.lower > -LIMIT_SLACK_M && joint.upper > 0.0
+    as_the_other
+        && joint.kind == JointKind::Prismatic
+        && joint.lower > -LIMIT_SLACK_M
+        && joint.upper > 0.0
 }

@@ -9,11 +9,13 @@ use crate::{Joint, SelfContact, World, ik};
 use actcheck_base::{Files, Source};
 use actcheck_data::RobotProfile;
 
-/// A hand with fingers of 10 cm whose inner faces are 2 cm off its middle at position 0. The grasp frame is 10 cm
-/// from the hinges. `left` and `right` are the types and limits of the finger joints.
+/// A hand with fingers of 10 cm whose inner faces are 2 cm off its middle at position 0. The grasp
+/// frame is 10 cm from the hinges. `left` and `right` are the types and limits of the finger
+/// joints.
 pub(crate) fn hand(left: &str, right: &str, finger_joints: &[&str]) -> RobotProfile {
     let path = Path::new("models/robots/mobile_manipulator.toml");
-    let mut profile = actcheck_config::robot::read(&Files::Shipped, path).expect("the shipped robot is valid");
+    let mut profile =
+        actcheck_config::robot::read(&Files::Shipped, path).expect("the shipped robot is valid");
     let inertial = "<inertial><mass value=\"0.1\"/>\
                     <inertia ixx=\"1e-4\" ixy=\"0\" ixz=\"0\" iyy=\"1e-4\" iyz=\"0\" izz=\"1e-4\"/></inertial>";
     let finger = |name: &str, y: f64, joint: &str| {
@@ -41,7 +43,10 @@ pub(crate) fn hand(left: &str, right: &str, finger_joints: &[&str]) -> RobotProf
     profile.home = vec![0.6];
     profile.postures = Vec::new();
     profile.head_joints = Vec::new();
-    profile.finger_joints = finger_joints.iter().map(|name| (*name).to_owned()).collect();
+    profile.finger_joints = finger_joints
+        .iter()
+        .map(|name| (*name).to_owned())
+        .collect();
     profile.finger_links = ["left_finger", "right_finger"].map(str::to_owned);
     profile.grasp_link = "grasp".to_owned();
     profile.camera_link = "base".to_owned();
@@ -67,23 +72,43 @@ fn sliding_from(lower: f64, upper: f64, y: f64) -> String {
 const FIXED: &str = "type=\"fixed\">";
 const MIMIC: &str = "<mimic joint=\"left\" multiplier=\"-1\"/>";
 
-/// Distance of the inner face from the middle: nearest 9 cm from the hinge, at the border of the measured region.
+/// Distance of the inner face from the middle: nearest 9 cm from the hinge, at the border of the
+/// measured region.
 fn turned(angle: f64) -> f64 {
     0.02 + 0.09 * libm::tan(angle)
 }
 
-/// Hands, each with its motors, the positions of left and right finger at share 0.5 of the way, and the opening
-/// there in closed form.
+/// Hands, each with its motors, the positions of left and right finger at share 0.5 of the way, and
+/// the opening there in closed form.
 fn hands() -> Vec<(RobotProfile, Vec<f64>, f64)> {
     let (left, right) = (turning(0.0, 0.6), turning(-0.6, 0.0));
     let coupled = format!("{right}{MIMIC}");
-    let (down, up) = (sliding_from(-0.04, 0.0, -1.0), sliding_from(-0.04, 0.0, 1.0));
+    let (down, up) = (
+        sliding_from(-0.04, 0.0, -1.0),
+        sliding_from(-0.04, 0.0, 1.0),
+    );
     vec![
-        (hand(&left, &right, &["left", "right"]), vec![0.3, -0.3], 2.0 * turned(0.3)),
-        (hand(&left, &coupled, &["left"]), vec![0.3, -0.3], 2.0 * turned(0.3)),
-        (hand(&left, &coupled, &["left", "right"]), vec![0.3, -0.3], 2.0 * turned(0.3)),
+        (
+            hand(&left, &right, &["left", "right"]),
+            vec![0.3, -0.3],
+            2.0 * turned(0.3),
+        ),
+        (
+            hand(&left, &coupled, &["left"]),
+            vec![0.3, -0.3],
+            2.0 * turned(0.3),
+        ),
+        (
+            hand(&left, &coupled, &["left", "right"]),
+            vec![0.3, -0.3],
+            2.0 * turned(0.3),
+        ),
         (hand(&left, FIXED, &["left"]), vec![0.3], 0.02 + turned(0.3)),
-        (hand(&down, &up, &["left", "right"]), vec![-0.02, -0.02], 0.08),
+        (
+            hand(&down, &up, &["left", "right"]),
+            vec![-0.02, -0.02],
+            0.08,
+        ),
     ]
 }
 
@@ -92,14 +117,27 @@ fn the_opening_is_that_of_the_closed_form() {
     for (idx, (profile, positions, opening_m)) in hands().into_iter().enumerate() {
         let world = alone(profile);
         let gripper = &world.layout().gripper;
-        let place = |joint: &Joint| ["left", "right"].iter().position(|name| *name == joint.name);
+        let place = |joint: &Joint| {
+            ["left", "right"]
+                .iter()
+                .position(|name| *name == joint.name)
+        };
         let joints = world.kinematics().joints().iter();
-        let all: Vec<f64> = joints.map(|joint| place(joint).map_or(0.6, |idx| positions[idx])).collect();
+        let all: Vec<f64> = joints
+            .map(|joint| place(joint).map_or(0.6, |idx| positions[idx]))
+            .collect();
         let measured = gripper.opening_m(&all);
-        assert!((measured - opening_m).abs() < 2e-5, "hand {idx}: {measured} m instead of {opening_m} m");
+        assert!(
+            (measured - opening_m).abs() < 2e-5,
+            "hand {idx}: {measured} m instead of {opening_m} m"
+        );
         let mut set = vec![0.6; all.len()];
         gripper.set(&mut set, opening_m);
-        let far = set.iter().zip(&all).map(|(is, wanted)| (is - wanted).abs()).fold(0.0, f64::max);
+        let far = set
+            .iter()
+            .zip(&all)
+            .map(|(is, wanted)| (is - wanted).abs())
+            .fold(0.0, f64::max);
         assert!(far < 2e-4, "hand {idx}: {set:?} instead of {all:?}");
     }
 }
@@ -109,10 +147,14 @@ fn one_moving_finger_has_its_middle_beside_the_grasp_frame() {
     let world = alone(hands().swap_remove(3).0);
     let middle_m = world.layout().gripper.middle_m(0.02 + turned(0.3));
     let expected = f64::midpoint(turned(0.3), -0.02);
-    assert!((middle_m - expected).abs() < 2e-5, "{middle_m} m instead of {expected} m");
+    assert!(
+        (middle_m - expected).abs() < 2e-5,
+        "{middle_m} m instead of {expected} m"
+    );
 }
 
-/// A cylinder between two faces that are inclined by an angle to each other is pushed out with the tangent of half of it.
+/// A cylinder between two faces that are inclined by an angle to each other is pushed out with the
+/// tangent of half of it.
 #[test]
 fn fingers_that_turn_push_a_cylinder_out_as_calculated() {
     let angle = 0.3;
@@ -120,11 +162,20 @@ fn fingers_that_turn_push_a_cylinder_out_as_calculated() {
     let both = 2.0 * (0.1 * sin + 0.02 * cos);
     let one = 2.0 * (0.1 * sin + 0.04 * cos) / (1.0 + cos);
     let slides = 0.06;
-    let cases = [(0, both, angle), (1, both, angle), (3, one, angle / 2.0), (4, slides, 0.0)];
+    let cases = [
+        (0, both, angle),
+        (1, both, angle),
+        (3, one, angle / 2.0),
+        (4, slides, 0.0),
+    ];
     for (idx, diameter_m, half_angle) in cases {
-        let found = outward_push(&hands().swap_remove(idx).0, diameter_m).expect("the hand is valid");
+        let found =
+            outward_push(&hands().swap_remove(idx).0, diameter_m).expect("the hand is valid");
         let expected = libm::tan(half_angle);
-        assert!(found.is_some_and(|found| (found - expected).abs() < 1e-3), "hand {idx}: {found:?}, not {expected}");
+        assert!(
+            found.is_some_and(|found| (found - expected).abs() < 1e-3),
+            "hand {idx}: {found:?}, not {expected}"
+        );
     }
     let too_wide = outward_push(&hands().swap_remove(4).0, 0.2).expect("the hand is valid");
     assert_eq!(too_wide, None);
@@ -132,8 +183,10 @@ fn fingers_that_turn_push_a_cylinder_out_as_calculated() {
 
 #[test]
 fn one_of_the_hands_has_a_fixed_jaw() {
-    let are_fixed: Vec<bool> =
-        hands().into_iter().map(|(profile, ..)| alone(profile).layout().gripper.has_fixed_jaw()).collect();
+    let are_fixed: Vec<bool> = hands()
+        .into_iter()
+        .map(|(profile, ..)| alone(profile).layout().gripper.has_fixed_jaw())
+        .collect();
     assert_eq!(are_fixed, [false, false, false, true, false]);
 }
 
@@ -147,7 +200,10 @@ fn all_hands_open_and_close() {
             command.gripper_opening_m = opening_m;
             (0..120).for_each(|_| world.step(&command));
             let reached = world.observe().gripper_opening_m;
-            assert!((reached - opening_m).abs() < 1e-3, "hand {idx}: {reached} m instead of {opening_m} m");
+            assert!(
+                (reached - opening_m).abs() < 1e-3,
+                "hand {idx}: {reached} m instead of {opening_m} m"
+            );
         }
     }
 }
@@ -155,7 +211,11 @@ fn all_hands_open_and_close() {
 #[test]
 fn a_gripper_that_cannot_be_measured_is_refused() {
     let left = turning(0.0, 0.6);
-    let of = |profile: &RobotProfile| check_robot(profile).expect_err("it can't be measured").diagnostic();
+    let of = |profile: &RobotProfile| {
+        check_robot(profile)
+            .expect_err("it can't be measured")
+            .diagnostic()
+    };
     let mut apart = hand(&left, FIXED, &["left"]);
     apart.grasp_offset_m = [0.0, 0.0, 0.5];
     let mut inside = hand(&left, FIXED, &["left"]);
@@ -174,8 +234,8 @@ fn a_gripper_that_cannot_be_measured_is_refused() {
     }
 }
 
-/// A mast that mimics the lift has a motor of its own, which must not hold it back. (The torso of a robot whose arm and
-/// head are on one lift stayed at 0, and stopped the arm.)
+/// A mast that mimics the lift has a motor of its own, which must not hold it back. (The torso of a
+/// robot whose arm and head are on one lift stayed at 0, and stopped the arm.)
 #[test]
 fn a_mimic_joint_outside_the_gripper_follows_its_leader() {
     let (left, right) = (turning(0.0, 0.6), turning(-0.6, 0.0));
@@ -187,16 +247,28 @@ fn a_mimic_joint_outside_the_gripper_follows_its_leader() {
     profile.urdf = Source::new("hand.urdf", profile.urdf.text.replace("</robot>", mast));
     let mut world = alone(profile);
     let at = |world: &World, name: &str| {
-        let idx = world.kinematics().joints().iter().position(|joint| joint.name == name).expect("it has this joint");
+        let idx = world
+            .kinematics()
+            .joints()
+            .iter()
+            .position(|joint| joint.name == name)
+            .expect("it has this joint");
         (idx, world.observe().positions[idx])
     };
-    assert!((at(&world, "mast").1 - 0.3).abs() < 1e-6, "at home: {:?}", at(&world, "mast"));
+    assert!(
+        (at(&world, "mast").1 - 0.3).abs() < 1e-6,
+        "at home: {:?}",
+        at(&world, "mast")
+    );
     let mut command = world.hold();
     command.positions[at(&world, "lift").0] = 0.9;
     (0..180).for_each(|_| world.step(&command));
     for (name, wanted) in [("lift", 0.9), ("mast", 0.45)] {
         let reached = at(&world, name).1;
-        assert!((reached - wanted).abs() < 2e-3, "{name}: {reached} m instead of {wanted} m");
+        assert!(
+            (reached - wanted).abs() < 2e-3,
+            "{name}: {reached} m instead of {wanted} m"
+        );
     }
 }
 
@@ -208,23 +280,36 @@ fn inverse_kinematics_moves_the_joints_that_follow_others() {
     let stage = "<link name=\"stage\"/><joint name=\"second\" type=\"prismatic\"><parent link=\"stage\"/>\
                  <child link=\"palm\"/><axis xyz=\"0 0 1\"/><limit lower=\"0\" upper=\"0.1\" effort=\"300\" velocity=\"0.2\"/>\
                  <mimic joint=\"lift\" multiplier=\"0.5\"/></joint></robot>";
-    let text = profile.urdf.text.replacen("<child link=\"palm\"/>", "<child link=\"stage\"/>", 1);
+    let text = profile
+        .urdf
+        .text
+        .replacen("<child link=\"palm\"/>", "<child link=\"stage\"/>", 1);
     profile.urdf = Source::new("hand.urdf", text.replace("</robot>", stage));
     let world = alone(profile);
     let kinematics = world.kinematics();
-    let at = |name: &str| kinematics.joints().iter().position(|joint| joint.name == name).expect("it has this joint");
+    let at = |name: &str| {
+        kinematics
+            .joints()
+            .iter()
+            .position(|joint| joint.name == name)
+            .expect("it has this joint")
+    };
     let start = world.observe().positions;
     let target = nalgebra::Translation3::new(0.0, 0.0, 0.15) * kinematics.grasp(&start);
     let mut mobility = vec![0.0; start.len()];
     mobility[at("lift")] = 1.0;
-    let found = ik::solve(kinematics, &start, &ik::Reach { target, mobility }).expect("it is within reach");
+    let found =
+        ik::solve(kinematics, &start, &ik::Reach { target, mobility }).expect("it is within reach");
     assert!((found[at("lift")] - 0.7).abs() < 2e-3, "{found:?}");
     // The limits of the second stage would stop it at 0.1 m.
     assert!((found[at("second")] - 0.35).abs() < 1e-3, "{found:?}");
-    assert!((kinematics.grasp(&found).translation.vector - target.translation.vector).norm() < 1e-3);
+    assert!(
+        (kinematics.grasp(&found).translation.vector - target.translation.vector).norm() < 1e-3
+    );
 }
 
-/// The convex shapes of neighbouring fingers overlap where the real ones do not; an arm brings none of them together.
+/// The convex shapes of neighbouring fingers overlap where the real ones do not; an arm brings none
+/// of them together.
 #[test]
 fn fingers_that_overlap_do_not_forbid_postures_of_the_arm() {
     let (left, right) = (turning(0.0, 0.6), turning(-0.6, 0.0));
@@ -239,7 +324,11 @@ fn fingers_that_overlap_do_not_forbid_postures_of_the_arm() {
     let itself = SelfContact::new(world.kinematics(), &[]);
     for opening_m in [0.0, 0.02, 0.1] {
         world.layout().gripper.set(&mut positions, opening_m);
-        assert_eq!(itself.touching(&world.kinematics().links(&positions)), None, "{opening_m} m");
+        assert_eq!(
+            itself.touching(&world.kinematics().links(&positions)),
+            None,
+            "{opening_m} m"
+        );
     }
 }
 
@@ -256,10 +345,13 @@ fn the_grip_is_as_strong_as_its_motors() {
     let coupled = of(&hand(&left, &format!("{right}{MIMIC}"), &["left"]));
     assert!((coupled - 10.0 / lever_m).abs() < 0.5, "{coupled} N");
     // An effort of 0 is unknown: it is as if it were 100 Nm.
-    let efforts =
-        ["0", "100"].map(|effort| turning(0.0, 0.6).replace("effort=\"20\"", &format!("effort=\"{effort}\"")));
+    let efforts = ["0", "100"]
+        .map(|effort| turning(0.0, 0.6).replace("effort=\"20\"", &format!("effort=\"{effort}\"")));
     let [unknown, strong] = efforts.map(|left| of(&hand(&left, FIXED, &["left"])));
-    assert!((unknown - strong).abs() < 1e-9 && strong > 100.0, "{unknown} N, {strong} N");
+    assert!(
+        (unknown - strong).abs() < 1e-9 && strong > 100.0,
+        "{unknown} N, {strong} N"
+    );
 }
 
 /// A hand with a third finger beside the right one, whose joint turns in the other direction.
@@ -274,13 +366,19 @@ fn three_fingers(finger_joints: &[&str]) -> RobotProfile {
     profile
 }
 
-/// A third finger closes with the one beside it, and both share the force of their side, in whatever order they are named.
+/// A third finger closes with the one beside it, and both share the force of their side, in
+/// whatever order they are named.
 #[test]
 fn a_third_finger_moves_with_the_others() {
     for names in [["left", "right", "third"], ["third", "right", "left"]] {
         let mut world = alone(three_fingers(&names));
         let at = |world: &World, name: &str| {
-            world.kinematics().joints().iter().position(|joint| joint.name == name).expect("it has this joint")
+            world
+                .kinematics()
+                .joints()
+                .iter()
+                .position(|joint| joint.name == name)
+                .expect("it has this joint")
         };
         let joints = ["left", "right", "third"].map(|name| at(&world, name));
         let gripper = world.layout().gripper.clone();
@@ -288,17 +386,33 @@ fn a_third_finger_moves_with_the_others() {
         gripper.set(&mut set, 2.0 * turned(0.3));
         let found = joints.map(|joint| set[joint]);
         for (found, wanted) in found.iter().zip([0.3, -0.3, 0.3]) {
-            assert!((found - wanted).abs() < 2e-4, "{names:?}: {found} instead of {wanted}");
+            assert!(
+                (found - wanted).abs() < 2e-4,
+                "{names:?}: {found} instead of {wanted}"
+            );
         }
-        assert!((gripper.opening_m(&set) - 2.0 * turned(0.3)).abs() < 2e-5, "{names:?}");
-        let [left, right, third] = joints.map(|joint| gripper.effort_per_n(joint).expect("it has a motor"));
-        assert!((right / left - 0.5).abs() < 1e-6 && (third / left - 0.5).abs() < 1e-6, "{left} {right} {third}");
+        assert!(
+            (gripper.opening_m(&set) - 2.0 * turned(0.3)).abs() < 2e-5,
+            "{names:?}"
+        );
+        let [left, right, third] =
+            joints.map(|joint| gripper.effort_per_n(joint).expect("it has a motor"));
+        assert!(
+            (right / left - 0.5).abs() < 1e-6 && (third / left - 0.5).abs() < 1e-6,
+            "{left} {right} {third}"
+        );
         let mut command = world.hold();
         for opening_m in [0.07, 0.06] {
             command.gripper_opening_m = opening_m;
             (0..120).for_each(|_| world.step(&command));
-            let (is, wanted) = (world.observe().positions[joints[2]], gripper.target(joints[2], opening_m));
-            assert!(wanted.is_some_and(|wanted| (is - wanted).abs() < 5e-3), "{names:?}: {is} instead of {wanted:?}");
+            let (is, wanted) = (
+                world.observe().positions[joints[2]],
+                gripper.target(joints[2], opening_m),
+            );
+            assert!(
+                wanted.is_some_and(|wanted| (is - wanted).abs() < 5e-3),
+                "{names:?}: {is} instead of {wanted:?}"
+            );
         }
     }
 }
@@ -309,14 +423,17 @@ fn the_links_of_a_gripper_pass_through_each_other_but_its_fingertips_do_not() {
     let (left, right) = (turning(0.0, 0.6), turning(-0.6, 0.0));
     let profile = hand(&left, &right, &["left", "right"]);
     let model = RobotModel::read(&profile).expect("it is valid");
-    let passing = Named::find(&profile, &model).expect("it is valid").passing(&model);
+    let passing = Named::find(&profile, &model)
+        .expect("it is valid")
+        .passing(&model);
     let links = |pair: &(usize, usize)| [pair.0, pair.1].map(|link| model.links[link].name.clone());
     let mut found: Vec<[String; 2]> = passing.iter().map(links).collect();
     found.sort();
     assert_eq!(found, [["palm", "left_finger"], ["palm", "right_finger"]]);
 }
 
-/// A joint without a role is rigid at the position nearest to 0, also where it carries the hand; a programmed one moves.
+/// A joint without a role is rigid at the position nearest to 0, also where it carries the hand; a
+/// programmed one moves.
 #[test]
 fn joints_without_a_role_are_rigid() {
     let (left, right) = (turning(0.0, 0.6), turning(-0.6, 0.0));
@@ -327,36 +444,58 @@ fn joints_without_a_role_are_rigid() {
     profile.urdf = Source::new("hand.urdf", profile.urdf.text.replace("</robot>", mast));
     let names = |profile: &RobotProfile| -> Vec<String> {
         let model = RobotModel::read(profile).expect("it is valid");
-        let mut names: Vec<String> = model.joints.iter().map(|joint| joint.name.clone()).collect();
+        let mut names: Vec<String> = model
+            .joints
+            .iter()
+            .map(|joint| joint.name.clone())
+            .collect();
         names.sort();
         names
     };
     assert_eq!(names(&profile), ["left", "lift", "right"]);
     let world = alone(profile.clone());
-    let height = world.kinematics().grasp(&world.observe().positions).translation.z;
-    assert!((height - 0.85).abs() < 1e-6, "the mast is at 0.25 m, the lift at 0.6 m: {height} m");
+    let height = world
+        .kinematics()
+        .grasp(&world.observe().positions)
+        .translation
+        .z;
+    assert!(
+        (height - 0.85).abs() < 1e-6,
+        "the mast is at 0.25 m, the lift at 0.6 m: {height} m"
+    );
     profile.other_joints = vec!["mast".to_owned()];
     assert_eq!(names(&profile), ["left", "lift", "mast", "right"]);
 }
 
-/// Coupled joints have the rotors' inertia together: as much as a single one would have for their common motion.
+/// Coupled joints have the rotors' inertia together: as much as a single one would have for their
+/// common motion.
 #[test]
 fn coupled_joints_share_the_inertia_of_the_rotors() {
     let (left, right) = (turning(0.0, 0.6), turning(-0.6, 0.0));
     let of = |profile: &RobotProfile| {
         let model = RobotModel::read(profile).expect("it is a URDF");
-        Named::find(profile, &model).expect("it has a gripper").layout.gripper
+        Named::find(profile, &model)
+            .expect("it has a gripper")
+            .layout
+            .gripper
     };
     let alone = of(&hand(&left, FIXED, &["left"]));
     let coupled = of(&hand(&left, &format!("{right}{MIMIC}"), &["left"]));
     let inertia = |gripper: &crate::Gripper, factors: &[f64]| -> f64 {
-        gripper.joints().zip(factors).map(|(joint, factor)| gripper.armature(joint, 0.05) * factor * factor).sum()
+        gripper
+            .joints()
+            .zip(factors)
+            .map(|(joint, factor)| gripper.armature(joint, 0.05) * factor * factor)
+            .sum()
     };
     for (gripper, factors) in [(&alone, &[1.0][..]), (&coupled, &[1.0, -1.0])] {
         let (_, lever_m) = gripper.motors().next().expect("it has a motor");
         assert!((inertia(gripper, factors) - 0.05 * lever_m * lever_m).abs() < 1e-12);
     }
-    let shares: Vec<f64> = coupled.joints().map(|joint| coupled.armature(joint, 0.05)).collect();
+    let shares: Vec<f64> = coupled
+        .joints()
+        .map(|joint| coupled.armature(joint, 0.05))
+        .collect();
     assert_eq!(shares.len(), 2);
     assert!((shares[0] - shares[1]).abs() < 1e-15, "{shares:?}");
 }
@@ -364,15 +503,21 @@ fn coupled_joints_share_the_inertia_of_the_rotors() {
 /// The names of the links of both fingers, sorted.
 fn links_of_fingers(profile: &RobotProfile) -> [Vec<String>; 2] {
     let model = RobotModel::read(profile).expect("it is valid");
-    let fingers = Named::find(profile, &model).expect("it has a gripper").fingers;
+    let fingers = Named::find(profile, &model)
+        .expect("it has a gripper")
+        .fingers;
     fingers.map(|finger| {
-        let mut names: Vec<String> = finger.into_iter().map(|link| model.links[link].name.clone()).collect();
+        let mut names: Vec<String> = finger
+            .into_iter()
+            .map(|link| model.links[link].name.clone())
+            .collect();
         names.sort();
         names
     })
 }
 
-/// A link with a shape in front of its joint, as many as there are; `joint` is the rest of the joint.
+/// A link with a shape in front of its joint, as many as there are; `joint` is the rest of the
+/// joint.
 fn link(name: &str, shape: &str, joint: &str) -> String {
     format!(
         "<link name=\"{name}\"><inertial><mass value=\"0.1\"/><inertia ixx=\"1e-4\" ixy=\"0\" ixz=\"0\" iyy=\"1e-4\" iyz=\"0\" \
@@ -383,11 +528,18 @@ fn link(name: &str, shape: &str, joint: &str) -> String {
 
 /// The hand with these links in addition.
 fn with_links(profile: &RobotProfile, links: &[String]) -> RobotProfile {
-    let text = profile.urdf.text.replace("</robot>", &format!("{}</robot>", links.concat()));
-    RobotProfile { urdf: Source::new("hand.urdf", text), ..profile.clone() }
+    let text = profile
+        .urdf
+        .text
+        .replace("</robot>", &format!("{}</robot>", links.concat()));
+    RobotProfile {
+        urdf: Source::new("hand.urdf", text),
+        ..profile.clone()
+    }
 }
 
-/// A can that was held between the lower links of both fingers was not held, because only the tips counted.
+/// A can that was held between the lower links of both fingers was not held, because only the tips
+/// counted.
 #[test]
 fn all_links_that_a_finger_joint_moves_belong_to_the_finger_on_their_side() {
     let (left, right) = (turning(0.0, 0.6), turning(-0.6, 0.0));
@@ -399,51 +551,94 @@ fn all_links_that_a_finger_joint_moves_belong_to_the_finger_on_their_side() {
         )
     };
     let cube = "<geometry><box size=\"0.02 0.01 0.02\"/></geometry>";
-    let owned =
-        |names: [&[&str]; 2]| names.map(|names| names.iter().map(|name| (*name).to_owned()).collect::<Vec<_>>());
-    assert_eq!(links_of_fingers(&plain), owned([&["left_finger"], &["right_finger"]]));
+    let owned = |names: [&[&str]; 2]| {
+        names.map(|names| {
+            names
+                .iter()
+                .map(|name| (*name).to_owned())
+                .collect::<Vec<_>>()
+        })
+    };
+    assert_eq!(
+        links_of_fingers(&plain),
+        owned([&["left_finger"], &["right_finger"]])
+    );
 
-    // Tips on joints that mimic, with a pad that is fixed to one of them and a claw that a program moves.
+    // Tips on joints that mimic, with a pad that is fixed to one of them and a claw that a program
+    // moves.
     let mut phalanges = with_links(
         &plain,
         &[
             link("left_tip", cube, &mimic("left_finger", 0.005, -1.0)),
             link("right_tip", cube, &mimic("right_finger", -0.005, 1.0)),
             link("pad", cube, "type=\"fixed\"><parent link=\"left_tip\"/>"),
-            link("claw", cube, &mimic("right_tip", 0.0, 1.0).replace("<mimic joint=\"left\" multiplier=\"1\"/>", "")),
+            link(
+                "claw",
+                cube,
+                &mimic("right_tip", 0.0, 1.0)
+                    .replace("<mimic joint=\"left\" multiplier=\"1\"/>", ""),
+            ),
         ],
     );
     phalanges.other_joints = vec!["claw_joint".to_owned()];
     assert_eq!(
         links_of_fingers(&phalanges),
-        owned([&["left_finger", "left_tip"], &["claw", "right_finger", "right_tip"]])
+        owned([
+            &["left_finger", "left_tip"],
+            &["claw", "right_finger", "right_tip"]
+        ])
     );
 
-    // Knuckles beside the fingers, which carry nothing, and a plate between them; the fingers are named in the other order.
+    // Knuckles beside the fingers, which carry nothing, and a plate between them; the fingers are
+    // named in the other order.
     let mut linkage = with_links(
         &plain,
         &[
-            link("left_knuckle", cube, &mimic("palm", 0.05, 1.0).replace("0.1 ", "0.02 ")),
-            link("right_knuckle", cube, &mimic("palm", -0.05, -1.0).replace("0.1 ", "0.02 ")),
-            link("plate", cube, &mimic("palm", 0.0, 0.1).replace("0.1 ", "-0.05 ")),
+            link(
+                "left_knuckle",
+                cube,
+                &mimic("palm", 0.05, 1.0).replace("0.1 ", "0.02 "),
+            ),
+            link(
+                "right_knuckle",
+                cube,
+                &mimic("palm", -0.05, -1.0).replace("0.1 ", "0.02 "),
+            ),
+            link(
+                "plate",
+                cube,
+                &mimic("palm", 0.0, 0.1).replace("0.1 ", "-0.05 "),
+            ),
         ],
     );
     assert_eq!(
         links_of_fingers(&linkage),
-        owned([&["left_finger", "left_knuckle"], &["right_finger", "right_knuckle"]])
+        owned([
+            &["left_finger", "left_knuckle"],
+            &["right_finger", "right_knuckle"]
+        ])
     );
     linkage.finger_links.reverse();
     assert_eq!(
         links_of_fingers(&linkage),
-        owned([&["right_finger", "right_knuckle"], &["left_finger", "left_knuckle"]])
+        owned([
+            &["right_finger", "right_knuckle"],
+            &["left_finger", "left_knuckle"]
+        ])
     );
 
     // A further finger is on the side from which it presses.
     let further = three_fingers(&["left", "right", "third"]);
-    assert_eq!(links_of_fingers(&further), owned([&["left_finger"], &["right_finger", "third_finger"]]));
+    assert_eq!(
+        links_of_fingers(&further),
+        owned([&["left_finger"], &["right_finger", "third_finger"]])
+    );
 
     // A fixed jaw is part of the palm.
-    assert_eq!(links_of_fingers(&hand(&left, FIXED, &["left"])), owned([&["left_finger"], &["palm"]]));
+    assert_eq!(
+        links_of_fingers(&hand(&left, FIXED, &["left"])),
+        owned([&["left_finger"], &["palm"]])
+    );
 
     // A carriage that moves with both fingers.
     let carried = plain.urdf.text.replace(
@@ -456,7 +651,10 @@ fn all_links_that_a_finger_joint_moves_belong_to_the_finger_on_their_side() {
     );
     let slides = "type=\"prismatic\"><parent link=\"palm\"/><axis xyz=\"1 0 0\"/><limit lower=\"-0.1\" upper=\"0.1\" effort=\"9\" \
                   velocity=\"1\"/><mimic joint=\"left\" multiplier=\"0.001\"/>";
-    let base = RobotProfile { urdf: Source::new("hand.urdf", carried), ..plain };
+    let base = RobotProfile {
+        urdf: Source::new("hand.urdf", carried),
+        ..plain
+    };
     let carriage = with_links(
         &base,
         &[link(
@@ -465,7 +663,10 @@ fn all_links_that_a_finger_joint_moves_belong_to_the_finger_on_their_side() {
             slides,
         )],
     );
-    assert_eq!(links_of_fingers(&carriage), owned([&["left_finger"], &["right_finger"]]));
+    assert_eq!(
+        links_of_fingers(&carriage),
+        owned([&["left_finger"], &["right_finger"]])
+    );
 }
 
 /// The same for a hand in MuJoCo's format, whose joints are coupled by equalities.
@@ -483,8 +684,9 @@ fn coupled_links_of_a_mujoco_hand_belong_to_its_fingers() {
             0.005 * sign
         )
     };
-    let couple =
-        |joint: &str, factor: f64| format!("<joint joint1=\"{joint}\" joint2=\"left\" polycoef=\"0 {factor} 0 0 0\"/>");
+    let couple = |joint: &str, factor: f64| {
+        format!("<joint joint1=\"{joint}\" joint2=\"left\" polycoef=\"0 {factor} 0 0 0\"/>")
+    };
     let text = format!(
         "<mujoco><compiler angle=\"radian\"/><worldbody><body name=\"base\"><geom type=\"box\" size=\"0.05 0.05 0.05\"/>\
          <body name=\"palm\" pos=\"0 0 0.2\"><joint name=\"lift\" type=\"slide\" axis=\"0 0 1\" range=\"0.3 1\"/>\
@@ -503,9 +705,11 @@ fn coupled_links_of_a_mujoco_hand_belong_to_its_fingers() {
                    grasp_link = \"grasp\"\ncamera_link = \"base\"\nmax_opening_m = 0.05\nhome = [0.6]\n";
     std::fs::write(folder.path().join("hand.xml"), text).expect("it can be written");
     std::fs::write(folder.path().join("hand.toml"), profile).expect("it can be written");
-    let read = actcheck_config::robot::read(&Files::Disk, &folder.path().join("hand.toml")).expect("it is valid");
+    let read = actcheck_config::robot::read(&Files::Disk, &folder.path().join("hand.toml"))
+        .expect("it is valid");
     assert_eq!(
         links_of_fingers(&read),
-        [["left_lower", "left_upper"], ["right_lower", "right_upper"]].map(|names| names.map(str::to_owned).to_vec())
+        [["left_lower", "left_upper"], ["right_lower", "right_upper"]]
+            .map(|names| names.map(str::to_owned).to_vec())
     );
 }

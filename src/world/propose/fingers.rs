@@ -1,4 +1,5 @@
-//! The gripper: which joints move it, which links are its fingertips, and where an object is between them.
+//! The gripper: which joints move it, which links are its fingertips, and where an object is
+//! between them.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -38,22 +39,41 @@ pub(super) struct Hand {
     pub(super) score: f64,
 }
 
-/// Finds the best gripper, and keeps the parts that the profile names. Of several hands, only those with `wanted` in a
-/// name of theirs or of their arm count.
+/// Finds the best gripper, and keeps the parts that the profile names. Of several hands, only those
+/// with `wanted` in a name of theirs or of their arm count.
 ///
 /// # Errors
 /// [`NoHand`] if there is none.
-pub(super) fn find(partial: &RobotProfile, model: &RobotModel, wanted: Option<&str>) -> Result<Hand, NoHand> {
+pub(super) fn find(
+    partial: &RobotProfile,
+    model: &RobotModel,
+    wanted: Option<&str>,
+) -> Result<Hand, NoHand> {
     let stated = Stated::of(partial, model)?;
     if let (Some(_), Some((palm, _))) = (partial.suction, stated.grasp) {
-        return Ok(Hand { profile: partial.clone(), palm, notes: BTreeMap::new(), others: Vec::new(), score: 0.0 });
+        return Ok(Hand {
+            profile: partial.clone(),
+            palm,
+            notes: BTreeMap::new(),
+            others: Vec::new(),
+            score: 0.0,
+        });
     }
-    if let (Some(links), [_, ..], Some(grasp)) = (stated.links, stated.joints.as_slice(), stated.grasp) {
+    if let (Some(links), [_, ..], Some(grasp)) =
+        (stated.links, stated.joints.as_slice(), stated.grasp)
+    {
         let mut profile = partial.clone();
         if profile.max_opening_m == 0.0 {
-            profile.max_opening_m = as_opening(Gripper::find(partial, model, links, grasp)?.widest_m());
+            profile.max_opening_m =
+                as_opening(Gripper::find(partial, model, links, grasp)?.widest_m());
         }
-        return Ok(Hand { profile, palm: grasp.0, notes: BTreeMap::new(), others: Vec::new(), score: 0.0 });
+        return Ok(Hand {
+            profile,
+            palm: grasp.0,
+            notes: BTreeMap::new(),
+            others: Vec::new(),
+            score: 0.0,
+        });
     }
     let groups = stated.groups(model).unwrap_or_else(|| groups(model));
     if groups.is_empty() {
@@ -62,19 +82,34 @@ pub(super) fn find(partial: &RobotProfile, model: &RobotModel, wanted: Option<&s
         }
         if let (Some(wanted), Some(other)) = (wanted, cup::find(partial, model, None)) {
             let there = &model.links[other.palm].name;
-            return Err(NoHand::Gripper(format!("no hand has `{wanted}` in a name: there is `{there}`")));
+            return Err(NoHand::Gripper(format!(
+                "no hand has `{wanted}` in a name: there is `{there}`"
+            )));
         }
         let what = "no gripper was found: none of its movable joints or their links has a name with `finger`, `grip`, \
                     `hand`, `jaw`, `knuckle` or `thumb`, and no link one with `suction` or `vacuum`";
         return Err(NoHand::Gripper(what.to_owned()));
     }
-    let mut rated: Vec<(usize, usize, &BTreeSet<usize>)> =
-        groups.iter().map(|(palm, joints)| (rank(model, *palm), *palm, joints)).collect();
+    let mut rated: Vec<(usize, usize, &BTreeSet<usize>)> = groups
+        .iter()
+        .map(|(palm, joints)| (rank(model, *palm), *palm, joints))
+        .collect();
     if let Some(wanted) = wanted {
-        let hands: Vec<&str> = rated.iter().map(|(_, palm, _)| model.links[*palm].name.as_str()).collect();
-        let unknown =
-            || NoHand::Gripper(format!("no hand has `{wanted}` in a name: there are `{}`", hands.join("`, `")));
-        let chosen: Vec<_> = rated.iter().copied().filter(|(_, palm, _)| is_called(model, *palm, wanted)).collect();
+        let hands: Vec<&str> = rated
+            .iter()
+            .map(|(_, palm, _)| model.links[*palm].name.as_str())
+            .collect();
+        let unknown = || {
+            NoHand::Gripper(format!(
+                "no hand has `{wanted}` in a name: there are `{}`",
+                hands.join("`, `")
+            ))
+        };
+        let chosen: Vec<_> = rated
+            .iter()
+            .copied()
+            .filter(|(_, palm, _)| is_called(model, *palm, wanted))
+            .collect();
         if chosen.is_empty() {
             return Err(unknown());
         }
@@ -83,50 +118,84 @@ pub(super) fn find(partial: &RobotProfile, model: &RobotModel, wanted: Option<&s
     rated.retain(|(_, palm, _)| stated.grasp.is_none_or(|(link, _)| link == *palm));
     rated.sort_by_key(|(rank, palm, _)| (std::cmp::Reverse(*rank), *palm));
     // The meshes are in the model already.
-    let light = RobotProfile { meshes: BTreeMap::new(), ..partial.clone() };
-    let best = rated.iter().find_map(|(_, palm, joints)| measure(&light, model, &stated, *palm, joints));
+    let light = RobotProfile {
+        meshes: BTreeMap::new(),
+        ..partial.clone()
+    };
+    let best = rated
+        .iter()
+        .find_map(|(_, palm, joints)| measure(&light, model, &stated, *palm, joints));
     let others_than = |own: usize| {
         // A link on the way to this hand is a wrist that is named after it.
         let inner = chain(model, own);
-        let is_elsewhere = |palm: &&usize| **palm != own && palm.checked_sub(1).is_none_or(|idx| !inner.contains(&idx));
-        let others = groups.keys().filter(is_elsewhere).filter(|palm| chain(model, **palm).len() >= FEWEST_ARM_JOINTS);
+        let is_elsewhere = |palm: &&usize| {
+            **palm != own && palm.checked_sub(1).is_none_or(|idx| !inner.contains(&idx))
+        };
+        let others = groups
+            .keys()
+            .filter(is_elsewhere)
+            .filter(|palm| chain(model, **palm).len() >= FEWEST_ARM_JOINTS);
         others.map(|palm| model.links[*palm].name.clone()).collect()
     };
     let best = best.map(|hand| Hand {
-        profile: RobotProfile { meshes: partial.meshes.clone(), ..hand.profile },
+        profile: RobotProfile {
+            meshes: partial.meshes.clone(),
+            ..hand.profile
+        },
         others: others_than(hand.palm),
         ..hand
     });
     best.ok_or_else(|| NoHand::Gripper(why_none(model, &rated)))
 }
 
-/// Whether a name of a hand or of the arm that carries it contains a text; for `left` and `right`, also the abbreviation of
-/// one letter. Fingers don't count: each hand has a left one.
+/// Whether a name of a hand or of the arm that carries it contains a text; for `left` and `right`,
+/// also the abbreviation of one letter. Fingers don't count: each hand has a left one.
 pub(super) fn is_called(model: &RobotModel, palm: usize, text: &str) -> bool {
     let text = text.to_lowercase();
-    let letter = ["left", "right"].contains(&text.as_str()).then(|| &text[..1]);
+    let letter = ["left", "right"]
+        .contains(&text.as_str())
+        .then(|| &text[..1]);
     let is_so = |name: &str| {
         let name = name.to_lowercase();
-        name.contains(&text) || letter.is_some_and(|letter| name.split(['_', '-']).any(|word| word == letter))
+        name.contains(&text)
+            || letter.is_some_and(|letter| name.split(['_', '-']).any(|word| word == letter))
     };
-    let has = |joint: &usize| is_so(&model.joints[*joint].name) || is_so(&model.links[*joint + 1].name);
+    let has =
+        |joint: &usize| is_so(&model.joints[*joint].name) || is_so(&model.links[*joint + 1].name);
     chain(model, palm).iter().any(has)
 }
 
 /// Why none of these groups of joints is a gripper.
 fn why_none(model: &RobotModel, groups: &[(usize, usize, &BTreeSet<usize>)]) -> String {
-    let joints: Vec<usize> = groups.iter().flat_map(|(_, _, joints)| joints.iter().copied()).collect();
+    let joints: Vec<usize> = groups
+        .iter()
+        .flat_map(|(_, _, joints)| joints.iter().copied())
+        .collect();
     let is_stiff = |joint: &usize| model.joints[*joint].upper - model.joints[*joint].lower < 1e-6;
-    if let Some(joint) = joints.iter().copied().find(is_stiff).map(|joint| &model.joints[joint]) {
+    if let Some(joint) = joints
+        .iter()
+        .copied()
+        .find(is_stiff)
+        .map(|joint| &model.joints[joint])
+    {
         let (lower, upper) = (joint.lower, joint.upper);
         return format!(
             "no gripper was found: its joint `{}` can't move, its limits are {lower} and {upper}",
             joint.name
         );
     }
-    if joints.iter().all(|joint| model.links[joint + 1].solids.is_empty()) {
-        let links: Vec<&str> = joints.iter().map(|joint| model.links[joint + 1].name.as_str()).collect();
-        return format!("no gripper was found: the links `{}` have no collision shapes", links.join("`, `"));
+    if joints
+        .iter()
+        .all(|joint| model.links[joint + 1].solids.is_empty())
+    {
+        let links: Vec<&str> = joints
+            .iter()
+            .map(|joint| model.links[joint + 1].name.as_str())
+            .collect();
+        return format!(
+            "no gripper was found: the links `{}` have no collision shapes",
+            links.join("`, `")
+        );
     }
     "no two links of its gripper face each other and come closer".to_owned()
 }
@@ -155,26 +224,43 @@ fn measure(
     joints: &BTreeSet<usize>,
 ) -> Option<Hand> {
     let mut best: Option<Found> = None;
-    for (links, drives) in pairs(model, palm, (joints, stated)).into_iter().take(MOST_PAIRS) {
+    for (links, drives) in pairs(model, palm, (joints, stated))
+        .into_iter()
+        .take(MOST_PAIRS)
+    {
         for named in drives {
             let all = match stated.grasp {
                 Some((_, frame)) => vec![(1.0, frame)],
                 None => frames(model, palm, links, &named),
             };
             for (weight, frame) in all {
-                let Some(found) = rate(bare, model, palm, links, &named, frame) else { continue };
+                let Some(found) = rate(bare, model, palm, links, &named, frame) else {
+                    continue;
+                };
                 let weight = weight * powered(model, &named, joints) * tips(model, links, joints);
                 let further = beside(model, (found.links, &found.named), joints, palm);
-                let weight = weight * amid(model, &found.named, &further) * across(model, &found.named, &further);
+                let weight = weight
+                    * amid(model, &found.named, &further)
+                    * across(model, &found.named, &further);
                 let is_better = |found: &Found, best: &Option<Found>| {
-                    best.as_ref().is_none_or(|best| found.score > best.score + 1e-9)
+                    best.as_ref()
+                        .is_none_or(|best| found.score > best.score + 1e-9)
                 };
-                let found = Found { score: found.score * weight, ..found };
+                let found = Found {
+                    score: found.score * weight,
+                    ..found
+                };
                 // Rays are cast only for candidates that could be the best.
                 if !is_better(&found, &best) {
                     continue;
                 }
-                let between = Between { bare, model, palm, links: found.links, named: &found.named };
+                let between = Between {
+                    bare,
+                    model,
+                    palm,
+                    links: found.links,
+                    named: &found.named,
+                };
                 let score = found.score * innermost(&between, found.frame, joints);
                 let found = Found { score, ..found };
                 if is_better(&found, &best) {
@@ -185,9 +271,19 @@ fn measure(
     }
     let mut found = best?;
     let mut deeper = false;
-    let between = Between { bare, model, palm, links: found.links, named: &found.named };
+    let between = Between {
+        bare,
+        model,
+        palm,
+        links: found.links,
+        named: &found.named,
+    };
     if stated.grasp.is_none() {
-        let turned = if found.links.contains(&palm) { between.turned(found.frame) } else { found.frame };
+        let turned = if found.links.contains(&palm) {
+            between.turned(found.frame)
+        } else {
+            found.frame
+        };
         let centred = between.centred(turned);
         let seated = between.seated(centred);
         deeper = seated.is_some();
@@ -200,15 +296,28 @@ fn measure(
     let mut notes = BTreeMap::new();
     if stated.joints.is_empty() {
         let named = alike(model, found.links).unwrap_or_else(|| {
-            [found.named.clone(), beside(model, (found.links, &found.named), joints, palm)].concat()
+            [
+                found.named.clone(),
+                beside(model, (found.links, &found.named), joints, palm),
+            ]
+            .concat()
         });
         let own = |idx: &usize| model.own_leaders.get(idx).copied().unwrap_or(*idx);
-        profile.finger_joints = named.iter().map(|idx| model.joints[own(idx)].name.clone()).collect();
-        notes.insert("finger_joints", "their names, and the links that they move".to_owned());
+        profile.finger_joints = named
+            .iter()
+            .map(|idx| model.joints[own(idx)].name.clone())
+            .collect();
+        notes.insert(
+            "finger_joints",
+            "their names, and the links that they move".to_owned(),
+        );
     }
     if stated.links.is_none() {
         profile.finger_links = found.links.map(|link| model.links[link].name.clone());
-        notes.insert("finger_links", "these two face each other and open widest".to_owned());
+        notes.insert(
+            "finger_links",
+            "these two face each other and open widest".to_owned(),
+        );
     }
     if stated.grasp.is_none() {
         profile.grasp_link = model.links[palm].name.clone();
@@ -220,13 +329,22 @@ fn measure(
             false => "between the fingertips, 2.5 cm before their ends",
         };
         notes.insert("grasp_offset_m", place.to_owned());
-        notes.insert("grasp_turned_rad", "x along the fingers, y from the right to the left one".to_owned());
+        notes.insert(
+            "grasp_turned_rad",
+            "x along the fingers, y from the right to the left one".to_owned(),
+        );
     }
     if profile.max_opening_m == 0.0 {
         profile.max_opening_m = as_opening(found.widest_m);
         notes.insert("max_opening_m", "measured at that place".to_owned());
     }
-    Some(Hand { profile, palm, notes, others: Vec::new(), score: found.score })
+    Some(Hand {
+        profile,
+        palm,
+        notes,
+        others: Vec::new(),
+        score: found.score,
+    })
 }
 
 /// Not wider than measured, up to the rounding of limits. Unit: metres.
@@ -234,14 +352,19 @@ pub(super) fn as_opening(widest_m: f64) -> f64 {
     (widest_m.min(1.0) * 1000.0 + 0.1).floor() / 1000.0
 }
 
-/// The joints of two fingers that slide alike, one of which mimics the other: each has a motor of its own then.
+/// The joints of two fingers that slide alike, one of which mimics the other: each has a motor of
+/// its own then.
 fn alike(model: &RobotModel, links: [usize; 2]) -> Option<Vec<usize>> {
     let [left, right] = links.map(|link| link.checked_sub(1));
     let (left, right) = (left?, right?);
-    let slides = |idx: usize| model.joints[idx].kind == JointKind::Prismatic && model.joints[idx].lower >= -1e-3;
+    let slides = |idx: usize| {
+        model.joints[idx].kind == JointKind::Prismatic && model.joints[idx].lower >= -1e-3
+    };
     let follows = |idx: usize, other: usize| {
         let mimic = model.joints[idx].mimic;
-        mimic.is_some_and(|(leader, factor, offset)| leader == other && (factor - 1.0).abs() < 1e-9 && offset == 0.0)
+        mimic.is_some_and(|(leader, factor, offset)| {
+            leader == other && (factor - 1.0).abs() < 1e-9 && offset == 0.0
+        })
     };
     let is_alike = slides(left) && slides(right) && (follows(left, right) || follows(right, left));
     is_alike.then(|| vec![left, right])
@@ -252,7 +375,10 @@ fn as_written(frame: &Isometry3<f64>) -> Isometry3<f64> {
     let [x, y, z] = rounded(frame.translation.vector.into());
     let (roll, pitch, yaw) = frame.rotation.euler_angles();
     let [roll, pitch, yaw] = rounded([roll, pitch, yaw]);
-    Isometry3::from_parts(Translation3::new(x, y, z), UnitQuaternion::from_euler_angles(roll, pitch, yaw))
+    Isometry3::from_parts(
+        Translation3::new(x, y, z),
+        UnitQuaternion::from_euler_angles(roll, pitch, yaw),
+    )
 }
 
 /// Rounds to the tenth of a millimetre or milliradian.
@@ -267,7 +393,9 @@ fn pairs(
     (joints, stated): (&BTreeSet<usize>, &Stated),
 ) -> Vec<([usize; 2], Vec<Vec<usize>>)> {
     let drivers = |link: usize| -> Vec<usize> {
-        let own = chain(model, link).into_iter().filter(|joint| joints.contains(joint));
+        let own = chain(model, link)
+            .into_iter()
+            .filter(|joint| joints.contains(joint));
         let mut leaders: Vec<usize> = own.map(|joint| leader(model, joint)).collect();
         leaders.dedup();
         leaders
@@ -282,28 +410,51 @@ fn pairs(
         }
         match (of_left.as_slice(), of_right.as_slice()) {
             (one, []) | ([], one) => one.iter().map(|joint| vec![*joint]).collect(),
-            (firsts, seconds) => {
-                firsts.iter().flat_map(|first| seconds.iter().map(move |second| vec![*first, *second])).collect()
-            }
+            (firsts, seconds) => firsts
+                .iter()
+                .flat_map(|first| seconds.iter().map(move |second| vec![*first, *second]))
+                .collect(),
         }
     };
-    let links = stated.links.map_or_else(|| facing(model, palm, joints), |links| vec![links]);
-    links.into_iter().map(|links| (links, ways(links))).collect()
+    let links = stated
+        .links
+        .map_or_else(|| facing(model, palm, joints), |links| vec![links]);
+    links
+        .into_iter()
+        .map(|links| (links, ways(links)))
+        .collect()
 }
 
-/// Pairs of links that the joints move, and each with the palm; the outermost first: fingertips rather than knuckles.
+/// Pairs of links that the joints move, and each with the palm; the outermost first: fingertips
+/// rather than knuckles.
 fn facing(model: &RobotModel, palm: usize, joints: &BTreeSet<usize>) -> Vec<[usize; 2]> {
     let is_solid = |link: usize| !model.links[link].solids.is_empty();
-    let mut moved: Vec<usize> = joints.iter().map(|joint| joint + 1).filter(|link| is_solid(*link)).collect();
+    let mut moved: Vec<usize> = joints
+        .iter()
+        .map(|joint| joint + 1)
+        .filter(|link| is_solid(*link))
+        .collect();
     moved.sort_by_key(|link| std::cmp::Reverse(chain(model, *link).len()));
-    let others = |place: usize| moved[place + 1..].iter().copied().chain(is_solid(palm).then_some(palm));
-    moved.iter().enumerate().flat_map(|(place, left)| others(place).map(|right| [*left, right])).collect()
+    let others = |place: usize| {
+        moved[place + 1..]
+            .iter()
+            .copied()
+            .chain(is_solid(palm).then_some(palm))
+    };
+    moved
+        .iter()
+        .enumerate()
+        .flat_map(|(place, left)| others(place).map(|right| [*left, right]))
+        .collect()
 }
 
 /// The joint that a joint follows, or itself.
 pub(super) fn leader(model: &RobotModel, joint: usize) -> usize {
     let next = |joint: &usize| model.joints[*joint].mimic.map(|(leader, ..)| leader);
-    std::iter::successors(Some(joint), next).take(model.joints.len()).last().unwrap_or(joint)
+    std::iter::successors(Some(joint), next)
+        .take(model.joints.len())
+        .last()
+        .unwrap_or(joint)
 }
 
 /// Rates a candidate: how far its fingers open and close, and how far it is from the palm.
@@ -339,8 +490,15 @@ fn rate(
     let from_palm = frame.translation.vector - behind(model, palm, links).coords;
     let points_back = (frame.rotation * Vector3::x()).dot(&from_palm) < 0.0;
     let both = both * if points_back { BACKWARDS } else { 1.0 };
-    let score = (0.3 + flat) * both * closes_m.min(WIDE_M) * (0.05 + reach_m) / (1.0 + 10.0 * off_m);
-    Some(Found { score, named: named.to_vec(), links, frame, widest_m })
+    let score =
+        (0.3 + flat) * both * closes_m.min(WIDE_M) * (0.05 + reach_m) / (1.0 + 10.0 * off_m);
+    Some(Found {
+        score,
+        named: named.to_vec(),
+        links,
+        frame,
+        widest_m,
+    })
 }
 
 #[cfg(test)]
@@ -352,14 +510,18 @@ mod tests {
     const INERTIAL: &str = "<inertial><mass value=\"0.1\"/>\
         <inertia ixx=\"1e-4\" ixy=\"0\" ixz=\"0\" iyy=\"1e-4\" iyz=\"0\" izz=\"1e-4\"/></inertial>";
 
-    /// A finger that slides by 4 cm along y, with its shape ahead of its joint along x, and the share by which it follows the joint
-    /// `finger_pad_left`.
+    /// A finger that slides by 4 cm along y, with its shape ahead of its joint along x, and the
+    /// share by which it follows the joint `finger_pad_left`.
     fn finger(name: &str, [x, y]: [f64; 2], ahead_m: f64, share: f64) -> String {
         let mimic = match name {
             "finger_pad_left" => String::new(),
             _ => format!("<mimic joint=\"finger_pad_left\" multiplier=\"{share}\"/>"),
         };
-        let (lower, upper) = if share > 0.0 { (0.0, 0.04) } else { (-0.04, 0.0) };
+        let (lower, upper) = if share > 0.0 {
+            (0.0, 0.04)
+        } else {
+            (-0.04, 0.0)
+        };
         format!(
             "<link name=\"{name}\">{INERTIAL}<collision><origin xyz=\"{ahead_m} 0 0\"/>\
              <geometry><box size=\"0.1 0.008 0.03\"/></geometry></collision></link>\
@@ -377,9 +539,12 @@ mod tests {
     /// The hand that is found on a palm with these shapes and fingers.
     fn found_on(shapes: &str, fingers: &[String]) -> RobotProfile {
         let path = Path::new("models/robots/fixed_arm.toml");
-        let shipped = actcheck_config::robot::read(&Files::Shipped, path).expect("the shipped robot is valid");
-        let text =
-            format!("<robot name=\"hand\"><link name=\"palm\">{INERTIAL}{shapes}</link>{}</robot>", fingers.concat());
+        let shipped = actcheck_config::robot::read(&Files::Shipped, path)
+            .expect("the shipped robot is valid");
+        let text = format!(
+            "<robot name=\"hand\"><link name=\"palm\">{INERTIAL}{shapes}</link>{}</robot>",
+            fingers.concat()
+        );
         let profile = RobotProfile {
             urdf: Source::new("hand.urdf", text),
             arm_joints: Vec::new(),
@@ -390,10 +555,13 @@ mod tests {
             ..shipped
         };
         let model = RobotModel::read(&profile).expect("the hand is valid");
-        find(&profile, &model, None).unwrap_or_else(|_| panic!("there is a hand")).profile
+        find(&profile, &model, None)
+            .unwrap_or_else(|_| panic!("there is a hand"))
+            .profile
     }
 
-    /// Each finger has a pad and a bar outside of it, which opens wider; both slide with the same motor.
+    /// Each finger has a pad and a bar outside of it, which opens wider; both slide with the same
+    /// motor.
     #[test]
     fn the_innermost_links_are_the_fingertips() {
         let mut found = found(&[
@@ -404,15 +572,20 @@ mod tests {
         ]);
         found.finger_links.sort();
         assert_eq!(found.finger_links, ["finger_pad_left", "finger_pad_right"]);
-        assert!((found.max_opening_m - 0.084).abs() < 1e-3, "{}", found.max_opening_m);
+        assert!(
+            (found.max_opening_m - 0.084).abs() < 1e-3,
+            "{}",
+            found.max_opening_m
+        );
     }
 
-    /// The joints of the fingers of a Piper are at their tips; those of an AIRBOT Play, too, with the origin of the palm.
+    /// The joints of the fingers of a Piper are at their tips; those of an AIRBOT Play, too, with
+    /// the origin of the palm.
     #[test]
     fn fingers_point_away_from_the_palm_wherever_their_joints_are() {
-        let shape =
-            "<collision><origin xyz=\"-0.13 0 0\"/><geometry><box size=\"0.06 0.1 0.06\"/></geometry></collision>";
-        for (shapes, joint_m, ahead_m) in [("", 0.03, 0.06), ("", 0.14, -0.05), (shape, 0.0, -0.05)] {
+        let shape = "<collision><origin xyz=\"-0.13 0 0\"/><geometry><box size=\"0.06 0.1 0.06\"/></geometry></collision>";
+        for (shapes, joint_m, ahead_m) in [("", 0.03, 0.06), ("", 0.14, -0.05), (shape, 0.0, -0.05)]
+        {
             let fingers = [
                 finger("finger_pad_left", [joint_m, 0.006], ahead_m, 1.0),
                 finger("finger_pad_right", [joint_m, -0.006], ahead_m, -1.0),
@@ -422,7 +595,11 @@ mod tests {
             let ahead = UnitQuaternion::from_euler_angles(roll, pitch, yaw) * Vector3::x();
             assert!(ahead.x > 0.99, "{ahead}");
             let before_tip_m = joint_m + ahead_m + 0.05 - found.grasp_offset_m[0];
-            assert!((0.01..0.046).contains(&before_tip_m), "{:?}", found.grasp_offset_m);
+            assert!(
+                (0.01..0.046).contains(&before_tip_m),
+                "{:?}",
+                found.grasp_offset_m
+            );
         }
     }
 }

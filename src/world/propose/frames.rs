@@ -8,12 +8,14 @@ use crate::gripper::Probe;
 use crate::kinematics::motion;
 use actcheck_data::{Part, Shape};
 
-/// Distances of the grasp frame from the tips of the fingers. Unit: metres. Skills assume that fingers reach as much
-/// further as the first of them; the others are for short pads, and for fingers that turn, which open wider there.
+/// Distances of the grasp frame from the tips of the fingers. Unit: metres. Skills assume that
+/// fingers reach as much further as the first of them; the others are for short pads, and for
+/// fingers that turn, which open wider there.
 const DEPTHS_M: [f64; 4] = [0.025, 0.018, 0.012, 0.045];
 /// Length of the fingertips, which decide about the other directions. Unit: metres.
 const TIP_M: f64 = 0.05;
-/// Axes closer than this to an axis of the palm are taken to be that axis. Unit: cosine (about 10 degrees).
+/// Axes closer than this to an axis of the palm are taken to be that axis. Unit: cosine (about 10
+/// degrees).
 const ALIGNED_COSINE: f64 = 0.985;
 /// Least change of the gap between two fingers. Unit: metres.
 pub(super) const LEAST_CHANGE_M: f64 = 0.008;
@@ -26,12 +28,23 @@ const FROM_SHAPES: f64 = 0.8;
 pub(super) fn corners(part: &Part) -> Vec<Point3<f64>> {
     let at = part.pose.to_isometry();
     match &part.shape {
-        Shape::Hull { points, .. } => points.iter().map(|point| at * Point3::from(*point)).collect(),
-        Shape::Mesh { mesh } => mesh.vertices.iter().map(|point| at * Point3::from(*point)).collect(),
+        Shape::Hull { points, .. } => points
+            .iter()
+            .map(|point| at * Point3::from(*point))
+            .collect(),
+        Shape::Mesh { mesh } => mesh
+            .vertices
+            .iter()
+            .map(|point| at * Point3::from(*point))
+            .collect(),
         _ => {
             let (low, high) = part.bounds();
             let pick = |axis: usize, bit: usize| if bit == 0 { low[axis] } else { high[axis] };
-            (0..8).map(|bits: usize| Point3::new(pick(0, bits & 1), pick(1, bits & 2), pick(2, bits & 4))).collect()
+            (0..8)
+                .map(|bits: usize| {
+                    Point3::new(pick(0, bits & 1), pick(1, bits & 2), pick(2, bits & 4))
+                })
+                .collect()
         }
     }
 }
@@ -59,19 +72,25 @@ impl Pair {
 
 /// Returns the middle of the box around points.
 fn middle(points: &[Point3<f64>]) -> Point3<f64> {
-    let (low, high) = points
-        .iter()
-        .fold((Vector3::repeat(f64::INFINITY), Vector3::repeat(f64::NEG_INFINITY)), |(low, high), point| {
-            (low.inf(&point.coords), high.sup(&point.coords))
-        });
+    let (low, high) = points.iter().fold(
+        (
+            Vector3::repeat(f64::INFINITY),
+            Vector3::repeat(f64::NEG_INFINITY),
+        ),
+        |(low, high), point| (low.inf(&point.coords), high.sup(&point.coords)),
+    );
     Point3::from((low + high) / 2.0)
 }
 
-/// A point behind the fingers, in the palm's frame: the middle of the palm's shapes, or its origin if it has none or is itself a
-/// finger.
+/// A point behind the fingers, in the palm's frame: the middle of the palm's shapes, or its origin
+/// if it has none or is itself a finger.
 pub(super) fn behind(model: &RobotModel, palm: usize, links: [usize; 2]) -> Point3<f64> {
     let points: Vec<Point3<f64>> = model.links[palm].solids.iter().flat_map(corners).collect();
-    if points.is_empty() || links.contains(&palm) { Point3::origin() } else { middle(&points) }
+    if points.is_empty() || links.contains(&palm) {
+        Point3::origin()
+    } else {
+        middle(&points)
+    }
 }
 
 /// Where fingers begin, and which of them point away from there.
@@ -92,13 +111,18 @@ impl Root {
     }
 }
 
-/// Returns likely grasp frames in the palm's frame. `ends` are the fingers at both ends of their way.
+/// Returns likely grasp frames in the palm's frame. `ends` are the fingers at both ends of their
+/// way.
 fn likely(ends: &[Pair; 2], from: &Root) -> Vec<Isometry3<f64>> {
     let mut found = Vec::new();
     let moved = ends[0].apart() - ends[1].apart();
     for across in [moved, ends[0].apart(), ends[1].apart()] {
         for open in ends {
-            found.extend(DEPTHS_M.into_iter().filter_map(|depth_m| at(open, &across, from, depth_m)));
+            found.extend(
+                DEPTHS_M
+                    .into_iter()
+                    .filter_map(|depth_m| at(open, &across, from, depth_m)),
+            );
         }
     }
     found
@@ -115,14 +139,20 @@ fn at(pair: &Pair, across: &Vector3<f64>, from: &Root, depth_m: f64) -> Option<I
     let z = x.cross(&y);
     let along = |axis: &Vector3<f64>, points: &[Point3<f64>]| -> (f64, f64) {
         let values = points.iter().map(|point| point.coords.dot(axis));
-        values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(value), high.max(value)))
+        values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| {
+            (low.min(value), high.max(value))
+        })
     };
     let (left, right) = (along(&x, &pair.left), along(&x, &pair.right));
     let (tip, root) = (left.1.min(right.1), left.0.max(right.0));
     let depth = depth_m.min((tip - root) / 2.0);
     // Only the parts near the tips decide about the other axes.
     let near = |points: &[Point3<f64>]| -> Vec<Point3<f64>> {
-        points.iter().copied().filter(|point| point.coords.dot(&x) > tip - TIP_M).collect()
+        points
+            .iter()
+            .copied()
+            .filter(|point| point.coords.dot(&x) > tip - TIP_M)
+            .collect()
     };
     let (left, right) = (near(&pair.left), near(&pair.right));
     let (left_z, right_z) = (along(&z, &left), along(&z, &right));
@@ -132,7 +162,8 @@ fn at(pair: &Pair, across: &Vector3<f64>, from: &Root, depth_m: f64) -> Option<I
     let origin = x * (tip - depth) + y * side + z * height;
     origin.iter().all(|value| value.is_finite()).then(|| {
         let axes = Matrix3::from_columns(&[x, y, z]);
-        let rotation = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(axes));
+        let rotation =
+            UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(axes));
         Isometry3::from_parts(Translation3::from(origin), rotation)
     })
 }
@@ -148,36 +179,76 @@ fn aligned(direction: Vector3<f64>) -> Vector3<f64> {
     direction
 }
 
-/// Likely grasp frames of a pair, in the palm's frame, with weights: those at which both fingers have surfaces at several
-/// openings. The fingers point away from their joints or, less likely, from the palm's origin or shapes.
+/// Likely grasp frames of a pair, in the palm's frame, with weights: those at which both fingers
+/// have surfaces at several openings. The fingers point away from their joints or, less likely,
+/// from the palm's origin or shapes.
 pub(super) fn frames(
     model: &RobotModel,
     palm: usize,
     links: [usize; 2],
     named: &[usize],
 ) -> Vec<(f64, Isometry3<f64>)> {
-    let ways: &[[bool; 2]] = if named.len() == 1 { &[[true, true]] } else { &[[true, true], [true, false]] };
+    let ways: &[[bool; 2]] = if named.len() == 1 {
+        &[[true, true]]
+    } else {
+        &[[true, true], [true, false]]
+    };
     let inner = chain(model, palm);
-    let joints = links.map(|link| chain(model, link).into_iter().find(|joint| !inner.contains(joint)));
-    let origins: Vec<Point3<f64>> =
-        joints.iter().flatten().map(|joint| Point3::from(model.joints[*joint].origin.translation.vector)).collect();
-    let middle = origins.iter().map(|at| at.coords).sum::<Vector3<f64>>() / origins.len().max(1) as f64;
+    let joints = links.map(|link| {
+        chain(model, link)
+            .into_iter()
+            .find(|joint| !inner.contains(joint))
+    });
+    let origins: Vec<Point3<f64>> = joints
+        .iter()
+        .flatten()
+        .map(|joint| Point3::from(model.joints[*joint].origin.translation.vector))
+        .collect();
+    let middle =
+        origins.iter().map(|at| at.coords).sum::<Vector3<f64>>() / origins.len().max(1) as f64;
     let roots = [
-        (1.0, Root { from: Point3::from(middle), sides: joints.map(|joint| joint.is_some()) }),
-        (FROM_PALM, Root { from: Point3::origin(), sides: [true; 2] }),
-        (FROM_SHAPES, Root { from: behind(model, palm, links), sides: [true; 2] }),
+        (
+            1.0,
+            Root {
+                from: Point3::from(middle),
+                sides: joints.map(|joint| joint.is_some()),
+            },
+        ),
+        (
+            FROM_PALM,
+            Root {
+                from: Point3::origin(),
+                sides: [true; 2],
+            },
+        ),
+        (
+            FROM_SHAPES,
+            Root {
+                from: behind(model, palm, links),
+                sides: [true; 2],
+            },
+        ),
     ];
     let mut found: Vec<(f64, Isometry3<f64>)> = Vec::new();
     for way in ways {
-        let ends = [posture(model, named, *way, 1.0), posture(model, named, *way, 0.0)];
+        let ends = [
+            posture(model, named, *way, 1.0),
+            posture(model, named, *way, 0.0),
+        ];
         let ends = ends.map(|positions| Pair::new(model, links, &poses(model, &positions), palm));
-        for (weight, frame) in roots.iter().flat_map(|(w, root)| likely(&ends, root).into_iter().map(move |f| (*w, f)))
+        for (weight, frame) in roots
+            .iter()
+            .flat_map(|(w, root)| likely(&ends, root).into_iter().map(move |f| (*w, f)))
         {
             let is_known = found.iter().any(|(_, known)| {
                 let off = (known.translation.vector - frame.translation.vector).norm();
                 off < 1e-3 && known.rotation.angle_to(&frame.rotation) < 1e-2
             });
-            if !is_known && closes(model, palm, links, &frame, |share| posture(model, named, *way, share)) {
+            if !is_known
+                && closes(model, palm, links, &frame, |share| {
+                    posture(model, named, *way, share)
+                })
+            {
                 found.push((weight, frame));
             }
         }
@@ -185,12 +256,19 @@ pub(super) fn frames(
     found
 }
 
-/// Positions at a share of the way between the ends of the named joints; of the second one, in the opposite direction if
-/// the ends differ.
+/// Positions at a share of the way between the ends of the named joints; of the second one, in the
+/// opposite direction if the ends differ.
 fn posture(model: &RobotModel, named: &[usize], at_upper: [bool; 2], share: f64) -> Vec<f64> {
-    let mut positions: Vec<f64> = model.joints.iter().map(|joint| 0.0_f64.clamp(joint.lower, joint.upper)).collect();
+    let mut positions: Vec<f64> = model
+        .joints
+        .iter()
+        .map(|joint| 0.0_f64.clamp(joint.lower, joint.upper))
+        .collect();
     for (joint, rises) in named.iter().zip(at_upper) {
-        let (lower, upper) = (model.joints[*joint].lower.max(-2.0), model.joints[*joint].upper.min(2.0));
+        let (lower, upper) = (
+            model.joints[*joint].lower.max(-2.0),
+            model.joints[*joint].upper.min(2.0),
+        );
         positions[*joint] = lower + (upper - lower) * if rises { share } else { 1.0 - share };
     }
     // Leaders come before their followers, or the chain is longer than one.
@@ -217,7 +295,11 @@ fn closes(
         let probe = Probe::new(model, links, (palm, *frame));
         let gaps = (0..=8).filter_map(|eighth| probe.gap(&posture(f64::from(eighth) / 8.0)));
         let widths: Vec<f64> = gaps.map(|gap| gap.width_m()).collect();
-        let (least, most) = widths.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), w| (a.min(*w), b.max(*w)));
+        let (least, most) = widths
+            .iter()
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), w| {
+                (a.min(*w), b.max(*w))
+            });
         widths.len() >= 2 && most - least > LEAST_CHANGE_M
     })
 }

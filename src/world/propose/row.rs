@@ -11,23 +11,32 @@ const LIMIT_SLACK: f64 = 1e-3;
 /// Weight of a finger at the end of a row that closes together.
 const AT_THE_END: f64 = 0.7;
 
-/// Weight of two fingers of a row of three or more, which curl side by side rather than against each other.
+/// Weight of two fingers of a row of three or more, which curl side by side rather than against
+/// each other.
 const IN_A_ROW: f64 = 0.2;
 /// Least cosine between the axes of the fingers of a row.
 const PARALLEL: f64 = 0.9;
 
-/// Weight of two fingers against each other: not both of a row, as the fingers of a human hand without its thumb.
+/// Weight of two fingers against each other: not both of a row, as the fingers of a human hand
+/// without its thumb.
 pub(super) fn across(model: &RobotModel, named: &[usize], further: &[usize]) -> f64 {
-    let axis = |joint: usize| model.joints[joint].origin.rotation * model.joints[joint].axis.into_inner();
-    let curl_alike = |one: usize, other: usize| is_like(model, one, other) && axis(one).dot(&axis(other)) > PARALLEL;
+    let axis =
+        |joint: usize| model.joints[joint].origin.rotation * model.joints[joint].axis.into_inner();
+    let curl_alike = |one: usize, other: usize| {
+        is_like(model, one, other) && axis(one).dot(&axis(other)) > PARALLEL
+    };
     let &[one, other] = named else { return 1.0 };
     let turns = model.joints[one].kind == JointKind::Revolute;
     let has_third = || further.iter().any(|third| curl_alike(one, *third));
-    if turns && curl_alike(one, other) && has_third() { IN_A_ROW } else { 1.0 }
+    if turns && curl_alike(one, other) && has_third() {
+        IN_A_ROW
+    } else {
+        1.0
+    }
 }
 
-/// The joints that move further fingers: they are on the same link as one of the named joints, with the same limits, and move
-/// neither of the two fingers.
+/// The joints that move further fingers: they are on the same link as one of the named joints, with
+/// the same limits, and move neither of the two fingers.
 pub(super) fn beside(
     model: &RobotModel,
     (links, named): ([usize; 2], &[usize]),
@@ -35,10 +44,14 @@ pub(super) fn beside(
     palm: usize,
 ) -> Vec<usize> {
     let inner = chain(model, palm);
-    let in_use: BTreeSet<usize> =
-        links.iter().flat_map(|link| chain(model, *link)).map(|joint| leader(model, joint)).collect();
+    let in_use: BTreeSet<usize> = links
+        .iter()
+        .flat_map(|link| chain(model, *link))
+        .map(|joint| leader(model, joint))
+        .collect();
     let is_further = |joint: &usize| {
-        let other = leader(model, *joint) == *joint && !in_use.contains(joint) && !inner.contains(joint);
+        let other =
+            leader(model, *joint) == *joint && !in_use.contains(joint) && !inner.contains(joint);
         other && named.iter().any(|named| is_like(model, *joint, *named))
     };
     joints.iter().copied().filter(is_further).collect()
@@ -53,14 +66,23 @@ fn is_like(model: &RobotModel, joint: usize, other: usize) -> bool {
         && (a.effort > 0.0) == (b.effort > 0.0)
 }
 
-/// Weight of a finger's place among those that close with it: in their middle, an object does not tip out of the hand.
+/// Weight of a finger's place among those that close with it: in their middle, an object does not
+/// tip out of the hand.
 pub(super) fn amid(model: &RobotModel, named: &[usize], further: &[usize]) -> f64 {
     let knuckle = |joint: usize| model.joints[joint].origin.translation.vector;
     let is_amid = |named: &usize| {
-        let ways: Vec<_> = further.iter().map(|joint| knuckle(*joint) - knuckle(*named)).collect();
-        ways.iter().any(|way| ways.iter().any(|other| way.dot(other) < 0.0))
+        let ways: Vec<_> = further
+            .iter()
+            .map(|joint| knuckle(*joint) - knuckle(*named))
+            .collect();
+        ways.iter()
+            .any(|way| ways.iter().any(|other| way.dot(other) < 0.0))
     };
-    if further.len() < 2 || named.iter().any(is_amid) { 1.0 } else { AT_THE_END }
+    if further.len() < 2 || named.iter().any(is_amid) {
+        1.0
+    } else {
+        AT_THE_END
+    }
 }
 
 #[cfg(test)]
@@ -72,7 +94,8 @@ mod tests {
     /// A palm with fingers that turn about these axes, with the same limits.
     fn hand(axes: &[[f64; 3]]) -> RobotModel {
         let path = Path::new("models/robots/fixed_arm.toml");
-        let mut profile = actcheck_config::robot::read(&Files::Shipped, path).expect("the shipped robot is valid");
+        let mut profile = actcheck_config::robot::read(&Files::Shipped, path)
+            .expect("the shipped robot is valid");
         let inertial = "<inertial><mass value=\"0.1\"/>\
                         <inertia ixx=\"1e-4\" ixy=\"0\" ixz=\"0\" iyy=\"1e-4\" iyz=\"0\" izz=\"1e-4\"/></inertial>";
         let finger = |(idx, [x, y, z]): (usize, &[f64; 3])| {
@@ -95,12 +118,23 @@ mod tests {
     #[test]
     fn fingers_of_a_row_are_not_against_each_other() {
         let of = |model: &RobotModel, fingers: [usize; 2]| {
-            let named = fingers.map(|idx| model.joint(&format!("finger_{idx}")).expect("it is a joint"));
-            let further: Vec<usize> = (0..model.joints.len()).filter(|joint| !named.contains(joint)).collect();
+            let named = fingers.map(|idx| {
+                model
+                    .joint(&format!("finger_{idx}"))
+                    .expect("it is a joint")
+            });
+            let further: Vec<usize> = (0..model.joints.len())
+                .filter(|joint| !named.contains(joint))
+                .collect();
             across(model, &named, &further)
         };
         // Three fingers and a thumb that turns the other way.
-        let human = hand(&[[0.0, 0.0, 1.0], [0.0, 0.0, 1.0], [0.0, 0.1, 1.0], [0.0, 0.0, -1.0]]);
+        let human = hand(&[
+            [0.0, 0.0, 1.0],
+            [0.0, 0.0, 1.0],
+            [0.0, 0.1, 1.0],
+            [0.0, 0.0, -1.0],
+        ]);
         assert!(of(&human, [0, 1]) < 1.0 && of(&human, [0, 2]) < 1.0);
         assert_eq!(of(&human, [0, 3]), 1.0);
         // Three fingers around a palm, and two that turn about parallel axes.

@@ -12,17 +12,19 @@ use crate::gripper::{Probe, outward_push};
 const CAN_M: f64 = 0.066;
 /// Fingers that push a can out with this share of their force: friction seldom holds it. Unit: 1.
 const SQUEEZED: f64 = 0.5;
-/// Room between the can and the palm. Unit: metres. Hands on their way to an object keep as much from it.
+/// Room between the can and the palm. Unit: metres. Hands on their way to an object keep as much
+/// from it.
 const PALM_ROOM_M: f64 = 0.003;
 /// How much deeper a frame may be, and the steps that are compared. Unit: metres.
 const DEEPEST_M: f64 = 0.02;
 const STEP_M: f64 = 0.005;
 
-/// Returns how much deeper between the fingers an object belongs than at this frame. Unit: metres. `at` is the gripper with
-/// the frame that much deeper, if its fingers can be measured there.
+/// Returns how much deeper between the fingers an object belongs than at this frame. Unit: metres.
+/// `at` is the gripper with the frame that much deeper, if its fingers can be measured there.
 ///
-/// A jaw that turns against a fixed one pushes the object along both until the angle between them holds it: it must have
-/// room to slide, so it begins at the palm. Two fingers that turn hold it where they push it out least.
+/// A jaw that turns against a fixed one pushes the object along both until the angle between them
+/// holds it: it must have room to slide, so it begins at the palm. Two fingers that turn hold it
+/// where they push it out least.
 pub(super) fn deeper_m(
     model: &RobotModel,
     links: [usize; 2],
@@ -33,7 +35,9 @@ pub(super) fn deeper_m(
         let moved = (palm, frame * Translation3::new(-depth_m, 0.0, 0.0));
         outward_push(model, &at(depth_m)?, links, moved, CAN_M)
     };
-    let Some(now) = push(0.0).filter(|push| *push >= SQUEEZED) else { return 0.0 };
+    let Some(now) = push(0.0).filter(|push| *push >= SQUEEZED) else {
+        return 0.0;
+    };
     if links.contains(&palm) {
         let behind_m = at(0.0).and_then(|gripper| palm_m(model, links, (palm, frame), &gripper));
         let room_m = behind_m.map_or(0.0, |behind_m| behind_m - CAN_M / 2.0 - PALM_ROOM_M);
@@ -43,7 +47,8 @@ pub(super) fn deeper_m(
     let mut depth_m = STEP_M;
     while depth_m <= DEEPEST_M {
         match push(depth_m) {
-            // Fingers that push it inwards hold it too, but no better than those that don't push it.
+            // Fingers that push it inwards hold it too, but no better than those that don't push
+            // it.
             Some(push) if push.max(0.0) < best.0 => best = (push.max(0.0), depth_m),
             Some(_) => {}
             None => break,
@@ -60,7 +65,11 @@ fn palm_m(
     (palm, frame): (usize, Isometry3<f64>),
     gripper: &Gripper,
 ) -> Option<f64> {
-    let mut positions: Vec<f64> = model.joints.iter().map(|joint| 0.0_f64.clamp(joint.lower, joint.upper)).collect();
+    let mut positions: Vec<f64> = model
+        .joints
+        .iter()
+        .map(|joint| 0.0_f64.clamp(joint.lower, joint.upper))
+        .collect();
     gripper.set(&mut positions, CAN_M.min(gripper.widest_m()));
     let middle_m = gripper.middle_m(CAN_M.min(gripper.widest_m()));
     let probe = Probe::new(model, links, (palm, frame));
@@ -84,22 +93,29 @@ mod tests {
     use actcheck_base::{Files, Source};
     use std::path::Path;
 
-    /// A jaw of 6 cm that turns against a fixed one, 2 cm before a palm, and its frame 2.5 cm before their tips: around a can it
-    /// is at 56 degrees to the fixed one. Returns how much deeper an object belongs.
+    /// A jaw of 6 cm that turns against a fixed one, 2 cm before a palm, and its frame 2.5 cm
+    /// before their tips: around a can it is at 56 degrees to the fixed one. Returns how much
+    /// deeper an object belongs.
     fn deeper(hinge_m: f64) -> f64 {
         let path = Path::new("models/robots/mobile_manipulator.toml");
-        let mut profile = actcheck_config::robot::read(&Files::Shipped, path).expect("the shipped robot is valid");
+        let mut profile = actcheck_config::robot::read(&Files::Shipped, path)
+            .expect("the shipped robot is valid");
         let inertial = "<inertial><mass value=\"0.1\"/>\
                         <inertia ixx=\"1e-4\" ixy=\"0\" ixz=\"0\" iyy=\"1e-4\" iyz=\"0\" izz=\"1e-4\"/></inertial>";
         let shape = |size: [f64; 3], at: [f64; 3]| {
             let words = |values: [f64; 3]| values.map(|value| value.to_string()).join(" ");
             let (size, at) = (words(size), words(at));
-            format!("<collision><origin xyz=\"{at}\"/><geometry><box size=\"{size}\"/></geometry></collision>")
+            format!(
+                "<collision><origin xyz=\"{at}\"/><geometry><box size=\"{size}\"/></geometry></collision>"
+            )
         };
         let plate = shape([0.02, 0.12, 0.04], [-0.01, 0.02, 0.0]);
         let (fixed, moving) = (
             shape([0.08, 0.01, 0.03], [0.04, -0.025, 0.0]),
-            shape([0.08 - hinge_m, 0.01, 0.03], [(0.08 - hinge_m) / 2.0, 0.005, 0.0]),
+            shape(
+                [0.08 - hinge_m, 0.01, 0.03],
+                [(0.08 - hinge_m) / 2.0, 0.005, 0.0],
+            ),
         );
         let text = format!(
             "<robot name=\"hand\"><link name=\"palm\">{inertial}{plate}{fixed}</link>\
@@ -111,9 +127,16 @@ mod tests {
         profile.urdf = Source::new("hand.urdf", text);
         profile.finger_joints = vec!["jaw".to_owned()];
         let model = RobotModel::read(&profile).expect("the hand is valid");
-        let links = ["jaw", "palm"].map(|name| model.links.iter().position(|link| link.name == name).unwrap_or(0));
+        let links = ["jaw", "palm"].map(|name| {
+            model
+                .links
+                .iter()
+                .position(|link| link.name == name)
+                .unwrap_or(0)
+        });
         let frame = |depth_m: f64| Isometry3::translation(0.055 - depth_m, 0.0, 0.0);
-        let at = |depth_m: f64| Gripper::find(&profile, &model, links, (links[1], frame(depth_m))).ok();
+        let at =
+            |depth_m: f64| Gripper::find(&profile, &model, links, (links[1], frame(depth_m))).ok();
         deeper_m(&model, links, (links[1], frame(0.0)), at)
     }
 

@@ -23,7 +23,10 @@ impl NoHand {
     /// The error about a robot's file.
     pub(super) fn named(self, name: &str) -> WorldError {
         match self {
-            Self::Gripper(what) => WorldError::Gripper { name: name.to_owned(), what },
+            Self::Gripper(what) => WorldError::Gripper {
+                name: name.to_owned(),
+                what,
+            },
             Self::Model(error) => error,
         }
     }
@@ -50,15 +53,32 @@ impl Stated {
             true => None,
             false => Some([model.frame(left)?.0, model.frame(right)?.0]),
         };
-        let led_here =
-            |joint: usize| model.own_leaders.iter().find(|(_, own)| **own == joint).map_or(joint, |(new, _)| *new);
-        let named = profile.finger_joints.iter().map(|name| model.joint(name).map(led_here));
+        let led_here = |joint: usize| {
+            model
+                .own_leaders
+                .iter()
+                .find(|(_, own)| **own == joint)
+                .map_or(joint, |(new, _)| *new)
+        };
+        let named = profile
+            .finger_joints
+            .iter()
+            .map(|name| model.joint(name).map(led_here));
         let joints = named.collect::<Result<Vec<_>, _>>()?;
         let grasp = match profile.grasp_link.is_empty() {
             true => None,
-            false => Some(frame(model, &profile.grasp_link, profile.grasp_offset_m, profile.grasp_turned_rad)?),
+            false => Some(frame(
+                model,
+                &profile.grasp_link,
+                profile.grasp_offset_m,
+                profile.grasp_turned_rad,
+            )?),
         };
-        Ok(Self { links, joints, grasp })
+        Ok(Self {
+            links,
+            joints,
+            grasp,
+        })
     }
 
     /// The gripper's joints by its palm, if the named parts decide about them.
@@ -71,20 +91,33 @@ impl Stated {
         let chains: Vec<Vec<usize>> = links.iter().map(|link| chain(model, *link)).collect();
         let common = (0..).take_while(|place| match &chains[..] {
             [one] => place + 1 < one.len(),
-            chains => {
-                chains.iter().all(|chain| chain.get(*place).is_some_and(|joint| Some(joint) == chains[0].get(*place)))
-            }
+            chains => chains.iter().all(|chain| {
+                chain
+                    .get(*place)
+                    .is_some_and(|joint| Some(joint) == chains[0].get(*place))
+            }),
         });
         let mut n_common = common.count();
-        let of_drives = self.joints.iter().filter_map(|joint| chains[0].iter().position(|known| known == joint));
+        let of_drives = self
+            .joints
+            .iter()
+            .filter_map(|joint| chains[0].iter().position(|known| known == joint));
         n_common = of_drives.fold(n_common, usize::min);
         let palm = match self.grasp {
             Some((link, _)) => link,
-            None => n_common.checked_sub(1).map_or(0, |last| chains[0][last] + 1),
+            None => n_common
+                .checked_sub(1)
+                .map_or(0, |last| chains[0][last] + 1),
         };
         let inner = chain(model, palm);
-        let followers = (0..model.joints.len()).filter(|joint| self.joints.contains(&leader(model, *joint)));
-        let all = chains.iter().flatten().copied().chain(followers).filter(|joint| !inner.contains(joint));
+        let followers =
+            (0..model.joints.len()).filter(|joint| self.joints.contains(&leader(model, *joint)));
+        let all = chains
+            .iter()
+            .flatten()
+            .copied()
+            .chain(followers)
+            .filter(|joint| !inner.contains(joint));
         Some(BTreeMap::from([(palm, all.collect())]))
     }
 }

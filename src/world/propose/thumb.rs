@@ -1,4 +1,5 @@
-//! Thumbs that turn across the palm: a hand may open wider with its thumb parked opposite the fingers.
+//! Thumbs that turn across the palm: a hand may open wider with its thumb parked opposite the
+//! fingers.
 
 use std::collections::BTreeSet;
 
@@ -9,23 +10,30 @@ use super::stated::NoHand;
 use crate::description::{JointKind, RobotModel};
 use actcheck_data::RobotProfile;
 
-/// Share of the way from 0 to a limit at which a thumb is parked: at the limit itself it may touch the wrist.
+/// Share of the way from 0 to a limit at which a thumb is parked: at the limit itself it may touch
+/// the wrist.
 const SHARE: f64 = 0.9;
 /// A position nearer to 0 than this does not turn a thumb across the palm. Unit: radians.
 const LEAST_TURN_RAD: f64 = 0.8;
-/// Axes with a smaller angle between them than this are parallel, as those of a finger's joints are. Unit: radians.
+/// Axes with a smaller angle between them than this are parallel, as those of a finger's joints
+/// are. Unit: radians.
 const PARALLEL_RAD: f64 = 0.5;
 /// Most joints of thumbs that are tried.
 const MOST_JOINTS: usize = 4;
-/// A parked thumb must rate this many times higher than one at 0: it is one more joint that the robot must hold.
+/// A parked thumb must rate this many times higher than one at 0: it is one more joint that the
+/// robot must hold.
 const CLEARLY: f64 = 1.1;
 
-/// Finds the best hand of a robot on its model without roles, with the thumb at 0 or turned. Returns that model too, in
-/// which a turned thumb is rigid.
+/// Finds the best hand of a robot on its model without roles, with the thumb at 0 or turned.
+/// Returns that model too, in which a turned thumb is rigid.
 ///
 /// # Errors
-/// [`NoHand`] as [`fingers::find`], with the thumb at 0, if there is none with a turned thumb either.
-pub(super) fn find(partial: &RobotProfile, wanted: Option<&str>) -> Result<(RobotModel, Hand), NoHand> {
+/// [`NoHand`] as [`fingers::find`], with the thumb at 0, if there is none with a turned thumb
+/// either.
+pub(super) fn find(
+    partial: &RobotProfile,
+    wanted: Option<&str>,
+) -> Result<(RobotModel, Hand), NoHand> {
     let model = without_roles(partial)?;
     let at_zero = fingers::find(partial, &model, wanted);
     let is_stated = !partial.finger_joints.is_empty()
@@ -39,18 +47,32 @@ pub(super) fn find(partial: &RobotProfile, wanted: Option<&str>) -> Result<(Robo
         Ok(hand) => vec![hand.palm],
         Err(_) => groups(&model).into_keys().collect(),
     };
-    let thumbs: Vec<(String, f64)> = palms.into_iter().flat_map(|palm| turned(&model, palm)).collect();
+    let thumbs: Vec<(String, f64)> = palms
+        .into_iter()
+        .flat_map(|palm| turned(&model, palm))
+        .collect();
     let mut best = at_zero.map(|hand| (model, hand));
     for (joint, position) in thumbs {
         let thumb = (joint.clone(), position);
         let other_model = with_rigid(partial, vec![thumb.clone()])?;
         let parked = partial.parked.iter().cloned().chain([thumb]).collect();
-        let with_thumb = RobotProfile { parked, ..partial.clone() };
-        let Ok(mut other) = fingers::find(&with_thumb, &other_model, wanted) else { continue };
-        if best.as_ref().is_ok_and(|(_, known)| other.score < CLEARLY * known.score) {
+        let with_thumb = RobotProfile {
+            parked,
+            ..partial.clone()
+        };
+        let Ok(mut other) = fingers::find(&with_thumb, &other_model, wanted) else {
+            continue;
+        };
+        if best
+            .as_ref()
+            .is_ok_and(|(_, known)| other.score < CLEARLY * known.score)
+        {
             continue;
         }
-        other.notes.insert("parked_joints", format!("`{joint}` turns the thumb opposite the fingers"));
+        other.notes.insert(
+            "parked_joints",
+            format!("`{joint}` turns the thumb opposite the fingers"),
+        );
         best = Ok((other_model, other));
     }
     best
@@ -59,26 +81,54 @@ pub(super) fn find(partial: &RobotProfile, wanted: Option<&str>) -> Result<(Robo
 /// The model in which all joints move but those that the profile parks in its fingers.
 pub(super) fn without_roles(partial: &RobotProfile) -> Result<RobotModel, NoHand> {
     let model = with_rigid(partial, Vec::new())?;
-    let links = partial.finger_links.iter().filter_map(|name| Some(model.frame(name).ok()?.0));
-    let joints = partial.finger_joints.iter().filter_map(|name| Some(model.joint(name).ok()? + 1));
-    let in_fingers: BTreeSet<usize> = links.chain(joints).flat_map(|link| chain(&model, link)).collect();
-    let is_in_finger = |name: &str| model.joint(name).is_ok_and(|joint| in_fingers.contains(&joint));
-    let parked: Vec<(String, f64)> = partial.parked.iter().filter(|(name, _)| is_in_finger(name)).cloned().collect();
-    if parked.is_empty() { Ok(model) } else { with_rigid(partial, parked) }
+    let links = partial
+        .finger_links
+        .iter()
+        .filter_map(|name| Some(model.frame(name).ok()?.0));
+    let joints = partial
+        .finger_joints
+        .iter()
+        .filter_map(|name| Some(model.joint(name).ok()? + 1));
+    let in_fingers: BTreeSet<usize> = links
+        .chain(joints)
+        .flat_map(|link| chain(&model, link))
+        .collect();
+    let is_in_finger = |name: &str| {
+        model
+            .joint(name)
+            .is_ok_and(|joint| in_fingers.contains(&joint))
+    };
+    let parked: Vec<(String, f64)> = partial
+        .parked
+        .iter()
+        .filter(|(name, _)| is_in_finger(name))
+        .cloned()
+        .collect();
+    if parked.is_empty() {
+        Ok(model)
+    } else {
+        with_rigid(partial, parked)
+    }
 }
 
 /// The model in which all joints move but these, which are rigid at their positions.
 fn with_rigid(partial: &RobotProfile, parked: Vec<(String, f64)>) -> Result<RobotModel, NoHand> {
-    Ok(RobotModel::read(&RobotProfile { arm_joints: Vec::new(), planar_base: false, parked, ..partial.clone() })?)
+    Ok(RobotModel::read(&RobotProfile {
+        arm_joints: Vec::new(),
+        planar_base: false,
+        parked,
+        ..partial.clone()
+    })?)
 }
 
-/// Joints of a hand that turn another one of the same finger about an axis that is not parallel to its own, each with a
-/// position near one of its limits.
+/// Joints of a hand that turn another one of the same finger about an axis that is not parallel to
+/// its own, each with a position near one of its limits.
 fn turned(model: &RobotModel, palm: usize) -> Vec<(String, f64)> {
     let n_inner = chain(model, palm).len();
     let beyond = |joint: &usize| {
         let path = chain(model, *joint + 1);
-        path.len() > n_inner && (n_inner == 0 || path.get(n_inner - 1) == palm.checked_sub(1).as_ref())
+        path.len() > n_inner
+            && (n_inner == 0 || path.get(n_inner - 1) == palm.checked_sub(1).as_ref())
     };
     let carries_across = |joint: usize| {
         let own = &model.joints[joint];
@@ -97,7 +147,9 @@ fn turned(model: &RobotModel, palm: usize) -> Vec<(String, f64)> {
         let own = &model.joints[joint];
         [own.lower, own.upper].map(|limit| (own.name.clone(), rounded(SHARE * limit)))
     });
-    limits.filter(|(_, position)| position.is_finite() && position.abs() > LEAST_TURN_RAD).collect()
+    limits
+        .filter(|(_, position)| position.is_finite() && position.abs() > LEAST_TURN_RAD)
+        .collect()
 }
 
 fn rounded(position: f64) -> f64 {

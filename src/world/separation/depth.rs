@@ -1,4 +1,5 @@
-//! How deep two convex solids are in each other: the expanding polytope algorithm (G. van den Bergen, 2001).
+//! How deep two convex solids are in each other: the expanding polytope algorithm (G. van den
+//! Bergen, 2001).
 
 use nalgebra::Vector3;
 
@@ -15,8 +16,8 @@ const PARALLEL: f64 = 1e-12;
 /// Points this near to a plane are in it. Unit: metres. More than the rounding error.
 const PLANE_M: f64 = 1e-12;
 
-/// A whole polytope has about half as many faces after the last step. If there are more, rounding errors have torn it, and
-/// their number doubles with each step.
+/// A whole polytope has about half as many faces after the last step. If there are more, rounding
+/// errors have torn it, and their number doubles with each step.
 const MOST_FACES: usize = 4 * N_STEPS;
 
 /// A triangle of the polytope.
@@ -33,17 +34,25 @@ impl Face {
     fn new(all: &[Corner], corners: [usize; 3]) -> Option<Self> {
         let [a, b, c] = corners.map(|idx| all[idx].point);
         let normal = (b - a).cross(&(c - a)).try_normalize(f64::MIN_POSITIVE)?;
-        Some(Self { corners, normal, far_m: normal.dot(&a) })
+        Some(Self {
+            corners,
+            normal,
+            far_m: normal.dot(&a),
+        })
     }
 
-    /// Whether a point is beyond the face or in its plane: a new face in the same plane could have no area.
+    /// Whether a point is beyond the face or in its plane: a new face in the same plane could have
+    /// no area.
     fn is_seen_from(&self, all: &[Corner], point: &Vector3<f64>) -> bool {
         (point - all[self.corners[0]].point).dot(&self.normal) > -PLANE_M
     }
 
-    /// Weights of its corners for the point that is nearest to the origin; some are negative if that is beyond an edge.
+    /// Weights of its corners for the point that is nearest to the origin; some are negative if
+    /// that is beyond an edge.
     fn weights(&self, all: &[Corner]) -> [f64; 3] {
-        let [a, b, c] = self.corners.map(|idx| all[idx].point - self.normal * self.far_m);
+        let [a, b, c] = self
+            .corners
+            .map(|idx| all[idx].point - self.normal * self.far_m);
         let part = |from: Vector3<f64>, to: Vector3<f64>| from.cross(&to).dot(&self.normal);
         let parts = [part(b, c), part(c, a), part(a, b)];
         let sum: f64 = parts.iter().sum();
@@ -56,14 +65,16 @@ impl Face {
         let sum: f64 = weights.iter().sum();
         let of = |which: usize| {
             let corners = self.corners.iter().zip(weights);
-            corners.map(|(idx, weight)| all[*idx].of[which] * (weight / sum)).sum()
+            corners
+                .map(|(idx, weight)| all[*idx].of[which] * (weight / sum))
+                .sum()
         };
         [of(0), of(1)]
     }
 }
 
-/// Finds the direction in which two solids overlap least. `simplex`: corners with the origin in them or at them. Returns
-/// `None` if they are flat.
+/// Finds the direction in which two solids overlap least. `simplex`: corners with the origin in
+/// them or at them. Returns `None` if they are flat.
 pub(super) fn depth(solids: &Solids<'_>, simplex: &Simplex) -> Option<Separation> {
     let mut all = tetrahedron(solids, simplex)?;
     let mut faces: Vec<Face> = [[0, 1, 2], [0, 3, 1], [0, 2, 3], [1, 3, 2]]
@@ -77,12 +88,18 @@ pub(super) fn depth(solids: &Solids<'_>, simplex: &Simplex) -> Option<Separation
         let overlap_m = corner.point.dot(&nearest.normal);
         if overlap_m - nearest.far_m <= TOLERANCE_M {
             // The nearest point may be in another triangle of the same face of the solids.
-            let near = faces.iter().filter(|face| face.normal.dot(&nearest.normal) > 1.0 - PARALLEL);
+            let near = faces
+                .iter()
+                .filter(|face| face.normal.dot(&nearest.normal) > 1.0 - PARALLEL);
             let around = near.map(|face| (face, face.weights(&all)));
             let least = |weights: &[f64; 3]| weights.iter().copied().fold(f64::INFINITY, f64::min);
             let (face, weights) = around.max_by(|a, b| least(&a.1).total_cmp(&least(&b.1)))?;
             let points = face.points(&all, weights);
-            return Some(Separation { distance_m: -overlap_m, normal: nearest.normal, points });
+            return Some(Separation {
+                distance_m: -overlap_m,
+                normal: nearest.normal,
+                points,
+            });
         }
         if all.iter().any(|known| known.point == corner.point) {
             return None;
@@ -98,7 +115,9 @@ pub(super) fn depth(solids: &Solids<'_>, simplex: &Simplex) -> Option<Separation
         all.push(corner);
         let new = all.len() - 1;
         // The edges of the hole belong to one face that was seen.
-        let rim = edges.iter().filter(|[from, to]| !edges.contains(&[*to, *from]));
+        let rim = edges
+            .iter()
+            .filter(|[from, to]| !edges.contains(&[*to, *from]));
         faces.extend(rim.filter_map(|[from, to]| Face::new(&all, [*from, *to, new])));
         if faces.len() > MOST_FACES {
             return None;
@@ -107,12 +126,16 @@ pub(super) fn depth(solids: &Solids<'_>, simplex: &Simplex) -> Option<Separation
     None
 }
 
-/// Four corners that are not in one plane, with the origin between them or at them, in right-handed order.
+/// Four corners that are not in one plane, with the origin between them or at them, in right-handed
+/// order.
 fn tetrahedron(solids: &Solids<'_>, simplex: &Simplex) -> Option<Vec<Corner>> {
     let mut all: Vec<Corner> = simplex.corners().to_vec();
     let axes = [Vector3::x(), Vector3::y(), Vector3::z()];
     while all.len() < 4 {
-        let edges: Vec<Vector3<f64>> = all[1..].iter().map(|corner| corner.point - all[0].point).collect();
+        let edges: Vec<Vector3<f64>> = all[1..]
+            .iter()
+            .map(|corner| corner.point - all[0].point)
+            .collect();
         let ways: Vec<Vector3<f64>> = match edges.as_slice() {
             [] => axes.to_vec(),
             [edge] => axes.iter().map(|axis| edge.cross(axis)).collect(),
@@ -126,13 +149,21 @@ fn tetrahedron(solids: &Solids<'_>, simplex: &Simplex) -> Option<Vec<Corner>> {
                 [one, other, ..] => one.cross(other).dot(&way).abs(),
             }
         };
-        let both = ways.iter().filter_map(|way| way.try_normalize(f64::MIN_POSITIVE)).flat_map(|way| [way, -way]);
-        let found = both.map(|way| solids.corner(way)).max_by(|a, b| spread(a).total_cmp(&spread(b)))?;
+        let both = ways
+            .iter()
+            .filter_map(|way| way.try_normalize(f64::MIN_POSITIVE))
+            .flat_map(|way| [way, -way]);
+        let found = both
+            .map(|way| solids.corner(way))
+            .max_by(|a, b| spread(a).total_cmp(&spread(b)))?;
         all.push(found);
     }
     let [a, b, c, d] = [0, 1, 2, 3].map(|idx| all[idx].point);
     let volume = (b - a).cross(&(c - a)).dot(&(d - a));
-    let longest = [b - a, c - a, d - a].iter().map(Vector3::norm).fold(0.0, f64::max);
+    let longest = [b - a, c - a, d - a]
+        .iter()
+        .map(Vector3::norm)
+        .fold(0.0, f64::max);
     if volume.abs() <= FLAT * longest.powi(3) {
         return None;
     }

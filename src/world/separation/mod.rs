@@ -1,8 +1,8 @@
 //! Distance and penetration of two convex solids, in 64 bits.
 //!
-//! The engine searches for them in 32 bits. Between hulls with many corners it ends too early and is millimetres wrong, or
-//! finds bodies to overlap that don't touch: a finger pressed a can along a direction 40° off, and links of an arm collided
-//! that were 8 mm apart.
+//! The engine searches for them in 32 bits. Between hulls with many corners it ends too early and
+//! is millimetres wrong, or finds bodies to overlap that don't touch: a finger pressed a can along
+//! a direction 40° off, and links of an arm collided that were 8 mm apart.
 
 mod depth;
 mod simplex;
@@ -22,11 +22,14 @@ const N_STEPS: usize = 100;
 /// How far apart two convex solids are.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Separation {
-    /// Their distance; negative: by how much they overlap in the direction in which they overlap least. Unit: metres.
+    /// Their distance; negative: by how much they overlap in the direction in which they overlap
+    /// least. Unit: metres.
     pub distance_m: f64,
-    /// From the first to the second solid, the direction of the distance or least overlap. Frame: the first solid.
+    /// From the first to the second solid, the direction of the distance or least overlap. Frame:
+    /// the first solid.
     pub normal: Vector3<f64>,
-    /// The points of the first and of the second solid that are this distance apart. Frame: the first solid.
+    /// The points of the first and of the second solid that are this distance apart. Frame: the
+    /// first solid.
     pub points: [Vector3<f64>; 2],
 }
 
@@ -59,18 +62,26 @@ impl<'a> Solids<'a> {
     /// Two solids, with the pose of the second in the frame of the first.
     pub(crate) fn new(pose: &Pose, first: &'a dyn SupportMap, second: &'a dyn SupportMap) -> Self {
         let [x, y, z, w] = pose.rotation.to_array().map(f64::from);
-        let turn = UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z)).to_rotation_matrix().into_inner();
-        Self { first, second, turn, shift: from_vector(pose.translation) }
+        let turn = UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z))
+            .to_rotation_matrix()
+            .into_inner();
+        Self {
+            first,
+            second,
+            turn,
+            shift: from_vector(pose.translation),
+        }
     }
 
-    /// Finds their distance if it is less than `far_m`, or how much they overlap. The search begins with the direction `start`, of
-    /// length 1.
+    /// Finds their distance if it is less than `far_m`, or how much they overlap. The search begins
+    /// with the direction `start`, of length 1.
     pub(crate) fn separation(&self, start: Vector3<f64>, far_m: f64) -> Found {
         self.separation_near(start, far_m, &mut Vec::new())
     }
 
-    /// As [`Solids::separation`]. The search begins with these points of both solids, each in the frame of its solid, if there are
-    /// any, and leaves those with which it ended; none if they overlap.
+    /// As [`Solids::separation`]. The search begins with these points of both solids, each in the
+    /// frame of its solid, if there are any, and leaves those with which it ended; none if they
+    /// overlap.
     pub(crate) fn separation_near(
         &self,
         start: Vector3<f64>,
@@ -106,7 +117,11 @@ impl<'a> Solids<'a> {
             let stuck = length_m >= last_m || simplex.has(&corner);
             if converged || stuck {
                 corners.extend(simplex.corners().iter().map(|corner| self.apart(corner)));
-                return Found::Near(Separation { distance_m: length_m, normal, points: simplex.points() });
+                return Found::Near(Separation {
+                    distance_m: length_m,
+                    normal,
+                    points: simplex.points(),
+                });
             }
             last_m = length_m;
             simplex.add(corner);
@@ -115,16 +130,24 @@ impl<'a> Solids<'a> {
             }
         }
         if best.0 > -TOLERANCE_M {
-            return Found::Near(Separation { distance_m: best.0.max(0.0), normal: best.1, points: simplex.points() });
+            return Found::Near(Separation {
+                distance_m: best.0.max(0.0),
+                normal: best.1,
+                points: simplex.points(),
+            });
         }
         depth::depth(self, &simplex).map_or(Found::Nothing, Found::Near)
     }
 
-    /// The simplex of some points of both solids, each in the frame of its solid, or of a corner if there are none.
+    /// The simplex of some points of both solids, each in the frame of its solid, or of a corner if
+    /// there are none.
     fn begun(&self, corner: Corner, points: &[[Vector3<f64>; 2]]) -> Simplex {
         let mut corners = points.iter().map(|[first, second]| {
             let second = self.turn * second + self.shift;
-            Corner { point: first - second, of: [*first, second] }
+            Corner {
+                point: first - second,
+                of: [*first, second],
+            }
         });
         let mut simplex = Simplex::new(corners.next().unwrap_or(corner));
         corners.for_each(|corner| simplex.add(corner));
@@ -140,9 +163,14 @@ impl<'a> Solids<'a> {
     /// The point of the differences that is farthest along a direction.
     fn corner(&self, direction: Vector3<f64>) -> Corner {
         let first = from_vector(self.first.local_support_point(to_vector(&direction)));
-        let second = self.second.local_support_point(to_vector(&-self.turn.tr_mul(&direction)));
+        let second = self
+            .second
+            .local_support_point(to_vector(&-self.turn.tr_mul(&direction)));
         let second = self.turn * from_vector(second) + self.shift;
-        Corner { point: first - second, of: [first, second] }
+        Corner {
+            point: first - second,
+            of: [first, second],
+        }
     }
 }
 
@@ -165,7 +193,10 @@ mod tests {
     fn pose(n: u32, size_m: f64) -> Isometry3<f64> {
         let at = |k: u32| spread(n * 7 + k);
         let place = Translation3::new(at(0) * size_m, at(1) * size_m, at(2) * size_m);
-        Isometry3::from_parts(place, UnitQuaternion::new(3.0 * Vector3::new(at(3), at(4), at(5))))
+        Isometry3::from_parts(
+            place,
+            UnitQuaternion::new(3.0 * Vector3::new(at(3), at(4), at(5))),
+        )
     }
 
     fn found(b_in_a: &Isometry3<f64>, [a, b]: [&dyn Shape; 2]) -> Option<Separation> {
@@ -179,29 +210,44 @@ mod tests {
     /// Boxes side by side: the gap along each axis is known, and turning both changes nothing.
     #[test]
     fn boxes_are_as_far_apart_and_as_deep_as_calculated() {
-        let half = [Vector3::new(0.02, 0.05, 0.03), Vector3::new(0.04, 0.01, 0.06)];
+        let half = [
+            Vector3::new(0.02, 0.05, 0.03),
+            Vector3::new(0.04, 0.01, 0.06),
+        ];
         let boxes = half.map(|half| Cuboid::new(to_vector(&half)));
         let (mut apart, mut deep) = (0, 0);
         for trial in 0..300 {
-            let shift = Vector3::new(spread(trial), spread(trial + 1000), spread(trial + 2000)) * 0.12;
+            let shift =
+                Vector3::new(spread(trial), spread(trial + 1000), spread(trial + 2000)) * 0.12;
             let gaps = shift.abs() - half[0] - half[1];
             let beyond = gaps.sup(&Vector3::zeros());
-            let true_m = if beyond.norm() > 0.0 { beyond.norm() } else { gaps.max() };
+            let true_m = if beyond.norm() > 0.0 {
+                beyond.norm()
+            } else {
+                gaps.max()
+            };
             let b_in_a = Isometry3::from(Translation3::from(shift));
             let found = found(&b_in_a, [&boxes[0], &boxes[1]]).map(|found| found.distance_m);
-            assert!(found.is_some_and(|found| (found - true_m).abs() < 2e-6), "{trial}: {found:?}, {true_m}");
+            assert!(
+                found.is_some_and(|found| (found - true_m).abs() < 2e-6),
+                "{trial}: {found:?}, {true_m}"
+            );
             if true_m > 0.0 { apart += 1 } else { deep += 1 }
         }
         assert!(apart > 50 && deep > 50, "{apart} apart, {deep} deep");
     }
 
-    /// Hulls with many corners: each result is a proof, because no two points are nearer than the gap along the normal.
-    /// The library is wrong by more than a tenth of a millimetre for some.
+    /// Hulls with many corners: each result is a proof, because no two points are nearer than the
+    /// gap along the normal. The library is wrong by more than a tenth of a millimetre for some.
     #[test]
     fn hulls_are_as_far_apart_as_their_nearest_points() {
         let corners = |n: u32| {
             (0..70).map(move |k| {
-                let at = Vector3::new(spread(n + 3 * k), spread(n + 3 * k + 1), spread(n + 3 * k + 2));
+                let at = Vector3::new(
+                    spread(n + 3 * k),
+                    spread(n + 3 * k + 1),
+                    spread(n + 3 * k + 2),
+                );
                 to_vector(&(at.normalize() * 0.04))
             })
         };
@@ -209,28 +255,51 @@ mod tests {
         let (mut apart, mut deep, mut wrong) = (0, 0, 0);
         for trial in 0..400 {
             let points: Vec<_> = corners(trial * 331).collect();
-            let hull = ConvexPolyhedron::from_convex_hull(&points).expect("corners of a ball are not flat");
+            let hull = ConvexPolyhedron::from_convex_hull(&points)
+                .expect("corners of a ball are not flat");
             let b_in_a = pose(trial, 0.09);
-            let found = found(&b_in_a, [&hull, &cylinder]).unwrap_or_else(|| panic!("trial {trial}: nothing"));
+            let found = found(&b_in_a, [&hull, &cylinder])
+                .unwrap_or_else(|| panic!("trial {trial}: nothing"));
             let solids = Solids::new(&to_pose(&b_in_a), &hull, &cylinder);
             let along_m = -solids.corner(found.normal).point.dot(&found.normal);
             let between = found.points[1] - found.points[0];
-            assert!((along_m - found.distance_m).abs() < 2e-6, "trial {trial}: {found:?}, {along_m} along the normal");
-            assert!((between.dot(&found.normal) - found.distance_m).abs() < 2e-6, "trial {trial}: {found:?}");
-            // The normal of round bodies that are deep in each other is known less well than the depth.
+            assert!(
+                (along_m - found.distance_m).abs() < 2e-6,
+                "trial {trial}: {found:?}, {along_m} along the normal"
+            );
+            assert!(
+                (between.dot(&found.normal) - found.distance_m).abs() < 2e-6,
+                "trial {trial}: {found:?}"
+            );
+            // The normal of round bodies that are deep in each other is known less well than the
+            // depth.
             let aside = (between - found.normal * found.distance_m).norm();
-            assert!(aside < 1e-4 || found.distance_m < -0.001, "trial {trial}: {found:?} {aside}");
+            assert!(
+                aside < 1e-4 || found.distance_m < -0.001,
+                "trial {trial}: {found:?} {aside}"
+            );
             if found.distance_m > 0.0 {
                 apart += 1
             } else {
                 deep += 1
             }
-            let by_library =
-                contact(&to_pose(&Isometry3::identity()), &hull, &to_pose(&b_in_a), &cylinder, to_real(FAR_M));
-            let dist = by_library.ok().flatten().map_or(f64::INFINITY, |contact| f64::from(contact.dist));
+            let by_library = contact(
+                &to_pose(&Isometry3::identity()),
+                &hull,
+                &to_pose(&b_in_a),
+                &cylinder,
+                to_real(FAR_M),
+            );
+            let dist = by_library
+                .ok()
+                .flatten()
+                .map_or(f64::INFINITY, |contact| f64::from(contact.dist));
             wrong += usize::from((dist - found.distance_m).abs() > 1e-4);
         }
-        assert!(apart > 50 && deep > 50 && wrong > 0, "{apart} apart, {deep} deep, {wrong} wrong in the library");
+        assert!(
+            apart > 50 && deep > 50 && wrong > 0,
+            "{apart} apart, {deep} deep, {wrong} wrong in the library"
+        );
     }
 
     /// Corners of a piece of a finger of the Z1 in the package `example-robot-data`. Unit: metres.
@@ -265,15 +334,21 @@ mod tests {
         [0.08107865, 0.028, -0.0052163517],
     ];
 
-    /// Many corners of the differences of a cylinder and this finger are in one plane, where rounding errors tear the polytope.
-    /// Without a limit, the number of its faces doubles with each step, and the search takes seconds.
+    /// Many corners of the differences of a cylinder and this finger are in one plane, where
+    /// rounding errors tear the polytope. Without a limit, the number of its faces doubles with
+    /// each step, and the search takes seconds.
     #[test]
     fn a_search_with_a_torn_polytope_ends() {
         let points = FINGER.map(|[x, y, z]| parry3d::math::Vector::new(x, y, z));
         let hull = ConvexPolyhedron::from_convex_hull(&points).expect("a finger is not flat");
         let cylinder = Cylinder::new(0.008, 0.033);
         let pose = Pose {
-            rotation: parry3d::math::Rotation::from_xyzw(1.2443363e-10, -0.41314983, -2.7427602e-10, 0.91066307),
+            rotation: parry3d::math::Rotation::from_xyzw(
+                1.2443363e-10,
+                -0.41314983,
+                -2.7427602e-10,
+                0.91066307,
+            ),
             translation: parry3d::math::Vector::new(0.08137189, 9.995261e-11, 0.034244776),
             ..Pose::IDENTITY
         };

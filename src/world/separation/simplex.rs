@@ -6,8 +6,8 @@ use super::Corner;
 
 /// Most corners of a simplex in space.
 const MAX_CORNERS: usize = 4;
-/// Least share of the product of its edges that the area of a triangle or volume of a tetrahedron must have, squared or
-/// not: flatter ones say nothing about where the origin is.
+/// Least share of the product of its edges that the area of a triangle or volume of a tetrahedron
+/// must have, squared or not: flatter ones say nothing about where the origin is.
 const FLAT: f64 = 1e-12;
 /// Square of that share, above which the signs of weights are known in spite of rounding errors.
 const NEARLY_FLAT: f64 = 1e-10;
@@ -25,7 +25,12 @@ pub(super) struct Simplex {
 
 impl Simplex {
     pub(super) fn new(corner: Corner) -> Self {
-        Self { corners: [corner; MAX_CORNERS], n_corners: 1, weights: [1.0, 0.0, 0.0, 0.0], nearest: corner.point }
+        Self {
+            corners: [corner; MAX_CORNERS],
+            n_corners: 1,
+            weights: [1.0, 0.0, 0.0, 0.0],
+            nearest: corner.point,
+        }
     }
 
     pub(super) fn corners(&self) -> &[Corner] {
@@ -40,13 +45,19 @@ impl Simplex {
     /// The points of both solids whose difference is the nearest one.
     pub(super) fn points(&self) -> [Vector3<f64>; 2] {
         let weighted = |which: usize| {
-            self.corners().iter().zip(&self.weights).map(|(corner, weight)| corner.of[which] * *weight).sum()
+            self.corners()
+                .iter()
+                .zip(&self.weights)
+                .map(|(corner, weight)| corner.of[which] * *weight)
+                .sum()
         };
         [weighted(0), weighted(1)]
     }
 
     pub(super) fn has(&self, corner: &Corner) -> bool {
-        self.corners().iter().any(|known| known.point == corner.point)
+        self.corners()
+            .iter()
+            .any(|known| known.point == corner.point)
     }
 
     pub(super) fn is_around_origin(&self) -> bool {
@@ -58,12 +69,24 @@ impl Simplex {
         self.corners[self.n_corners] = corner;
         let n_known = self.n_corners;
         let points = self.corners.map(|corner| corner.point);
-        let around = if n_known + 1 == MAX_CORNERS { weights_around_origin(&points) } else { None };
+        let around = if n_known + 1 == MAX_CORNERS {
+            weights_around_origin(&points)
+        } else {
+            None
+        };
         let best = nearest_with_last(&points[..=n_known]);
         let best = match around {
             // Nothing is nearer, unless the origin is exactly on a side.
-            Some(weights) if best.as_ref().is_none_or(|side| side.at.norm_squared() > 0.0) => {
-                Some(Nearest { subset: (1 << MAX_CORNERS) - 1, weights, at: weighted(&points, &weights) })
+            Some(weights)
+                if best
+                    .as_ref()
+                    .is_none_or(|side| side.at.norm_squared() > 0.0) =>
+            {
+                Some(Nearest {
+                    subset: (1 << MAX_CORNERS) - 1,
+                    weights,
+                    at: weighted(&points, &weights),
+                })
             }
             _ => best,
         };
@@ -87,15 +110,26 @@ struct Nearest {
 }
 
 fn weighted(points: &[Vector3<f64>], weights: &[f64]) -> Vector3<f64> {
-    points.iter().zip(weights).map(|(point, weight)| point * *weight).sum()
+    points
+        .iter()
+        .zip(weights)
+        .map(|(point, weight)| point * *weight)
+        .sum()
 }
 
-/// Finds the nearest point of the last corner, and of the edges and triangles of it and the others, with the weights not below 0:
-/// the nearest point of the others alone is known and is not the nearest of all.
+/// Finds the nearest point of the last corner, and of the edges and triangles of it and the others,
+/// with the weights not below 0: the nearest point of the others alone is known and is not the
+/// nearest of all.
 fn nearest_with_last(points: &[Vector3<f64>]) -> Option<Nearest> {
     let (last, others) = points.split_last()?;
-    let mut best =
-        (last.norm_squared(), Nearest { subset: 1 << others.len(), weights: [1.0, 0.0, 0.0, 0.0], at: *last });
+    let mut best = (
+        last.norm_squared(),
+        Nearest {
+            subset: 1 << others.len(),
+            weights: [1.0, 0.0, 0.0, 0.0],
+            at: *last,
+        },
+    );
     // From each of the others to the last one, its square, and the way along it to the origin.
     let mut edges = [(Vector3::zeros(), 0.0, 0.0); MAX_CORNERS - 1];
     for (point, edge) in others.iter().zip(&mut edges) {
@@ -107,13 +141,21 @@ fn nearest_with_last(points: &[Vector3<f64>]) -> Option<Nearest> {
         let (other, c, q) = edges[first];
         let subset = known | 1 << others.len();
         let found = if rest == 0 {
-            weights_of_edge(c, q).map(|[one, two]| ([one, two, 0.0, 0.0], points[first] * one + last * two))
+            weights_of_edge(c, q)
+                .map(|[one, two]| ([one, two, 0.0, 0.0], points[first] * one + last * two))
         } else if rest & (rest - 1) == 0 {
             let second = rest.trailing_zeros() as usize;
             let one = points[second] - points[first];
-            let (a, b, p) = (one.norm_squared(), one.dot(&other), -points[first].dot(&one));
+            let (a, b, p) = (
+                one.norm_squared(),
+                one.dot(&other),
+                -points[first].dot(&one),
+            );
             weights_of_triangle([a, b, c], [p, q]).map(|[one, two, three]| {
-                ([one, two, three, 0.0], points[first] * one + points[second] * two + last * three)
+                (
+                    [one, two, three, 0.0],
+                    points[first] * one + points[second] * two + last * three,
+                )
             })
         } else {
             // A tetrahedron: the origin is not in it.
@@ -122,22 +164,30 @@ fn nearest_with_last(points: &[Vector3<f64>]) -> Option<Nearest> {
         let Some((weights, at)) = found else { continue };
         let far = at.norm_squared();
         if far < best.0 {
-            best = (far, Nearest { subset, weights, at });
+            best = (
+                far,
+                Nearest {
+                    subset,
+                    weights,
+                    at,
+                },
+            );
         }
     }
     Some(best.1)
 }
 
-/// Weights of both ends of an edge for its point that is nearest to the origin, unless it is beyond one of them. `square`: of the
-/// length of the edge; `way`: the product of the edge with the way from its first end to the origin.
+/// Weights of both ends of an edge for its point that is nearest to the origin, unless it is beyond
+/// one of them. `square`: of the length of the edge; `way`: the product of the edge with the way
+/// from its first end to the origin.
 fn weights_of_edge(square: f64, way: f64) -> Option<[f64; 2]> {
     let second = way / square;
     let first = 1.0 - second;
     (square != 0.0 && first >= 0.0 && second >= 0.0).then_some([first, second])
 }
 
-/// As [`weights_of_edge`], for a triangle: the products of its first edge with itself, with the second and of the second with itself,
-/// and those of both edges with the way to the origin.
+/// As [`weights_of_edge`], for a triangle: the products of its first edge with itself, with the
+/// second and of the second with itself, and those of both edges with the way to the origin.
 fn weights_of_triangle([a, b, c]: [f64; 3], [p, q]: [f64; 2]) -> Option<[f64; 3]> {
     let area = a * c - b * b;
     let (second, third) = (p * c - q * b, q * a - p * b);
@@ -149,7 +199,8 @@ fn weights_of_triangle([a, b, c]: [f64; 3], [p, q]: [f64; 2]) -> Option<[f64; 3]
     (first >= 0.0).then_some([first, second, third])
 }
 
-/// Weights of the corners of a tetrahedron with the origin in it; `None` if it is outside, or the corners are in a plane.
+/// Weights of the corners of a tetrahedron with the origin in it; `None` if it is outside, or the
+/// corners are in a plane.
 fn weights_around_origin(points: &[Vector3<f64>; MAX_CORNERS]) -> Option<[f64; MAX_CORNERS]> {
     let base = points[0];
     let edges = [1, 2, 3].map(|idx| points[idx] - base);
@@ -159,7 +210,9 @@ fn weights_around_origin(points: &[Vector3<f64>; MAX_CORNERS]) -> Option<[f64; M
     let squares = a.norm_squared() * b.norm_squared() * c.norm_squared();
     // Weights times the volume. In most cases one is far below 0.
     let parts = across.map(|across| -base.dot(&across) * volume.signum());
-    let least = parts.into_iter().fold(volume.abs() - parts.iter().sum::<f64>(), f64::min);
+    let least = parts
+        .into_iter()
+        .fold(volume.abs() - parts.iter().sum::<f64>(), f64::min);
     if volume * volume > NEARLY_FLAT * squares && least < -SURELY * volume.abs() {
         return None;
     }
@@ -167,8 +220,16 @@ fn weights_around_origin(points: &[Vector3<f64>; MAX_CORNERS]) -> Option<[f64; M
         return None;
     }
     let found = Matrix3::from_columns(&edges).try_inverse()? * -base;
-    let weights = [1.0 - (found.x + found.y + found.z), found.x, found.y, found.z];
-    weights.iter().all(|weight| *weight >= 0.0).then_some(weights)
+    let weights = [
+        1.0 - (found.x + found.y + found.z),
+        found.x,
+        found.y,
+        found.z,
+    ];
+    weights
+        .iter()
+        .all(|weight| *weight >= 0.0)
+        .then_some(weights)
 }
 
 #[cfg(test)]
@@ -180,14 +241,26 @@ mod tests {
     fn by_trial(points: &[Vector3<f64>]) -> Option<(usize, [f64; MAX_CORNERS], Vector3<f64>)> {
         let mut best: Option<(f64, usize, [f64; MAX_CORNERS], Vector3<f64>)> = None;
         for subset in (1_usize << (points.len() - 1))..(1 << points.len()) {
-            let chosen: Vec<_> =
-                (0..points.len()).filter(|idx| subset >> idx & 1 == 1).map(|idx| points[idx]).collect();
-            let Some(weights) = weights(&chosen) else { continue };
+            let chosen: Vec<_> = (0..points.len())
+                .filter(|idx| subset >> idx & 1 == 1)
+                .map(|idx| points[idx])
+                .collect();
+            let Some(weights) = weights(&chosen) else {
+                continue;
+            };
             if weights.iter().any(|weight| *weight < 0.0) {
                 continue;
             }
-            let at: Vector3<f64> = chosen.iter().zip(&weights).map(|(point, weight)| point * *weight).sum();
-            let far = if chosen.len() == MAX_CORNERS { 0.0 } else { at.norm_squared() };
+            let at: Vector3<f64> = chosen
+                .iter()
+                .zip(&weights)
+                .map(|(point, weight)| point * *weight)
+                .sum();
+            let far = if chosen.len() == MAX_CORNERS {
+                0.0
+            } else {
+                at.norm_squared()
+            };
             if best.is_none_or(|(known, ..)| far < known) {
                 best = Some((far, subset, weights, at));
             }
@@ -195,8 +268,8 @@ mod tests {
         best.map(|(_, subset, weights, at)| (subset, weights, at))
     }
 
-    /// Weights of the points, whose sum is 1, for the point of the plane, line or space through them that is nearest to the
-    /// origin. Returns `None` if they don't span it.
+    /// Weights of the points, whose sum is 1, for the point of the plane, line or space through
+    /// them that is nearest to the origin. Returns `None` if they don't span it.
     fn weights(points: &[Vector3<f64>]) -> Option<[f64; MAX_CORNERS]> {
         let base = points[0];
         let edge = |idx: usize| points[idx] - base;
@@ -250,7 +323,10 @@ mod tests {
                     2 => point *= 0.01,
                     _ => point.x += 0.5,
                 }
-                let corner = Corner { point, of: [point, Vector3::new(f64::from(n), 0.0, 0.0)] };
+                let corner = Corner {
+                    point,
+                    of: [point, Vector3::new(f64::from(n), 0.0, 0.0)],
+                };
                 let Some(simplex) = &mut simplex else {
                     simplex = Some(Simplex::new(corner));
                     continue;
@@ -258,16 +334,36 @@ mod tests {
                 if simplex.is_around_origin() || simplex.has(&corner) {
                     break;
                 }
-                let points: Vec<_> = simplex.corners().iter().map(|known| known.point).chain([point]).collect();
+                let points: Vec<_> = simplex
+                    .corners()
+                    .iter()
+                    .map(|known| known.point)
+                    .chain([point])
+                    .collect();
                 simplex.add(corner);
-                let Some((subset, weights, at)) = by_trial(&points) else { panic!("trial {trial}: nothing") };
-                let kept: Vec<_> =
-                    (0..points.len()).filter(|idx| subset >> idx & 1 == 1).map(|idx| points[idx]).collect();
-                let found: Vec<_> = simplex.corners().iter().map(|corner| corner.point).collect();
-                assert_eq!((found, simplex.weights, simplex.nearest()), (kept, weights, at), "trial {trial}");
+                let Some((subset, weights, at)) = by_trial(&points) else {
+                    panic!("trial {trial}: nothing")
+                };
+                let kept: Vec<_> = (0..points.len())
+                    .filter(|idx| subset >> idx & 1 == 1)
+                    .map(|idx| points[idx])
+                    .collect();
+                let found: Vec<_> = simplex
+                    .corners()
+                    .iter()
+                    .map(|corner| corner.point)
+                    .collect();
+                assert_eq!(
+                    (found, simplex.weights, simplex.nearest()),
+                    (kept, weights, at),
+                    "trial {trial}"
+                );
                 *subsets.entry(subset).or_insert(0) += 1;
             }
         }
-        assert!(subsets.len() > 10 && subsets.values().all(|n| *n > 5), "all kinds of subsets: {subsets:?}");
+        assert!(
+            subsets.len() > 10 && subsets.values().all(|n| *n > 5),
+            "all kinds of subsets: {subsets:?}"
+        );
     }
 }
