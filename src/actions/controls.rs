@@ -97,8 +97,8 @@ impl Operator<'_> {
         self.command.grip_force_n
     }
 
-    /// The object perceived earlier in this run that best matches this id. Returns `None` if there
-    /// were no percepts or none matches.
+    /// The object perceived earlier in this run that best matches this id. Returns `None` if
+    /// nothing was perceived or nothing matches.
     pub fn recall(&self, id: &str) -> Option<Sighting> {
         let perceived = self.memory().perceived.as_ref()?;
         let kind = self.kind_of(id)?;

@@ -24,8 +24,8 @@ impl Mesh {
     /// Creates a mesh with finite coordinates and valid vertex indices.
     ///
     /// # Errors
-    /// A lower-case message if a coordinate is not finite, an index is out of bounds, or there are
-    /// no triangles.
+    /// A lower-case message if a coordinate is not finite, an index is out of bounds, or the
+    /// mesh lacks triangles.
     pub fn new(vertices: Vec<[f64; 3]>, triangles: Vec<[u32; 3]>) -> Result<Self, String> {
         if let Some(vertex) = vertices
             .iter()

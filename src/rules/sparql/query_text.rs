@@ -75,8 +75,8 @@ pub(crate) fn variables(text: &str) -> BTreeSet<String> {
         .collect()
 }
 
-/// Returns the offset of the first `{` outside strings, IRIs and comments. Returns `None` if there
-/// is no such brace.
+/// Returns the offset of the first `{` outside strings, IRIs and comments. Returns `None` if it has
+/// none.
 pub(crate) fn first_group(text: &str) -> Option<usize> {
     braces(text)
         .into_iter()
