@@ -3,9 +3,9 @@
 
 use crate::journal::Record;
 use crate::outlines::Outline;
-use crate::quad_source::RunQuads;
+use crate::stored_run::StoredRun;
 use crate::write_run::{self, run_node};
-use crate::{History, RunRecord, detail, fault, graphs, trace_file, trace_parts};
+use crate::{History, RunRecord, fault, graphs, trace_file, trace_parts};
 use actcheck_base::{Diagnostic, Diagnostics};
 
 /// A run that is ready to be stored by [`History::write`].
@@ -58,15 +58,12 @@ impl Entry {
 }
 
 fn whole(record: &RunRecord) -> Result<Content, String> {
-    let (run, in_memory) = (
-        run_node(&record.id),
-        RunQuads::new(write_run::quads_without_facts(record)),
-    );
-    let parts = detail::parts(&in_memory, &run).map_err(|error| error.to_string())?;
+    let stored = StoredRun::of(record);
     let trace = trace_file::encode(&record.choices, &record.trace)?;
+    let parts = (stored.objects(), stored.actions());
     let trace = trace_parts::appended(trace, &record.trace.hash, &parts)?;
-    let mut quads = in_memory.into_quads();
-    graphs::write(&record.facts, &run, &mut quads);
+    let mut quads = write_run::quads_without_facts(&stored, &record.campaign);
+    graphs::write(&record.facts, &run_node(&record.id), &mut quads);
     let statements = Record::of(&quads).map_err(|error| error.to_string())?;
     Ok(Content::Whole { trace, statements })
 }

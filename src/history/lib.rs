@@ -42,9 +42,13 @@ mod rows;
 mod salvage;
 mod scene_digest;
 mod seal;
+// The next form of the history, which is not used yet.
+#[cfg(test)]
+mod segment;
 mod snapshot;
 mod statements;
 mod store;
+mod stored_run;
 mod syntax_fault;
 mod tail;
 mod terms;

@@ -2,6 +2,8 @@
 
 use std::collections::BTreeMap;
 
+use serde::{Deserialize, Serialize};
+
 use actcheck_base::{Diagnostic, Judgement, Outcome, RunFacts, Shard};
 use actcheck_data::{Choice, Quality, Scene, Trace};
 
@@ -95,7 +97,7 @@ impl SkillRecord {
 }
 
 /// How a run ended as a whole.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub enum RunStatus {
     /// Every action ended on its own.
     Completed,
@@ -143,7 +145,7 @@ pub struct CampaignEnd {
 }
 
 /// One of several runs of a scene, each with different noise.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub struct Repetition {
     /// Number of the scene in its campaign, from 0.
     pub scene: u64,

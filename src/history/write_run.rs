@@ -4,13 +4,12 @@ use std::collections::BTreeMap;
 
 use oxigraph::model::{BlankNode, Literal, NamedNode, Quad};
 
-use crate::RunRecord;
 use crate::graphs::{below, during_graph, state_graph};
 use crate::statements::{About, Statements, count, iri, time};
+use crate::stored_run::StoredRun;
 use crate::write_campaign::{campaign_node, program};
 use crate::write_scene;
 use actcheck_base::{Digest, Judgement, names};
-use actcheck_data::{ActionEnd, ActionTrace};
 use actcheck_facts::thing_iri;
 
 /// A run's node.
@@ -18,79 +17,79 @@ pub(super) fn run_node(id: &str) -> NamedNode {
     NamedNode::new_unchecked(format!("{}{id}", names::RUN))
 }
 
-/// The quads of a run in the default graph.
-pub(super) fn quads_without_facts(record: &RunRecord) -> Vec<Quad> {
-    let run = run_node(&record.id);
+/// The quads of a run of a campaign in the default graph.
+pub(super) fn quads_without_facts(stored: &StoredRun, campaign: &str) -> Vec<Quad> {
+    let run = run_node(&stored.id_in(campaign));
     let mut statements = Statements::default();
-    write_run(record, &run, &mut statements);
-    write_discards(record, &run, &mut statements);
-    write_scene::write(record, &run, &mut statements);
-    for step in 0..record.trace.actions.len() {
-        write_execution(record, step, &run, &mut statements);
+    write_run(stored, campaign, &run, &mut statements);
+    write_discards(stored, &run, &mut statements);
+    write_scene::write(&stored.scene, &run, &mut statements);
+    for step in 0..stored.actions.len() {
+        write_execution(stored, step, &run, &mut statements);
     }
     statements.quads
 }
 
-fn write_run(record: &RunRecord, run: &NamedNode, statements: &mut Statements) {
+fn write_run(stored: &StoredRun, campaign: &str, run: &NamedNode, statements: &mut Statements) {
     let mut about = statements.about(run.clone());
     about
         .is_a("act:Run")
         .is_a("prov:Activity")
-        .has("act:campaign", campaign_node(&record.campaign))
-        .text("act:test", &record.test)
-        .has("act:seed", count(record.seed))
-        .has("act:index", count(record.index))
+        .has("act:campaign", campaign_node(campaign))
+        .text("act:test", &stored.test)
+        .has("act:seed", count(stored.seed))
+        .has("act:index", count(stored.index))
         .optional(
             "act:sceneNumber",
-            record.repetition.map(|repetition| count(repetition.scene)),
+            stored.repetition.map(|repetition| count(repetition.scene)),
         )
         .optional(
             "act:repetition",
-            record.repetition.map(|repetition| count(repetition.number)),
+            stored.repetition.map(|repetition| count(repetition.number)),
         )
-        .optional("act:weight", record.weight.map(Literal::from))
-        .has("act:score", Literal::from(record.score))
-        .text("act:status", record.status.word())
-        .text("act:traceHash", &record.trace.hash)
-        .has("act:discards", count(record.discards.len() as u64))
+        .optional("act:weight", stored.weight.map(Literal::from))
+        .has("act:score", Literal::from(stored.score))
+        .text("act:status", stored.status.word())
+        .text("act:traceHash", &stored.trace_hash)
+        .has("act:discards", count(stored.discards.len() as u64))
         .optional(
             "act:reason",
-            record.reason.as_deref().map(Literal::new_simple_literal),
+            stored.reason.as_deref().map(Literal::new_simple_literal),
         )
         .optional(
             "act:programOutput",
-            record
+            stored
                 .program_output
                 .as_deref()
                 .map(Literal::new_simple_literal),
         )
         .optional(
             "act:shrunkFrom",
-            record.shrunk_from.as_deref().map(run_node),
+            stored.shrunk_from.as_deref().map(run_node),
         )
-        .has("prov:startedAtTime", time(&record.started))
-        .has("act:wallSeconds", Literal::from(record.wall_secs))
-        .has("act:elapsedSeconds", Literal::from(record.elapsed_secs))
+        .has("prov:startedAtTime", time(&stored.started))
+        .has("act:wallSeconds", Literal::from(stored.wall_secs))
+        .has("act:elapsedSeconds", Literal::from(stored.elapsed_secs))
         .optional(
             "act:deepestPenetration",
-            record
+            stored
                 .quality
                 .map(|quality| Literal::from(quality.deepest_penetration_m)),
         )
         .optional(
             "act:energyGain",
-            record
+            stored
                 .quality
                 .map(|quality| Literal::from(quality.energy_gain_j)),
         )
-        .text("act:program", &program(env!("CARGO_PKG_VERSION")));
-    write_designators(&record.scene.designators, record, &mut about);
+        .text("act:program", &program(&stored.program_version));
+    write_designators(&stored.scene.designators, stored, &mut about);
 }
 
 /// Writes the scenes that were discarded before the run's own, so that their number survives
 /// interrupting and resuming the campaign.
-fn write_discards(record: &RunRecord, run: &NamedNode, statements: &mut Statements) {
-    for (number, reason) in record.discards.iter().enumerate() {
+fn write_discards(stored: &StoredRun, run: &NamedNode, statements: &mut Statements) {
+    for (number, reason) in stored.discards.iter().enumerate() {
         statements
             .about(below(run, &format!("discard/{}", number + 1)))
             .is_a("act:Discard")
@@ -103,14 +102,14 @@ fn write_discards(record: &RunRecord, run: &NamedNode, statements: &mut Statemen
 /// Writes designators: as an object if the scene has one of that name, otherwise as a text.
 fn write_designators(
     designators: &BTreeMap<String, Vec<String>>,
-    record: &RunRecord,
+    stored: &StoredRun,
     about: &mut About<'_>,
 ) {
     for (designator, values) in designators {
         let property = names::act(designator);
         about.has("act:designator", iri(&property));
         for value in values {
-            if record
+            if stored
                 .scene
                 .objects
                 .iter()
@@ -124,50 +123,33 @@ fn write_designators(
     }
 }
 
-fn write_execution(record: &RunRecord, step: usize, run: &NamedNode, statements: &mut Statements) {
-    let action = &record.trace.actions[step];
+fn write_execution(stored: &StoredRun, step: usize, run: &NamedNode, statements: &mut Statements) {
+    let action = &stored.actions[step];
     let node = below(run, &(step + 1).to_string());
     let mut about = statements.about(node.clone());
     about
         .is_a("act:ActionExecution")
         .has("act:ofRun", run.clone())
-        .optional(
-            "act:action",
-            record.actions.get(step).map(|action| iri(action)),
-        )
+        .optional("act:action", action.action.as_deref().map(iri))
         .has("act:step", Literal::from((step + 1) as u64))
-        .optional(
-            "act:score",
-            record.action_scores.get(step).copied().map(Literal::from),
-        )
-        .text("act:end", end_word(&action.end))
+        .optional("act:score", action.score.map(Literal::from))
+        .text("act:end", &action.end)
         .has("act:duration", Literal::from(action.duration_secs))
-        .optional(
-            "act:reported",
-            action
-                .report
-                .as_ref()
-                .map(|report| Literal::from(report.succeeded)),
-        )
+        .optional("act:reported", action.reported.map(Literal::from))
         .optional(
             "act:message",
-            message(action).map(Literal::new_simple_literal),
+            action.message.as_deref().map(Literal::new_simple_literal),
         );
-    write_designators(&action.parameters, record, &mut about);
+    write_designators(&action.parameters, stored, &mut about);
     for (property, state) in [("act:before", step), ("act:after", step + 1)] {
-        if state < record.facts.snapshots.len() {
+        if state < stored.states as usize {
             about.has(property, state_graph(run, state));
         }
     }
-    if record
-        .facts
-        .during
-        .get(step)
-        .is_some_and(|during| !during.is_empty())
-    {
+    if action.has_events {
         about.has("act:during", during_graph(run, step));
     }
-    for judgement in record.judgements.get(step).into_iter().flatten() {
+    for judgement in &action.judgements {
         let result = unique(&[node.as_str(), &judgement.property, "result"]);
         write_assertion(
             judgement,
@@ -181,30 +163,6 @@ fn write_execution(record: &RunRecord, step: usize, run: &NamedNode, statements:
 /// The node of the campaign's own judgement of a property in an execution.
 pub(super) fn assertion_of(execution: &NamedNode, property: &str) -> BlankNode {
     unique(&[execution.as_str(), property, "assertion"])
-}
-
-/// The word for how an action ended.
-fn end_word(end: &ActionEnd) -> &'static str {
-    match end {
-        ActionEnd::Completed => "completed",
-        ActionEnd::Broken(_) => "broken",
-        ActionEnd::Timeout(_) | ActionEnd::Cut(_) => "timeout",
-        ActionEnd::NotReached => "untested",
-        ActionEnd::NotPerformed(_) => "inapplicable",
-    }
-}
-
-/// The message of an action: why it did not complete, or the message of its report.
-fn message(action: &ActionTrace) -> Option<&str> {
-    match &action.end {
-        ActionEnd::Broken(reason)
-        | ActionEnd::Timeout(reason)
-        | ActionEnd::Cut(reason)
-        | ActionEnd::NotPerformed(reason) => Some(reason),
-        ActionEnd::Completed | ActionEnd::NotReached => {
-            action.report.as_ref().map(|report| report.message.as_str())
-        }
-    }
 }
 
 /// Writes a judgement as two nodes: the assertion and its result.

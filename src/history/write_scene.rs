@@ -2,10 +2,11 @@
 
 use oxigraph::model::{Literal, NamedNode};
 
-use crate::RunRecord;
+use crate::ObjectDetail;
 use crate::statements::{Statements, iri};
+use crate::stored_run::StoredScene;
 use actcheck_base::names;
-use actcheck_data::{Role, Scene, SceneObject};
+use actcheck_data::{Role, Scene};
 use actcheck_facts::thing_iri;
 
 /// Local names of the terms for sensing errors, in the order of [`noise`].
@@ -50,8 +51,7 @@ pub fn noise(scene: &Scene) -> [(&'static str, f64); 13] {
 
 /// Writes the scene of a run: values of the whole scene on the run's node, and one node for each
 /// object.
-pub(super) fn write(record: &RunRecord, run: &NamedNode, statements: &mut Statements) {
-    let scene = &record.scene;
+pub(super) fn write(scene: &StoredScene, run: &NamedNode, statements: &mut Statements) {
     let standing = scene
         .objects
         .iter()
@@ -60,104 +60,51 @@ pub(super) fn write(record: &RunRecord, run: &NamedNode, statements: &mut Statem
     let mut about = statements.about(run.clone());
     about
         .text("act:worldName", &scene.world)
-        .text("act:robot", &scene.robot.profile.name)
+        .text("act:robot", &scene.robot)
         .has("act:objectCount", Literal::from(standing as u64));
     for (property, value) in ["w:baseX", "w:baseY", "w:baseYaw"]
         .into_iter()
-        .zip(scene.robot.base)
+        .zip(scene.base)
     {
         about.has(property, Literal::from(value));
     }
-    for (name, value) in noise(scene) {
+    for (name, value) in NOISE_TERMS.into_iter().zip(scene.noise) {
         about.has(&format!("act:{name}"), Literal::from(value));
     }
     for object in &scene.objects {
-        write_object(record, object, run, statements);
+        write_object(object, run, statements);
     }
 }
 
-fn write_object(
-    record: &RunRecord,
-    object: &SceneObject,
-    run: &NamedNode,
-    statements: &mut Statements,
-) {
+fn write_object(object: &ObjectDetail, run: &NamedNode, statements: &mut Statements) {
     let thing = thing_iri(&object.id);
     let node = NamedNode::new_unchecked(format!("{}/scene/{}", run.as_str(), names::local(&thing)));
-    let extremes = || {
-        record
-            .trace
-            .actions
-            .iter()
-            .flat_map(|action| &action.extremes)
-            .filter(|extremes| extremes.id == object.id)
-    };
-    let targets = |other: &SceneObject| other.role == Role::Target;
-    let [x, y, z] = object.pose.position;
     let mut about = statements.about(node);
     about
         .is_a("act:SceneObject")
         .has("act:ofRun", run.clone())
         .has("act:object", iri(&thing))
-        .has("act:category", iri(&object.model.category))
-        .text("act:model", &object.model.name)
+        .has("act:category", iri(&object.category))
+        .text("act:model", &object.model)
         .text("act:role", object.role.word());
     for (property, value) in [
-        ("w:x", x),
-        ("w:y", y),
-        ("w:z", z),
-        ("w:yaw", object.pose.yaw()),
+        ("w:x", object.x),
+        ("w:y", object.y),
+        ("w:z", object.z),
+        ("w:yaw", object.yaw),
         ("w:mass", object.mass_kg),
         ("w:friction", object.friction),
         ("w:restitution", object.restitution),
-        (
-            "act:robotDistance",
-            libm::hypot(x - scene_base(record)[0], y - scene_base(record)[1]),
-        ),
+        ("act:robotDistance", object.robot_distance_m),
     ] {
         about.has(property, Literal::from(value));
     }
-    about.optional(
-        "act:neighbourDistance",
-        nearest(&record.scene, object, |other| other.role != Role::Platform),
-    );
-    if object.role != Role::Platform && object.role != Role::Target {
-        about.optional(
-            "act:targetDistance",
-            nearest(&record.scene, object, targets),
-        );
+    for (property, value) in [
+        ("act:neighbourDistance", object.neighbour_distance_m),
+        ("act:targetDistance", object.target_distance_m),
+        ("act:displacement", object.displacement_m),
+        ("act:maxTilt", object.max_tilt_rad),
+    ] {
+        about.optional(property, value.map(Literal::from));
     }
-    about
-        .optional(
-            "act:displacement",
-            largest(extremes().map(|extremes| extremes.max_displacement_m)),
-        )
-        .optional(
-            "act:maxTilt",
-            largest(extremes().map(|extremes| extremes.max_tilt_rad)),
-        );
-}
-
-fn scene_base(record: &RunRecord) -> [f64; 3] {
-    record.scene.robot.base
-}
-
-/// Horizontal distance from an object to the nearest other object that satisfies `among`.
-fn nearest(
-    scene: &Scene,
-    object: &SceneObject,
-    among: impl Fn(&SceneObject) -> bool,
-) -> Option<Literal> {
-    let [x, y, _] = object.pose.position;
-    scene
-        .objects
-        .iter()
-        .filter(|other| other.id != object.id && among(other))
-        .map(|other| libm::hypot(other.pose.position[0] - x, other.pose.position[1] - y))
-        .min_by(f64::total_cmp)
-        .map(Literal::from)
-}
-
-fn largest(values: impl Iterator<Item = f64>) -> Option<Literal> {
-    values.max_by(f64::total_cmp).map(Literal::from)
 }

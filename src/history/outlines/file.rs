@@ -11,11 +11,11 @@ use oxigraph::model::Quad;
 use crate::inflate::read_expanded;
 use crate::journal::{self, Content, Part};
 use crate::outlines::row::Rows;
-use crate::quad_source::RunQuads;
+use crate::stored_run::StoredRun;
 use crate::trace_file;
 use crate::vertical::{self, CHANGED, Sheet};
 use crate::wanted::Wanted;
-use crate::{RunRecord, scene_digest, write_run};
+use crate::{RunRecord, write_run};
 use actcheck_base::{ByteReader, put_varint};
 
 /// Magic bytes at the start of each file. The last one is the format version.
@@ -48,12 +48,10 @@ impl Outline {
     /// # Errors
     /// A message, if a part can't be encoded.
     pub(crate) fn of(record: &RunRecord) -> Result<Self, String> {
-        let quads = RunQuads::new(write_run::quads_without_facts(record));
-        let scene = scene_digest::read(&quads, &write_run::run_node(&record.id))
-            .map_err(|error| error.to_string())?;
+        let stored = StoredRun::of(record);
         Ok(Self {
-            rows: Rows::of(record, scene),
-            quads: quads.into_quads(),
+            rows: Rows::of(record, stored.scene_digest()),
+            quads: write_run::quads_without_facts(&stored, &record.campaign),
             head: trace_file::encode_head(&record.choices, &record.trace)?,
         })
     }

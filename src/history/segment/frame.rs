@@ -1,0 +1,379 @@
+//! Frames: the units in which a column file grows.
+//!
+//! A file begins with eight bytes that name its format and its column. Each frame has a header of
+//! twelve bytes: the size of its content, the checksum of its content, and a checksum of these two
+//! and of the frame's place. A frame that was moved, or whose size was changed, is therefore found
+//! before its size is used; only a file that ends within a frame has a torn tail.
+
+use std::io::{self, Read};
+
+use flate2::Crc;
+
+/// Size of a file's first bytes. Unit: bytes.
+pub(crate) const HEAD: usize = 8;
+/// Size of a frame's header. Unit: bytes.
+pub(crate) const FRAME_HEADER: usize = 12;
+/// Largest content of a frame. Unit: bytes.
+const MOST_CONTENT: u32 = 1 << 30;
+/// Format of all columns: it increases with every change of what is stored.
+const FORMAT: u8 = b'1';
+
+/// What the files of a column hold.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Column {
+    /// The values of runs in lists, and where the rest of each run is.
+    Runs,
+    /// The other values of runs.
+    Details,
+    /// Choices and states of runs.
+    States,
+    /// Motion of runs that are kept whole.
+    Motion,
+}
+
+impl Column {
+    /// All columns, in the order in which a run is written: the frame in [`Column::Runs`] says that
+    /// it is complete.
+    pub(crate) const ALL: [Self; 4] = [Self::Motion, Self::States, Self::Details, Self::Runs];
+
+    /// Extension of its files.
+    pub(crate) fn extension(self) -> &'static str {
+        match self {
+            Self::Runs => "runs",
+            Self::Details => "details",
+            Self::States => "states",
+            Self::Motion => "motion",
+        }
+    }
+
+    /// The first bytes of its files.
+    pub(crate) fn head(self) -> [u8; HEAD] {
+        let letter = match self {
+            Self::Runs => b'r',
+            Self::Details => b'd',
+            Self::States => b's',
+            Self::Motion => b'm',
+        };
+        [b'a', b'c', b't', b's', b'e', b'g', FORMAT, letter]
+    }
+}
+
+/// Where a frame is, and the checksum of its content: whoever refers to a frame notices another one
+/// in its place.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+pub(crate) struct Place {
+    /// Offset of its header in the file. Unit: bytes.
+    pub offset: u64,
+    /// Size of its content. Unit: bytes.
+    pub size: u32,
+    /// Checksum of its content.
+    pub sum: u32,
+}
+
+impl Place {
+    /// Offset of the first byte after the frame.
+    pub(crate) fn end(self) -> u64 {
+        self.offset + FRAME_HEADER as u64 + u64::from(self.size)
+    }
+}
+
+/// Damage to a column file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub(crate) enum FrameFault {
+    /// The first bytes are others.
+    #[error("it is not a file of this column in format {}", char::from(FORMAT))]
+    Head,
+    /// A header has a wrong checksum.
+    #[error("the frame at byte {0} has a damaged header")]
+    Header(u64),
+    /// A content has a wrong checksum.
+    #[error("the frame at byte {0} is damaged")]
+    Content(u64),
+    /// A frame that is referred to is not in the file, which has been cut.
+    #[error("the frame at byte {0} is missing")]
+    Missing(u64),
+}
+
+/// Why a file of frames can't be read.
+#[derive(Debug, thiserror::Error)]
+pub(crate) enum ReadFault {
+    /// It is damaged.
+    #[error(transparent)]
+    Damaged(#[from] FrameFault),
+    /// The system can't read it.
+    #[error(transparent)]
+    Io(#[from] io::Error),
+}
+
+/// Appends a frame that begins at `offset` to `out`.
+///
+/// # Errors
+/// The content is too large.
+pub(crate) fn put(offset: u64, content: &[u8], out: &mut Vec<u8>) -> io::Result<Place> {
+    let size = u32::try_from(content.len())
+        .ok()
+        .filter(|size| *size <= MOST_CONTENT)
+        .ok_or_else(|| io::Error::other("a run has more than 1 GiB of one kind"))?;
+    let place = Place {
+        offset,
+        size,
+        sum: sum(&[content]),
+    };
+    out.extend(place.size.to_le_bytes());
+    out.extend(place.sum.to_le_bytes());
+    out.extend(header_sum(place).to_le_bytes());
+    out.extend(content);
+    Ok(place)
+}
+
+fn sum(parts: &[&[u8]]) -> u32 {
+    let mut crc = Crc::new();
+    parts.iter().for_each(|part| crc.update(part));
+    crc.sum()
+}
+
+fn header_sum(place: Place) -> u32 {
+    let (offset, size, content) = (
+        place.offset.to_le_bytes(),
+        place.size.to_le_bytes(),
+        place.sum.to_le_bytes(),
+    );
+    sum(&[&offset, &size, &content])
+}
+
+/// Parses a header at `offset`.
+fn header(offset: u64, bytes: [u8; FRAME_HEADER]) -> Result<Place, FrameFault> {
+    let [a, b, c, d, e, f, g, h, i, j, k, l] = bytes;
+    let place = Place {
+        offset,
+        size: u32::from_le_bytes([a, b, c, d]),
+        sum: u32::from_le_bytes([e, f, g, h]),
+    };
+    let is_right = header_sum(place) == u32::from_le_bytes([i, j, k, l]);
+    if is_right && place.size <= MOST_CONTENT {
+        Ok(place)
+    } else {
+        Err(FrameFault::Header(offset))
+    }
+}
+
+/// Reads the frames of a file one after another.
+#[derive(Debug)]
+pub(crate) struct Frames<R> {
+    source: R,
+    offset: u64,
+    is_torn: bool,
+}
+
+impl<R: Read> Frames<R> {
+    /// Begins to read a file of a column. An empty file has no frames: its writer was stopped at
+    /// once.
+    ///
+    /// # Errors
+    /// It is a file of another kind; the system can't read it.
+    pub(crate) fn new(column: Column, mut source: R) -> Result<Self, ReadFault> {
+        let mut head = [0; HEAD];
+        let read = fill(&mut source, &mut head)?;
+        if !column.head().starts_with(&head[..read]) {
+            return Err(FrameFault::Head.into());
+        }
+        Ok(Self {
+            source,
+            offset: read as u64,
+            is_torn: read < HEAD,
+        })
+    }
+
+    /// Reads the next frame into `content`. Returns `None` at the end.
+    ///
+    /// # Errors
+    /// The frame is damaged; the system can't read it.
+    pub(crate) fn next(&mut self, content: &mut Vec<u8>) -> Result<Option<Place>, ReadFault> {
+        content.clear();
+        if self.is_torn {
+            return Ok(None);
+        }
+        let mut bytes = [0; FRAME_HEADER];
+        let read = fill(&mut self.source, &mut bytes)?;
+        if read < FRAME_HEADER {
+            self.is_torn = read > 0;
+            return Ok(None);
+        }
+        let place = header(self.offset, bytes)?;
+        let size = u64::from(place.size);
+        // The memory grows with what is read, not with the size that the header claims.
+        self.source.by_ref().take(size).read_to_end(content)?;
+        if (content.len() as u64) < size {
+            self.is_torn = true;
+            return Ok(None);
+        }
+        if sum(&[content]) != place.sum {
+            return Err(FrameFault::Content(place.offset).into());
+        }
+        self.offset = place.end();
+        Ok(Some(place))
+    }
+
+    /// After the last frame: the offset at which the whole frames end, and whether more bytes
+    /// follow, which a writer that was stopped has left.
+    pub(crate) fn tail(&self) -> (u64, bool) {
+        (self.offset, self.is_torn)
+    }
+}
+
+/// Reads until the buffer is full or the source ends. Returns the number of bytes.
+fn fill(source: &mut impl Read, buffer: &mut [u8]) -> io::Result<usize> {
+    let mut filled = 0;
+    while filled < buffer.len() {
+        match source.read(&mut buffer[filled..]) {
+            Ok(0) => break,
+            Ok(count) => filled += count,
+            Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
+            Err(error) => return Err(error),
+        }
+    }
+    Ok(filled)
+}
+
+/// Checks the bytes of a frame at a known place. Returns its content.
+///
+/// # Errors
+/// The bytes are those of another frame, damaged, or cut.
+pub(crate) fn content_of(place: Place, bytes: &[u8]) -> Result<&[u8], FrameFault> {
+    let (head, rest) = bytes
+        .split_first_chunk::<FRAME_HEADER>()
+        .ok_or(FrameFault::Missing(place.offset))?;
+    if header(place.offset, *head)? != place {
+        return Err(FrameFault::Header(place.offset));
+    }
+    let content = rest
+        .get(..place.size as usize)
+        .ok_or(FrameFault::Missing(place.offset))?;
+    if sum(&[content]) == place.sum {
+        Ok(content)
+    } else {
+        Err(FrameFault::Content(place.offset))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A file with three frames, and their places.
+    fn file() -> (Vec<u8>, Vec<Place>) {
+        let mut bytes = Column::Runs.head().to_vec();
+        let mut places = Vec::new();
+        for content in [&b"first"[..], b"", b"the third"] {
+            let offset = bytes.len() as u64;
+            places.push(put(offset, content, &mut bytes).expect("it is small"));
+        }
+        (bytes, places)
+    }
+
+    /// The frames of a file, or its fault; and whether its tail is torn.
+    fn read(bytes: &[u8]) -> Result<(Vec<Vec<u8>>, bool), ReadFault> {
+        let mut frames = Frames::new(Column::Runs, bytes)?;
+        let (mut found, mut content) = (Vec::new(), Vec::new());
+        while frames.next(&mut content)?.is_some() {
+            found.push(content.clone());
+        }
+        Ok((found, frames.tail().1))
+    }
+
+    #[test]
+    fn frames_are_read_as_they_were_written() {
+        let (bytes, places) = file();
+        let (found, is_torn) = read(&bytes).expect("it is whole");
+        assert_eq!(found, [&b"first"[..], b"", b"the third"]);
+        assert!(!is_torn);
+        for (place, content) in places.iter().zip(&found) {
+            let own = &bytes[place.offset as usize..place.end() as usize];
+            assert_eq!(content_of(*place, own), Ok(content.as_slice()));
+        }
+    }
+
+    #[test]
+    fn every_flipped_bit_is_found() {
+        let (bytes, _) = file();
+        for at in 0..bytes.len() {
+            for bit in 0..8 {
+                let mut damaged = bytes.clone();
+                damaged[at] ^= 1 << bit;
+                let found = read(&damaged);
+                assert!(found.is_err(), "bit {bit} of byte {at}: {found:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_file_that_ends_within_a_frame_has_a_torn_tail() {
+        let (bytes, places) = file();
+        let ends: Vec<u64> = places.iter().map(|place| place.end()).collect();
+        for length in 0..=bytes.len() {
+            let (found, is_torn) = read(&bytes[..length]).expect("cut files are no damage");
+            let whole = ends.iter().filter(|end| **end <= length as u64).count();
+            let is_border = length == HEAD || ends.contains(&(length as u64));
+            assert_eq!(
+                (found.len(), is_torn),
+                (whole, !is_border),
+                "{length} bytes"
+            );
+        }
+    }
+
+    #[test]
+    fn another_frame_at_a_place_is_noticed() {
+        let (bytes, places) = file();
+        let [first, second, third] = places[..] else {
+            panic!("three frames");
+        };
+        let at = |place: Place| &bytes[place.offset as usize..];
+        assert_eq!(
+            content_of(first, at(third)),
+            Err(FrameFault::Header(first.offset))
+        );
+        let moved = Place {
+            offset: second.offset,
+            ..third
+        };
+        assert_eq!(
+            content_of(moved, at(second)),
+            Err(FrameFault::Header(second.offset))
+        );
+        assert_eq!(
+            content_of(third, &at(third)[..20]),
+            Err(FrameFault::Missing(third.offset))
+        );
+        // The same frame in another place of the file.
+        let mut swapped = bytes.clone();
+        swapped.drain(first.offset as usize..first.end() as usize);
+        assert!(read(&swapped).is_err());
+    }
+
+    #[test]
+    fn files_of_other_columns_and_formats_are_refused() {
+        let (bytes, _) = file();
+        let heads = Column::ALL.map(Column::head);
+        assert!((1..heads.len()).all(|n| !heads[..n].contains(&heads[n])));
+        let fault = Frames::new(Column::Details, bytes.as_slice()).expect_err("it holds runs");
+        assert!(matches!(fault, ReadFault::Damaged(FrameFault::Head)));
+    }
+
+    #[test]
+    fn a_large_size_takes_no_memory() {
+        let mut bytes = Column::Runs.head().to_vec();
+        let place = Place {
+            offset: HEAD as u64,
+            size: MOST_CONTENT,
+            sum: 0,
+        };
+        bytes.extend(place.size.to_le_bytes());
+        bytes.extend(place.sum.to_le_bytes());
+        bytes.extend(header_sum(place).to_le_bytes());
+        let mut frames = Frames::new(Column::Runs, bytes.as_slice()).expect("its head is right");
+        let mut content = Vec::new();
+        assert!(frames.next(&mut content).expect("it is cut").is_none());
+        assert!(content.capacity() < 4096 && frames.tail().1);
+    }
+}
