@@ -71,7 +71,7 @@ def main():
         folder = pathlib.Path(name)
         done("run", CONFIG, "--runs", RUNS, "--jobs", "2", "--history", str(folder / "whole"))
         expected = rows(folder / "whole")
-        launch = ["launch", CONFIG, "--on", "local", "--runs", RUNS, "--shards", SHARDS, "--parallel", "2"]
+        launch = ["launch", CONFIG, "--on", "local", "--runs", RUNS, "--shards", SHARDS, "--jobs", "2"]
         history = folder / "launched"
         wrong = disturbed("launch", [*launch, "--history", str(history)], history, expected)
         parts = [str(folder / f"part{part}") for part in range(1, PARTS + 1)]

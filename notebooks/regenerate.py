@@ -66,8 +66,8 @@ def export(asked, data):
         runs = max(int(asked.runs) // 4, 1) if config == TASKS else asked.runs
         # Exit code 1 means that a property failed, which is a valid result.
         actcheck(asked, "run", config, "--runs", runs, "--jobs", asked.jobs, *history, good=(0, 1))
-        actcheck(asked, "export", "--parquet", folder, "--complete", *history)
-        actcheck(asked, "export", "--nquads", folder / "history.nq", *history)
+        actcheck(asked, "export", "tables", folder, "--complete", *history)
+        actcheck(asked, "export", "rdf", folder / "history.nq", *history)
         (folder / "findings.json").write_text(actcheck(asked, "analyse", "--format", "json", *history))
     pair = [data / name / "history" for name in CAMPAIGNS]
     (data / "comparison.json").write_text(actcheck(asked, "compare", *pair, "--format", "json"))

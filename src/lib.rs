@@ -37,7 +37,7 @@
 //! | [`analysis`] | history to tables and patterns: rates with intervals, failure modes, comparison of campaigns, failure conditions | polars, statrs |
 //! | [`report`] | verdicts and tables as text, JSON and HTML, and in the formats of other tools; runs as pictures and in 3D | rerun (feature `rerun`) |
 //! | [`serve`] | a history over HTTP: SPARQL endpoint, query page, report | hyper, tokio |
-//! | [`remote`] | HTTP client: sends statements to stores of others, asks there; copies files into object storage | ureq, rustls (feature `https`), rusty-s3 (feature `object-storage`) |
+//! | [`remote`] | HTTP client: sends statements to stores of others, and asks there | ureq, rustls (feature `https`) |
 //! | [`cli`] | arguments, exit codes, progress; the one place that prints errors | clap, clap_complete, clap_mangen |
 //!
 //! A crate depends only on crates above it in this table ([`campaign`] on many, [`cli`] on all),

@@ -39,7 +39,7 @@ fn failing_of(folder: &Path, config: &str) -> String {
 }
 
 fn export(folder: &Path, run: &str, to: &str) {
-    let output = actcheck(folder, &["export", run, "-o", to, "--history", "h"]);
+    let output = actcheck(folder, &["export", "run", run, "-o", to, "--history", "h"]);
     assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
 }
 
@@ -114,7 +114,7 @@ fn an_exported_run_reproduces_inside_and_outside_the_project() {
     );
     let second = actcheck(
         machine.path(),
-        &["export", again, "-o", "-", "--history", "h2"],
+        &["export", "run", again, "-o", "-", "--history", "h2"],
     );
     let from = |text: &str| {
         text.lines()
@@ -173,7 +173,7 @@ fn a_case_is_readable_and_its_values_have_names_units_and_bounds() {
     let run = failing(project.path());
     let output = actcheck(
         project.path(),
-        &["export", &run, "-o", "-", "--history", "h"],
+        &["export", "run", &run, "-o", "-", "--history", "h"],
     );
     let text = stdout(&output);
     for line in [
@@ -429,7 +429,7 @@ fn a_campaign_runs_its_regressions_first_and_reports_them_separately() {
     let run = failing(project.path());
     let added = actcheck(
         project.path(),
-        &["export", &run, "--regression", "--history", "h"],
+        &["export", "run", &run, "--regression", "--history", "h"],
     );
     assert!(
         stdout(&added).contains(&format!("regressions/{run}.toml holds run {run}")),
@@ -438,7 +438,7 @@ fn a_campaign_runs_its_regressions_first_and_reports_them_separately() {
     );
     let twice = refused(
         project.path(),
-        &["export", &run, "--regression", "--history", "h"],
+        &["export", "run", &run, "--regression", "--history", "h"],
     );
     assert!(twice.contains("X042"), "{twice}");
     let arguments = [
@@ -507,7 +507,7 @@ fn regressions_of_a_standalone_configuration_are_beside_it() {
     );
     let table = stdout(&output);
     let run = table.lines().nth(1).unwrap().split(',').next().unwrap();
-    let added = actcheck(folder.path(), &["export", run, "--regression"]);
+    let added = actcheck(folder.path(), &["export", "run", run, "--regression"]);
     assert!(
         stdout(&added).starts_with(&format!("mine/regressions/{run}.toml holds")),
         "{}{}",
@@ -528,7 +528,7 @@ fn only_the_first_shard_runs_the_regressions() {
     let run = failing(project.path());
     actcheck(
         project.path(),
-        &["export", &run, "--regression", "--history", "h"],
+        &["export", "run", &run, "--regression", "--history", "h"],
     );
     for (part, cases) in [("1/2", 1), ("2/2", 0)] {
         let history = format!("part{}", &part[..1]);
@@ -573,7 +573,10 @@ fn regressions_test_the_skills_of_the_campaign() {
     let project = project();
     let folder = project.path();
     let run = failing(folder);
-    actcheck(folder, &["export", &run, "--regression", "--history", "h"]);
+    actcheck(
+        folder,
+        &["export", "run", &run, "--regression", "--history", "h"],
+    );
     script(
         &folder.join("configs/no_skill.sh"),
         "#!/bin/sh\necho no robot here\nexit 3\n",
@@ -618,7 +621,10 @@ fn regressions_test_the_skills_of_the_campaign() {
         shown.contains("the program printed last:\n  no robot here"),
         "{shown}"
     );
-    let again = actcheck(folder, &["export", case, "-o", "-", "--history", "h4"]);
+    let again = actcheck(
+        folder,
+        &["export", "run", case, "-o", "-", "--history", "h4"],
+    );
     assert!(
         stdout(&again).contains("no_skill.sh"),
         "{}{}",
@@ -633,7 +639,10 @@ fn a_resumed_campaign_keeps_the_results_of_its_regressions() {
     let project = project();
     let folder = project.path();
     let run = failing(folder);
-    actcheck(folder, &["export", &run, "--regression", "--history", "h"]);
+    actcheck(
+        folder,
+        &["export", "run", &run, "--regression", "--history", "h"],
+    );
     let arguments = [
         "run",
         "configs/lone_glass.toml",

@@ -487,7 +487,7 @@ fn a_campaign_is_newer_than_its_regressions() {
     let run = format!("{}-1", ran("old").as_str().unwrap());
     let exported = actcheck(
         folder,
-        &["export", &run, "--regression", "--history", "old"],
+        &["export", "run", &run, "--regression", "--history", "old"],
     );
     assert!(exported.status.success(), "{}", stderr(&exported));
     for history in ["a", "b", "c", "d"] {

@@ -99,22 +99,20 @@ fn reading_commands_start_no_program_and_name_the_one_that_they_would_start() {
             ],
             false,
         ),
-        (&["export", "--dataset", "d"], true),
-        (&["export", "--dataset", "d", "--course"], true),
-        (&["export", "--parquet", "p", "--complete"], false),
-        (&["export", "--nquads", "n.nq", "--complete"], false),
-        (
-            &["export", "--csv", "c", "--turtle", "t.ttl", "--tables", "t"],
-            false,
-        ),
-        (&["export", run, "-o", "case.toml"], false),
+        (&["export", "tables", "d", "--dataset"], true),
+        (&["export", "tables", "d", "--course"], true),
+        (&["export", "tables", "p", "--complete"], false),
+        (&["export", "rdf", "n.nq", "--complete"], false),
+        (&["export", "tables", "c", "--csv"], false),
+        (&["export", "rdf", "t.ttl"], false),
+        (&["export", "run", run, "-o", "case.toml"], false),
         (&["show", run, "--picture", "s.svg"], true),
         (&["show", run], false),
         (&["why", run], false),
         (&["list"], false),
         (&["analyse"], false),
         (&["health"], false),
-        (&["rules"], false),
+        (&["list", "--rules"], false),
         (&["query", "SELECT * { ?run a act:Run }"], false),
     ] {
         let output = downloaded.command(command);
@@ -154,7 +152,7 @@ fn with_consent_the_motion_is_simulated_again() {
             "--trust",
         ][..],
         &["report", "--html", "r.html", "--trust"],
-        &["export", "--dataset", "d", "--trust"],
+        &["export", "tables", "d", "--dataset", "--trust"],
     ] {
         let output = downloaded.command(command);
         let said = words(&stderr(&output));
@@ -377,7 +375,7 @@ fn xacro_writes_into_no_file_and_is_not_started_by_reading_commands() {
     for command in [
         &["report", "--html", "r.html"][..],
         &["show", run],
-        &["export", run, "-o", "case.toml"],
+        &["export", "run", run, "-o", "case.toml"],
     ] {
         let output = with_tools(here, &[command, &["--history", "h"]].concat());
         let said = words(&stderr(&output));
@@ -390,6 +388,7 @@ fn xacro_writes_into_no_file_and_is_not_started_by_reading_commands() {
         here,
         &[
             "export",
+            "run",
             run,
             "-o",
             "case.toml",

@@ -1,4 +1,4 @@
-//! `actcheck export --dataset`: its contents, read by an independent reader, and their agreement
+//! `actcheck export tables --dataset`: its contents, read by an independent reader, and their agreement
 //! with the history.
 
 use std::path::Path;
@@ -32,7 +32,14 @@ fn export(arguments: &[&str]) -> (tempfile::TempDir, Output) {
     let output = actcheck(
         folder.path(),
         &[
-            &["export", "--history", "history", "--dataset", "data"],
+            &[
+                "export",
+                "tables",
+                "data",
+                "--dataset",
+                "--history",
+                "history",
+            ],
             arguments,
         ]
         .concat(),
@@ -130,7 +137,15 @@ fn the_course_has_every_sample_on_request() {
     assert_eq!(
         export_of(
             folder.path(),
-            &["export", "--history", "history", "--course", "--csv", "t"]
+            &[
+                "export",
+                "tables",
+                "t",
+                "--course",
+                "--csv",
+                "--history",
+                "history"
+            ]
         ),
         Some(2)
     );
@@ -190,12 +205,13 @@ fn complete_exports_have_every_fact_in_tables_and_in_rdf() {
     let export = |words: &[&str]| {
         let output = actcheck(
             folder.path(),
-            &[&["export", "--history", "."], words].concat(),
+            &[&["export"], words, &["--history", "."]].concat(),
         );
         assert!(output.status.success(), "{}", stderr(&output));
         stdout(&output)
     };
-    let printed = export(&["--complete", "--parquet", "tables", "--nquads", "all.nq"]);
+    let printed = export(&["tables", "tables", "--complete"]);
+    export(&["rdf", "all.nq", "--complete"]);
     for table in FACTS {
         assert!(
             folder
@@ -237,7 +253,7 @@ fn complete_exports_have_every_fact_in_tables_and_in_rdf() {
         rows(&printed, "states")
     );
     // The store has only facts that queries ask for.
-    export(&["--nquads", "stored.nq"]);
+    export(&["rdf", "stored.nq"]);
     let stored = read("stored.nq");
     assert_eq!(count(&stored, [&property("minX"), "/state/"]), 0);
     // Everything else is the same.
@@ -259,20 +275,11 @@ fn complete_tables_and_rdf_have_the_same_numbers() {
         return;
     };
     let folder = made_history();
-    let output = actcheck(
-        folder.path(),
-        &[
-            "export",
-            "--history",
-            ".",
-            "--complete",
-            "--parquet",
-            "tables",
-            "--nquads",
-            "all.nq",
-        ],
-    );
-    assert!(output.status.success(), "{}", stderr(&output));
+    for kind in [["tables", "tables"], ["rdf", "all.nq"]] {
+        let words = [&["export"], &kind[..], &["--complete", "--history", "."]].concat();
+        let output = actcheck(folder.path(), &words);
+        assert!(output.status.success(), "{}", stderr(&output));
+    }
     let output = Command::new(python)
         .arg(root().join("tests/foreign/check_complete.py"))
         .args(["all.nq", "tables"])
@@ -298,10 +305,16 @@ fn is_fact(line: &str) -> bool {
 #[test]
 fn complete_needs_a_format_with_facts() {
     let folder = made_history();
-    let output = actcheck(
-        folder.path(),
-        &["export", "--history", ".", "--complete", "--csv", "tables"],
-    );
-    assert_eq!(output.status.code(), Some(2));
-    assert!(stderr(&output).contains("--parquet"), "{}", stderr(&output));
+    for (words, said) in [
+        (
+            &["export", "tables", "t", "--complete", "--csv"][..],
+            "--csv",
+        ),
+        (&["export", "rdf", "all.ttl", "--complete"], "FILE.nq"),
+        (&["export", "rdf", "all"], "FILE.ttl"),
+    ] {
+        let output = actcheck(folder.path(), &[words, &["--history", "."]].concat());
+        assert_eq!(output.status.code(), Some(2), "{words:?}");
+        assert!(stderr(&output).contains(said), "{}", stderr(&output));
+    }
 }

@@ -229,7 +229,7 @@ fn every_link_of_the_documents_leads_somewhere() {
 /// Run with `UPDATE_EXPECT=1` to write the page.
 #[test]
 fn the_configuration_reference_is_up_to_date() {
-    let page = stdout(&actcheck(root(), &["schema", "--markdown"]));
+    let page = stdout(&actcheck(root(), &["new", "schema", "--markdown"]));
     assert_expected([(root().join("docs/configuration.md"), page)]);
 }
 

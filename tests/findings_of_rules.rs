@@ -63,7 +63,7 @@ fn answers(case: &Path) -> String {
     let history = ["--history", "history"];
     let run = ["run", config, "--runs", "1", "--jobs", "1", "--quiet"];
     say("run", told(folder.path(), &[&run[..], &history].concat()).1);
-    let rules = ["rules", "--ontology", ontology];
+    let rules = ["list", "--rules", "--ontology", ontology];
     if code != Some(0) {
         say("rules", told(folder.path(), &rules).1);
         return text;

@@ -41,7 +41,7 @@ const FLOORS: [(&str, &[&str]); 18] = [
 ];
 
 /// Libraries of the field and the crates that may depend on them.
-const FENCES: [(&str, &[&str]); 31] = [
+const FENCES: [(&str, &[&str]); 30] = [
     ("toml", &["config"]),
     ("roxmltree", &["config"]),
     ("mesh-loader", &["config"]),
@@ -66,7 +66,6 @@ const FENCES: [(&str, &[&str]); 31] = [
     ("spargebra", &["history", "rules"]),
     ("ureq", &["remote"]),
     ("rustls", &["remote"]),
-    ("rusty-s3", &["remote"]),
     ("rustls-native-certs", &["remote"]),
     ("re_chunk", &["report"]),
     ("re_log_encoding", &["report"]),

@@ -88,6 +88,11 @@ fn killed_processes_lose_nothing() {
     for number in 0..kills {
         let kind = ["run", "resume", "merge", "recheck", "export"][number % 5];
         let place = format!("kill {number}: {kind}");
+        let export = if number % 2 == 0 {
+            "export rdf DIR.nq --history DIR"
+        } else {
+            "export tables DIR.set --dataset --history DIR"
+        };
         let dir = at(format!("h{number}"));
         let name = dir.display().to_string();
         let words = |text: &str| -> Vec<String> {
@@ -112,7 +117,7 @@ fn killed_processes_lose_nothing() {
                 let command = if other == "recheck" {
                     "recheck --history DIR"
                 } else {
-                    "export --nquads DIR.nq --dataset DIR.set --history DIR"
+                    export
                 };
                 killed(&words(command), after / 4)
             }
@@ -134,7 +139,7 @@ fn killed_processes_lose_nothing() {
             }
             "merge" => words(&format!("merge {whole} --into DIR")),
             "recheck" => words("recheck --history DIR"),
-            _ => words("export --nquads DIR.nq --dataset DIR.set --history DIR"),
+            _ => words(export),
         };
         if kind == "export" {
             // Whole or absent.

@@ -48,7 +48,10 @@ fn an_own_object_lies_on_a_shipped_table() {
         .unwrap();
     // A case elsewhere names the folder and still finds the table.
     std::fs::create_dir(project.path().join("cases")).unwrap();
-    let case = actcheck(project.path(), &["export", id, "-o", "cases/case.toml"]);
+    let case = actcheck(
+        project.path(),
+        &["export", "run", id, "-o", "cases/case.toml"],
+    );
     assert_eq!(case.status.code(), Some(0), "{}", stderr(&case));
     let text = std::fs::read_to_string(project.path().join("cases/case.toml")).unwrap();
     assert!(text.contains("model_dir = \"../mine\""), "{text}");

@@ -34,9 +34,12 @@ fn parameter(name: &str) -> Parameter {
 /// The rows of a history's table.
 fn rows(project: &Path) -> Vec<BTreeMap<String, String>> {
     assert!(
-        actcheck(project, &["export", "--csv", "t", "--history", "h"])
-            .status
-            .success()
+        actcheck(
+            project,
+            &["export", "tables", "t", "--csv", "--history", "h"]
+        )
+        .status
+        .success()
     );
     csv::Reader::from_path(project.join("t/outcomes.csv"))
         .unwrap()

@@ -264,7 +264,15 @@ fn every_run_is_the_same_with_one_and_two_workers_and_differs_without_noise() {
         .to_owned();
     actcheck(
         project.path(),
-        &["export", &id, "--history", "1", "-o", "configs/case.toml"],
+        &[
+            "export",
+            "run",
+            &id,
+            "--history",
+            "1",
+            "-o",
+            "configs/case.toml",
+        ],
     );
     let case = actcheck(project.path(), &["check", "configs/case.toml"]);
     assert_eq!(case.status.code(), Some(0), "{}", stderr(&case));

@@ -10,6 +10,7 @@ use actcheck::rules::explain::{Failure, Premise, Proof, Support};
 use actcheck::rules::standalone::{Closure, Engine, Loading, Program, run_as};
 use proptest::prelude::*;
 
+use crate::support::foreign::left_out;
 use crate::support::nulls::{Facts, are_isomorphic};
 
 /// A rule or fact of a random program, as text.
@@ -454,7 +455,7 @@ fn a_nonterminating_program_is_stopped_and_its_rule_named() {
 }
 
 /// Runs the programs of a checkout of knowsys/nemo: `NEMO=path/to/nemo cargo test --release nemo`.
-/// Skipped without `NEMO`.
+/// Left out without `NEMO`.
 ///
 /// Every program gives the expected tables, or is listed in `nemo_deviations.tsv` with the code of
 /// the fault that refuses it and the reason. A listed program that gives its tables must be removed
@@ -462,6 +463,7 @@ fn a_nonterminating_program_is_stopped_and_its_rule_named() {
 #[test]
 fn nemo_programs_give_their_expected_tables() {
     let Some(nemo) = std::env::var_os("NEMO") else {
+        left_out("Nemo's programs", "NEMO names no checkout of knowsys/nemo");
         return;
     };
     let root = PathBuf::from(nemo).join("resources/testcases");

@@ -72,18 +72,14 @@ fn history() -> TempDir {
     copied
 }
 
-/// The statements of `export --nquads`, with IRIs in place of blank nodes.
+/// The statements of `export rdf`, with IRIs in place of blank nodes.
 fn exported(history: &Path, options: &[&str]) -> BTreeSet<String> {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("all.nq");
     let (file_name, name) = (file.display().to_string(), history.display().to_string());
     let output = actcheck(
         root(),
-        &[
-            &["export", "--nquads", &file_name, "--history", &name],
-            options,
-        ]
-        .concat(),
+        &[&["export", "rdf", &file_name, "--history", &name], options].concat(),
     );
     assert!(output.status.success(), "{}", stderr(&output));
     let named = |label: &str| NamedNode::new(format!("{NODE}{label}")).unwrap();
@@ -106,7 +102,7 @@ fn send(history: &Path, url: &str, options: &[&str]) -> Output {
     let name = history.display().to_string();
     actcheck(
         root(),
-        &[&["export", "--sparql", url, "--history", &name], options].concat(),
+        &[&["export", "store", url, "--history", &name], options].concat(),
     )
 }
 
@@ -255,15 +251,7 @@ fn an_upload_that_is_killed_or_interrupted_continues() {
     let right = exported(history.path(), &[]);
     let url = store.url("update");
     let name = history.path().display().to_string();
-    let words = [
-        "export",
-        "--sparql",
-        &url,
-        "--batch",
-        "1",
-        "--history",
-        &name,
-    ];
+    let words = ["export", "store", &url, "--batch", "1", "--history", &name];
     let mut dice = Dice::new(11);
     let (mut running, mut resumed) = (0, 0);
     for kill in 0..kills {
@@ -447,24 +435,20 @@ fn faults_of_servers_have_codes_and_their_words() {
 }
 
 #[test]
-fn credentials_come_from_the_environment_or_a_netrc_file() {
+fn credentials_come_from_the_environment() {
     let (history, store) = (history(), TripleStore::start());
-    let folder = tempfile::tempdir().unwrap();
-    let netrc = folder.path().join("netrc");
-    std::fs::write(&netrc, "machine 127.0.0.1 login me password secret\n").unwrap();
-    let with = |variables: &[(&str, &str)], options: &[&str]| {
+    let with = |variables: &[(&str, &str)]| {
         let mut command = Command::new(env!("CARGO_BIN_EXE_actcheck"));
         command
             .args([
                 "export",
-                "--from-start",
-                "--sparql",
+                "store",
                 &store.url("moved/update"),
+                "--from-start",
                 "--history",
             ])
             .arg(history.path());
         command
-            .args(options)
             .envs(variables.iter().copied())
             .env("NO_COLOR", "1")
             .output()
@@ -475,27 +459,18 @@ fn credentials_come_from_the_environment_or_a_netrc_file() {
         authorization: Some("Basic bWU6c2VjcmV0".to_owned()),
         ..Faults::default()
     });
-    let (code, text) = fault(&with(&[], &[]));
+    let (code, text) = fault(&with(&[]));
     assert!(
         code == "X092" && text.contains("who are you?") && text.contains("ACTCHECK_SPARQL_TOKEN"),
         "{text}"
     );
     assert_eq!(
-        with(
-            &[
-                ("ACTCHECK_SPARQL_USER", "me"),
-                ("ACTCHECK_SPARQL_PASSWORD", "secret")
-            ],
-            &[]
-        )
+        with(&[
+            ("ACTCHECK_SPARQL_USER", "me"),
+            ("ACTCHECK_SPARQL_PASSWORD", "secret")
+        ])
         .status
         .code(),
-        Some(0)
-    );
-    assert_eq!(
-        with(&[("NETRC", &netrc.display().to_string())], &["--netrc"])
-            .status
-            .code(),
         Some(0)
     );
     store.set(Faults {
@@ -503,117 +478,11 @@ fn credentials_come_from_the_environment_or_a_netrc_file() {
         ..Faults::default()
     });
     assert_eq!(
-        with(&[("ACTCHECK_SPARQL_TOKEN", "abc")], &[]).status.code(),
+        with(&[("ACTCHECK_SPARQL_TOKEN", "abc")]).status.code(),
         Some(0)
     );
     assert_eq!(
-        fault(&with(&[("ACTCHECK_SPARQL_PASSWORD", "abc")], &[])).0,
+        fault(&with(&[("ACTCHECK_SPARQL_PASSWORD", "abc")])).0,
         "X096"
     );
-    assert_eq!(
-        fault(&with(&[("NETRC", "/nonexistent")], &["--netrc"])).0,
-        "X096"
-    );
-}
-
-/// The files below a folder, with their contents.
-fn files(folder: &Path) -> std::collections::BTreeMap<String, Vec<u8>> {
-    let mut found = std::collections::BTreeMap::new();
-    for entry in std::fs::read_dir(folder).unwrap() {
-        let path = entry.unwrap().path();
-        if path.is_dir() {
-            found.extend(files(&path));
-        } else {
-            found.insert(path.display().to_string(), std::fs::read(&path).unwrap());
-        }
-    }
-    found
-}
-
-#[test]
-fn tables_are_copied_completely_and_outdated_ones_are_removed() {
-    let (history, folder) = (history(), tempfile::tempdir().unwrap());
-    let (name, to) = (
-        history.path().display().to_string(),
-        folder.path().join("to"),
-    );
-    let words = [
-        "export",
-        "--tables",
-        &to.display().to_string(),
-        "--history",
-        &name,
-    ];
-    let copied = |words: &[&str]| {
-        let output = actcheck(root(), words);
-        assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
-        stdout(&output)
-    };
-    let told = copied(&words);
-    assert!(told.contains("2 tables: 2 were copied"), "{told}");
-    let first = files(&to);
-    // Readers take each file of the folder for a table, and make a column of `campaign=ID`.
-    assert!(
-        first
-            .keys()
-            .all(|name| name.ends_with(".parquet") && name.contains("/campaign=")),
-        "{:?}",
-        first.keys()
-    );
-    let list = std::fs::read_to_string(folder.path().join("to.tables.json")).unwrap();
-    assert!(
-        list.contains("\"name\": \"campaign=") && list.contains("\"columns\""),
-        "{list}"
-    );
-    assert!(copied(&words).contains("2 tables: 0 were copied"));
-    assert_eq!(files(&to), first);
-    // A copy that was interrupted: a file is missing, another is short, and there is no list yet.
-    // Files of others are kept.
-    let tables: Vec<&String> = first
-        .keys()
-        .filter(|name| name.ends_with(".parquet"))
-        .collect();
-    std::fs::remove_file(tables[0]).unwrap();
-    std::fs::write(tables[1], "short").unwrap();
-    std::fs::remove_file(folder.path().join("to.tables.json")).unwrap();
-    std::fs::write(to.join("notes.txt"), "mine").unwrap();
-    assert!(copied(&words).contains("2 were copied"));
-    let mut again = files(&to);
-    assert_eq!(
-        again
-            .remove(&to.join("notes.txt").display().to_string())
-            .as_deref(),
-        Some(&b"mine"[..])
-    );
-    assert_eq!(again, first);
-    // New judgements make new tables, and the old ones disappear.
-    let project = project_with(crate::support::COARSEST);
-    edit(
-        &project.path().join("rules/moved_object.rls"),
-        "?d > 0.02",
-        "?d > 9",
-    );
-    let recheck = actcheck(
-        project.path(),
-        &["recheck", "MovedObject", "--history", &name],
-    );
-    assert!(
-        recheck.status.code().is_some_and(|code| code < 2),
-        "{}",
-        stderr(&recheck)
-    );
-    let told = copied(&words);
-    assert!(told.contains("outdated ones were removed"), "{told}");
-    assert_eq!(
-        files(&to)
-            .keys()
-            .filter(|name| name.ends_with(".parquet"))
-            .count(),
-        2
-    );
-    let refused = actcheck(
-        root(),
-        &["export", "--tables", "gs://bucket/x", "--history", &name],
-    );
-    assert_eq!(fault(&refused).0, "X090");
 }

@@ -598,6 +598,7 @@ fn an_exported_run_finds_its_program() {
         folder.path(),
         &[
             "export",
+            "run",
             id,
             "--history",
             ".actcheck",

@@ -59,7 +59,7 @@ fn twice() -> &'static Path {
         let run = run.lines().nth(1).unwrap().split(',').next().unwrap();
         said(
             folder,
-            &["export", run, "--regression", "--history", "other"],
+            &["export", "run", run, "--regression", "--history", "other"],
         );
         for _ in 0..2 {
             let output = actcheck(folder, &[&RUN[..], &["h"]].concat());
@@ -92,7 +92,7 @@ fn a_repeated_campaign_and_its_regression_have_the_rates_of_three_scenes() {
         "two regressions and six runs: {list}"
     );
 
-    let rules = json(folder, &["rules", "--history", "h"]);
+    let rules = json(folder, &["list", "--rules", "--history", "h"]);
     let grasp = rules
         .as_array()
         .unwrap()
@@ -189,7 +189,10 @@ fn named_queries_and_queries_with_act_counts_count_each_trace_once() {
 #[test]
 fn exported_rows_say_whether_their_run_counts() {
     let folder = twice();
-    said(folder, &["export", "--history", "h", "--csv", "tables"]);
+    said(
+        folder,
+        &["export", "tables", "tables", "--csv", "--history", "h"],
+    );
     let rows = std::fs::read_to_string(folder.join("tables/outcomes.csv")).unwrap();
     let mut lines = rows.lines();
     assert!(lines.next().unwrap().ends_with(",counts"));
@@ -215,12 +218,13 @@ fn exported_rows_say_whether_their_run_counts() {
         folder,
         &[
             "export",
+            "tables",
+            "one",
+            "--csv",
             "--history",
             "h",
             "--campaign",
             first,
-            "--csv",
-            "one",
         ],
     );
     let rows = std::fs::read_to_string(folder.join("one/outcomes.csv")).unwrap();

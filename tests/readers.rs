@@ -40,7 +40,8 @@ fn reading(run: &str) -> Vec<Vec<String>> {
         "health --integrity --history h".to_owned(),
         "analyse --history h".to_owned(),
         "report --html out/report.html --history h".to_owned(),
-        "export --nquads out/all.nq --parquet out/table --history h".to_owned(),
+        "export rdf out/all.nq --history h".to_owned(),
+        "export tables out/table --history h".to_owned(),
         format!("replay {run} --history h"),
         "merge h --into out/merged".to_owned(),
     ];

@@ -287,7 +287,7 @@ fn a_recheck_uses_current_or_older_rules_and_writes_no_duplicates() {
     );
     assert_ne!(ask(folder, "h", NEWEST), own);
     for _ in 0..2 {
-        recheck_json(folder, &["--as-of-rules", "old"]);
+        recheck_json(folder, &["--ontology", "old"]);
         assert_eq!(ask(folder, "h", NEWEST), own);
         assert_eq!(ask(folder, "h", RECHECKED), "n\n8\n");
     }
@@ -330,7 +330,7 @@ fn every_command_knows_a_property_and_an_outcome_after_a_recheck() {
     recheck_json(folder, &[]);
     let ontology = ["--ontology", "ontology/actions.ttl"];
     let rules: Value = serde_json::from_str(&said(
-        &[&["rules", "--format", "json"], &ontology[..]].concat(),
+        &[&["list", "--rules", "--format", "json"], &ontology[..]].concat(),
     ))
     .unwrap();
     let counts = |name: &str| {
@@ -421,7 +421,7 @@ fn impossible_rechecks_are_refused_without_writes() {
         &["X033", "did you mean `k`?"],
     );
     fails(
-        &["--as-of-rules", "models", "--history", "h"],
+        &["--ontology", "models", "--history", "h"],
         &["X032", "models"],
     );
     edit(

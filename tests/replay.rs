@@ -174,7 +174,7 @@ fn mismatched_choices_are_refused_by_name_or_clamped() {
         "{}",
         stderr(&exact)
     );
-    let (code, json) = replayed(project.path(), &[&run, config[0], config[1], "--nearest"]);
+    let (code, json) = replayed(project.path(), &[&run, config[0], config[1]]);
     assert_eq!(code, 1, "{json:#}");
     let choices = json[0]["choices"].to_string();
     assert!(

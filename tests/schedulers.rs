@@ -398,7 +398,7 @@ fn another_program_is_refused() {
 
 /// Everything that a scheduler receives, without names that differ from run to run.
 fn dry_run(site: &Site, on: &[&str]) -> String {
-    let output = site.launch(&[on, &["--dry-run", "--parallel", "2"]].concat());
+    let output = site.launch(&[on, &["--dry-run", "--jobs", "2"]].concat());
     assert!(output.status.success(), "{}", stderr(&output));
     assert!(!site.folder().join("parts.launch").exists());
     let text = stdout(&output).replace(

@@ -215,7 +215,7 @@ fn refused_by_schema(folder: &Path) -> Option<BTreeMap<String, String>> {
 
 #[test]
 fn the_program_prints_the_schema() {
-    let output = actcheck(root(), &["schema"]);
+    let output = actcheck(root(), &["new", "schema"]);
     assert_eq!(
         stdout(&output),
         std::fs::read_to_string(root().join("configs/campaign.schema.json")).unwrap()
@@ -407,6 +407,7 @@ fn shipped_new_and_exported_configurations_match_the_schema() {
         root(),
         &[
             "export",
+            "run",
             run,
             "--history",
             &history,

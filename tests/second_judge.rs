@@ -41,14 +41,7 @@ fn made(campaign: &str) -> (TempDir, u64) {
 fn judged_anew(python: &Path, folder: &Path) -> Output {
     let exported = actcheck(
         folder,
-        &[
-            "export",
-            "--history",
-            "h",
-            "--parquet",
-            "tables",
-            "--complete",
-        ],
+        &["export", "tables", "tables", "--complete", "--history", "h"],
     );
     assert!(exported.status.success(), "{}", stderr(&exported));
     Command::new(python)
@@ -202,14 +195,7 @@ fn properties_about_time_can_be_judged_from_the_exported_course() {
     );
     let exported = actcheck(
         folder.path(),
-        &[
-            "export",
-            "--history",
-            "h",
-            "--dataset",
-            "tables",
-            "--course",
-        ],
+        &["export", "tables", "tables", "--course", "--history", "h"],
     );
     assert!(exported.status.success(), "{}", stderr(&exported));
     let judge = || {

@@ -12,14 +12,7 @@ use crate::support::{actcheck, copy_made_history, foreign, made_history, signal,
 
 /// A server with narrow limits.
 fn limited() -> Server {
-    Server::alone(&[
-        "--max-time",
-        "3s",
-        "--max-rows",
-        "1000",
-        "--max-queries",
-        "64",
-    ])
+    Server::alone(&["--limits", "time=3s,rows=1000,processes=64"])
 }
 
 const RUNS: &str = "SELECT ?run ?index { ?run a act:Run ; act:index ?index } ORDER BY ?index";
@@ -272,7 +265,7 @@ fn huge_answers_are_refused() {
     );
     assert_eq!(reply.status, 403, "{}", reply.body);
     // Few rows, each of them large.
-    let small = Server::alone(&["--max-mb", "1"]);
+    let small = Server::alone(&["--limits", "size=1MB"]);
     let doubled = "SELECT ?t { BIND(\"0123456789abcdef\" AS ?a) BIND(CONCAT(?a,?a,?a,?a,?a,?a,?a,?a,?a,?a,?a,?a,?a,?a,?a,?a) AS ?b) \
                    BIND(CONCAT(?b,?b,?b,?b,?b,?b,?b,?b,?b,?b,?b,?b,?b,?b,?b,?b) AS ?c) BIND(CONCAT(?c,?c,?c,?c,?c,?c,?c,?c) AS ?d) \
                    BIND(CONCAT(?d,?d,?d,?d,?d,?d,?d,?d) AS ?e) BIND(CONCAT(?e,?e,?e,?e,?e,?e,?e,?e) AS ?t) }";
@@ -550,31 +543,23 @@ fn servers_that_cannot_start_report_the_reason() {
             "X053",
         ),
         (
-            vec![
-                "serve",
-                "--history",
-                &history,
-                "--bind",
-                "192.0.2.1",
-                "--port",
-                "0",
-            ],
+            vec!["serve", "--history", &history, "--port", "192.0.2.1:0"],
             "X053",
         ),
         (
-            vec!["serve", "--history", &history, "--max-secs", "0"],
+            vec!["serve", "--history", &history, "--limits", "time=0"],
             "above zero",
         ),
         (
-            vec!["serve", "--history", &history, "--max-time", "25h"],
+            vec!["serve", "--history", &history, "--limits", "time=25h"],
             "at most a day",
         ),
         (
-            vec!["serve", "--history", &history, "--max-time", "soon"],
+            vec!["serve", "--history", &history, "--limits", "time=soon"],
             "not a duration",
         ),
         (
-            vec!["serve", "--history", &history, "--bind", "localhost"],
+            vec!["serve", "--history", &history, "--port", "localhost"],
             "invalid",
         ),
     ] {

@@ -64,7 +64,7 @@ fn connections_stay_open_and_memory_stays_flat() {
 
 #[test]
 fn queries_that_need_much_memory_end_without_harm_to_the_server() {
-    let server = Server::alone(&["--max-memory-mb", "200", "--max-queries", "2"]);
+    let server = Server::alone(&["--limits", "memory=200MB,processes=2"]);
     // Doubles a string 36 times: 64 GB.
     let doubled: String = (0..36)
         .map(|n| format!("BIND(CONCAT(?x{n}, ?x{n}) AS ?x{}) ", n + 1))
@@ -105,7 +105,7 @@ fn queries_that_need_much_memory_end_without_harm_to_the_server() {
 
 #[test]
 fn none_of_many_clients_is_refused() {
-    let server = Server::alone(&["--max-queries", "2"]);
+    let server = Server::alone(&["--limits", "processes=2"]);
     // Not light: it is answered by a process.
     let heavy = "SELECT (CONCAT('a', STR(?run)) AS ?name) { ?run a act:Run } LIMIT 1";
     std::thread::scope(|scope| {

@@ -291,7 +291,7 @@ fn replayed_values(folder: &Path, config: &str, [runs, trials]: [&str; 2], take:
         let shrunk = small["run"].as_str().unwrap();
         let exported = actcheck(
             folder,
-            &["export", shrunk, "-o", "case.toml", "--history", "h"],
+            &["export", "run", shrunk, "-o", "case.toml", "--history", "h"],
         );
         assert!(exported.status.success(), "{}", stderr(&exported));
         let text = std::fs::read_to_string(&case).unwrap();

@@ -241,7 +241,10 @@ fn cases_keep_the_values() {
     assert_eq!(ran.status.code(), Some(1), "{}", stderr(&ran));
     let listed = json(folder, &["list", "--history", "h"]);
     let id = listed[0]["run"].as_str().unwrap();
-    let exported = actcheck(folder, &["export", id, "--history", "h", "-o", "case.toml"]);
+    let exported = actcheck(
+        folder,
+        &["export", "run", id, "--history", "h", "-o", "case.toml"],
+    );
     assert!(exported.status.success(), "{}", stderr(&exported));
     let case = std::fs::read_to_string(folder.join("case.toml")).unwrap();
     assert!(

@@ -271,16 +271,7 @@ fn waiting(folder: &Path, rest: &str) -> Child {
             .success()
     );
     Command::new(env!("CARGO_BIN_EXE_actcheck"))
-        .args([
-            "datalog",
-            "waits.rls",
-            "-D",
-            "out",
-            "--max-tuples",
-            "1000000000000",
-            "--max-secs",
-            "1e9",
-        ])
+        .args(["datalog", "waits.rls", "-D", "out", "--max-time", "1e9"])
         .current_dir(folder)
         .env("NO_COLOR", "1")
         .stdout(Stdio::piped())

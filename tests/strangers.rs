@@ -106,6 +106,7 @@ fn an_id_of_a_foreign_history_does_not_lead_out_of_a_folder() {
         &["report", "--history", "theirs", "--html", "r.html"],
         &[
             "export",
+            "run",
             "../../../x-1",
             "-o",
             "case.toml",

@@ -135,7 +135,7 @@ fn messages_and_tables_look_as_in_the_files_at_every_width() {
     let mut texts = Vec::new();
     for (name, arguments) in [
         ("mistake", &["check", "configs/pick.toml"][..]),
-        ("rules", &["rules"]),
+        ("rules", &["list", "--rules"]),
         ("explain", &["explain", "C021"]),
         ("help", &["help", "check"]),
     ] {

@@ -111,7 +111,7 @@ fn a_campaign_warns_of_uninformative_outcomes() {
 fn rules_lists_every_property_with_its_rate() {
     let project = with_odd_properties();
     let list = |arguments: &[&str]| {
-        let output = actcheck(project.path(), &[&["rules"], arguments].concat());
+        let output = actcheck(project.path(), &[&["list", "--rules"], arguments].concat());
         assert!(output.status.success(), "{}", stderr(&output));
         stdout(&output)
     };
@@ -156,9 +156,12 @@ fn rules_lists_every_property_with_its_rate() {
     assert_eq!(grasped["language"], "SPARQL");
     let csv = list(&["--history", "h", "--format", "csv"]);
     assert_eq!(csv.lines().count(), rows.len() + 1, "{csv}");
-    let missing = actcheck(project.path(), &["rules", "--history", "nowhere"]);
+    let missing = actcheck(project.path(), &["list", "--rules", "--history", "nowhere"]);
     assert_eq!(missing.status.code(), Some(2));
-    let missing = actcheck(project.path(), &["rules", "--ontology", "nowhere.ttl"]);
+    let missing = actcheck(
+        project.path(),
+        &["list", "--rules", "--ontology", "nowhere.ttl"],
+    );
     assert_eq!(missing.status.code(), Some(2));
 }
 

@@ -42,7 +42,7 @@ def actcheck(folder, task, program):
     _, rules, facts = task
     text = programs.write_rules(rules, "~", " .", lambda v: f"?{v}") + programs.write_facts(facts, " .")
     (folder / "program.rls").write_text(text)
-    command = [str(Path(found).resolve()), "datalog", "program.rls", "--max-tuples", "100000000", "--max-time", "10m"]
+    command = [str(Path(found).resolve()), "datalog", "program.rls", "--max-time", "10m"]
     return command, r"^\s*p\s+(\d+)"
 
 

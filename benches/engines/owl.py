@@ -113,7 +113,7 @@ def main():
     program = shutil.which(args.actcheck) or sys.exit(f"no program `{args.actcheck}`: build it with `make`")
     rules = (ROOT / "rules" / "lib" / "owl-rl.rls").read_text()
     head = '@import triple :- turtle{resource = "o.ttl"} .\n@export t :- csv{resource = "t.csv"} .\n'
-    limits = ["--max-tuples", "100000000", "--max-memory", "12GiB"]
+    limits = ["--max-memory", "12GiB"]
     with tempfile.TemporaryDirectory(prefix="owl-") as name:
         folder = Path(name)
         (folder / "owl.rls").write_text(head + rules)

@@ -1,6 +1,6 @@
 """A second judgement of robot actions, from exported tables alone.
 
-    actcheck export --parquet DIR --complete --history HISTORY
+    actcheck export tables DIR --complete --history HISTORY
     python -m second_judge DIR
 
 It judges the default properties of `ontology/actions.ttl` anew from their meaning in words, without the rules, and

@@ -97,7 +97,7 @@ class Action:
 
 
 def read(folder):
-    """Reads the tables that `actcheck export --parquet FOLDER --complete` wrote. Returns the actions in order."""
+    """Reads the tables that `actcheck export tables FOLDER --complete` wrote. Returns the actions in order."""
     tables = Tables(Path(folder))
     states = read_states(tables)
     runs = read_runs(tables)

@@ -1,6 +1,6 @@
 """Properties about time, judged anew from their labels and comments in `ontology/time.ttl`.
 
-    actcheck export --dataset DIR --course --history HISTORY
+    actcheck export tables DIR --course --history HISTORY
     python -m second_judge.time_properties DIR
 
 It reads the course of each action at the control rate (`course_*.parquet`), without the rules, and compares the result with

@@ -64,7 +64,7 @@ pub use score_interval::score_interval;
 pub use stopped::{PassesUntilFailures, Sampling, anytime, passes_until_failures};
 pub use tables::{
     Column, ColumnKind, ColumnRole, Hierarchy, Mirror, MirrorChange, OutcomeTable, TableFilter,
-    TextColumn, columns, export_csv, export_parquet, without_campaign,
+    TextColumn, columns, export_csv, export_parquet,
 };
 
 // Re-exported for readers of tables.

@@ -312,7 +312,7 @@ fn unfit(detail: &RunDetail, misfits: &[Misfit]) -> Diagnostic {
             named.join(", ")
         ),
     )
-    .help("`--nearest` clamps values to their bounds and uses nominal values for missing choices")
+    .help("without `--exact`, values are clamped to their bounds, and missing choices are nominal")
 }
 
 impl std::fmt::Display for Misfit {

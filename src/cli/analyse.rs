@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 
 use crate::chosen::{self, ChosenRuns, is_meant};
-use crate::options::{Format, level};
+use crate::options::Format;
 use crate::output;
 use crate::picture::Picture;
 use crate::work::{all_cores, both};
@@ -14,7 +14,7 @@ use actcheck_analysis::{
     TableFilter, cascades, collisions, columns, finding_columns, flaky_scenes, judged,
     property_findings, table_failure_modes, trend, two_way,
 };
-use actcheck_base::{Diagnostic, Diagnostics, ShellLine, did_you_mean};
+use actcheck_base::{Diagnostic, Diagnostics, did_you_mean};
 use actcheck_history::History;
 use actcheck_ontology::Ontology;
 use actcheck_report::{
@@ -30,8 +30,10 @@ const USUAL_MAPS: [[&str; 2]; 2] = [
     ["target_category", "target_turned_rad"],
 ];
 
-/// Maximum number of conditions of a pattern, also the default.
-const MOST_CONDITIONS: u8 = 3;
+/// Maximum number of conditions of a pattern.
+const MOST_CONDITIONS: usize = 3;
+/// Accepted false discovery rate of patterns, after correction for multiple testing.
+const LEVEL: f64 = 0.05;
 
 /// `actcheck analyse`
 #[derive(Debug, Args)]
@@ -55,12 +57,6 @@ pub struct AnalyseArgs {
     /// configuration names the file, every scene matches the pattern
     #[arg(long, value_name = "N", requires = "property", conflicts_with = "by")]
     pub scene_rule: Option<usize>,
-    /// Maximum number of conditions of a pattern
-    #[arg(long, value_name = "N", default_value_t = MOST_CONDITIONS, value_parser = clap::value_parser!(u8).range(1..=3))]
-    pub depth: u8,
-    /// Accepted false discovery rate of patterns, after correction for multiple testing
-    #[arg(long, value_name = "LEVEL", default_value_t = 0.05, value_parser = level)]
-    pub level: f64,
     /// The runs to analyse, and their history.
     #[command(flatten)]
     pub chosen: ChosenRuns,
@@ -101,8 +97,6 @@ pub fn analyse(args: &AnalyseArgs) -> Result<(), Diagnostics> {
         by: &args.by,
         // In a text about all properties they would be too long.
         usual_maps: !args.property.is_empty() || args.format != Format::Text,
-        depth: args.depth,
-        level: args.level,
     };
     let summary = analysed(&asked, &history, &[])?.summary;
     if let Some(picture) = picture {
@@ -145,22 +139,6 @@ pub(super) struct Question<'a> {
     pub by: &'a [String],
     /// Whether to compute the default heat maps.
     pub usual_maps: bool,
-    /// Maximum number of conditions of a pattern.
-    pub depth: u8,
-    /// Accepted false discovery rate of patterns.
-    pub level: f64,
-}
-
-impl Question<'_> {
-    /// The options that choose runs and the depth of patterns, as they were typed.
-    fn typed(&self) -> ShellLine {
-        let typed = self.chosen.typed();
-        if self.depth < MOST_CONDITIONS {
-            typed.option("--depth", self.depth.to_string())
-        } else {
-            typed
-        }
-    }
 }
 
 /// Updates the tables beside a history and finds conditions that go with failures; reads the
@@ -197,7 +175,7 @@ pub(super) fn analysed(
             let collisions = collisions(sample.as_ref().unwrap_or(&table));
             (
                 table_failure_modes(&table),
-                cascades(&table, asked.level),
+                cascades(&table, LEVEL),
                 collisions,
             )
         },
@@ -212,7 +190,7 @@ pub(super) fn analysed(
         program: std::env::args()
             .next()
             .unwrap_or_else(|| "actcheck".to_owned()),
-        options: asked.typed().to_string(),
+        options: asked.chosen.typed().to_string(),
         campaigns: table.text("campaign").texts.clone(),
         runs: table.text("run").texts.len() as u64,
         sampling,
@@ -229,7 +207,7 @@ pub(super) fn analysed(
         cascades,
         collisions,
         properties,
-        level: asked.level,
+        level: LEVEL,
     };
     Ok(Analysed {
         table,
@@ -296,8 +274,8 @@ fn report(
     ontology: &Ontology,
 ) -> PropertyReport {
     let options = PatternOptions {
-        most_conditions: usize::from(asked.depth),
-        level: asked.level,
+        most_conditions: MOST_CONDITIONS,
+        level: LEVEL,
         ..PatternOptions::default()
     };
     let findings = match sampled {
@@ -338,7 +316,7 @@ fn report(
             .properties
             .get(&of.property)
             .and_then(|property| property.unit.clone()),
-        trend: trend(table, of, asked.level),
+        trend: trend(table, of, LEVEL),
         flaky,
         repeated_scenes,
         findings,

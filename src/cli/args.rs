@@ -40,32 +40,73 @@ pub enum Command {
         after_help = "Example:\n  actcheck run configs/pick.toml --runs 5 --history /tmp/try"
     )]
     Run(crate::run_args::RunArgs),
-    /// Run a campaign in shards, each in a process of its own, and merge them into one history
-    ///
-    /// The processes run here, or where Slurm, Kubernetes or Ray starts them (`--on`). The results
-    /// are those of `actcheck run`. A shard whose process was lost is resumed. Until they are
-    /// merged, the shards are in a folder beside the history (DIR.launch); after an interrupt, the
-    /// same command continues there, and follows a submitted job again.
-    ///
-    /// Exit code: 0 everything passed, 1 a property failed, 2 a shard could not be completed, 130
-    /// interrupted by Ctrl-C (finished runs are kept).
+    /// List the runs of a history, or the properties with their pass rates
     #[command(
-        after_help = "Examples:\n  actcheck launch configs/quick.toml --shards 2 --history /tmp/shards\n  \
-                      actcheck launch configs/quick.toml --shards 3 --on slurm --resources cpus=2,time=1h --dry-run"
+        after_help = "Examples:\n  actcheck list --format csv\n  actcheck list --rules\n  actcheck list --failed --property ObjectInGripper --where 'target_mass_kg > 0.3'"
     )]
-    Launch(crate::launch::LaunchArgs),
-    /// Write a configuration or a property, ready to edit
+    List(crate::list::ListArgs),
+    /// Explain why a property holds in a run, or how close it came and which facts were missing
+    ///
+    /// Uses the current rules: those that the ontology links now.
+    #[command(
+        after_help = "Example:\n  actcheck why k7f3-3 MovedObject    (a run id from `actcheck list`)"
+    )]
+    Why(crate::why::WhyArgs),
+    /// Write a report: one HTML page that works offline, or results for Allure, JUnit readers,
+    /// EARL, …
+    ///
+    /// The page has an overview with counts, scores and intervals, properties, failure modes,
+    /// patterns with plots, target positions, trends, and each run with witnesses, explanations and
+    /// parameters. Failed runs have a 3D replay, up to the limit of `--replay-mb`, so that each
+    /// failure mode and property has one; the others are listed with the command that shows them.
+    ///
+    /// Reads the tables beside the history, and updates them first. Exit code: 0 written, 2 the
+    /// report could not be written.
+    #[command(
+        after_help = "Examples:\n  actcheck report --html report.html    (after `actcheck run configs/pick.toml`)\n  actcheck report --html picks.html --campaign k7f3 --property ObjectInGripper\n  actcheck report --rrd runs.rrd    (built with `--features rerun`; `rerun runs.rrd` shows it)\n  actcheck report --allure allure-results --junit junit.xml --markdown"
+    )]
+    Report(crate::report::ReportArgs),
+    /// Query a history with SPARQL 1.1
+    ///
+    /// The prefixes act, w, obj, run, campaign, rdf, rdfs, owl, xsd, earl and prov are predefined.
+    /// Facts about the world are in named graphs, one for each moment:
+    /// `?execution act:before ?g . GRAPH ?g { … }`.
+    #[command(
+        after_help = "Examples:\n  actcheck query 'SELECT (COUNT(?r) AS ?n) WHERE { ?r a act:Run }'\n  actcheck query --named\n  actcheck query --named failure-rates\n  actcheck query --named failure-rates --endpoint http://localhost:3030/history/query"
+    )]
+    Query(crate::query::QueryArgs),
+    /// Judge stored runs by the current rules, without simulating
+    ///
+    /// Properties that are newer than the runs are judged too. New and changed outcomes are stored
+    /// beside the old ones, with the digest of the rules and the time. From then on,
+    /// `list`, `show`, `why`, `analyse`, `report` and `export` use the newest outcomes; `compare`
+    /// and `replay` use the campaign's own. In queries, the newest outcomes are those in the graph
+    /// act:rechecked that no other supersedes (see ontology/history.ttl).
+    ///
+    /// `--ontology` also takes a folder with the rules of another version, such as an older checkout:
+    /// with `ontology/actions.ttl` or `actions.ttl`.
+    ///
+    /// Exit code: 0 no property fails now, 1 a property fails now, 2 the recheck failed or nothing
+    /// could be decided, 130 interrupted by Ctrl-C (judgements so far are kept).
+    #[command(
+        after_help = "Example:\n  actcheck recheck MovedObject    (after `actcheck run configs/pick.toml`)"
+    )]
+    Recheck(crate::recheck::RecheckArgs),
+    /// Write a configuration, a property or a robot's profile to edit, or files for editors and
+    /// shells
     #[command(
         after_help = "Examples:\n  actcheck new campaign\n  actcheck new property StaysUpright --for Pick"
     )]
     New(crate::new::NewArgs),
-    /// Write a ready-to-run configuration: the same as `actcheck new campaign`
-    #[command(hide = true, after_help = "Example:\n  actcheck init")]
-    Init(crate::new_campaign::NewCampaignArgs),
     /// Check configuration, ontology, rules and models without simulating; reports all mistakes at
     /// once
     #[command(after_help = "Example:\n  actcheck check configs/pick.toml")]
     Check(crate::check::CheckArgs),
+    /// Show one run: its scene, and every property's outcome with margin and witness
+    #[command(
+        after_help = "Examples:\n  actcheck show k7f3-3    (a run id from `actcheck list`; a prefix is enough)\n  actcheck show @last    (the last run; @last-failed: the last one in which a property failed)"
+    )]
+    Show(crate::show::ShowArgs),
     /// Run stored runs again from their recorded choices, and check that every state is the same
     ///
     /// For a run that differs, prints the first time, body and quantity that differ, and which
@@ -89,30 +130,6 @@ pub enum Command {
         after_help = "Example:\n  actcheck shrink k7f3-3 --picture small.svg    (a run id from `actcheck list`; a prefix is enough)"
     )]
     Shrink(crate::shrink::ShrinkArgs),
-    /// List the runs of a history
-    #[command(
-        after_help = "Examples:\n  actcheck list --format csv\n  actcheck list --failed --property ObjectInGripper --where 'target_mass_kg > 0.3'"
-    )]
-    List(crate::list::ListArgs),
-    /// Show one run: its scene, and every property's outcome with margin and witness
-    #[command(
-        after_help = "Examples:\n  actcheck show k7f3-3    (a run id from `actcheck list`; a prefix is enough)\n  actcheck show @last    (the last run; @last-failed: the last one in which a property failed)"
-    )]
-    Show(crate::show::ShowArgs),
-    /// Write a report: one HTML page that works offline, or results for Allure, JUnit readers,
-    /// EARL, …
-    ///
-    /// The page has an overview with counts, scores and intervals, properties, failure modes,
-    /// patterns with plots, target positions, trends, and each run with witnesses, explanations and
-    /// parameters. Failed runs have a 3D replay, up to the limit of `--replay-mb`, so that each
-    /// failure mode and property has one; the others are listed with the command that shows them.
-    ///
-    /// Reads the tables beside the history, and updates them first. Exit code: 0 written, 2 the
-    /// report could not be written.
-    #[command(
-        after_help = "Examples:\n  actcheck report --html report.html    (after `actcheck run configs/pick.toml`)\n  actcheck report --html picks.html --campaign k7f3 --property ObjectInGripper\n  actcheck report --rrd runs.rrd    (built with `--features rerun`; `rerun runs.rrd` shows it)\n  actcheck report --allure allure-results --junit junit.xml --markdown"
-    )]
-    Report(crate::report::ReportArgs),
     /// Find when and how actions fail: conditions and effects that go with failures more often than
     /// by chance
     ///
@@ -190,15 +207,6 @@ pub enum Command {
         after_help = "Example:\n  actcheck health    (the newest campaign, after `actcheck run configs/pick.toml`)"
     )]
     Health(crate::health::HealthArgs),
-    /// Query a history with SPARQL 1.1
-    ///
-    /// The prefixes act, w, obj, run, campaign, rdf, rdfs, owl, xsd, earl and prov are predefined.
-    /// Facts about the world are in named graphs, one for each moment:
-    /// `?execution act:before ?g . GRAPH ?g { … }`.
-    #[command(
-        after_help = "Examples:\n  actcheck query 'SELECT (COUNT(?r) AS ?n) WHERE { ?r a act:Run }'\n  actcheck query --list-named\n  actcheck query --named failure-rates\n  actcheck query --named failure-rates --endpoint http://localhost:3030/history/query"
-    )]
-    Query(crate::query::QueryArgs),
     /// Serve a history over HTTP: a read-only SPARQL 1.1 endpoint, a query page, and the current
     /// report
     ///
@@ -220,62 +228,20 @@ pub enum Command {
         after_help = "Examples:\n  actcheck explain C003\n  actcheck explain    (lists all codes)"
     )]
     Explain(crate::explain::ExplainArgs),
-    /// Explain why a property holds in a run, or how close it came and which facts were missing
+    /// Run a campaign in shards, each in a process of its own, and merge them into one history
     ///
-    /// Uses the current rules: those that the ontology links now.
+    /// The processes run here, or where Slurm, Kubernetes or Ray starts them (`--on`). The results
+    /// are those of `actcheck run`. A shard whose process was lost is resumed. Until they are
+    /// merged, the shards are in a folder beside the history (DIR.launch); after an interrupt, the
+    /// same command continues there, and follows a submitted job again.
+    ///
+    /// Exit code: 0 everything passed, 1 a property failed, 2 a shard could not be completed, 130
+    /// interrupted by Ctrl-C (finished runs are kept).
     #[command(
-        after_help = "Example:\n  actcheck why k7f3-3 MovedObject    (a run id from `actcheck list`)"
+        after_help = "Examples:\n  actcheck launch configs/quick.toml --shards 2 --history /tmp/shards\n  \
+                      actcheck launch configs/quick.toml --shards 3 --on slurm --resources cpus=2,time=1h --dry-run"
     )]
-    Why(crate::why::WhyArgs),
-    /// Judge stored runs by the current rules, without simulating
-    ///
-    /// Properties that are newer than the runs are judged too. New and changed outcomes are stored
-    /// beside the old ones, with the digest of the rules and the time. From then on, `rules`,
-    /// `list`, `show`, `why`, `analyse`, `report` and `export` use the newest outcomes; `compare`
-    /// and `replay` use the campaign's own. In queries, the newest outcomes are those in the graph
-    /// act:rechecked that no other supersedes (see ontology/history.ttl).
-    ///
-    /// Exit code: 0 no property fails now, 1 a property fails now, 2 the recheck failed or nothing
-    /// could be decided, 130 interrupted by Ctrl-C (judgements so far are kept).
-    #[command(
-        after_help = "Example:\n  actcheck recheck MovedObject    (after `actcheck run configs/pick.toml`)"
-    )]
-    Recheck(crate::recheck::RecheckArgs),
-    /// List all properties: label, language, rule file, actions, and how often each passed in the
-    /// history
-    #[command(after_help = "Example:\n  actcheck rules --format csv")]
-    Rules(crate::rules::RulesArgs),
-    /// Test the properties themselves: inject faults into the world and the robot, and see which
-    /// property detects them
-    ///
-    /// Runs every scene without a fault and once with each fault (a robot that does nothing, a
-    /// gripper that opens in mid-air, a false report, …), from the same choices. A property detects
-    /// a fault if it fails with the fault in scenes that it passes without, more often than by
-    /// chance. Runs are not stored in a history.
-    ///
-    /// Exit code: 0 every fault is detected and every property detects one, 1 there is a gap, 2 the
-    /// check failed, 130 interrupted by Ctrl-C.
-    #[command(after_help = "Example:\n  actcheck check-oracles configs/pick.toml")]
-    CheckOracles(crate::check_oracles::CheckOraclesArgs),
-    /// Run a standalone Datalog program, with its imports and exports
-    #[command(after_help = "Example:\n  actcheck datalog program.rls -D results")]
-    Datalog(crate::datalog::DatalogArgs),
-    /// Export a stored run as a configuration, or the history as tables or RDF, or send it to a
-    /// SPARQL store
-    ///
-    /// A run becomes one readable file (a case) that recreates its scene. `actcheck run` accepts
-    /// the file like any configuration, and reports whether it still fails in the same way. You can
-    /// edit its values; an invalid value is rejected at its line. A file inside the project refers
-    /// to the ontology and models by relative paths; a file elsewhere omits those that are the same
-    /// as the shipped ones, so that it runs anywhere.
-    ///
-    /// Tables come from the mirror beside the history (its folder `tables`), which is updated
-    /// first. They contain no shrunk runs, no cases, and no runs of `run --last-failed`. Their
-    /// column `counts` is false for runs that are bit-identical to a later one.
-    #[command(
-        after_help = "Examples:\n  actcheck export k7f3-3 -o case.toml    (a run id from `actcheck list`; a prefix is enough)\n  actcheck export --parquet tables    (after `actcheck run configs/pick.toml`)\n  actcheck export --tables /tmp/columns    (or s3://BUCKET/PREFIX)\n  actcheck export --nquads history.nq --turtle history.ttl\n  actcheck export --sparql http://localhost:3030/history/update    (another store, such as Fuseki)"
-    )]
-    Export(crate::export::ExportArgs),
+    Launch(crate::launch::LaunchArgs),
     /// Merge histories into one: parts of a campaign (`run --shard`) become one campaign,
     /// duplicates are kept once
     ///
@@ -291,27 +257,26 @@ pub enum Command {
         after_help = "Example:\n  actcheck run configs/pick.toml --shard 1/2 --history /tmp/h1\n  actcheck run configs/pick.toml --shard 2/2 --history /tmp/h2\n  actcheck merge /tmp/h1 /tmp/h2 --into /tmp/all"
     )]
     Merge(crate::merge::MergeArgs),
-    /// Print the JSON schema of configurations, for completion and validation in editors
-    ///
-    /// Editors that use taplo, such as VS Code with Even Better TOML, read it if a configuration
-    /// begins with the line `#:schema campaign.schema.json`. Only `actcheck check` checks model
-    /// names and relations between keys.
+    /// Export a stored run as a case, or the history as tables or RDF, or send it to a SPARQL store
     #[command(
-        after_help = "Examples:\n  actcheck schema > campaign.schema.json\n  actcheck schema --markdown > configuration.md"
+        after_help = "Examples:\n  actcheck export run k7f3-3 -o case.toml    (a run id from `actcheck list`; a prefix is enough)\n  actcheck export tables columns    (after `actcheck run configs/pick.toml`)\n  actcheck export rdf history.nq\n  actcheck export store http://localhost:3030/history/update    (another store, such as Fuseki)"
     )]
-    Schema(crate::schema::SchemaArgs),
-    /// Print a shell completion script for commands and options
+    Export(crate::export::ExportArgs),
+    /// Test the properties themselves: inject faults into the world and the robot, and see which
+    /// property detects them
     ///
-    /// Save it where the shell finds it: `~/.local/share/bash-completion/completions/actcheck` for
-    /// bash, `_actcheck` in a folder of `$fpath` for zsh,
-    /// `~/.config/fish/completions/actcheck.fish` for fish.
-    #[command(
-        after_help = "Examples:\n  actcheck completions bash > actcheck.bash\n  . ./actcheck.bash"
-    )]
-    Completions(crate::completions::CompletionsArgs),
-    /// Print the manual as a man page, or write one page for each command
-    #[command(after_help = "Examples:\n  actcheck man | man -l -\n  actcheck man --out man1")]
-    Man(crate::man::ManArgs),
+    /// Runs every scene without a fault and once with each fault (a robot that does nothing, a
+    /// gripper that opens in mid-air, a false report, …), from the same choices. A property detects
+    /// a fault if it fails with the fault in scenes that it passes without, more often than by
+    /// chance. Runs are not stored in a history.
+    ///
+    /// Exit code: 0 every fault is detected and every property detects one, 1 there is a gap, 2 the
+    /// check failed, 130 interrupted by Ctrl-C.
+    #[command(after_help = "Example:\n  actcheck check-oracles configs/pick.toml")]
+    CheckOracles(crate::check_oracles::CheckOraclesArgs),
+    /// Run a standalone Datalog program, with its imports and exports
+    #[command(after_help = "Example:\n  actcheck datalog program.rls -D results")]
+    Datalog(crate::datalog::DatalogArgs),
     /// Begin or resume one shard of `actcheck launch`
     #[command(
         hide = true,

@@ -1,4 +1,4 @@
-//! `actcheck completions`
+//! `actcheck new completions`
 
 use clap::{Args, Command, ValueEnum};
 use clap_complete::generate;
@@ -6,7 +6,7 @@ use clap_complete::shells;
 
 use crate::output;
 
-/// `actcheck completions`
+/// `actcheck new completions`
 #[derive(Debug, Args)]
 pub struct CompletionsArgs {
     /// The shell that reads the script

@@ -14,6 +14,9 @@ use actcheck_rules::Budget;
 use actcheck_rules::explain::Explanation;
 use actcheck_rules::standalone::{self, Loading, Program};
 
+/// Maximum number of derived tuples: few fit into the usual limit of memory.
+const MOST_TUPLES: usize = 100_000_000;
+
 /// `actcheck datalog`
 #[derive(Debug, Args)]
 pub struct DatalogArgs {
@@ -35,9 +38,6 @@ pub struct DatalogArgs {
     /// only explanations)
     #[arg(long, value_name = "FORMAT", value_enum, default_value_t)]
     pub format: ProofFormat,
-    /// Stop after this many derived tuples
-    #[arg(long, value_name = "N", default_value_t = 100_000_000)]
-    pub max_tuples: usize,
     /// Stop after this many new things of rules that may make them without end
     #[arg(long, value_name = "N", default_value_t = 1_000_000)]
     pub max_new: usize,
@@ -45,7 +45,7 @@ pub struct DatalogArgs {
     #[arg(long, value_name = "SIZE", default_value = "4GiB", value_parser = memory)]
     pub max_memory: usize,
     /// Stop after this time, such as 90s, 10m or 2h
-    #[arg(long, alias = "max-secs", value_name = "DURATION", default_value = "10m", value_parser = duration)]
+    #[arg(long, value_name = "DURATION", default_value = "10m", value_parser = duration)]
     pub max_time: f64,
     /// Leave out rows and statements of imported files that can't be read, with a warning
     #[arg(long)]
@@ -70,7 +70,7 @@ fn parameter(text: &str) -> Result<(String, String), String> {
 /// Runs a standalone program, or explains why one of its facts holds or does not. Returns the exit
 /// code: 1 if the fact to explain does not hold.
 pub fn datalog(args: &DatalogArgs, stop: &Arc<AtomicBool>) -> Result<u8, Diagnostics> {
-    let (tuples, bytes, secs) = (args.max_tuples, args.max_memory, args.max_time);
+    let (tuples, bytes, secs) = (MOST_TUPLES, args.max_memory, args.max_time);
     let budget = Budget {
         tuples,
         bytes,

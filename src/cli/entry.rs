@@ -6,8 +6,8 @@ use clap::FromArgMatches as _;
 
 use crate::args::{Arguments, Command};
 use crate::{
-    check, check_oracles, completions, datalog, explain, export, groups, list, man, new, output,
-    query, recheck, rules, show, shrink, stop, why,
+    check, check_oracles, datalog, explain, export, groups, list, new, output, query, recheck,
+    show, shrink, stop, why,
 };
 use actcheck_base::set_program_digest;
 
@@ -43,21 +43,10 @@ pub fn run(sources_digest: &'static str) -> ExitCode {
         Command::Show(args) => show::show(&args).map(|()| 0),
         Command::Shrink(args) => shrink::shrink(&args),
         Command::Query(args) => query::query(&args),
-        Command::Rules(args) => rules::rules(&args).map(|()| 0),
         Command::Recheck(args) => recheck::recheck(&args),
         Command::Why(args) => stop::interruptible(|stop| why::why(&args, stop).map(|()| 0)),
         Command::New(args) => new::new(&args).map(|()| 0),
-        Command::Init(args) => crate::new_campaign::campaign(&args).map(|()| 0),
         Command::Datalog(args) => stop::interruptible(|stop| datalog::datalog(&args, stop)),
-        Command::Schema(args) => {
-            crate::schema::schema(&args);
-            Ok(0)
-        }
-        Command::Completions(args) => {
-            completions::completions(&args, groups::command_tree());
-            Ok(0)
-        }
-        Command::Man(args) => man::man(&args, groups::command_tree()).map(|()| 0),
     };
     match done {
         Ok(code) => ExitCode::from(code),

@@ -3,7 +3,7 @@
 
 use clap::builder::styling::{Effects, Style};
 use clap::error::{ContextKind, ContextValue};
-use clap::{Command, CommandFactory as _};
+use clap::{Arg, ArgAction, Command, CommandFactory as _};
 
 use crate::args::Arguments;
 use crate::terminal;
@@ -18,25 +18,63 @@ struct Group {
 
 /// All commands except hidden ones. They are declared in the same order, which completions and the
 /// manual use.
-const GROUPS: [Group; 4] = [
+const GROUPS: [Group; 2] = [
     Group {
-        title: "Run",
-        commands: &["run", "launch", "new", "check", "replay", "shrink"],
+        title: "First steps",
+        commands: &["run", "list", "why", "report", "query", "recheck", "new"],
     },
     Group {
-        title: "Look",
+        title: "More",
         commands: &[
-            "list", "show", "report", "analyse", "compare", "bisect", "health", "query", "serve",
+            "check",
+            "show",
+            "replay",
+            "shrink",
+            "analyse",
+            "compare",
+            "bisect",
+            "health",
+            "serve",
             "explain",
+            "launch",
+            "merge",
+            "export",
+            "check-oracles",
+            "datalog",
         ],
     },
-    Group {
-        title: "Judge",
-        commands: &["why", "recheck", "rules", "check-oracles", "datalog"],
+];
+
+/// An option that many commands have. The program's help explains it once; the help of a command
+/// names it.
+struct CommonOption {
+    name: &'static str,
+    /// The name of its value, unless it is a flag.
+    value: Option<&'static str>,
+    help: &'static str,
+}
+
+const COMMON: [CommonOption; 4] = [
+    CommonOption {
+        name: "history",
+        value: Some("DIR"),
+        help: "Folder of the history [default: `.actcheck` beside the configuration, here, or the only one in a subfolder]",
     },
-    Group {
-        title: "Exchange",
-        commands: &["export", "merge", "schema", "completions", "man"],
+    CommonOption {
+        name: "ontology",
+        value: Some("FILE"),
+        help: "The ontology with the properties, their rules and the object categories [default: ontology/actions.ttl here, \
+               or the shipped one]",
+    },
+    CommonOption {
+        name: "trust",
+        value: None,
+        help: "Start the programs that a case or a history names; read them first",
+    },
+    CommonOption {
+        name: "jobs",
+        value: Some("N"),
+        help: "Number of workers, each with one simulation; does not affect results [default: all cores]",
     },
 ];
 
@@ -44,16 +82,69 @@ const GROUPS: [Group; 4] = [
 pub(super) fn program() -> Command {
     let heading = Style::new().effects(Effects::BOLD | Effects::UNDERLINE);
     let help = format!(
-        "{{about-with-newline}}\n{{usage-heading}} {{usage}}\n\n{}{heading}Options:{heading:#}\n{{options}}{{after-help}}",
-        listed(heading)
+        "{{about-with-newline}}\n{{usage-heading}} {{usage}}\n\n{}{heading}Options:{heading:#}\n{{options}}\n\n\
+         {heading}Options of many commands:{heading:#}\n{}{{after-help}}",
+        listed(heading),
+        common_options()
     );
     let program = Arguments::command()
+        .mut_subcommands(with_short_help)
         .disable_help_subcommand(false)
         .help_template(help);
     match terminal::demanded_width() {
         Some(width) => program.term_width(width),
         None => program,
     }
+}
+
+/// A command whose help names the common options instead of explaining them.
+fn with_short_help(command: Command) -> Command {
+    let is_common = |argument: &Arg| {
+        COMMON
+            .iter()
+            .find(|option| argument.get_long() == Some(option.name))
+    };
+    let mut names: Vec<String> = Vec::new();
+    for option in command.get_arguments().filter_map(is_common) {
+        let value = option
+            .value
+            .map_or(String::new(), |value| format!(" {value}"));
+        names.push(format!("--{}{value}", option.name));
+    }
+    let command = command
+        .mut_subcommands(with_short_help)
+        .mut_args(|argument| {
+            let is_hidden = argument.is_hide_set() || is_common(&argument).is_some();
+            argument.hide(is_hidden)
+        });
+    if names.is_empty() || command.is_hide_set() {
+        return command;
+    }
+    let examples = command.get_after_help().cloned().unwrap_or_default();
+    let names = names.join(", ");
+    command.after_help(format!(
+        "Also: {names} (see `actcheck --help`)\n\n{examples}"
+    ))
+}
+
+/// The common options as clap renders them.
+fn common_options() -> String {
+    let list = Command::new("actcheck")
+        .disable_help_flag(true)
+        .max_term_width(100)
+        .help_template("{options}");
+    let arguments = COMMON.iter().map(|option| {
+        let argument = Arg::new(option.name).long(option.name).help(option.help);
+        match option.value {
+            Some(value) => argument.value_name(value),
+            None => argument.action(ArgAction::SetTrue),
+        }
+    });
+    let list = match terminal::demanded_width() {
+        Some(width) => list.term_width(width),
+        None => list,
+    };
+    list.args(arguments).render_help().ansi().to_string()
 }
 
 /// The program with all commands except the hidden ones, for completions and the manual.

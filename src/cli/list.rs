@@ -1,6 +1,7 @@
 //! `actcheck list`
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::path::PathBuf;
 use std::sync::Arc;
 
 use clap::Args;
@@ -9,7 +10,7 @@ use serde_json::Value;
 use crate::chosen::{self, is_meant};
 use crate::options::{Format, HistoryArgs};
 use crate::where_rows::{Condition, matching_runs};
-use crate::{history_dir, output};
+use crate::{history_dir, output, rules};
 use actcheck_base::{Diagnostics, Outcome, did_you_mean, names};
 use actcheck_history::{History, JudgedOutcome, Judgements, RunFilter, RunRow, Wish};
 use actcheck_report::Table;
@@ -40,11 +41,19 @@ pub struct ListArgs {
     pub outcome: Option<Outcome>,
     /// Only runs with an outcome that satisfies this condition on a column of the table of
     /// outcomes, such as `target_mass_kg > 0.3` or `target_category = Glass` (may be given several
-    /// times; `actcheck export --csv` writes the table and describes its columns). With
+    /// times; `actcheck export tables` writes the table and describes its columns). With
     /// `--property`, `--failed` or `--outcome`, one of these outcomes must satisfy it. Shrunk runs,
     /// cases and failed runs that ran again are not in the table
     #[arg(long = "where", value_name = "COLUMN<VALUE", value_parser = Condition::parse)]
     pub conditions: Vec<Condition>,
+    /// List all properties instead: label, language, rule file, actions, and how often each passed
+    /// in the history
+    #[arg(long, conflicts_with_all = ["campaign", "failed", "property", "outcome", "conditions"])]
+    pub rules: bool,
+    /// The ontology whose properties are listed [default: ontology/actions.ttl here, or the shipped
+    /// one]
+    #[arg(long, value_name = "FILE", requires = "rules")]
+    pub ontology: Option<PathBuf>,
     /// How the table is printed
     #[arg(long, value_name = "FORMAT", value_enum, default_value_t)]
     pub format: Format,
@@ -64,8 +73,11 @@ impl ListArgs {
 /// Returns a run's value in a column.
 type Cell = fn(&RunRow) -> Value;
 
-/// Prints one line for each run.
+/// Prints one line for each run, or for each property.
 pub fn list(args: &ListArgs) -> Result<(), Diagnostics> {
+    if args.rules {
+        return rules::rules(args);
+    }
     let history = history_dir::open_to_read(&args.history)?;
     if let Some(campaign) = &args.campaign {
         history.campaign(campaign)?;

@@ -1,4 +1,4 @@
-//! `actcheck man`
+//! `actcheck new man`
 
 use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
@@ -9,7 +9,7 @@ use clap_mangen::Man;
 use crate::{output, output_file};
 use actcheck_base::{Diagnostic, Diagnostics};
 
-/// `actcheck man`
+/// `actcheck new man`
 #[derive(Debug, Args)]
 pub struct ManArgs {
     /// Write a page for each command into this folder, such as `actcheck-run.1`, instead of

@@ -50,7 +50,7 @@ pub fn named(name: &str) -> Result<Source, Diagnostics> {
             };
             Err(fault
                 .help(format!(
-                    "{help} `actcheck query --list-named` describes all of them"
+                    "{help} `actcheck query --named` describes all of them"
                 ))
                 .into())
         }

@@ -2,9 +2,13 @@
 
 use clap::{Args, Subcommand};
 
+use crate::completions::{self, CompletionsArgs};
+use crate::groups;
+use crate::man::{self, ManArgs};
 use crate::new_campaign::{self, NewCampaignArgs};
 use crate::new_property::{self, NewPropertyArgs};
 use crate::new_robot::{self, NewRobotArgs};
+use crate::schema::{self, SchemaArgs};
 use actcheck_base::Diagnostics;
 
 /// `actcheck new`
@@ -40,13 +44,45 @@ pub enum NewKind {
     /// Existing files are never overwritten.
     #[command(after_help = "Example:\n  actcheck new robot models/robots/fixed_arm.urdf")]
     Robot(NewRobotArgs),
+    /// The JSON schema of configurations, for completion and validation in editors
+    ///
+    /// Editors that use taplo, such as VS Code with Even Better TOML, read it if a configuration
+    /// begins with the line `#:schema campaign.schema.json`. Only `actcheck check` checks model
+    /// names and relations between keys.
+    #[command(
+        after_help = "Examples:\n  actcheck new schema > campaign.schema.json\n  actcheck new schema --markdown > configuration.md"
+    )]
+    Schema(SchemaArgs),
+    /// A shell completion script for commands and options
+    ///
+    /// Save it where the shell finds it: `~/.local/share/bash-completion/completions/actcheck` for
+    /// bash, `_actcheck` in a folder of `$fpath` for zsh,
+    /// `~/.config/fish/completions/actcheck.fish` for fish.
+    #[command(
+        after_help = "Examples:\n  actcheck new completions bash > actcheck.bash\n  . ./actcheck.bash"
+    )]
+    Completions(CompletionsArgs),
+    /// The manual as a man page, or one page for each command
+    #[command(
+        after_help = "Examples:\n  actcheck new man | man -l -\n  actcheck new man --out man1"
+    )]
+    Man(ManArgs),
 }
 
-/// Creates a configuration, a property or a profile.
+/// Creates a configuration, a property or a profile, or prints a file for editors and shells.
 pub fn new(args: &NewArgs) -> Result<(), Diagnostics> {
     match &args.kind {
         NewKind::Campaign(args) => new_campaign::campaign(args),
         NewKind::Property(args) => new_property::property(args),
         NewKind::Robot(args) => new_robot::robot(args),
+        NewKind::Schema(args) => {
+            schema::schema(args);
+            Ok(())
+        }
+        NewKind::Completions(args) => {
+            completions::completions(args, groups::command_tree());
+            Ok(())
+        }
+        NewKind::Man(args) => man::man(args, groups::command_tree()),
     }
 }

@@ -21,7 +21,6 @@ pub struct HistoryArgs {
 pub enum Format {
     /// Human-readable text
     #[default]
-    #[value(alias = "table")]
     Text,
     /// Comma-separated values
     Csv,
@@ -44,7 +43,6 @@ impl From<Format> for TableFormat {
 pub enum QueryFormat {
     /// Human-readable text
     #[default]
-    #[value(alias = "table")]
     Text,
     /// Comma-separated values
     Csv,

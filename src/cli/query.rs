@@ -6,7 +6,6 @@ use std::path::PathBuf;
 use clap::Args;
 
 use crate::options::{HistoryArgs, QueryFormat};
-use crate::remote::RemoteArgs;
 use crate::why::ontology_file;
 use crate::{history_dir, named_queries, output, query_endpoint, stop};
 use actcheck_base::{Diagnostic, Diagnostics, Files, Source, Term, names};
@@ -19,28 +18,23 @@ use actcheck_rules::unknown_terms;
 #[derive(Debug, Args)]
 pub struct QueryArgs {
     /// The query's text
-    #[arg(value_name = "SPARQL", required_unless_present_any = ["file", "named", "list_named"])]
-    #[arg(conflicts_with_all = ["file", "named", "list_named"])]
+    #[arg(value_name = "SPARQL", required_unless_present_any = ["file", "named"])]
+    #[arg(conflicts_with_all = ["file", "named"])]
     pub text: Option<String>,
     /// A file with the query
-    #[arg(short, long, value_name = "FILE", conflicts_with_all = ["named", "list_named"])]
+    #[arg(short, long, value_name = "FILE", conflicts_with = "named")]
     pub file: Option<PathBuf>,
-    /// Name of a query: a shipped one, or `ontology/queries/NAME.rq` here
-    #[arg(long, value_name = "NAME", conflicts_with = "list_named")]
+    /// Name of a query: a shipped one, or `ontology/queries/NAME.rq` here; without NAME, lists all
+    /// with their descriptions
+    #[arg(long, value_name = "NAME", num_args = 0..=1, default_missing_value = "")]
     pub named: Option<String>,
-    /// List the named queries with their descriptions
-    #[arg(long)]
-    pub list_named: bool,
     /// The folder of the history.
     #[command(flatten)]
     pub history: HistoryArgs,
-    /// Ask a SPARQL 1.1 endpoint, to which the history was sent with `actcheck export --sparql`,
-    /// instead of the history here. Credentials: as for `export --sparql`
+    /// Ask a SPARQL 1.1 endpoint, to which the history was sent with `actcheck export store`,
+    /// instead of the history here. Credentials: as for `export store`
     #[arg(long, value_name = "URL", conflicts_with = "history")]
     pub endpoint: Option<String>,
-    /// Time limit and credentials of the endpoint.
-    #[command(flatten)]
-    pub remote: RemoteArgs,
     /// How the answer is printed (turtle: for CONSTRUCT and DESCRIBE)
     #[arg(long, value_name = "FORMAT", value_enum, default_value_t)]
     pub format: QueryFormat,
@@ -48,7 +42,7 @@ pub struct QueryArgs {
 
 /// Runs a query and prints its answer. Ctrl-C stops a long query. Returns the exit code.
 pub fn query(args: &QueryArgs) -> Result<u8, Diagnostics> {
-    if args.list_named {
+    if args.named.as_deref() == Some("") {
         return list_named(args.format).map(|()| 0);
     }
     let text = text(args)?;

@@ -4,7 +4,7 @@ use serde_json::Value;
 
 use crate::options::QueryFormat;
 use crate::query::{QueryArgs, turtle_line, turtle_prefixes, unknown};
-use crate::{output, stop};
+use crate::{output, remote, stop};
 use actcheck_base::{Diagnostic, Diagnostics, Source, Term, names};
 use actcheck_history::{ForeignAnswer, check_query, without_counts};
 use actcheck_remote::{Address, ask};
@@ -19,7 +19,7 @@ const MOST_TEXT: usize = 16 << 20;
 pub fn query(args: &QueryArgs, url: &str, text: &Source) -> Result<u8, Diagnostics> {
     let address = Address::parse(url)?;
     stop::interruptible(|flag| {
-        let client = args.remote.client(&address, flag)?;
+        let client = remote::client(flag)?;
         let answer = ask(&client, &address, &standard(text), || check_query(text))?;
         print(
             args.format,

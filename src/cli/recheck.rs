@@ -27,12 +27,10 @@ pub struct RecheckArgs {
     /// Only the runs of this campaign; may be given several times [default: all]
     #[arg(long = "campaign", value_name = "ID")]
     pub campaigns: Vec<String>,
-    /// Judge by the rules of another version: a folder with `ontology/actions.ttl` (or
-    /// `actions.ttl`) and the files that it links
-    #[arg(long, value_name = "DIR", conflicts_with = "ontology")]
-    pub as_of_rules: Option<PathBuf>,
-    /// The ontology with the rules [default: ontology/actions.ttl here, or the shipped one]
-    #[arg(long, value_name = "FILE")]
+    /// The ontology with the rules, or a folder with it (`ontology/actions.ttl` or `actions.ttl`)
+    /// and its rules, such as an older checkout [default: ontology/actions.ttl here, or the shipped
+    /// one]
+    #[arg(long, value_name = "FILE|DIR")]
     pub ontology: Option<PathBuf>,
     /// Number of workers; does not affect results [default: all cores]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
@@ -122,7 +120,7 @@ fn both<A, B>(
 
 /// The named ontology, the one of another version, or the default one.
 fn ontology(args: &RecheckArgs) -> Result<(Files, PathBuf), Diagnostics> {
-    let Some(folder) = &args.as_of_rules else {
+    let Some(folder) = args.ontology.as_ref().filter(|path| path.is_dir()) else {
         return Ok(ontology_file(args.ontology.as_deref()));
     };
     let places = ["ontology/actions.ttl", "actions.ttl"];

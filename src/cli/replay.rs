@@ -30,12 +30,10 @@ pub struct ReplayArgs {
     /// Seed of the random sample
     #[arg(long, value_name = "S", default_value_t = 0, requires = "sample")]
     pub seed: u64,
-    /// Fail if choices are missing, left over or made differently now, and list them
-    #[arg(long, conflicts_with = "nearest")]
-    pub exact: bool,
-    /// Clamp values to their bounds, and use nominal values for missing choices (the default)
+    /// Fail if choices are missing, left over or made differently now, and list them; otherwise
+    /// values are clamped to their bounds, and missing choices are nominal
     #[arg(long)]
-    pub nearest: bool,
+    pub exact: bool,
     /// Run with this configuration instead of the one in the history
     #[arg(long, value_name = "FILE")]
     pub config: Option<PathBuf>,

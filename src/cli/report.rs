@@ -13,10 +13,6 @@ use actcheck_base::{Diagnostic, Diagnostics};
 use actcheck_history::{History, RunDetail};
 use actcheck_report::HTML_COLUMNS;
 
-/// Maximum number of conditions of a pattern, and the false discovery rate: the defaults of
-/// `actcheck analyse`.
-const DEPTH: u8 = 3;
-const LEVEL: f64 = 0.05;
 /// Millions, not 2^20, as browsers and file listings count them.
 const BYTES_IN_A_MB: f64 = 1e6;
 
@@ -154,8 +150,6 @@ fn found(args: &ReportArgs, history: &History) -> Result<Analysed, Diagnostics> 
         property: &args.property,
         by: &[],
         usual_maps: true,
-        depth: DEPTH,
-        level: LEVEL,
     };
     analysed(&asked, history, &HTML_COLUMNS)
 }

@@ -1,12 +1,11 @@
-//! `actcheck rules`
+//! `actcheck list --rules`
 
 use std::collections::BTreeMap;
-use std::path::PathBuf;
 
-use clap::Args;
 use serde_json::Value;
 
-use crate::options::{Format, HistoryArgs};
+use crate::list::ListArgs;
+use crate::options::Format;
 use crate::why::ontology_file;
 use crate::{chosen, history_dir, output};
 use actcheck_analysis::Sampling;
@@ -18,27 +17,12 @@ use actcheck_report::{Proportion, Table};
 use actcheck_rules::RuleBook;
 use actcheck_verdict::Counts;
 
-/// `actcheck rules`
-#[derive(Debug, Args)]
-pub struct RulesArgs {
-    /// The ontology whose properties are listed [default: ontology/actions.ttl here, or the shipped
-    /// one]
-    #[arg(long, value_name = "FILE")]
-    pub ontology: Option<PathBuf>,
-    /// The folder of the history.
-    #[command(flatten)]
-    pub history: HistoryArgs,
-    /// How the table is printed
-    #[arg(long, value_name = "FORMAT", value_enum, default_value_t)]
-    pub format: Format,
-}
-
 /// Prints one line for each property of the ontology, and the warnings about its rules. Without a
 /// history, there are no pass rates.
 ///
 /// # Errors
 /// Those of the ontology; and those of the rules, after the table.
-pub fn rules(args: &RulesArgs) -> Result<(), Diagnostics> {
+pub fn rules(args: &ListArgs) -> Result<(), Diagnostics> {
     let (files, path) = ontology_file(args.ontology.as_deref());
     let ontology = ontology::load(&files, &path)?;
     let mut judged: BTreeMap<String, Counts> = BTreeMap::new();

@@ -1,14 +1,14 @@
 //! `actcheck serve`
 
-use std::net::{IpAddr, Ipv4Addr};
+use std::net::{Ipv4Addr, SocketAddr};
 use std::path::Path;
 use std::sync::mpsc::channel;
 
 use clap::Args;
 
-use crate::options::{HistoryArgs, duration};
+use crate::options::{HistoryArgs, duration, memory};
 use crate::{history_dir, named_queries, output, stop};
-use actcheck_base::{Diagnostic, Diagnostics};
+use actcheck_base::{Diagnostic, Diagnostics, did_you_mean};
 use actcheck_history::History;
 use actcheck_serve as serve;
 use actcheck_serve::{ExampleQuery, ServeOptions};
@@ -16,31 +16,19 @@ use actcheck_serve::{ExampleQuery, ServeOptions};
 /// `actcheck serve`
 #[derive(Debug, Args)]
 pub struct ServeArgs {
-    /// Address to listen on; any but this machine's own allows access from the network
-    #[arg(long, value_name = "ADDRESS", default_value_t = IpAddr::V4(Ipv4Addr::LOCALHOST))]
-    pub bind: IpAddr,
-    /// Port to listen on; 0 takes a free one, which is printed
-    #[arg(long, value_name = "PORT", default_value_t = 7878)]
-    pub port: u16,
+    /// Port to listen on; 0 takes a free one, which is printed. With an address before it, such as
+    /// 0.0.0.0:7878, the server can be reached from the network
+    #[arg(long, value_name = "[ADDRESS:]PORT", default_value = "7878", value_parser = listened)]
+    pub port: SocketAddr,
     /// A host name by which clients reach this server, besides addresses and localhost (may be
     /// given several times)
     #[arg(long, value_name = "NAME")]
     pub allow_host: Vec<String>,
-    /// Time limit for a query, such as 500ms, 10s or 1m
-    #[arg(long, alias = "max-secs", value_name = "DURATION", default_value = "10s", value_parser = at_most_a_day)]
-    pub max_time: f64,
-    /// Maximum number of rows or triples in an answer
-    #[arg(long, value_name = "N", default_value_t = 100_000)]
-    pub max_rows: u64,
-    /// Maximum size of an answer
-    #[arg(long, value_name = "MB", default_value_t = 50, value_parser = clap::value_parser!(u64).range(1..=10_000))]
-    pub max_mb: u64,
-    /// Memory limit for a query
-    #[arg(long, value_name = "MB", default_value_t = 2000, value_parser = clap::value_parser!(u64).range(100..=1_000_000))]
-    pub max_memory_mb: u64,
-    /// Maximum number of processes for queries that are not light; others wait
-    #[arg(long, value_name = "N", default_value_t = 4, value_parser = clap::value_parser!(u16).range(1..))]
-    pub max_queries: u16,
+    /// Limits, such as `time=30s,rows=1000`: time, rows or triples, and size of an answer
+    /// [default: time=10s,rows=100000,size=50MB]; memory of a query [default: memory=2GB]; processes
+    /// for queries that are not light, while others wait [default: processes=4]
+    #[arg(long, value_name = "KEY=VALUE,…", value_delimiter = ',', value_parser = Limit::parse)]
+    pub limits: Vec<Limit>,
     /// The folder of the history.
     #[command(flatten)]
     pub history: HistoryArgs,
@@ -52,6 +40,65 @@ pub struct ServeQueryArgs {
     /// The folder of the history.
     #[command(flatten)]
     pub history: HistoryArgs,
+}
+
+/// Parses a port of this machine, or an address with a port.
+fn listened(text: &str) -> Result<SocketAddr, String> {
+    let own = text
+        .parse()
+        .map(|port| SocketAddr::from((Ipv4Addr::LOCALHOST, port)));
+    own.or_else(|_| text.parse()).map_err(|_| {
+        "must be a port from 0 to 65535, or an address with a port such as 0.0.0.0:7878".to_owned()
+    })
+}
+
+/// A limit of the server.
+#[derive(Debug, Clone, Copy)]
+pub enum Limit {
+    /// Time of a query, in seconds.
+    Time(f64),
+    /// Rows or triples of an answer.
+    Rows(u64),
+    /// Bytes of an answer.
+    Size(u64),
+    /// Bytes of memory of a query.
+    Memory(u64),
+    /// Processes for queries.
+    Processes(usize),
+}
+
+impl Limit {
+    const KEYS: [&str; 5] = ["time", "rows", "size", "memory", "processes"];
+
+    /// Parses a limit such as `time=30s`.
+    fn parse(text: &str) -> Result<Self, String> {
+        let (key, value) = text.split_once('=').unwrap_or((text, ""));
+        let number = || {
+            let number = value.parse::<u64>().ok().filter(|number| *number > 0);
+            number.ok_or_else(|| format!("`{value}` must be a whole number above zero"))
+        };
+        let bytes = |least: u64, most: u64, range: &str| {
+            let bytes = memory(value)? as u64;
+            if (least..=most).contains(&bytes) {
+                Ok(bytes)
+            } else {
+                Err(format!("`{value}` must be {range}"))
+            }
+        };
+        match key {
+            "time" => at_most_a_day(value).map(Self::Time),
+            "rows" => number().map(Self::Rows),
+            "size" => bytes(1_000_000, 10_000_000_000, "from 1MB to 10GB").map(Self::Size),
+            "memory" => {
+                bytes(100_000_000, 1_000_000_000_000, "from 100MB to 1000GB").map(Self::Memory)
+            }
+            "processes" => number()?
+                .try_into()
+                .map(Self::Processes)
+                .map_err(|_| format!("`{value}` is too large")),
+            _ => Err(did_you_mean(key, Self::KEYS)),
+        }
+    }
 }
 
 fn at_most_a_day(text: &str) -> Result<f64, String> {
@@ -126,28 +173,35 @@ fn options(args: &ServeArgs, folder: &Path) -> Result<ServeOptions, Diagnostics>
         description: query.description,
         query: query.text,
     };
-    Ok(ServeOptions {
+    let mut options = ServeOptions {
         history: folder.to_owned(),
         program,
         query_arguments: with_history(&["serve-query", "--history"]),
         report_arguments: with_history(&["report", "--html", "-", "--history"]),
-        address: args.bind,
-        port: args.port,
+        address: args.port.ip(),
+        port: args.port.port(),
         hosts: args.allow_host.clone(),
-        most_secs: args.max_time,
-        most_rows: args.max_rows,
-        most_bytes: args.max_mb * 1_000_000,
-        most_memory: args.max_memory_mb * 1_000_000,
-        most_queries: usize::from(args.max_queries),
+        most_secs: 10.0,
+        most_rows: 100_000,
+        most_bytes: 50_000_000,
+        most_memory: 2_000_000_000,
+        most_queries: 4,
         examples: named.into_iter().map(example).collect(),
-    })
+    };
+    for limit in &args.limits {
+        match *limit {
+            Limit::Time(secs) => options.most_secs = secs,
+            Limit::Rows(rows) => options.most_rows = rows,
+            Limit::Size(bytes) => options.most_bytes = bytes,
+            Limit::Memory(bytes) => options.most_memory = bytes,
+            Limit::Processes(number) => options.most_queries = number,
+        }
+    }
+    Ok(options)
 }
 
 fn unheard(args: &ServeArgs, error: &std::io::Error) -> Diagnostics {
-    Diagnostic::error(
-        "X053",
-        format!("can't listen on {} port {}: {error}", args.bind, args.port),
-    )
-    .help("name another port with `--port`, or 0 for any; another address with `--bind`")
-    .into()
+    Diagnostic::error("X053", format!("can't listen on {}: {error}", args.port))
+        .help("name another port with `--port`, or 0 for any")
+        .into()
 }

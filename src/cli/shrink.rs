@@ -35,7 +35,7 @@ pub struct ShrinkArgs {
     pub time: Option<f64>,
     /// A scene must fail in K of N repetitions with fresh noise [default: once, with the recorded
     /// noise]
-    #[arg(long, alias = "repeat", value_name = "K/N", value_parser = must_fail)]
+    #[arg(long, value_name = "K/N", value_parser = must_fail)]
     pub must_fail: Option<Repeat>,
     /// Number of workers, each with one simulation; does not affect results [default: all cores]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]

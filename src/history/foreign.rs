@@ -125,7 +125,7 @@ fn unparsed(error: &RdfParseError) -> Diagnostics {
 
 fn ended(error: &io::Error) -> Diagnostics {
     Diagnostic::error("H040", format!("the answer ended early: {error}"))
-        .help("ask again; for a large answer, give the server more time (`--timeout`), or fetch parts with `LIMIT` and `OFFSET`")
+        .help("ask again; for a large answer, raise its time limit, or fetch parts with `LIMIT` and `OFFSET`")
         .into()
 }
 

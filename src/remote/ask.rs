@@ -5,7 +5,7 @@ use std::io::Read;
 use ureq::http::Method;
 
 use crate::Address;
-use crate::client::{Client, Content, Request};
+use crate::client::{Client, Request};
 use crate::fault::Fault;
 use actcheck_base::Diagnostics;
 
@@ -47,7 +47,7 @@ pub fn ask(
             ),
             ("accept", ACCEPTED.to_owned()),
         ],
-        content: Content::Bytes(form.as_bytes()),
+        content: form.as_bytes(),
     };
     match client.send(&request) {
         Ok(response) => Ok(Answer {

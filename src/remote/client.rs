@@ -21,16 +21,6 @@ const FIRST_TRIES: u32 = 3;
 /// While it waits, a client looks at the flag that stops it this often.
 const LOOK: Duration = Duration::from_millis(50);
 
-/// The body of a request. A file is opened for each try.
-#[derive(Clone, Copy)]
-pub(crate) enum Content<'a> {
-    Bytes(&'a [u8]),
-    #[cfg(feature = "object-storage")]
-    File(&'a std::path::Path),
-    #[cfg(feature = "object-storage")]
-    None,
-}
-
 /// A request, which may be sent several times.
 pub(crate) struct Request<'a> {
     pub method: Method,
@@ -38,7 +28,7 @@ pub(crate) struct Request<'a> {
     /// Parameters that are part of the target but not of the address in messages.
     pub target: String,
     pub headers: Vec<(&'static str, String)>,
-    pub content: Content<'a>,
+    pub content: &'a [u8],
 }
 
 /// A client of HTTP servers. Reuses connections.
@@ -82,36 +72,13 @@ impl Client {
     /// Sends a request until it has an answer with a status of success. Waits longer after each
     /// failure of a kind that may pass.
     pub(crate) fn send(&self, request: &Request<'_>) -> Result<Response, Fault> {
-        self.retried(request, Ok)
-    }
-
-    /// Like [`Self::send`], but also sends the request again if the answer's body ends too early.
-    /// Returns the body, up to `most` bytes.
-    #[cfg(any(test, feature = "object-storage"))]
-    pub(crate) fn body(&self, request: &Request<'_>, most: u64) -> Result<Vec<u8>, Fault> {
-        self.retried(request, |response| {
-            let mut bytes = Vec::new();
-            let read = std::io::Read::read_to_end(
-                &mut std::io::Read::take(response.into_reader(), most),
-                &mut bytes,
-            );
-            read.map(|_| bytes)
-                .map_err(|error| Fault::unreachable(format!("its answer was cut off: {error}")))
-        })
-    }
-
-    fn retried<T>(
-        &self,
-        request: &Request<'_>,
-        read: impl Fn(Response) -> Result<T, Fault>,
-    ) -> Result<T, Fault> {
         let (mut tries, mut waited) = (0, Duration::ZERO);
         loop {
             if self.is_stopped() {
                 return Err(Fault::Stopped);
             }
-            let fault = match self.follow(request).and_then(&read) {
-                Ok(read) => return Ok(read),
+            let fault = match self.follow(request) {
+                Ok(response) => return Ok(response),
                 Err(fault) => fault,
             };
             tries += 1;
@@ -183,21 +150,7 @@ impl Client {
         if let Some(header) = self.credentials.header() {
             new = new.header("authorization", header);
         }
-        match request.content {
-            Content::Bytes(bytes) => self.run(new.body(bytes)),
-            #[cfg(feature = "object-storage")]
-            Content::None => self.run(new.body(())),
-            #[cfg(feature = "object-storage")]
-            Content::File(path) => {
-                let cannot = |error: std::io::Error| Fault::Unreachable {
-                    why: format!("{} can't be read: {error}", path.display()),
-                    is_temporary: false,
-                };
-                let file = actcheck_base::open_regular(path).map_err(cannot)?;
-                let length = file.metadata().map_err(cannot)?.len();
-                self.run(new.header("content-length", length).body(&file))
-            }
-        }
+        self.run(new.body(request.content))
     }
 
     fn run(
@@ -217,9 +170,7 @@ impl Client {
                 ureq::Error::Timeout(ureq::Timeout::Connect | ureq::Timeout::Resolve) => {
                     Fault::unreachable("no connection within the time limit")
                 }
-                ureq::Error::Timeout(_) => {
-                    Fault::unreachable("no answer within the time limit (`--timeout`)")
-                }
+                ureq::Error::Timeout(_) => Fault::unreachable("no answer within the time limit"),
                 ureq::Error::HostNotFound => Fault::unreachable("there is no server of this name"),
                 ureq::Error::ConnectionFailed
                 | ureq::Error::Protocol(_)
@@ -239,47 +190,5 @@ impl Client {
             left -= part;
         }
         Ok(())
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use std::io::{Read as _, Write as _};
-    use std::net::TcpListener;
-
-    #[test]
-    fn a_request_is_sent_again_if_its_answer_is_cut_off() {
-        let listener = TcpListener::bind("127.0.0.1:0").expect("there is a port");
-        let address = format!("http://{}/", listener.local_addr().expect("it is bound"));
-        let server = std::thread::spawn(move || {
-            for body in ["wh", "", "whole"] {
-                let (mut stream, _) = listener.accept().expect("a client connects");
-                let _ = stream.read(&mut [0; 1024]);
-                let head = "HTTP/1.1 200 OK\r\nconnection: close\r\ncontent-length: 5\r\n\r\n";
-                stream
-                    .write_all(format!("{head}{body}").as_bytes())
-                    .expect("the client reads");
-            }
-        });
-        let client = Client::new(
-            Credentials::default(),
-            Duration::from_secs(5),
-            Arc::default(),
-        );
-        let to = Address::parse(&address).expect("it is valid");
-        let content = Content::Bytes(&[]);
-        let request = Request {
-            method: Method::POST,
-            address: &to,
-            target: address,
-            headers: Vec::new(),
-            content,
-        };
-        assert_eq!(
-            client.body(&request, 100).ok().as_deref(),
-            Some("whole".as_bytes())
-        );
-        server.join().expect("it has answered all");
     }
 }

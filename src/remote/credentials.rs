@@ -5,8 +5,6 @@ use std::fmt;
 use base64::Engine as _;
 use base64::prelude::BASE64_STANDARD;
 
-use crate::Address;
-use crate::netrc::netrc_entry;
 use actcheck_base::{Diagnostic, Diagnostics};
 
 /// The credentials of requests to one server.
@@ -55,14 +53,6 @@ impl Credentials {
         Ok(Self {
             header: Some(format!("Bearer {token}")),
         })
-    }
-
-    /// The entry of a server in the text of a netrc file, or none if there is no entry.
-    pub fn from_netrc(text: &str, address: &Address) -> Self {
-        match netrc_entry(text, address.host()) {
-            Some((user, password)) => Self::basic(&user, &password),
-            None => Self::default(),
-        }
     }
 
     pub(crate) fn header(&self) -> Option<&str> {

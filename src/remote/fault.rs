@@ -73,7 +73,7 @@ fn advice(status: u16) -> &'static str {
         400 => "the server does not accept this request; its message has the reason",
         401 => {
             "the server wants credentials: set ACTCHECK_SPARQL_USER and ACTCHECK_SPARQL_PASSWORD, or \
-             ACTCHECK_SPARQL_TOKEN, or use `--netrc`"
+             ACTCHECK_SPARQL_TOKEN"
         }
         403 => "these credentials don't have the right to do this",
         404 | 405 | 415 | 501 => {

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use ureq::http::Method;
 
-use crate::client::{Client, Content, Request};
+use crate::client::{Client, Request};
 use crate::fault::Fault;
 use crate::ledger::{Ledger, digest};
 use crate::protocol::{by_graph, quads, triples, update};
@@ -204,7 +204,7 @@ impl<'a> Upload<'a> {
                 ("content-type", media_type.to_owned()),
                 ("accept", "*/*".to_owned()),
             ],
-            content: Content::Bytes(body.as_bytes()),
+            content: body.as_bytes(),
         };
         self.client.send(&request)?.finish();
         self.sent.requests += 1;

@@ -1,6 +1,7 @@
 //! External tools, for tests that check our files and our server with them. If one is not
-//! available, the test prints one line, also if it passes, and ends.
+//! available, the test says so and ends: `.ci/test` then counts it as left out, not as passed.
 
+use std::fs::OpenOptions;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -8,23 +9,34 @@ use std::sync::OnceLock;
 
 use super::root;
 
-/// Prints that a part of a test was skipped, and why.
-pub fn left_out(what: &str, why: &str) {
+/// Says that a test, or the part of it that `part` names, can't run here, and why. `.ci/test` lists
+/// these tests: it names the file of the environment variable `ACTCHECK_LEFT_OUT`.
+pub fn left_out(part: &str, why: &str) {
+    let thread = std::thread::current();
+    // With one thread, tests run in the main one.
+    let test = thread.name().filter(|name| *name != "main");
+    let line = format!("{}\t{part}: {why}\n", test.unwrap_or_default()).replace('\r', "");
     // The test harness shows direct writes to the stream.
-    let _ = writeln!(std::io::stderr(), "LEFT OUT {what}: {why}");
+    let _ = write!(std::io::stderr(), "LEFT OUT {line}");
+    if let Some(file) = std::env::var_os("ACTCHECK_LEFT_OUT") {
+        let file = OpenOptions::new().append(true).create(true).open(file);
+        // One write: lines of several tests don't mix.
+        let _ = file.and_then(|mut file| file.write_all(line.as_bytes()));
+    }
+}
+
+/// A tool that is made once; each test without it is left out.
+fn made<'a, T>(made: &'a Result<T, String>, part: &str) -> Option<&'a T> {
+    let made = made.as_ref();
+    made.map_err(|why| left_out(part, why)).ok()
 }
 
 /// Python with the packages of `tests/foreign/requirements.txt`, in an environment cached beside
 /// the build output. Returns `None` if it can't be created.
 pub fn python() -> Option<&'static Path> {
-    static PYTHON: OnceLock<Option<PathBuf>> = OnceLock::new();
-    PYTHON
-        .get_or_init(|| {
-            environment("python", "requirements.txt")
-                .map_err(|why| left_out("tests of Python's packages", &why))
-                .ok()
-        })
-        .as_deref()
+    static PYTHON: OnceLock<Result<PathBuf, String>> = OnceLock::new();
+    let python = PYTHON.get_or_init(|| environment("python", "requirements.txt"));
+    made(python, "Python's packages").map(PathBuf::as_path)
 }
 
 /// Python with our client, installed by pip from its folder into an environment with only its
@@ -109,34 +121,24 @@ fn environment(name: &str, packages: &str) -> Result<PathBuf, String> {
 /// Allure's own generator from npm, as `tests/foreign/package.json` pins it, cached beside the
 /// build output. Returns `None` if it can't be installed.
 pub fn allure() -> Option<&'static Path> {
-    static ALLURE: OnceLock<Option<PathBuf>> = OnceLock::new();
-    ALLURE
-        .get_or_init(|| {
-            let made = from_npm("allure", "package.json");
-            let folder = made
-                .map_err(|why| left_out("tests of Allure's generator from npm", &why))
-                .ok()?;
-            Some(folder.join("node_modules/.bin/allure"))
-        })
-        .as_deref()
+    static ALLURE: OnceLock<Result<PathBuf, String>> = OnceLock::new();
+    let allure = ALLURE.get_or_init(|| {
+        let folder = from_npm("allure", "package.json")?;
+        Ok(folder.join("node_modules/.bin/allure"))
+    });
+    made(allure, "Allure's generator from npm").map(PathBuf::as_path)
 }
 
 /// The script of axe-core from npm, as `tests/foreign/axe/package.json` pins it, cached beside the
 /// build output. Returns `None` if it can't be installed. It is fetched and never copied into this
 /// project (MPL-2.0).
 pub fn axe() -> Option<&'static str> {
-    static AXE: OnceLock<Option<String>> = OnceLock::new();
-    AXE.get_or_init(|| {
-        from_npm("axe", "axe/package.json")
-            .and_then(|folder| {
-                let script = folder.join("node_modules/axe-core/axe.min.js");
-                std::fs::read_to_string(&script)
-                    .map_err(|error| format!("{}: {error}", script.display()))
-            })
-            .map_err(|why| left_out("axe-core's checks of the report and the query page", &why))
-            .ok()
-    })
-    .as_deref()
+    static AXE: OnceLock<Result<String, String>> = OnceLock::new();
+    let axe = AXE.get_or_init(|| {
+        let script = from_npm("axe", "axe/package.json")?.join("node_modules/axe-core/axe.min.js");
+        std::fs::read_to_string(&script).map_err(|error| format!("{}: {error}", script.display()))
+    });
+    made(axe, "axe-core's checks of the report and the query page").map(String::as_str)
 }
 
 /// A folder with the packages of a `package.json` in `tests/foreign`, cached beside the build

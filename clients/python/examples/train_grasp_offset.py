@@ -3,7 +3,7 @@ r"""Trains the network of `learned_pick.py` on an exported dataset of its runs: 
     sed 's|^test_launcher.*|test_launcher = "../clients/python/examples/learned_pick.py --untrained"|' \
         configs/pick.toml > configs/collect.toml
     actcheck run configs/collect.toml --runs 400 --seed 1000 --history collected
-    actcheck export --history collected --dataset runs
+    actcheck export tables runs --dataset --history collected
     python clients/python/examples/train_grasp_offset.py runs
 
 Needs polars (`pip install polars`) to read the dataset's tables.
@@ -98,7 +98,7 @@ def learn(inputs: Array, offsets: Array, seed: int) -> Network:
 def main() -> None:
     """Trains on four fifths of the runs, evaluates on the rest, then trains on all runs and writes the weights."""
     arguments = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    arguments.add_argument("dataset", type=Path, help="folder written by `actcheck export --dataset`")
+    arguments.add_argument("dataset", type=Path, help="folder written by `actcheck export tables --dataset`")
     arguments.add_argument("--output", type=Path, default=Path(__file__).with_name("grasp_offset.json"))
     arguments.add_argument("--seed", type=int, default=1)
     given = arguments.parse_args()

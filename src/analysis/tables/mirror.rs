@@ -580,7 +580,7 @@ pub(super) fn unread(file: &Path, error: &PolarsError) -> Diagnostics {
             plain(error)
         ),
     )
-    .help("rebuild it with `actcheck export --rebuild-mirror`")
+    .help("delete the folder `tables` in the history: the same command makes it anew")
     .into()
 }
 

@@ -5,7 +5,7 @@ use std::rc::Rc;
 use super::judge::{Judge, Unjudged};
 use super::search::Step;
 use super::versions::{Version, Versions};
-use super::{BisectArgs, By, LEVEL, text};
+use super::{BisectArgs, By, LEVEL, MARGIN, text};
 use crate::output;
 use actcheck_analysis::{
     Answer, Compared, ComparedRun, Likeness, OutcomeFlip, Sampling, compare, like_by_outcomes,
@@ -53,7 +53,7 @@ impl<'a> Ends<'a> {
             };
             let answer = match by {
                 By::Outcome => answer_of(&flips, versions.finds_fix),
-                By::Rate => compare(&good, &bad, Sampling::Fixed).answer(LEVEL, args.margin),
+                By::Rate => compare(&good, &bad, Sampling::Fixed).answer(LEVEL, MARGIN),
             };
             let more = (scenes * 2).min(args.most_scenes);
             match answer {
@@ -122,7 +122,7 @@ impl<'a> Ends<'a> {
                 }
                 Err(stopped) => return Err(stopped),
             };
-            let (likeness, reason) = self.likeness(args, &runs, judge)?;
+            let (likeness, reason) = self.likeness(&runs, judge)?;
             let step = |is_new, word| {
                 Ok(Step {
                     is_new,
@@ -149,12 +149,7 @@ impl<'a> Ends<'a> {
         }
     }
 
-    fn likeness(
-        &self,
-        args: &BisectArgs,
-        runs: &Runs,
-        judge: &mut Judge<'_>,
-    ) -> Result<(Likeness, String), Unjudged> {
+    fn likeness(&self, runs: &Runs, judge: &mut Judge<'_>) -> Result<(Likeness, String), Unjudged> {
         match self.by {
             By::Outcome => {
                 let likeness = like_by_outcomes(&self.flips, runs);
@@ -163,7 +158,7 @@ impl<'a> Ends<'a> {
             By::Rate => {
                 let [good, bad] = self.versions.ends().map(|end| judge.runs(end, self.scenes));
                 let (good, bad) = (good?, bad?);
-                let likeness = like_by_rates([&good, &bad], runs, LEVEL, args.margin);
+                let likeness = like_by_rates([&good, &bad], runs, LEVEL, MARGIN);
                 let reason = if likeness == Likeness::Undecided {
                     format!(
                         "{} are too few to decide; see --most-scenes",
@@ -173,8 +168,7 @@ impl<'a> Ends<'a> {
                     let ends = compare(&good, &bad, Sampling::Fixed);
                     let worse = |of: &Compared| {
                         ends.lines.iter().any(|line| {
-                            line.of == *of
-                                && ends.answer_of(line, LEVEL, args.margin) == Answer::Worse
+                            line.of == *of && ends.answer_of(line, LEVEL, MARGIN) == Answer::Worse
                         })
                     };
                     text::rates(&compare(&good, runs, Sampling::Fixed), |line| {
@@ -238,8 +232,9 @@ fn check_names(named: &[String], good: &Runs, bad: &Runs) -> Result<(), Diagnost
     let mut faults = Diagnostics::new();
     for name in named.iter().filter(missing) {
         let message = format!("neither end judges a property `{name}`");
-        faults
-            .push(Diagnostic::error("X045", message).help("`actcheck rules` lists all properties"));
+        faults.push(
+            Diagnostic::error("X045", message).help("`actcheck list --rules` lists all properties"),
+        );
     }
     faults.or(())
 }

@@ -16,7 +16,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use clap::{Args, ValueEnum};
 
-use crate::options::{HistoryArgs, level};
+use crate::options::HistoryArgs;
 use crate::{output, stop};
 use actcheck_base::{Diagnostic, Diagnostics, ScratchFolder};
 
@@ -57,9 +57,6 @@ pub struct BisectArgs {
     /// If these are too few to decide, run more, up to this number
     #[arg(long, value_name = "N", default_value_t = 400, value_parser = clap::value_parser!(u64).range(1..))]
     pub most_scenes: u64,
-    /// Rates that differ by less count as equal, as a share
-    #[arg(long, value_name = "SHARE", value_parser = level, default_value = "0.05")]
-    pub margin: f64,
     /// A shell command that builds each revision, in its folder
     #[arg(long, value_name = "COMMAND", requires = "config")]
     pub build: Option<String>,
@@ -96,6 +93,8 @@ pub enum By {
 
 /// Significance level of the comparisons.
 const LEVEL: f64 = 0.05;
+/// Rates that differ by less count as equal.
+const MARGIN: f64 = 0.05;
 
 /// Finds the first bad version and prints it. Returns the exit code: 0 found, 1 several versions
 /// remain because they could not be judged.

@@ -127,7 +127,7 @@ const CODES_X: &[Code] = &[
     code(
         "X032",
         "a folder has no rules",
-        "`--as-of-rules` names a folder without `ontology/actions.ttl`",
+        "`--ontology` names a folder without `ontology/actions.ttl`",
         "name a folder such as an older checkout of the project",
     ),
     code(
@@ -192,9 +192,9 @@ const CODES_X: &[Code] = &[
     ),
     code(
         "X043",
-        "an exported run needs an output file",
-        "neither `-o` nor `--regression` is given",
-        "add one of them",
+        "an exported file needs another name",
+        "its extension names no format of RDF, or one that lacks named graphs",
+        "name FILE.nq (N-Quads), or without `--complete` also FILE.ttl (Turtle)",
     ),
     code(
         "X044",
@@ -224,7 +224,7 @@ const CODES_X: &[Code] = &[
         "X048",
         "there is no such named query",
         "the name is misspelt",
-        "take the suggested name; `actcheck query --list-named` describes all",
+        "take the suggested name; `actcheck query --named` describes all",
     ),
     code(
         "X049",
@@ -434,7 +434,7 @@ const CODES_X: &[Code] = &[
         "X091",
         "a server can't be reached",
         "it doesn't run, is busy, or the address or the network is wrong",
-        "check the address, and give the same command again: `export --sparql` continues where it was",
+        "check the address, and give the same command again: `export store` continues where it was",
     ),
     code(
         "X092",
@@ -457,13 +457,7 @@ const CODES_X: &[Code] = &[
     code(
         "X096",
         "credentials can't be used",
-        "an environment variable is missing or malformed, or the netrc file can't be read",
-        "set ACTCHECK_SPARQL_USER and ACTCHECK_SPARQL_PASSWORD, or ACTCHECK_SPARQL_TOKEN alone, or use `--netrc`",
-    ),
-    code(
-        "X097",
-        "files can't be copied to or from a folder or an object storage",
-        "credentials, region, address or rights are wrong, or the disk is full; the message has the first lines of the answer",
-        "set AWS_ACCESS_KEY_ID, AWS_SECRET_ACCESS_KEY, AWS_REGION and, for storages of others, AWS_ENDPOINT_URL; then give the same command again",
+        "an environment variable is missing or malformed",
+        "set ACTCHECK_SPARQL_USER and ACTCHECK_SPARQL_PASSWORD, or ACTCHECK_SPARQL_TOKEN alone",
     ),
 ];

@@ -26,7 +26,7 @@ const CODES_C: &[Code] = &[
         "C003",
         "a table has an unknown key",
         "the key is misspelt, or it is in the wrong table",
-        "take the suggested key; `actcheck schema` prints all keys for completion in editors",
+        "take the suggested key; `actcheck new schema` prints all keys for completion in editors",
     ),
     code(
         "C004",

@@ -115,7 +115,7 @@ const CODES_H: &[Code] = &[
     code(
         "H018",
         "the answer of a query over HTTP is too large",
-        "it has more rows than `--max-rows`",
+        "it has more rows than `--limits rows=N` allows",
         "request less, or fetch it in parts with `LIMIT` and `OFFSET`",
     ),
     code(
@@ -182,7 +182,7 @@ const CODES_H: &[Code] = &[
         "H030",
         "a query needs too many statements about runs that are kept as outlines",
         "most queries read columns of outlines; facts, any property, paths and blank nodes as values need their statements in the store",
-        "leave that part out, ask a smaller history, or export tables (`actcheck export --parquet`)",
+        "leave that part out, ask a smaller history, or export tables (`actcheck export tables`)",
     ),
     code(
         "H031",
@@ -200,6 +200,6 @@ const CODES_H: &[Code] = &[
         "H040",
         "the answer of another store can't be read",
         "the address is that of another service, or the server or the connection ended the answer early",
-        "check the address; ask for less, or give the server more time with `--timeout`",
+        "check the address; ask for less, or raise the time limit of that server",
     ),
 ];

@@ -20,7 +20,7 @@ const CODES_A: &[Code] = &[
         "A002",
         "a table beside the history can't be read",
         "it is damaged or was written by another version",
-        "rebuild it with `actcheck export --rebuild-mirror`",
+        "delete the folder `tables` in the history: the same command makes it anew",
     ),
 ];
 

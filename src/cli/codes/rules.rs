@@ -374,7 +374,7 @@ const CODES_R: &[Code] = &[
         "R090",
         "a budget of rule evaluation is spent",
         "a recursive rule computes new values or makes new things without end, there are very many facts, or an import has no end",
-        "add a limit such as `?x < 100`; `actcheck datalog` has `--max-tuples`, `--max-new`, `--max-memory` and `--max-time`",
+        "add a limit such as `?x < 100`; `actcheck datalog` has `--max-new`, `--max-memory` and `--max-time`",
     ),
     code(
         "R091",

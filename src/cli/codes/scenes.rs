@@ -146,7 +146,7 @@ const CODES_S: &[Code] = &[
         "S042",
         "the recorded choices of a run don't fit exactly",
         "a range or a list of candidates changed",
-        "use `--nearest`, which clamps values and uses nominal values for missing choices",
+        "leave `--exact` out: values are clamped then, and missing choices are nominal",
     ),
     code(
         "S050",

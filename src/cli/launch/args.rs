@@ -53,11 +53,7 @@ pub struct LaunchArgs {
     pub resources: Vec<String>,
     /// Shards that run at once [default: all cores; with a scheduler, as many as it starts]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
-    pub parallel: Option<u16>,
-    /// How often a shard is started before it is given up: with a scheduler, in each job, and this
-    /// many jobs
-    #[arg(long, value_name = "N", default_value_t = 4, value_parser = clap::value_parser!(u32).range(1..=100))]
-    pub tries: u32,
+    pub jobs: Option<u16>,
     /// Scenes for each test, instead of the configuration's `test_count`
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     pub runs: Option<u32>,

@@ -51,11 +51,7 @@ pub fn launch(args: &LaunchArgs) -> Result<u8, Diagnostics> {
     let env = Env::prepare_within(&args.config, &args.overrides(), budget.clone())?;
     plan::check(&env, args.shards)?;
     let cores = u64::try_from(all_cores()).unwrap_or(1);
-    let at_once = args
-        .parallel
-        .map_or(cores, u64::from)
-        .min(args.shards)
-        .max(1);
+    let at_once = args.jobs.map_or(cores, u64::from).min(args.shards).max(1);
     let jobs = match args.on {
         On::Local => resources.cpus.unwrap_or((cores / at_once).max(1)),
         On::Slurm | On::Kubernetes | On::Ray => resources.cpus.unwrap_or(1),
@@ -85,6 +81,10 @@ pub fn launch(args: &LaunchArgs) -> Result<u8, Diagnostics> {
     finish::finish(args, env, &plan, &budget, &stop)
 }
 
+/// How often a shard is started before it is given up: with a scheduler, in each job, and this many
+/// jobs.
+const TRIES: u32 = 4;
+
 /// Where and how the shards run.
 fn place(args: &LaunchArgs, resources: Resources) -> Result<Place, Diagnostics> {
     let folder = std::env::current_dir().map_err(|error| {
@@ -97,8 +97,8 @@ fn place(args: &LaunchArgs, resources: Resources) -> Result<Place, Diagnostics> 
     Ok(Place {
         folder,
         resources,
-        parallel: args.parallel.map(u64::from),
-        tries: args.tries,
+        parallel: args.jobs.map(u64::from),
+        tries: TRIES,
     })
 }
 
@@ -123,7 +123,7 @@ fn local(
     args: &LaunchArgs,
     stop: &AtomicBool,
 ) -> Result<bool, Diagnostics> {
-    let are_complete = local::run_all(plan, at_once, args.tries, args.quiet, stop)?;
+    let are_complete = local::run_all(plan, at_once, TRIES, args.quiet, stop)?;
     if !are_complete {
         let help = "finished runs are kept; the same command continues";
         output::print_diagnostics(&Diagnostic::error("X030", "interrupted").help(help).into());

@@ -127,6 +127,6 @@ pub(crate) fn too_many(history: &History, part: &str, statements: u64) -> Diagno
         (number * GIGABYTES_A_STATEMENT).max(1.0),
     );
     Diagnostic::error("H030", message)
-        .help("ask for one campaign's runs in a history of its own, without that part, or export the campaign's tables (`actcheck export --parquet DIR`)")
+        .help("ask for one campaign's runs in a history of its own, without that part, or export the campaign's tables (`actcheck export tables DIR`)")
         .into()
 }

@@ -1,12 +1,12 @@
-//! `actcheck export --sparql`
+//! `actcheck export store`
 
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
-use crate::remote::RemoteArgs;
-use crate::{output, stop};
+use crate::options::HistoryArgs;
+use crate::{history_dir, output, remote, restore, stop};
 use actcheck_base::{Diagnostics, digest_of};
 use actcheck_history::History;
 use actcheck_remote::{Address, Part, Protocol, Sent, Upload, UploadOptions};
@@ -14,35 +14,26 @@ use actcheck_remote::{Address, Part, Protocol, Sent, Upload, UploadOptions};
 /// Folder in a history with the records of uploads.
 const RECORDS: &str = "sent";
 
-/// The store to which a history is sent.
+/// `actcheck export store`
 #[derive(Debug, Args)]
-pub struct SparqlArgs {
-    /// Send the whole history to a SPARQL 1.1 store, runs that are kept as outlines too. If it ends
-    /// early, the same command continues where it was; later it sends only new runs and judgements.
-    /// The store then has the statements of `--nquads`, with IRIs in place of blank nodes.
-    /// Credentials: ACTCHECK_SPARQL_USER and ACTCHECK_SPARQL_PASSWORD, or ACTCHECK_SPARQL_TOKEN, or
-    /// `--netrc`
-    #[arg(long, value_name = "URL")]
-    pub sparql: Option<String>,
+pub struct ExportStoreArgs {
+    /// Address of the store
+    pub url: String,
     /// How statements are sent
-    #[arg(
-        long,
-        value_name = "PROTOCOL",
-        value_enum,
-        default_value_t,
-        requires = "sparql"
-    )]
+    #[arg(long, value_name = "PROTOCOL", value_enum, default_value_t)]
     pub protocol: ProtocolName,
     /// Number of statements in a request; runs are not divided unless the server asks for it
-    #[arg(long, value_name = "N", default_value_t = 5_000, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
-    #[arg(requires = "sparql")]
+    #[arg(long, value_name = "N", hide = true, default_value_t = 5_000, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     pub batch: u32,
+    /// All facts from the traces, not only those in the history
+    #[arg(long)]
+    pub complete: bool,
     /// Send everything again, for a store that was emptied
-    #[arg(long, requires = "sparql")]
+    #[arg(long)]
     pub from_start: bool,
-    /// Time limit and credentials.
+    /// The folder of the history.
     #[command(flatten)]
-    pub remote: RemoteArgs,
+    pub history: HistoryArgs,
 }
 
 /// Protocols, as they are named.
@@ -58,23 +49,24 @@ pub enum ProtocolName {
     Quads,
 }
 
-/// Sends the history. `complete`: with all facts from the traces. Returns the exit code.
-pub fn send(
-    args: &SparqlArgs,
-    url: &str,
-    complete: bool,
-    history: &History,
-) -> Result<u8, Diagnostics> {
-    let address = Address::parse(url)?;
+/// Sends the history. Returns the exit code.
+pub fn store(args: &ExportStoreArgs) -> Result<u8, Diagnostics> {
+    let address = Address::parse(&args.url)?;
+    let history = history_dir::open_to_read(&args.history)?;
+    restore::allow(&history, false);
     stop::interruptible(|flag| {
-        let client = args.remote.client(&address, flag)?;
-        let (upload, warning) =
-            Upload::new(&client, &address, options(args), &record(history, &address));
+        let client = remote::client(flag)?;
+        let (upload, warning) = Upload::new(
+            &client,
+            &address,
+            options(args),
+            &record(&history, &address),
+        );
         if let Some(warning) = warning {
             output::print_diagnostics(&warning.into());
         }
         let bar = bar(history.parts()? as u64);
-        let sent = all(upload, complete, history, &bar);
+        let sent = all(upload, args.complete, &history, &bar);
         bar.finish_and_clear();
         output::print_prose(&summary(&sent?, &address));
         Ok(0)
@@ -99,7 +91,7 @@ fn all(
     upload.finish()
 }
 
-fn options(args: &SparqlArgs) -> UploadOptions {
+fn options(args: &ExportStoreArgs) -> UploadOptions {
     let protocol = match args.protocol {
         ProtocolName::Update => Protocol::Update,
         ProtocolName::GraphStore => Protocol::GraphStore,

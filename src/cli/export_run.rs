@@ -1,0 +1,104 @@
+//! `actcheck export run`
+
+use std::path::{Path, PathBuf};
+
+use clap::{ArgGroup, Args};
+
+use crate::options::HistoryArgs;
+use crate::trust::TrustArgs;
+use crate::{history_dir, output, output_file, restore, trust};
+use actcheck_base::{Diagnostic, Diagnostics, ShellLine};
+use actcheck_campaign as campaign;
+use actcheck_campaign::Env;
+
+/// `actcheck export run`
+#[derive(Debug, Args)]
+#[command(group(ArgGroup::new("written").args(["output", "regression"]).required(true)))]
+pub struct ExportRunArgs {
+    /// Id of the run, or a unique prefix
+    pub run: String,
+    /// The file to write (TOML); `-` prints it
+    #[arg(short, long, value_name = "FILE.toml")]
+    pub output: Option<PathBuf>,
+    /// Write it into the project's folder `regressions`, named after the run; every campaign runs
+    /// these files first
+    #[arg(long)]
+    pub regression: bool,
+    /// Take everything but the choices from this configuration instead of the one in the history
+    #[arg(long, value_name = "FILE")]
+    pub config: Option<PathBuf>,
+    /// The folder of the history.
+    #[command(flatten)]
+    pub history: HistoryArgs,
+    /// The consent to start programs.
+    #[command(flatten)]
+    pub trust: TrustArgs,
+}
+
+/// Writes a stored run as a configuration.
+pub fn run(args: &ExportRunArgs) -> Result<(), Diagnostics> {
+    let history = history_dir::open_to_read(&args.history)?;
+    restore::allow(&history, args.trust.trust);
+    let run = history.run(&args.run)?;
+    if args.config.is_none() && !args.trust.trust {
+        trust::check_expansion(
+            &run.row.campaign,
+            &Env::starts_from_history(&history, &run.row.campaign)?,
+        )?;
+    }
+    let recalled = Env::from_history(&history, &run.row.campaign, args.config.as_deref())?;
+    let file = match &args.output {
+        Some(file) => file.clone(),
+        None => {
+            let named = args.config.is_some() || args.trust.trust;
+            new_regression(&recalled.0, &run.row.run, named)?
+        }
+    };
+    let text = campaign::export(
+        &history,
+        &recalled,
+        &run,
+        file.parent().unwrap_or(Path::new("")),
+    )?;
+    if file.as_os_str() == "-" {
+        output::print(&text);
+        return Ok(());
+    }
+    if args.output.is_some() {
+        output_file::write(&file, text)
+    } else {
+        output_file::write_in_project(&file, text)
+    }?;
+    let again = ShellLine::default().fixed("actcheck run").file(&file);
+    output::print_prose(&format!(
+        "{} holds run {}: {again}\n",
+        file.display(),
+        run.row.run
+    ));
+    Ok(())
+}
+
+/// Returns the path of a new file in the folder of regressions, which is created if missing. Unless
+/// the user named the configuration, the history chooses the folder, so it must be below the
+/// present one.
+fn new_regression(env: &Env, run: &str, named: bool) -> Result<PathBuf, Diagnostics> {
+    let folder = campaign::regressions_folder(&env.campaign.source)?;
+    if !named && !output_file::is_below_here(&folder) {
+        let message = format!(
+            "the history names the folder {}, which is outside the present one",
+            folder.display()
+        );
+        let help = "change to the project's folder, or name the configuration with `--config`, or a file with `-o`";
+        return Err(Diagnostic::error("X084", message).help(help).into());
+    }
+    let created = output_file::project(&folder).create_folder(&folder);
+    created.map_err(|error| output_file::cannot_write(&folder, error))?;
+    let file = folder.join(format!("{run}.toml"));
+    if file.exists() {
+        let fault = Diagnostic::error("X042", format!("{} already exists", file.display()));
+        return Err(fault
+            .help("it may have been edited: move it away, or name another file with `-o`")
+            .into());
+    }
+    Ok(file)
+}
